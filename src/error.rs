@@ -1,0 +1,216 @@
+//! The one error type of the program: what went wrong, where, and what to do about it.
+//!
+//! Rooms make errors as data; `cli` prints them, once (see [`Error::render`]). Not converging is not an
+//! error but a [`Status`](crate::ddm::Status) of a run.
+
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use std::fmt;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A text that the user wrote: a scene file, or the value of one `--set`.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Source {
+    /// File name, or `--set` for an override.
+    pub name: String,
+    /// The whole text.
+    pub text: String,
+}
+
+/// A place in a [`Source`]: what a caret points to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// The text.
+    pub source: Arc<Source>,
+    /// Byte range in it.
+    pub span: Range<usize>,
+}
+
+/// A value and the place where the user wrote it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Located<T> {
+    /// The value.
+    pub value: T,
+    /// Where it stands.
+    pub place: Place,
+}
+
+impl<T> Located<T> {
+    /// Joins a value with its place.
+    pub fn new(value: T, place: Place) -> Self {
+        Self { value, place }
+    }
+}
+
+/// What kind of thing failed; it fixes the exit code of the process (docs/command-line.md).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The command line: exit code 2.
+    Usage,
+    /// The scene file or an override of it: exit code 3.
+    Scene,
+    /// The mesh, or Gmsh: exit code 4.
+    Mesh,
+    /// PETSc, a PETSc option, or MPI: exit code 5.
+    Solver,
+    /// The file system: exit code 6.
+    File,
+}
+
+impl Kind {
+    /// Exit code of the process for this kind of error.
+    pub fn exit_code(self) -> i32 {
+        match self {
+            Kind::Usage => 2,
+            Kind::Scene => 3,
+            Kind::Mesh => 4,
+            Kind::Solver => 5,
+            Kind::File => 6,
+        }
+    }
+}
+
+/// An error that a user can act on.
+#[derive(Debug)]
+pub struct Error(Box<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    kind: Kind,
+    message: String,
+    place: Option<Place>,
+    label: String,
+    file: Option<(PathBuf, Option<usize>)>,
+    help: Option<String>,
+    causes: Vec<String>,
+}
+
+/// Result with [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+impl Error {
+    /// An error of a kind; `message` is a fragment without a full stop.
+    pub fn new(kind: Kind, message: impl Into<String>) -> Self {
+        Error(Box::new(Inner {
+            kind,
+            message: message.into(),
+            place: None,
+            label: String::new(),
+            file: None,
+            help: None,
+            causes: Vec::new(),
+        }))
+    }
+
+    /// A refusal of something that stands at `place` in the scene.
+    pub fn scene(place: &Place, message: impl Into<String>) -> Self {
+        let mut error = Self::new(Kind::Scene, message);
+        error.0.place = Some(place.clone());
+        error
+    }
+
+    /// A refusal of a mesh file, with the line where that is known.
+    pub fn mesh(path: &Path, line: Option<usize>, message: impl Into<String>) -> Self {
+        let mut error = Self::new(Kind::Mesh, message);
+        error.0.file = Some((path.to_owned(), line));
+        error
+    }
+
+    /// A failure of the file system; `verb` says what was tried ("read", "create").
+    pub fn file(path: &Path, verb: &str, cause: &std::io::Error) -> Self {
+        let mut error = Self::new(Kind::File, format!("cannot {verb} {}", path.display()));
+        error.0.causes.push(cause.to_string());
+        error
+    }
+
+    /// Points at a place in the scene.
+    pub fn at(mut self, place: &Place) -> Self {
+        self.0.place = Some(place.clone());
+        self
+    }
+
+    /// Says next to the caret what is wrong there.
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.0.label = label.into();
+        self
+    }
+
+    /// Says what to do about it.
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.0.help = Some(help.into());
+        self
+    }
+
+    /// Adds a cause, printed on a line of its own.
+    pub fn because(mut self, cause: impl Into<String>) -> Self {
+        self.0.causes.push(cause.into());
+        self
+    }
+
+    /// The kind.
+    pub fn kind(&self) -> Kind {
+        self.0.kind
+    }
+
+    /// The message alone.
+    pub fn message(&self) -> &str {
+        &self.0.message
+    }
+
+    /// The advice, if there is one.
+    pub fn advice(&self) -> Option<&str> {
+        self.0.help.as_deref()
+    }
+
+    /// The whole message as a terminal shows it: message, file, line, caret, causes, help.
+    pub fn render(&self, color: bool) -> String {
+        let inner = &*self.0;
+        let renderer = if color { Renderer::styled() } else { Renderer::plain() };
+        let file = inner.file.as_ref().map(|(path, line)| match line {
+            Some(line) => format!("{}:{line}", path.display()),
+            None => path.display().to_string(),
+        });
+        let title = match &file {
+            Some(file) => format!("{file}: {}", inner.message),
+            None => inner.message.clone(),
+        };
+        let mut group = Group::with_title(Level::ERROR.primary_title(title.as_str()));
+        if let Some(place) = &inner.place {
+            let mut annotation = AnnotationKind::Primary.span(place.span.clone());
+            if !inner.label.is_empty() {
+                annotation = annotation.label(inner.label.as_str());
+            }
+            group = group.element(
+                Snippet::source(place.source.text.as_str())
+                    .path(place.source.name.as_str())
+                    .annotation(annotation),
+            );
+        }
+        for cause in &inner.causes {
+            group = group.element(Level::NOTE.message(cause.as_str()));
+        }
+        if let Some(help) = &inner.help {
+            group = group.element(Level::HELP.message(help.as_str()));
+        }
+        renderer.render(&[group])
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.render(false))
+    }
+}
+
+impl std::error::Error for Error {}
+
+/// The known name nearest to `name`, if one is near enough to be a slip of the keyboard.
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .into_iter()
+        .map(|candidate| (strsim::damerau_levenshtein(name, candidate), candidate))
+        .filter(|(distance, _)| *distance <= 1 + name.len() / 4)
+        .min_by_key(|(distance, candidate)| (*distance, candidate.to_string()))
+        .map(|(_, candidate)| candidate)
+}

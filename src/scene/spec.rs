@@ -1,0 +1,203 @@
+//! What the user asked for, checked: the types of a scene.
+//!
+//! Everything that names a mesh group keeps its [`Located`] place, so that a refusal after the mesh was
+//! read (missing group, surface of the wrong body) still points into the scene file.
+
+use super::expression::Field;
+use crate::error::Located;
+use std::path::PathBuf;
+
+/// A checked scene.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Path of the scene file as given.
+    pub path: PathBuf,
+    /// Title, or the file's stem.
+    pub title: String,
+    /// Space dimension: 2 or 3.
+    pub dimension: Located<usize>,
+    /// Plane strain (default) or plane stress; plane problems only.
+    pub plane: Plane,
+    /// Where the mesh comes from.
+    pub mesh: MeshSource,
+    /// The bodies, in the order of the file.
+    pub bodies: Vec<BodySpec>,
+    /// The pairs of contact surfaces, in the order of the file.
+    pub contacts: Vec<ContactSpec>,
+    /// The outer iteration.
+    pub method: MethodSpec,
+    /// The inner solver.
+    pub solver: SolverSpec,
+    /// What to write.
+    pub output: OutputSpec,
+}
+
+/// Plane problems: which out-of-plane component vanishes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Plane {
+    /// No out-of-plane strain.
+    Strain,
+    /// No out-of-plane stress.
+    Stress,
+}
+
+/// Where the mesh comes from; paths are relative to the scene file's folder and already joined with it.
+#[derive(Debug, Clone)]
+pub enum MeshSource {
+    /// A Gmsh geometry script and the numbers set in it (`gmsh -setnumber NAME VALUE`), sorted by name.
+    Geo { file: Located<PathBuf>, set: Vec<(String, f64)> },
+    /// A mesh file, format 4.1, text or binary.
+    Msh { file: Located<PathBuf> },
+}
+
+/// Polynomial order of the displacements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Order {
+    /// Linear simplices.
+    P1,
+    /// Quadratic simplices.
+    P2,
+}
+
+/// A body: a named group of cells, its material, supports and loads.
+#[derive(Debug, Clone)]
+pub struct BodySpec {
+    /// Name of the physical group of cells; `[a-z][a-z0-9]*`, no PETSc family word (it is an option prefix).
+    pub name: Located<String>,
+    /// Young's modulus, > 0.
+    pub young: Located<f64>,
+    /// Poisson's ratio, in (-1, 0.5).
+    pub poisson: Located<f64>,
+    /// Polynomial order.
+    pub order: Order,
+    /// Supports: prescribed displacement components on named groups.
+    pub fix: Vec<Support>,
+    /// Loads on named groups.
+    pub load: Vec<Load>,
+    /// Body force density (x, y, z), if any.
+    pub force: Option<[Field; 3]>,
+}
+
+/// Prescribed displacement components on a named group (a boundary, or points).
+#[derive(Debug, Clone)]
+pub struct Support {
+    /// The physical group.
+    pub on: Located<String>,
+    /// Prescribed value of each component; `None` leaves it free.
+    pub value: [Option<f64>; 3],
+}
+
+/// A load on a named boundary.
+#[derive(Debug, Clone)]
+pub struct Load {
+    /// The physical group.
+    pub on: Located<String>,
+    /// What acts there.
+    pub kind: LoadKind,
+}
+
+/// Kinds of boundary load.
+#[derive(Debug, Clone)]
+pub enum LoadKind {
+    /// Pressure against the outer normal, > 0 pushes.
+    Pressure(Field),
+    /// Traction vector (x, y, z).
+    Traction([Field; 3]),
+}
+
+/// A pair of contact surfaces and the layer between them.
+#[derive(Debug, Clone)]
+pub struct ContactSpec {
+    /// The two physical groups.
+    pub between: [Located<String>; 2],
+    /// The scene's own gap d(x), added to the geometric distance; zero if not given.
+    pub gap: Field,
+    /// Law of the layer.
+    pub layer: LayerSpec,
+    /// A known contact pressure to draw and compare with, if any.
+    pub reference: Option<Field>,
+}
+
+/// Law of a Winkler layer, parameters checked.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LayerSpec {
+    /// p(c) = (c/B)^(1/a), B > 0, 0 < a <= 1.
+    Power { b: f64, a: f64 },
+    /// p(c) = stiffness * c, stiffness > 0.
+    Linear { stiffness: f64 },
+}
+
+/// The outer iteration.
+#[derive(Debug, Clone)]
+pub struct MethodSpec {
+    /// Robin zone psi.
+    pub psi: Zone,
+    /// Stationary relaxation gamma > 0.
+    pub gamma: f64,
+    /// Start of the iteration.
+    pub start: Start,
+    /// When to stop.
+    pub stop: StopSpec,
+}
+
+/// Robin zone: where psi = 1 in (38).
+#[derive(Debug, Clone)]
+pub enum Zone {
+    /// psi = 0: Neumann-Neumann.
+    None,
+    /// psi = 1: full Robin.
+    Full,
+    /// psi = chi = \[c > 0\] (36).
+    Active,
+    /// psi = \[expression is true, or a number > 0\], in x, y, z and the iteration k = 0, 1, ...
+    Subset(Field),
+}
+
+/// Start of the iteration, given on the contact surfaces.
+#[derive(Debug, Clone)]
+pub enum Start {
+    /// Zero normal displacement.
+    Zero,
+    /// Outer normal displacement on every contact surface.
+    Normal(Field),
+}
+
+/// When to stop. At least one of `residual` and `increment` is given; the first rule met stops.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StopSpec {
+    /// Relative residual (docs/theory.md); default 1e-8 when `increment` is not given.
+    pub residual: Option<f64>,
+    /// The paper's rule on the increment of normal displacements, for every body.
+    pub increment: Option<f64>,
+    /// Most iterations; default 2000.
+    pub iterations: usize,
+}
+
+/// Inner solver asked for in the scene; PETSc options override it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SolverSpec {
+    /// A preset, or the program's choice.
+    pub preset: Option<Preset>,
+    /// PETSc options of the scene, as words, weaker than those of the command line.
+    pub options: Vec<String>,
+}
+
+/// Presets of inner solvers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Preset {
+    /// Sparse Cholesky factorisation by MUMPS.
+    Mumps,
+    /// Conjugate gradients preconditioned by hypre's BoomerAMG.
+    Hypre,
+}
+
+/// What to write.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutputSpec {
+    /// Folder for the results, if the scene names one (`-o` wins).
+    pub dir: Option<PathBuf>,
+    /// Whether to write `<body>.vtu` and the `.pvd`; default true.
+    pub vtu: bool,
+    /// Whether to draw the SVG plots; default true.
+    pub plots: bool,
+}
