@@ -84,6 +84,7 @@ struct Inner {
     file: Option<(PathBuf, Option<usize>)>,
     help: Option<String>,
     causes: Vec<String>,
+    agreed: bool,
 }
 
 /// Result with [`Error`].
@@ -100,6 +101,7 @@ impl Error {
             file: None,
             help: None,
             causes: Vec::new(),
+            agreed: false,
         }))
     }
 
@@ -122,6 +124,29 @@ impl Error {
         let mut error = Self::new(Kind::File, format!("cannot {verb} {}", path.display()));
         error.0.causes.push(cause.to_string());
         error
+    }
+
+    /// The end of a rank whose fellow has the words: not printed, same exit code.
+    pub fn silent(exit_code: i32) -> Self {
+        let kinds = [Kind::Usage, Kind::Scene, Kind::Mesh, Kind::Solver, Kind::File];
+        let kind = kinds.into_iter().find(|kind| kind.exit_code() == exit_code).unwrap_or(Kind::Solver);
+        Self::new(kind, String::new())
+    }
+
+    /// Whether another rank prints the words.
+    pub fn is_silent(&self) -> bool {
+        self.0.message.is_empty()
+    }
+
+    /// Marks that every rank ends with this error.
+    pub fn agreed(mut self) -> Self {
+        self.0.agreed = true;
+        self
+    }
+
+    /// Whether every rank ends with this error, so that nobody waits for this one.
+    pub fn is_agreed(&self) -> bool {
+        self.0.agreed
     }
 
     /// Points at a place in the scene.

@@ -1,4 +1,24 @@
 //! Simplicial meshes with named groups, from Gmsh.
+//!
+//! [`load`] is the way in: a `.geo` script is meshed by Gmsh, once, and kept in a cache; a `.msh` file (format 4.1,
+//! text or binary) is read as it is. Everything downstream sees a [`Mesh`] only.
+
+mod cache;
+mod cursor;
+mod elements;
+mod gmsh;
+mod groups;
+mod load;
+mod msh;
+mod nodes;
+mod physical;
+mod script;
+mod simplex;
+#[cfg(test)]
+mod tests;
+
+pub use load::{Loaded, Origin, load};
+pub use msh::read;
 
 use crate::scene::Order;
 use std::path::PathBuf;
@@ -8,20 +28,23 @@ use std::path::PathBuf;
 /// Groups are Gmsh's physical groups. Cells are groups of dimension `D`; surfaces, edges and points have lower
 /// dimension. Local numbering is VTK's: vertices first, then for `Order::P2` mid-edges in the order
 /// `01` (line), `01 12 02` (triangle), `01 12 02 03 13 23` (tetrahedron).
+///
+/// No simplex is degenerate (its measure is above 1e-12 of its longest edge to its dimension), cells have positive
+/// volume, group names are unique, no group is empty, and coordinates are finite.
 #[derive(Debug, Clone)]
 pub struct Mesh<const D: usize> {
-    /// The file that was read, for messages.
+    /// The file that the user named (`.geo` or `.msh`), for messages.
     pub path: PathBuf,
-    /// Coordinates of the points, only those that some group uses.
+    /// Coordinates of the points, only those that some group uses, in the order of the file.
     pub points: Vec<[f64; D]>,
     /// Order of all elements (points have none).
     pub order: Order,
-    /// Named groups.
+    /// Named groups, in the order of the file.
     pub groups: Vec<Group>,
 }
 
 /// A named group of simplices of one dimension.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Group {
     /// Name of the physical group.
     pub name: String,
@@ -29,6 +52,61 @@ pub struct Group {
     pub dimension: usize,
     /// Points per simplex.
     pub stride: usize,
-    /// Point numbers, `stride` per simplex.
+    /// Point numbers, `stride` per simplex. Only cells have an orientation that means something.
     pub connectivity: Vec<u32>,
+}
+
+impl Group {
+    /// Number of simplices.
+    pub fn len(&self) -> usize {
+        self.connectivity.len() / self.stride
+    }
+
+    /// Whether there is no simplex; never so in a mesh that was read.
+    pub fn is_empty(&self) -> bool {
+        self.connectivity.is_empty()
+    }
+
+    /// The simplices, each as its `stride` point numbers.
+    pub fn simplices(&self) -> std::slice::ChunksExact<'_, u32> {
+        self.connectivity.chunks_exact(self.stride)
+    }
+}
+
+impl<const D: usize> Mesh<D> {
+    /// The group of a name, of whatever dimension.
+    pub fn group(&self, name: &str) -> Option<&Group> {
+        self.groups.iter().find(|group| group.name == name)
+    }
+
+    /// Names of the groups of a dimension, in the order of the file.
+    pub fn group_names(&self, dimension: usize) -> impl Iterator<Item = &str> {
+        self.groups
+            .iter()
+            .filter(move |group| group.dimension == dimension)
+            .map(|group| group.name.as_str())
+    }
+
+    /// The mesh of the same simplices without mid-edge points; a copy if there are none.
+    pub fn lower_order(&self) -> Mesh<D> {
+        let mut groups = self.groups.clone();
+        for group in &mut groups {
+            let vertices = group.dimension + 1;
+            group.connectivity = group
+                .simplices()
+                .flat_map(|simplex| &simplex[..vertices])
+                .copied()
+                .collect();
+            group.stride = vertices;
+        }
+        let points = groups::compact(&mut groups, self.points.len())
+            .map(|old| self.points[old])
+            .collect();
+        Mesh {
+            path: self.path.clone(),
+            points,
+            order: Order::P1,
+            groups,
+        }
+    }
 }

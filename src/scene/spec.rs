@@ -45,9 +45,17 @@ pub enum Plane {
 #[derive(Debug, Clone)]
 pub enum MeshSource {
     /// A Gmsh geometry script and the numbers set in it (`gmsh -setnumber NAME VALUE`), sorted by name.
-    Geo { file: Located<PathBuf>, set: Vec<(String, f64)> },
+    Geo {
+        /// The script.
+        file: Located<PathBuf>,
+        /// Names and numbers, sorted by name.
+        set: Vec<(String, f64)>,
+    },
     /// A mesh file, format 4.1, text or binary.
-    Msh { file: Located<PathBuf> },
+    Msh {
+        /// The mesh file.
+        file: Located<PathBuf>,
+    },
 }
 
 /// Polynomial order of the displacements.
@@ -122,9 +130,17 @@ pub struct ContactSpec {
 #[derive(Debug, Clone, PartialEq)]
 pub enum LayerSpec {
     /// p(c) = (c/B)^(1/a), B > 0, 0 < a <= 1.
-    Power { b: f64, a: f64 },
+    Power {
+        /// B, a compression per pressure^a.
+        b: f64,
+        /// a, the exponent; 1 is linear.
+        a: f64,
+    },
     /// p(c) = stiffness * c, stiffness > 0.
-    Linear { stiffness: f64 },
+    Linear {
+        /// Pressure per compression.
+        stiffness: f64,
+    },
 }
 
 /// The outer iteration.
@@ -174,7 +190,7 @@ pub struct StopSpec {
 }
 
 /// Inner solver asked for in the scene; PETSc options override it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct SolverSpec {
     /// A preset, or the program's choice.
     pub preset: Option<Preset>,
@@ -191,6 +207,27 @@ pub enum Preset {
     Hypre,
 }
 
+impl Default for MethodSpec {
+    fn default() -> Self {
+        Self {
+            psi: Zone::Active,
+            gamma: 0.6,
+            start: Start::Zero,
+            stop: StopSpec::default(),
+        }
+    }
+}
+
+impl Default for StopSpec {
+    fn default() -> Self {
+        Self {
+            residual: Some(1e-8),
+            increment: None,
+            iterations: 2000,
+        }
+    }
+}
+
 /// What to write.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutputSpec {
@@ -200,4 +237,14 @@ pub struct OutputSpec {
     pub vtu: bool,
     /// Whether to draw the SVG plots; default true.
     pub plots: bool,
+}
+
+impl Default for OutputSpec {
+    fn default() -> Self {
+        Self {
+            dir: None,
+            vtu: true,
+            plots: true,
+        }
+    }
 }

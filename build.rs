@@ -1,0 +1,206 @@
+//! Finds PETSc, refuses one that cannot serve, and makes the Rust declarations of the functions that we call.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::exit;
+
+#[path = "src/petsc/requirements.rs"]
+mod requirements;
+
+/// All that the binding calls; a function that is missing here does not exist for the crate.
+const FUNCTIONS: &[&str] = &[
+    "KSPCreate",
+    "KSPDestroy",
+    "KSPGetConvergedReason",
+    "KSPGetDiagonalScale",
+    "KSPGetInitialGuessNonzero",
+    "KSPGetIterationNumber",
+    "KSPGetPC",
+    "KSPGetResidualNorm",
+    "KSPGetTolerances",
+    "KSPGetType",
+    "KSPSetErrorIfNotConverged",
+    "KSPSetFromOptions",
+    "KSPSetOperators",
+    "KSPSetOptionsPrefix",
+    "KSPSetReusePreconditioner",
+    "KSPSetTolerances",
+    "KSPSetUp",
+    "KSPSetUpOnBlocks",
+    "KSPSolve",
+    "KSPView",
+    "MatCreateSeqAIJWithArrays",
+    "MatDestroy",
+    "MatMult",
+    "MatMumpsGetInfog",
+    "MatNullSpaceCreate",
+    "MatNullSpaceDestroy",
+    "MatSeqAIJGetArray",
+    "MatSeqAIJRestoreArray",
+    "MatSetBlockSize",
+    "MatSetNearNullSpace",
+    "MatSetOption",
+    "MatSetOptionsPrefix",
+    "MatViewFromOptions",
+    "PCFactorGetMatSolverType",
+    "PCFactorGetMatrix",
+    "PCGetFailedReason",
+    "PCGetType",
+    "PetscContainerCreate",
+    "PetscContainerDestroy",
+    "PetscContainerSetPointer",
+    "PetscContainerSetUserDestroy",
+    "PetscErrorMessage",
+    "PetscFinalize",
+    "PetscGetVersionNumber",
+    "PetscInitialize",
+    "PetscObjectCompose",
+    "PetscOptionsClearValue",
+    "PetscOptionsFindPair",
+    "PetscOptionsGetAll",
+    "PetscOptionsLeftGet",
+    "PetscOptionsLeftRestore",
+    "PetscOptionsSetValue",
+    "PetscOptionsUsed",
+    "PetscPushErrorHandler",
+    "PetscViewerASCIIGetStdout",
+    "VecCreateSeq",
+    "VecCreateSeqWithArray",
+    "VecDestroy",
+    "VecGetArray",
+    "VecPlaceArray",
+    "VecResetArray",
+    "VecRestoreArray",
+    "VecSetBlockSize",
+];
+
+/// Ends the build with a sentence; cargo shows what a failed build script wrote.
+fn refuse(sentence: &str) -> ! {
+    eprintln!("\n{sentence}\n");
+    exit(1)
+}
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=src/petsc/wrapper.h");
+    println!("cargo:rerun-if-changed=src/petsc/requirements.rs");
+    println!("cargo:rerun-if-env-changed=PETSC_DIR");
+    println!("cargo:rerun-if-env-changed=PETSC_ARCH");
+
+    let petsc = find();
+    for header in ["petscconf.h", "petscversion.h"] {
+        let Some(path) = petsc
+            .include_paths
+            .iter()
+            .map(|folder| folder.join(header))
+            .find(|path| path.exists())
+        else {
+            refuse(&format!(
+                "{header} of PETSc is missing from {:?}: {}",
+                petsc.include_paths,
+                requirements::ADVICE
+            ));
+        };
+        println!("cargo:rerun-if-changed={}", path.display());
+        let text = std::fs::read_to_string(&path)
+            .unwrap_or_else(|cause| refuse(&format!("cannot read {}: {cause}", path.display())));
+        let checked = match header {
+            "petscconf.h" => requirements::check_config(&text),
+            _ => requirements::check_version(&text),
+        };
+        if let Err(sentence) = checked {
+            refuse(&format!("{}: {sentence}", path.display()));
+        }
+    }
+    // A PETSc outside the system's folders is found again when the program runs.
+    for folder in petsc
+        .link_paths
+        .iter()
+        .filter(|folder| !folder.starts_with("/usr"))
+    {
+        println!("cargo:rustc-link-arg=-Wl,-rpath,{}", folder.display());
+    }
+    declare(&petsc.include_paths);
+}
+
+/// PETSc by its pkg-config file: the one of PETSC_DIR and PETSC_ARCH where these are set, else the system's.
+fn find() -> pkg_config::Library {
+    if let Some(root) = env::var_os("PETSC_DIR")
+        .filter(|root| !root.is_empty())
+        .map(PathBuf::from)
+    {
+        let build = root.join(env::var_os("PETSC_ARCH").unwrap_or_default());
+        let folder = build.join("lib/pkgconfig");
+        if !folder.exists() {
+            refuse(&format!(
+                "PETSC_DIR and PETSC_ARCH point at {}, which has no lib/pkgconfig: correct or unset them, or {}",
+                build.display(),
+                requirements::ADVICE
+            ));
+        }
+        let mut folders = vec![folder];
+        folders.extend(
+            env::var_os("PKG_CONFIG_PATH")
+                .iter()
+                .flat_map(env::split_paths),
+        );
+        let joined =
+            env::join_paths(folders).unwrap_or_else(|cause| refuse(&format!("PETSC_DIR: {cause}")));
+        // SAFETY: the build script has one thread.
+        unsafe { env::set_var("PKG_CONFIG_PATH", joined) };
+    }
+    // Old releases install PETSc.pc only; newer ones both names.
+    let found =
+        ["PETSc", "petsc"].map(|name| pkg_config::Config::new().cargo_metadata(false).probe(name));
+    let name = match found {
+        [Ok(_), _] => "PETSc",
+        [_, Ok(_)] => "petsc",
+        [Err(cause), _] => refuse(&format!(
+            "PETSc was not found: {}\n\n{cause}",
+            requirements::ADVICE
+        )),
+    };
+    pkg_config::probe_library(name)
+        .unwrap_or_else(|cause| refuse(&format!("PETSc was not found: {cause}")))
+}
+
+/// Writes the declarations to `petsc.rs` in the build folder.
+fn declare(petsc: &[PathBuf]) {
+    let mpi = ["mpi-c", "ompi-c", "mpi", "ompi", "mpich"]
+        .iter()
+        .find_map(|name| {
+            pkg_config::Config::new()
+                .cargo_metadata(false)
+                .probe(name)
+                .ok()
+        })
+        .map(|library| library.include_paths)
+        .unwrap_or_default();
+    let mut builder = bindgen::Builder::default()
+        .header("src/petsc/wrapper.h")
+        .clang_args(
+            petsc
+                .iter()
+                .chain(&mpi)
+                .map(|folder| format!("-I{}", folder.display())),
+        )
+        .rust_edition(bindgen::RustEdition::Edition2024)
+        // One type for communicators in the whole crate: that of the `mpi` crate.
+        .blocklist_type("(MPI_Comm|ompi_communicator_t)")
+        .raw_line("use mpi::ffi::MPI_Comm;")
+        .allowlist_type("(KSPConvergedReason|MatOption|PCFailedReason|PetscErrorType|PetscBool)")
+        .allowlist_var("PetscTrFree")
+        .generate_comments(false)
+        .layout_tests(false);
+    for function in FUNCTIONS {
+        builder = builder.allowlist_function(function);
+    }
+    let bindings = builder.generate().unwrap_or_else(|cause| {
+        refuse(&format!("bindgen could not read PETSc's headers: {cause}; it needs `apt-get install libclang-dev`"))
+    });
+    let folder = env::var_os("OUT_DIR").unwrap_or_default();
+    let file = Path::new(&folder).join("petsc.rs");
+    bindings
+        .write_to_file(&file)
+        .unwrap_or_else(|cause| refuse(&format!("cannot write {}: {cause}", file.display())));
+}

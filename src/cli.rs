@@ -1,0 +1,117 @@
+//! The command line: words -> request -> command -> exit code.
+
+use crate::commands::{check, solve, sweep};
+use crate::error::{Error, Kind, Result};
+use crate::petsc::Session;
+use crate::solver::options;
+use clap::{Args, Parser, Subcommand};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+/// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition on PETSc.
+///
+/// PETSc options are typed as in every PETSc program, for all bodies (-ksp_type cg -pc_type hypre) or for one
+/// (-upper_ksp_type cg); -help lists them.
+#[derive(Parser)]
+#[command(name = "winkler", version, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 converged, 1 not converged (results are written), 2 command line, 3 scene, 4 mesh, \
+5 solver or PETSc option, 6 file system.";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Solve a scene and write its results
+    Solve {
+        #[command(flatten)]
+        scene: SceneArgs,
+        /// Folder for the results [default: output.dir of the scene, else results/CASE]
+        #[arg(short, value_name = "DIR")]
+        output: Option<PathBuf>,
+    },
+    /// Build a scene's problem, solve nothing, and say what is there
+    Check {
+        #[command(flatten)]
+        scene: SceneArgs,
+    },
+    /// Solve a scene for every combination of values of its keys
+    Sweep {
+        #[command(flatten)]
+        scene: SceneArgs,
+        /// Folder for the results [default: output.dir of the scene, else results/CASE]
+        #[arg(short, value_name = "DIR")]
+        output: Option<PathBuf>,
+        /// Key and its values, for example method.gamma=0.3,0.6; may be repeated
+        #[arg(long, value_name = "KEY=V1,V2,...", required = true)]
+        over: Vec<String>,
+    },
+}
+
+#[derive(Args)]
+struct SceneArgs {
+    /// Scene file (TOML)
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+    /// Replace a key of the scene, for example method.gamma=0.3 or contact.0.layer.power.a=0.3; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the program with the words of its command line, the name first; returns the exit code.
+pub fn run(words: Vec<String>) -> i32 {
+    let mut words = words.into_iter();
+    let name = words.next().unwrap_or_else(|| "winkler".to_owned());
+    let (program, petsc) = options::split(words);
+    let cli = match Cli::try_parse_from(std::iter::once(name).chain(program)) {
+        Ok(cli) => cli,
+        Err(refusal) => {
+            // a closed pipe is no reason to say more
+            let _ = refusal.print();
+            return refusal.exit_code();
+        }
+    };
+    let session = match Session::start(&petsc) {
+        Ok(session) => session,
+        Err(error) => return complain(&error),
+    };
+    match dispatch(&session, cli.command) {
+        Ok(code) => code,
+        Err(error) if error.is_silent() => error.kind().exit_code(),
+        Err(error) => {
+            let code = complain(&error);
+            // the other ranks may be waiting for this one unless all agreed to end
+            if session.size() > 1 && !error.is_agreed() {
+                session.abort(code);
+            }
+            code
+        }
+    }
+}
+
+fn dispatch(session: &Session, command: Command) -> Result<i32> {
+    match command {
+        Command::Solve { scene, output } => {
+            let SceneArgs { scene, overrides, json } = scene;
+            solve::solve(session, solve::Request { scene, folder: output, overrides, json })
+        }
+        Command::Check { scene } => check::check(session, scene.scene, scene.overrides, scene.json),
+        Command::Sweep { scene, output, over } => {
+            let SceneArgs { scene, overrides, json } = scene;
+            sweep::sweep(session, sweep::Request { scene, folder: output, overrides, over, json })
+        }
+    }
+}
+
+fn complain(error: &Error) -> i32 {
+    eprintln!("{}", error.render(std::io::stderr().is_terminal()));
+    if error.kind() == Kind::Usage {
+        eprintln!("`winkler --help` shows the command line");
+    }
+    error.kind().exit_code()
+}

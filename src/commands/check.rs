@@ -1,0 +1,92 @@
+//! `winkler check`: builds everything, solves nothing, says what is there.
+
+use super::run::{self, Clock, Prepared};
+use super::{load, report};
+use crate::error::Result;
+use crate::output::sci;
+use crate::petsc::Session;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Builds a scene's problem and prints bodies, dofs, surfaces, gaps and the rigid motions left to each body; returns the
+/// exit code.
+///
+/// # Errors
+/// Refusals of scene and mesh.
+pub fn check(session: &Session, path: PathBuf, overrides: Vec<String>, as_json: bool) -> Result<i32> {
+    let mut clock = Clock::default();
+    let scene = load(session, &path, &overrides)?;
+    let prepared = run::prepare(session, &scene, &mut clock)?;
+    clock.total();
+    if session.rank() != 0 {
+        return Ok(0);
+    }
+    if as_json {
+        let mut value = json!(report::headline(session, &scene, &prepared, &clock));
+        value["status"] = json!("checked");
+        value["message"] = json!(prepared.choice);
+        for (info, body) in prepared.problem.bodies.iter().zip(0..) {
+            value["bodies"][body]["supported"] = json!(info.supported);
+            value["bodies"][body]["rigid_motions"] = json!(info.left_by_supports);
+            value["bodies"][body]["rigid_motions_unheld"] = json!(info.left_by_all);
+        }
+        value["pairs"] = pairs(&prepared);
+        println!("{value:#}");
+    } else {
+        print(&scene.title, &prepared);
+    }
+    Ok(0)
+}
+
+fn pairs(prepared: &Prepared) -> serde_json::Value {
+    let describe = |i: usize| {
+        let pair = &prepared.problem.model.pairs[i];
+        let (low, high) = gap_range(&pair.gap);
+        json!({
+            "surfaces": pair.surfaces,
+            "carrier": pair.surfaces[0],
+            "points": pair.len(),
+            "length": pair.weight.iter().sum::<f64>(),
+            "gap": [low, high],
+            "facets_uncovered": pair.uncovered.0,
+        })
+    };
+    (0..prepared.problem.model.pairs.len()).map(describe).collect()
+}
+
+fn gap_range(gap: &[f64]) -> (f64, f64) {
+    (gap.iter().copied().fold(f64::INFINITY, f64::min), gap.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+}
+
+fn print(title: &str, prepared: &Prepared) {
+    println!("{title}");
+    for info in &prepared.problem.bodies {
+        println!(
+            "  body {}: {} cells, {} nodes, {} dofs, {} of them supported",
+            info.name, info.cells, info.nodes, info.dofs, info.supported
+        );
+        if !info.left_by_supports.is_empty() {
+            println!("    rigid motions left to contact: {}", info.left_by_supports.join("; "));
+        }
+        if !info.left_by_all.is_empty() {
+            println!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; "));
+        }
+    }
+    for pair in &prepared.problem.model.pairs {
+        let (low, high) = gap_range(&pair.gap);
+        println!(
+            "  contact {} - {}: {} points on {}, length {:.6}, gap {} to {}",
+            pair.surfaces[0],
+            pair.surfaces[1],
+            pair.len(),
+            pair.surfaces[0],
+            pair.weight.iter().sum::<f64>(),
+            sci(low, 3),
+            sci(high, 3)
+        );
+    }
+    println!("  inner solver: {}", prepared.choice);
+    for warning in &prepared.warnings {
+        println!("  warning: {warning}");
+    }
+}

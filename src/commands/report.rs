@@ -1,0 +1,244 @@
+//! Outcome -> report, contact tables and plots.
+
+use super::run::{Clock, Prepared};
+use crate::contact::ContactPair;
+use crate::ddm::{Model, Outcome, Status};
+use crate::output::plot::{ConvergenceSeries, PressureSeries};
+use crate::output::{BodyReport, ContactTable, PairReport, Report, sci};
+use crate::petsc::Session;
+use crate::scene::Scene;
+
+/// Name of a status in `report.json`.
+pub fn status_name(status: &Status) -> &'static str {
+    match status {
+        Status::Converged => "converged",
+        Status::Attainable => "attainable",
+        Status::IterationLimit => "iteration-limit",
+        Status::NotFinite { .. } => "not-finite",
+        Status::Cycle { .. } => "cycle",
+        Status::Unheld { .. } => "unheld",
+        Status::InnerSolver { .. } => "inner-solver",
+    }
+}
+
+/// Exit code of a run that ended with this status.
+pub fn exit_code(status: &Status) -> i32 {
+    match status {
+        Status::Converged | Status::Attainable => 0,
+        _ => 1,
+    }
+}
+
+/// The status in words: what happened, to which body, in which iteration, and what to try.
+fn message(outcome: &Outcome, model: &Model) -> String {
+    let k = outcome.iterations;
+    let name = |body: &usize| &model.bodies[*body].name;
+    let residual = outcome.rows.last().map_or(f64::NAN, |row| row.residual);
+    match &outcome.status {
+        Status::Converged => format!("converged in {k} iterations"),
+        Status::Attainable => {
+            format!("residual {} after {k} iterations: rounding allows no less", sci(residual, 1))
+        }
+        Status::IterationLimit => format!(
+            "not converged in {k} iterations, residual {}: allow more (method.stop.iterations) or choose another method.gamma",
+            sci(residual, 1)
+        ),
+        Status::NotFinite { body } => format!(
+            "body `{}`: a number is not finite in iteration {k}: a smaller start (method.start) or method.gamma may help",
+            name(body)
+        ),
+        Status::Cycle { period } => format!(
+            "the iterates repeat every {period} iterations (seen in iteration {k}): choose a smaller method.gamma"
+        ),
+        Status::Unheld { body, motion } => format!(
+            "body `{}`: nothing holds its {motion} in iteration {k}: neither a support nor the Robin zone; add a support, \
+             or a start that closes the contact (method.start)",
+            name(body)
+        ),
+        Status::InnerSolver { body, reason } => {
+            let reason = if reason.is_empty() { "its rank knows more" } else { reason };
+            format!("body `{}`: its inner solver failed in iteration {k}: {reason}", name(body))
+        }
+    }
+}
+
+/// Fills the report of a run.
+pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &Outcome, clock: &Clock) -> Report {
+    let model = &prepared.problem.model;
+    let counts = global_counts(model);
+    let last = outcome.rows.last();
+    let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
+    Report {
+        status: status_name(&outcome.status).to_owned(),
+        message: message(outcome, model),
+        iterations: outcome.iterations,
+        sweeps: outcome.sweeps,
+        factorizations: counts[0],
+        symbolic_factorizations: counts[1],
+        body_solves: counts[2],
+        inner_iterations: counts[3],
+        robin_updates: counts[4],
+        robin_updates_skipped: counts[5],
+        assemblies: prepared.problem.bodies.len(),
+        body_solves_skipped: outcome.solves_skipped,
+        messages: model.exchange.messages(),
+        residual: finite(last.map(|row| row.residual)),
+        increment: finite(last.map(|row| row.increment)),
+        f1: finite(last.map(|row| row.energy)),
+        pairs: (0..model.pairs.len()).map(|i| pair_report(scene, prepared, outcome, i)).collect(),
+        ..headline(session, scene, prepared, clock)
+    }
+}
+
+/// The part of the report that is known before the first sweep.
+pub fn headline(session: &Session, scene: &Scene, prepared: &Prepared, clock: &Clock) -> Report {
+    let bodies = &prepared.problem.bodies;
+    Report {
+        winkler: env!("CARGO_PKG_VERSION").to_owned(),
+        petsc: session.petsc_version(),
+        blas: session.blas_name(),
+        ranks: session.size(),
+        title: scene.title.clone(),
+        dofs: bodies.iter().map(|body| body.dofs).sum(),
+        bodies: bodies
+            .iter()
+            .zip(&prepared.problem.model.bodies)
+            .map(|(info, slot)| BodyReport {
+                name: info.name.clone(),
+                nodes: info.nodes,
+                cells: info.cells,
+                dofs: info.dofs,
+                solver: slot.local.as_ref().map_or(String::new(), |body| body.describe()),
+                rank: info.rank,
+            })
+            .collect(),
+        times: clock.times.clone(),
+        warnings: prepared.warnings.clone(),
+        settings: scene.settings(),
+        ..Report::default()
+    }
+}
+
+/// Counts of all bodies on all ranks: factorisations, symbolic ones, solves, inner iterations, Robin updates and skips.
+fn global_counts(model: &Model) -> [usize; 6] {
+    let mut sums = [0.0; 6];
+    for counts in model.bodies.iter().filter_map(|slot| slot.local.as_ref()).map(|body| body.counts()) {
+        let mine = [
+            counts.factorizations,
+            counts.symbolic,
+            counts.solves,
+            counts.inner_iterations,
+            counts.robin_updates,
+            counts.robin_skipped,
+        ];
+        sums.iter_mut().zip(mine).for_each(|(sum, count)| *sum += count as f64);
+    }
+    model.exchange.sum(&mut sums);
+    sums.map(|sum| sum as usize)
+}
+
+/// Sides of pair `i` in the order of the scene.
+fn sides(prepared: &Prepared, i: usize) -> [usize; 2] {
+    if prepared.problem.swapped[i] { [1, 0] } else { [0, 1] }
+}
+
+fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) -> PairReport {
+    let model = &prepared.problem.model;
+    let (pair, layer, range) = (&model.pairs[i], &outcome.layer, model.range(i));
+    let (c, p, force) =
+        (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
+    let length = |closed: bool| (0..pair.len()).filter(|&q| (c[q] > 0.0) == closed).map(|q| pair.weight[q]).sum();
+    let on_side = |side: usize| -> [f64; 3] {
+        std::array::from_fn(|k| -(0..pair.len()).map(|q| force[q] * pair.resultant[side][q][k]).sum::<f64>())
+    };
+    let sides = sides(prepared, i);
+    let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
+    PairReport {
+        surfaces: scene.contacts[i].between.each_ref().map(|name| name.value.clone()),
+        bodies: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
+        points: pair.len(),
+        carrier: pair.surfaces[0].clone(),
+        facets_uncovered: pair.uncovered.0,
+        layer_energy: layer.energy[i],
+        force: sides.map(on_side),
+        peak_pressure: p[peak],
+        peak_at: pair.position[peak],
+        contact_length: length(true),
+        open_length: length(false),
+        contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
+    }
+}
+
+/// Where the compression changes sign between neighbouring points of a curve.
+fn ends(pair: &ContactPair, c: &[f64]) -> Vec<[f64; 3]> {
+    let mut ends = Vec::new();
+    for q in 1..pair.len() {
+        if (c[q - 1] > 0.0) != (c[q] > 0.0) {
+            let s = c[q - 1] / (c[q - 1] - c[q]);
+            ends.push(std::array::from_fn(|k| {
+                pair.position[q - 1][k] * (1.0 - s) + pair.position[q][k] * s
+            }));
+        }
+    }
+    ends
+}
+
+/// The contact table of pair `i`, sides in the order of the scene.
+pub fn contact_table(prepared: &Prepared, outcome: &Outcome, i: usize) -> ContactTable {
+    let model = &prepared.problem.model;
+    let (pair, range, points) = (&model.pairs[i], model.range(i), model.points());
+    let sides = sides(prepared, i);
+    let displacement = |side: usize| -> Vec<f64> {
+        let trace = &outcome.iterate.trace[side * points + range.start..side * points + range.end];
+        trace.iter().zip(&pair.prescribed[side]).map(|(free, known)| free + known).collect()
+    };
+    ContactTable {
+        side_names: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
+        points: pair.position.clone(),
+        gap: pair.gap.clone(),
+        compression: outcome.layer.compression[range.clone()].to_vec(),
+        pressure: outcome.layer.pressure[range.clone()].to_vec(),
+        displacement: sides.map(displacement),
+    }
+}
+
+/// Residual and increment of a run against the iteration.
+pub fn convergence(label: &str, outcome: &Outcome) -> ConvergenceSeries {
+    let rows = outcome.rows.iter().map(|row| (row.iteration, row.residual, row.increment)).collect();
+    ConvergenceSeries { label: label.to_owned(), rows }
+}
+
+/// Pressure of pair `i` along its surface (the coordinate that varies most), and the scene's reference for it.
+pub fn pressure(label: &str, prepared: &Prepared, outcome: &Outcome, i: usize) -> PressureSeries {
+    let model = &prepared.problem.model;
+    let (axis, _) = main_axis(&model.pairs[i]);
+    PressureSeries {
+        label: label.to_owned(),
+        s: model.pairs[i].position.iter().map(|x| x[axis]).collect(),
+        p: outcome.layer.pressure[model.range(i)].to_vec(),
+        dashed: false,
+    }
+}
+
+/// The scene's reference pressure of pair `i`, drawn dashed.
+pub fn reference(scene: &Scene, model: &Model, i: usize) -> Option<PressureSeries> {
+    let field = scene.contacts[i].reference.as_ref()?;
+    let (axis, _) = main_axis(&model.pairs[i]);
+    let position = &model.pairs[i].position;
+    Some(PressureSeries {
+        label: "reference".to_owned(),
+        s: position.iter().map(|x| x[axis]).collect(),
+        p: position.iter().map(|&x| field.eval(x)).collect(),
+        dashed: true,
+    })
+}
+
+/// The coordinate along which a pair's points spread most, and its name.
+pub fn main_axis(pair: &ContactPair) -> (usize, &'static str) {
+    let spread = |k: usize| {
+        let values = pair.position.iter().map(|x| x[k]);
+        values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
+    };
+    let axis = (0..3).max_by(|&i, &j| spread(i).total_cmp(&spread(j)).then(j.cmp(&i))).unwrap_or(0);
+    (axis, ["x", "y", "z"][axis])
+}

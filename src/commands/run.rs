@@ -1,0 +1,240 @@
+//! From a scene to a solved problem: mesh, discretisation, inner solvers, options, iteration.
+
+use crate::contact::pieces;
+use crate::ddm::{self, Model, Observer, Outcome, Settings, Stationary, StopRule};
+use crate::discretize::{self, Assembled, Problem};
+use crate::error::{Error, Kind, Result};
+use crate::parallel::{Ranks, agree};
+use crate::petsc::Session;
+use crate::scene::{MeshSource, Order, Preset, Scene};
+use crate::solver::{Krylov, SparseBody, options, preset};
+use mpi::collective::SystemOperation;
+use mpi::traits::CommunicatorCollectives;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Wall seconds of the phases of a run.
+#[derive(Debug, Clone)]
+pub struct Clock {
+    began: Instant,
+    last: Instant,
+    /// Seconds by phase.
+    pub times: BTreeMap<String, f64>,
+}
+
+impl Default for Clock {
+    fn default() -> Self {
+        let now = Instant::now();
+        Self { began: now, last: now, times: BTreeMap::new() }
+    }
+}
+
+impl Clock {
+    /// Ends a phase.
+    pub fn phase(&mut self, name: &str) {
+        let now = Instant::now();
+        *self.times.entry(name.to_owned()).or_default() += (now - self.last).as_secs_f64();
+        self.last = now;
+    }
+
+    /// Seconds since the run began, noted as `total`.
+    pub fn total(&mut self) -> f64 {
+        let total = self.began.elapsed().as_secs_f64();
+        self.times.insert("total".to_owned(), total);
+        total
+    }
+}
+
+/// A problem that is ready to be solved, with what the user should know of its making.
+pub struct Prepared {
+    /// The discrete problem.
+    pub problem: Problem,
+    /// Inner solver in words, with the reason of the choice.
+    pub choice: String,
+    /// Warnings.
+    pub warnings: Vec<String>,
+}
+
+/// Builds the discrete problem of a scene; bodies get their inner solvers but nothing is factored.
+///
+/// # Errors
+/// Refusals of scene and mesh, printed on one rank; failures of PETSc.
+pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Prepared> {
+    agree(session, refuse(scene))?;
+    agree(session, scene_options(session, scene))?;
+    let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
+    options::distribute(session, &names)?;
+    let mesh = mesh(session, scene)?;
+    clock.phase("mesh");
+    let largest = mesh.points.len() * scene.dimension.value;
+    let (chosen, choice) = match scene.solver.preset {
+        Some(preset) => (preset, format!("{preset:?} as the scene asks")),
+        None => {
+            let (preset, why) = preset::choose(scene.dimension.value, largest);
+            (preset, format!("{preset:?}: {why}"))
+        }
+    };
+    for name in &names {
+        preset::apply(session, name, chosen)?;
+    }
+    let mut make = |assembled: Assembled| solver(session, assembled);
+    let ranks = (session.rank(), session.size());
+    let exchange = Box::new(Ranks::new(session));
+    let problem =
+        agree(session, discretize::discretize::<2>(scene, &mesh, pieces::plane, ranks, exchange, &mut make))?;
+    clock.phase("discretize");
+    let warnings = warnings(session, scene, &problem);
+    Ok(Prepared { problem, choice: describe(chosen, choice), warnings })
+}
+
+fn describe(preset: Preset, why: String) -> String {
+    let what = match preset {
+        Preset::Mumps => "sparse Cholesky by MUMPS",
+        Preset::Hypre => "CG preconditioned by hypre's BoomerAMG",
+    };
+    format!("{what} ({why})")
+}
+
+/// What the decoder of the scene cannot know.
+fn refuse(scene: &Scene) -> Result<()> {
+    for body in &scene.bodies {
+        if let Some(reason) = options::forbidden_body_name(&body.name.value) {
+            let message = format!("`{}` cannot name a body: {reason}", body.name.value);
+            return Err(Error::scene(&body.name.place, message).help("rename the physical group and the body"));
+        }
+    }
+    if scene.dimension.value != 2 {
+        return Err(Error::scene(&scene.dimension.place, "this version solves plane problems only")
+            .help("set dimension = 2"));
+    }
+    Ok(())
+}
+
+/// PETSc options of the scene, weaker than typed ones.
+fn scene_options(session: &Session, scene: &Scene) -> Result<()> {
+    let table = session.options();
+    let mut words = scene.solver.options.iter().peekable();
+    while let Some(word) = words.next() {
+        if !word.starts_with('-') {
+            return Err(Error::new(Kind::Scene, format!("`{word}` in solver.options belongs to no option"))
+                .help("write options as on the command line: \"-ksp_type cg -ksp_rtol 1e-8\""));
+        }
+        let is_value = |next: &&String| !next.starts_with('-') || next.parse::<f64>().is_ok();
+        let value = words.next_if(is_value).map(String::as_str);
+        if !table.has(word) {
+            table.set(word, value)?;
+        }
+    }
+    Ok(())
+}
+
+/// The mesh: one rank lets Gmsh work, then every rank reads.
+fn mesh(session: &Session, scene: &Scene) -> Result<crate::mesh::Mesh<2>> {
+    let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
+    let load = || crate::mesh::load::<2>(&scene.mesh, order).map(|loaded| loaded.mesh);
+    if session.size() == 1 {
+        return load();
+    }
+    if matches!(scene.mesh, MeshSource::Geo { .. }) {
+        agree(session, if session.rank() == 0 { load().map(|_| ()) } else { Ok(()) })?;
+    }
+    agree(session, load())
+}
+
+fn solver(session: &Session, assembled: Assembled) -> Result<Box<dyn ddm::Body>> {
+    let Assembled { name, dimension, body, rows, motions, .. } = assembled;
+    let modes: Vec<Vec<f64>> = motions.into_iter().map(|motion| motion.displacement).collect();
+    let krylov = Krylov::new(session, &name, dimension, &body.stiffness, &modes)?;
+    Ok(Box::new(SparseBody::new(body, rows, krylov)))
+}
+
+fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if session.blas_name() == "reference BLAS" {
+        warnings.push(
+            "the reference BLAS is in use: factorisations are up to ten times slower; run scripts/setup for OpenBLAS"
+                .to_owned(),
+        );
+    }
+    if session.size() > problem.bodies.len() {
+        warnings.push(format!("{} of {} ranks have no body to solve", session.size() - problem.bodies.len(), session.size()));
+    }
+    for (pair, spec) in problem.model.pairs.iter().zip(&scene.contacts) {
+        let (without, all) = pair.uncovered;
+        if without > 0 {
+            let names = [&spec.between[0].value, &spec.between[1].value];
+            warnings.push(format!("{} - {}: {without} of {all} facets have no partner", names[0], names[1]));
+        }
+        let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
+        if overlap < 0.0 {
+            warnings.push(format!("{} - {}: the bodies overlap by {:.3e} before loading; the layer takes it as compression", pair.surfaces[0], pair.surfaces[1], -overlap));
+        }
+    }
+    warnings
+}
+
+/// Factors every body for the start, then refuses options that nobody read.
+///
+/// # Errors
+/// Unknown PETSc options, failures of PETSc.
+pub fn set_up(session: &Session, prepared: &mut Prepared, clock: &mut Clock) -> Result<()> {
+    let failed = ddm::prepare(&mut prepared.problem.model);
+    agree(session, failed)?;
+    let names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let any = |flags: &mut [u8]| {
+        if session.size() > 1 && !flags.is_empty() {
+            let mine = flags.to_vec();
+            session.world().all_reduce_into(&mine[..], flags, SystemOperation::max());
+        }
+    };
+    let unread = options::unread(session, &names, &any)?;
+    let mut unknown = None;
+    for option in unread {
+        match option.kind {
+            options::UnreadKind::NotInUse => prepared
+                .warnings
+                .push(format!("option {} was not used: no solver of this run reads it", option.name)),
+            options::UnreadKind::Unknown => {
+                let error = Error::new(Kind::Solver, format!("PETSc knows no option {}", option.name));
+                unknown.get_or_insert(match option.nearest {
+                    Some(near) => error.help(format!("did you mean {near}?")),
+                    None => error.help("`-help` lists the options of this run"),
+                });
+            }
+        }
+    }
+    agree(session, unknown.map_or(Ok(()), Err))?;
+    clock.phase("set-up");
+    Ok(())
+}
+
+/// Iterates.
+///
+/// # Errors
+/// Failures of PETSc; not converging is a status of the outcome.
+pub fn iterate(
+    scene: &Scene,
+    model: &mut Model,
+    observer: &mut dyn Observer,
+    clock: &mut Clock,
+) -> Result<Outcome> {
+    let stop = &scene.method.stop;
+    let mut settings = Settings {
+        zone: discretize::robin_zone(scene),
+        gamma: Box::new(Stationary(scene.method.gamma)),
+        stop: StopRule { residual: stop.residual, increment: stop.increment, iterations: stop.iterations },
+        start: discretize::start(scene, model)?,
+    };
+    let outcome = ddm::solve(model, &mut settings, observer)?;
+    clock.phase("iterate");
+    Ok(outcome)
+}
+
+/// The stopping rules in words.
+pub fn targets(scene: &Scene) -> String {
+    let stop = &scene.method.stop;
+    let rules = [("residual", stop.residual), ("increment", stop.increment)];
+    let rules = rules.iter().filter_map(|(name, value)| value.map(|value| format!("{name} <= {value:e}")));
+    rules.collect::<Vec<_>>().join(" or ")
+}

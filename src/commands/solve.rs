@@ -1,0 +1,146 @@
+//! `winkler solve`: one scene, one run, all its results.
+
+use super::run::{self, Clock, Prepared};
+use super::{folder_of, load, report};
+use crate::ddm::{Observer, Outcome, Row};
+use crate::error::{Error, Kind, Result};
+use crate::output::{Folder, HistoryWriter, IterationTable, Plot, Report, Verbosity, vtu};
+use crate::parallel::agree;
+use crate::petsc::Session;
+use crate::scene::Scene;
+use std::path::PathBuf;
+
+/// What the user typed.
+pub struct Request {
+    /// Scene file.
+    pub scene: PathBuf,
+    /// Folder of results, if typed.
+    pub folder: Option<PathBuf>,
+    /// Overrides of scene keys.
+    pub overrides: Vec<String>,
+    /// Whether to print the report as JSON instead of the table.
+    pub json: bool,
+}
+
+/// Solves a scene, writes its results and returns the exit code.
+///
+/// # Errors
+/// Everything that keeps the run from starting, and failures of the file system. Not converging is an exit code, and all
+/// that was computed is written.
+pub fn solve(session: &Session, request: Request) -> Result<i32> {
+    let mut clock = Clock::default();
+    let scene = load(session, &request.scene, &request.overrides)?;
+    let folder = agree(session, Folder::create(folder_of(&scene, request.folder)))?;
+    let mut prepared = run::prepare(session, &scene, &mut clock)?;
+    run::set_up(session, &mut prepared, &mut clock)?;
+    let first = session.rank() == 0;
+    let monitored = session.options().all()?.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
+    let verbosity = if request.json || monitored || !first { Verbosity::Quiet } else { Verbosity::Table };
+    let mut watchers = Watchers {
+        table: IterationTable::new(verbosity, &run::targets(&scene)),
+        history: if first { Some(history(&folder, &scene)?) } else { None },
+    };
+    let outcome = run::iterate(&scene, &mut prepared.problem.model, &mut watchers, &mut clock)?;
+    watchers.table.finish();
+    let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
+    let written = failed.and(write(session, &scene, &prepared, &outcome, &folder));
+    clock.phase("output");
+    clock.total();
+    let mut report = report::report(session, &scene, &prepared, &outcome, &clock);
+    if first {
+        report.files = names(&folder, &scene, &prepared);
+        let json = to_json(&report)?;
+        folder.write("report.json", |out| out.write_all(json.as_bytes()))?;
+        if request.json {
+            print!("{json}");
+        } else {
+            println!("{}\n  inner solver: {}\n  results in {}", report.summary(), prepared.choice, folder.path().display());
+        }
+    }
+    written?;
+    Ok(report::exit_code(&outcome.status))
+}
+
+/// A report as JSON text, ended by a newline.
+///
+/// # Errors
+/// None in practice: a report holds nothing that JSON cannot hold.
+pub fn to_json(report: &Report) -> Result<String> {
+    serde_json::to_string_pretty(report)
+        .map(|text| text + "\n")
+        .map_err(|cause| Error::new(Kind::File, "the report cannot be written as JSON").because(cause.to_string()))
+}
+
+fn history(folder: &Folder, scene: &Scene) -> Result<HistoryWriter> {
+    let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
+    HistoryWriter::create(folder, &names)
+}
+
+/// Table and file of the iterations.
+struct Watchers {
+    table: IterationTable,
+    history: Option<HistoryWriter>,
+}
+
+impl Observer for Watchers {
+    fn row(&mut self, row: &Row) {
+        self.table.row(row);
+        if let Some(history) = &mut self.history {
+            history.row(row);
+        }
+    }
+
+    fn note(&mut self, text: &str) {
+        self.table.note(text);
+    }
+}
+
+/// Writes fields (each rank its bodies), contact tables and plots (the first rank).
+fn write(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &Outcome, folder: &Folder) -> Result<()> {
+    let model = &prepared.problem.model;
+    let first = session.rank() == 0;
+    if scene.output.vtu {
+        for (index, info) in prepared.problem.bodies.iter().enumerate() {
+            if let Some(body) = &model.bodies[index].local {
+                let field = info.field(&body.recover(&outcome.iterate.states[index]));
+                folder.write(&field.file_name(), |out| field.write(out))?;
+            }
+        }
+        if first {
+            let names: Vec<&str> = prepared.problem.bodies.iter().map(|body| body.name.as_str()).collect();
+            folder.write(&vtu::pvd_name("bodies"), |out| vtu::write_pvd(&names, out))?;
+        }
+    }
+    if !first {
+        return Ok(());
+    }
+    for i in 0..model.pairs.len() {
+        report::contact_table(prepared, outcome, i).save(folder)?;
+    }
+    if scene.output.plots {
+        let convergence = Plot::convergence(&scene.title, &[report::convergence("", outcome)]);
+        folder.write("convergence.svg", |out| convergence.write(out))?;
+        for i in 0..model.pairs.len() {
+            let mut curves = vec![report::pressure("pressure", prepared, outcome, i)];
+            curves.extend(report::reference(scene, model, i));
+            let (_, axis) = report::main_axis(&model.pairs[i]);
+            let plot = Plot::pressure(&scene.title, axis, &curves);
+            folder.write(&folder.unused("pressure", "svg"), |out| plot.write(out))?;
+        }
+    }
+    Ok(())
+}
+
+/// Names of the files of a run, those of other ranks included.
+fn names(folder: &Folder, scene: &Scene, prepared: &Prepared) -> Vec<String> {
+    let own = folder.files();
+    let mut names: Vec<String> =
+        own.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned()).collect();
+    if scene.output.vtu {
+        names.extend(prepared.problem.bodies.iter().map(|body| format!("{}.vtu", body.name)));
+    }
+    names.push("report.json".to_owned());
+    names.sort();
+    names.dedup();
+    names
+}

@@ -1,0 +1,205 @@
+//! `winkler sweep`: a scene over values of its keys, one row a run.
+
+use super::run::{self, Clock};
+use super::{folder_of, report};
+use crate::ddm::Silent;
+use crate::error::{Error, Kind, Result};
+use crate::output::plot::{ConvergenceSeries, PressureSeries};
+use crate::output::{Folder, Plot, Report, sci};
+use crate::parallel::agree;
+use crate::petsc::Session;
+use crate::solver::options;
+use std::path::PathBuf;
+
+/// What the user typed.
+pub struct Request {
+    /// Scene file.
+    pub scene: PathBuf,
+    /// Folder of results, if typed.
+    pub folder: Option<PathBuf>,
+    /// Overrides of scene keys for every run.
+    pub overrides: Vec<String>,
+    /// `KEY=V1,V2,...`; several make all combinations, the last one fastest.
+    pub over: Vec<String>,
+    /// Whether to print the reports as a JSON list.
+    pub json: bool,
+}
+
+/// Runs a scene for every combination of values and writes `sweep.csv`, `convergence.svg` and `pressure.svg`; returns the
+/// exit code: that of a run that did not converge, if there is one.
+///
+/// # Errors
+/// Refusals of any scene of the sweep, before the first run; failures of the file system.
+pub fn sweep(session: &Session, request: Request) -> Result<i32> {
+    let axes = agree(session, request.over.iter().map(|text| axis(text)).collect::<Result<Vec<_>>>())?;
+    let runs = combinations(&axes);
+    let load = |values: &[String]| {
+        let mut overrides = request.overrides.clone();
+        overrides.extend(values.iter().zip(&axes).map(|(value, (key, _))| format!("{key}={value}")));
+        crate::scene::load(&request.scene, &overrides)
+    };
+    let scenes = agree(session, runs.iter().map(|values| load(values)).collect::<Result<Vec<_>>>())?;
+    let folder = agree(session, Folder::create(folder_of(&scenes[0], request.folder.clone())))?;
+    let first = session.rank() == 0;
+    let mut table = csv::Writer::from_writer(folder.open("sweep.csv")?.1);
+    let mut exit = 0;
+    let (mut reports, mut histories, mut pressures, mut reference) = (Vec::new(), Vec::new(), Vec::new(), None);
+    for (scene, values) in scenes.iter().zip(&runs) {
+        let mut clock = Clock::default();
+        let mut prepared = run::prepare(session, scene, &mut clock)?;
+        run::set_up(session, &mut prepared, &mut clock)?;
+        let outcome = run::iterate(scene, &mut prepared.problem.model, &mut Silent, &mut clock)?;
+        clock.total();
+        let report = report::report(session, scene, &prepared, &outcome, &clock);
+        options::withdraw(session)?;
+        exit = exit.max(report::exit_code(&outcome.status));
+        if !first {
+            continue;
+        }
+        let label = label(&axes, values);
+        if reports.is_empty() {
+            row(&mut table, &folder, header(&axes, &report))?;
+        }
+        row(&mut table, &folder, line(values, &report))?;
+        if !request.json {
+            println!("{label}: {}, {} iterations, residual {}", report.status, report.iterations, sci(report.residual.unwrap_or(f64::NAN), 2));
+        }
+        histories.push(report::convergence(&label, &outcome));
+        for i in 0..prepared.problem.model.pairs.len() {
+            pressures.push((i, report::main_axis(&prepared.problem.model.pairs[i]).1, report::pressure(&label, &prepared, &outcome, i)));
+            if let Some(curve) = report::reference(scene, &prepared.problem.model, i) {
+                reference.get_or_insert((i, curve));
+            }
+        }
+        reports.push(report);
+    }
+    if first {
+        plots(&folder, &scenes[0].title, histories, pressures, reference)?;
+        if request.json {
+            let list = serde_json::to_string_pretty(&reports).map_err(|cause| {
+                Error::new(Kind::File, "the reports cannot be written as JSON").because(cause.to_string())
+            })?;
+            println!("{list}");
+        } else {
+            println!("results in {}", folder.path().display());
+        }
+    }
+    Ok(exit)
+}
+
+/// One `--over`: key and values. Commas inside brackets, braces, parentheses or quotes do not separate.
+fn axis(text: &str) -> Result<(String, Vec<String>)> {
+    let refuse = || {
+        Error::new(Kind::Usage, format!("`--over {text}` is not KEY=V1,V2,..."))
+            .help("for example --over method.gamma=0.3,0.6,0.9")
+    };
+    let (key, list) = text.split_once('=').ok_or_else(refuse)?;
+    let mut values = vec![String::new()];
+    let (mut depth, mut quote) = (0, None);
+    for c in list.chars() {
+        match (quote, c) {
+            (None, '"' | '\'') => quote = Some(c),
+            (Some(open), c) if c == open => quote = None,
+            (None, '[' | '{' | '(') => depth += 1,
+            (None, ']' | '}' | ')') => depth -= 1,
+            (None, ',') if depth == 0 => {
+                values.push(String::new());
+                continue;
+            }
+            _ => {}
+        }
+        if let Some(value) = values.last_mut() {
+            value.push(c);
+        }
+    }
+    if key.trim().is_empty() || values.iter().any(|value| value.trim().is_empty()) {
+        return Err(refuse());
+    }
+    Ok((key.trim().to_owned(), values.into_iter().map(|value| value.trim().to_owned()).collect()))
+}
+
+fn combinations(axes: &[(String, Vec<String>)]) -> Vec<Vec<String>> {
+    axes.iter().fold(vec![Vec::new()], |runs, (_, values)| {
+        runs.iter()
+            .flat_map(|run| values.iter().map(move |value| [run.clone(), vec![value.clone()]].concat()))
+            .collect()
+    })
+}
+
+fn label(axes: &[(String, Vec<String>)], values: &[String]) -> String {
+    let parts = axes.iter().zip(values).map(|((key, _), value)| {
+        let short = key.rsplit('.').next().unwrap_or(key);
+        format!("{short} = {value}")
+    });
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+fn header(axes: &[(String, Vec<String>)], report: &Report) -> Vec<String> {
+    let mut header: Vec<String> = axes.iter().map(|(key, _)| key.clone()).collect();
+    let columns = ["status", "iterations", "sweeps", "factorizations", "inner_iterations", "residual", "increment", "F1", "dofs", "seconds"];
+    header.extend(columns.map(str::to_owned));
+    for pair in &report.pairs {
+        let name = format!("{}-{}", pair.bodies[0], pair.bodies[1]);
+        header.extend(["peak_pressure", "contact_length", "layer_energy"].map(|what| format!("{what} {name}")));
+    }
+    header
+}
+
+fn line(values: &[String], report: &Report) -> Vec<String> {
+    let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
+    let mut line = values.to_vec();
+    line.push(report.status.clone());
+    let counts = [report.iterations, report.sweeps, report.factorizations, report.inner_iterations];
+    line.extend(counts.map(|count| count.to_string()));
+    line.extend([report.residual, report.increment, report.f1].map(number));
+    line.push(report.dofs.to_string());
+    line.push(number(report.times.get("total").copied()));
+    for pair in &report.pairs {
+        line.extend([pair.peak_pressure, pair.contact_length, pair.layer_energy].map(|value| format!("{value:?}")));
+    }
+    line
+}
+
+/// Writes a row at once: what was computed is kept whatever comes next.
+fn row(table: &mut csv::Writer<std::fs::File>, folder: &Folder, fields: Vec<String>) -> Result<()> {
+    let written = table.write_record(&fields).map_err(std::io::Error::from).and_then(|()| table.flush());
+    written.map_err(|cause| Error::file(&folder.path().join("sweep.csv"), "write", &cause))
+}
+
+fn plots(
+    folder: &Folder,
+    title: &str,
+    histories: Vec<ConvergenceSeries>,
+    pressures: Vec<(usize, &'static str, PressureSeries)>,
+    reference: Option<(usize, PressureSeries)>,
+) -> Result<()> {
+    let convergence = Plot::convergence(title, &histories);
+    folder.write("convergence.svg", |out| convergence.write(out))?;
+    let pairs = pressures.iter().map(|(pair, ..)| pair + 1).max().unwrap_or(0);
+    for pair in 0..pairs {
+        let of_pair = || pressures.iter().filter(|(index, ..)| *index == pair);
+        let mut curves: Vec<PressureSeries> = of_pair().map(|(.., curve)| curve.clone()).collect();
+        curves.extend(reference.iter().filter(|(index, _)| *index == pair).map(|(_, curve)| curve.clone()));
+        let axis = of_pair().map(|(_, axis, _)| *axis).next().unwrap_or("x");
+        let plot = Plot::pressure(title, axis, &curves);
+        folder.write(&folder.unused("pressure", "svg"), |out| plot.write(out))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_split_at_commas_outside_brackets_and_all_combinations_made() {
+        let a = axis("method.gamma=0.3, 0.6").expect("two numbers");
+        assert_eq!(a, ("method.gamma".to_owned(), vec!["0.3".to_owned(), "0.6".to_owned()]));
+        let b = axis("contact.0.gap=\"max(x, 1)\",0").expect("an expression and a number");
+        assert_eq!(b.1, ["\"max(x, 1)\"", "0"]);
+        assert!(axis("method.gamma").is_err() && axis("method.gamma=1,,2").is_err());
+        let runs = combinations(&[a, b]);
+        assert_eq!(runs.len(), 4);
+        assert_eq!(runs[1], ["0.3", "0"]);
+    }
+}

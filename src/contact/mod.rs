@@ -1,0 +1,14 @@
+//! Contact of two surfaces: search, common pieces, and the arrays that the method works on.
+//!
+//! Data flow: two [`Side`]s -> [`pieces`] (integration points that both sides share) -> [`ContactPair`]
+//! (weights, rows B_a and B_b, gaps), which knows no dimension. Layer laws live in [`law`].
+
+pub mod law;
+pub mod order;
+mod pair;
+pub mod pieces;
+mod side;
+
+pub use law::{LayerLaw, Response};
+pub use pair::{ContactPair, Fault, assemble, pad};
+pub use side::Side;

@@ -1,0 +1,238 @@
+//! The arrays of a contact pair: all that the method knows of two surfaces.
+
+use super::law::LayerLaw;
+use super::pieces::Shared;
+use super::side::Side;
+use crate::fem::element;
+use crate::linalg::Csr;
+use crate::scene::Order;
+use nalgebra::DMatrix;
+use std::collections::HashMap;
+
+/// A pair of surfaces, discretised: n points with one pressure each.
+///
+/// Point q stands for a function mu_q of a pressure space on side a, with sum_q mu_q = 1 on the covered surface and
+/// omega_q = int mu_q. With <v>_q = (1/omega_q) int mu_q v over the common pieces, the compression of the layer is
+/// `c = B_a u_a + B_b u_b - d`. One set of points serves both sides, so action equals reaction to rounding.
+#[derive(Debug)]
+pub struct ContactPair {
+    /// Names of the two surfaces; the first carries the points.
+    pub surfaces: [String; 2],
+    /// Numbers of the two bodies.
+    pub bodies: [usize; 2],
+    /// Positions of the points on side a, n.
+    pub position: Vec<[f64; 3]>,
+    /// omega_q > 0, length or area, n.
+    pub weight: Vec<f64>,
+    /// Unit normals from side a to side b, n.
+    pub normal: Vec<[f64; 3]>,
+    /// Initial gap d_q along the normal, n: geometry and the scene's own gap.
+    pub gap: Vec<f64>,
+    /// What prescribed displacements contribute to the outer normal displacement of each side, n each.
+    pub prescribed: [Vec<f64>; 2],
+    /// B_a and B_b, n rows each, columns the dofs of the body: `B_a u_a = <n.u_a>`, `B_b u_b = -<n.u_b>`.
+    pub rows: [Csr; 2],
+    /// Sum of each row's entries by component, prescribed dofs included: force vectors on a side are
+    /// `-sum_q omega_q p_q resultant[side][q]`.
+    pub resultant: [Vec<[f64; 3]>; 2],
+    /// Whether the points run along curves in their order (plane problems).
+    pub along_curve: bool,
+    /// Law of the layer.
+    pub law: Box<dyn LayerLaw>,
+    /// Facets of side a without a partner, and all of them.
+    pub uncovered: (usize, usize),
+}
+
+/// Why a pair could not be made.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Fault {
+    /// The surfaces do not face each other anywhere.
+    NoPartner,
+    /// The scene's gap is not finite at a point.
+    Gap([f64; 3]),
+}
+
+/// Makes the arrays of a pair from shared integration points.
+///
+/// `bodies` are the numbers of the bodies of side a and b, `gap(x)` the scene's own gap, added to the geometric one.
+/// Points: the nodes of side a with the dual basis diag(int phi) M^-1 phi of each facet's covered part; a facet on which
+/// that gives a weight that is not positive (quadratic, partly covered) takes the hats of its vertices.
+///
+/// # Errors
+/// [`Fault`] if nothing is covered or the gap is not finite.
+pub fn assemble<const D: usize>(
+    a: &Side<D>,
+    b: &Side<D>,
+    bodies: [usize; 2],
+    shared: &[Shared<D>],
+    gap: &dyn Fn([f64; 3]) -> f64,
+    law: Box<dyn LayerLaw>,
+) -> Result<ContactPair, Fault> {
+    let mut points: HashMap<u32, Accumulator> = HashMap::new();
+    let mut covered = vec![false; a.facets.count()];
+    let group = shared.chunk_by(|p, q| p.facet_a == q.facet_a);
+    for chunk in group {
+        let facet = chunk[0].facet_a;
+        covered[facet] = true;
+        let nodes = a.facets.facet(facet);
+        let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk);
+        for point in chunk {
+            let phi = element::values(a.facets.order, &point.at_a);
+            let psi = element::values(b.facets.order, &point.at_b);
+            let others = b.facets.facet(point.facet_b);
+            for (i, &node) in nodes.iter().enumerate() {
+                let mu = point.weight * basis.value(i, &phi, &point.at_a);
+                if mu == 0.0 {
+                    continue;
+                }
+                let sum = points.entry(node).or_default();
+                sum.weight += mu;
+                nodes.iter().zip(phi).for_each(|(&n, phi)| *sum.sides[0].entry(n).or_default() += mu * phi);
+                others.iter().zip(psi).for_each(|(&n, psi)| *sum.sides[1].entry(n).or_default() += mu * psi);
+            }
+        }
+    }
+    let tiny = 1e-12 * a.mean_measure();
+    let order = super::order::along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&n, _)| n));
+    if order.is_empty() {
+        return Err(Fault::NoPartner);
+    }
+    let size = order.len() as f64 * a.mean_measure();
+    let mut pair = ContactPair {
+        surfaces: [a.name.to_owned(), b.name.to_owned()],
+        bodies,
+        position: Vec::new(),
+        weight: Vec::new(),
+        normal: Vec::new(),
+        gap: Vec::new(),
+        prescribed: [Vec::new(), Vec::new()],
+        rows: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
+        resultant: [Vec::new(), Vec::new()],
+        along_curve: D == 2,
+        law,
+        uncovered: (covered.iter().filter(|&&c| !c).count(), covered.len()),
+    };
+    for node in order {
+        let sum = &points[&node];
+        let normal = a.normals[&node];
+        let mut position = [0.0; D];
+        let mut distance = 0.0;
+        for (side, sign, space, prescribed) in
+            [(0, 1.0, a.space, a.prescribed), (1, -1.0, b.space, b.prescribed)]
+        {
+            let mut entries = Vec::new();
+            let mut resultant = [0.0; D];
+            let mut known = 0.0;
+            for (&n, &value) in &sum.sides[side] {
+                let share = value / sum.weight;
+                // the dual basis is nodal on its own side: the rest of the row is rounding
+                if share.abs() < 1e-13 {
+                    continue;
+                }
+                let x = space.nodes[n as usize];
+                for c in 0..D {
+                    if side == 0 {
+                        position[c] += share * x[c];
+                    }
+                    let entry = sign * share * normal[c];
+                    distance -= entry * x[c];
+                    resultant[c] += entry;
+                    let dof = D * n as usize + c;
+                    match prescribed.get(&dof) {
+                        Some(u) => known += entry * u,
+                        None => entries.push((dof, entry)),
+                    }
+                }
+            }
+            pair.rows[side].push_row(entries);
+            pair.resultant[side].push(pad(resultant));
+            pair.prescribed[side].push(known);
+        }
+        if distance.abs() < 1e-12 * size {
+            distance = 0.0;
+        }
+        let position = pad(position);
+        let own = gap(position);
+        if !own.is_finite() {
+            return Err(Fault::Gap(position));
+        }
+        pair.position.push(position);
+        pair.weight.push(sum.weight);
+        pair.normal.push(pad(normal));
+        pair.gap.push(distance + own);
+    }
+    Ok(pair)
+}
+
+/// A vector of 2 or 3 components as 3.
+pub fn pad<const D: usize>(v: [f64; D]) -> [f64; 3] {
+    std::array::from_fn(|c| if c < D { v[c] } else { 0.0 })
+}
+
+#[derive(Default)]
+struct Accumulator {
+    weight: f64,
+    sides: [std::collections::BTreeMap<u32, f64>; 2],
+}
+
+/// The functions mu_i on the covered part of one facet of side a.
+enum PressureBasis {
+    /// mu = C phi.
+    Dual(DMatrix<f64>),
+    /// mu_i = L_i at vertices, zero at mid-edges.
+    Hats(usize),
+}
+
+impl PressureBasis {
+    fn on<const D: usize>(order: Order, count: usize, chunk: &[Shared<D>]) -> Self {
+        // quadratic triangles have vertex weights of zero: the dual basis does not exist there
+        if order == Order::P2 && D == 3 {
+            return Self::Hats(D);
+        }
+        let mut mass = DMatrix::zeros(count, count);
+        let mut integral = vec![0.0; count];
+        for point in chunk {
+            let phi = element::values(order, &point.at_a);
+            for i in 0..count {
+                integral[i] += point.weight * phi[i];
+                for j in 0..count {
+                    mass[(i, j)] += point.weight * phi[i] * phi[j];
+                }
+            }
+        }
+        let total: f64 = integral.iter().sum();
+        if integral.iter().any(|&w| w <= 1e-6 * total) {
+            return Self::Hats(D);
+        }
+        match mass.cholesky() {
+            Some(factor) => {
+                let mut dual = factor.inverse();
+                for (i, mut row) in dual.row_iter_mut().enumerate() {
+                    row *= integral[i];
+                }
+                Self::Dual(dual)
+            }
+            None => Self::Hats(D),
+        }
+    }
+
+    fn value<const D: usize>(&self, i: usize, phi: &[f64], l: &[f64; D]) -> f64 {
+        match self {
+            Self::Dual(c) => c.row(i).iter().zip(phi).map(|(c, phi)| c * phi).sum(),
+            Self::Hats(vertices) if i < *vertices => l[i],
+            Self::Hats(_) => 0.0,
+        }
+    }
+}
+
+impl ContactPair {
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.weight.len()
+    }
+
+    /// Whether the pair has no points; [`assemble`] makes none such.
+    pub fn is_empty(&self) -> bool {
+        self.weight.is_empty()
+    }
+}

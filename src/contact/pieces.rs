@@ -1,0 +1,230 @@
+//! Common pieces of two surfaces: where facets face each other along the normals of side a, cut so that
+//! products of shape functions of both sides are integrated exactly.
+//!
+//! In the plane a piece is an interval of a facet of side a. Normals are interpolated between the nodes of
+//! side a, so that curved surfaces are covered without gaps or overlaps between neighbouring facets.
+
+use super::side::{Side, length};
+use crate::fem::{element, quadrature};
+use crate::scene::Order;
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, RTree};
+
+/// An integration point that both surfaces share.
+#[derive(Debug, Clone, Copy)]
+pub struct Shared<const D: usize> {
+    /// Facet of side a.
+    pub facet_a: usize,
+    /// Barycentric coordinates in it.
+    pub at_a: [f64; D],
+    /// Facet of side b.
+    pub facet_b: usize,
+    /// Barycentric coordinates of the projection along the normal of side a.
+    pub at_b: [f64; D],
+    /// Length (area) that belongs to the point, measured on side a.
+    pub weight: f64,
+}
+
+/// Parameters closer than this to a facet's end are its end: surfaces that match do match.
+const SNAP: f64 = 1e-9;
+
+/// Finds the common pieces of two surfaces: integration points grouped by facet of side a.
+pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>) -> Vec<Shared<D>>;
+
+/// Integration points of the common pieces of two plane curves, grouped by facet of side a.
+pub fn plane(a: &Side<2>, b: &Side<2>) -> Vec<Shared<2>> {
+    let tree = RTree::bulk_load(
+        (0..b.facets.count())
+            .map(|i| {
+                let (low, high) = b.bounds(i);
+                GeomWithData::new(Rectangle::from_corners(low, high), i)
+            })
+            .collect(),
+    );
+    // faces farther apart than the smaller surface is long are not a pair
+    let extent = |side: &Side<2>| side.mean_measure() * side.facets.count() as f64;
+    let reach = extent(a).min(extent(b));
+    let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
+    let rule = quadrature::gauss(if quadratic { 4 } else { 3 });
+    let mut points = Vec::new();
+    for i in 0..a.facets.count() {
+        let facet = Curve::of(a, i);
+        let (low, high) = a.bounds(i);
+        let middle = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])];
+        let Some(nearest) = tree.nearest_neighbor(middle) else { continue };
+        let margin = distance_to(nearest.geom(), middle) + length(a.area(i));
+        let window = AABB::from_corners(low.map(|x| x - margin), high.map(|x| x + margin));
+        let mut found: Vec<Piece> = tree
+            .locate_in_envelope_intersecting(window)
+            .filter_map(|candidate| Piece::between(&facet, Curve::of(b, candidate.data), candidate.data))
+            .filter(|piece| piece.gap.abs() <= reach)
+            .collect();
+        found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
+        let mut free = vec![(0.0, 1.0)];
+        let mut pieces = Vec::new();
+        for piece in found {
+            for (low, high) in take(&mut free, piece.range) {
+                pieces.push((low, high, piece.index, Curve::of(b, piece.index)));
+            }
+        }
+        pieces.sort_by(|p, q| p.0.total_cmp(&q.0));
+        for (low, high, index, other) in pieces {
+            for &(position, weight) in &rule {
+                let s = low + (high - low) * position;
+                let Some(t) = other.hit(facet.at(s), facet.normal(s)) else { continue };
+                points.push(Shared {
+                    facet_a: i,
+                    at_a: [1.0 - s, s],
+                    facet_b: index,
+                    at_b: [1.0 - t, t],
+                    weight: weight * (high - low) * length(facet.tangent(s)),
+                });
+            }
+        }
+    }
+    points
+}
+
+fn distance_to(rectangle: &Rectangle<[f64; 2]>, point: [f64; 2]) -> f64 {
+    let (low, high) = (rectangle.lower(), rectangle.upper());
+    length([0, 1].map(|c| (low[c] - point[c]).max(point[c] - high[c]).max(0.0)))
+}
+
+/// Removes `range` from the free intervals and returns what it got of them.
+fn take(free: &mut Vec<(f64, f64)>, range: (f64, f64)) -> Vec<(f64, f64)> {
+    let (mut got, mut left) = (Vec::new(), Vec::new());
+    for &(low, high) in free.iter() {
+        let (from, to) = (low.max(range.0), high.min(range.1));
+        if to - from <= SNAP {
+            left.push((low, high));
+            continue;
+        }
+        got.push((from, to));
+        left.extend([(low, from), (to, high)].into_iter().filter(|(l, h)| h - l > SNAP));
+    }
+    *free = left;
+    got
+}
+
+/// A facet of side a or b as a parametrised curve x(s), s from 0 to 1.
+struct Curve {
+    order: Order,
+    x: Vec<[f64; 2]>,
+    normals: [[f64; 2]; 2],
+}
+
+impl Curve {
+    fn of(side: &Side<2>, i: usize) -> Self {
+        let nodes = side.facets.facet(i);
+        Self {
+            order: side.facets.order,
+            x: side.facets.coordinates(i, side.space),
+            normals: [side.normals[&nodes[0]], side.normals[&nodes[1]]],
+        }
+    }
+
+    fn at(&self, s: f64) -> [f64; 2] {
+        crate::fem::assemble::interpolate(&self.x, &element::values(self.order, &[1.0 - s, s]))
+    }
+
+    fn tangent(&self, s: f64) -> [f64; 2] {
+        let d = element::derivatives(self.order, &[1.0 - s, s]);
+        std::array::from_fn(|c| (0..self.x.len()).map(|n| (d[n][1] - d[n][0]) * self.x[n][c]).sum())
+    }
+
+    fn normal(&self, s: f64) -> [f64; 2] {
+        std::array::from_fn(|c| (1.0 - s) * self.normals[0][c] + s * self.normals[1][c])
+    }
+
+    /// Parameter at which the ray from `x` along `n` meets the curve: cross(x(s) - x, n) = 0.
+    fn hit(&self, x: [f64; 2], n: [f64; 2]) -> Option<f64> {
+        let mut s = 0.5;
+        for _ in 0..30 {
+            let here = self.at(s);
+            let slope = cross(self.tangent(s), n);
+            let step = cross([here[0] - x[0], here[1] - x[1]], n) / slope;
+            s -= step;
+            if !s.is_finite() || s.abs() > 1e3 {
+                return None;
+            }
+            if step.abs() < 1e-14 {
+                break;
+            }
+        }
+        Some(s)
+    }
+
+    /// Parameter whose normal passes through `x`: cross(x - x(s), n(s)) = 0.
+    fn foot(&self, x: [f64; 2]) -> Option<f64> {
+        let turn: [f64; 2] = std::array::from_fn(|c| self.normals[1][c] - self.normals[0][c]);
+        let mut s = 0.5;
+        for _ in 0..30 {
+            let (here, t, n) = (self.at(s), self.tangent(s), self.normal(s));
+            let arm = [x[0] - here[0], x[1] - here[1]];
+            let step = cross(arm, n) / (cross(arm, turn) - cross(t, n));
+            s -= step;
+            if !s.is_finite() || s.abs() > 1e3 {
+                return None;
+            }
+            if step.abs() < 1e-14 {
+                break;
+            }
+        }
+        Some(s)
+    }
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+/// Part of a facet of side a that faces one facet of side b.
+struct Piece {
+    range: (f64, f64),
+    index: usize,
+    gap: f64,
+}
+
+impl Piece {
+    fn between(a: &Curve, b: Curve, index: usize) -> Option<Self> {
+        let facing: f64 = (0..2)
+            .map(|c| (a.normals[0][c] + a.normals[1][c]) * (b.normals[0][c] + b.normals[1][c]))
+            .sum();
+        if facing >= 0.0 {
+            return None;
+        }
+        let snap = |s: f64| {
+            if s.abs() < SNAP {
+                0.0
+            } else if (s - 1.0).abs() < SNAP {
+                1.0
+            } else {
+                s
+            }
+        };
+        let (first, last) = (snap(a.foot(b.x[0])?), snap(a.foot(b.x[1])?));
+        let (low, high) = (first.min(last).max(0.0), first.max(last).min(1.0));
+        if high - low <= SNAP {
+            return None;
+        }
+        let middle = 0.5 * (low + high);
+        let (from, normal) = (a.at(middle), a.normal(middle));
+        let to = b.at(b.hit(from, normal)?);
+        let gap = (0..2).map(|c| (to[c] - from[c]) * normal[c]).sum::<f64>() / length(normal);
+        Some(Self { range: (low, high), index, gap })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::take;
+
+    #[test]
+    fn intervals_are_given_away_once() {
+        let mut free = vec![(0.0, 1.0)];
+        assert_eq!(take(&mut free, (0.25, 0.5)), [(0.25, 0.5)]);
+        assert_eq!(take(&mut free, (0.0, 0.75)), [(0.0, 0.25), (0.5, 0.75)]);
+        assert_eq!(free, [(0.75, 1.0)]);
+        assert_eq!(take(&mut free, (0.25, 0.75)), []);
+    }
+}

@@ -1,0 +1,77 @@
+//! One surface of a pair: facets of a body with averaged nodal normals.
+
+use crate::fem::space::area_vector;
+use crate::fem::{Facets, Space, element};
+use std::collections::HashMap;
+
+/// One contact surface of a body.
+#[derive(Debug, Clone)]
+pub struct Side<'a, const D: usize> {
+    /// Name of the mesh group.
+    pub name: &'a str,
+    /// The body's space.
+    pub space: &'a Space<D>,
+    /// The facets, oriented outwards.
+    pub facets: Facets<D>,
+    /// Prescribed dofs of the body and their values.
+    pub prescribed: &'a HashMap<usize, f64>,
+    /// Outer unit normal at each node of the surface: mean of the facets around it.
+    pub normals: HashMap<u32, [f64; D]>,
+}
+
+impl<'a, const D: usize> Side<'a, D> {
+    /// The side with its nodal normals.
+    pub fn new(
+        name: &'a str,
+        space: &'a Space<D>,
+        facets: Facets<D>,
+        prescribed: &'a HashMap<usize, f64>,
+    ) -> Self {
+        let mut normals: HashMap<u32, [f64; D]> = HashMap::new();
+        let places = element::nodes::<D>(facets.order);
+        for i in 0..facets.count() {
+            let x = facets.coordinates(i, space);
+            for (l, &node) in places.iter().zip(facets.facet(i)) {
+                let area = area_vector(facets.order, &x, l);
+                let sum = normals.entry(node).or_insert([0.0; D]);
+                (0..D).for_each(|c| sum[c] += area[c]);
+            }
+        }
+        for normal in normals.values_mut() {
+            *normal = unit(*normal);
+        }
+        Self { name, space, facets, prescribed, normals }
+    }
+
+    /// Mean measure (length, area) of a facet.
+    pub fn mean_measure(&self) -> f64 {
+        let total: f64 = (0..self.facets.count()).map(|i| length(self.area(i))).sum();
+        total / self.facets.count().max(1) as f64
+    }
+
+    /// Outer normal times measure at the middle of facet `i`.
+    pub fn area(&self, i: usize) -> [f64; D] {
+        let x = self.facets.coordinates(i, self.space);
+        area_vector(self.facets.order, &x, &[1.0 / D as f64; D])
+    }
+
+    /// Corners of the box around facet `i`.
+    pub fn bounds(&self, i: usize) -> ([f64; D], [f64; D]) {
+        let x = self.facets.coordinates(i, self.space);
+        let corner = |pick: fn(f64, f64) -> f64| -> [f64; D] {
+            std::array::from_fn(|c| x[1..].iter().fold(x[0][c], |value, x| pick(value, x[c])))
+        };
+        (corner(f64::min), corner(f64::max))
+    }
+}
+
+/// Euclidean length.
+pub fn length<const D: usize>(v: [f64; D]) -> f64 {
+    v.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// The vector scaled to length one.
+pub fn unit<const D: usize>(v: [f64; D]) -> [f64; D] {
+    let norm = length(v);
+    v.map(|v| v / norm)
+}

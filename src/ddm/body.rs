@@ -1,0 +1,96 @@
+//! What the method asks of a body.
+
+use crate::error::Result;
+
+/// Quadratic terms of F1 (25) of one body.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Energy {
+    /// u'Ku, twice the strain energy.
+    pub strain: f64,
+    /// u'Ku/2 - f'u.
+    pub potential: f64,
+}
+
+/// How a solve G z = r ended.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Solved {
+    /// Krylov iterations; 0 for a direct solver.
+    pub iterations: usize,
+    /// Why the inner solver gave up, in its own words; `None` if it reached its tolerance.
+    pub failure: Option<String>,
+}
+
+/// What a body did so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct BodyCounts {
+    /// Numeric factorisations or preconditioner set-ups.
+    pub factorizations: usize,
+    /// Symbolic factorisations (patterns analysed).
+    pub symbolic: usize,
+    /// Solves G z = r.
+    pub solves: usize,
+    /// Krylov iterations in them.
+    pub inner_iterations: usize,
+    /// Changes of the Robin term that reached the matrix.
+    pub robin_updates: usize,
+    /// Changes asked for that changed nothing and cost nothing.
+    pub robin_skipped: usize,
+}
+
+/// An elastic body with stiffness K, load f and contact rows B (one row a contact point of each of its surfaces).
+///
+/// A state is a vector of `len()` numbers whose meaning is the body's own: all dofs, or those that were retained.
+/// Solves need not be exact; what is exact is [`Body::residual`].
+pub trait Body {
+    /// Length of a state.
+    fn len(&self) -> usize;
+
+    /// Whether states are empty; they never are.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The undeformed state: zero on free dofs, prescribed values on supports.
+    fn rest(&self) -> Vec<f64>;
+
+    /// t = B u: outer normal displacement at each row, without what prescribed dofs contribute.
+    fn trace(&self, u: &[f64], t: &mut [f64]);
+
+    /// r = f - K u - B' force, `force` = omega p at each row: the equilibrium residual (26). Also returns the
+    /// energies of u.
+    fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy;
+
+    /// y = K u.
+    fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]);
+
+    /// Makes G = K + B' diag(weight) B (37)-(38), `weight` = omega psi kappa at each row. Nothing happens if the weights
+    /// are those of the last call.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn robin(&mut self, weight: &[f64]) -> Result<()>;
+
+    /// Factors G, or sets its preconditioner up, if that has not been done since it changed.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn set_up(&mut self) -> Result<()>;
+
+    /// Solves G z = r (41) with zero guess.
+    ///
+    /// # Errors
+    /// Failures of the solver library; not converging is told in [`Solved`].
+    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
+
+    /// Size of the rounding errors in [`Body::residual`], as |e|_{diag(G)^-1} squared.
+    fn rounding(&self, u: &[f64], force: &[f64]) -> f64;
+
+    /// What was done so far.
+    fn counts(&self) -> BodyCounts;
+
+    /// Displacements of all nodes for a state.
+    fn recover(&self, u: &[f64]) -> Vec<f64>;
+
+    /// One line about the inner solver.
+    fn describe(&self) -> String;
+}

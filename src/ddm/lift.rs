@@ -1,0 +1,76 @@
+//! The start: a trace, lifted into every body with the interior in equilibrium.
+//!
+//! The sweep (41) depends on the iterate through its traces only, so a start is a trace. Its lift minimises the energy
+//! of the body among the displacements with that trace: the augmented Lagrangian method with springs much stiffer than
+//! the body, whose error shrinks by their ratio in every step.
+
+use super::body::Solved;
+use super::model::{BodySlot, Model};
+use super::sweep::Iterate;
+use crate::error::Result;
+
+/// Springs of the constraint B u = t over the stiffness of the nodes under them.
+const STIFF: f64 = 1e4;
+/// Steps; each gains a factor of about `STIFF` over the surface's compliance.
+const STEPS: usize = 4;
+
+/// Gives every body that lives here the springs of the lift and sets its solver up, so that a refusal of the solver or
+/// of an option comes before the first sweep. The start then finds its factorisation made.
+///
+/// # Errors
+/// Failures of the solver library.
+pub fn prepare(model: &mut Model) -> Result<()> {
+    for slot in &mut model.bodies {
+        let springs = springs(slot);
+        if let Some(body) = &mut slot.local {
+            body.robin(&springs)?;
+            body.set_up()?;
+        }
+    }
+    Ok(())
+}
+
+fn springs(slot: &BodySlot) -> Vec<f64> {
+    slot.row_stiffness.iter().map(|k| STIFF * k).collect()
+}
+
+/// The iterate with the given trace (values where a support prescribes the row are not taken: the support wins).
+/// The second value is a body whose inner solver failed, with its reason.
+///
+/// # Errors
+/// Failures of the solver library.
+pub fn lift(model: &mut Model, trace: &[f64]) -> Result<(Iterate, Option<(usize, String)>)> {
+    let mut iterate = Iterate { states: Vec::new(), trace: vec![0.0; trace.len()] };
+    let mut failed = None;
+    for index in 0..model.bodies.len() {
+        let target = model.of_body(index, trace);
+        let slot = &mut model.bodies[index];
+        let springs = springs(slot);
+        let Some(body) = &mut slot.local else {
+            iterate.states.push(Vec::new());
+            continue;
+        };
+        body.robin(&springs)?;
+        let mut u = body.rest();
+        let (mut r, mut z) = (vec![0.0; u.len()], vec![0.0; u.len()]);
+        let mut rows = vec![0.0; springs.len()];
+        let mut multiplier = vec![0.0; springs.len()];
+        for _ in 0..STEPS {
+            body.trace(&u, &mut rows);
+            for q in 0..rows.len() {
+                multiplier[q] += springs[q] * (rows[q] - target[q]);
+            }
+            body.residual(&u, &multiplier, &mut r);
+            let Solved { failure, .. } = body.solve(&r, &mut z)?;
+            if let Some(reason) = failure {
+                failed.get_or_insert((index, reason));
+            }
+            crate::linalg::axpy(1.0, &z, &mut u);
+        }
+        body.trace(&u, &mut rows);
+        model.put(index, &rows, &mut iterate.trace);
+        iterate.states.push(u);
+    }
+    model.exchange.sum(&mut iterate.trace);
+    Ok((iterate, failed))
+}

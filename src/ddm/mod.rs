@@ -1,0 +1,27 @@
+//! The method: Robin-Robin domain decomposition for the nonlinear variational equation (29).
+//!
+//! Start with [`iterate`]: the loop. It works on point arrays (compression, pressure, tangent, weight) and on
+//! bodies that answer the verbs of [`Body`]; it knows no dimension, no element, no mesh and no PETSc.
+
+pub mod body;
+pub mod gamma;
+pub mod held;
+pub mod iterate;
+pub mod layer;
+mod lift;
+pub mod model;
+mod progress;
+pub mod stop;
+pub mod sweep;
+pub mod zone;
+
+pub use body::{Body, BodyCounts, Energy, Solved};
+pub use gamma::{GammaRule, Stationary};
+pub use iterate::{Outcome, Settings, Status, solve};
+pub use layer::Layer;
+pub use lift::prepare;
+pub use model::{BodySlot, Exchange, Model, Motion, Segment, Serial};
+pub use progress::{Observer, Row, Silent};
+pub use stop::StopRule;
+pub use sweep::{Iterate, Sweep};
+pub use zone::RobinZone;

@@ -1,0 +1,146 @@
+//! The discrete problem as the method sees it: bodies that answer verbs, and arrays of contact points.
+//!
+//! Points of all pairs are numbered through: point q of pair i is `offset[i] + q`. A trace vector has two entries a
+//! point, first all of side a, then all of side b: `trace[side * points + offset[pair] + q]`.
+
+use super::body::Body;
+use crate::contact::ContactPair;
+use crate::error::Result;
+use std::ops::Range;
+
+/// Sums over the ranks of a parallel run. Every entry is non-zero on one rank only, so sums are exact and every rank
+/// gets the serial numbers.
+pub trait Exchange {
+    /// Replaces `values` on every rank by the sum over the ranks.
+    fn sum(&self, values: &mut [f64]);
+    /// Collective calls made so far.
+    fn messages(&self) -> usize;
+}
+
+/// One process: nothing to exchange.
+#[derive(Debug, Default)]
+pub struct Serial;
+
+impl Exchange for Serial {
+    fn sum(&self, _values: &mut [f64]) {}
+    fn messages(&self) -> usize {
+        0
+    }
+}
+
+/// Which contact rows a body has: side `side` of pair `pair`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Segment {
+    /// Number of the pair.
+    pub pair: usize,
+    /// 0 for side a, which carries the points, 1 for side b.
+    pub side: usize,
+}
+
+/// A rigid motion that a body's supports leave free.
+#[derive(Debug, Clone)]
+pub struct Motion {
+    /// Name for messages.
+    pub name: String,
+    /// Its trace on the body's contact rows; largest displacement in the body about one.
+    pub trace: Vec<f64>,
+}
+
+/// A body in the model; the arrays are known on every rank, the body itself where it lives.
+pub struct BodySlot {
+    /// Name in the scene.
+    pub name: String,
+    /// The body, on the rank that owns it.
+    pub local: Option<Box<dyn Body>>,
+    /// Its contact rows, in this order.
+    pub segments: Vec<Segment>,
+    /// Rigid motions that its supports leave free.
+    pub motions: Vec<Motion>,
+    /// Largest diagonal entry of K.
+    pub scale: f64,
+    /// b diag(K) b' of each contact row b: stiffness of the nodes under a point.
+    pub row_stiffness: Vec<f64>,
+}
+
+/// The discrete problem.
+pub struct Model {
+    /// Every body, in the order of the scene.
+    pub bodies: Vec<BodySlot>,
+    /// Every pair, in the order of the scene.
+    pub pairs: Vec<ContactPair>,
+    /// First point of each pair, and the number of all points.
+    pub offset: Vec<usize>,
+    /// omega of all points.
+    pub weight: Vec<f64>,
+    /// d of all points, less what prescribed displacements close of it.
+    pub gap: Vec<f64>,
+    /// Connection to the other ranks.
+    pub exchange: Box<dyn Exchange>,
+}
+
+impl Model {
+    /// Joins bodies and pairs.
+    pub fn new(bodies: Vec<BodySlot>, pairs: Vec<ContactPair>, exchange: Box<dyn Exchange>) -> Self {
+        let mut offset = vec![0];
+        for pair in &pairs {
+            offset.push(offset[offset.len() - 1] + pair.len());
+        }
+        let weight = pairs.iter().flat_map(|pair| pair.weight.iter().copied()).collect();
+        let free_gap = |pair: &ContactPair, q: usize| pair.gap[q] - pair.prescribed[0][q] - pair.prescribed[1][q];
+        let gap = pairs.iter().flat_map(|pair| (0..pair.len()).map(|q| free_gap(pair, q))).collect();
+        Self { bodies, pairs, offset, weight, gap, exchange }
+    }
+
+    /// Number of contact points of all pairs.
+    pub fn points(&self) -> usize {
+        self.weight.len()
+    }
+
+    /// Points of pair `i` among all.
+    pub fn range(&self, i: usize) -> Range<usize> {
+        self.offset[i]..self.offset[i + 1]
+    }
+
+    /// Parts of a trace vector that belong to the rows of a body, in their order.
+    pub fn trace_ranges(&self, body: usize) -> impl Iterator<Item = Range<usize>> + '_ {
+        let points = self.points();
+        self.bodies[body].segments.iter().map(move |segment| {
+            let range = self.range(segment.pair);
+            segment.side * points + range.start..segment.side * points + range.end
+        })
+    }
+
+    /// Values at points, as seen by the rows of a body.
+    pub fn at_rows(&self, body: usize, points: &[f64]) -> Vec<f64> {
+        self.bodies[body].segments.iter().flat_map(|s| points[self.range(s.pair)].iter().copied()).collect()
+    }
+
+    /// The part of a trace vector that belongs to a body.
+    pub fn of_body(&self, body: usize, trace: &[f64]) -> Vec<f64> {
+        self.trace_ranges(body).flat_map(|range| trace[range].iter().copied()).collect()
+    }
+
+    /// Writes a body's rows into a trace vector.
+    pub fn put(&self, body: usize, rows: &[f64], trace: &mut [f64]) {
+        let mut next = 0;
+        for range in self.trace_ranges(body) {
+            let count = range.len();
+            trace[range].copy_from_slice(&rows[next..next + count]);
+            next += count;
+        }
+    }
+
+    /// Gives every body its Robin term `weight` = omega psi kappa at the points (37)-(38).
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn robin(&mut self, weight: &[f64]) -> Result<()> {
+        for body in 0..self.bodies.len() {
+            let rows = self.at_rows(body, weight);
+            if let Some(local) = &mut self.bodies[body].local {
+                local.robin(&rows)?;
+            }
+        }
+        Ok(())
+    }
+}

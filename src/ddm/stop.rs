@@ -1,0 +1,135 @@
+//! When to stop: residual, the paper's increment rule, rounding floor, cycles.
+
+use std::collections::VecDeque;
+
+/// Rules of a run; the first one met ends it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StopRule {
+    /// Relative residual at most this.
+    pub residual: Option<f64>,
+    /// The paper's rule: rho of every body at most this.
+    pub increment: Option<f64>,
+    /// Updates at most.
+    pub iterations: usize,
+}
+
+impl StopRule {
+    /// Whether an iterate with this residual, reached by this increment (NaN before the first update), is good
+    /// enough.
+    pub fn is_met(&self, residual: f64, increment: f64) -> bool {
+        self.residual.is_some_and(|tolerance| residual <= tolerance)
+            || self.increment.is_some_and(|tolerance| increment <= tolerance)
+    }
+}
+
+/// The paper's rho: norm of the increment of normal displacements over the norm of the displacements. Zero over zero
+/// is zero.
+pub fn relative_increment(step: &[f64], now: &[f64]) -> f64 {
+    let norm = |v: &[f64]| crate::linalg::dot(v, v).sqrt();
+    if norm(step) == 0.0 { 0.0 } else { norm(step) / norm(now) }
+}
+
+/// Numerator over reference, where a zero reference asks for an absolute zero.
+///
+/// The reference is at least 1e-8 of the largest one of the run, so that a solution that is zero is reached.
+#[derive(Debug, Default)]
+pub struct Reference {
+    largest: f64,
+}
+
+impl Reference {
+    /// sqrt(numerator / reference), both squared norms.
+    pub fn relative(&mut self, numerator: f64, reference: f64) -> f64 {
+        self.largest = self.largest.max(reference);
+        let reference = reference.max(1e-16 * self.largest);
+        // rounding can make a tiny numerator negative
+        if numerator.abs() == 0.0 { 0.0 } else { (numerator.max(0.0) / reference).sqrt() }
+    }
+}
+
+/// Watches for progress: at the rounding floor the residual stays where it is.
+#[derive(Debug)]
+pub struct Floor {
+    best: f64,
+    since: usize,
+}
+
+impl Default for Floor {
+    fn default() -> Self {
+        Self { best: f64::INFINITY, since: 0 }
+    }
+}
+
+impl Floor {
+    /// Iterations without a residual a tenth below the best one, after which rounding is suspected.
+    const PATIENCE: usize = 20;
+
+    /// Notes a residual; true when it is time to compare it with the rounding errors.
+    pub fn is_suspected(&mut self, residual: f64) -> bool {
+        if residual < 0.9 * self.best {
+            self.best = residual;
+            self.since = 0;
+        } else {
+            self.since += 1;
+        }
+        self.since > 0 && self.since.is_multiple_of(Self::PATIENCE)
+    }
+}
+
+/// Recognises traces that come back: the iteration runs in a circle.
+#[derive(Debug, Default)]
+pub struct Cycle {
+    recent: VecDeque<Vec<f64>>,
+}
+
+impl Cycle {
+    /// Longest period looked for.
+    const LONGEST: usize = 8;
+
+    /// The period, if `trace` equals one seen 2 to 8 updates ago while the last update moved it.
+    pub fn period(&mut self, trace: &[f64]) -> Option<usize> {
+        let size = crate::linalg::dot(trace, trace).sqrt();
+        let apart = |other: &[f64]| {
+            trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt() / size
+        };
+        let moved = self.recent.back().is_some_and(|last| apart(last) > 1e-7);
+        let found = (2..=self.recent.len())
+            .find(|&period| moved && apart(&self.recent[self.recent.len() - period]) < 1e-12);
+        if self.recent.len() == Self::LONGEST {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(trace.to_vec());
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cycle_is_seen_and_a_slow_approach_is_not() {
+        let mut cycle = Cycle::default();
+        let found: Vec<_> = (0..9).map(|k| cycle.period(&[(k % 3) as f64, 1.0])).collect();
+        assert_eq!(found.iter().flatten().next(), Some(&3));
+        let mut slow = Cycle::default();
+        assert!((0..100).all(|k| slow.period(&[1.0 + 0.999f64.powi(k)]).is_none()));
+        let mut still = Cycle::default();
+        assert!((0..20).all(|_| still.period(&[1.0]).is_none()));
+    }
+
+    #[test]
+    fn a_vanishing_solution_is_reached_and_a_zero_is_zero() {
+        let mut reference = Reference::default();
+        assert_eq!(reference.relative(0.0, 0.0), 0.0);
+        assert_eq!(reference.relative(4.0, 1.0), 2.0);
+        assert!(reference.relative(1e-40, 1e-40) < 1e-11);
+    }
+
+    #[test]
+    fn stalling_is_suspected_only_after_a_while() {
+        let mut floor = Floor::default();
+        assert!((0..200).all(|k| !floor.is_suspected(0.95f64.powi(k))));
+        assert!((0..20).any(|_| floor.is_suspected(1e-4)));
+    }
+}

@@ -1,0 +1,344 @@
+//! Assembly of stiffness matrix and loads by direct scatter into compressed rows.
+//!
+//! The pattern is built once from the node graph (cells, and couplings through contact rows); entry positions
+//! follow from the graph by arithmetic, so that assembly writes each value straight to its place.
+
+use super::material::Material;
+use super::quadrature;
+use super::space::{Facets, Space, area_vector};
+use super::element;
+use crate::linalg::Csr;
+use crate::scene::Order;
+
+/// Which nodes of a body are coupled: compressed rows of sorted node numbers, symmetric, with diagonal.
+#[derive(Debug, Clone)]
+pub struct NodeGraph {
+    /// Row starts.
+    pub ptr: Vec<u32>,
+    /// Neighbours of each node, the node itself included, sorted.
+    pub col: Vec<u32>,
+}
+
+impl NodeGraph {
+    /// The graph of a space's cells plus `extra` sets of nodes that are coupled among themselves (the nodes of
+    /// each contact row: pattern of B'B).
+    pub fn new<const D: usize>(space: &Space<D>, extra: &[Vec<u32>]) -> Self {
+        let n = space.nodes.len();
+        let sets = || space.cells.chunks_exact(space.stride).chain(extra.iter().map(Vec::as_slice));
+        // node -> sets that contain it
+        let mut start = vec![0u32; n + 1];
+        sets().flatten().for_each(|&node| start[node as usize + 1] += 1);
+        for i in 0..n {
+            start[i + 1] += start[i];
+        }
+        let mut next = start.clone();
+        let mut member = vec![0u32; start[n] as usize];
+        for (index, set) in sets().enumerate() {
+            for &node in set {
+                member[next[node as usize] as usize] = index as u32;
+                next[node as usize] += 1;
+            }
+        }
+        let cell_count = space.cell_count();
+        let set = |index: u32| -> &[u32] {
+            let index = index as usize;
+            if index < cell_count {
+                &space.cells[index * space.stride..(index + 1) * space.stride]
+            } else {
+                &extra[index - cell_count]
+            }
+        };
+        let mut seen = vec![u32::MAX; n];
+        let mut graph = NodeGraph { ptr: vec![0], col: Vec::with_capacity(8 * n) };
+        for i in 0..n {
+            let first = graph.col.len();
+            for &index in &member[start[i] as usize..start[i + 1] as usize] {
+                for &node in set(index) {
+                    if seen[node as usize] != i as u32 {
+                        seen[node as usize] = i as u32;
+                        graph.col.push(node);
+                    }
+                }
+            }
+            graph.col[first..].sort_unstable();
+            graph.ptr.push(graph.col.len() as u32);
+        }
+        graph
+    }
+
+    /// Scalar compressed rows with D x D blocks on this graph, all zero.
+    fn matrix<const D: usize>(&self) -> Csr {
+        let n = self.ptr.len() - 1;
+        let mut ptr = Vec::with_capacity(D * n + 1);
+        let mut col = Vec::with_capacity(D * D * self.col.len());
+        ptr.push(0);
+        for i in 0..n {
+            let neighbours = &self.col[self.ptr[i] as usize..self.ptr[i + 1] as usize];
+            for _ in 0..D {
+                col.extend(neighbours.iter().flat_map(|&j| (0..D).map(move |c| (D * j as usize + c) as i32)));
+                ptr.push(col.len() as i32);
+            }
+        }
+        Csr { columns: D * n, ptr, values: vec![0.0; col.len()], col }
+    }
+
+    /// Where block (i, j) starts in the values of [`NodeGraph::matrix`], and the distance between its rows.
+    fn block<const D: usize>(&self, i: u32, j: u32) -> (usize, usize) {
+        let (from, to) = (self.ptr[i as usize] as usize, self.ptr[i as usize + 1] as usize);
+        let slot = match self.col[from..to].binary_search(&j) {
+            Ok(slot) => slot,
+            Err(_) => unreachable!("the graph holds every pair of nodes of a cell"),
+        };
+        (D * D * from + D * slot, D * (to - from))
+    }
+}
+
+/// One elastic body, discretised: stiffness K, load f, and what the supports took out.
+///
+/// Supported dofs stay as rows of K with one entry, `K[c][c]` = a typical diagonal, and `f[c] = K[c][c] u_c`, so that
+/// their residual vanishes at the prescribed value; their columns went to the right-hand side.
+#[derive(Debug, Clone)]
+pub struct ElasticBody {
+    /// Stiffness matrix K, symmetric positive semidefinite.
+    pub stiffness: Csr,
+    /// Load vector f, one entry a dof.
+    pub load: Vec<f64>,
+    /// Prescribed (dof, value), sorted by dof.
+    pub prescribed: Vec<(usize, f64)>,
+    /// K_fc u_c on the free dofs if some prescribed value is not zero, else empty. Strain energy needs it.
+    pub lifting: Vec<f64>,
+    /// What must be added to u'Ku/2 - f'u to give the potential energy of the body.
+    pub energy_constant: f64,
+    /// u_c'K_cc u_c minus the u_c'K_cc u_c that the scaled diagonal gives: correction of u'Ku.
+    pub strain_constant: f64,
+}
+
+/// Why a body could not be assembled.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Defect {
+    /// Cell (number within the body) with a singular or inverted map.
+    Inverted(usize),
+}
+
+/// Stiffness matrix of a space on a graph.
+///
+/// # Errors
+/// [`Defect::Inverted`] names a cell whose map is not invertible at an integration point.
+pub fn stiffness<const D: usize>(
+    space: &Space<D>,
+    graph: &NodeGraph,
+    material: &Material,
+) -> Result<Csr, Defect> {
+    match D {
+        2 => stiffness_on::<D, 3>(space, graph, material),
+        _ => stiffness_on::<D, 4>(space, graph, material),
+    }
+}
+
+fn stiffness_on<const D: usize, const N: usize>(
+    space: &Space<D>,
+    graph: &NodeGraph,
+    material: &Material,
+) -> Result<Csr, Defect> {
+    let mut matrix = graph.matrix::<D>();
+    let affine = quadrature::simplex::<N>(if space.order == Order::P1 { 1 } else { 2 });
+    let curved = quadrature::simplex::<N>(5);
+    let stride = space.stride;
+    let mut local = vec![[[0.0; D]; D]; stride * stride];
+    let mut x = vec![[0.0; D]; stride];
+    for (index, cell) in space.cells.chunks_exact(stride).enumerate() {
+        for (x, &node) in x.iter_mut().zip(cell) {
+            *x = space.nodes[node as usize];
+        }
+        let rule = if is_affine::<D>(&x) { &affine } else { &curved };
+        local.fill([[0.0; D]; D]);
+        for (l, weight) in rule.points.iter().zip(&rule.weights) {
+            let (gradient, measure) =
+                element::gradients::<D, N>(space.order, &x, l).ok_or(Defect::Inverted(index))?;
+            let weight = weight * measure;
+            for a in 0..stride {
+                for b in a..stride {
+                    let block = material.block(&gradient[a], &gradient[b]);
+                    for i in 0..D {
+                        for j in 0..D {
+                            local[a * stride + b][i][j] += weight * block[i][j];
+                        }
+                    }
+                }
+            }
+        }
+        for a in 0..stride {
+            for b in a..stride {
+                let block = &local[a * stride + b];
+                let (start, step) = graph.block::<D>(cell[a], cell[b]);
+                for i in 0..D {
+                    for j in 0..D {
+                        matrix.values[start + i * step + j] += block[i][j];
+                    }
+                }
+                if a != b {
+                    let (start, step) = graph.block::<D>(cell[b], cell[a]);
+                    for i in 0..D {
+                        for j in 0..D {
+                            matrix.values[start + i * step + j] += block[j][i];
+                        }
+                    }
+                }
+            }
+        }
+    }
+    Ok(matrix)
+}
+
+/// Whether the mid-edge nodes of a cell lie on the straight edges (to rounding of the coordinates).
+fn is_affine<const D: usize>(x: &[[f64; D]]) -> bool {
+    let edges = D * (D + 1) / 2;
+    x.len() == D + 1
+        || element::EDGES[..edges].iter().enumerate().all(|(k, &(i, j))| {
+            let length: f64 = (0..D).map(|c| (x[i][c] - x[j][c]).abs()).sum();
+            (0..D).all(|c| (2.0 * x[D + 1 + k][c] - x[i][c] - x[j][c]).abs() <= 1e-9 * length)
+        })
+}
+
+/// Adds a body force density (per volume) to `load`.
+pub fn body_force<const D: usize>(
+    space: &Space<D>,
+    density: &dyn Fn([f64; D]) -> [f64; D],
+    load: &mut [f64],
+) {
+    match D {
+        2 => body_force_on::<D, 3>(space, density, load),
+        _ => body_force_on::<D, 4>(space, density, load),
+    }
+}
+
+fn body_force_on<const D: usize, const N: usize>(
+    space: &Space<D>,
+    density: &dyn Fn([f64; D]) -> [f64; D],
+    load: &mut [f64],
+) {
+    let rule = quadrature::simplex::<N>(if space.order == Order::P1 { 2 } else { 5 });
+    for index in 0..space.cell_count() {
+        let x = space.cell_nodes(index);
+        let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
+        for (l, weight) in rule.points.iter().zip(&rule.weights) {
+            let Some((_, measure)) = element::gradients::<D, N>(space.order, &x, l) else { continue };
+            let phi = element::values(space.order, l);
+            let at = interpolate(&x, &phi);
+            let force = density(at);
+            for (a, &node) in cell.iter().enumerate() {
+                for c in 0..D {
+                    load[D * node as usize + c] += weight * measure * phi[a] * force[c];
+                }
+            }
+        }
+    }
+}
+
+/// Adds a surface load to `load`; `traction(x, n)` is force per area at a point with outer unit normal n.
+pub fn surface_load<const D: usize>(
+    space: &Space<D>,
+    facets: &Facets<D>,
+    traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
+    load: &mut [f64],
+) {
+    let rule = quadrature::simplex::<D>(if space.order == Order::P1 { 3 } else { 5 });
+    for index in 0..facets.count() {
+        let x = facets.coordinates(index, space);
+        for (l, weight) in rule.points.iter().zip(&rule.weights) {
+            let area = area_vector(space.order, &x, l);
+            let measure = area.iter().map(|a| a * a).sum::<f64>().sqrt();
+            let normal = area.map(|a| a / measure);
+            let phi = element::values(space.order, l);
+            let force = traction(interpolate(&x, &phi), normal);
+            for (a, &node) in facets.facet(index).iter().enumerate() {
+                for c in 0..D {
+                    load[D * node as usize + c] += weight * measure * phi[a] * force[c];
+                }
+            }
+        }
+    }
+}
+
+/// Point of an element with node coordinates `x` and shape function values `phi`.
+pub fn interpolate<const D: usize>(x: &[[f64; D]], phi: &[f64]) -> [f64; D] {
+    std::array::from_fn(|i| x.iter().zip(phi).map(|(x, phi)| phi * x[i]).sum())
+}
+
+/// Takes prescribed dofs out of K and f, symmetrically, and keeps what energies need.
+///
+/// `prescribed` holds (dof, value), sorted, without repetition.
+pub fn support(mut stiffness: Csr, mut load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> ElasticBody {
+    let n = load.len();
+    let mut value = vec![None; n];
+    for &(dof, u) in &prescribed {
+        value[dof] = Some(u);
+    }
+    let free: Vec<f64> = (0..n)
+        .filter(|&i| value[i].is_none())
+        .filter_map(|i| stiffness.position(i, i).map(|k| stiffness.values[k]))
+        .collect();
+    let scale = if free.is_empty() { 1.0 } else { free.iter().sum::<f64>() / free.len() as f64 };
+    let moved = prescribed.iter().any(|&(_, u)| u != 0.0);
+    let mut lifting = if moved { vec![0.0; n] } else { Vec::new() };
+    let (mut energy_constant, mut strain_constant) = (0.0, 0.0);
+    for i in 0..n {
+        for k in stiffness.range(i) {
+            let j = stiffness.col[k] as usize;
+            match (value[i], value[j]) {
+                (None, None) => {}
+                (None, Some(u)) => {
+                    if moved {
+                        lifting[i] += stiffness.values[k] * u;
+                    }
+                    stiffness.values[k] = 0.0;
+                }
+                (Some(_), None) => stiffness.values[k] = 0.0,
+                (Some(u), Some(v)) => {
+                    strain_constant += u * stiffness.values[k] * v;
+                    stiffness.values[k] = if i == j { scale } else { 0.0 };
+                }
+            }
+        }
+        if let Some(u) = value[i] {
+            energy_constant += 0.5 * scale * u * u - load[i] * u;
+            load[i] = scale * u;
+        } else if moved {
+            load[i] -= lifting[i];
+        }
+    }
+    energy_constant += 0.5 * strain_constant;
+    strain_constant -= prescribed.iter().map(|(_, u)| scale * u * u).sum::<f64>();
+    ElasticBody { stiffness, load, prescribed, lifting, energy_constant, strain_constant }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::dot;
+
+    /// Two dofs joined by springs to each other and to ground: K = [[3, -1], [-1, 2]].
+    fn springs() -> Csr {
+        let mut k = Csr::new(2);
+        k.push_row([(0, 3.0), (1, -1.0)]);
+        k.push_row([(0, -1.0), (1, 2.0)]);
+        k
+    }
+
+    #[test]
+    fn a_prescribed_value_keeps_energies_and_equilibrium() {
+        let body = support(springs(), vec![5.0, 0.7], vec![(1, 0.4)]);
+        let u = [(5.0 + 0.4) / 3.0, 0.4];
+        let mut ku = [0.0; 2];
+        body.stiffness.multiply(&u, &mut ku);
+        let residual: f64 = (0..2).map(|i| (body.load[i] - ku[i]).abs()).sum();
+        assert!(residual < 1e-15, "{residual}");
+        let mut full = [0.0; 2];
+        springs().multiply(&u, &mut full);
+        let strain = dot(&u, &ku) + 2.0 * dot(&body.lifting, &u) + body.strain_constant;
+        assert!((strain - dot(&u, &full)).abs() < 1e-14);
+        let energy = 0.5 * dot(&u, &ku) - dot(&body.load, &u) + body.energy_constant;
+        let exact = 0.5 * dot(&u, &full) - 5.0 * u[0] - 0.7 * u[1];
+        assert!((energy - exact).abs() < 1e-14, "{energy} {exact}");
+    }
+}

@@ -1,0 +1,17 @@
+//! Finite elements on one body: P1 and P2 simplices, linear elasticity, assembly into sparse rows.
+//!
+//! Data flow: [`Mesh`](crate::mesh::Mesh) group -> [`Space`] -> [`assemble()`](assemble::assemble) ->
+//! [`ElasticBody`] {K, f, supports}; afterwards [`stress`] recovers nodal stresses from displacements.
+//! Degree of freedom `D * node + component` everywhere.
+
+pub mod assemble;
+pub mod element;
+pub mod material;
+pub mod quadrature;
+pub mod rigid;
+pub mod space;
+pub mod stress;
+
+pub use assemble::{ElasticBody, NodeGraph};
+pub use material::Material;
+pub use space::{Facets, Space};

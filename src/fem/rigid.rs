@@ -1,0 +1,93 @@
+//! Rigid motions of a body and what its supports leave of them.
+
+use crate::linalg::kernel;
+use nalgebra::{DMatrix, DVector};
+
+/// A rigid motion: displacement of every node and a name for messages.
+#[derive(Debug, Clone)]
+pub struct RigidMotion {
+    /// "translation along y", "rotation", or a mixture of them.
+    pub name: String,
+    /// Displacement, one entry a dof (`D * node + component`), largest entry about one.
+    pub displacement: Vec<f64>,
+}
+
+/// The 3 (2D) or 6 (3D) rigid motions about the centre of `nodes`: translations, then rotations, scaled to
+/// displacements of about one. Gmsh and PETSc call them rigid body modes.
+pub fn modes<const D: usize>(nodes: &[[f64; D]]) -> Vec<RigidMotion> {
+    let n = nodes.len().max(1) as f64;
+    let centre: [f64; D] = std::array::from_fn(|i| nodes.iter().map(|x| x[i]).sum::<f64>() / n);
+    let size = nodes
+        .iter()
+        .flat_map(|x| (0..D).map(move |i| (x[i] - centre[i]).abs()))
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let mut all = Vec::new();
+    for c in 0..D {
+        let mut displacement = vec![0.0; D * nodes.len()];
+        displacement.iter_mut().skip(c).step_by(D).for_each(|u| *u = 1.0);
+        all.push(RigidMotion { name: format!("translation along {}", ["x", "y", "z"][c]), displacement });
+    }
+    let planes: &[(usize, usize, &str)] = if D == 2 {
+        &[(0, 1, "rotation")]
+    } else {
+        &[(1, 2, "rotation about x"), (2, 0, "rotation about y"), (0, 1, "rotation about z")]
+    };
+    for &(i, j, name) in planes {
+        let mut displacement = vec![0.0; D * nodes.len()];
+        for (node, x) in nodes.iter().enumerate() {
+            displacement[D * node + i] = -(x[j] - centre[j]) / size;
+            displacement[D * node + j] = (x[i] - centre[i]) / size;
+        }
+        all.push(RigidMotion { name: name.to_owned(), displacement });
+    }
+    all
+}
+
+/// The rigid motions that vanish on the prescribed dofs: a basis of what the supports leave free.
+pub fn left_by_supports(motions: &[RigidMotion], prescribed: &[(usize, f64)]) -> Vec<RigidMotion> {
+    let rows = DMatrix::from_fn(prescribed.len(), motions.len(), |i, j| {
+        motions[j].displacement[prescribed[i].0]
+    });
+    kernel(&(rows.transpose() * &rows), prescribed.len().max(1) as f64, 1e-13)
+        .into_iter()
+        .map(|weights| combine(motions, &weights))
+        .collect()
+}
+
+/// Combination of motions, named after the parts that matter.
+pub fn combine(motions: &[RigidMotion], weights: &DVector<f64>) -> RigidMotion {
+    let largest = weights.amax();
+    let mut name = Vec::new();
+    let mut displacement = vec![0.0; motions.first().map_or(0, |m| m.displacement.len())];
+    for (motion, &weight) in motions.iter().zip(weights.iter()) {
+        if weight.abs() > 1e-6 * largest {
+            name.push(motion.name.as_str());
+        }
+        crate::linalg::axpy(weight / largest, &motion.displacement, &mut displacement);
+    }
+    RigidMotion { name: name.join(" with "), displacement }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn supports_leave_what_they_do_not_hold() {
+        let nodes = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
+        let all = modes(&nodes);
+        let left = |dofs: &[usize]| {
+            let prescribed: Vec<_> = dofs.iter().map(|&dof| (dof, 0.0)).collect();
+            left_by_supports(&all, &prescribed).into_iter().map(|m| m.name).collect::<Vec<_>>()
+        };
+        assert_eq!(left(&[]).len(), 3);
+        // x held on the edge x = 2: translation along y is left, and nothing else
+        assert_eq!(left(&[2, 4]), ["translation along y"]);
+        assert_eq!(left(&[0, 1, 3]), Vec::<String>::new());
+        // one pinned node: a rotation about it
+        let pinned = left_by_supports(&all, &[(0, 0.0), (1, 0.0)]);
+        assert_eq!(pinned.len(), 1);
+        assert!(pinned[0].displacement[0].abs() < 1e-14 && pinned[0].displacement[1].abs() < 1e-14);
+        assert!(pinned[0].displacement[5].abs() > 0.4);
+    }
+}

@@ -1,0 +1,225 @@
+//! The finite element space of one body: its nodes, cells and boundary facets, numbered within the body.
+
+use super::element;
+use crate::mesh::{Group, Mesh};
+use crate::scene::Order;
+use std::collections::HashMap;
+
+const ABSENT: u32 = u32::MAX;
+
+/// Nodes and cells of one body. Nodes are numbered as the cells meet them, so that neighbours in the mesh file
+/// stay neighbours in memory.
+#[derive(Debug, Clone)]
+pub struct Space<const D: usize> {
+    /// Polynomial order.
+    pub order: Order,
+    /// Coordinates of the nodes.
+    pub nodes: Vec<[f64; D]>,
+    /// Nodes per cell.
+    pub stride: usize,
+    /// Body node numbers, `stride` per cell, in the local order of [`element`].
+    pub cells: Vec<u32>,
+    /// Body node of each mesh point, or `ABSENT`.
+    from_mesh: Vec<u32>,
+    /// Mid-edge nodes made here (quadratic space on a linear mesh), by the body nodes of their ends.
+    middles: HashMap<(u32, u32), u32>,
+    /// Order of the mesh that the space was made from.
+    mesh_order: Order,
+}
+
+/// Facets of a body's boundary, oriented so that [`Facets::normal`] points out of the body.
+#[derive(Debug, Clone)]
+pub struct Facets<const D: usize> {
+    /// Polynomial order.
+    pub order: Order,
+    /// Nodes per facet.
+    pub stride: usize,
+    /// Body node numbers, `stride` per facet.
+    pub nodes: Vec<u32>,
+}
+
+impl<const D: usize> Space<D> {
+    /// The space of `order` on the cells of `group` (of dimension `D`).
+    pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
+        let stride = element::node_count(D + 1, order);
+        let mut space = Space {
+            order,
+            nodes: Vec::new(),
+            stride,
+            cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
+            from_mesh: vec![ABSENT; mesh.points.len()],
+            middles: HashMap::new(),
+            mesh_order: mesh.order,
+        };
+        let kept = stride.min(group.stride);
+        for cell in group.connectivity.chunks_exact(group.stride) {
+            let first = space.cells.len();
+            for &point in &cell[..kept] {
+                let node = &mut space.from_mesh[point as usize];
+                if *node == ABSENT {
+                    *node = space.nodes.len() as u32;
+                    space.nodes.push(mesh.points[point as usize]);
+                }
+                space.cells.push(*node);
+            }
+            if stride > kept {
+                for &(i, j) in &element::EDGES[..D * (D + 1) / 2] {
+                    let (a, b) = (space.cells[first + i], space.cells[first + j]);
+                    let node = *space.middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                        let (x, y) = (space.nodes[a as usize], space.nodes[b as usize]);
+                        space.nodes.push(std::array::from_fn(|c| 0.5 * (x[c] + y[c])));
+                        space.nodes.len() as u32 - 1
+                    });
+                    space.cells.push(node);
+                }
+            }
+        }
+        space
+    }
+
+    /// Number of degrees of freedom.
+    pub fn dofs(&self) -> usize {
+        D * self.nodes.len()
+    }
+
+    /// Number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.cells.len() / self.stride
+    }
+
+    /// Coordinates of the nodes of cell `i`.
+    pub fn cell_nodes(&self, i: usize) -> Vec<[f64; D]> {
+        self.cells[i * self.stride..(i + 1) * self.stride]
+            .iter()
+            .map(|&node| self.nodes[node as usize])
+            .collect()
+    }
+
+    /// The body's node numbers of one simplex of a mesh group (vertices, then mid-edges for a quadratic
+    /// space), or `None` if it is not part of this body.
+    fn simplex(&self, points: &[u32], dimension: usize) -> Option<Vec<u32>> {
+        let vertices = dimension + 1;
+        let wanted = element::node_count(vertices, self.order);
+        let mut nodes = Vec::with_capacity(wanted);
+        let kept = if self.order == Order::P1 { vertices } else { points.len() };
+        for &point in &points[..kept] {
+            match self.from_mesh[point as usize] {
+                ABSENT => return None,
+                node => nodes.push(node),
+            }
+        }
+        if nodes.len() < wanted {
+            for &(i, j) in &element::EDGES[..vertices * (vertices - 1) / 2] {
+                let (a, b) = (nodes[i], nodes[j]);
+                nodes.push(*self.middles.get(&(a.min(b), a.max(b)))?);
+            }
+        }
+        debug_assert!(self.mesh_order == Order::P1 || nodes.len() == wanted);
+        Some(nodes)
+    }
+
+    /// All body nodes on a mesh group of any dimension, sorted; empty if the group does not touch the body.
+    pub fn nodes_on(&self, group: &Group) -> Vec<u32> {
+        let mut nodes: Vec<u32> = group
+            .connectivity
+            .chunks_exact(group.stride)
+            .filter_map(|points| self.simplex(points, group.dimension))
+            .flatten()
+            .collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
+    /// The facets of a mesh group (of dimension `D - 1`) that bound a cell of this body, oriented outwards.
+    pub fn facets(&self, group: &Group) -> Facets<D> {
+        let stride = element::node_count(D, self.order);
+        let mut on_group = vec![false; self.nodes.len()];
+        let mut wanted: HashMap<Vec<u32>, Vec<u32>> = HashMap::new();
+        let mut order_of_file = Vec::new();
+        for points in group.connectivity.chunks_exact(group.stride) {
+            if let Some(nodes) = self.simplex(points, D - 1) {
+                nodes[..D].iter().for_each(|&node| on_group[node as usize] = true);
+                let mut key = nodes[..D].to_vec();
+                key.sort_unstable();
+                if wanted.insert(key.clone(), nodes).is_none() {
+                    order_of_file.push(key);
+                }
+            }
+        }
+        // the cell next to each facet decides which way is out
+        let mut oriented: HashMap<Vec<u32>, Vec<u32>> = HashMap::new();
+        for cell in self.cells.chunks_exact(self.stride) {
+            let touching = cell[..=D].iter().filter(|&&node| on_group[node as usize]).count();
+            if touching < D {
+                continue;
+            }
+            for opposite in 0..=D {
+                let mut key: Vec<u32> = (0..=D).filter(|&i| i != opposite).map(|i| cell[i]).collect();
+                key.sort_unstable();
+                if let Some(mut nodes) = wanted.remove(&key) {
+                    if self.points_inwards(&nodes, cell[opposite]) {
+                        flip::<D>(&mut nodes);
+                    }
+                    oriented.insert(key, nodes);
+                }
+            }
+        }
+        let nodes = order_of_file.iter().filter_map(|key| oriented.get(key)).flatten().copied();
+        Facets { order: self.order, stride, nodes: nodes.collect() }
+    }
+
+    fn points_inwards(&self, facet: &[u32], opposite: u32) -> bool {
+        let x: Vec<_> = facet[..D].iter().map(|&node| self.nodes[node as usize]).collect();
+        let normal = area_vector::<D>(Order::P1, &x, &[1.0 / D as f64; D]);
+        let inner = self.nodes[opposite as usize];
+        (0..D).map(|i| normal[i] * (inner[i] - x[0][i])).sum::<f64>() > 0.0
+    }
+}
+
+fn flip<const D: usize>(nodes: &mut [u32]) {
+    nodes.swap(0, 1);
+    if D == 3 && nodes.len() == 6 {
+        // mid-edges 01 12 02 become 01 02 12
+        nodes.swap(4, 5);
+    }
+}
+
+impl<const D: usize> Facets<D> {
+    /// Number of facets.
+    pub fn count(&self) -> usize {
+        self.nodes.len() / self.stride
+    }
+
+    /// Body node numbers of facet `i`.
+    pub fn facet(&self, i: usize) -> &[u32] {
+        &self.nodes[i * self.stride..(i + 1) * self.stride]
+    }
+
+    /// Coordinates of the nodes of facet `i`.
+    pub fn coordinates(&self, i: usize, space: &Space<D>) -> Vec<[f64; D]> {
+        self.facet(i).iter().map(|&node| space.nodes[node as usize]).collect()
+    }
+}
+
+/// Outer normal times length (2D) or area (3D) measure of a facet with node coordinates `x`, at barycentric
+/// point `l`: integrate with weights that sum to one.
+pub fn area_vector<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64; D]) -> [f64; D] {
+    let d = element::derivatives(order, l);
+    let tangent = |c: usize| -> [f64; D] {
+        std::array::from_fn(|i| (0..x.len()).map(|n| (d[n][c] - d[n][0]) * x[n][i]).sum())
+    };
+    let mut vector = [0.0; D];
+    let t = tangent(1);
+    if D == 2 {
+        vector[0] = t[1];
+        vector[1] = -t[0];
+    } else {
+        let s = tangent(2);
+        for (i, v) in vector.iter_mut().enumerate() {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            *v = 0.5 * (t[j] * s[k] - t[k] * s[j]);
+        }
+    }
+    vector
+}

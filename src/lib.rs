@@ -1,0 +1,22 @@
+//! Frictionless contact of N elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition.
+//!
+//! Data flows one way: scene file -> [`scene::Scene`] -> [`mesh::Mesh`] -> [`fem`] bodies and [`contact`] pairs ->
+//! [`ddm::Model`] -> sweeps -> [`ddm::Outcome`] -> [`report`](commands::report). The loop is [`ddm::iterate`].
+#![deny(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod cli;
+pub mod commands;
+pub mod contact;
+pub mod ddm;
+pub mod discretize;
+pub mod error;
+pub mod fem;
+pub mod linalg;
+pub mod mesh;
+pub mod output;
+pub mod parallel;
+#[allow(unsafe_code)]
+pub mod petsc;
+pub mod scene;
+pub mod solver;

@@ -1,0 +1,145 @@
+//! Compressed sparse rows with the few operations that the method needs.
+//!
+//! Dense algebra comes from `nalgebra`. The sparse type is our own because its index type must be PETSc's
+//! 32-bit integer, so that the arrays of a stiffness matrix are shared and never copied.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// A sparse matrix in compressed rows: row `i` holds columns `col[ptr[i]..ptr[i+1]]`, sorted.
+#[derive(Debug, Clone, Default)]
+pub struct Csr {
+    /// Number of columns.
+    pub columns: usize,
+    /// Row starts, one more than there are rows.
+    pub ptr: Vec<i32>,
+    /// Column of each entry.
+    pub col: Vec<i32>,
+    /// Value of each entry.
+    pub values: Vec<f64>,
+}
+
+impl Csr {
+    /// A matrix without rows, to be filled with [`Csr::push_row`].
+    pub fn new(columns: usize) -> Self {
+        Self { columns, ptr: vec![0], col: Vec::new(), values: Vec::new() }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.ptr.len() - 1
+    }
+
+    /// Appends a row; `entries` are (column, value), in any order, columns distinct. Zeros are kept out.
+    pub fn push_row(&mut self, entries: impl IntoIterator<Item = (usize, f64)>) {
+        let mut row: Vec<_> = entries.into_iter().filter(|entry| entry.1 != 0.0).collect();
+        row.sort_unstable_by_key(|entry| entry.0);
+        for (column, value) in row {
+            debug_assert!(column < self.columns);
+            self.col.push(column as i32);
+            self.values.push(value);
+        }
+        self.ptr.push(self.col.len() as i32);
+    }
+
+    /// Entry range of row `i`.
+    pub fn range(&self, i: usize) -> std::ops::Range<usize> {
+        self.ptr[i] as usize..self.ptr[i + 1] as usize
+    }
+
+    /// Entries (column, value) of row `i`.
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.range(i).map(|k| (self.col[k] as usize, self.values[k]))
+    }
+
+    /// y = A x.
+    pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        debug_assert_eq!(x.len(), self.columns);
+        for (i, y) in y.iter_mut().enumerate() {
+            let range = self.range(i);
+            *y = self.col[range.clone()]
+                .iter()
+                .zip(&self.values[range])
+                .map(|(&j, a)| a * x[j as usize])
+                .sum();
+        }
+    }
+
+    /// y += s A' x.
+    pub fn add_transpose(&self, s: f64, x: &[f64], y: &mut [f64]) {
+        debug_assert_eq!(y.len(), self.columns);
+        for (i, &x) in x.iter().enumerate() {
+            if x != 0.0 {
+                for k in self.range(i) {
+                    y[self.col[k] as usize] += s * self.values[k] * x;
+                }
+            }
+        }
+    }
+
+    /// Position of entry (i, j) in `values`, if the pattern has it.
+    pub fn position(&self, i: usize, j: usize) -> Option<usize> {
+        let range = self.range(i);
+        let offset = self.col[range.clone()].binary_search(&(j as i32)).ok()?;
+        Some(range.start + offset)
+    }
+}
+
+/// Scalar product.
+pub fn dot(x: &[f64], y: &[f64]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+/// y += a x.
+pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += a * x;
+    }
+}
+
+/// Basis of the kernel of a small symmetric positive semidefinite matrix: eigenvectors of eigenvalues at most
+/// `tolerance * scale`. The basis is reduced so that pure motions come out pure where the kernel allows it.
+pub fn kernel(gram: &DMatrix<f64>, scale: f64, tolerance: f64) -> Vec<DVector<f64>> {
+    let eigen = SymmetricEigen::new(gram.clone());
+    let mut basis: Vec<DVector<f64>> = (0..gram.nrows())
+        .filter(|&i| eigen.eigenvalues[i] <= tolerance * scale)
+        .map(|i| eigen.eigenvectors.column(i).into_owned())
+        .collect();
+    // Gauss-Jordan over the basis vectors, with row pivoting
+    for k in 0..basis.len() {
+        let pivot = basis[k].icamax();
+        let head = basis[k][pivot];
+        basis[k] /= head;
+        for other in 0..basis.len() {
+            if other != k {
+                let factor = basis[other][pivot];
+                let update = factor * &basis[k];
+                basis[other] -= update;
+            }
+        }
+    }
+    basis
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_agree_with_their_transposes() {
+        let mut a = Csr::new(3);
+        a.push_row([(2, 4.0), (0, 1.0)]);
+        a.push_row([]);
+        a.push_row([(1, -2.0), (2, 0.0)]);
+        assert_eq!(a.rows(), 3);
+        assert_eq!(a.col, [0, 2, 1]);
+        let (x, y) = ([1.0, 2.0, 3.0], [5.0, 7.0, 11.0]);
+        let mut ax = [0.0; 3];
+        a.multiply(&x, &mut ax);
+        assert_eq!(ax, [13.0, 0.0, -4.0]);
+        let mut aty = [0.0; 3];
+        a.add_transpose(1.0, &y, &mut aty);
+        assert_eq!(dot(&y, &ax), dot(&x, &aty));
+        assert_eq!(a.position(0, 2), Some(1));
+        assert_eq!(a.position(0, 1), None);
+    }
+}

@@ -1,0 +1,179 @@
+//! The cache of meshes that Gmsh made: one file for each script, set of numbers, order, dimension and Gmsh.
+
+use crate::error::{Error, Result};
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What a mesh was made from, digested piece by piece.
+pub struct Key(Sha256);
+
+impl Key {
+    /// The empty key; changes with how this program calls Gmsh.
+    pub fn new() -> Key {
+        let mut key = Key(Sha256::new());
+        key.add(b"winkler mesh 1");
+        key
+    }
+
+    /// Adds a piece; its length goes in, too, so that pieces do not run together.
+    pub fn add(&mut self, piece: &[u8]) {
+        self.0.update((piece.len() as u64).to_le_bytes());
+        self.0.update(piece);
+    }
+
+    /// Name of the file in the cache, beginning with a word that people recognise.
+    pub fn file_name(self, stem: &str) -> String {
+        // 128 bits are plenty.
+        let digest: String = self
+            .0
+            .finalize()
+            .iter()
+            .take(16)
+            .map(|byte| format!("{byte:02x}"))
+            .collect();
+        format!("{stem}-{digest}.msh")
+    }
+}
+
+/// Folders that may hold the cache, best first: $WINKLER_CACHE alone, or else $XDG_CACHE_HOME/winkler,
+/// ~/.cache/winkler and a folder for temporary files.
+pub fn folders() -> Vec<PathBuf> {
+    choose(|name| {
+        std::env::var_os(name)
+            .filter(|value| !value.is_empty())
+            .map(PathBuf::from)
+    })
+}
+
+fn choose(variable: impl Fn(&str) -> Option<PathBuf>) -> Vec<PathBuf> {
+    if let Some(folder) = variable("WINKLER_CACHE") {
+        return vec![folder];
+    }
+    [
+        variable("XDG_CACHE_HOME").map(|folder| folder.join("winkler")),
+        variable("HOME").map(|folder| folder.join(".cache").join("winkler")),
+        Some(std::env::temp_dir().join("winkler")),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// A folder of one process inside the cache, gone with its last use: files are finished there and then moved, so that
+/// nobody ever reads half a file.
+pub struct Workshop {
+    cache: PathBuf,
+    folder: PathBuf,
+}
+
+impl Workshop {
+    /// Opens one in the first of the folders where that is possible.
+    ///
+    /// # Errors
+    /// No folder can be written.
+    pub fn open(folders: &[PathBuf]) -> Result<Workshop> {
+        static COUNT: AtomicU64 = AtomicU64::new(0);
+        let name = format!(
+            "tmp-{}-{}",
+            std::process::id(),
+            COUNT.fetch_add(1, Ordering::Relaxed)
+        );
+        let mut failure = None;
+        for cache in folders {
+            let folder = cache.join(&name);
+            match std::fs::create_dir_all(&folder) {
+                Ok(()) => {
+                    return Ok(Workshop {
+                        cache: cache.clone(),
+                        folder,
+                    });
+                }
+                Err(cause) => {
+                    failure = Some(failure.unwrap_or(Error::file(&folder, "create", &cause)))
+                }
+            }
+        }
+        let error = failure.unwrap_or_else(|| {
+            Error::new(
+                crate::error::Kind::File,
+                "there is no folder for the mesh cache",
+            )
+        });
+        Err(error
+            .help("meshes are kept there: name a folder that can be written in $WINKLER_CACHE"))
+    }
+
+    /// The folder to work in.
+    pub fn path(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Moves a finished file into the cache, over an older one, and gives its place there.
+    ///
+    /// # Errors
+    /// The file system refuses.
+    pub fn publish(&self, file: &Path, name: &str) -> Result<PathBuf> {
+        let to = self.cache.join(name);
+        std::fs::rename(file, &to).map_err(|cause| Error::file(&to, "create", &cause))?;
+        Ok(to)
+    }
+}
+
+impl Drop for Workshop {
+    fn drop(&mut self) {
+        // What cannot be removed is litter, not an error.
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_of_a_key_do_not_run_together() {
+        let name = |pieces: &[&str]| {
+            let mut key = Key::new();
+            pieces.iter().for_each(|piece| key.add(piece.as_bytes()));
+            key.file_name("groove")
+        };
+        assert_eq!(name(&["ab", "c"]), name(&["ab", "c"]));
+        assert_ne!(name(&["ab", "c"]), name(&["a", "bc"]));
+        assert!(name(&[]).starts_with("groove-") && name(&[]).ends_with(".msh"));
+    }
+
+    #[test]
+    fn an_explicit_folder_stands_alone() {
+        let all = |name: &str| Some(PathBuf::from(format!("/{name}")));
+        assert_eq!(choose(all), [PathBuf::from("/WINKLER_CACHE")]);
+        let some = choose(|name| all(name).filter(|_| name != "WINKLER_CACHE"));
+        assert_eq!(
+            some[..2],
+            [
+                PathBuf::from("/XDG_CACHE_HOME/winkler"),
+                PathBuf::from("/HOME/.cache/winkler")
+            ]
+        );
+        assert_eq!(choose(|_| None).len(), 1);
+    }
+
+    #[test]
+    fn a_workshop_takes_the_first_folder_that_works_and_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let blocked = folder.path().join("file");
+        std::fs::write(&blocked, "").unwrap();
+        let good = folder.path().join("good");
+        let workshop = Workshop::open(&[blocked.clone(), good.clone()]).unwrap();
+        let file = workshop.path().join("a");
+        std::fs::write(&file, "a").unwrap();
+        assert_eq!(
+            workshop.publish(&file, "b.msh").unwrap(),
+            good.join("b.msh")
+        );
+        drop(workshop);
+        assert_eq!(std::fs::read_dir(&good).unwrap().count(), 1);
+        let error = Workshop::open(&[blocked]).err().unwrap().to_string();
+        assert!(error.contains("$WINKLER_CACHE"), "{error}");
+    }
+}

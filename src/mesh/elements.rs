@@ -1,0 +1,164 @@
+//! The `$Elements` section: the simplices of all physical groups.
+
+use super::cursor::Cursor;
+use super::nodes::Nodes;
+use super::physical::Physical;
+use super::simplex::{self, Kind, THINGS};
+use crate::error::Result;
+use crate::scene::Order;
+
+/// Reads the section's contents into the groups; gives the order of the elements, if there is one but points.
+///
+/// # Errors
+/// Malformed text, elements in a group that are no simplices of order 1 or 2 or mix both, nodes that do not exist,
+/// degenerate simplices, nodes off the plane if `D` is 2.
+pub fn read<const D: usize>(
+    cursor: &mut Cursor,
+    nodes: &Nodes,
+    physical: &mut Physical,
+) -> Result<Option<Order>> {
+    cursor.begin();
+    let start = cursor.position();
+    let blocks = cursor.count(4, 20)?;
+    let total = cursor.count(1, 8)?;
+    cursor.size()?;
+    cursor.size()?;
+    cursor.end()?;
+    let mut seen: usize = 0;
+    let mut common_order = None;
+    for _ in 0..blocks {
+        cursor.begin();
+        let head = cursor.position();
+        let (dimension, tag, number) = (cursor.int()?, cursor.int()?, cursor.int()?);
+        let Some(dimension) = usize::try_from(dimension)
+            .ok()
+            .filter(|dimension| *dimension <= 3)
+        else {
+            return Err(cursor.error_at(
+                head,
+                format!("a block of elements of dimension {dimension}"),
+            ));
+        };
+        let Some((shape, stride)) = simplex::type_name(number) else {
+            return Err(cursor
+                .error_at(
+                    head,
+                    format!("elements of Gmsh's type {number} cannot be used"),
+                )
+                .help(SIMPLICES));
+        };
+        let count = cursor.count(1 + stride, 8 * (1 + stride))?;
+        cursor.end()?;
+        seen = seen.saturating_add(count);
+        let Some(members) = physical.members(dimension, tag) else {
+            let thing = THINGS[dimension].to_lowercase();
+            let message = format!("elements of {thing} {tag}, which $Entities does not list");
+            return Err(cursor
+                .error_at(head, message)
+                .help("save the mesh again with Gmsh"));
+        };
+        let Some(first) = members.first() else {
+            cursor.skip_records(count, 8 * (1 + stride))?;
+            continue;
+        };
+        let name = &physical.groups[*first].name;
+        let Some(kind) = Kind::of_type(number).filter(|kind| kind.dimension == dimension) else {
+            let message = format!(
+                "group `{name}` has {shape} elements of {stride} nodes (Gmsh's type {number})"
+            );
+            return Err(cursor.error_at(head, message).help(SIMPLICES));
+        };
+        if kind
+            .order
+            .is_some_and(|order| *common_order.get_or_insert(order) != order)
+        {
+            let message = format!("group `{name}` is of another order than the elements before it");
+            return Err(cursor
+                .error_at(head, message)
+                .help("save all elements with one order: gmsh -order 1 or 2"));
+        }
+        let connectivity = Block { kind, count, name }.read::<D>(cursor, nodes)?;
+        physical.extend(dimension, tag, stride, &connectivity);
+    }
+    if seen != total {
+        let message = format!("$Elements announces {total} elements and holds {seen}");
+        return Err(cursor.error_at(start, message));
+    }
+    Ok(common_order)
+}
+
+/// What to do about elements that are not simplices of order 1 or 2.
+const SIMPLICES: &str =
+    "use triangles and tetrahedra of order 1 or 2: no `Recombine`, `gmsh -order 1` or `2`";
+
+/// The elements of one entity, all of one kind.
+struct Block<'a> {
+    kind: Kind,
+    count: usize,
+    /// Name of a group it belongs to, for messages.
+    name: &'a str,
+}
+
+impl Block<'_> {
+    /// Reads the elements: our point numbers in our order, cells turned to positive volume.
+    fn read<const D: usize>(&self, cursor: &mut Cursor, nodes: &Nodes) -> Result<Vec<u32>> {
+        let Kind {
+            dimension, stride, ..
+        } = self.kind;
+        let mut connectivity = vec![0; self.count * stride];
+        let mut vertices = [[0.0; 3]; 4];
+        let vertices = &mut vertices[..dimension + 1];
+        for points in connectivity.chunks_exact_mut(stride) {
+            cursor.begin();
+            let start = cursor.position();
+            let tag = cursor.size()?;
+            for point in &mut *points {
+                let node = cursor.size()?;
+                *point = nodes.number(node).ok_or_else(|| {
+                    let message = format!(
+                        "element {tag} of group `{}` uses node {node}, which does not exist",
+                        self.name
+                    );
+                    cursor
+                        .error_at(start, message)
+                        .help("the file is damaged: save the mesh again with Gmsh")
+                })?;
+            }
+            cursor.end()?;
+            if D == 2 {
+                self.check_plane(cursor, nodes, points)?;
+            }
+            simplex::from_gmsh_order(points);
+            for (vertex, point) in vertices.iter_mut().zip(&*points) {
+                *vertex = nodes.points[*point as usize];
+            }
+            let measure = simplex::measure(vertices, D);
+            if simplex::is_degenerate(vertices, measure) {
+                let size = ["", "length", "area", "volume"][dimension];
+                let message = format!("element {tag} of group `{}` has zero {size}", self.name);
+                return Err(cursor
+                    .error_at(start, message)
+                    .help("mend the geometry there, or mesh it again"));
+            }
+            if dimension == D && measure < 0.0 {
+                simplex::mirror(points);
+            }
+        }
+        Ok(connectivity)
+    }
+
+    fn check_plane(&self, cursor: &mut Cursor, nodes: &Nodes, points: &[u32]) -> Result<()> {
+        let outside = points
+            .iter()
+            .map(|point| *point as usize)
+            .find(|point| nodes.points[*point][2].abs() > nodes.flat);
+        let Some(point) = outside else { return Ok(()) };
+        let message = format!(
+            "a node of group `{}` has z = {}, but the scene has dimension = 2",
+            self.name, nodes.points[point][2]
+        );
+        Err(nodes
+            .error_at(cursor, point, message)
+            .help("draw plane bodies in the plane z = 0, or set `dimension = 3`"))
+    }
+}

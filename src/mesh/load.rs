@@ -1,0 +1,150 @@
+//! From what the scene names to a mesh: Gmsh, or the cache, or a file.
+
+use super::cache::{Key, Workshop, folders};
+use super::gmsh::Gmsh;
+use super::script::Script;
+use super::{Mesh, msh};
+use crate::error::{Error, Located, Result};
+use crate::scene::{MeshSource, Order};
+use std::path::{Path, PathBuf};
+
+/// A mesh and where it came from.
+#[derive(Debug, Clone)]
+pub struct Loaded<const D: usize> {
+    /// The mesh.
+    pub mesh: Mesh<D>,
+    /// Where it came from.
+    pub origin: Origin,
+    /// The `.msh` file that was read: the user's own, or the one in the cache.
+    pub file: PathBuf,
+}
+
+/// Where a mesh came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    /// The `.msh` file that the scene names.
+    File,
+    /// The cache: Gmsh had meshed the same script with the same numbers before.
+    Cache,
+    /// Gmsh, just now.
+    Gmsh,
+}
+
+/// Loads the mesh of a scene for displacements of an order.
+///
+/// A `.geo` script is meshed with that order by Gmsh, unless the cache has the result. A `.msh` file of order 2 serves
+/// order 1 without its mid-edge points.
+///
+/// # Errors
+/// A file that cannot be read, a number that the script does not take, Gmsh missing or failing, a mesh that is not one
+/// of named simplices in `D` dimensions (see [`read`](super::read)), or of too low an order.
+pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<D>> {
+    match source {
+        MeshSource::Geo { file, set } => from_script(file, set, order, &folders()),
+        MeshSource::Msh { file } => from_file(file, order),
+    }
+}
+
+fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order) -> Result<Loaded<D>> {
+    let path = &file.value;
+    let bytes =
+        std::fs::read(path).map_err(|cause| Error::file(path, "read", &cause).at(&file.place))?;
+    let mesh = msh::parse(path, &bytes, false)?;
+    let mesh = match (mesh.order, order) {
+        (Order::P2, Order::P1) => mesh.lower_order(),
+        (Order::P1, Order::P2) => {
+            let help = format!(
+                "set `order = 1`, or save it anew: gmsh {} -order 2 -{D} -format msh41 -o new.msh",
+                path.display()
+            );
+            let error = Error::mesh(
+                path,
+                None,
+                "the mesh is of order 1, the scene asks for order 2",
+            );
+            return Err(error.at(&file.place).help(help));
+        }
+        _ => mesh,
+    };
+    Ok(Loaded {
+        mesh,
+        origin: Origin::File,
+        file: path.clone(),
+    })
+}
+
+/// Meshes a script, with the cache in one of `folders`.
+pub(super) fn from_script<const D: usize>(
+    file: &Located<PathBuf>,
+    set: &[(String, f64)],
+    order: Order,
+    folders: &[PathBuf],
+) -> Result<Loaded<D>> {
+    let path = &file.value;
+    let script = Script::read(path).map_err(|error| error.at(&file.place))?;
+    for (name, _) in set {
+        script.check(name, file)?;
+    }
+    let gmsh = Gmsh::find()?;
+    let name = file_name::<D>(path, &script, set, order, &gmsh);
+
+    // A file of the cache that cannot be read or is damaged is as good as none.
+    for folder in folders {
+        let cached = folder.join(&name);
+        let mesh = std::fs::read(&cached)
+            .ok()
+            .and_then(|bytes| checked(path, &bytes, order).ok());
+        if let Some(mesh) = mesh {
+            return Ok(Loaded {
+                mesh,
+                origin: Origin::Cache,
+                file: cached,
+            });
+        }
+    }
+    let workshop = Workshop::open(folders)?;
+    let made = workshop.path().join(&name);
+    gmsh.run(path, set, D, order, &made, workshop.path())?;
+    let bytes = std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause))?;
+    let mesh = checked(path, &bytes, order)?;
+    Ok(Loaded {
+        mesh,
+        origin: Origin::Gmsh,
+        file: workshop.publish(&made, &name)?,
+    })
+}
+
+/// Name of the mesh in the cache: it changes with everything that changes the mesh.
+fn file_name<const D: usize>(
+    path: &Path,
+    script: &Script,
+    set: &[(String, f64)],
+    order: Order,
+    gmsh: &Gmsh,
+) -> String {
+    let mut key = Key::new();
+    key.add(gmsh.identity().as_bytes());
+    key.add(&[D as u8, order as u8]);
+    for (name, value) in set {
+        key.add(name.as_bytes());
+        key.add(&value.to_le_bytes());
+    }
+    for text in &script.files {
+        key.add(text);
+    }
+    key.file_name(&path.file_stem().unwrap_or_default().to_string_lossy())
+}
+
+/// The mesh in bytes that Gmsh made from a script, of the order asked for.
+fn checked<const D: usize>(path: &Path, bytes: &[u8], order: Order) -> Result<Mesh<D>> {
+    let mesh: Mesh<D> = msh::parse(path, bytes, true)?;
+    if mesh.order == order {
+        return Ok(mesh);
+    }
+    let error = Error::mesh(
+        path,
+        None,
+        "Gmsh made a mesh of another order than the scene asks for",
+    );
+    Err(error.help("remove `Mesh.ElementOrder` and `SetOrder` from the script"))
+}

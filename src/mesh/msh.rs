@@ -1,0 +1,182 @@
+//! Reader of Gmsh's `.msh` 4.1, text and binary, into a [`Mesh`].
+
+use super::cursor::Cursor;
+use super::nodes::Nodes;
+use super::physical::Physical;
+use super::simplex::THINGS;
+use super::{Group, Mesh, elements, groups};
+use crate::error::{Error, Result};
+use crate::scene::Order;
+use std::path::Path;
+
+/// Reads a `.msh` file.
+///
+/// # Errors
+/// Everything that makes the file no mesh of named simplices in `D` dimensions is a [`Kind::Mesh`](crate::error::Kind)
+/// error with the line or byte and a way out.
+pub fn read<const D: usize>(path: &Path) -> Result<Mesh<D>> {
+    let bytes = std::fs::read(path).map_err(|cause| Error::file(path, "read", &cause))?;
+    parse(path, &bytes, false)
+}
+
+/// Reads the bytes of a `.msh` file; `path` stands in messages, and `made` says that it is the script that Gmsh made
+/// the bytes from.
+pub fn parse<const D: usize>(path: &Path, bytes: &[u8], made: bool) -> Result<Mesh<D>> {
+    const { assert!(D == 2 || D == 3) };
+    let cursor = &mut Cursor::new(path, bytes, made);
+    read_format(cursor)?;
+    let mut physical = Physical::default();
+    let mut nodes: Option<Nodes> = None;
+    let mut order = None;
+    let mut seen: Vec<&str> = Vec::new();
+    while !cursor.at_end() {
+        let start = cursor.position();
+        let Some(section) = cursor.line()?.strip_prefix('$') else {
+            return Err(cursor.error_at(start, "a section such as `$Nodes` should begin here"));
+        };
+        cursor.enter(section);
+        match section {
+            // Each needs those before it, and once.
+            "PhysicalNames" | "Entities" | "Nodes" | "Elements" => {
+                if seen.contains(&section) {
+                    return Err(
+                        cursor.error_at(start, format!("the section ${section} stands twice"))
+                    );
+                }
+                seen.push(section);
+            }
+            "PartitionedEntities" => {
+                let error = cursor.error_at(start, "the mesh is partitioned");
+                return Err(
+                    error.help("save it in one piece: the program shares the work out itself")
+                );
+            }
+            _ => {
+                cursor.skip_section()?;
+                continue;
+            }
+        }
+        match (section, &nodes) {
+            ("PhysicalNames", _) => physical.read_names(cursor, D)?,
+            ("Entities", _) => physical.read_entities(cursor)?,
+            ("Nodes", _) => nodes = Some(Nodes::read(cursor)?),
+            (_, Some(nodes)) if seen.contains(&"Entities") => {
+                order = elements::read::<D>(cursor, nodes, &mut physical)?;
+            }
+            _ => {
+                let error =
+                    cursor.error_at(start, "$Elements needs $Entities and $Nodes before it");
+                return Err(error.help("save the mesh again with Gmsh"));
+            }
+        }
+        cursor.leave()?;
+    }
+    match nodes {
+        Some(nodes) if seen.contains(&"Elements") => finish(path, physical.groups, nodes, order),
+        _ => {
+            let error = Error::mesh(path, None, "there are no elements");
+            Err(error.help("the file was cut short, or nothing was meshed"))
+        }
+    }
+}
+
+/// Reads `$MeshFormat`, the first section but for comments.
+fn read_format(cursor: &mut Cursor) -> Result<()> {
+    let save_again = |error: Error, path: &Path| {
+        error.help(format!(
+            "save it as 4.1: gmsh {} -save -format msh41 -o new.msh",
+            path.display()
+        ))
+    };
+    loop {
+        let start = cursor.position();
+        let line = if cursor.at_end() {
+            ""
+        } else {
+            cursor.line().unwrap_or("")
+        };
+        match line {
+            "$MeshFormat" => break,
+            "$Comments" => {
+                cursor.enter("Comments");
+                cursor.skip_section()?;
+            }
+            _ => {
+                let message = "this is not a mesh file of Gmsh: it does not begin with $MeshFormat";
+                return Err(save_again(cursor.error_at(start, message), cursor.path));
+            }
+        }
+    }
+    cursor.enter("MeshFormat");
+    let start = cursor.position();
+    let words: Vec<&str> = cursor.line()?.split_whitespace().collect();
+    let [version, form, size] = words[..] else {
+        return Err(cursor.error_at(start, "a format such as `4.1 0 8` should stand here"));
+    };
+    if version != "4.1" {
+        let shown: String = version.chars().take(20).collect();
+        let message = format!("this is version {shown} of the mesh format, not 4.1");
+        return Err(save_again(cursor.error_at(start, message), cursor.path));
+    }
+    match (form, size) {
+        ("0", _) => {}
+        ("1", "8") => {
+            cursor.binary = true;
+            let start = cursor.position();
+            if cursor.int()? != 1 {
+                let error = cursor.error_at(
+                    start,
+                    "the bytes of the numbers are not in this machine's order",
+                );
+                return Err(error.help("save the mesh as text on the machine that made it"));
+            }
+        }
+        _ => {
+            let message = format!("`{form} {size}` is neither text (`0 8`) nor binary (`1 8`)");
+            return Err(save_again(cursor.error_at(start, message), cursor.path));
+        }
+    }
+    cursor.leave()
+}
+
+/// The mesh, once all sections are read.
+fn finish<const D: usize>(
+    path: &Path,
+    mut groups: Vec<Group>,
+    nodes: Nodes,
+    order: Option<Order>,
+) -> Result<Mesh<D>> {
+    let fail = |message: String| Error::mesh(path, None, message);
+    let (thing, cells) = (THINGS[D], THINGS[D].to_lowercase());
+    let example =
+        format!("name the bodies and their boundaries: Physical {thing}(\"lower\") = {{1}};");
+    if groups.is_empty() {
+        return Err(fail("the mesh has no physical groups".into()).help(example));
+    }
+    if let Some(empty) = groups.iter().find(|group| group.is_empty()) {
+        let thing = THINGS[empty.dimension];
+        let message = format!(
+            "the physical {} `{}` has no elements",
+            thing.to_lowercase(),
+            empty.name
+        );
+        return Err(fail(message).help(format!(
+            "check what its `Physical {thing}` names, or remove it"
+        )));
+    }
+    let (Some(order), true) = (order, groups.iter().any(|group| group.dimension == D)) else {
+        return Err(fail(format!(
+            "no physical group holds {cells}s, and dimension = {D}"
+        ))
+        .help(example));
+    };
+    let points = groups::compact(&mut groups, nodes.points.len())
+        .map(|old| std::array::from_fn(|k| nodes.points[old][k]))
+        .collect();
+    Ok(Mesh {
+        path: path.to_owned(),
+        points,
+        order,
+        groups,
+    })
+}

@@ -1,0 +1,153 @@
+//! Physical groups: their names, and which entities of the geometry belong to them.
+
+use super::Group;
+use super::cursor::Cursor;
+use super::simplex::THINGS;
+use crate::error::Result;
+use std::collections::HashMap;
+
+/// The groups of a file, and who belongs to them.
+#[derive(Default)]
+pub struct Physical {
+    /// The groups, empty until the elements are read.
+    pub groups: Vec<Group>,
+    /// From dimension and physical tag to the place in `groups`.
+    group_of: HashMap<(usize, i32), usize>,
+    /// From dimension and tag of an entity of the geometry to the groups it belongs to.
+    entities: HashMap<(usize, i32), Vec<usize>>,
+}
+
+impl Physical {
+    /// Places in `groups` of those that an entity belongs to; `None` if the file does not list the entity.
+    pub fn members(&self, dimension: usize, tag: i32) -> Option<&[usize]> {
+        self.entities.get(&(dimension, tag)).map(Vec::as_slice)
+    }
+
+    /// Adds simplices of `stride` points each to all groups of an entity.
+    pub fn extend(&mut self, dimension: usize, tag: i32, stride: usize, connectivity: &[u32]) {
+        for member in self.entities.get(&(dimension, tag)).into_iter().flatten() {
+            let group = &mut self.groups[*member];
+            group.stride = stride;
+            group.connectivity.extend_from_slice(connectivity);
+        }
+    }
+
+    /// `$PhysicalNames`: lines of dimension, tag and quoted name, in binary files too.
+    pub fn read_names(&mut self, cursor: &mut Cursor, space: usize) -> Result<()> {
+        let start = cursor.position();
+        let count = cursor.line()?.parse::<usize>();
+        let count =
+            count.map_err(|_| cursor.error_at(start, "the number of names should stand here"))?;
+        for _ in 0..count {
+            let start = cursor.position();
+            let line = cursor.line()?;
+            let mut words = line.splitn(3, ' ');
+            let dimension = words
+                .next()
+                .and_then(|word| word.parse::<usize>().ok())
+                .filter(|dimension| *dimension <= 3);
+            let tag = words.next().and_then(|word| word.parse::<i32>().ok());
+            let name = words
+                .next()
+                .and_then(|word| word.trim().strip_prefix('"')?.strip_suffix('"'));
+            let (Some(dimension), Some(tag), Some(name)) = (dimension, tag, name) else {
+                return Err(cursor.error_at(
+                    start,
+                    "dimension, tag and \"name\" of a physical group should stand here",
+                ));
+            };
+            let thing = THINGS[dimension];
+            if name.trim().is_empty() {
+                let error = cursor.error_at(
+                    start,
+                    format!("physical {} {tag} has an empty name", thing.to_lowercase()),
+                );
+                return Err(error.help(format!(
+                    "name it: Physical {thing}(\"name\", {tag}) = {{...}};"
+                )));
+            }
+            if dimension > space {
+                let message = format!(
+                    "group `{name}` is made of volumes, but the scene has dimension = {space}"
+                );
+                return Err(cursor
+                    .error_at(start, message)
+                    .help("set `dimension = 3`, or remove the group"));
+            }
+            if self.groups.iter().any(|group| group.name == name) {
+                let error =
+                    cursor.error_at(start, format!("two physical groups are named `{name}`"));
+                return Err(error.help("rename one: a name alone must tell which group is meant"));
+            }
+            if self
+                .group_of
+                .insert((dimension, tag), self.groups.len())
+                .is_some()
+            {
+                let message = format!("two names for physical {} {tag}", thing.to_lowercase());
+                return Err(cursor.error_at(start, message));
+            }
+            // The stride is final once the first elements of the group are seen.
+            self.groups.push(Group {
+                name: name.to_owned(),
+                dimension,
+                stride: dimension + 1,
+                connectivity: Vec::new(),
+            });
+        }
+        Ok(())
+    }
+
+    /// `$Entities`: which physical groups each point, curve, surface and volume of the geometry belongs to.
+    pub fn read_entities(&mut self, cursor: &mut Cursor) -> Result<()> {
+        cursor.begin();
+        let mut counts = [0; 4];
+        for (dimension, count) in counts.iter_mut().enumerate() {
+            *count = if dimension == 0 {
+                cursor.count(5, 36)?
+            } else {
+                cursor.count(9, 68)?
+            };
+        }
+        cursor.end()?;
+        for (dimension, count) in counts.into_iter().enumerate() {
+            for _ in 0..count {
+                cursor.begin();
+                let start = cursor.position();
+                let tag = cursor.int()?;
+                // The entity's place, or the corners of the box around it.
+                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                    cursor.bound()?;
+                }
+                let mut members: Vec<usize> = Vec::new();
+                for _ in 0..cursor.count(1, 4)? {
+                    // The sign is an orientation.
+                    let physical = i32::try_from(cursor.int()?.unsigned_abs()).unwrap_or(i32::MAX);
+                    let Some(group) = self.group_of.get(&(dimension, physical)) else {
+                        let thing = THINGS[dimension];
+                        let message =
+                            format!("physical {} {physical} has no name", thing.to_lowercase());
+                        let help =
+                            format!("name it: Physical {thing}(\"name\", {physical}) = {{...}};");
+                        return Err(cursor.error_at(start, message).help(help));
+                    };
+                    if !members.contains(group) {
+                        members.push(*group);
+                    }
+                }
+                if dimension > 0 {
+                    for _ in 0..cursor.count(1, 4)? {
+                        cursor.int()?;
+                    }
+                }
+                cursor.end()?;
+                if self.entities.insert((dimension, tag), members).is_some() {
+                    let message =
+                        format!("{} {tag} stands twice", THINGS[dimension].to_lowercase());
+                    return Err(cursor.error_at(start, message));
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,288 @@
+//! What a `.geo` script says, as far as it matters before Gmsh runs it: which files it reads, and which numbers can
+//! be set from outside.
+//!
+//! This is a search through its text, not an interpreter: a file whose name the script computes is not seen.
+
+use crate::error::{Error, Located, Result, nearest};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// A script and all files that it reads.
+#[derive(Debug)]
+pub struct Script {
+    /// The contents of the script itself and of every file it names, in the order they are met.
+    pub files: Vec<Vec<u8>>,
+    /// Names that take a number from outside.
+    settable: BTreeSet<String>,
+    /// Names of constants whose number is set under another name, and that name.
+    aliases: Vec<(String, String)>,
+    /// Names that the script gives a value itself.
+    assigned: BTreeSet<String>,
+    /// All names.
+    mentioned: BTreeSet<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Token<'a> {
+    Name(&'a str),
+    Text(&'a str),
+    Sign(char),
+}
+
+impl Script {
+    /// Reads the script and what it includes or merges.
+    ///
+    /// # Errors
+    /// A script that cannot be read. Included files that do not exist are left to Gmsh to report.
+    pub fn read(path: &Path) -> Result<Script> {
+        let mut script = Script {
+            files: Vec::new(),
+            settable: BTreeSet::new(),
+            aliases: Vec::new(),
+            assigned: BTreeSet::new(),
+            mentioned: BTreeSet::new(),
+        };
+        // Canonical paths, since scripts may include each other along ever longer ones.
+        let canonical = path
+            .canonicalize()
+            .map_err(|cause| Error::file(path, "read", &cause))?;
+        let mut found: Vec<PathBuf> = vec![canonical];
+        let mut next = 0;
+        while let Some(path) = found.get(next).cloned() {
+            next += 1;
+            let bytes = std::fs::read(&path).map_err(|cause| Error::file(&path, "read", &cause))?;
+            // Gmsh looks for a file beside the one that names it. Every quoted name of a file counts, so that
+            // `Merge "part.step"` and the like need no list of commands.
+            let folder = path.parent().unwrap_or(Path::new(""));
+            let text = String::from_utf8_lossy(&bytes);
+            let tokens = tokens(&text);
+            for token in &tokens {
+                let Token::Text(name) = token else { continue };
+                let Ok(file) = folder.join(name).canonicalize() else {
+                    continue;
+                };
+                if file.is_file() && !found.contains(&file) {
+                    found.push(file);
+                }
+            }
+            script.note(&tokens);
+            script.files.push(bytes);
+        }
+        Ok(script)
+    }
+
+    /// Notes the names in a piece of the script.
+    fn note(&mut self, tokens: &[Token]) {
+        use Token::{Name, Sign, Text};
+        // Depth of brackets inside `DefineConstant[ ... ]`, 0 outside; and the constant being defined there.
+        let mut depth = 0;
+        let mut constant: Option<&str> = None;
+        for (at, token) in tokens.iter().enumerate() {
+            let after = &tokens[at + 1..];
+            let before = at.checked_sub(1).map(|at| tokens[at]);
+            match token {
+                Name("DefineConstant") => depth = 0,
+                Sign('[') if depth == 0 && before == Some(Name("DefineConstant")) => depth = 1,
+                Sign('[' | '{' | '(') if depth > 0 => depth += 1,
+                Sign(']' | '}' | ')') if depth > 0 => depth -= 1,
+                Name("Exists") => {
+                    if let [Sign('('), Name(name), ..] = after {
+                        self.settable.insert((*name).to_owned());
+                    }
+                }
+                Name("Name") if depth != 1 => {
+                    if let [Text(label), ..] = after {
+                        self.settable.insert((*label).to_owned());
+                        if let Some(name) = constant.filter(|name| name != label) {
+                            self.settable.remove(name);
+                            self.aliases.push((name.to_owned(), (*label).to_owned()));
+                        }
+                    }
+                }
+                Name(name) if depth == 1 && matches!(before, Some(Sign('[' | ','))) => {
+                    constant = Some(name);
+                    self.settable.insert((*name).to_owned());
+                }
+                Name(name)
+                    if depth == 0
+                        && matches!(after, [Sign('='), second, ..] if *second != Sign('=')) =>
+                {
+                    self.assigned.insert((*name).to_owned());
+                }
+                _ => {}
+            }
+            if depth == 0 {
+                constant = None;
+            }
+            if let Name(name) = token {
+                self.mentioned.insert((*name).to_owned());
+            }
+        }
+    }
+
+    /// Checks that a number set from outside arrives.
+    ///
+    /// # Errors
+    /// A name that the script never mentions, or one that it overwrites.
+    pub fn check(&self, name: &str, file: &Located<PathBuf>) -> Result<()> {
+        if self.settable.contains(name) {
+            return Ok(());
+        }
+        let error = |message: String| Error::scene(&file.place, message);
+        let shown = file.value.display();
+        if let Some((_, label)) = self.aliases.iter().find(|(constant, _)| constant == name) {
+            return Err(
+                error(format!("Gmsh knows `{name}` of {shown} as `{label}`")).help(format!(
+                    "set `\"{label}\"`, or write `Name \"{name}\"` in the script"
+                )),
+            );
+        }
+        if self.assigned.contains(name) {
+            return Err(error(format!(
+                "{shown} gives `{name}` a value itself, so setting it has no effect"
+            ))
+            .help(format!(
+                "write `DefineConstant[ {name} = {{..., Name \"{name}\"}} ];` in the script"
+            )));
+        }
+        if self.mentioned.contains(name) {
+            return Ok(());
+        }
+        let error = error(format!("{shown} has no number `{name}` to set"));
+        Err(
+            match nearest(name, self.settable.iter().map(String::as_str)) {
+                Some(near) => error.help(format!("did you mean `{near}`?")),
+                None if self.settable.is_empty() => error.help(format!(
+                    "write `DefineConstant[ {name} = {{..., Name \"{name}\"}} ];` in the script"
+                )),
+                None => {
+                    let known: Vec<&str> = self.settable.iter().map(String::as_str).collect();
+                    error.help(format!("it has: {}", known.join(", ")))
+                }
+            },
+        )
+    }
+}
+
+/// The names, quoted texts and other signs of a script; comments and numbers are left out.
+fn tokens(text: &str) -> Vec<Token<'_>> {
+    let mut tokens = Vec::new();
+    let mut rest = text;
+    while let Some(first) = rest.chars().next() {
+        let length = if rest.starts_with("//") {
+            rest.find('\n').unwrap_or(rest.len())
+        } else if let Some(comment) = rest.strip_prefix("/*") {
+            comment.find("*/").map_or(rest.len(), |end| end + 4)
+        } else if first == '"' || first == '\'' {
+            let body = &rest[1..];
+            let end = body.find(first).unwrap_or(body.len());
+            tokens.push(Token::Text(&body[..end]));
+            rest.len().min(end + 2)
+        } else if first.is_ascii_alphabetic() || first == '_' {
+            let end = rest
+                .find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
+                .unwrap_or(rest.len());
+            tokens.push(Token::Name(&rest[..end]));
+            end
+        } else if first.is_ascii_digit() {
+            // With the exponent, whose `e` is not a name.
+            rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '.'))
+                .unwrap_or(rest.len())
+        } else {
+            if !first.is_whitespace() {
+                tokens.push(Token::Sign(first));
+            }
+            first.len_utf8()
+        };
+        rest = &rest[length..];
+    }
+    tokens
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::{Place, Source};
+
+    fn located(path: &Path) -> Located<PathBuf> {
+        let source = Source {
+            name: "scene.toml".into(),
+            text: "mesh".into(),
+        };
+        Located::new(
+            path.to_owned(),
+            Place {
+                source: source.into(),
+                span: 0..4,
+            },
+        )
+    }
+
+    fn verdict(text: &str, name: &str) -> Option<String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.geo");
+        std::fs::write(&path, text).unwrap();
+        let script = Script::read(&path).unwrap();
+        script
+            .check(name, &located(&path))
+            .err()
+            .map(|error| error.to_string())
+    }
+
+    const SCRIPT: &str = r#"
+        // slip = 3;  /* not here */
+        DefineConstant[ n = {32, Min 1, Name "n"}, plain = 4 ];
+        DefineConstant[ h = {1e-3, Name "Sizes/h"} ];
+        If(!Exists(length)) length = 4; EndIf
+        fixed = 2;
+        Point(1) = {free, n == fixed, 0};
+    "#;
+
+    #[test]
+    fn numbers_that_arrive_pass() {
+        for name in ["n", "plain", "Sizes/h", "length", "free"] {
+            assert_eq!(verdict(SCRIPT, name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn numbers_that_would_be_lost_are_refused_with_a_way_out() {
+        for (name, expected) in [
+            ("slip", "has no number `slip` to set"),
+            ("lenght", "did you mean `length`?"),
+            ("fixed", "gives `fixed` a value itself"),
+            ("h", "as `Sizes/h`"),
+            ("e", "has no number `e` to set"),
+            ("thickness", "it has: Sizes/h, length, n, plain"),
+        ] {
+            let error = verdict(SCRIPT, name).unwrap_or_default();
+            assert!(error.contains(expected), "{name}: {error}");
+        }
+        assert!(
+            verdict("Point(1) = {0, 0, 0};", "n")
+                .unwrap()
+                .contains("write `DefineConstant[ n")
+        );
+    }
+
+    #[test]
+    fn files_are_followed_once_and_through_folders() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("parts")).unwrap();
+        std::fs::write(
+            folder.path().join("a.geo"),
+            "Include \"parts/b.geo\"; Merge 'parts/c.stl';",
+        )
+        .unwrap();
+        std::fs::write(
+            folder.path().join("parts/b.geo"),
+            "n = 1; Include \"c.stl\"; Include \"../a.geo\";",
+        )
+        .unwrap();
+        std::fs::write(folder.path().join("parts/c.stl"), [0xff, b'"', 0x80]).unwrap();
+        let script = Script::read(&folder.path().join("a.geo")).unwrap();
+        assert!(script.assigned.contains("n"));
+        assert!(script.files[0].starts_with(b"Include"));
+        assert_eq!(script.files.len(), 3);
+    }
+}

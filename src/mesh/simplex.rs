@@ -1,0 +1,186 @@
+//! Facts about single simplices: sizes, orientation, Gmsh's numbering.
+
+use crate::scene::Order;
+
+/// What Gmsh calls things of dimension 0 to 3, as in `Physical Surface`.
+pub const THINGS: [&str; 4] = ["Point", "Curve", "Surface", "Volume"];
+
+/// A simplex type of Gmsh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Kind {
+    /// Dimension, 0 to 3.
+    pub dimension: usize,
+    /// Order; `None` for points, which have none.
+    pub order: Option<Order>,
+    /// Points per simplex.
+    pub stride: usize,
+}
+
+impl Kind {
+    /// The simplex that an element type number of Gmsh stands for, if it is one we compute with.
+    pub fn of_type(number: i32) -> Option<Kind> {
+        let (dimension, order, stride) = match number {
+            15 => (0, None, 1),
+            1 => (1, Some(Order::P1), 2),
+            8 => (1, Some(Order::P2), 3),
+            2 => (2, Some(Order::P1), 3),
+            9 => (2, Some(Order::P2), 6),
+            4 => (3, Some(Order::P1), 4),
+            11 => (3, Some(Order::P2), 10),
+            _ => return None,
+        };
+        Some(Kind {
+            dimension,
+            order,
+            stride,
+        })
+    }
+}
+
+/// What Gmsh calls an element type and its number of nodes, for types 1 to 31.
+pub fn type_name(number: i32) -> Option<(&'static str, usize)> {
+    const NODES: [usize; 31] = [
+        2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4,
+        5, 6, 20, 35, 56,
+    ];
+    let nodes = *NODES.get(usize::try_from(number).ok()?.checked_sub(1)?)?;
+    let name = match number {
+        1 | 8 | 26..=28 => "line",
+        2 | 9 | 20..=25 => "triangle",
+        3 | 10 | 16 => "quadrangle",
+        4 | 11 | 29..=31 => "tetrahedron",
+        5 | 12 | 17 => "hexahedron",
+        6 | 13 | 18 => "prism",
+        7 | 14 | 19 => "pyramid",
+        _ => "point",
+    };
+    Some((name, nodes))
+}
+
+/// Puts the points of a simplex from Gmsh's order into ours; they differ in the quadratic tetrahedron only, where
+/// Gmsh has mid-edge 23 before 13.
+pub fn from_gmsh_order(simplex: &mut [u32]) {
+    if simplex.len() == 10 {
+        simplex.swap(8, 9);
+    }
+}
+
+/// Turns a cell inside out: exchanges its last two vertices and the mid-edges that go with them.
+pub fn mirror(cell: &mut [u32]) {
+    match cell.len() {
+        3 => cell.swap(1, 2),
+        4 => cell.swap(2, 3),
+        6 => {
+            cell.swap(1, 2);
+            cell.swap(3, 5);
+        }
+        10 => {
+            cell.swap(2, 3);
+            cell.swap(5, 8);
+            cell.swap(6, 7);
+        }
+        _ => {}
+    }
+}
+
+/// Signed measure of the simplex on these vertices, times the factorial of its dimension. The sign means something
+/// for cells alone: triangles if `space` is 2, tetrahedra if it is 3. Coordinates are (x, y, z), z unused in planes.
+pub fn measure(vertices: &[[f64; 3]], space: usize) -> f64 {
+    let edge = |to: usize| std::array::from_fn(|k| vertices[to][k] - vertices[0][k]);
+    match vertices.len() {
+        2 => norm(edge(1)),
+        3 if space == 2 => cross(edge(1), edge(2))[2],
+        3 => norm(cross(edge(1), edge(2))),
+        4 => dot(cross(edge(1), edge(2)), edge(3)),
+        _ => 1.0,
+    }
+}
+
+/// Whether a simplex of this [`measure`] has, to rounding, no extent: true for numbers that overflowed, too.
+pub fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
+    let mut longest = 0.0_f64;
+    for (i, a) in vertices.iter().enumerate() {
+        for b in &vertices[..i] {
+            longest = longest.max(norm(std::array::from_fn(|k| a[k] - b[k])));
+        }
+    }
+    let smallest = 1e-12 * longest.powi(vertices.len() as i32 - 1);
+    // Overflow leaves infinity or NaN; a point has measure 1 and passes.
+    !measure.is_finite() || measure.abs() <= smallest
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn norm(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TETRAHEDRON: [[f64; 3]; 4] = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+    ];
+
+    #[test]
+    fn measures_have_their_sign() {
+        assert_eq!(measure(&TETRAHEDRON, 3), 1.0);
+        assert_eq!(measure(&TETRAHEDRON[..3], 2), 1.0);
+        let [a, b, c, d] = TETRAHEDRON;
+        assert_eq!(measure(&[a, c, b, d], 3), -1.0);
+        assert_eq!(measure(&[a, c, b], 2), -1.0);
+        assert_eq!(measure(&[a, c, b], 3), 1.0);
+    }
+
+    #[test]
+    fn flat_and_overflown_simplices_are_degenerate() {
+        let [a, b, c, _] = TETRAHEDRON;
+        let flat = [a, b, c, [0.3, 0.3, 1e-14]];
+        assert!(is_degenerate(&flat, measure(&flat, 3)));
+        assert!(!is_degenerate(&TETRAHEDRON, measure(&TETRAHEDRON, 3)));
+        assert!(!is_degenerate(&[a], measure(&[a], 3)));
+        let far = [a, [1e300, 0.0, 0.0], [0.0, 1e300, 0.0]];
+        assert!(is_degenerate(&far, measure(&far, 2)));
+    }
+
+    /// Mid-edges must stay between the same two vertices, whatever their order.
+    #[test]
+    fn mirrored_cells_keep_their_edges() {
+        let edges: [(usize, &[[usize; 2]]); 2] = [
+            (3, &[[0, 1], [1, 2], [0, 2]]),
+            (4, &[[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]),
+        ];
+        for (vertices, edges) in edges {
+            // The number of a mid-edge point is the sum of the powers of ten of its vertices, so it names them.
+            let mut cell: Vec<u32> = (0..vertices)
+                .map(|vertex| 10_u32.pow(vertex as u32))
+                .collect();
+            cell.extend(
+                edges
+                    .iter()
+                    .map(|[a, b]| 10_u32.pow(*a as u32) + 10_u32.pow(*b as u32))
+                    .collect::<Vec<_>>(),
+            );
+            let before = cell.clone();
+            mirror(&mut cell);
+            assert_ne!(before, cell);
+            for (k, [a, b]) in edges.iter().enumerate() {
+                assert_eq!(cell[vertices + k], cell[*a] + cell[*b]);
+            }
+        }
+    }
+}

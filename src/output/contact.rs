@@ -1,0 +1,143 @@
+//! `contact-<a>-<b>.csv`: gap, compression, pressure and normal displacements at the contact points of one pair.
+
+use super::folder::{Folder, safe_name};
+use super::format::field;
+use crate::error::Result;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+/// The result on one pair of contact surfaces; all vectors have one entry per contact point.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ContactTable {
+    /// Names of the two contact surfaces, side a and side b.
+    pub side_names: [String; 2],
+    /// Contact points, before deformation.
+    pub points: Vec<[f64; 3]>,
+    /// Initial gap d.
+    pub gap: Vec<f64>,
+    /// Compression c of the layer; negative where the layer is open.
+    pub compression: Vec<f64>,
+    /// Contact pressure p(c), >= 0.
+    pub pressure: Vec<f64>,
+    /// Averaged normal displacement of side a and of side b, each along its own outer normal.
+    pub displacement: [Vec<f64>; 2],
+}
+
+impl ContactTable {
+    /// `contact-<a>-<b>`, safe as a file name.
+    pub fn stem(&self) -> String {
+        let [a, b] = &self.side_names;
+        format!("contact-{}-{}", safe_name(a), safe_name(b))
+    }
+
+    /// Writes the table into the folder of results under a name of its own; returns the path.
+    ///
+    /// # Errors
+    /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
+    pub fn save(&self, folder: &Folder) -> Result<PathBuf> {
+        folder.write(&folder.unused(&self.stem(), "csv"), |out| self.write(out))
+    }
+
+    /// Writes the table as CSV, points in their order, numbers to full precision.
+    ///
+    /// # Errors
+    /// Those of `out`, and `InvalidInput` when the vectors differ in length.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        let [of_a, of_b] = &self.displacement;
+        let columns = [&self.gap, &self.compression, &self.pressure, of_a, of_b];
+        if columns
+            .iter()
+            .any(|column| column.len() != self.points.len())
+        {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "contact table with columns of different length",
+            ));
+        }
+        let mut csv = csv::Writer::from_writer(out);
+        let sides = self.side_names.each_ref().map(|side| format!("u_n_{side}"));
+        csv.write_record(
+            ["x", "y", "z", "gap", "compression", "pressure"]
+                .into_iter()
+                .chain(sides.iter().map(String::as_str)),
+        )?;
+        for (q, point) in self.points.iter().enumerate() {
+            let values = point
+                .iter()
+                .copied()
+                .chain(columns.iter().map(|column| column[q]));
+            csv.write_record(values.map(field))?;
+        }
+        csv.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> ContactTable {
+        ContactTable {
+            side_names: ["upper bottom".into(), "lower".into()],
+            points: vec![[1.0, 0.0, -0.5], [0.1 + 0.2, 0.0, 1e-20]],
+            gap: vec![0.0, 1.0 / 3.0],
+            compression: vec![1e-7, -0.25],
+            pressure: vec![2.0f64.sqrt(), 0.0],
+            displacement: [vec![1e-300, 2.0], vec![-3.0, 1e22]],
+        }
+    }
+
+    #[test]
+    fn every_number_reads_back_in_its_column() {
+        let base = tempfile::tempdir().unwrap();
+        let folder = Folder::create(base.path()).unwrap();
+        let table = table();
+        let path = table.save(&folder).unwrap();
+        assert_eq!(path, base.path().join("contact-upper_bottom-lower.csv"));
+        let mut csv = csv::Reader::from_path(&path).unwrap();
+        let header: Vec<_> = csv.headers().unwrap().iter().map(String::from).collect();
+        assert_eq!(
+            header.join(","),
+            "x,y,z,gap,compression,pressure,u_n_upper bottom,u_n_lower"
+        );
+        let rows: Vec<Vec<f64>> = csv
+            .records()
+            .map(|row| row.unwrap().iter().map(|v| v.parse().unwrap()).collect())
+            .collect();
+        assert_eq!(rows.len(), 2);
+        for (q, row) in rows.iter().enumerate() {
+            let [x, y, z] = table.points[q];
+            let [a, b] = &table.displacement;
+            let expected = [
+                x,
+                y,
+                z,
+                table.gap[q],
+                table.compression[q],
+                table.pressure[q],
+                a[q],
+                b[q],
+            ];
+            assert_eq!(row[..], expected);
+        }
+    }
+
+    #[test]
+    fn two_pairs_never_share_a_file() {
+        let base = tempfile::tempdir().unwrap();
+        let folder = Folder::create(base.path()).unwrap();
+        let mut other = table();
+        other.side_names = ["upper/bottom".into(), "lower".into()];
+        assert_ne!(table().save(&folder).unwrap(), other.save(&folder).unwrap());
+    }
+
+    #[test]
+    fn short_columns_are_refused() {
+        let mut table = table();
+        table.pressure.pop();
+        assert_eq!(
+            table.write(&mut Vec::new()).unwrap_err().kind(),
+            io::ErrorKind::InvalidInput
+        );
+    }
+}

@@ -1,0 +1,230 @@
+//! The folder of results: made before the work starts, and never left with half a file.
+
+use crate::error::{Error, Result};
+use std::cell::RefCell;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A folder for the results of one run.
+#[derive(Debug)]
+pub struct Folder {
+    path: PathBuf,
+    files: RefCell<Vec<PathBuf>>,
+}
+
+impl Folder {
+    /// Makes the folder with its parents, or takes the one that is there, and tries whether it can be written.
+    ///
+    /// # Errors
+    /// [`Kind::File`](crate::error::Kind::File) when it cannot be made, is no folder, or cannot be written.
+    pub fn create(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref().to_owned();
+        fs::create_dir_all(&path).map_err(|cause| {
+            Error::file(&path, "create the folder", &cause)
+                .help("name a folder that can be made with `-o FOLDER`")
+        })?;
+        let probe = path.join(format!(".winkler-{}", std::process::id()));
+        File::create(&probe)
+            .and_then(|_| fs::remove_file(&probe))
+            .map_err(|cause| {
+                Error::file(&path, "write to the folder", &cause)
+                    .help("give yourself write permission, or name another folder with `-o FOLDER`")
+            })?;
+        Ok(Self {
+            path,
+            files: RefCell::new(Vec::new()),
+        })
+    }
+
+    /// The folder as it was named.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The files written so far, in order, each once; paths begin with [`Folder::path`].
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.files.borrow().clone()
+    }
+
+    /// Writes a whole file `name`, replacing one of this name; returns its path.
+    ///
+    /// The text goes to a temporary file in the same folder, which takes the name only when it is complete.
+    ///
+    /// # Errors
+    /// [`Kind::File`](crate::error::Kind::File) with the path and the cause; then nothing was changed.
+    pub fn write(
+        &self,
+        name: &str,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<PathBuf> {
+        let path = self.path.join(name);
+        write_whole(&path, fill)?;
+        self.add(&path);
+        Ok(path)
+    }
+
+    /// Opens a file `name` that grows while the program works, replacing one of this name.
+    ///
+    /// # Errors
+    /// [`Kind::File`](crate::error::Kind::File) with the path and the cause.
+    pub fn open(&self, name: &str) -> Result<(PathBuf, File)> {
+        let path = self.path.join(name);
+        let file = File::create(&path).map_err(|cause| failed(&path, &cause))?;
+        self.add(&path);
+        Ok((path, file))
+    }
+
+    /// `stem.extension`, or `stem-2.extension` and so on when this run has already written a file of that name.
+    pub fn unused(&self, stem: &str, extension: &str) -> String {
+        let files = self.files.borrow();
+        let mut name = format!("{stem}.{extension}");
+        let mut number = 1;
+        while files.contains(&self.path.join(&name)) {
+            number += 1;
+            name = format!("{stem}-{number}.{extension}");
+        }
+        name
+    }
+
+    fn add(&self, path: &Path) {
+        let mut files = self.files.borrow_mut();
+        if !files.iter().any(|file| file == path) {
+            files.push(path.to_owned());
+        }
+    }
+}
+
+/// Writes a whole file or nothing: fills a temporary file beside `path` and renames it.
+pub(super) fn write_whole(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<()> {
+    let mut hidden = std::ffi::OsString::from(".");
+    hidden.push(path.file_name().unwrap_or_default());
+    hidden.push(format!(".{}.part", std::process::id()));
+    let part = path.with_file_name(hidden);
+    let written = (|| {
+        let mut out = BufWriter::new(File::create(&part)?);
+        fill(&mut out)?;
+        let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+        // Network file systems and quotas may refuse the data only here.
+        file.sync_all()?;
+        fs::rename(&part, path)
+    })();
+    written.map_err(|cause| {
+        // The first failure is the one to tell; the part may not even exist.
+        let _ = fs::remove_file(&part);
+        failed(path, &cause)
+    })
+}
+
+/// The error for a file that could not be written.
+pub(super) fn failed(path: &Path, cause: &io::Error) -> Error {
+    let help = match cause.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "free some space, or name a folder on another disk with `-o FOLDER`"
+        }
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "give yourself write permission, or name another folder with `-o FOLDER`"
+        }
+        io::ErrorKind::IsADirectory => "a folder has the name of this file: rename or remove it",
+        _ => "name another folder with `-o FOLDER`",
+    };
+    Error::file(path, "write", cause).help(help)
+}
+
+/// A name that is safe in a file name: characters other than letters, digits, `-`, `_` and `.` become `_`.
+/// An empty name, or one that begins with a dot, gets a `_` in front.
+pub fn safe_name(name: &str) -> String {
+    let safe: String = name
+        .chars()
+        .map(|c| {
+            if c.is_alphanumeric() || "-_.".contains(c) {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    if safe.is_empty() || safe.starts_with('.') {
+        format!("_{safe}")
+    } else {
+        safe
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Kind;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn makes_parents_and_lists_files_once() {
+        let base = tempfile::tempdir().unwrap();
+        let folder = Folder::create(base.path().join("a/b")).unwrap();
+        assert!(names(folder.path()).is_empty());
+        for text in ["first", "second"] {
+            folder.write("x.txt", |out| write!(out, "{text}")).unwrap();
+        }
+        assert_eq!(
+            fs::read_to_string(folder.path().join("x.txt")).unwrap(),
+            "second"
+        );
+        assert_eq!(folder.files(), [folder.path().join("x.txt")]);
+        assert_eq!(names(folder.path()), ["x.txt"]);
+        assert_eq!(folder.unused("x", "txt"), "x-2.txt");
+        assert_eq!(folder.unused("y", "txt"), "y.txt");
+    }
+
+    #[test]
+    fn a_failure_keeps_the_old_file_and_no_part() {
+        let base = tempfile::tempdir().unwrap();
+        let folder = Folder::create(base.path()).unwrap();
+        folder
+            .write("x.txt", |out| out.write_all(b"whole"))
+            .unwrap();
+        let error = folder
+            .write("x.txt", |out| {
+                out.write_all(&[b'h'; 100_000])?;
+                Err(io::ErrorKind::StorageFull.into())
+            })
+            .unwrap_err();
+        assert_eq!(error.kind(), Kind::File);
+        assert!(error.message().contains("x.txt"), "{error}");
+        assert!(error.advice().unwrap().contains("space"), "{error}");
+        assert_eq!(
+            fs::read_to_string(folder.path().join("x.txt")).unwrap(),
+            "whole"
+        );
+        assert_eq!(names(folder.path()), ["x.txt"]);
+    }
+
+    #[test]
+    fn a_file_in_place_of_the_folder_is_refused() {
+        let base = tempfile::tempdir().unwrap();
+        let path = base.path().join("taken");
+        fs::write(&path, "").unwrap();
+        let error = Folder::create(&path).unwrap_err();
+        assert_eq!(error.kind(), Kind::File);
+        assert!(error.message().contains("taken"), "{error}");
+        assert!(error.advice().unwrap().contains("-o"));
+    }
+
+    #[test]
+    fn names_stay_in_the_folder() {
+        assert_eq!(safe_name("upper bottom/../x"), "upper_bottom_.._x");
+        assert_eq!(safe_name("..\\x"), "_.._x");
+        assert_eq!(safe_name(""), "_");
+        assert_eq!(safe_name("größe-1"), "größe-1");
+    }
+}

@@ -1,0 +1,87 @@
+//! How numbers are written.
+
+/// A number for people: `digits` after the point and a two-digit exponent (`1.23e-08`); NaN is `-`.
+pub fn sci(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        return "-".into();
+    }
+    let text = format!("{value:.digits$e}");
+    match text.split_once('e') {
+        Some((mantissa, exponent)) => {
+            let (sign, power) = match exponent.strip_prefix('-') {
+                Some(power) => ('-', power),
+                None => ('+', exponent),
+            };
+            format!("{mantissa}e{sign}{power:0>2}")
+        }
+        None => text, // infinite
+    }
+}
+
+/// A duration in seconds for people: two decimals below 100 s, none from 10 000 s on; NaN is `-`.
+pub fn seconds(value: f64) -> String {
+    match value {
+        v if v.is_nan() => "-".into(),
+        v if v < 100.0 => format!("{v:.2}"),
+        v if v < 10_000.0 => format!("{v:.1}"),
+        v => format!("{v:.0}"),
+    }
+}
+
+/// A number for programs: the shortest text that reads back as the same number; NaN is an empty field.
+pub(super) fn field(value: f64) -> String {
+    if value.is_nan() {
+        String::new()
+    } else {
+        format!("{value:?}")
+    }
+}
+
+/// An integer in superscript digits, for powers of ten.
+pub(super) fn superscript(value: i32) -> String {
+    value
+        .to_string()
+        .chars()
+        .map(|digit| match digit {
+            '-' => '⁻',
+            '1' => '¹',
+            '2' => '²',
+            '3' => '³',
+            '0' | '4'..='9' => {
+                char::from_u32('⁰' as u32 + digit as u32 - '0' as u32).unwrap_or(digit)
+            }
+            other => other,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_for_people() {
+        assert_eq!(sci(1.2345e-8, 2), "1.23e-08");
+        assert_eq!(sci(-9.999, 1), "-1.0e+01");
+        assert_eq!(sci(1e-123, 0), "1e-123");
+        assert_eq!(sci(f64::NAN, 3), "-");
+        assert_eq!(sci(f64::INFINITY, 3), "inf");
+        assert_eq!(seconds(0.123), "0.12");
+        assert_eq!(seconds(123.45), "123.5");
+        assert_eq!(seconds(86_400.4), "86400");
+    }
+
+    #[test]
+    fn numbers_for_programs_read_back() {
+        for value in [0.1, 1.0 / 3.0, -2.5e-300, 1e22, 0.0] {
+            assert_eq!(field(value).parse::<f64>(), Ok(value));
+        }
+        assert_eq!(field(f64::NAN), "");
+    }
+
+    #[test]
+    fn superscripts() {
+        assert_eq!(superscript(-1203), "⁻¹²⁰³");
+        assert_eq!(superscript(456_789), "⁴⁵⁶⁷⁸⁹");
+    }
+}

@@ -1,0 +1,172 @@
+//! `history.csv`: the iteration history, written as it comes.
+
+use super::folder::{Folder, failed};
+use super::format::field;
+use crate::ddm::{Observer, Row};
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::path::PathBuf;
+
+/// Writes one line of `history.csv` for each row. Every line reaches the file at once, so that a run that is
+/// killed keeps all rows it had computed.
+pub struct HistoryWriter {
+    path: PathBuf,
+    csv: csv::Writer<File>,
+    bodies: usize,
+    failure: Option<Error>,
+}
+
+impl HistoryWriter {
+    /// Opens `history.csv` and writes its header; `bodies` are the names in the order of [`Row::increments`].
+    ///
+    /// # Errors
+    /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
+    pub fn create<S: AsRef<str>>(folder: &Folder, bodies: &[S]) -> Result<Self> {
+        let (path, file) = folder.open("history.csv")?;
+        let csv = csv::Writer::from_writer(file);
+        let mut header: Vec<String> = ["iteration", "residual", "increment"]
+            .map(String::from)
+            .into();
+        header.extend(
+            bodies
+                .iter()
+                .map(|body| format!("increment_{}", body.as_ref())),
+        );
+        header.extend(
+            [
+                "gamma",
+                "energy",
+                "closed",
+                "points",
+                "sweeps",
+                "factorizations",
+                "inner_iterations",
+                "seconds",
+            ]
+            .map(String::from),
+        );
+        let mut history = Self {
+            path,
+            csv,
+            bodies: bodies.len(),
+            failure: None,
+        };
+        history.line(&header);
+        history.failure.take().map_or(Ok(history), Err)
+    }
+
+    /// Ends the file and returns its path.
+    ///
+    /// # Errors
+    /// The first failure to write a row: later rows were dropped then.
+    pub fn finish(self) -> Result<PathBuf> {
+        self.failure.map_or(Ok(self.path), Err)
+    }
+
+    fn line(&mut self, fields: &[String]) {
+        // After a failure the file ends with whole rows; going on would leave a hole.
+        if self.failure.is_some() {
+            return;
+        }
+        let written = self
+            .csv
+            .write_record(fields)
+            .map_err(Into::into)
+            .and_then(|()| self.csv.flush());
+        self.failure = written.err().map(|cause| failed(&self.path, &cause));
+    }
+}
+
+impl Observer for HistoryWriter {
+    fn row(&mut self, row: &Row) {
+        let mut fields = vec![
+            row.iteration.to_string(),
+            field(row.residual),
+            field(row.increment),
+        ];
+        // Row 0 may come without increments.
+        fields.extend((0..self.bodies).map(|body| {
+            row.increments
+                .get(body)
+                .map_or(String::new(), |&v| field(v))
+        }));
+        fields.extend([field(row.gamma), field(row.energy)]);
+        fields.extend(
+            [
+                row.closed,
+                row.points,
+                row.sweeps,
+                row.factorizations,
+                row.inner_iterations,
+            ]
+            .map(|count| count.to_string()),
+        );
+        fields.push(field(row.seconds));
+        self.line(&fields);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_in_the_file_before_the_end() {
+        let base = tempfile::tempdir().unwrap();
+        let folder = Folder::create(base.path()).unwrap();
+        let mut history = HistoryWriter::create(&folder, &["upper", "lower"]).unwrap();
+        history.row(&Row {
+            residual: 1.0,
+            increment: f64::NAN,
+            gamma: f64::NAN,
+            energy: -0.1,
+            points: 9,
+            sweeps: 1,
+            ..Row::default()
+        });
+        history.row(&Row {
+            iteration: 1,
+            residual: 1e-9,
+            increment: 0.5,
+            increments: vec![0.5, 1.0 / 3.0],
+            gamma: 0.25,
+            energy: -0.2,
+            closed: 4,
+            points: 9,
+            sweeps: 2,
+            factorizations: 3,
+            inner_iterations: 7,
+            seconds: 1.5,
+        });
+        let text = std::fs::read_to_string(base.path().join("history.csv")).unwrap();
+        let lines: Vec<_> = text.lines().collect();
+        assert_eq!(
+            lines,
+            [
+                "iteration,residual,increment,increment_upper,increment_lower,gamma,energy,closed,points,\
+                 sweeps,factorizations,inner_iterations,seconds",
+                "0,1.0,,,,,-0.1,0,9,1,0,0,0.0",
+                "1,1e-9,0.5,0.5,0.3333333333333333,0.25,-0.2,4,9,2,3,7,1.5",
+            ]
+        );
+        assert_eq!(history.finish().unwrap(), base.path().join("history.csv"));
+        assert_eq!(folder.files().len(), 1);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_told_once_at_the_end() {
+        let file = File::options().write(true).open("/dev/full").unwrap();
+        let mut history = HistoryWriter {
+            path: "history.csv".into(),
+            csv: csv::Writer::from_writer(file),
+            bodies: 0,
+            failure: None,
+        };
+        history.row(&Row::default());
+        history.row(&Row::default());
+        let error = history.finish().unwrap_err();
+        assert!(error.message().contains("history.csv"), "{error}");
+        assert!(error.advice().unwrap().contains("space"), "{error}");
+    }
+}

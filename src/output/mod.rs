@@ -1,0 +1,26 @@
+//! Everything the program writes: the table on the terminal, and the files of a run.
+//!
+//! Nothing here knows the space dimension: points and vectors have three components, z = 0 in the plane.
+
+mod canvas;
+mod chart;
+pub mod contact;
+pub mod folder;
+mod format;
+pub mod history;
+mod legend;
+mod look;
+pub mod plot;
+pub mod report;
+pub mod table;
+mod ticks;
+pub mod vtu;
+
+pub use contact::ContactTable;
+pub use folder::{Folder, safe_name};
+pub use format::{sci, seconds};
+pub use history::HistoryWriter;
+pub use plot::{Axis, Color, ConvergenceSeries, Plot, PressureSeries, Series, Style};
+pub use report::{BodyReport, PairReport, Report};
+pub use table::{IterationTable, Verbosity};
+pub use vtu::{BodyField, CellKind};

@@ -1,0 +1,286 @@
+//! The plots of a run as SVG files: convergence, contact pressure, and lines in general.
+
+use super::chart;
+use super::folder::write_whole;
+use crate::error::Result;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// A plot: curves over two axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plot {
+    /// Heading; empty for none.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// Curves, drawn in this order.
+    pub series: Vec<Series>,
+}
+
+/// An axis; its range and ticks follow the data.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Axis {
+    /// What it shows, with the unit.
+    pub label: String,
+    /// Logarithmic, with ticks at powers of ten.
+    pub log: bool,
+}
+
+/// A curve, or marks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name in the legend; empty for none. A named series without points only explains a style there.
+    pub label: String,
+    /// Points (x, y). Values that the axes cannot show (NaN, infinite, not positive on a logarithmic axis) leave
+    /// a gap in the curve.
+    pub points: Vec<(f64, f64)>,
+    /// How it is drawn.
+    pub style: Style,
+    /// Its colour.
+    pub color: Color,
+}
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// A solid line.
+    Line,
+    /// A dashed line.
+    Dashed,
+    /// Marks at the points.
+    Markers,
+    /// A solid line with marks at the points.
+    LineMarkers,
+}
+
+/// Colour of a series.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Color {
+    /// That of its place among the series without colour of their own.
+    #[default]
+    Next,
+    /// An entry of the palette, which starts again after its end; entries can be told apart by colour-blind readers.
+    Palette(usize),
+    /// Dark grey: references and explanations.
+    Grey,
+}
+
+impl Series {
+    /// A series in the next colour.
+    pub fn new(label: impl Into<String>, points: Vec<(f64, f64)>, style: Style) -> Self {
+        Self {
+            label: label.into(),
+            points,
+            style,
+            color: Color::Next,
+        }
+    }
+
+    /// The same in another colour.
+    pub fn color(self, color: Color) -> Self {
+        Self { color, ..self }
+    }
+}
+
+/// The history of one run, for [`convergence`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConvergenceSeries {
+    /// Name of the run.
+    pub label: String,
+    /// Iteration, relative residual, increment; NaN where there is none.
+    pub rows: Vec<(usize, f64, f64)>,
+}
+
+/// A pressure along a surface, for [`pressure`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressureSeries {
+    /// Name in the legend.
+    pub label: String,
+    /// Place along the surface, in any order.
+    pub s: Vec<f64>,
+    /// Pressure there.
+    pub p: Vec<f64>,
+    /// A reference: dashed and grey.
+    pub dashed: bool,
+}
+
+impl Plot {
+    /// Residual (solid) and increment (dashed) of one or more runs against the iteration, on a logarithmic axis.
+    pub fn convergence(title: &str, runs: &[ConvergenceSeries]) -> Self {
+        let (solid, dashed) = ("residual", "increment");
+        let mut series = Vec::new();
+        let has_increments = runs.iter().flat_map(|run| &run.rows).any(|row| row.2 > 0.0);
+        for (index, run) in runs.iter().enumerate() {
+            let curve = |label: &str, style, value: fn(&(usize, f64, f64)) -> f64| {
+                let points = run
+                    .rows
+                    .iter()
+                    .map(|row| (row.0 as f64, value(row)))
+                    .collect();
+                Series::new(label, points, style).color(Color::Palette(index))
+            };
+            let (residual, increment) = if runs.len() == 1 {
+                (solid, dashed)
+            } else {
+                (run.label.as_str(), "")
+            };
+            series.push(curve(residual, Style::Line, |row| row.1));
+            if has_increments {
+                series.push(curve(increment, Style::Dashed, |row| row.2));
+            }
+        }
+        if runs.len() > 1 && has_increments {
+            for (label, style) in [(solid, Style::Line), (dashed, Style::Dashed)] {
+                series.push(Series::new(label, Vec::new(), style).color(Color::Grey));
+            }
+        }
+        let y = match (has_increments, runs.len()) {
+            (false, _) => "relative residual",
+            (true, _) => "relative residual, increment",
+        };
+        Self {
+            title: title.into(),
+            x: Axis {
+                label: "iteration".into(),
+                log: false,
+            },
+            y: Axis {
+                label: y.into(),
+                log: true,
+            },
+            series,
+        }
+    }
+
+    /// Contact pressure along a surface; references dashed and grey, on top.
+    pub fn pressure(title: &str, x_label: &str, curves: &[PressureSeries]) -> Self {
+        let (references, results): (Vec<_>, Vec<_>) = curves.iter().partition(|curve| curve.dashed);
+        let series = results.into_iter().chain(references).map(|curve| {
+            let mut points: Vec<_> = curve
+                .s
+                .iter()
+                .copied()
+                .zip(curve.p.iter().copied())
+                .collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let (style, color) = match curve.dashed {
+                true => (Style::Dashed, Color::Grey),
+                false => (Style::Line, Color::Next),
+            };
+            Series::new(&curve.label, points, style).color(color)
+        });
+        Self {
+            title: title.into(),
+            x: Axis {
+                label: x_label.into(),
+                log: false,
+            },
+            y: Axis {
+                label: "contact pressure".into(),
+                log: false,
+            },
+            series: series.collect(),
+        }
+    }
+
+    /// Writes the plot as SVG, 900 by 560 pixels, on white.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(chart::draw(self)?.as_bytes())
+    }
+
+    /// Writes the plot as an SVG file, the whole file or nothing.
+    ///
+    /// # Errors
+    /// [`Kind::File`](crate::error::Kind::File) when it cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        write_whole(path, |out| self.write(out))
+    }
+}
+
+/// Saves [`Plot::convergence`].
+///
+/// # Errors
+/// [`Kind::File`](crate::error::Kind::File) when it cannot be written.
+pub fn convergence(path: &Path, title: &str, runs: &[ConvergenceSeries]) -> Result<()> {
+    Plot::convergence(title, runs).save(path)
+}
+
+/// Saves [`Plot::pressure`].
+///
+/// # Errors
+/// [`Kind::File`](crate::error::Kind::File) when it cannot be written.
+pub fn pressure(path: &Path, title: &str, x_label: &str, curves: &[PressureSeries]) -> Result<()> {
+    Plot::pressure(title, x_label, curves).save(path)
+}
+
+/// Saves any plot.
+///
+/// # Errors
+/// [`Kind::File`](crate::error::Kind::File) when it cannot be written.
+pub fn lines(path: &Path, plot: &Plot) -> Result<()> {
+    plot.save(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(label: &str) -> ConvergenceSeries {
+        let rows = vec![(0, 1.0, f64::NAN), (1, 0.1, 0.5), (2, 0.0, 0.05)];
+        ConvergenceSeries {
+            label: label.into(),
+            rows,
+        }
+    }
+
+    #[test]
+    fn several_runs_share_one_explanation_of_the_line_styles() {
+        let labels = |plot: &Plot| -> Vec<String> {
+            plot.series
+                .iter()
+                .map(|s| s.label.clone())
+                .filter(|l| !l.is_empty())
+                .collect()
+        };
+        let one = Plot::convergence("", &[run("a")]);
+        assert_eq!(labels(&one), ["residual", "increment"]);
+        let two = Plot::convergence("", &[run("a"), run("b")]);
+        assert_eq!(labels(&two), ["a", "b", "residual", "increment"]);
+        assert_eq!(two.series[2].color, two.series[3].color);
+        assert_eq!(two.series[2].points, [(0.0, 1.0), (1.0, 0.1), (2.0, 0.0)]);
+        assert_eq!(two.series[3].points[1..], [(1.0, 0.5), (2.0, 0.05)]);
+    }
+
+    #[test]
+    fn references_come_last_and_points_in_order() {
+        let curve = |label: &str, dashed| PressureSeries {
+            label: label.into(),
+            s: vec![1.0, 0.0],
+            p: vec![5.0, 7.0],
+            dashed,
+        };
+        let plot = Plot::pressure("", "x, m", &[curve("exact", true), curve("run", false)]);
+        assert_eq!(plot.series[0].label, "run");
+        assert_eq!(plot.series[0].points, [(0.0, 7.0), (1.0, 5.0)]);
+        assert_eq!(plot.series[1].style, Style::Dashed);
+    }
+
+    #[test]
+    fn a_file_is_written_and_a_missing_folder_told() {
+        let base = tempfile::tempdir().unwrap();
+        let path = base.path().join("convergence.svg");
+        convergence(&path, "Two blocks", &[run("a")]).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(
+            text.contains("Two blocks") && text.contains("10⁻¹"),
+            "{text}"
+        );
+        let error = convergence(&base.path().join("no/x.svg"), "", &[]).unwrap_err();
+        assert!(error.message().contains("x.svg"));
+    }
+}

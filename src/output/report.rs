@@ -1,0 +1,148 @@
+//! The report of a run: `report.json`, and the closing lines on the terminal.
+
+use super::format::{sci, seconds};
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// What a run did and found. Lengths, forces and energies are in the units of the scene.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Report {
+    /// Version of the program.
+    pub winkler: String,
+    /// Version of PETSc.
+    pub petsc: String,
+    /// BLAS library in use.
+    pub blas: String,
+    /// MPI ranks.
+    pub ranks: usize,
+    /// Title of the scene.
+    pub title: String,
+    /// How the run ended: `converged`, `attainable`, `iteration-limit`, `not-finite`, `cycle`, `unheld`,
+    /// `inner-solver`.
+    pub status: String,
+    /// The status in words, with body and iteration where they matter.
+    pub message: String,
+    /// Updates of the iterate.
+    pub iterations: usize,
+    /// Times that every body was solved.
+    pub sweeps: usize,
+    /// Numeric factorisations or preconditioner set-ups, all bodies.
+    pub factorizations: usize,
+    /// Symbolic factorisations, all bodies.
+    pub symbolic_factorizations: usize,
+    /// Stiffness matrices assembled.
+    pub assemblies: usize,
+    /// Solves of one body, those of the start included.
+    pub body_solves: usize,
+    /// Solves of one body that were not needed because its data did not change.
+    pub body_solves_skipped: usize,
+    /// Changes of a body's Robin term.
+    pub robin_updates: usize,
+    /// Robin terms that did not change, so that nothing was refactored.
+    pub robin_updates_skipped: usize,
+    /// Krylov iterations, all bodies.
+    pub inner_iterations: usize,
+    /// Collective messages between ranks.
+    pub messages: usize,
+    /// Relative residual of the result.
+    pub residual: Option<f64>,
+    /// Relative increment of the last update, the largest of the bodies.
+    pub increment: Option<f64>,
+    /// Functional F1 (25).
+    #[serde(rename = "F1")]
+    pub f1: Option<f64>,
+    /// Degrees of freedom of all bodies.
+    pub dofs: usize,
+    /// Bodies in the order of the scene.
+    pub bodies: Vec<BodyReport>,
+    /// Pairs in the order of the scene.
+    pub pairs: Vec<PairReport>,
+    /// Wall seconds of each phase.
+    pub times: BTreeMap<String, f64>,
+    /// What a user should know.
+    pub warnings: Vec<String>,
+    /// The scene with all defaults filled in.
+    pub settings: Value,
+    /// Files written, relative to the folder of results.
+    pub files: Vec<String>,
+}
+
+/// One body.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct BodyReport {
+    /// Name.
+    pub name: String,
+    /// Nodes.
+    pub nodes: usize,
+    /// Cells.
+    pub cells: usize,
+    /// Degrees of freedom.
+    pub dofs: usize,
+    /// Inner solver in words; empty if nothing was solved.
+    pub solver: String,
+    /// Rank that owned it.
+    pub rank: usize,
+}
+
+/// One pair of surfaces, sides in the order of the scene.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct PairReport {
+    /// Names of the surfaces.
+    pub surfaces: [String; 2],
+    /// Names of the bodies.
+    pub bodies: [String; 2],
+    /// Contact points.
+    pub points: usize,
+    /// Surface whose mesh carries the points.
+    pub carrier: String,
+    /// Facets of the carrier without a partner.
+    pub facets_uncovered: usize,
+    /// Energy of the layer, J.
+    pub layer_energy: f64,
+    /// Contact force on each side (x, y, z).
+    pub force: [[f64; 3]; 2],
+    /// Largest pressure.
+    pub peak_pressure: f64,
+    /// Where it is (x, y, z).
+    pub peak_at: [f64; 3],
+    /// Length (area) with c > 0.
+    pub contact_length: f64,
+    /// Length (area) that is covered by both surfaces and open.
+    pub open_length: f64,
+    /// Plane problems: where contact begins or ends, c = 0 between two points, interpolated linearly.
+    pub contact_ends: Vec<[f64; 3]>,
+}
+
+impl Report {
+    /// The closing lines for a terminal.
+    pub fn summary(&self) -> String {
+        let mut lines = vec![format!("{}: {}", self.title, self.message)];
+        let number = |value: Option<f64>| sci(value.unwrap_or(f64::NAN), 2);
+        lines.push(format!(
+            "  {} iterations, {} sweeps, {} factorizations, residual {}, increment {}, {} dofs, {} s",
+            self.iterations,
+            self.sweeps,
+            self.factorizations,
+            number(self.residual),
+            number(self.increment),
+            self.dofs,
+            seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
+        ));
+        for pair in &self.pairs {
+            lines.push(format!(
+                "  {} - {}: peak pressure {:.6} at ({:.4}, {:.4}, {:.4}), contact {:.6}, open {:.6}",
+                pair.bodies[0],
+                pair.bodies[1],
+                pair.peak_pressure,
+                pair.peak_at[0],
+                pair.peak_at[1],
+                pair.peak_at[2],
+                pair.contact_length,
+                pair.open_length,
+            ));
+        }
+        lines.extend(self.warnings.iter().map(|warning| format!("  warning: {warning}")));
+        lines.join("\n")
+    }
+}

@@ -1,0 +1,342 @@
+//! The table of iterations on the terminal, and the progress line.
+//!
+//! The table goes to standard output when that is a terminal; the progress line to standard error when that is one.
+//! Piped output stays free of both.
+
+use super::format::{sci, seconds};
+use crate::ddm::{Observer, Row};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::{self, IsTerminal, Write};
+use std::time::Duration;
+
+/// How much the iteration says while it runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verbosity {
+    /// The table and the progress line, each where there is a terminal.
+    Table,
+    /// Notes only.
+    Quiet,
+}
+
+/// Prints one line per iteration: all up to 20, every 10th up to 200, every 100th after that, and always the last.
+pub struct IterationTable {
+    /// Where the table goes; `None` prints no table.
+    table: Option<Box<dyn Write>>,
+    /// Where notes go.
+    notes: Box<dyn Write>,
+    bar: ProgressBar,
+    target: String,
+    columns: Option<Columns>,
+    /// Last row, as long as it is not printed.
+    waiting: Option<Row>,
+}
+
+impl IterationTable {
+    /// A table on this process's terminal; `target` says in words when the iteration stops ("residual < 1e-8").
+    pub fn new(verbosity: Verbosity, target: &str) -> Self {
+        let loud = verbosity == Verbosity::Table;
+        let bar = if loud && io::stderr().is_terminal() {
+            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_msg}") {
+                bar.set_style(style);
+            }
+            bar.set_message(format!("before the first sweep, until {target}"));
+            bar.enable_steady_tick(Duration::from_millis(120));
+            bar
+        } else {
+            ProgressBar::hidden()
+        };
+        let stdout = io::stdout();
+        let table = (loud && stdout.is_terminal()).then(|| Box::new(stdout) as Box<dyn Write>);
+        Self::on(table, Box::new(io::stderr()), bar, target)
+    }
+
+    fn on(
+        table: Option<Box<dyn Write>>,
+        notes: Box<dyn Write>,
+        bar: ProgressBar,
+        target: &str,
+    ) -> Self {
+        Self {
+            table,
+            notes,
+            bar,
+            target: target.into(),
+            columns: None,
+            waiting: None,
+        }
+    }
+
+    /// Prints the last row, if it is not there yet, and takes the progress line away. Dropping does the same.
+    pub fn finish(&mut self) {
+        if let Some(row) = self.waiting.take() {
+            self.print(&row);
+        }
+        self.bar.finish_and_clear();
+    }
+
+    fn print(&mut self, row: &Row) {
+        let Some(table) = &mut self.table else { return };
+        let mut text = String::new();
+        let columns = self.columns.get_or_insert_with(|| {
+            let columns = Columns::new(row);
+            text = columns.header() + "\n";
+            columns
+        });
+        text += &columns.line(row);
+        put(&self.bar, table, &text);
+    }
+}
+
+/// Prints a line above the progress line. A terminal that is gone is no reason to stop computing.
+fn put(bar: &ProgressBar, out: &mut dyn Write, text: &str) {
+    bar.suspend(|| {
+        let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+    });
+}
+
+impl Observer for IterationTable {
+    fn row(&mut self, row: &Row) {
+        self.bar.set_message(format!(
+            "iteration {}, residual {}, until {}, {} s",
+            row.iteration,
+            sci(row.residual, 2),
+            self.target,
+            seconds(row.seconds)
+        ));
+        if shown(row.iteration) {
+            self.print(row);
+            self.waiting = None;
+        } else {
+            self.waiting = Some(row.clone());
+        }
+    }
+
+    /// Prints the line on standard error, where it does not mix with results.
+    fn note(&mut self, text: &str) {
+        put(&self.bar, &mut self.notes, text);
+    }
+}
+
+impl Drop for IterationTable {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
+/// Whether iteration `k` has a line of its own in a long run.
+fn shown(k: usize) -> bool {
+    k <= 20 || k <= 200 && k.is_multiple_of(10) || k.is_multiple_of(100)
+}
+
+/// Columns of the table, fixed by the first row.
+struct Columns {
+    /// Width of the column closed: contact points with pressure out of all.
+    contact: usize,
+    /// Whether there are inner iterations to show.
+    inner: bool,
+}
+
+impl Columns {
+    fn new(first: &Row) -> Self {
+        let digits = first.points.to_string().len();
+        Self {
+            contact: (2 * digits + 1).max("closed".len()),
+            inner: first.inner_iterations > 0,
+        }
+    }
+
+    fn header(&self) -> String {
+        self.join(
+            [
+                "k",
+                "residual",
+                "increment",
+                "gamma",
+                "F1",
+                "closed",
+                "factored",
+            ],
+            "inner",
+            "seconds",
+        )
+    }
+
+    fn line(&self, row: &Row) -> String {
+        let gamma = if row.gamma.is_nan() {
+            "-".into()
+        } else {
+            format!("{:.4}", row.gamma)
+        };
+        self.join(
+            [
+                &row.iteration.to_string(),
+                &sci(row.residual, 3),
+                &sci(row.increment, 3),
+                &gamma,
+                &sci(row.energy, 6),
+                &format!("{}/{}", row.closed, row.points),
+                &row.factorizations.to_string(),
+            ],
+            &row.inner_iterations.to_string(),
+            &seconds(row.seconds),
+        )
+    }
+
+    fn join(&self, fields: [&str; 7], inner: &str, seconds: &str) -> String {
+        let [k, residual, increment, gamma, energy, contact, factored] = fields;
+        let width = self.contact;
+        let inner = if self.inner {
+            format!("  {inner:>7}")
+        } else {
+            String::new()
+        };
+        format!(
+            "{k:>5}  {residual:>9}  {increment:>9}  {gamma:>6}  {energy:>13}  {contact:>width$}  \
+             {factored:>8}{inner}  {seconds:>7}"
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::RefCell;
+    use std::rc::Rc;
+
+    #[derive(Clone, Default)]
+    struct Screen(Rc<RefCell<Vec<u8>>>);
+
+    impl Write for Screen {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.borrow_mut().write(bytes)
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Screen {
+        fn lines(&self) -> Vec<String> {
+            let bytes = self.0.borrow();
+            String::from_utf8_lossy(&bytes)
+                .lines()
+                .map(String::from)
+                .collect()
+        }
+    }
+
+    fn row(iteration: usize) -> Row {
+        let first = iteration == 0;
+        Row {
+            iteration,
+            residual: 0.5f64.powi(iteration as i32),
+            increment: if first { f64::NAN } else { 0.25 },
+            gamma: if first { f64::NAN } else { 0.6 },
+            energy: -0.0123,
+            closed: iteration,
+            points: 128,
+            factorizations: 2 * iteration,
+            ..Row::default()
+        }
+    }
+
+    fn run(iterations: usize, first_inner: usize) -> Vec<String> {
+        let screen = Screen::default();
+        let mut table = IterationTable::on(
+            Some(Box::new(screen.clone())),
+            Box::new(screen.clone()),
+            ProgressBar::hidden(),
+            "residual < 1e-8",
+        );
+        for k in 0..=iterations {
+            table.row(&Row {
+                inner_iterations: first_inner * (k + 1),
+                ..row(k)
+            });
+        }
+        drop(table);
+        screen.lines()
+    }
+
+    fn iterations(lines: &[String]) -> Vec<usize> {
+        lines
+            .iter()
+            .skip(1)
+            .map(|l| l.split_whitespace().next().unwrap().parse().unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn one_header_and_aligned_lines() {
+        let lines = run(3, 0);
+        assert_eq!(lines.len(), 5);
+        assert!(
+            lines.iter().all(|line| line.len() == lines[0].len()),
+            "{lines:#?}"
+        );
+        let words: Vec<_> = lines[1].split_whitespace().collect();
+        assert_eq!(
+            words,
+            [
+                "0",
+                "1.000e+00",
+                "-",
+                "-",
+                "-1.230000e-02",
+                "0/128",
+                "0",
+                "0.00"
+            ]
+        );
+        let words: Vec<_> = lines[4].split_whitespace().collect();
+        assert_eq!(
+            words,
+            [
+                "3",
+                "1.250e-01",
+                "2.500e-01",
+                "0.6000",
+                "-1.230000e-02",
+                "3/128",
+                "6",
+                "0.00"
+            ]
+        );
+    }
+
+    #[test]
+    fn inner_iterations_only_where_there_are_any() {
+        assert!(!run(1, 0)[0].contains("inner"));
+        let lines = run(1, 5);
+        assert!(lines[0].contains("inner"));
+        assert!(
+            lines.iter().all(|line| line.len() == lines[0].len()),
+            "{lines:#?}"
+        );
+        assert_eq!(lines[2].split_whitespace().rev().nth(1), Some("10"));
+    }
+
+    #[test]
+    fn long_runs_are_thinned_and_end_with_the_last_row() {
+        let lines = run(437, 0);
+        let mut expected: Vec<usize> = (0..=20).collect();
+        expected.extend((30..=200).step_by(10));
+        expected.extend([300, 400, 437]);
+        assert_eq!(iterations(&lines), expected);
+        assert_eq!(iterations(&run(30, 0)).last(), Some(&30));
+        assert_eq!(iterations(&run(30, 0)).len(), 22);
+    }
+
+    #[test]
+    fn without_a_terminal_only_notes() {
+        let screen = Screen::default();
+        let mut table =
+            IterationTable::on(None, Box::new(screen.clone()), ProgressBar::hidden(), "");
+        table.row(&row(0));
+        table.note("body `upper` is held by contact alone");
+        table.row(&row(1));
+        drop(table);
+        assert_eq!(screen.lines(), ["body `upper` is held by contact alone"]);
+    }
+}

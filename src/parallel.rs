@@ -1,0 +1,90 @@
+//! Which rank owns which body, and the exchange of traces, over the `mpi` crate.
+
+use crate::ddm::Exchange;
+use crate::error::{Error, Result};
+use crate::petsc::Session;
+use mpi::collective::SystemOperation;
+use mpi::traits::CommunicatorCollectives;
+use std::cell::Cell;
+
+/// The ranks of a run.
+pub struct Ranks {
+    session: Session,
+    messages: Cell<usize>,
+}
+
+impl Ranks {
+    /// The ranks of a session.
+    pub fn new(session: &Session) -> Self {
+        Self { session: session.clone(), messages: Cell::new(0) }
+    }
+}
+
+impl Exchange for Ranks {
+    fn sum(&self, values: &mut [f64]) {
+        if self.session.size() > 1 && !values.is_empty() {
+            let mine = values.to_vec();
+            self.session.world().all_reduce_into(&mine[..], values, SystemOperation::sum());
+            self.messages.set(self.messages.get() + 1);
+        }
+    }
+
+    fn messages(&self) -> usize {
+        self.messages.get()
+    }
+}
+
+/// Owner of each body: whole bodies, largest first, each to the rank with the least load so far.
+pub fn owners(loads: &[usize], ranks: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..loads.len()).collect();
+    order.sort_by_key(|&body| (std::cmp::Reverse(loads[body]), body));
+    let mut sum = vec![0; ranks];
+    let mut owner = vec![0; loads.len()];
+    for body in order {
+        let rank = (0..ranks).min_by_key(|&rank| (sum[rank], rank)).unwrap_or(0);
+        owner[body] = rank;
+        sum[rank] += loads[body];
+    }
+    owner
+}
+
+/// Makes a result that ranks reached separately a common one: if it failed anywhere it fails everywhere, with the error
+/// of the lowest rank that has one. Other ranks get an error of the same kind without words, which is not printed.
+///
+/// # Errors
+/// As described; collective, so every rank must call it.
+pub fn agree<T>(session: &Session, result: Result<T>) -> Result<T> {
+    if session.size() == 1 {
+        return result;
+    }
+    let silent = i32::MAX;
+    let mine = if result.is_err() { session.rank() as i32 } else { silent };
+    let mut first = silent;
+    session.world().all_reduce_into(&mine, &mut first, SystemOperation::min());
+    if first == silent {
+        return result;
+    }
+    let mine = match &result {
+        Err(error) if session.rank() as i32 == first => error.kind().exit_code(),
+        _ => 0,
+    };
+    let mut code = 0;
+    session.world().all_reduce_into(&mine, &mut code, SystemOperation::max());
+    match result {
+        Err(error) if session.rank() as i32 == first => Err(error.agreed()),
+        _ => Err(Error::silent(code)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::owners;
+
+    #[test]
+    fn bodies_are_packed_whole_by_their_load() {
+        assert_eq!(owners(&[5, 5], 2), [0, 1]);
+        assert_eq!(owners(&[1, 9, 4, 4], 2), [1, 0, 1, 1]);
+        assert_eq!(owners(&[3], 4), [0]);
+        assert_eq!(owners(&[1, 2, 3], 1), [0, 0, 0]);
+    }
+}

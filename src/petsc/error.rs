@@ -1,0 +1,116 @@
+//! PETSc's return codes as [`Error`], with PETSc's own message.
+//!
+//! PETSc reports an error frame by frame, innermost first, through a handler. Ours records the frames and prints
+//! nothing; [`check`] picks them up when the code has come back to Rust.
+
+use super::ffi;
+use crate::error::{Error, Kind, Result};
+use std::cell::RefCell;
+use std::ffi::{CStr, c_char, c_int, c_void};
+
+/// What PETSc said about the error that is on its way up.
+#[derive(Default)]
+struct Trace {
+    message: String,
+    /// `function (file:line)`, innermost first.
+    frames: Vec<String>,
+}
+
+thread_local! {
+    static TRACE: RefCell<Trace> = RefCell::default();
+}
+
+/// Calls one PETSc function and checks its return code: `petsc!(MatMult(a, x, y))?`.
+///
+/// It stands for an `unsafe` call: who uses it vouches for the pointers. They are valid because each wrapper owns its
+/// PETSc object and holds a session token.
+macro_rules! petsc {
+    ($function:ident($($argument:expr),* $(,)?)) => {
+        $crate::petsc::error::check(stringify!($function), || unsafe { $crate::petsc::ffi::$function($($argument),*) })
+    };
+}
+pub(super) use petsc;
+
+/// Runs `call` and turns a nonzero code into an error that says what PETSc said.
+pub(super) fn check(function: &str, call: impl FnOnce() -> ffi::PetscErrorCode) -> Result<()> {
+    TRACE.take();
+    let code = call();
+    // PETSc 3.18 has an int here, newer ones an enum; both fit.
+    if code as i64 == 0 {
+        Ok(())
+    } else {
+        Err(failure(function, code))
+    }
+}
+
+/// The error of a failed call.
+fn failure(function: &str, code: ffi::PetscErrorCode) -> Error {
+    let trace = TRACE.take();
+    let mut error = Error::new(Kind::Solver, format!("PETSc failed in {function}"));
+    let kind = meaning(code);
+    error = match (trace.message.is_empty(), kind) {
+        (false, Some(kind)) => error.because(format!("{} ({kind})", trace.message)),
+        (false, None) => error.because(trace.message),
+        (true, Some(kind)) => error.because(kind),
+        (true, None) => error.because(format!("error code {code}")),
+    };
+    if let Some(innermost) = trace.frames.first() {
+        error = error.because(format!("raised in {innermost}"));
+    }
+    error
+}
+
+/// PETSc's general text for an error code.
+fn meaning(code: ffi::PetscErrorCode) -> Option<String> {
+    let mut text: *const c_char = std::ptr::null();
+    // SAFETY: PETSc sets the pointer to a static text or to null; no message of the error itself is asked for.
+    unsafe {
+        ffi::PetscErrorMessage(code as _, &mut text, std::ptr::null_mut());
+        (!text.is_null()).then(|| string(text))
+    }
+    .filter(|text| !text.is_empty())
+}
+
+/// A copy of a C text; empty for null.
+///
+/// # Safety
+/// `text` is null or ends with a zero byte.
+pub(super) unsafe fn string(text: *const c_char) -> String {
+    if text.is_null() {
+        return String::new();
+    }
+    // SAFETY: the caller's promise.
+    unsafe { CStr::from_ptr(text) }
+        .to_string_lossy()
+        .into_owned()
+}
+
+/// The handler given to `PetscPushErrorHandler`.
+///
+/// # Safety
+/// Called by PETSc alone, with texts that end with a zero byte.
+pub(super) unsafe extern "C" fn record(
+    _comm: mpi::ffi::MPI_Comm,
+    line: c_int,
+    function: *const c_char,
+    file: *const c_char,
+    code: ffi::PetscErrorCode,
+    kind: ffi::PetscErrorType,
+    message: *const c_char,
+    _context: *mut c_void,
+) -> ffi::PetscErrorCode {
+    // SAFETY: PETSc's texts end with a zero byte.
+    let (function, file, message) = unsafe { (string(function), string(file), string(message)) };
+    TRACE.with_borrow_mut(|trace| {
+        if kind == ffi::PetscErrorType_PETSC_ERROR_INITIAL {
+            *trace = Trace::default();
+        }
+        // Frames on the way up carry a blank message.
+        if trace.message.is_empty() {
+            trace.message = message.trim().to_owned();
+        }
+        let file = file.rsplit('/').next().unwrap_or_default();
+        trace.frames.push(format!("{function} ({file}:{line})"));
+    });
+    code
+}

@@ -1,0 +1,48 @@
+//! A safe binding of the part of PETSc that solves linear systems, useful alone.
+//!
+//! Objects hold a counted token of the [`Session`] and no lifetimes; PETSc ends with the last of them. They are neither
+//! `Send` nor `Sync`. Every call is checked, and PETSc's own message is in the [`Error`](crate::error::Error); PETSc
+//! prints only what the user asks of it (`-ksp_monitor`, `-ksp_view`, `-log_view`, `-help`, ...).
+//!
+//! ```
+//! use winkler::petsc::{Ksp, Matrix, Session};
+//!
+//! // 2 x - y = 1,  -x + 2 y = 1
+//! let session = Session::start(&["-pc_type".to_owned(), "cholesky".to_owned()])?;
+//! let mut matrix = Matrix::from_csr(&session, 1, vec![0, 2, 4], vec![0, 1, 0, 1], vec![2.0, -1.0, -1.0, 2.0])?;
+//! matrix.set_spd()?;
+//! let mut ksp = Ksp::new(&session, "")?;
+//! ksp.set_operator(&matrix)?;
+//! ksp.set_from_options()?;
+//! let mut x = [0.0; 2];
+//! let solved = ksp.solve(&[1.0, 1.0], &mut x)?;
+//! assert!(solved.reason.converged());
+//! assert!((x[0] - 1.0).abs() < 1e-12 && (x[1] - 1.0).abs() < 1e-12);
+//! # Ok::<(), winkler::error::Error>(())
+//! ```
+#![allow(unsafe_code)]
+
+mod blas;
+mod error;
+mod ffi;
+mod ksp;
+mod launcher;
+mod matrix;
+mod options;
+mod print;
+mod reason;
+#[cfg(test)]
+mod requirements;
+mod session;
+mod vector;
+
+pub use ksp::{Ksp, Solved};
+pub use matrix::{Int, Matrix};
+pub use options::{Entry, Options};
+pub use reason::ConvergedReason;
+pub use session::Session;
+
+/// Runs `action` and returns its result and all that PETSc printed meanwhile, which is not shown.
+pub fn printed<T>(_session: &Session, action: impl FnOnce() -> T) -> (T, String) {
+    print::caught(action)
+}

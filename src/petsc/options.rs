@@ -1,0 +1,230 @@
+//! PETSc's options: one table in a process.
+
+use super::error::{petsc, string};
+use super::{Session, ffi};
+use crate::error::{Error, Kind, Result};
+use std::collections::BTreeMap;
+use std::ffi::{CString, c_char};
+use std::ptr::null_mut;
+
+/// PETSc's table of options, filled from the command line, `PETSC_OPTIONS`, `.petscrc` and `-options_file`.
+///
+/// Names may be given with or without their dash and come back with it; PETSc does not tell capital from small letters
+/// in them. Looking at an option here does not count as reading it.
+///
+/// ```
+/// use winkler::petsc::Session;
+/// let words = ["-ksp_type", "cg", "-shift", "-1e-3", "-note", "a -b c", "-flag"].map(String::from);
+/// let options = Session::start(&words)?.options();
+/// assert_eq!(options.get("-shift").as_deref(), Some("-1e-3"));
+/// assert_eq!(options.get("-note").as_deref(), Some("a -b c"));
+/// assert!(options.has("flag") && !options.has("-b"));
+/// assert!(!options.used("-flag"));
+/// options.mark_used("-flag")?;
+/// assert!(options.used("-flag"));
+/// options.set("-ksp_rtol", Some("1e-8"))?;
+/// options.clear("-shift")?;
+/// let names: Vec<String> = options.all()?.into_iter().map(|(name, _)| name).collect();
+/// assert_eq!(names, ["-flag", "-ksp_rtol", "-ksp_type", "-note"]);
+/// assert_eq!(options.left()?.len(), 3); // all but -flag
+/// assert_eq!(options.get("-flag").as_deref(), Some("")); // without a value
+/// assert_eq!(options.get("-shift"), None);
+/// assert!(options.set("-1", None).is_err());
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+#[derive(Clone)]
+pub struct Options {
+    _session: Session,
+}
+
+/// An option: its name with the dash, and its value if it has one.
+pub type Entry = (String, Option<String>);
+
+impl Options {
+    /// The table of the running session.
+    pub(super) fn new(session: &Session) -> Self {
+        Options {
+            _session: session.clone(),
+        }
+    }
+
+    /// Sets an option, replacing its value.
+    ///
+    /// # Errors
+    /// When the name is not one or two dashes, a letter and letters, digits or underscores, or a text has a zero byte.
+    pub fn set(&self, name: &str, value: Option<&str>) -> Result<()> {
+        let name = key(name)?;
+        let value = value.map(text).transpose()?;
+        petsc!(PetscOptionsSetValue(
+            null_mut(),
+            name.as_ptr(),
+            value.as_ref().map_or(null_mut(), |v| v.as_ptr())
+        ))
+    }
+
+    /// Value of an option; empty for one without a value, `None` for one that is not set.
+    pub fn get(&self, name: &str) -> Option<String> {
+        let name = dashed(name);
+        let all = self.all().ok()?;
+        all.into_iter()
+            .find(|(known, _)| known.eq_ignore_ascii_case(&name))
+            .map(|(_, value)| value.unwrap_or_default())
+    }
+
+    /// Whether an option is set.
+    pub fn has(&self, name: &str) -> bool {
+        self.get(name).is_some()
+    }
+
+    /// Removes an option, if it is set.
+    ///
+    /// # Errors
+    /// When the name is not one of an option.
+    pub fn clear(&self, name: &str) -> Result<()> {
+        let name = key(name)?;
+        petsc!(PetscOptionsClearValue(null_mut(), name.as_ptr()))
+    }
+
+    /// All options that are set, by name.
+    ///
+    /// PETSc's own list is one text in which a value may look like a name. So its words are only proposals: a word is a
+    /// name if it is among those [`left`](Self::left), or if PETSc says that such an option was read.
+    ///
+    /// # Errors
+    /// When PETSc is out of memory.
+    pub fn all(&self) -> Result<Vec<Entry>> {
+        let mut entries: BTreeMap<String, Option<String>> = self.left()?.into_iter().collect();
+        let mut whole: *mut c_char = null_mut();
+        petsc!(PetscOptionsGetAll(null_mut(), &mut whole))?;
+        // SAFETY: PETSc made the text and ends it with a zero byte; its own function frees it, once.
+        let words = unsafe {
+            let words = string(whole);
+            if let Some(free) = ffi::PetscTrFree {
+                free(
+                    whole.cast(),
+                    0,
+                    c"Options::all".as_ptr(),
+                    c"options.rs".as_ptr(),
+                );
+            }
+            words
+        };
+        for word in words
+            .split_whitespace()
+            .filter(|word| word.starts_with('-'))
+        {
+            if !entries.contains_key(word) && self.used(word) {
+                entries.insert(word.to_owned(), self.read(word)?);
+            }
+        }
+        Ok(entries.into_iter().collect())
+    }
+
+    /// Whether PETSc, or [`mark_used`](Self::mark_used), has read an option that is set.
+    pub fn used(&self, name: &str) -> bool {
+        let Ok(name) = key(name) else { return false };
+        let mut used = ffi::PetscBool_PETSC_FALSE;
+        // This one PETSc function wants the name without its dash.
+        let bare = &name.as_c_str().to_bytes_with_nul()[1..];
+        petsc!(PetscOptionsUsed(
+            null_mut(),
+            bare.as_ptr().cast(),
+            &mut used
+        ))
+        .is_ok()
+            && used == ffi::PetscBool_PETSC_TRUE
+    }
+
+    /// Marks an option as read, so that PETSc does not warn about it at its end.
+    ///
+    /// # Errors
+    /// When the name is not one of an option.
+    pub fn mark_used(&self, name: &str) -> Result<()> {
+        self.read(name).map(drop)
+    }
+
+    /// The options that nobody has read so far, by name.
+    ///
+    /// # Errors
+    /// When PETSc is out of memory.
+    pub fn left(&self) -> Result<Vec<Entry>> {
+        let mut count = 0;
+        let (mut names, mut values) = (null_mut(), null_mut());
+        petsc!(PetscOptionsLeftGet(
+            null_mut(),
+            &mut count,
+            &mut names,
+            &mut values
+        ))?;
+        // SAFETY: PETSc gives `count` names and as many values; a value is null where there is none. They are copied
+        // before PETSc takes its two lists back.
+        let mut entries: Vec<Entry> = (0..count as usize)
+            .map(|i| unsafe {
+                let value = *values.add(i);
+                (
+                    format!("-{}", string(*names.add(i))),
+                    (!value.is_null()).then(|| string(value)),
+                )
+            })
+            .collect();
+        petsc!(PetscOptionsLeftRestore(
+            null_mut(),
+            &mut count,
+            &mut names,
+            &mut values
+        ))?;
+        entries.sort();
+        Ok(entries)
+    }
+
+    /// Value of an option, marking it as read.
+    fn read(&self, name: &str) -> Result<Option<String>> {
+        let name = key(name)?;
+        let mut value: *const c_char = std::ptr::null();
+        let mut set = ffi::PetscBool_PETSC_FALSE;
+        petsc!(PetscOptionsFindPair(
+            null_mut(),
+            std::ptr::null(),
+            name.as_ptr(),
+            &mut value,
+            &mut set
+        ))?;
+        // SAFETY: null, or a text that PETSc keeps till the option changes; it is copied.
+        Ok((!value.is_null()).then(|| unsafe { string(value) }))
+    }
+}
+
+/// The name with its dash.
+fn dashed(name: &str) -> String {
+    if name.starts_with('-') {
+        name.to_owned()
+    } else {
+        format!("-{name}")
+    }
+}
+
+/// The name as PETSc wants it, checked: PETSc takes any text and never finds it again.
+fn key(name: &str) -> Result<CString> {
+    let name = dashed(name);
+    let valid = name.strip_prefix('-').is_some_and(|bare| {
+        bare.trim_start_matches('-')
+            .starts_with(char::is_alphabetic)
+    }) && !name.contains(char::is_whitespace);
+    if !valid {
+        return Err(Error::new(
+            Kind::Solver,
+            format!("`{name}` is not the name of a PETSc option"),
+        ));
+    }
+    text(&name)
+}
+
+/// A C text.
+pub(super) fn text(text: &str) -> Result<CString> {
+    CString::new(text).map_err(|_| {
+        Error::new(
+            Kind::Solver,
+            format!("a zero byte in a PETSc option: {text:?}"),
+        )
+    })
+}

@@ -1,0 +1,110 @@
+//! What winkler asks of the installed PETSc, as pure functions of the texts of its headers.
+//!
+//! `build.rs` includes this file to refuse an unsuitable PETSc in words before anything is compiled; the crate
+//! compiles it for its unit tests.
+
+/// Oldest PETSc that has all that the binding calls: major and minor number.
+pub const OLDEST: (u32, u32) = (3, 18);
+
+/// What to do about every refusal: Debian's package is real, double and has MUMPS and hypre.
+pub const ADVICE: &str = "install one, e.g. `apt-get install petsc-dev` (or run scripts/setup), \
+                          or point PETSC_DIR and PETSC_ARCH at one";
+
+/// Whether `petscconf.h` defines `name` (to anything).
+fn defines(petscconf: &str, name: &str) -> bool {
+    petscconf.lines().any(|line| {
+        let mut words = line.split_whitespace();
+        words.next() == Some("#define") && words.next() == Some(name)
+    })
+}
+
+/// Checks the text of `petscconf.h`: real numbers, double precision, MUMPS, hypre.
+///
+/// # Errors
+/// One plain sentence that names what is wrong and what to install.
+pub fn check_config(petscconf: &str) -> Result<(), String> {
+    let wrong = if defines(petscconf, "PETSC_USE_COMPLEX") {
+        "this PETSc computes with complex numbers, but winkler needs one with real numbers"
+    } else if !defines(petscconf, "PETSC_USE_REAL_DOUBLE") {
+        "this PETSc does not compute in double precision, but winkler needs one that does"
+    } else if !defines(petscconf, "PETSC_HAVE_MUMPS") {
+        "this PETSc was built without MUMPS, but winkler needs one with MUMPS"
+    } else if !defines(petscconf, "PETSC_HAVE_HYPRE") {
+        "this PETSc was built without hypre, but winkler needs one with hypre"
+    } else {
+        return Ok(());
+    };
+    Err(format!("{wrong}: {ADVICE}"))
+}
+
+/// Checks the text of `petscversion.h` against [`OLDEST`].
+///
+/// # Errors
+/// One plain sentence that names the version found and the version needed.
+pub fn check_version(petscversion: &str) -> Result<(), String> {
+    let number = |name: &str| {
+        petscversion.lines().find_map(|line| {
+            let mut words = line.split_whitespace();
+            let found = words.next() == Some("#define") && words.next() == Some(name);
+            found.then(|| words.next()?.parse::<u32>().ok()).flatten()
+        })
+    };
+    let (Some(major), Some(minor)) = (number("PETSC_VERSION_MAJOR"), number("PETSC_VERSION_MINOR"))
+    else {
+        return Err(format!(
+            "petscversion.h of this PETSc does not tell its version: {ADVICE}"
+        ));
+    };
+    if (major, minor) < OLDEST {
+        let (a, b) = OLDEST;
+        return Err(format!(
+            "this PETSc is {major}.{minor}, but winkler needs {a}.{b} or newer: {ADVICE}"
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = "#define PETSC_HAVE_HYPRE 1\n#define PETSC_HAVE_MUMPS 1\n#define PETSC_USE_REAL_DOUBLE 1\n\
+                        #define PETSC_HAVE_C99_COMPLEX 1\n/* #define PETSC_USE_COMPLEX 1 */\n";
+
+    #[test]
+    fn a_suitable_petsc_passes() {
+        assert_eq!(check_config(GOOD), Ok(()));
+    }
+
+    #[test]
+    fn each_shortcoming_has_its_own_sentence() {
+        let refusals = [
+            (format!("{GOOD}#define PETSC_USE_COMPLEX 1\n"), "complex"),
+            (
+                GOOD.replace("REAL_DOUBLE", "REAL_SINGLE"),
+                "double precision",
+            ),
+            (GOOD.replace("HAVE_MUMPS", "HAVE_MUMPSX"), "without MUMPS"),
+            (GOOD.replace("HAVE_HYPRE", "HAVE_HYPREX"), "without hypre"),
+        ];
+        for (text, words) in refusals {
+            let refusal = check_config(&text).expect_err(words);
+            assert!(refusal.contains(words), "{refusal}");
+            assert!(refusal.contains("petsc-dev"), "{refusal}");
+        }
+    }
+
+    #[test]
+    fn the_version_is_compared_by_numbers() {
+        let text = |major: u32, minor: u32| {
+            format!(
+                "#define PETSC_VERSION_MAJOR      {major}\n#define PETSC_VERSION_MINOR      {minor}\n"
+            )
+        };
+        assert_eq!(check_version(&text(3, 18)), Ok(()));
+        assert_eq!(check_version(&text(3, 100)), Ok(()));
+        assert_eq!(check_version(&text(4, 0)), Ok(()));
+        assert!(check_version(&text(3, 9)).is_err_and(|refusal| refusal.contains("3.9")));
+        assert!(check_version("").is_err());
+    }
+}

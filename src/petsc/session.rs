@@ -1,0 +1,177 @@
+//! The life of MPI and PETSc in this process.
+
+use super::error::{petsc, record};
+use super::{Options, blas, ffi, launcher};
+use crate::error::{Error, Kind, Result};
+use mpi::environment::Universe;
+use mpi::topology::{Communicator, SimpleCommunicator};
+use std::ffi::{CString, c_char, c_int};
+use std::rc::Rc;
+use std::sync::Once;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// PETSc and MPI can be started once in a process.
+static STARTED: AtomicBool = AtomicBool::new(false);
+
+/// A counted token: PETSc and MPI run as long as one of its clones lives.
+///
+/// Every PETSc object holds one, so objects need no lifetimes and cannot outlive PETSc. Neither `Send` nor `Sync`:
+/// PETSc and MUMPS belong to the thread that started them.
+///
+/// ```
+/// use winkler::petsc::Session;
+/// let session = Session::start(&[])?;
+/// assert_eq!((session.rank(), session.size()), (0, 1));
+/// assert!(session.petsc_version().starts_with("3."));
+/// assert!(!session.blas_name().is_empty());
+/// assert!(Session::start(&[]).is_err()); // one a process, also after it ended
+/// drop(session);
+/// assert!(Session::start(&[]).is_err());
+/// assert!(std::env::var_os("OMPI_MCA_btl").is_none()); // nothing is left for child processes
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+#[derive(Clone)]
+pub struct Session(Rc<Running>);
+
+struct Running {
+    world: SimpleCommunicator,
+    /// Its drop ends MPI, after PETSc.
+    _universe: Universe,
+}
+
+impl Session {
+    /// Starts MPI, then PETSc with the options in `words` (as typed: `-ksp_type`, `cg`), in `PETSC_OPTIONS`, in
+    /// `.petscrc` and in the file of `-options_file`. PETSc installs no signal handlers. With several ranks a panic on
+    /// one of them ends them all.
+    ///
+    /// # Errors
+    /// `Kind::Solver` when a session was started before in this process, when MPI runs already, or when PETSc refuses
+    /// an option; PETSc's message is among the causes.
+    pub fn start(words: &[String]) -> Result<Session> {
+        let nul = |_| Error::new(Kind::Solver, "a PETSc option contains a zero byte");
+        // PETSc keeps a pointer to these words till its end; they are leaked, once.
+        let mut arguments = Vec::with_capacity(words.len() + 3);
+        for word in std::iter::once("winkler")
+            .chain(words.iter().map(String::as_str))
+            .chain([NO_SIGNALS])
+        {
+            arguments.push(CString::new(word).map_err(nul)?.into_raw());
+        }
+        let mut count = arguments.len() as c_int;
+        arguments.push(std::ptr::null_mut());
+        let mut arguments: *mut *mut c_char = Vec::leak(arguments).as_mut_ptr();
+
+        if STARTED.swap(true, Ordering::SeqCst) {
+            return Err(
+                Error::new(Kind::Solver, "PETSc was already started in this process")
+                    .help("start one session and clone it"),
+            );
+        }
+        let universe = launcher::quick(mpi::initialize).ok_or_else(|| {
+            Error::new(
+                Kind::Solver,
+                "MPI was already started in this process by other code",
+            )
+        })?;
+        let world = SimpleCommunicator::world();
+        abort_on_panic(world.size() > 1);
+        // Pushed first, so that errors of the start are recorded too and handlers that the user asks for
+        // (-on_error_abort, -start_in_debugger) come on top.
+        petsc!(PetscPushErrorHandler(Some(record), std::ptr::null_mut()))?;
+        let (count, arguments) = (&raw mut count, &raw mut arguments);
+        petsc!(PetscInitialize(
+            count,
+            arguments,
+            std::ptr::null(),
+            std::ptr::null()
+        ))?;
+        let session = Session(Rc::new(Running {
+            world,
+            _universe: universe,
+        }));
+        session.options().clear(NO_SIGNALS)?;
+        Ok(session)
+    }
+
+    /// The options of this process.
+    pub fn options(&self) -> Options {
+        Options::new(self)
+    }
+
+    /// Number of this process among [`size`](Self::size), from 0.
+    pub fn rank(&self) -> usize {
+        self.0.world.rank() as usize
+    }
+
+    /// Number of processes.
+    pub fn size(&self) -> usize {
+        self.0.world.size() as usize
+    }
+
+    /// The communicator of all processes.
+    pub fn world(&self) -> &SimpleCommunicator {
+        &self.0.world
+    }
+
+    /// Version of PETSc at run time, such as `3.18.5`.
+    pub fn petsc_version(&self) -> String {
+        let (mut major, mut minor, mut patch, mut release) = (0, 0, 0, 0);
+        match petsc!(PetscGetVersionNumber(
+            &mut major,
+            &mut minor,
+            &mut patch,
+            &mut release
+        )) {
+            Ok(()) => format!("{major}.{minor}.{patch}"),
+            Err(_) => "unknown".to_owned(),
+        }
+    }
+
+    /// Name of the BLAS in use: `OpenBLAS`, `MKL`, `BLIS`, `reference BLAS`, ..., or the file of another one.
+    pub fn blas_name(&self) -> String {
+        blas::name()
+    }
+
+    /// Ends all ranks at once with an exit code, running no destructor: for a failure that other ranks cannot know of.
+    /// This is `MPI_Abort`, except that a process started without a launcher just exits, without MPI's banner.
+    ///
+    /// ```no_run
+    /// # let session = winkler::petsc::Session::start(&[]).unwrap();
+    /// session.abort(5);
+    /// ```
+    pub fn abort(&self, code: i32) -> ! {
+        // SAFETY: a null file means all files of the C library.
+        unsafe { ffi::fflush(std::ptr::null_mut()) };
+        if self.size() > 1 || launcher::seen() {
+            self.0.world.abort(code);
+        }
+        std::process::exit(code)
+    }
+}
+
+/// Leaves the signals to Rust, so that a panic or a stack overflow prints its own message.
+const NO_SIGNALS: &str = "-no_signal_handler";
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // What the user asked to see at the end (-log_view) is printed here; there is nobody left to tell an error.
+        let _ = petsc!(PetscFinalize());
+    }
+}
+
+/// Makes a panic on one rank end the others too, which would wait for it for ever.
+fn abort_on_panic(several: bool) {
+    static ONCE: Once = Once::new();
+    if !several {
+        return;
+    }
+    ONCE.call_once(|| {
+        let print = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            print(panic);
+            if mpi::environment::is_initialized() && !mpi::environment::is_finalized() {
+                SimpleCommunicator::world().abort(101);
+            }
+        }));
+    });
+}

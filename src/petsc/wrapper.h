@@ -1,0 +1,2 @@
+/* The part of PETSc that build.rs makes Rust declarations of; the functions are listed there. */
+#include <petscksp.h>

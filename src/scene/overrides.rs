@@ -1,0 +1,172 @@
+//! `--set KEY=VALUE`: replaces any value of the scene before it is checked.
+//!
+//! KEY is a dotted path in which items of lists are numbered from 0 (`contact.0.layer.power.a`). VALUE is TOML, or a
+//! bare text. What is replaced then stands in the source `--set`, so later refusals point there.
+
+use super::read::{self, Entry, Node, Value};
+use crate::error::{Error, Kind, Place, Result, Source};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Applies one override to the tree of a scene.
+pub(super) fn apply(tree: &mut Node, text: &str) -> Result<()> {
+    let source = Arc::new(Source {
+        name: "--set".into(),
+        text: text.trim_end().into(),
+    });
+    let text = source.text.as_str();
+    let at = |span: Range<usize>| Place {
+        source: source.clone(),
+        span,
+    };
+    let Some(equals) = text.find('=') else {
+        return Err(Error::new(Kind::Usage, "--set without `=`")
+            .at(&at(0..text.len()))
+            .help("write --set KEY=VALUE, such as --set contact.0.layer.power.a=0.3"));
+    };
+    let path = segments(&text[..equals]);
+    for span in &path {
+        let key = &text[span.clone()];
+        if key.is_empty()
+            || !key
+                .chars()
+                .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+        {
+            return Err(
+                Error::scene(&at(0..equals), "this is not a key of the scene")
+                    .help("a key is names and numbers joined by points: body.1.young"),
+            );
+        }
+    }
+    let new = value(&source, equals + 1)?;
+    let mut node = tree;
+    for (depth, span) in path.iter().enumerate() {
+        let key = Key {
+            name: &text[span.clone()],
+            place: at(span.clone()),
+        };
+        let parent = &text[..span.start.saturating_sub(1)];
+        let indexed = path
+            .get(depth + 1)
+            .is_some_and(|next| is_number(&text[next.clone()]));
+        node = descend(node, &key, parent, indexed)?;
+    }
+    *node = new;
+    Ok(())
+}
+
+struct Key<'a> {
+    name: &'a str,
+    place: Place,
+}
+
+/// Byte ranges of the parts of a dotted path, without the spaces around them.
+fn segments(path: &str) -> Vec<Range<usize>> {
+    let mut start = 0;
+    let segment = |part: &str| {
+        let from = start + part.len() - part.trim_start().len();
+        start += part.len() + 1;
+        from..from + part.trim().len()
+    };
+    path.split('.').map(segment).collect()
+}
+
+/// The value that stands at `offset`: TOML, or a bare text.
+fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
+    let bare = source.text[offset..].trim_start();
+    let span = source.text.len() - bare.len()..source.text.len();
+    let place = Place {
+        source: source.clone(),
+        span,
+    };
+    if bare.is_empty() {
+        return Err(
+            Error::scene(&place, "the value is missing").help("an empty text is written \"\"")
+        );
+    }
+    match read::value(source, place.span.start) {
+        Ok(node) => Ok(node),
+        // What was meant as TOML: a table, a list, a quoted text, a number too large to hold.
+        Err(error) if bare.starts_with(['{', '[', '"', '\'']) || bare.parse::<f64>().is_ok() => {
+            Err(error)
+        }
+        Err(_) => Ok(Node {
+            place,
+            value: Value::String(bare.to_owned()),
+        }),
+    }
+}
+
+/// The child of a node that a key names; made if it is not there. `indexed` says that an item of it is wanted next.
+fn descend<'a>(
+    node: &'a mut Node,
+    key: &Key<'_>,
+    parent: &str,
+    indexed: bool,
+) -> Result<&'a mut Node> {
+    if !matches!(node.value, Value::List(_) | Value::Table(_)) {
+        *node = Node {
+            place: key.place.clone(),
+            value: Value::Table(Vec::new()),
+        };
+    }
+    match &mut node.value {
+        Value::List(items) => {
+            let count = match items.len() {
+                1 => "1 item".to_owned(),
+                count => format!("{count} items"),
+            };
+            let refuse = |message: String| {
+                let error = Error::scene(&key.place, message);
+                match items.len() {
+                    0 => error,
+                    1 => error.help("the only item is number 0"),
+                    count => error.help(format!("they are numbered 0 to {}", count - 1)),
+                }
+            };
+            if !is_number(key.name) {
+                return Err(refuse(format!(
+                    "`{parent}` is a list of {count}; `{}` is no number",
+                    key.name
+                )));
+            }
+            match key.name.parse::<usize>() {
+                Ok(index) if index < items.len() => Ok(&mut items[index]),
+                _ => Err(refuse(format!(
+                    "`{parent}` has {count}, there is no number {}",
+                    key.name
+                ))),
+            }
+        }
+        Value::Table(entries) => {
+            let index = entries
+                .iter()
+                .position(|entry| entry.key == key.name)
+                .unwrap_or(entries.len());
+            if index == entries.len() {
+                if indexed {
+                    return Err(Error::scene(
+                        &key.place,
+                        format!("`{}` has no items to choose from", key.name),
+                    )
+                    .help("the scene has no such list"));
+                }
+                let node = Node {
+                    place: key.place.clone(),
+                    value: Value::Table(Vec::new()),
+                };
+                entries.push(Entry {
+                    key: key.name.to_owned(),
+                    key_place: key.place.clone(),
+                    node,
+                });
+            }
+            Ok(&mut entries[index].node)
+        }
+        _ => Err(Error::scene(&key.place, "there is nothing below this")),
+    }
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit())
+}

@@ -1,0 +1,297 @@
+//! TOML as a tree of values that know where they stand, with getters that refuse in words.
+
+use crate::error::{Error, Located, Place, Result, Source, nearest};
+use std::ops::Range;
+use std::sync::Arc;
+use toml::de::{DeTable, DeValue};
+
+/// A value and its place.
+#[derive(Debug, Clone)]
+pub(super) struct Node {
+    pub place: Place,
+    pub value: Value,
+}
+
+/// Kinds of TOML value.
+#[derive(Debug, Clone)]
+pub(super) enum Value {
+    String(String),
+    Integer(i64),
+    Float(f64),
+    Boolean(bool),
+    Date,
+    List(Vec<Node>),
+    /// In the order of the text.
+    Table(Vec<Entry>),
+}
+
+/// A key of a table and its value.
+#[derive(Debug, Clone)]
+pub(super) struct Entry {
+    pub key: String,
+    pub key_place: Place,
+    pub node: Node,
+}
+
+/// Parses a whole scene; the result is a table.
+pub(super) fn document(source: &Arc<Source>) -> Result<Node> {
+    let table = DeTable::parse(&source.text).map_err(|error| syntax(source, 0, &error))?;
+    let convert = Convert { source, offset: 0 };
+    let value = Value::Table(convert.entries(table.get_ref())?);
+    Ok(Node {
+        place: convert.place(table.span()),
+        value,
+    })
+}
+
+/// Parses the value that stands at `offset` of the source up to its end.
+pub(super) fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
+    let value =
+        DeValue::parse(&source.text[offset..]).map_err(|error| syntax(source, offset, &error))?;
+    Convert { source, offset }.node(&value)
+}
+
+/// Turns an error of the `toml` crate into ours.
+fn syntax(source: &Arc<Source>, offset: usize, error: &toml::de::Error) -> Error {
+    let span = error.span().unwrap_or(0..0);
+    let place = Convert { source, offset }.place(span);
+    let marked = &source.text[place.span.clone()];
+    let refusal = Error::scene(&place, format!("this is not TOML: {}", error.message()));
+    let quotable = !marked.is_empty() && !marked.contains(['"', '\'', '\n', '=', '[', '{']);
+    let after_equals = source.text[..place.span.start]
+        .trim_end()
+        .ends_with(['=', '[', ',']);
+    match quotable && after_equals {
+        true => refusal.help(format!("texts and expressions need quotes: \"{marked}\"")),
+        false => refusal,
+    }
+}
+
+struct Convert<'a> {
+    source: &'a Arc<Source>,
+    offset: usize,
+}
+
+impl Convert<'_> {
+    /// A place, kept inside the text and on character borders.
+    fn place(&self, span: Range<usize>) -> Place {
+        let text = &self.source.text;
+        let border = |from: usize| {
+            (0..=from.min(text.len()))
+                .rev()
+                .find(|at| text.is_char_boundary(*at))
+                .unwrap_or(0)
+        };
+        let start = border(span.start + self.offset);
+        let end = border(span.end + self.offset).max(start);
+        Place {
+            source: self.source.clone(),
+            span: start..end,
+        }
+    }
+
+    fn entries(&self, table: &DeTable<'_>) -> Result<Vec<Entry>> {
+        let entry = |(key, value): (&toml::Spanned<_>, &_)| {
+            let key: &toml::Spanned<toml::de::DeString<'_>> = key;
+            let node = self.node(value)?;
+            Ok(Entry {
+                key: key.get_ref().to_string(),
+                key_place: self.place(key.span()),
+                node,
+            })
+        };
+        let mut entries = table.iter().map(entry).collect::<Result<Vec<_>>>()?;
+        entries.sort_by_key(|entry| entry.key_place.span.start);
+        Ok(entries)
+    }
+
+    fn node(&self, value: &toml::Spanned<DeValue<'_>>) -> Result<Node> {
+        let place = self.place(value.span());
+        let value = match value.get_ref() {
+            DeValue::String(text) => Value::String(text.to_string()),
+            DeValue::Integer(digits) => {
+                match i64::from_str_radix(digits.as_str(), digits.radix()) {
+                    Ok(value) => Value::Integer(value),
+                    Err(_) => return Err(Error::scene(&place, "the number is too large")),
+                }
+            }
+            DeValue::Float(digits) => match digits.as_str().parse() {
+                Ok(value) => Value::Float(value),
+                Err(_) => return Err(Error::scene(&place, "not a number")),
+            },
+            DeValue::Boolean(value) => Value::Boolean(*value),
+            DeValue::Datetime(_) => Value::Date,
+            DeValue::Array(items) => Value::List(
+                items
+                    .iter()
+                    .map(|item| self.node(item))
+                    .collect::<Result<_>>()?,
+            ),
+            DeValue::Table(table) => Value::Table(self.entries(table)?),
+        };
+        Ok(Node { place, value })
+    }
+}
+
+impl Node {
+    /// Refusal of a value of the wrong kind.
+    pub fn expected(&self, what: &str) -> Error {
+        let found = match &self.value {
+            Value::String(_) => "a string",
+            Value::Integer(_) => "a whole number",
+            Value::Float(_) => "a number",
+            Value::Boolean(_) => "true or false",
+            Value::Date => "a date",
+            Value::List(_) => "a list",
+            Value::Table(_) => "a table",
+        };
+        let error = Error::scene(&self.place, format!("expected {what}, found {found}"))
+            .label(format!("not {what}"));
+        match &self.value {
+            Value::String(text) if text.parse::<f64>().is_ok() => {
+                error.help("write the number without quotes")
+            }
+            Value::Integer(_) | Value::Float(_) | Value::Boolean(_) if what == "a string" => {
+                error.help("write it in quotes")
+            }
+            _ => error,
+        }
+    }
+
+    /// Refusal of a value of the right kind.
+    pub fn refuse(&self, message: impl Into<String>) -> Error {
+        Error::scene(&self.place, message)
+    }
+
+    pub fn string(&self) -> Result<&str> {
+        match &self.value {
+            Value::String(text) => Ok(text),
+            _ => Err(self.expected("a string")),
+        }
+    }
+
+    /// A string that is a name: not empty.
+    pub fn name(&self) -> Result<Located<String>> {
+        match self.string()? {
+            "" => Err(self.refuse("the name is empty")),
+            name => Ok(Located::new(name.to_owned(), self.place.clone())),
+        }
+    }
+
+    /// A finite number.
+    pub fn number(&self) -> Result<f64> {
+        match self.value {
+            Value::Integer(value) => Ok(value as f64),
+            Value::Float(value) if value.is_finite() => Ok(value),
+            Value::Float(_) => Err(self.refuse("the number is not finite")),
+            _ => Err(self.expected("a number")),
+        }
+    }
+
+    /// A finite number > 0; `what` names it in the message.
+    pub fn positive(&self, what: &str) -> Result<f64> {
+        match self.number()? {
+            value if value > 0.0 => Ok(value),
+            value => Err(self
+                .refuse(format!("{what} is {value}"))
+                .label("must be greater than 0")),
+        }
+    }
+
+    /// A whole number; a fraction is refused.
+    pub fn whole(&self) -> Result<i64> {
+        match self.value {
+            Value::Integer(value) => Ok(value),
+            _ => Err(self.expected("a whole number")),
+        }
+    }
+
+    pub fn boolean(&self) -> Result<bool> {
+        match self.value {
+            Value::Boolean(value) => Ok(value),
+            _ => Err(self.expected("true or false")),
+        }
+    }
+
+    pub fn list(&self) -> Result<&[Node]> {
+        match &self.value {
+            Value::List(items) => Ok(items),
+            _ => Err(self.expected("a list")),
+        }
+    }
+}
+
+/// A table whose keys are all known.
+pub(super) struct Keys<'a> {
+    node: &'a Node,
+    entries: &'a [Entry],
+    what: &'a str,
+}
+
+impl<'a> Keys<'a> {
+    /// Opens a table; `what` names it in messages. The first key outside `known` is refused.
+    pub fn open(node: &'a Node, what: &'a str, known: &[&str]) -> Result<Self> {
+        let Value::Table(entries) = &node.value else {
+            return Err(node
+                .expected("a table")
+                .help(format!("its keys are {}", known.join(", "))));
+        };
+        match entries
+            .iter()
+            .find(|entry| !known.contains(&entry.key.as_str()))
+        {
+            None => Ok(Self {
+                node,
+                entries,
+                what,
+            }),
+            Some(Entry { key, key_place, .. }) => {
+                let error = Error::scene(key_place, format!("unknown key `{key}` in {what}"))
+                    .label("unknown key");
+                Err(error.help(match nearest(key, known.iter().copied()) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!("its keys are {}", known.join(", ")),
+                }))
+            }
+        }
+    }
+
+    /// The table itself.
+    pub fn node(&self) -> &'a Node {
+        self.node
+    }
+
+    pub fn entry(&self, key: &str) -> Option<&'a Entry> {
+        self.entries.iter().find(|entry| entry.key == key)
+    }
+
+    pub fn get(&self, key: &str) -> Option<&'a Node> {
+        self.entry(key).map(|entry| &entry.node)
+    }
+
+    /// The value of a key that must be there.
+    pub fn require(&self, key: &str) -> Result<&'a Node> {
+        self.get(key).ok_or_else(|| {
+            Error::scene(&self.node.place, format!("{} has no `{key}`", self.what))
+                .label(format!("`{key}` is missing"))
+        })
+    }
+
+    /// Refuses a table with two keys of which only one can hold; points at the later one, or the overriding one.
+    pub fn exclude(&self, first: &str, second: &str) -> Result<()> {
+        let mut both = self
+            .entries
+            .iter()
+            .filter(|entry| entry.key == first || entry.key == second)
+            .skip(1);
+        match both.next() {
+            None => Ok(()),
+            Some(Entry { key_place, .. }) => Err(Error::scene(
+                key_place,
+                format!("{} has both `{first}` and `{second}`", self.what),
+            )
+            .label("only one of them can hold")
+            .help(format!("remove `{first}` or `{second}`"))),
+        }
+    }
+}

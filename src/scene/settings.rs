@@ -1,0 +1,173 @@
+//! The scene echoed with all defaults filled in, for the report.
+
+use super::expression::Field;
+use super::{
+    BodySpec, ContactSpec, LayerSpec, LoadKind, MeshSource, MethodSpec, Order, Plane, Preset,
+    Scene, SolverSpec, Start, StopSpec, Zone,
+};
+use serde_json::{Map, Value, json};
+
+impl Scene {
+    /// The scene as JSON, keyed like the scene file, every default written out. What has no default and was not
+    /// given is left out; expressions are texts.
+    pub fn settings(&self) -> Value {
+        let mut settings = Map::new();
+        settings.insert("scene".into(), json!(self.path.display().to_string()));
+        settings.insert("title".into(), json!(self.title));
+        settings.insert("dimension".into(), json!(self.dimension.value));
+        if self.dimension.value == 2 {
+            let plane = match self.plane {
+                Plane::Strain => "strain",
+                Plane::Stress => "stress",
+            };
+            settings.insert("plane".into(), json!(plane));
+        }
+        settings.insert("mesh".into(), mesh(&self.mesh));
+        let dimension = self.dimension.value;
+        settings.insert(
+            "body".into(),
+            self.bodies
+                .iter()
+                .map(|item| body(item, dimension))
+                .collect(),
+        );
+        settings.insert(
+            "contact".into(),
+            self.contacts.iter().map(contact).collect(),
+        );
+        settings.insert("method".into(), method(&self.method));
+        settings.insert("solver".into(), solver(&self.solver));
+        let mut output = Map::new();
+        insert(
+            &mut output,
+            "dir",
+            self.output
+                .dir
+                .as_ref()
+                .map(|dir| json!(dir.display().to_string())),
+        );
+        output.insert("vtu".into(), json!(self.output.vtu));
+        output.insert("plots".into(), json!(self.output.plots));
+        settings.insert("output".into(), output.into());
+        settings.into()
+    }
+}
+
+fn insert(map: &mut Map<String, Value>, key: &str, value: Option<Value>) {
+    if let Some(value) = value {
+        map.insert(key.into(), value);
+    }
+}
+
+fn field(field: &Field) -> Value {
+    match field {
+        Field::Constant(value) => json!(value),
+        Field::Expression(expression) => json!(expression.text()),
+    }
+}
+
+fn vector(components: &[Field; 3], dimension: usize) -> Value {
+    components.iter().take(dimension).map(field).collect()
+}
+
+fn mesh(mesh: &MeshSource) -> Value {
+    match mesh {
+        MeshSource::Msh { file } => json!({ "msh": file.value.display().to_string() }),
+        MeshSource::Geo { file, set } => {
+            let set: Map<_, _> = set
+                .iter()
+                .map(|(name, value)| (name.clone(), json!(value)))
+                .collect();
+            json!({ "geo": file.value.display().to_string(), "set": set })
+        }
+    }
+}
+
+fn body(body: &BodySpec, dimension: usize) -> Value {
+    let fix = body.fix.iter().map(|support| {
+        let mut map = Map::new();
+        map.insert("on".into(), json!(support.on.value));
+        for (axis, value) in ["x", "y", "z"].iter().zip(support.value) {
+            insert(&mut map, axis, value.map(|value| json!(value)));
+        }
+        Value::Object(map)
+    });
+    let load = body.load.iter().map(|load| match &load.kind {
+        LoadKind::Pressure(pressure) => json!({ "on": load.on.value, "pressure": field(pressure) }),
+        LoadKind::Traction(traction) => {
+            json!({ "on": load.on.value, "traction": vector(traction, dimension) })
+        }
+    });
+    let order = match body.order {
+        Order::P1 => 1,
+        Order::P2 => 2,
+    };
+    let mut map = Map::new();
+    map.insert("name".into(), json!(body.name.value));
+    map.insert("young".into(), json!(body.young.value));
+    map.insert("poisson".into(), json!(body.poisson.value));
+    map.insert("order".into(), json!(order));
+    map.insert("fix".into(), fix.collect());
+    map.insert("load".into(), load.collect());
+    insert(
+        &mut map,
+        "force",
+        body.force.as_ref().map(|force| vector(force, dimension)),
+    );
+    map.into()
+}
+
+fn contact(contact: &ContactSpec) -> Value {
+    let layer = match contact.layer {
+        LayerSpec::Power { b, a } => json!({ "power": { "B": b, "a": a } }),
+        LayerSpec::Linear { stiffness } => json!({ "linear": { "stiffness": stiffness } }),
+    };
+    let mut map = Map::new();
+    map.insert(
+        "between".into(),
+        contact
+            .between
+            .iter()
+            .map(|name| json!(name.value))
+            .collect(),
+    );
+    map.insert("gap".into(), field(&contact.gap));
+    map.insert("layer".into(), layer);
+    insert(&mut map, "reference", contact.reference.as_ref().map(field));
+    map.into()
+}
+
+fn method(method: &MethodSpec) -> Value {
+    let psi = match &method.psi {
+        Zone::None => json!("none"),
+        Zone::Full => json!("full"),
+        Zone::Active => json!("active"),
+        // Text also for a constant condition, as the key takes no number.
+        Zone::Subset(condition) => json!(condition.text()),
+    };
+    let start = match &method.start {
+        Start::Zero => json!("zero"),
+        Start::Normal(normal) => json!({ "normal": field(normal) }),
+    };
+    let StopSpec {
+        residual,
+        increment,
+        iterations,
+    } = &method.stop;
+    let mut stop = Map::new();
+    insert(&mut stop, "residual", residual.map(|value| json!(value)));
+    insert(&mut stop, "increment", increment.map(|value| json!(value)));
+    stop.insert("iterations".into(), json!(iterations));
+    json!({ "psi": psi, "gamma": method.gamma, "start": start, "stop": stop })
+}
+
+fn solver(solver: &SolverSpec) -> Value {
+    let preset = solver.preset.map(|preset| match preset {
+        Preset::Mumps => json!("mumps"),
+        Preset::Hypre => json!("hypre"),
+    });
+    let mut map = Map::new();
+    insert(&mut map, "preset", preset);
+    map.insert("options".into(), json!(solver.options.join(" ")));
+    map.into()
+}

@@ -1,0 +1,184 @@
+//! Every refusal: its message, the word that the caret marks, and the way out.
+
+use super::{GROOVE, caret, load_text};
+use crate::error::Kind;
+
+/// Replacement in the groove scene; text under the caret; message; part of the help (empty: whatever).
+type Case = (
+    &'static str,
+    &'static str,
+    &'static str,
+    &'static str,
+    &'static str,
+);
+
+#[rustfmt::skip]
+const CASES: &[Case] = &[
+    // Syntax.
+    ("dimension = 2", "dimension = two", "two", "this is not TOML: ", "need quotes: \"two\""),
+    ("gamma = 0.7", "gamma = 0.7\ngamma = 0.8", "gamma", "this is not TOML: duplicate key", ""),
+    ("[method]", "[method", "", "this is not TOML: unclosed table", ""),
+    ("n = 32", "n = 99999999999999999999", "99999999999999999999", "the number is too large", ""),
+    // Keys.
+    ("young = 2.1e5", "yuong = 2.1e5", "yuong", "unknown key `yuong` in [[body]]", "did you mean `young`?"),
+    ("young = 2.1e5", "density = 2.1e5", "density", "unknown key `density` in [[body]]", "its keys are name, young, poisson, order"),
+    ("title = ", "colour = ", "colour", "unknown key `colour` in the scene", "title, dimension, plane"),
+    ("[method]", "[methods]", "methods", "unknown key `methods` in the scene", "`method`"),
+    ("B = 2.5e-5", "b = 2.5e-5", "b", "unknown key `b` in the power layer", "`B`"),
+    ("increment", "incremnt", "incremnt", "unknown key `incremnt` in the stop rule", "`increment`"),
+    ("pressure = 10", "presure = 10", "presure", "unknown key `presure` in a load", "`pressure`"),
+    ("young = 2.1e5\n", "", "[[body]]", "[[body]] has no `young`", ""),
+    ("name = \"upper\"\n", "", "[[body]]", "[[body]] has no `name`", ""),
+    ("dimension = 2 ", "", "t", "the scene has no `dimension`", ""),
+    ("B = 2.5e-5, ", "", "{ a = 0.5 }", "the power layer has no `B`", ""),
+    ("on = \"lower_face\", ", "", "{ pressure = 10 }", "a load has no `on`", ""),
+    // Kinds of value.
+    ("young = 2.1e5", "young = \"2.1e5\"", "\"2.1e5\"", "expected a number, found a string", "without quotes"),
+    ("young = 2.1e5", "young = [1]", "[1]", "expected a number, found a list", ""),
+    ("young = 2.1e5", "young = inf", "inf", "the number is not finite", ""),
+    ("name = \"upper\"", "name = 7", "7", "expected a string, found a whole number", "quotes"),
+    ("name = \"upper\"", "name = 1979-05-27", "1979-05-27", "expected a string, found a date", ""),
+    ("dimension = 2 ", "dimension = 2.0 ", "2.0", "expected a whole number, found a number", ""),
+    ("pressure = 10", "pressure = true", "true", "expected a number or an expression, found true or false", ""),
+    ("layer = { power = { B = 2.5e-5, a = 0.5 } }", "layer = \"power\"", "\"power\"", "expected a table, found a string", "power = { B = 2.5e-5, a = 0.5 }"),
+    ("mesh = { geo = \"groove.geo\", set = { n = 32 } }", "mesh = 3", "3", "expected a file name or a table", ""),
+    ("[[contact]]", "[contact]", "[contact]", "expected a list, found a table", "[[contact]]"),
+    // Impossible values.
+    ("dimension = 2 ", "dimension = 4 ", "4", "the dimension is 4", ""),
+    ("young = 2.1e5", "young = -2.1e5", "-2.1e5", "Young's modulus is -210000", ""),
+    ("poisson = 0.3\norder", "poisson = 0.5\norder", "0.5", "Poisson's ratio is 0.5", "incompressible"),
+    ("poisson = 0.3\norder", "poisson = -1\norder", "-1", "Poisson's ratio is -1", ""),
+    ("order = 1", "order = 3", "3", "the order is 3", ""),
+    ("gamma = 0.7", "gamma = 0", "0", "gamma is 0", ""),
+    ("a = 0.5", "a = 1.5", "1.5", "a is 1.5", "p'(0) = infinity"),
+    ("a = 0.5", "a = 0", "0", "a is 0", ""),
+    ("B = 2.5e-5", "B = -1", "-1", "B is -1", ""),
+    ("increment = 1e-3", "residual = 0", "0", "the tolerance is 0", ""),
+    ("increment = 1e-3", "iterations = 0", "0", "no iteration is allowed", ""),
+    ("increment = 1e-3", "iterations = -3", "-3", "no iteration is allowed", ""),
+    ("[method]", "plane = 1\n[method]", "plane", "unknown key `plane` in [[contact]]", ""),
+    // Words.
+    ("psi = \"active\"", "psi = \"actve\"", "\"actve\"", "unknown zone `actve`", "`active`"),
+    ("psi = \"active\"", "psi = \"robin\"", "\"robin\"", "unknown zone `robin`", "none, full, active"),
+    ("psi = \"active\"", "psi = \"z > 0\"", "z", "unknown variable `z`", "x, y, k"),
+    ("start = { normal = 1e-4 }", "start = \"none\"", "\"none\"", "unknown start `none`", "\"zero\""),
+    ("[method]", "[solver]\npreset = \"mumpz\"\n[method]", "\"mumpz\"", "unknown solver `mumpz`", "`mumps`"),
+    ("[method]", "[solver]\noptions = \"ksp_rtol 1\"\n[method]", "\"ksp_rtol 1\"", "`ksp_rtol` is no PETSc option", "dash"),
+    ("dimension = 2 ", "dimension = 2\nplane = \"strein\" ", "\"strein\"", "unknown plane `strein`", "`strain`"),
+    ("dimension = 2 ", "dimension = 3\nplane = \"strain\" ", "plane", "`plane` in a problem in space", ""),
+    // Bodies.
+    ("name = \"upper\"", "name = \"lower\"", "\"lower\"", "two bodies are called `lower`", ""),
+    ("name = \"upper\"", "name = \"Upper\"", "\"Upper\"", "`Upper` cannot be the name of a body", "small letter"),
+    ("name = \"upper\"", "name = \"1st\"", "\"1st\"", "`1st` cannot be the name of a body", "small letter"),
+    ("name = \"upper\"", "name = \"ksp\"", "\"ksp\"", "`ksp` cannot be the name of a body", "another name"),
+    ("name = \"upper\"", "name = \"\"", "\"\"", "the name is empty", ""),
+    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\" }", "{ on = \"lower_axis\" }", "the support on `lower_axis` holds no component", "x, y: x = 0"),
+    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", z = 0 }", "z", "a support in `z` in a plane problem", ""),
+    ("pressure = 10 ", "", "{ on = \"lower_face\", }", "the load on `lower_face` has no component", "[tx, ty]"),
+    ("pressure = 10", "pressure = 10, traction = [0, 0]", "traction", "a load has both `pressure` and `traction`", ""),
+    ("force = [0, ", "force = [0, 0, ", "\"-9.81e-6 * (1 + y)\"", "a vector has 2 components here, not 3", "dimension"),
+    ("traction = [\"2*x\", -10]", "traction = []", "[]", "a vector has 2 components here, not 0", ""),
+    // Expressions.
+    ("(x - 4)^2", "(u - 4)^2", "u", "unknown variable `u`", "known are x, y, pi"),
+    ("max(0", "maximum(0", "maximum", "unknown function `maximum`", "max, min"),
+    ("\"2*x\"", "\"1/0\"", "\"1/0\"", "the expression is not a finite number but inf", ""),
+    ("\"2*x\"", "\"2*\\u0078 + q\"", "\"2*\\u0078 + q\"", "unknown variable `q`", ""),
+    ("\"2*x\"", "'''\n2*x + q'''", "q", "unknown variable `q`", ""),
+    // Contacts.
+    ("\"upper_bottom\"", "\"lower_top\"", "\"lower_top\"", "a contact between `lower_top` and itself", ""),
+    (", \"upper_bottom\"", "", "[\"lower_top\"]", "a contact is between two surfaces", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "", "{  }", "the layer has no law", "linear = { stiffness = 1e5 }"),
+    ("a = 0.5 } }", "a = 0.5 }, linear = { stiffness = 1 } }", "linear", "the layer has both `power` and `linear`", ""),
+    ("[method]", "[[contact]]\nbetween = [\"upper_bottom\", \"lower_top\"]\nlayer.linear.stiffness = 1\n[method]", "\"upper_bottom\"", "a second contact of `upper_bottom` and `lower_top`", ""),
+    // The mesh.
+    ("geo = \"groove.geo\"", "geo = \"groove.geo\", msh = \"groove.msh\"", "msh", "the mesh has both `geo` and `msh`", ""),
+    ("geo = \"groove.geo\"", "msh = \"groove.msh\"", "set", "`set` for a finished mesh", ""),
+    ("geo = \"groove.geo\"", "geo = \"grove.geo\"", "\"grove.geo\"", "/grove.geo", "did you mean `groove.geo`?"),
+    ("geo = \"groove.geo\"", "geo = \"no/such.geo\"", "\"no/such.geo\"", "/no/such.geo", "relative"),
+    ("geo = \"groove.geo\"", "geo = \".\"", "\".\"", " is not a file", ""),
+    ("n = 32", "n = \"many\"", "\"many\"", "expected a number, found a string", ""),
+    ("n = 32", "\"n m\" = 32", "\"n m\"", "`n m` is no name of a Gmsh number", ""),
+];
+
+#[test]
+fn refusals_point_at_the_word() {
+    for (from, to, marked, message, help) in CASES {
+        assert!(GROOVE.contains(from), "{from}");
+        let error = load_text(&GROOVE.replacen(from, to, 1), &[]).expect_err(to);
+        assert_eq!(error.kind(), Kind::Scene);
+        assert!(
+            error.message().contains(message),
+            "{from} -> {to}: not {message:?} in\n{error}"
+        );
+        assert!(
+            error.advice().unwrap_or_default().contains(help),
+            "{from} -> {to}: not {help:?} in\n{error}"
+        );
+        if !marked.is_empty() {
+            assert_eq!(&caret(&error), marked, "{from} -> {to}:\n{error}");
+        }
+        assert!(error.render(false).contains("scene.toml:"), "{error}");
+    }
+}
+
+#[test]
+fn empty_scenes_are_refused() {
+    for (text, message) in [
+        ("", "the scene has no `dimension`"),
+        ("dimension = 2", "the scene has no `mesh`"),
+        (
+            "dimension = 2\nmesh = 'groove.msh'",
+            "the scene has no `body`",
+        ),
+        (
+            "dimension = 2\nmesh = 'groove.msh'\nbody = []",
+            "the scene has no body",
+        ),
+    ] {
+        assert_eq!(load_text(text, &[]).expect_err(text).message(), message);
+    }
+}
+
+#[test]
+fn refusals_of_overrides_point_into_them() {
+    #[rustfmt::skip]
+    let cases = [
+        ("contact.7.layer=1", "7", "`contact` has 1 item, there is no number 7", "number 0"),
+        ("body.2.young=1", "2", "`body` has 2 items, there is no number 2", "0 to 1"),
+        ("body.upper.young=1", "upper", "`body` is a list of 2 items; `upper` is no number", "0 to 1"),
+        ("body.0.load.1.pressure=3", "1", "`body.0.load` has 1 item, there is no number 1", ""),
+        ("body.1.fix.0.x=3", "fix", "`fix` has no items to choose from", ""),
+        ("metod.gamma=1", "metod", "unknown key `metod` in the scene", "`method`"),
+        ("method.gama=1", "gama", "unknown key `gama` in [method]", "`gamma`"),
+        ("method.gamma = -1", "-1", "gamma is -1", ""),
+        ("method.gamma=much", "much", "expected a number, found a string", ""),
+        ("method.gamma=", "", "the value is missing", ""),
+        ("method..gamma=1", "method..gamma", "this is not a key of the scene", "joined by points"),
+        ("mesh.msh=groove.msh", "msh", "the mesh has both `geo` and `msh`", ""),
+        ("contact.0.layer.linear.stiffness=1", "linear", "the layer has both `power` and `linear`", ""),
+        ("contact.0.layer={linear={stiffness=0}}", "0", "the stiffness is 0", ""),
+        ("contact.0.layer={linear={stiffness=1}", "", "this is not TOML: unclosed inline table", ""),
+        ("contact.0.gap=1e-4 * max(0, w)", "w", "unknown variable `w`", ""),
+        ("mesh.geo=other.geo", "other.geo", "/other.geo", ""),
+        ("mesh.set.n=99999999999999999999", "99999999999999999999", "the number is too large", ""),
+        ("title.main=x", "main", "expected a string, found a table", ""),
+    ];
+    for (text, marked, message, help) in cases {
+        let error = load_text(GROOVE, &[text]).expect_err(text);
+        assert_eq!(error.kind(), Kind::Scene);
+        assert!(
+            error.message().contains(message),
+            "{text}: not {message:?} in\n{error}"
+        );
+        assert!(
+            error.advice().unwrap_or_default().contains(help),
+            "{text}: not {help:?} in\n{error}"
+        );
+        if !marked.is_empty() {
+            assert_eq!(caret(&error), marked, "{text}:\n{error}");
+        }
+        assert!(error.render(false).contains("--set:1:"), "{error}");
+    }
+    let error = load_text(GROOVE, &["gamma"]).expect_err("no =");
+    assert_eq!(error.kind(), Kind::Usage);
+}

@@ -1,0 +1,82 @@
+//! Any PETSc KSP and PC as inner solver.
+
+use super::InnerSolver;
+use crate::ddm::Solved;
+use crate::error::Result;
+use crate::linalg::Csr;
+use crate::petsc::{Ksp, Matrix, Session};
+
+/// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
+pub struct Krylov {
+    matrix: Matrix,
+    ksp: Ksp,
+    changed: bool,
+    set_ups: usize,
+}
+
+impl Krylov {
+    /// Starts from G = K, with the options of prefix `<body>_` that stand in the database now. `near_null_space` are the
+    /// rigid motions that algebraic multigrid (GAMG) wants to know, one entry a dof each.
+    ///
+    /// # Errors
+    /// PETSc's refusal of a matrix or an option value.
+    pub fn new(
+        session: &Session,
+        body: &str,
+        dimension: usize,
+        stiffness: &Csr,
+        near_null_space: &[Vec<f64>],
+    ) -> Result<Self> {
+        let pattern = |part: &[i32]| part.iter().map(|&i| i.into()).collect();
+        let mut matrix = Matrix::from_csr(
+            session,
+            dimension,
+            pattern(&stiffness.ptr),
+            pattern(&stiffness.col),
+            stiffness.values.clone(),
+        )?;
+        matrix.set_spd()?;
+        let mut ksp = Ksp::new(session, &format!("{body}_"))?;
+        ksp.set_operator(&matrix)?;
+        ksp.set_from_options()?;
+        if ksp.pc_type() == "gamg" {
+            matrix.set_near_null_space(near_null_space)?;
+        }
+        Ok(Self { matrix, ksp, changed: true, set_ups: 0 })
+    }
+}
+
+impl InnerSolver for Krylov {
+    fn update(&mut self, write: &mut dyn FnMut(&mut [f64])) -> Result<()> {
+        self.changed = true;
+        self.matrix.update(write)
+    }
+
+    fn set_up(&mut self) -> Result<()> {
+        if self.changed {
+            self.set_ups += 1;
+            self.changed = false;
+            self.ksp.set_up()?;
+        }
+        Ok(())
+    }
+
+    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+        self.set_up()?;
+        let solved = self.ksp.solve(r, z)?;
+        let direct = self.ksp.ksp_type() == "preonly";
+        Ok(Solved {
+            iterations: if direct { 0 } else { solved.iterations },
+            failure: (!solved.reason.converged()).then(|| solved.reason.to_string()),
+        })
+    }
+
+    fn factorizations(&self) -> (usize, usize) {
+        (usize::from(self.set_ups > 0), self.set_ups)
+    }
+
+    fn describe(&self) -> String {
+        let package = self.ksp.factor_package().map_or(String::new(), |package| format!(" by {package}"));
+        format!("{} + {}{package}", self.ksp.ksp_type(), self.ksp.pc_type())
+    }
+}

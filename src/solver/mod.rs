@@ -1,0 +1,44 @@
+//! Inner solvers: how a body solves G z = r.
+//!
+//! [`SparseBody`] owns K, f and B and answers the verbs of [`Body`](crate::ddm::Body); an [`InnerSolver`] owns G. A new
+//! way to solve is a new file with that trait.
+
+pub mod dense;
+pub mod krylov;
+pub mod options;
+pub mod preset;
+mod sparse;
+
+pub use dense::Dense;
+pub use krylov::Krylov;
+pub use sparse::SparseBody;
+
+use crate::ddm::Solved;
+use crate::error::Result;
+
+/// Owner of the matrix G with a way to solve G z = r.
+pub trait InnerSolver {
+    /// Changes values of G (in the order of the pattern it was made with); the next solve uses the new matrix.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn update(&mut self, write: &mut dyn FnMut(&mut [f64])) -> Result<()>;
+
+    /// Factors G, or sets its preconditioner up, if it changed since.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn set_up(&mut self) -> Result<()>;
+
+    /// Solves G z = r with zero guess.
+    ///
+    /// # Errors
+    /// Failures of the solver library; not converging is told in [`Solved`].
+    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
+
+    /// (symbolic, numeric) factorisations or preconditioner set-ups so far.
+    fn factorizations(&self) -> (usize, usize);
+
+    /// One line for the report.
+    fn describe(&self) -> String;
+}

@@ -1,0 +1,339 @@
+//! How PETSc options reach a body.
+//!
+//! Users type PETSc options as in any PETSc program, for all bodies (`-ksp_type cg`) or for one (`-upper_ksp_type cg`).
+//! PETSc never falls back from a prefix to the plain name, and nested objects read their options late. So, before the
+//! objects of the bodies are made:
+//!
+//! 1. [`distribute`] copies each plain option of the object families to every body that has not its own;
+//! 2. [`set_default`] and [`prefer_mumps`] add what the program chooses where nothing was typed;
+//! 3. the objects are made and set up;
+//! 4. [`mark_copies`] and [`unread`] find what nobody read: a slip of the keyboard ends the run before it starts.
+
+mod probe;
+mod split;
+mod unread;
+
+pub use split::split;
+pub use unread::{Unread, UnreadKind, unread};
+
+use crate::error::Result;
+use crate::petsc::{Options, Session};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+/// How options of a body begin, without its prefix: objects, and objects nested in them.
+const FAMILIES: [&str; 19] = [
+    "ksp_",
+    "pc_",
+    "mat_",
+    "sub_",
+    "mg_",
+    "fieldsplit_",
+    "vec_",
+    "esteig_",
+    "redundant_",
+    "telescope_",
+    "deflation_",
+    "hpddm_",
+    "lsc_",
+    "schur_",
+    "matmatmult_",
+    "matproduct_",
+    "matptap_",
+    "mattransposematmult_",
+    "inner_",
+];
+
+/// Why an option is in the table although nobody typed it.
+#[derive(Clone, Copy)]
+enum Origin {
+    /// A copy of the plain option.
+    Copy,
+    /// Our own choice.
+    Default,
+}
+
+thread_local! {
+    /// What this module put into PETSc's table, which is one for the process too.
+    static OURS: RefCell<BTreeMap<String, Origin>> = const { RefCell::new(BTreeMap::new()) };
+}
+
+fn key(body: &str, name: &str) -> String {
+    format!("-{body}_{}", name.trim_start_matches('-'))
+}
+
+/// Whether an option is a plain one of an object family, and of no body.
+fn is_plain(name: &str, bodies: &[&str]) -> bool {
+    let bare = name.trim_start_matches('-');
+    FAMILIES.iter().any(|family| bare.starts_with(family)) && body_of(name, bodies).is_none()
+}
+
+/// The body whose prefix an option has, and the option without it.
+fn body_of<'a, 'b>(name: &'a str, bodies: &[&'b str]) -> Option<(&'b str, &'a str)> {
+    let bare = name.trim_start_matches('-');
+    bodies
+        .iter()
+        .find_map(|body| Some((*body, bare.strip_prefix(body)?.strip_prefix('_')?)))
+}
+
+/// Sets an option that nobody typed and remembers why.
+fn put(options: &Options, name: &str, value: Option<&str>, origin: Origin) -> Result<()> {
+    options.set(name, value)?;
+    OURS.with_borrow_mut(|ours| ours.insert(name.to_owned(), origin));
+    Ok(())
+}
+
+fn origin(name: &str) -> Option<Origin> {
+    OURS.with_borrow(|ours| ours.get(name).copied())
+}
+
+/// Copies each plain option of the object families to `-<body>_<option>`, unless that is set. Give all bodies of the
+/// scene on every rank, before any object is made.
+///
+/// ```
+/// use winkler::{petsc::Session, solver::options};
+/// let words = ["-ksp_type", "cg", "-lower_ksp_type", "gmres"];
+/// let session = Session::start(&words.map(String::from))?;
+/// options::distribute(&session, &["upper", "lower"])?;
+/// assert_eq!(session.options().get("-upper_ksp_type").as_deref(), Some("cg"));
+/// assert_eq!(session.options().get("-lower_ksp_type").as_deref(), Some("gmres"));
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+///
+/// # Errors
+/// When PETSc refuses, which it does not for options it has taken before.
+pub fn distribute(session: &Session, bodies: &[&str]) -> Result<()> {
+    let options = session.options();
+    for (name, value) in options.all()? {
+        if !is_plain(&name, bodies) || origin(&name).is_some() {
+            continue;
+        }
+        for body in bodies {
+            let own = key(body, &name);
+            if !options.has(&own) {
+                put(&options, &own, value.as_deref(), Origin::Copy)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Takes back what this module put into the table, so that another scene of the process starts from the typed options.
+///
+/// # Errors
+/// When PETSc refuses, which it does not for options it has taken before.
+pub fn withdraw(session: &Session) -> Result<()> {
+    let ours = OURS.take();
+    ours.keys().try_for_each(|name| session.options().clear(name))
+}
+
+/// Sets `-<body>_<name>` unless it is set: a choice of the program, which never counts as typed or unread.
+///
+/// # Errors
+/// When `name` is not one of an option.
+pub fn set_default(session: &Session, body: &str, name: &str, value: Option<&str>) -> Result<()> {
+    let (options, own) = (session.options(), key(body, name));
+    if options.has(&own) {
+        Ok(())
+    } else {
+        put(&options, &own, value, Origin::Default)
+    }
+}
+
+/// What the user typed as option `name` for this body, under its prefix or plainly; empty without a value.
+///
+/// ```
+/// use winkler::{petsc::Session, solver::options::*};
+/// let session = Session::start(&["-pc_type", "icc"].map(String::from))?;
+/// distribute(&session, &["upper"])?;
+/// set_default(&session, "upper", "pc_type", Some("gamg"))?;
+/// set_default(&session, "upper", "ksp_type", Some("cg"))?;
+/// assert_eq!(typed(&session, "upper", "pc_type").as_deref(), Some("icc"));
+/// assert_eq!(typed(&session, "upper", "ksp_type"), None);
+/// assert_eq!(session.options().get("-upper_ksp_type").as_deref(), Some("cg"));
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+pub fn typed(session: &Session, body: &str, name: &str) -> Option<String> {
+    let (options, own) = (session.options(), key(body, name));
+    if matches!(origin(&own), Some(Origin::Default)) {
+        return None;
+    }
+    options
+        .get(&own)
+        .or_else(|| is_plain(name, &[body]).then(|| options.get(name)).flatten())
+}
+
+/// Lets `cholesky` and `lu` mean MUMPS, in the solver of a body and in those nested in it (`-sub_pc_type lu`), where
+/// `-pc_factor_mat_solver_type` was not given: PETSc's own factorisation is over 20 times slower.
+///
+/// ```
+/// use winkler::{petsc::Session, solver::options::*};
+/// let words = ["-pc_type", "asm", "-sub_pc_type", "lu", "-low_pc_type", "cholesky", "-low_pc_factor_mat_solver_type", "petsc"];
+/// let session = Session::start(&words.map(String::from))?;
+/// distribute(&session, &["up", "low"])?;
+/// prefer_mumps(&session, "up")?;
+/// prefer_mumps(&session, "low")?;
+/// let options = session.options();
+/// assert_eq!(options.get("-up_sub_pc_factor_mat_solver_type").as_deref(), Some("mumps"));
+/// assert!(!options.has("-up_pc_factor_mat_solver_type"));
+/// assert_eq!(options.get("-low_pc_factor_mat_solver_type").as_deref(), Some("petsc"));
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+///
+/// # Errors
+/// When PETSc refuses, which it does not for options of these names.
+pub fn prefer_mumps(session: &Session, body: &str) -> Result<()> {
+    for (name, value) in session.options().all()? {
+        let Some((_, bare)) = body_of(&name, &[body]) else {
+            continue;
+        };
+        let Some(nest) = bare.strip_suffix("pc_type") else {
+            continue;
+        };
+        if (nest.is_empty() || nest.ends_with('_'))
+            && matches!(value.as_deref(), Some("cholesky" | "lu"))
+        {
+            set_default(
+                session,
+                body,
+                &format!("{nest}pc_factor_mat_solver_type"),
+                Some("mumps"),
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// Marks each plain option as read of which a copy was read, or of which every body has its own instead.
+///
+/// ```
+/// use winkler::{petsc::{Ksp, Session}, solver::options::*};
+/// let words = ["-ksp_type", "cg", "-ksp_rtol", "1e-9", "-up_ksp_rtol", "1e-3", "-ksp_tpye", "gmres"];
+/// let session = Session::start(&words.map(String::from))?;
+/// distribute(&session, &["up"])?;
+/// Ksp::new(&session, "up_")?.set_from_options()?;
+/// mark_copies(&session, &["up"])?;
+/// let left: Vec<String> = session.options().left()?.into_iter().map(|(name, _)| name).collect();
+/// assert_eq!(left, ["-ksp_tpye", "-up_ksp_tpye"]);
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+///
+/// # Errors
+/// When PETSc refuses, which it does not for options it has taken before.
+pub fn mark_copies(session: &Session, bodies: &[&str]) -> Result<()> {
+    let options = session.options();
+    for (name, _) in options.left()? {
+        if !is_plain(&name, bodies) || bodies.is_empty() {
+            continue;
+        }
+        let mut copies = bodies
+            .iter()
+            .map(|body| key(body, &name))
+            .filter(|own| origin(own).is_some())
+            .peekable();
+        if copies.peek().is_none() || copies.any(|own| options.used(&own)) {
+            options.mark_used(&name)?;
+        }
+    }
+    Ok(())
+}
+
+/// Why a name cannot be that of a body; `None` for a good one. A body's name begins its options, so it is
+/// `[a-z][a-z0-9]*` and no word that begins options of PETSc.
+///
+/// ```
+/// use winkler::solver::options::forbidden_body_name;
+/// assert_eq!(forbidden_body_name("upper2"), None);
+/// assert!(forbidden_body_name("Upper").is_some_and(|reason| reason.contains("small letters")));
+/// assert!(forbidden_body_name("mg").is_some_and(|reason| reason.contains("PETSc")));
+/// ```
+pub fn forbidden_body_name(name: &str) -> Option<&'static str> {
+    let letters = name
+        .bytes()
+        .all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit());
+    if !letters || !name.starts_with(|first: char| first.is_ascii_lowercase()) {
+        return Some(
+            "it begins the PETSc options of the body, so it has small letters and digits only, a letter first",
+        );
+    }
+    let family = FAMILIES
+        .iter()
+        .any(|family| family.strip_suffix('_') == Some(name));
+    if family || unread::GLOBAL.contains(&name) || MORE_WORDS.contains(&name) {
+        return Some("options of PETSc itself begin with this word");
+    }
+    None
+}
+
+/// Words that begin options of PETSc, besides [`FAMILIES`] and those of PETSc as a whole.
+const MORE_WORDS: [&str; 32] = [
+    "snes",
+    "ts",
+    "tao",
+    "dm",
+    "is",
+    "da",
+    "dmda",
+    "dmplex",
+    "petscspace",
+    "petscfv",
+    "petscds",
+    "sf",
+    "sfnode",
+    "partitioner",
+    "petscpartitioner",
+    "vecscatter",
+    "ao",
+    "pf",
+    "ps",
+    "eps",
+    "svd",
+    "st",
+    "bv",
+    "hypre",
+    "mumps",
+    "npc",
+    "no",
+    "not",
+    "coarse",
+    "levels",
+    "winkler",
+    "winklerprobe",
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_body_hides_a_family_that_its_name_begins_with() {
+        assert!(is_plain("-mat_view", &["upper"]));
+        assert!(!is_plain("-upper_mat_view", &["upper"]));
+        assert!(!is_plain("-log_view", &["upper"]));
+        assert_eq!(
+            body_of("-up_ksp_type", &["u", "up"]),
+            Some(("up", "ksp_type"))
+        );
+        assert_eq!(body_of("-upper_ksp_type", &["up"]), None);
+    }
+
+    #[test]
+    fn forbidden_names_have_their_reason() {
+        for name in [
+            "ksp", "pc", "mat", "vec", "sub", "mg", "snes", "ts", "tao", "dm", "is", "log",
+            "options", "help",
+        ] {
+            assert!(
+                forbidden_body_name(name).is_some_and(|reason| reason.contains("PETSc itself")),
+                "{name}"
+            );
+        }
+        for name in ["", "2up", "up_per", "üb", "a b"] {
+            assert!(
+                forbidden_body_name(name).is_some_and(|reason| reason.contains("letter")),
+                "{name}"
+            );
+        }
+        assert_eq!(forbidden_body_name("punch"), None);
+    }
+}

@@ -1,0 +1,179 @@
+//! Options that nobody read: slips of the keyboard, and good options that have no effect.
+
+use super::probe::Names;
+use super::{body_of, mark_copies, origin};
+use crate::error::{Result, nearest};
+use crate::petsc::{Entry, Session};
+
+/// An option that the user typed and nobody read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unread {
+    /// Its name as typed, with the dash.
+    pub name: String,
+    /// Its value, if it has one.
+    pub value: Option<String>,
+    /// What it is.
+    pub kind: UnreadKind,
+    /// The most similar name that PETSc knows, with the dash, for an unknown one.
+    pub nearest: Option<String>,
+}
+
+/// What an unread option is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UnreadKind {
+    /// PETSc knows no such option: an error.
+    Unknown,
+    /// PETSc knows it, but no solver of this run has it: a warning.
+    NotInUse,
+}
+
+/// How options begin that PETSc reads for itself, some of them only at its end.
+pub(super) const GLOBAL: [&str; 41] = [
+    "log",
+    "options",
+    "malloc",
+    "on",
+    "help",
+    "h",
+    "version",
+    "v",
+    "info",
+    "memory",
+    "objects",
+    "error",
+    "debug",
+    "debugger",
+    "debuggers",
+    "start",
+    "stop",
+    "fp",
+    "no",
+    "citations",
+    "history",
+    "get",
+    "check",
+    "shared",
+    "not",
+    "tmp",
+    "mpi",
+    "saws",
+    "nox",
+    "display",
+    "draw",
+    "x",
+    "cuda",
+    "hip",
+    "device",
+    "root",
+    "skip",
+    "process",
+    "petsc",
+    "use",
+    "viewer",
+];
+
+/// Options of bodies that are read only during or after a solve.
+const LATE: [&str; 0] = [];
+
+/// The options that the user typed and that nobody has read on any rank. Call it on every rank with the same bodies,
+/// after all solvers are set up; `all_reduce` combines the flags of all ranks by "or". What is returned counts as read
+/// from then on, so that PETSc does not repeat it at its end.
+///
+/// ```
+/// use winkler::{petsc::{Ksp, Matrix, Session}, solver::options::*};
+/// let words = ["-ksp_tpye", "cg", "-pc_gamg_threshold", "0.1", "-ksp_max_it", "9", "-uper_pc_type", "icc", "-log"];
+/// let session = Session::start(&words.map(String::from))?;
+/// distribute(&session, &["upper"])?;
+/// set_default(&session, "upper", "pc_type", Some("jacobi"))?;
+/// let matrix = Matrix::from_csr(&session, 1, vec![0, 1], vec![0], vec![2.0])?;
+/// let mut ksp = Ksp::new(&session, "upper_")?;
+/// ksp.set_operator(&matrix)?;
+/// ksp.set_from_options()?;
+/// ksp.set_up()?;
+/// let unread = unread(&session, &["upper"], &|_| ())?;
+/// let told: Vec<_> = unread.iter().map(|u| (u.name.as_str(), u.kind, u.nearest.as_deref())).collect();
+/// assert_eq!(told, [
+///     ("-ksp_tpye", UnreadKind::Unknown, Some("-ksp_type")),
+///     ("-pc_gamg_threshold", UnreadKind::NotInUse, None),
+///     ("-uper_pc_type", UnreadKind::Unknown, Some("-upper_pc_type")),
+/// ]);
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+///
+/// # Errors
+/// When PETSc is out of memory.
+pub fn unread(
+    session: &Session,
+    bodies: &[&str],
+    all_reduce: &dyn Fn(&mut [u8]),
+) -> Result<Vec<Unread>> {
+    mark_copies(session, bodies)?;
+    let options = session.options();
+    let all = options.all()?;
+    // What the user typed is the same on every rank, unlike our defaults.
+    let candidates: Vec<&Entry> = all
+        .iter()
+        .filter(|(name, _)| origin(name).is_none() && !is_late(name, bodies))
+        .collect();
+    let mut read: Vec<u8> = candidates
+        .iter()
+        .map(|(name, _)| u8::from(options.used(name)))
+        .collect();
+    all_reduce(&mut read);
+    let left: Vec<&Entry> = candidates
+        .into_iter()
+        .zip(read)
+        .filter(|(_, read)| *read == 0)
+        .map(|(e, _)| e)
+        .collect();
+    if left.is_empty() {
+        return Ok(Vec::new());
+    }
+
+    let of_body = |body: &&str| {
+        all.iter()
+            .filter_map(|(name, value)| Some((body_of(name, &[body])?.1.to_owned(), value.clone())))
+            .collect()
+    };
+    let in_use: Vec<Vec<Entry>> = bodies.iter().map(of_body).collect();
+    let names = Names::collect(session, &in_use)?;
+    let known: Vec<String> = std::iter::once(String::new())
+        .chain(bodies.iter().map(|body| format!("{body}_")))
+        .flat_map(|prefix| names.iter().map(move |name| format!("-{prefix}{name}")))
+        .collect();
+    left.into_iter()
+        .map(|(name, value)| {
+            let bare = body_of(name, bodies).map_or(name.trim_start_matches('-'), |(_, bare)| bare);
+            let valid = names.contains(bare);
+            options.mark_used(name)?;
+            Ok(Unread {
+                name: name.clone(),
+                value: value.clone(),
+                kind: if valid {
+                    UnreadKind::NotInUse
+                } else {
+                    UnreadKind::Unknown
+                },
+                nearest: (!valid)
+                    .then(|| nearest(name, known.iter().map(String::as_str)))
+                    .flatten()
+                    .map(String::from),
+            })
+        })
+        .collect()
+}
+
+/// Whether an option is not read by the objects at set-up: one of PETSc as a whole, or one read later.
+fn is_late(name: &str, bodies: &[&str]) -> bool {
+    let bare = name.trim_start_matches('-');
+    match body_of(name, bodies) {
+        Some((_, own)) => LATE.contains(&own),
+        None => {
+            LATE.contains(&bare)
+                || bare
+                    .split('_')
+                    .next()
+                    .is_some_and(|first| GLOBAL.contains(&first))
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! A body whose state is all its dofs and whose G is a sparse matrix.
+
+use super::InnerSolver;
+use crate::ddm::{Body, BodyCounts, Energy, Solved};
+use crate::error::Result;
+use crate::fem::ElasticBody;
+use crate::linalg::{Csr, dot};
+
+/// A body with assembled K and f, its contact rows B, and a solver for G = K + B' diag(d) B.
+pub struct SparseBody<S> {
+    body: ElasticBody,
+    rows: Csr,
+    solver: S,
+    /// Robin weight of each row that G has now.
+    weight: Vec<f64>,
+    coupling: Coupling,
+    counts: BodyCounts,
+    product: Vec<f64>,
+}
+
+impl<S: InnerSolver> SparseBody<S> {
+    /// Joins a body, its contact rows (columns: its dofs, none of them prescribed) and a solver whose matrix is K on a
+    /// pattern that holds B'B.
+    pub fn new(body: ElasticBody, rows: Csr, solver: S) -> Self {
+        let coupling = Coupling::new(&body.stiffness, &rows);
+        let weight = vec![0.0; rows.rows()];
+        let product = vec![0.0; body.load.len()];
+        Self { body, rows, solver, weight, coupling, counts: BodyCounts::default(), product }
+    }
+
+    /// The inner solver.
+    pub fn solver(&self) -> &S {
+        &self.solver
+    }
+}
+
+/// Where B' diag(d) B goes in the values of G.
+struct Coupling {
+    /// Positions in the values that some row touches, sorted, each once.
+    touched: Vec<u32>,
+    /// (index into `touched`, row, b_i b_j).
+    terms: Vec<(u32, u32, f64)>,
+}
+
+impl Coupling {
+    fn new(pattern: &Csr, rows: &Csr) -> Self {
+        let mut places = Vec::new();
+        for q in 0..rows.rows() {
+            for (i, a) in rows.row(q) {
+                for (j, b) in rows.row(q) {
+                    match pattern.position(i, j) {
+                        Some(position) => places.push((position as u32, q as u32, a * b)),
+                        None => unreachable!("the pattern holds the couplings of every contact row"),
+                    }
+                }
+            }
+        }
+        places.sort_by_key(|place| (place.0, place.1));
+        let mut touched: Vec<u32> = Vec::new();
+        let terms = places
+            .into_iter()
+            .map(|(position, q, product)| {
+                if touched.last() != Some(&position) {
+                    touched.push(position);
+                }
+                (touched.len() as u32 - 1, q, product)
+            })
+            .collect();
+        Self { touched, terms }
+    }
+
+    /// Writes K + B' diag(d) B where it differs from K; the rest of G is K already.
+    fn write(&self, stiffness: &[f64], weight: &[f64], g: &mut [f64]) {
+        for &position in &self.touched {
+            g[position as usize] = stiffness[position as usize];
+        }
+        for &(slot, q, product) in &self.terms {
+            g[self.touched[slot as usize] as usize] += weight[q as usize] * product;
+        }
+    }
+}
+
+impl<S: InnerSolver> Body for SparseBody<S> {
+    fn len(&self) -> usize {
+        self.body.load.len()
+    }
+
+    fn rest(&self) -> Vec<f64> {
+        let mut u = vec![0.0; self.len()];
+        for &(dof, value) in &self.body.prescribed {
+            u[dof] = value;
+        }
+        u
+    }
+
+    fn trace(&self, u: &[f64], t: &mut [f64]) {
+        self.rows.multiply(u, t);
+    }
+
+    fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
+        self.body.stiffness.multiply(u, &mut self.product);
+        for i in 0..r.len() {
+            r[i] = self.body.load[i] - self.product[i];
+        }
+        let work = dot(&self.body.load, u);
+        let quadratic = dot(u, &self.product);
+        self.rows.add_transpose(-1.0, force, r);
+        Energy {
+            strain: quadratic + 2.0 * dot(&self.body.lifting, u) + self.body.strain_constant,
+            potential: 0.5 * quadratic - work + self.body.energy_constant,
+        }
+    }
+
+    fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
+        self.body.stiffness.multiply(u, y);
+    }
+
+    fn robin(&mut self, weight: &[f64]) -> Result<()> {
+        if weight == self.weight {
+            self.counts.robin_skipped += 1;
+            return Ok(());
+        }
+        self.weight.copy_from_slice(weight);
+        self.counts.robin_updates += 1;
+        let (coupling, stiffness) = (&self.coupling, &self.body.stiffness.values);
+        self.solver.update(&mut |g| coupling.write(stiffness, weight, g))
+    }
+
+    fn set_up(&mut self) -> Result<()> {
+        self.solver.set_up()
+    }
+
+    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+        self.counts.solves += 1;
+        let solved = self.solver.solve(r, z)?;
+        self.counts.inner_iterations += solved.iterations;
+        Ok(solved)
+    }
+
+    fn rounding(&self, u: &[f64], force: &[f64]) -> f64 {
+        let k = &self.body.stiffness;
+        let mut size: Vec<f64> = self.body.load.iter().map(|f| f.abs()).collect();
+        for (i, size) in size.iter_mut().enumerate() {
+            *size += k.row(i).map(|(j, a)| (a * u[j]).abs()).sum::<f64>();
+        }
+        for q in 0..self.rows.rows() {
+            for (i, b) in self.rows.row(q) {
+                size[i] += (b * force[q]).abs();
+            }
+        }
+        let diagonal = |i: usize| k.position(i, i).map_or(f64::INFINITY, |at| k.values[at]);
+        let sum: f64 = size.iter().enumerate().map(|(i, size)| size * size / diagonal(i)).sum();
+        sum * f64::EPSILON * f64::EPSILON
+    }
+
+    fn counts(&self) -> BodyCounts {
+        let (symbolic, factorizations) = self.solver.factorizations();
+        BodyCounts { symbolic, factorizations, ..self.counts }
+    }
+
+    fn recover(&self, u: &[f64]) -> Vec<f64> {
+        u.to_vec()
+    }
+
+    fn describe(&self) -> String {
+        self.solver.describe()
+    }
+}
