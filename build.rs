@@ -12,7 +12,6 @@ const FUNCTIONS: &[&str] = &[
     "KSPCreate",
     "KSPDestroy",
     "KSPGetConvergedReason",
-    "KSPGetDiagonalScale",
     "KSPGetInitialGuessNonzero",
     "KSPGetIterationNumber",
     "KSPGetPC",
@@ -45,7 +44,9 @@ const FUNCTIONS: &[&str] = &[
     "PCFactorGetMatSolverType",
     "PCFactorGetMatrix",
     "PCGetFailedReason",
+    "PCGetOperators",
     "PCGetType",
+    "PCReset",
     "PetscContainerCreate",
     "PetscContainerDestroy",
     "PetscContainerSetPointer",
@@ -55,6 +56,8 @@ const FUNCTIONS: &[&str] = &[
     "PetscGetVersionNumber",
     "PetscInitialize",
     "PetscObjectCompose",
+    "PetscObjectDereference",
+    "PetscObjectReference",
     "PetscOptionsClearValue",
     "PetscOptionsFindPair",
     "PetscOptionsGetAll",
@@ -89,17 +92,8 @@ fn main() {
 
     let petsc = find();
     for header in ["petscconf.h", "petscversion.h"] {
-        let Some(path) = petsc
-            .include_paths
-            .iter()
-            .map(|folder| folder.join(header))
-            .find(|path| path.exists())
-        else {
-            refuse(&format!(
-                "{header} of PETSc is missing from {:?}: {}",
-                petsc.include_paths,
-                requirements::ADVICE
-            ));
+        let Some(path) = petsc.include_paths.iter().map(|folder| folder.join(header)).find(|path| path.exists()) else {
+            refuse(&format!("{header} of PETSc is missing from {:?}: {}", petsc.include_paths, requirements::ADVICE));
         };
         println!("cargo:rerun-if-changed={}", path.display());
         let text = std::fs::read_to_string(&path)
@@ -113,11 +107,7 @@ fn main() {
         }
     }
     // A PETSc outside the system's folders is found again when the program runs.
-    for folder in petsc
-        .link_paths
-        .iter()
-        .filter(|folder| !folder.starts_with("/usr"))
-    {
+    for folder in petsc.link_paths.iter().filter(|folder| !folder.starts_with("/usr")) {
         println!("cargo:rustc-link-arg=-Wl,-rpath,{}", folder.display());
     }
     declare(&petsc.include_paths);
@@ -125,65 +115,41 @@ fn main() {
 
 /// PETSc by its pkg-config file: the one of PETSC_DIR and PETSC_ARCH where these are set, else the system's.
 fn find() -> pkg_config::Library {
-    if let Some(root) = env::var_os("PETSC_DIR")
-        .filter(|root| !root.is_empty())
-        .map(PathBuf::from)
-    {
+    if let Some(root) = env::var_os("PETSC_DIR").filter(|root| !root.is_empty()).map(PathBuf::from) {
         let build = root.join(env::var_os("PETSC_ARCH").unwrap_or_default());
         let folder = build.join("lib/pkgconfig");
         if !folder.exists() {
             refuse(&format!(
-                "PETSC_DIR and PETSC_ARCH point at {}, which has no lib/pkgconfig: correct or unset them, or {}",
-                build.display(),
-                requirements::ADVICE
+                "PETSC_DIR and PETSC_ARCH point at {}, which has no lib/pkgconfig: correct or unset them",
+                build.display()
             ));
         }
         let mut folders = vec![folder];
-        folders.extend(
-            env::var_os("PKG_CONFIG_PATH")
-                .iter()
-                .flat_map(env::split_paths),
-        );
-        let joined =
-            env::join_paths(folders).unwrap_or_else(|cause| refuse(&format!("PETSC_DIR: {cause}")));
+        folders.extend(env::var_os("PKG_CONFIG_PATH").iter().flat_map(env::split_paths));
+        let joined = env::join_paths(folders).unwrap_or_else(|cause| refuse(&format!("PETSC_DIR: {cause}")));
         // SAFETY: the build script has one thread.
         unsafe { env::set_var("PKG_CONFIG_PATH", joined) };
     }
     // Old releases install PETSc.pc only; newer ones both names.
-    let found =
-        ["PETSc", "petsc"].map(|name| pkg_config::Config::new().cargo_metadata(false).probe(name));
+    let found = ["PETSc", "petsc"].map(|name| pkg_config::Config::new().cargo_metadata(false).probe(name));
     let name = match found {
         [Ok(_), _] => "PETSc",
         [_, Ok(_)] => "petsc",
-        [Err(cause), _] => refuse(&format!(
-            "PETSc was not found: {}\n\n{cause}",
-            requirements::ADVICE
-        )),
+        [Err(cause), _] => refuse(&format!("{cause}\n\nPETSc was not found: {}", requirements::ADVICE)),
     };
-    pkg_config::probe_library(name)
-        .unwrap_or_else(|cause| refuse(&format!("PETSc was not found: {cause}")))
+    pkg_config::probe_library(name).unwrap_or_else(|cause| refuse(&format!("PETSc was not found: {cause}")))
 }
 
 /// Writes the declarations to `petsc.rs` in the build folder.
 fn declare(petsc: &[PathBuf]) {
     let mpi = ["mpi-c", "ompi-c", "mpi", "ompi", "mpich"]
         .iter()
-        .find_map(|name| {
-            pkg_config::Config::new()
-                .cargo_metadata(false)
-                .probe(name)
-                .ok()
-        })
+        .find_map(|name| pkg_config::Config::new().cargo_metadata(false).probe(name).ok())
         .map(|library| library.include_paths)
         .unwrap_or_default();
     let mut builder = bindgen::Builder::default()
         .header("src/petsc/wrapper.h")
-        .clang_args(
-            petsc
-                .iter()
-                .chain(&mpi)
-                .map(|folder| format!("-I{}", folder.display())),
-        )
+        .clang_args(petsc.iter().chain(&mpi).map(|folder| format!("-I{}", folder.display())))
         .rust_edition(bindgen::RustEdition::Edition2024)
         // One type for communicators in the whole crate: that of the `mpi` crate.
         .blocklist_type("(MPI_Comm|ompi_communicator_t)")
@@ -200,7 +166,5 @@ fn declare(petsc: &[PathBuf]) {
     });
     let folder = env::var_os("OUT_DIR").unwrap_or_default();
     let file = Path::new(&folder).join("petsc.rs");
-    bindings
-        .write_to_file(&file)
-        .unwrap_or_else(|cause| refuse(&format!("cannot write {}: {cause}", file.display())));
+    bindings.write_to_file(&file).unwrap_or_else(|cause| refuse(&format!("cannot write {}: {cause}", file.display())));
 }

@@ -112,8 +112,7 @@ pub fn discretize<const D: usize>(
             row_stiffness: Vec::new(),
             motions,
         };
-        let material =
-            Material::isotropic(part.spec.young.value, part.spec.poisson.value, D, scene.plane);
+        let material = Material::isotropic(part.spec.young.value, part.spec.poisson.value, D, scene.plane);
         if owner[index] == ranks.0 {
             let body = part.assemble(mesh, &rows, &material, prescribed)?;
             assemblies += 1;
@@ -121,14 +120,8 @@ pub fn discretize<const D: usize>(
             slot.scale = (0..body.load.len()).map(diagonal).fold(0.0, f64::max);
             slot.row_stiffness =
                 (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum()).collect();
-            slot.local = Some(make(Assembled {
-                name: slot.name.clone(),
-                index,
-                dimension: D,
-                body,
-                rows,
-                motions: free,
-            })?);
+            slot.local =
+                Some(make(Assembled { name: slot.name.clone(), index, dimension: D, body, rows, motions: free })?);
         }
         infos.push(BodyInfo {
             name: slot.name.clone(),
@@ -273,23 +266,27 @@ impl<'a, const D: usize> Part<'a, D> {
                         let pressure = field.eval(contact::pad(x));
                         n.map(|n| -pressure * n)
                     }
-                    LoadKind::Traction(fields) => {
-                        std::array::from_fn(|c| fields[c].eval(contact::pad(x)))
-                    }
+                    LoadKind::Traction(fields) => std::array::from_fn(|c| fields[c].eval(contact::pad(x))),
                 },
                 &mut load,
             );
             if load.iter().any(|f| !f.is_finite()) {
-                return Err(Error::scene(&spec.on.place, format!("body `{}`: this load is not finite everywhere on its surface", name.value))
-                    .help("mind roots of negative numbers and divisions by zero in the expression"));
+                return Err(Error::scene(
+                    &spec.on.place,
+                    format!("body `{}`: this load is not finite everywhere on its surface", name.value),
+                )
+                .help("mind roots of negative numbers and divisions by zero in the expression"));
             }
         }
         if let Some(fields) = &self.spec.force {
             let density = |x: [f64; D]| std::array::from_fn(|c| fields[c].eval(contact::pad(x)));
             assemble::body_force(&self.space, &density, &mut load);
             if load.iter().any(|f| !f.is_finite()) {
-                return Err(Error::scene(&name.place, format!("body `{}`: its body force is not finite everywhere", name.value))
-                    .help("mind roots of negative numbers and divisions by zero in the expression"));
+                return Err(Error::scene(
+                    &name.place,
+                    format!("body `{}`: its body force is not finite everywhere", name.value),
+                )
+                .help("mind roots of negative numbers and divisions by zero in the expression"));
             }
         }
         Ok(assemble::support(stiffness, load, prescribed))
@@ -313,8 +310,11 @@ fn make_pair<const D: usize>(
     let (body_b, b) = sides.remove(1);
     let (body_a, a) = sides.remove(0);
     if body_a == body_b {
-        return Err(Error::scene(&spec.between[1].place, format!("both surfaces belong to body `{}`", parts[body_a].spec.name.value))
-            .help("contact of a body with itself is out of scope; make two bodies of it"));
+        return Err(Error::scene(
+            &spec.between[1].place,
+            format!("both surfaces belong to body `{}`", parts[body_a].spec.name.value),
+        )
+        .help("contact of a body with itself is out of scope; make two bodies of it"));
     }
     // the finer side carries the points, whatever the order in the scene
     let (fine_a, fine_b) = (a.mean_measure(), b.mean_measure());
@@ -336,19 +336,18 @@ fn pair_on<const D: usize>(
     contact::assemble(&a, &b, bodies, &shared, &|x| spec.gap.eval(x), law).map_err(|fault| match fault {
         Fault::NoPartner => {
             let names = [&spec.between[0].value, &spec.between[1].value];
-            Error::scene(&spec.between[0].place, format!("`{}` and `{}` do not face each other anywhere", names[0], names[1]))
-                .help("a pair needs surfaces whose outer normals point at each other; look at the mesh with `gmsh`")
+            Error::scene(
+                &spec.between[0].place,
+                format!("`{}` and `{}` do not face each other anywhere", names[0], names[1]),
+            )
+            .help("a pair needs surfaces whose outer normals point at each other; look at the mesh with `gmsh`")
         }
         Fault::Gap(x) => placed(&spec.gap, format!("the gap is not finite at {}", point(x))),
     })
 }
 
 /// The body that a contact surface bounds, with the facets.
-fn owner_of<const D: usize>(
-    name: &Located<String>,
-    group: &Group,
-    parts: &[Part<D>],
-) -> Result<(usize, Facets<D>)> {
+fn owner_of<const D: usize>(name: &Located<String>, group: &Group, parts: &[Part<D>]) -> Result<(usize, Facets<D>)> {
     let mut found: Vec<(usize, Facets<D>)> = parts
         .iter()
         .enumerate()
@@ -413,11 +412,7 @@ fn left_by_all(motions: &[Motion]) -> Vec<String> {
         .collect()
 }
 
-fn field_maker<const D: usize>(
-    name: String,
-    space: Space<D>,
-    material: Material,
-) -> Box<dyn Fn(&[f64]) -> BodyField> {
+fn field_maker<const D: usize>(name: String, space: Space<D>, material: Material) -> Box<dyn Fn(&[f64]) -> BodyField> {
     Box::new(move |u| {
         let stress = stress::nodal(&space, &material, u);
         BodyField {
@@ -430,7 +425,10 @@ fn field_maker<const D: usize>(
                 (_, Order::P2) => CellKind::QuadraticTetra,
             },
             connectivity: space.cells.clone(),
-            displacement: u.chunks_exact(D).map(|u| std::array::from_fn(|c| u.get(c).copied().unwrap_or(0.0))).collect(),
+            displacement: u
+                .chunks_exact(D)
+                .map(|u| std::array::from_fn(|c| u.get(c).copied().unwrap_or(0.0)))
+                .collect(),
             von_mises: stress.iter().map(stress::von_mises).collect(),
             stress,
         }
@@ -456,8 +454,9 @@ fn find_group<'m, const D: usize>(
         (_, 0) => "point group",
         _ => "curve",
     };
-    let error = Error::scene(&name.place, format!("the mesh has no {} `{}` for this {what}", kind(dimensions[0]), name.value))
-        .because(format!("mesh {}", mesh.path.display()));
+    let error =
+        Error::scene(&name.place, format!("the mesh has no {} `{}` for this {what}", kind(dimensions[0]), name.value))
+            .because(format!("mesh {}", mesh.path.display()));
     if let Some(other) = mesh.groups.iter().find(|group| group.name == name.value) {
         return Err(error.help(format!("`{}` is a {} there", name.value, kind(other.dimension))));
     }
@@ -474,8 +473,8 @@ fn not_on_body(on: &Located<String>, body: &str) -> Error {
 
 /// A refusal that points at an expression of the scene.
 fn placed(field: &Field, message: String) -> Error {
-    let error = Error::new(Kind::Scene, message)
-        .help("mind roots of negative numbers and divisions by zero in the expression");
+    let error =
+        Error::new(Kind::Scene, message).help("mind roots of negative numbers and divisions by zero in the expression");
     match field.place() {
         Some(place) => error.at(place),
         None => error,

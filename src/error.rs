@@ -207,9 +207,7 @@ impl Error {
                 annotation = annotation.label(inner.label.as_str());
             }
             group = group.element(
-                Snippet::source(place.source.text.as_str())
-                    .path(place.source.name.as_str())
-                    .annotation(annotation),
+                Snippet::source(place.source.text.as_str()).path(place.source.name.as_str()).annotation(annotation),
             );
         }
         for cause in &inner.causes {

@@ -56,11 +56,7 @@ impl Csr {
         debug_assert_eq!(x.len(), self.columns);
         for (i, y) in y.iter_mut().enumerate() {
             let range = self.range(i);
-            *y = self.col[range.clone()]
-                .iter()
-                .zip(&self.values[range])
-                .map(|(&j, a)| a * x[j as usize])
-                .sum();
+            *y = self.col[range.clone()].iter().zip(&self.values[range]).map(|(&j, a)| a * x[j as usize]).sum();
         }
     }
 
@@ -99,6 +95,9 @@ pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
 /// Basis of the kernel of a small symmetric positive semidefinite matrix: eigenvectors of eigenvalues at most
 /// `tolerance * scale`. The basis is reduced so that pure motions come out pure where the kernel allows it.
 pub fn kernel(gram: &DMatrix<f64>, scale: f64, tolerance: f64) -> Vec<DVector<f64>> {
+    if gram.is_empty() {
+        return Vec::new();
+    }
     let eigen = SymmetricEigen::new(gram.clone());
     let mut basis: Vec<DVector<f64>> = (0..gram.nrows())
         .filter(|&i| eigen.eigenvalues[i] <= tolerance * scale)

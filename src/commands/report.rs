@@ -145,8 +145,7 @@ fn sides(prepared: &Prepared, i: usize) -> [usize; 2] {
 fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) -> PairReport {
     let model = &prepared.problem.model;
     let (pair, layer, range) = (&model.pairs[i], &outcome.layer, model.range(i));
-    let (c, p, force) =
-        (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
+    let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
     let length = |closed: bool| (0..pair.len()).filter(|&q| (c[q] > 0.0) == closed).map(|q| pair.weight[q]).sum();
     let on_side = |side: usize| -> [f64; 3] {
         std::array::from_fn(|k| -(0..pair.len()).map(|q| force[q] * pair.resultant[side][q][k]).sum::<f64>())
@@ -175,9 +174,7 @@ fn ends(pair: &ContactPair, c: &[f64]) -> Vec<[f64; 3]> {
     for q in 1..pair.len() {
         if (c[q - 1] > 0.0) != (c[q] > 0.0) {
             let s = c[q - 1] / (c[q - 1] - c[q]);
-            ends.push(std::array::from_fn(|k| {
-                pair.position[q - 1][k] * (1.0 - s) + pair.position[q][k] * s
-            }));
+            ends.push(std::array::from_fn(|k| pair.position[q - 1][k] * (1.0 - s) + pair.position[q][k] * s));
         }
     }
     ends

@@ -80,8 +80,7 @@ pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Pr
     let mut make = |assembled: Assembled| solver(session, assembled);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
-    let problem =
-        agree(session, discretize::discretize::<2>(scene, &mesh, pieces::plane, ranks, exchange, &mut make))?;
+    let problem = agree(session, discretize::discretize::<2>(scene, &mesh, pieces::plane, ranks, exchange, &mut make))?;
     clock.phase("discretize");
     let warnings = warnings(session, scene, &problem);
     Ok(Prepared { problem, choice: describe(chosen, choice), warnings })
@@ -104,8 +103,9 @@ fn refuse(scene: &Scene) -> Result<()> {
         }
     }
     if scene.dimension.value != 2 {
-        return Err(Error::scene(&scene.dimension.place, "this version solves plane problems only")
-            .help("set dimension = 2"));
+        return Err(
+            Error::scene(&scene.dimension.place, "this version solves plane problems only").help("set dimension = 2")
+        );
     }
     Ok(())
 }
@@ -157,7 +157,11 @@ fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> 
         );
     }
     if session.size() > problem.bodies.len() {
-        warnings.push(format!("{} of {} ranks have no body to solve", session.size() - problem.bodies.len(), session.size()));
+        warnings.push(format!(
+            "{} of {} ranks have no body to solve",
+            session.size() - problem.bodies.len(),
+            session.size()
+        ));
     }
     for (pair, spec) in problem.model.pairs.iter().zip(&scene.contacts) {
         let (without, all) = pair.uncovered;
@@ -167,7 +171,10 @@ fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> 
         }
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         if overlap < 0.0 {
-            warnings.push(format!("{} - {}: the bodies overlap by {:.3e} before loading; the layer takes it as compression", pair.surfaces[0], pair.surfaces[1], -overlap));
+            warnings.push(format!(
+                "{} - {}: the bodies overlap by {:.3e} before loading; the layer takes it as compression",
+                pair.surfaces[0], pair.surfaces[1], -overlap
+            ));
         }
     }
     warnings
@@ -192,9 +199,9 @@ pub fn set_up(session: &Session, prepared: &mut Prepared, clock: &mut Clock) -> 
     let mut unknown = None;
     for option in unread {
         match option.kind {
-            options::UnreadKind::NotInUse => prepared
-                .warnings
-                .push(format!("option {} was not used: no solver of this run reads it", option.name)),
+            options::UnreadKind::NotInUse => {
+                prepared.warnings.push(format!("option {} was not used: no solver of this run reads it", option.name))
+            }
             options::UnreadKind::Unknown => {
                 let error = Error::new(Kind::Solver, format!("PETSc knows no option {}", option.name));
                 unknown.get_or_insert(match option.nearest {
@@ -213,12 +220,7 @@ pub fn set_up(session: &Session, prepared: &mut Prepared, clock: &mut Clock) -> 
 ///
 /// # Errors
 /// Failures of PETSc; not converging is a status of the outcome.
-pub fn iterate(
-    scene: &Scene,
-    model: &mut Model,
-    observer: &mut dyn Observer,
-    clock: &mut Clock,
-) -> Result<Outcome> {
+pub fn iterate(scene: &Scene, model: &mut Model, observer: &mut dyn Observer, clock: &mut Clock) -> Result<Outcome> {
     let stop = &scene.method.stop;
     let mut settings = Settings {
         zone: discretize::robin_zone(scene),

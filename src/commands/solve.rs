@@ -54,7 +54,12 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
         if request.json {
             print!("{json}");
         } else {
-            println!("{}\n  inner solver: {}\n  results in {}", report.summary(), prepared.choice, folder.path().display());
+            println!(
+                "{}\n  inner solver: {}\n  results in {}",
+                report.summary(),
+                prepared.choice,
+                folder.path().display()
+            );
         }
     }
     written?;

@@ -62,11 +62,20 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
         }
         row(&mut table, &folder, line(values, &report))?;
         if !request.json {
-            println!("{label}: {}, {} iterations, residual {}", report.status, report.iterations, sci(report.residual.unwrap_or(f64::NAN), 2));
+            println!(
+                "{label}: {}, {} iterations, residual {}",
+                report.status,
+                report.iterations,
+                sci(report.residual.unwrap_or(f64::NAN), 2)
+            );
         }
         histories.push(report::convergence(&label, &outcome));
         for i in 0..prepared.problem.model.pairs.len() {
-            pressures.push((i, report::main_axis(&prepared.problem.model.pairs[i]).1, report::pressure(&label, &prepared, &outcome, i)));
+            pressures.push((
+                i,
+                report::main_axis(&prepared.problem.model.pairs[i]).1,
+                report::pressure(&label, &prepared, &outcome, i),
+            ));
             if let Some(curve) = report::reference(scene, &prepared.problem.model, i) {
                 reference.get_or_insert((i, curve));
             }
@@ -136,7 +145,18 @@ fn label(axes: &[(String, Vec<String>)], values: &[String]) -> String {
 
 fn header(axes: &[(String, Vec<String>)], report: &Report) -> Vec<String> {
     let mut header: Vec<String> = axes.iter().map(|(key, _)| key.clone()).collect();
-    let columns = ["status", "iterations", "sweeps", "factorizations", "inner_iterations", "residual", "increment", "F1", "dofs", "seconds"];
+    let columns = [
+        "status",
+        "iterations",
+        "sweeps",
+        "factorizations",
+        "inner_iterations",
+        "residual",
+        "increment",
+        "F1",
+        "dofs",
+        "seconds",
+    ];
     header.extend(columns.map(str::to_owned));
     for pair in &report.pairs {
         let name = format!("{}-{}", pair.bodies[0], pair.bodies[1]);

@@ -117,9 +117,7 @@ pub fn assemble<const D: usize>(
         let normal = a.normals[&node];
         let mut position = [0.0; D];
         let mut distance = 0.0;
-        for (side, sign, space, prescribed) in
-            [(0, 1.0, a.space, a.prescribed), (1, -1.0, b.space, b.prescribed)]
-        {
+        for (side, sign, space, prescribed) in [(0, 1.0, a.space, a.prescribed), (1, -1.0, b.space, b.prescribed)] {
             let mut entries = Vec::new();
             let mut resultant = [0.0; D];
             let mut known = 0.0;

@@ -187,9 +187,8 @@ struct Piece {
 
 impl Piece {
     fn between(a: &Curve, b: Curve, index: usize) -> Option<Self> {
-        let facing: f64 = (0..2)
-            .map(|c| (a.normals[0][c] + a.normals[1][c]) * (b.normals[0][c] + b.normals[1][c]))
-            .sum();
+        let facing: f64 =
+            (0..2).map(|c| (a.normals[0][c] + a.normals[1][c]) * (b.normals[0][c] + b.normals[1][c])).sum();
         if facing >= 0.0 {
             return None;
         }

@@ -21,12 +21,7 @@ pub struct Side<'a, const D: usize> {
 
 impl<'a, const D: usize> Side<'a, D> {
     /// The side with its nodal normals.
-    pub fn new(
-        name: &'a str,
-        space: &'a Space<D>,
-        facets: Facets<D>,
-        prescribed: &'a HashMap<usize, f64>,
-    ) -> Self {
+    pub fn new(name: &'a str, space: &'a Space<D>, facets: Facets<D>, prescribed: &'a HashMap<usize, f64>) -> Self {
         let mut normals: HashMap<u32, [f64; D]> = HashMap::new();
         let places = element::nodes::<D>(facets.order);
         for i in 0..facets.count() {

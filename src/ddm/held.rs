@@ -28,9 +28,7 @@ fn free_motion(slot: &BodySlot, weight: &[f64]) -> Option<String> {
     let free = kernel(&springs, slot.scale, SAFE);
     let motion = free.first()?;
     let largest = motion.amax();
-    let parts: Vec<&str> = (0..count)
-        .filter(|&i| motion[i].abs() > 1e-6 * largest)
-        .map(|i| slot.motions[i].name.as_str())
-        .collect();
+    let parts: Vec<&str> =
+        (0..count).filter(|&i| motion[i].abs() > 1e-6 * largest).map(|i| slot.motions[i].name.as_str()).collect();
     Some(parts.join(" with "))
 }

@@ -34,13 +34,29 @@ pub enum Status {
     /// The limit of iterations was reached.
     IterationLimit,
     /// A number that is not finite came up in a body.
-    NotFinite { body: usize },
+    NotFinite {
+        /// The first such body.
+        body: usize,
+    },
     /// The iterates repeat.
-    Cycle { period: usize },
+    Cycle {
+        /// Updates after which they come back.
+        period: usize,
+    },
     /// Neither supports nor the Robin term hold a body.
-    Unheld { body: usize, motion: String },
+    Unheld {
+        /// The body.
+        body: usize,
+        /// Name of its free rigid motion.
+        motion: String,
+    },
     /// A body's inner solver failed.
-    InnerSolver { body: usize, reason: String },
+    InnerSolver {
+        /// The body.
+        body: usize,
+        /// The solver's own words; empty if another rank has them.
+        reason: String,
+    },
 }
 
 /// Result of a run: the last iterate that made sense, and how it came about.
@@ -137,8 +153,7 @@ impl Watch {
             .map(|body| match step {
                 None => f64::NAN,
                 Some((last, gamma)) => {
-                    let step: Vec<f64> =
-                        model.of_body(body, &last.trace).iter().map(|t| gamma * t).collect();
+                    let step: Vec<f64> = model.of_body(body, &last.trace).iter().map(|t| gamma * t).collect();
                     relative_increment(&step, &model.of_body(body, &iterate.trace))
                 }
             })

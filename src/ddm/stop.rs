@@ -89,12 +89,10 @@ impl Cycle {
     /// The period, if `trace` equals one seen 2 to 8 updates ago while the last update moved it.
     pub fn period(&mut self, trace: &[f64]) -> Option<usize> {
         let size = crate::linalg::dot(trace, trace).sqrt();
-        let apart = |other: &[f64]| {
-            trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt() / size
-        };
+        let apart = |other: &[f64]| trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt() / size;
         let moved = self.recent.back().is_some_and(|last| apart(last) > 1e-7);
-        let found = (2..=self.recent.len())
-            .find(|&period| moved && apart(&self.recent[self.recent.len() - period]) < 1e-12);
+        let found =
+            (2..=self.recent.len()).find(|&period| moved && apart(&self.recent[self.recent.len() - period]) < 1e-12);
         if self.recent.len() == Self::LONGEST {
             self.recent.pop_front();
         }

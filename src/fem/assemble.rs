@@ -3,10 +3,10 @@
 //! The pattern is built once from the node graph (cells, and couplings through contact rows); entry positions
 //! follow from the graph by arithmetic, so that assembly writes each value straight to its place.
 
+use super::element;
 use super::material::Material;
 use super::quadrature;
 use super::space::{Facets, Space, area_vector};
-use super::element;
 use crate::linalg::Csr;
 use crate::scene::Order;
 
@@ -124,11 +124,7 @@ pub enum Defect {
 ///
 /// # Errors
 /// [`Defect::Inverted`] names a cell whose map is not invertible at an integration point.
-pub fn stiffness<const D: usize>(
-    space: &Space<D>,
-    graph: &NodeGraph,
-    material: &Material,
-) -> Result<Csr, Defect> {
+pub fn stiffness<const D: usize>(space: &Space<D>, graph: &NodeGraph, material: &Material) -> Result<Csr, Defect> {
     match D {
         2 => stiffness_on::<D, 3>(space, graph, material),
         _ => stiffness_on::<D, 4>(space, graph, material),
@@ -153,8 +149,7 @@ fn stiffness_on<const D: usize, const N: usize>(
         let rule = if is_affine::<D>(&x) { &affine } else { &curved };
         local.fill([[0.0; D]; D]);
         for (l, weight) in rule.points.iter().zip(&rule.weights) {
-            let (gradient, measure) =
-                element::gradients::<D, N>(space.order, &x, l).ok_or(Defect::Inverted(index))?;
+            let (gradient, measure) = element::gradients::<D, N>(space.order, &x, l).ok_or(Defect::Inverted(index))?;
             let weight = weight * measure;
             for a in 0..stride {
                 for b in a..stride {
@@ -201,11 +196,7 @@ fn is_affine<const D: usize>(x: &[[f64; D]]) -> bool {
 }
 
 /// Adds a body force density (per volume) to `load`.
-pub fn body_force<const D: usize>(
-    space: &Space<D>,
-    density: &dyn Fn([f64; D]) -> [f64; D],
-    load: &mut [f64],
-) {
+pub fn body_force<const D: usize>(space: &Space<D>, density: &dyn Fn([f64; D]) -> [f64; D], load: &mut [f64]) {
     match D {
         2 => body_force_on::<D, 3>(space, density, load),
         _ => body_force_on::<D, 4>(space, density, load),

@@ -110,8 +110,7 @@ pub fn gradients<const D: usize, const N: usize>(
     let mut gradient = [[0.0; D]; MOST];
     for node in 0..x.len() {
         for i in 0..D {
-            gradient[node][i] =
-                (0..D).map(|c| inverse[c][i] * (d[node][c + 1] - d[node][0])).sum();
+            gradient[node][i] = (0..D).map(|c| inverse[c][i] * (d[node][c + 1] - d[node][0])).sum();
         }
     }
     let measure = det / if D == 2 { 2.0 } else { 6.0 };

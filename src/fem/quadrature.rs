@@ -1,6 +1,5 @@
 //! Quadrature on reference simplices, in barycentric coordinates.
 
-
 /// A quadrature rule on the simplex with `N` vertices: barycentric points and weights that sum to one
 /// (multiply by length, area or volume).
 #[derive(Debug, Clone)]
@@ -17,10 +16,7 @@ pub fn gauss(count: usize) -> Vec<(f64, f64)> {
         1 => &[(0.0, 2.0)],
         2 => &[(0.577_350_269_189_625_8, 1.0)],
         3 => &[(0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)],
-        4 => &[
-            (0.339_981_043_584_856_3, 0.652_145_154_862_546_1),
-            (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
-        ],
+        4 => &[(0.339_981_043_584_856_3, 0.652_145_154_862_546_1), (0.861_136_311_594_052_6, 0.347_854_845_137_453_85)],
         _ => &[
             (0.0, 128.0 / 225.0),
             (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),

@@ -17,10 +17,8 @@ pub struct RigidMotion {
 pub fn modes<const D: usize>(nodes: &[[f64; D]]) -> Vec<RigidMotion> {
     let n = nodes.len().max(1) as f64;
     let centre: [f64; D] = std::array::from_fn(|i| nodes.iter().map(|x| x[i]).sum::<f64>() / n);
-    let size = nodes
-        .iter()
-        .flat_map(|x| (0..D).map(move |i| (x[i] - centre[i]).abs()))
-        .fold(f64::MIN_POSITIVE, f64::max);
+    let size =
+        nodes.iter().flat_map(|x| (0..D).map(move |i| (x[i] - centre[i]).abs())).fold(f64::MIN_POSITIVE, f64::max);
     let mut all = Vec::new();
     for c in 0..D {
         let mut displacement = vec![0.0; D * nodes.len()];
@@ -45,9 +43,7 @@ pub fn modes<const D: usize>(nodes: &[[f64; D]]) -> Vec<RigidMotion> {
 
 /// The rigid motions that vanish on the prescribed dofs: a basis of what the supports leave free.
 pub fn left_by_supports(motions: &[RigidMotion], prescribed: &[(usize, f64)]) -> Vec<RigidMotion> {
-    let rows = DMatrix::from_fn(prescribed.len(), motions.len(), |i, j| {
-        motions[j].displacement[prescribed[i].0]
-    });
+    let rows = DMatrix::from_fn(prescribed.len(), motions.len(), |i, j| motions[j].displacement[prescribed[i].0]);
     kernel(&(rows.transpose() * &rows), prescribed.len().max(1) as f64, 1e-13)
         .into_iter()
         .map(|weights| combine(motions, &weights))

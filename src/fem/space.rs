@@ -89,10 +89,7 @@ impl<const D: usize> Space<D> {
 
     /// Coordinates of the nodes of cell `i`.
     pub fn cell_nodes(&self, i: usize) -> Vec<[f64; D]> {
-        self.cells[i * self.stride..(i + 1) * self.stride]
-            .iter()
-            .map(|&node| self.nodes[node as usize])
-            .collect()
+        self.cells[i * self.stride..(i + 1) * self.stride].iter().map(|&node| self.nodes[node as usize]).collect()
     }
 
     /// The body's node numbers of one simplex of a mesh group (vertices, then mid-edges for a quadratic
@@ -206,9 +203,8 @@ impl<const D: usize> Facets<D> {
 /// point `l`: integrate with weights that sum to one.
 pub fn area_vector<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64; D]) -> [f64; D] {
     let d = element::derivatives(order, l);
-    let tangent = |c: usize| -> [f64; D] {
-        std::array::from_fn(|i| (0..x.len()).map(|n| (d[n][c] - d[n][0]) * x[n][i]).sum())
-    };
+    let tangent =
+        |c: usize| -> [f64; D] { std::array::from_fn(|i| (0..x.len()).map(|n| (d[n][c] - d[n][0]) * x[n][i]).sum()) };
     let mut vector = [0.0; D];
     let t = tangent(1);
     if D == 2 {

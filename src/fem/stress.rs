@@ -14,11 +14,7 @@ pub fn nodal<const D: usize>(space: &Space<D>, material: &Material, u: &[f64]) -
     }
 }
 
-fn nodal_on<const D: usize, const N: usize>(
-    space: &Space<D>,
-    material: &Material,
-    u: &[f64],
-) -> Vec<[f64; 6]> {
+fn nodal_on<const D: usize, const N: usize>(space: &Space<D>, material: &Material, u: &[f64]) -> Vec<[f64; 6]> {
     let mut sum = vec![[0.0; 6]; space.nodes.len()];
     let mut volume = vec![0.0; space.nodes.len()];
     let places = element::nodes::<N>(space.order);

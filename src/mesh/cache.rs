@@ -25,13 +25,7 @@ impl Key {
     /// Name of the file in the cache, beginning with a word that people recognise.
     pub fn file_name(self, stem: &str) -> String {
         // 128 bits are plenty.
-        let digest: String = self
-            .0
-            .finalize()
-            .iter()
-            .take(16)
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
+        let digest: String = self.0.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect();
         format!("{stem}-{digest}.msh")
     }
 }
@@ -39,11 +33,7 @@ impl Key {
 /// Folders that may hold the cache, best first: $WINKLER_CACHE alone, or else $XDG_CACHE_HOME/winkler,
 /// ~/.cache/winkler and a folder for temporary files.
 pub fn folders() -> Vec<PathBuf> {
-    choose(|name| {
-        std::env::var_os(name)
-            .filter(|value| !value.is_empty())
-            .map(PathBuf::from)
-    })
+    choose(|name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from))
 }
 
 fn choose(variable: impl Fn(&str) -> Option<PathBuf>) -> Vec<PathBuf> {
@@ -74,34 +64,20 @@ impl Workshop {
     /// No folder can be written.
     pub fn open(folders: &[PathBuf]) -> Result<Workshop> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
-        let name = format!(
-            "tmp-{}-{}",
-            std::process::id(),
-            COUNT.fetch_add(1, Ordering::Relaxed)
-        );
+        let name = format!("tmp-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let mut failure = None;
         for cache in folders {
             let folder = cache.join(&name);
             match std::fs::create_dir_all(&folder) {
                 Ok(()) => {
-                    return Ok(Workshop {
-                        cache: cache.clone(),
-                        folder,
-                    });
+                    return Ok(Workshop { cache: cache.clone(), folder });
                 }
-                Err(cause) => {
-                    failure = Some(failure.unwrap_or(Error::file(&folder, "create", &cause)))
-                }
+                Err(cause) => failure = Some(failure.unwrap_or(Error::file(&folder, "create", &cause))),
             }
         }
-        let error = failure.unwrap_or_else(|| {
-            Error::new(
-                crate::error::Kind::File,
-                "there is no folder for the mesh cache",
-            )
-        });
-        Err(error
-            .help("meshes are kept there: name a folder that can be written in $WINKLER_CACHE"))
+        let error =
+            failure.unwrap_or_else(|| Error::new(crate::error::Kind::File, "there is no folder for the mesh cache"));
+        Err(error.help("meshes are kept there: name a folder that can be written in $WINKLER_CACHE"))
     }
 
     /// The folder to work in.
@@ -148,13 +124,7 @@ mod tests {
         let all = |name: &str| Some(PathBuf::from(format!("/{name}")));
         assert_eq!(choose(all), [PathBuf::from("/WINKLER_CACHE")]);
         let some = choose(|name| all(name).filter(|_| name != "WINKLER_CACHE"));
-        assert_eq!(
-            some[..2],
-            [
-                PathBuf::from("/XDG_CACHE_HOME/winkler"),
-                PathBuf::from("/HOME/.cache/winkler")
-            ]
-        );
+        assert_eq!(some[..2], [PathBuf::from("/XDG_CACHE_HOME/winkler"), PathBuf::from("/HOME/.cache/winkler")]);
         assert_eq!(choose(|_| None).len(), 1);
     }
 
@@ -167,10 +137,7 @@ mod tests {
         let workshop = Workshop::open(&[blocked.clone(), good.clone()]).unwrap();
         let file = workshop.path().join("a");
         std::fs::write(&file, "a").unwrap();
-        assert_eq!(
-            workshop.publish(&file, "b.msh").unwrap(),
-            good.join("b.msh")
-        );
+        assert_eq!(workshop.publish(&file, "b.msh").unwrap(), good.join("b.msh"));
         drop(workshop);
         assert_eq!(std::fs::read_dir(&good).unwrap().count(), 1);
         let error = Workshop::open(&[blocked]).err().unwrap().to_string();

@@ -22,14 +22,7 @@ pub struct Cursor<'a> {
 impl<'a> Cursor<'a> {
     /// A cursor at the start of a file.
     pub fn new(path: &'a Path, bytes: &'a [u8], made: bool) -> Self {
-        Cursor {
-            path,
-            bytes,
-            at: 0,
-            binary: false,
-            section: String::new(),
-            made,
-        }
+        Cursor { path, bytes, at: 0, binary: false, section: String::new(), made }
     }
 
     /// Where the next number starts.
@@ -44,16 +37,8 @@ impl<'a> Cursor<'a> {
             return Error::mesh(self.path, None, message);
         }
         if self.binary {
-            let section = if self.section.is_empty() {
-                String::new()
-            } else {
-                format!(" in ${}", self.section)
-            };
-            return Error::mesh(
-                self.path,
-                None,
-                format!("{message}{section}, at byte {position}"),
-            );
+            let section = if self.section.is_empty() { String::new() } else { format!(" in ${}", self.section) };
+            return Error::mesh(self.path, None, format!("{message}{section}, at byte {position}"));
         }
         let before = &self.bytes[..position.min(self.bytes.len())];
         let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
@@ -66,13 +51,8 @@ impl<'a> Cursor<'a> {
     }
 
     fn ends_early(&self) -> Error {
-        let section = if self.section.is_empty() {
-            "its header"
-        } else {
-            self.section.as_str()
-        };
-        self.error(format!("the file ends within {section}"))
-            .help("it was cut short: save the mesh again with Gmsh")
+        let section = if self.section.is_empty() { "its header" } else { self.section.as_str() };
+        self.error(format!("the file ends within {section}")).help("it was cut short: save the mesh again with Gmsh")
     }
 
     /// Skips white space, lines too; tells whether the file ends there.
@@ -94,8 +74,7 @@ impl<'a> Cursor<'a> {
             None if rest.len() < LONGEST => rest.len(),
             None => return Err(self.error("this line is too long to be one of a mesh file")),
         };
-        let line = std::str::from_utf8(&rest[..end])
-            .map_err(|_| self.error("this line is not text in UTF-8"))?;
+        let line = std::str::from_utf8(&rest[..end]).map_err(|_| self.error("this line is not text in UTF-8"))?;
         self.at = self.bytes.len().min(self.at + end + 1);
         Ok(line.trim())
     }
@@ -109,15 +88,10 @@ impl<'a> Cursor<'a> {
     /// Leaves the section, over its closing line.
     pub fn leave(&mut self) -> Result<()> {
         let start = self.at;
-        let ok = !self.at_end()
-            && self
-                .line()
-                .is_ok_and(|line| line.strip_prefix("$End") == Some(&*self.section));
+        let ok = !self.at_end() && self.line().is_ok_and(|line| line.strip_prefix("$End") == Some(&*self.section));
         if !ok {
             let message = format!("`$End{}` should stand here", self.section);
-            return Err(self
-                .error_at(start, message)
-                .help("the file is damaged: save the mesh again with Gmsh"));
+            return Err(self.error_at(start, message).help("the file is damaged: save the mesh again with Gmsh"));
         }
         self.section.clear();
         Ok(())
@@ -135,9 +109,7 @@ impl<'a> Cursor<'a> {
             }
             from += 1;
         }
-        Err(self
-            .error(format!("`{end}` is missing"))
-            .help("the file was cut short: save the mesh again with Gmsh"))
+        Err(self.error(format!("`{end}` is missing")).help("the file was cut short: save the mesh again with Gmsh"))
     }
 
     /// Goes to the start of a record: in text, over blank lines.
@@ -182,18 +154,14 @@ impl<'a> Cursor<'a> {
     fn word(&mut self) -> Result<&'a str> {
         self.skip_blanks();
         let rest = &self.bytes[self.at..];
-        let length = rest
-            .iter()
-            .position(u8::is_ascii_whitespace)
-            .unwrap_or(rest.len());
+        let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
         if rest.is_empty() {
             return Err(self.ends_early());
         }
         if length == 0 {
             return Err(self.error("this line has too few entries"));
         }
-        let word = std::str::from_utf8(&rest[..length])
-            .map_err(|_| self.error("a number should stand here"))?;
+        let word = std::str::from_utf8(&rest[..length]).map_err(|_| self.error("a number should stand here"))?;
         self.at += length;
         Ok(word)
     }
@@ -208,30 +176,18 @@ impl<'a> Cursor<'a> {
 
     /// The next `int`.
     pub fn int(&mut self) -> Result<i32> {
-        if self.binary {
-            self.take().map(i32::from_le_bytes)
-        } else {
-            self.number("a whole number")
-        }
+        if self.binary { self.take().map(i32::from_le_bytes) } else { self.number("a whole number") }
     }
 
     /// The next `size_t`: a count or a tag.
     pub fn size(&mut self) -> Result<u64> {
-        if self.binary {
-            self.take().map(u64::from_le_bytes)
-        } else {
-            self.number("a whole number, not negative")
-        }
+        if self.binary { self.take().map(u64::from_le_bytes) } else { self.number("a whole number, not negative") }
     }
 
     /// The next `double`, finite.
     pub fn real(&mut self) -> Result<f64> {
         let start = self.at;
-        let value: f64 = if self.binary {
-            self.take().map(f64::from_le_bytes)?
-        } else {
-            self.number("a number")?
-        };
+        let value: f64 = if self.binary { self.take().map(f64::from_le_bytes)? } else { self.number("a number")? };
         if value.is_finite() {
             return Ok(value);
         }
@@ -240,11 +196,7 @@ impl<'a> Cursor<'a> {
 
     /// Skips a `double` that need not be finite: the box around an entity without nodes is not.
     pub fn bound(&mut self) -> Result<()> {
-        if self.binary {
-            self.take::<8>().map(|_| ())
-        } else {
-            self.number::<f64>("a number").map(|_| ())
-        }
+        if self.binary { self.take::<8>().map(|_| ()) } else { self.number::<f64>("a number").map(|_| ()) }
     }
 
     /// The next `size_t` as the count of things that take at least so many `numbers` in text, `bytes` in binary: what
@@ -258,10 +210,7 @@ impl<'a> Cursor<'a> {
         match usize::try_from(count) {
             Ok(count) if count <= most => Ok(count),
             _ => Err(self
-                .error_at(
-                    start,
-                    format!("the file is too short for a count of {count}"),
-                )
+                .error_at(start, format!("the file is too short for a count of {count}"))
                 .help("it was cut short or damaged: save the mesh again with Gmsh")),
         }
     }
@@ -269,19 +218,14 @@ impl<'a> Cursor<'a> {
     /// Skips records that nobody needs: lines of a text file, `bytes` each in a binary one.
     pub fn skip_records(&mut self, count: usize, bytes: usize) -> Result<()> {
         if self.binary {
-            let length = count
-                .checked_mul(bytes)
-                .filter(|length| *length <= self.bytes.len() - self.at);
+            let length = count.checked_mul(bytes).filter(|length| *length <= self.bytes.len() - self.at);
             self.at += length.ok_or_else(|| self.ends_early())?;
             return Ok(());
         }
         for _ in 0..count {
             self.begin();
             let rest = &self.bytes[self.at..];
-            let line = rest
-                .iter()
-                .position(|byte| *byte == b'\n')
-                .ok_or_else(|| self.ends_early())?;
+            let line = rest.iter().position(|byte| *byte == b'\n').ok_or_else(|| self.ends_early())?;
             self.at += line + 1;
         }
         Ok(())

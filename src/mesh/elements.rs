@@ -12,11 +12,7 @@ use crate::scene::Order;
 /// # Errors
 /// Malformed text, elements in a group that are no simplices of order 1 or 2 or mix both, nodes that do not exist,
 /// degenerate simplices, nodes off the plane if `D` is 2.
-pub fn read<const D: usize>(
-    cursor: &mut Cursor,
-    nodes: &Nodes,
-    physical: &mut Physical,
-) -> Result<Option<Order>> {
+pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut Physical) -> Result<Option<Order>> {
     cursor.begin();
     let start = cursor.position();
     let blocks = cursor.count(4, 20)?;
@@ -30,21 +26,12 @@ pub fn read<const D: usize>(
         cursor.begin();
         let head = cursor.position();
         let (dimension, tag, number) = (cursor.int()?, cursor.int()?, cursor.int()?);
-        let Some(dimension) = usize::try_from(dimension)
-            .ok()
-            .filter(|dimension| *dimension <= 3)
-        else {
-            return Err(cursor.error_at(
-                head,
-                format!("a block of elements of dimension {dimension}"),
-            ));
+        let Some(dimension) = usize::try_from(dimension).ok().filter(|dimension| *dimension <= 3) else {
+            return Err(cursor.error_at(head, format!("a block of elements of dimension {dimension}")));
         };
         let Some((shape, stride)) = simplex::type_name(number) else {
             return Err(cursor
-                .error_at(
-                    head,
-                    format!("elements of Gmsh's type {number} cannot be used"),
-                )
+                .error_at(head, format!("elements of Gmsh's type {number} cannot be used"))
                 .help(SIMPLICES));
         };
         let count = cursor.count(1 + stride, 8 * (1 + stride))?;
@@ -53,9 +40,7 @@ pub fn read<const D: usize>(
         let Some(members) = physical.members(dimension, tag) else {
             let thing = THINGS[dimension].to_lowercase();
             let message = format!("elements of {thing} {tag}, which $Entities does not list");
-            return Err(cursor
-                .error_at(head, message)
-                .help("save the mesh again with Gmsh"));
+            return Err(cursor.error_at(head, message).help("save the mesh again with Gmsh"));
         };
         let Some(first) = members.first() else {
             cursor.skip_records(count, 8 * (1 + stride))?;
@@ -63,19 +48,12 @@ pub fn read<const D: usize>(
         };
         let name = &physical.groups[*first].name;
         let Some(kind) = Kind::of_type(number).filter(|kind| kind.dimension == dimension) else {
-            let message = format!(
-                "group `{name}` has {shape} elements of {stride} nodes (Gmsh's type {number})"
-            );
+            let message = format!("group `{name}` has {shape} elements of {stride} nodes (Gmsh's type {number})");
             return Err(cursor.error_at(head, message).help(SIMPLICES));
         };
-        if kind
-            .order
-            .is_some_and(|order| *common_order.get_or_insert(order) != order)
-        {
+        if kind.order.is_some_and(|order| *common_order.get_or_insert(order) != order) {
             let message = format!("group `{name}` is of another order than the elements before it");
-            return Err(cursor
-                .error_at(head, message)
-                .help("save all elements with one order: gmsh -order 1 or 2"));
+            return Err(cursor.error_at(head, message).help("save all elements with one order: gmsh -order 1 or 2"));
         }
         let connectivity = Block { kind, count, name }.read::<D>(cursor, nodes)?;
         physical.extend(dimension, tag, stride, &connectivity);
@@ -88,8 +66,7 @@ pub fn read<const D: usize>(
 }
 
 /// What to do about elements that are not simplices of order 1 or 2.
-const SIMPLICES: &str =
-    "use triangles and tetrahedra of order 1 or 2: no `Recombine`, `gmsh -order 1` or `2`";
+const SIMPLICES: &str = "use triangles and tetrahedra of order 1 or 2: no `Recombine`, `gmsh -order 1` or `2`";
 
 /// The elements of one entity, all of one kind.
 struct Block<'a> {
@@ -102,9 +79,7 @@ struct Block<'a> {
 impl Block<'_> {
     /// Reads the elements: our point numbers in our order, cells turned to positive volume.
     fn read<const D: usize>(&self, cursor: &mut Cursor, nodes: &Nodes) -> Result<Vec<u32>> {
-        let Kind {
-            dimension, stride, ..
-        } = self.kind;
+        let Kind { dimension, stride, .. } = self.kind;
         let mut connectivity = vec![0; self.count * stride];
         let mut vertices = [[0.0; 3]; 4];
         let vertices = &mut vertices[..dimension + 1];
@@ -115,13 +90,9 @@ impl Block<'_> {
             for point in &mut *points {
                 let node = cursor.size()?;
                 *point = nodes.number(node).ok_or_else(|| {
-                    let message = format!(
-                        "element {tag} of group `{}` uses node {node}, which does not exist",
-                        self.name
-                    );
-                    cursor
-                        .error_at(start, message)
-                        .help("the file is damaged: save the mesh again with Gmsh")
+                    let message =
+                        format!("element {tag} of group `{}` uses node {node}, which does not exist", self.name);
+                    cursor.error_at(start, message).help("the file is damaged: save the mesh again with Gmsh")
                 })?;
             }
             cursor.end()?;
@@ -136,9 +107,7 @@ impl Block<'_> {
             if simplex::is_degenerate(vertices, measure) {
                 let size = ["", "length", "area", "volume"][dimension];
                 let message = format!("element {tag} of group `{}` has zero {size}", self.name);
-                return Err(cursor
-                    .error_at(start, message)
-                    .help("mend the geometry there, or mesh it again"));
+                return Err(cursor.error_at(start, message).help("mend the geometry there, or mesh it again"));
             }
             if dimension == D && measure < 0.0 {
                 simplex::mirror(points);
@@ -148,17 +117,13 @@ impl Block<'_> {
     }
 
     fn check_plane(&self, cursor: &mut Cursor, nodes: &Nodes, points: &[u32]) -> Result<()> {
-        let outside = points
-            .iter()
-            .map(|point| *point as usize)
-            .find(|point| nodes.points[*point][2].abs() > nodes.flat);
+        let outside =
+            points.iter().map(|point| *point as usize).find(|point| nodes.points[*point][2].abs() > nodes.flat);
         let Some(point) = outside else { return Ok(()) };
         let message = format!(
             "a node of group `{}` has z = {}, but the scene has dimension = 2",
             self.name, nodes.points[point][2]
         );
-        Err(nodes
-            .error_at(cursor, point, message)
-            .help("draw plane bodies in the plane z = 0, or set `dimension = 3`"))
+        Err(nodes.error_at(cursor, point, message).help("draw plane bodies in the plane z = 0, or set `dimension = 3`"))
     }
 }

@@ -18,15 +18,10 @@ impl Gmsh {
     /// It is not there.
     pub fn find() -> Result<Gmsh> {
         let path = std::env::var_os("PATH").unwrap_or_default();
-        let program = std::env::split_paths(&path)
-            .map(|folder| folder.join("gmsh"))
-            .find(|program| program.is_file());
+        let program = std::env::split_paths(&path).map(|folder| folder.join("gmsh")).find(|program| program.is_file());
         program.map(|program| Gmsh { program }).ok_or_else(|| {
-            Error::new(
-                Kind::Mesh,
-                "Gmsh is not installed: there is no `gmsh` in $PATH",
-            )
-            .help("run scripts/setup, or `apt-get install gmsh`")
+            Error::new(Kind::Mesh, "Gmsh is not installed: there is no `gmsh` in $PATH")
+                .help("run scripts/setup, or `apt-get install gmsh`")
         })
     }
 
@@ -34,16 +29,10 @@ impl Gmsh {
     /// than to read a mesh from the cache.
     pub fn identity(&self) -> String {
         let data = std::fs::metadata(&self.program).ok();
-        let time = data
-            .as_ref()
-            .and_then(|data| data.modified().ok())
-            .and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+        let time =
+            data.as_ref().and_then(|data| data.modified().ok()).and_then(|time| time.duration_since(UNIX_EPOCH).ok());
         let size = data.map_or(0, |data| data.len());
-        format!(
-            "{} {size} {}",
-            self.program.display(),
-            time.unwrap_or_default().as_nanos()
-        )
+        format!("{} {size} {}", self.program.display(), time.unwrap_or_default().as_nanos())
     }
 
     /// Meshes a script into the file `output`. `home` is an empty folder, read instead of the user's own Gmsh options:
@@ -62,55 +51,33 @@ impl Gmsh {
     ) -> Result<()> {
         let mut command = Command::new(&self.program);
         command.arg(format!("-{dimension}"));
-        command.args([
-            "-order",
-            if order == Order::P1 { "1" } else { "2" },
-            "-format",
-            "msh41",
-            "-bin",
-            "-v",
-            "2",
-        ]);
+        command.args(["-order", if order == Order::P1 { "1" } else { "2" }, "-format", "msh41", "-bin", "-v", "2"]);
         for (name, value) in set {
             command.args(["-setnumber", name, &value.to_string()]);
         }
         // An absolute path cannot be taken for an option.
-        let script_path =
-            std::path::absolute(script).map_err(|cause| Error::file(script, "find", &cause))?;
+        let script_path = std::path::absolute(script).map_err(|cause| Error::file(script, "find", &cause))?;
         command.arg("-o").arg(output).arg(script_path);
         command.env("GMSH_HOME", home).stdin(Stdio::null());
         // A Gmsh built with MPI must not think that it is one of our ranks.
         for (name, _) in std::env::vars_os() {
             let text = name.to_string_lossy();
-            if ["OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_"]
-                .iter()
-                .any(|prefix| text.starts_with(prefix))
-            {
+            if ["OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_"].iter().any(|prefix| text.starts_with(prefix)) {
                 command.env_remove(&name);
             }
         }
-        let result = command
-            .output()
-            .map_err(|cause| Error::file(&self.program, "run", &cause))?;
+        let result = command.output().map_err(|cause| Error::file(&self.program, "run", &cause))?;
         if result.status.success() && output.is_file() {
             return Ok(());
         }
         let said = [result.stdout, result.stderr].concat();
-        let mut error = Error::mesh(
-            script,
-            None,
-            format!("Gmsh cannot mesh this script ({})", result.status),
-        );
+        let mut error = Error::mesh(script, None, format!("Gmsh cannot mesh this script ({})", result.status));
         let causes = complaints(&String::from_utf8_lossy(&said));
         for cause in &causes {
             error = error.because(cause);
         }
         let again = format!("gmsh -{dimension} {}", script.display());
-        Err(if causes.is_empty() {
-            error.help(format!("see what it says: {again}"))
-        } else {
-            error
-        })
+        Err(if causes.is_empty() { error.help(format!("see what it says: {again}")) } else { error })
     }
 }
 
@@ -119,10 +86,7 @@ fn complaints(said: &str) -> Vec<String> {
     const MOST: usize = 8;
     let mut found: Vec<String> = Vec::new();
     for line in said.lines() {
-        let Some(text) = line
-            .strip_prefix("Error")
-            .and_then(|rest| rest.trim_start().strip_prefix(':'))
-        else {
+        let Some(text) = line.strip_prefix("Error").and_then(|rest| rest.trim_start().strip_prefix(':')) else {
             continue;
         };
         let text = text.trim();

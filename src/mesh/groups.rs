@@ -10,11 +10,7 @@ pub fn compact(groups: &mut [Group], count: usize) -> impl Iterator<Item = usize
     for point in groups.iter().flat_map(|group| &group.connectivity) {
         number[*point as usize] = 0;
     }
-    for (new, slot) in number
-        .iter_mut()
-        .filter(|slot| **slot != UNUSED)
-        .enumerate()
-    {
+    for (new, slot) in number.iter_mut().filter(|slot| **slot != UNUSED).enumerate() {
         *slot = new as u32;
     }
     for point in groups.iter_mut().flat_map(|group| &mut group.connectivity) {

@@ -47,8 +47,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<
 
 fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order) -> Result<Loaded<D>> {
     let path = &file.value;
-    let bytes =
-        std::fs::read(path).map_err(|cause| Error::file(path, "read", &cause).at(&file.place))?;
+    let bytes = std::fs::read(path).map_err(|cause| Error::file(path, "read", &cause).at(&file.place))?;
     let mesh = msh::parse(path, &bytes, false)?;
     let mesh = match (mesh.order, order) {
         (Order::P2, Order::P1) => mesh.lower_order(),
@@ -57,20 +56,12 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order) -> Result<Lo
                 "set `order = 1`, or save it anew: gmsh {} -order 2 -{D} -format msh41 -o new.msh",
                 path.display()
             );
-            let error = Error::mesh(
-                path,
-                None,
-                "the mesh is of order 1, the scene asks for order 2",
-            );
+            let error = Error::mesh(path, None, "the mesh is of order 1, the scene asks for order 2");
             return Err(error.at(&file.place).help(help));
         }
         _ => mesh,
     };
-    Ok(Loaded {
-        mesh,
-        origin: Origin::File,
-        file: path.clone(),
-    })
+    Ok(Loaded { mesh, origin: Origin::File, file: path.clone() })
 }
 
 /// Meshes a script, with the cache in one of `folders`.
@@ -91,15 +82,9 @@ pub(super) fn from_script<const D: usize>(
     // A file of the cache that cannot be read or is damaged is as good as none.
     for folder in folders {
         let cached = folder.join(&name);
-        let mesh = std::fs::read(&cached)
-            .ok()
-            .and_then(|bytes| checked(path, &bytes, order).ok());
+        let mesh = std::fs::read(&cached).ok().and_then(|bytes| checked(path, &bytes, order).ok());
         if let Some(mesh) = mesh {
-            return Ok(Loaded {
-                mesh,
-                origin: Origin::Cache,
-                file: cached,
-            });
+            return Ok(Loaded { mesh, origin: Origin::Cache, file: cached });
         }
     }
     let workshop = Workshop::open(folders)?;
@@ -107,21 +92,11 @@ pub(super) fn from_script<const D: usize>(
     gmsh.run(path, set, D, order, &made, workshop.path())?;
     let bytes = std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause))?;
     let mesh = checked(path, &bytes, order)?;
-    Ok(Loaded {
-        mesh,
-        origin: Origin::Gmsh,
-        file: workshop.publish(&made, &name)?,
-    })
+    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })
 }
 
 /// Name of the mesh in the cache: it changes with everything that changes the mesh.
-fn file_name<const D: usize>(
-    path: &Path,
-    script: &Script,
-    set: &[(String, f64)],
-    order: Order,
-    gmsh: &Gmsh,
-) -> String {
+fn file_name<const D: usize>(path: &Path, script: &Script, set: &[(String, f64)], order: Order, gmsh: &Gmsh) -> String {
     let mut key = Key::new();
     key.add(gmsh.identity().as_bytes());
     key.add(&[D as u8, order as u8]);
@@ -141,10 +116,6 @@ fn checked<const D: usize>(path: &Path, bytes: &[u8], order: Order) -> Result<Me
     if mesh.order == order {
         return Ok(mesh);
     }
-    let error = Error::mesh(
-        path,
-        None,
-        "Gmsh made a mesh of another order than the scene asks for",
-    );
+    let error = Error::mesh(path, None, "Gmsh made a mesh of another order than the scene asks for");
     Err(error.help("remove `Mesh.ElementOrder` and `SetOrder` from the script"))
 }

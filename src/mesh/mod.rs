@@ -81,10 +81,7 @@ impl<const D: usize> Mesh<D> {
 
     /// Names of the groups of a dimension, in the order of the file.
     pub fn group_names(&self, dimension: usize) -> impl Iterator<Item = &str> {
-        self.groups
-            .iter()
-            .filter(move |group| group.dimension == dimension)
-            .map(|group| group.name.as_str())
+        self.groups.iter().filter(move |group| group.dimension == dimension).map(|group| group.name.as_str())
     }
 
     /// The mesh of the same simplices without mid-edge points; a copy if there are none.
@@ -92,21 +89,10 @@ impl<const D: usize> Mesh<D> {
         let mut groups = self.groups.clone();
         for group in &mut groups {
             let vertices = group.dimension + 1;
-            group.connectivity = group
-                .simplices()
-                .flat_map(|simplex| &simplex[..vertices])
-                .copied()
-                .collect();
+            group.connectivity = group.simplices().flat_map(|simplex| &simplex[..vertices]).copied().collect();
             group.stride = vertices;
         }
-        let points = groups::compact(&mut groups, self.points.len())
-            .map(|old| self.points[old])
-            .collect();
-        Mesh {
-            path: self.path.clone(),
-            points,
-            order: Order::P1,
-            groups,
-        }
+        let points = groups::compact(&mut groups, self.points.len()).map(|old| self.points[old]).collect();
+        Mesh { path: self.path.clone(), points, order: Order::P1, groups }
     }
 }

@@ -39,17 +39,13 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], made: bool) -> Result<Me
             // Each needs those before it, and once.
             "PhysicalNames" | "Entities" | "Nodes" | "Elements" => {
                 if seen.contains(&section) {
-                    return Err(
-                        cursor.error_at(start, format!("the section ${section} stands twice"))
-                    );
+                    return Err(cursor.error_at(start, format!("the section ${section} stands twice")));
                 }
                 seen.push(section);
             }
             "PartitionedEntities" => {
                 let error = cursor.error_at(start, "the mesh is partitioned");
-                return Err(
-                    error.help("save it in one piece: the program shares the work out itself")
-                );
+                return Err(error.help("save it in one piece: the program shares the work out itself"));
             }
             _ => {
                 cursor.skip_section()?;
@@ -64,8 +60,7 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], made: bool) -> Result<Me
                 order = elements::read::<D>(cursor, nodes, &mut physical)?;
             }
             _ => {
-                let error =
-                    cursor.error_at(start, "$Elements needs $Entities and $Nodes before it");
+                let error = cursor.error_at(start, "$Elements needs $Entities and $Nodes before it");
                 return Err(error.help("save the mesh again with Gmsh"));
             }
         }
@@ -83,18 +78,11 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], made: bool) -> Result<Me
 /// Reads `$MeshFormat`, the first section but for comments.
 fn read_format(cursor: &mut Cursor) -> Result<()> {
     let save_again = |error: Error, path: &Path| {
-        error.help(format!(
-            "save it as 4.1: gmsh {} -save -format msh41 -o new.msh",
-            path.display()
-        ))
+        error.help(format!("save it as 4.1: gmsh {} -save -format msh41 -o new.msh", path.display()))
     };
     loop {
         let start = cursor.position();
-        let line = if cursor.at_end() {
-            ""
-        } else {
-            cursor.line().unwrap_or("")
-        };
+        let line = if cursor.at_end() { "" } else { cursor.line().unwrap_or("") };
         match line {
             "$MeshFormat" => break,
             "$Comments" => {
@@ -124,10 +112,7 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
             cursor.binary = true;
             let start = cursor.position();
             if cursor.int()? != 1 {
-                let error = cursor.error_at(
-                    start,
-                    "the bytes of the numbers are not in this machine's order",
-                );
+                let error = cursor.error_at(start, "the bytes of the numbers are not in this machine's order");
                 return Err(error.help("save the mesh as text on the machine that made it"));
             }
         }
@@ -140,43 +125,23 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
 }
 
 /// The mesh, once all sections are read.
-fn finish<const D: usize>(
-    path: &Path,
-    mut groups: Vec<Group>,
-    nodes: Nodes,
-    order: Option<Order>,
-) -> Result<Mesh<D>> {
+fn finish<const D: usize>(path: &Path, mut groups: Vec<Group>, nodes: Nodes, order: Option<Order>) -> Result<Mesh<D>> {
     let fail = |message: String| Error::mesh(path, None, message);
     let (thing, cells) = (THINGS[D], THINGS[D].to_lowercase());
-    let example =
-        format!("name the bodies and their boundaries: Physical {thing}(\"lower\") = {{1}};");
+    let example = format!("name the bodies and their boundaries: Physical {thing}(\"lower\") = {{1}};");
     if groups.is_empty() {
         return Err(fail("the mesh has no physical groups".into()).help(example));
     }
     if let Some(empty) = groups.iter().find(|group| group.is_empty()) {
         let thing = THINGS[empty.dimension];
-        let message = format!(
-            "the physical {} `{}` has no elements",
-            thing.to_lowercase(),
-            empty.name
-        );
-        return Err(fail(message).help(format!(
-            "check what its `Physical {thing}` names, or remove it"
-        )));
+        let message = format!("the physical {} `{}` has no elements", thing.to_lowercase(), empty.name);
+        return Err(fail(message).help(format!("check what its `Physical {thing}` names, or remove it")));
     }
     let (Some(order), true) = (order, groups.iter().any(|group| group.dimension == D)) else {
-        return Err(fail(format!(
-            "no physical group holds {cells}s, and dimension = {D}"
-        ))
-        .help(example));
+        return Err(fail(format!("no physical group holds {cells}s, and dimension = {D}")).help(example));
     };
     let points = groups::compact(&mut groups, nodes.points.len())
         .map(|old| std::array::from_fn(|k| nodes.points[old][k]))
         .collect();
-    Ok(Mesh {
-        path: path.to_owned(),
-        points,
-        order,
-        groups,
-    })
+    Ok(Mesh { path: path.to_owned(), points, order, groups })
 }

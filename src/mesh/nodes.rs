@@ -43,10 +43,7 @@ impl Nodes {
         cursor.size()?;
         cursor.end()?;
         if total >= NONE as usize {
-            return Err(cursor.error_at(
-                start,
-                format!("{total} nodes are too many: 32-bit numbers count them"),
-            ));
+            return Err(cursor.error_at(start, format!("{total} nodes are too many: 32-bit numbers count them")));
         }
 
         let mut tags = Vec::with_capacity(total);
@@ -69,11 +66,7 @@ impl Nodes {
                 tags.push(cursor.size()?);
                 cursor.end()?;
             }
-            blocks.push(Block {
-                first: points.len(),
-                position: cursor.position(),
-                bytes,
-            });
+            blocks.push(Block { first: points.len(), position: cursor.position(), bytes });
             for _ in 0..count {
                 cursor.begin();
                 points.push([cursor.real()?, cursor.real()?, cursor.real()?]);
@@ -87,12 +80,7 @@ impl Nodes {
             let message = format!("$Nodes announces {total} nodes and holds {}", points.len());
             return Err(cursor.error_at(start, message));
         }
-        let mut nodes = Nodes {
-            flat: 1e-12 * size(&points),
-            points,
-            numbers: Numbers::empty(&tags),
-            blocks,
-        };
+        let mut nodes = Nodes { flat: 1e-12 * size(&points), points, numbers: Numbers::empty(&tags), blocks };
         for (number, tag) in tags.iter().enumerate() {
             if nodes.numbers.insert(*tag, number as u32) {
                 return Err(nodes.error_at(cursor, number, format!("node tag {tag} stands twice")));
@@ -132,10 +120,7 @@ impl Numbers {
         let span = tags.iter().copied().max().unwrap_or(0) - least;
         // A table of at most four slots a node is faster and smaller than a map.
         if span < 4 * tags.len() as u64 + 1024 {
-            Numbers::Dense {
-                least,
-                number: vec![NONE; span as usize + 1],
-            }
+            Numbers::Dense { least, number: vec![NONE; span as usize + 1] }
         } else {
             Numbers::Sparse(HashMap::with_capacity(tags.len()))
         }
@@ -178,18 +163,10 @@ mod tests {
     #[test]
     fn tags_may_be_far_apart_and_as_large_as_they_like() {
         let found = nodes("1 2 1 2\n2 1 0 2\n18446744073709551615\n3\n0 0 0\n1 0 0\n").unwrap();
-        assert_eq!(
-            [found.number(u64::MAX), found.number(3), found.number(4)],
-            [Some(0), Some(1), None]
-        );
+        assert_eq!([found.number(u64::MAX), found.number(3), found.number(4)], [Some(0), Some(1), None]);
         let found = nodes("1 2 1 2\n2 1 0 2\n9\n7\n0 0 0\n1 0 0\n").unwrap();
         assert_eq!(
-            [
-                found.number(9),
-                found.number(7),
-                found.number(8),
-                found.number(0)
-            ],
+            [found.number(9), found.number(7), found.number(8), found.number(0)],
             [Some(0), Some(1), None, None]
         );
     }
@@ -203,30 +180,12 @@ mod tests {
     #[test]
     fn errors_name_the_line() {
         for (text, expected) in [
-            (
-                "1 2 1 2\n2 1 0 2\n5\n5\n0 0 0\n1 0 0\n",
-                "a.msh:6: node tag 5 stands twice",
-            ),
-            (
-                "1 1 1 1\n2 1 0 1\n5\n0 nan 0\n",
-                "a.msh:4: a coordinate is NaN",
-            ),
-            (
-                "1 1 1 1\n2 1 0 1\n5\n0 0\n",
-                "a.msh:4: this line has too few entries",
-            ),
-            (
-                "1 1 1 1\n2 1 0 1\n5\n0 0 0 0\n",
-                "a.msh:4: this line has more entries than expected",
-            ),
-            (
-                "1 2 1 1\n2 1 0 1\n5\n0 0 0\n",
-                "$Nodes announces 2 nodes and holds 1",
-            ),
-            (
-                "1 1 1 1\n2 1 0 999999999999\n5\n0 0 0\n",
-                "a.msh:2: the file is too short for a count of 999999999999",
-            ),
+            ("1 2 1 2\n2 1 0 2\n5\n5\n0 0 0\n1 0 0\n", "a.msh:6: node tag 5 stands twice"),
+            ("1 1 1 1\n2 1 0 1\n5\n0 nan 0\n", "a.msh:4: a coordinate is NaN"),
+            ("1 1 1 1\n2 1 0 1\n5\n0 0\n", "a.msh:4: this line has too few entries"),
+            ("1 1 1 1\n2 1 0 1\n5\n0 0 0 0\n", "a.msh:4: this line has more entries than expected"),
+            ("1 2 1 1\n2 1 0 1\n5\n0 0 0\n", "$Nodes announces 2 nodes and holds 1"),
+            ("1 1 1 1\n2 1 0 999999999999\n5\n0 0 0\n", "a.msh:2: the file is too short for a count of 999999999999"),
         ] {
             let error = nodes(text).err().unwrap().to_string();
             assert!(error.contains(expected), "{error}");

@@ -36,54 +36,33 @@ impl Physical {
     pub fn read_names(&mut self, cursor: &mut Cursor, space: usize) -> Result<()> {
         let start = cursor.position();
         let count = cursor.line()?.parse::<usize>();
-        let count =
-            count.map_err(|_| cursor.error_at(start, "the number of names should stand here"))?;
+        let count = count.map_err(|_| cursor.error_at(start, "the number of names should stand here"))?;
         for _ in 0..count {
             let start = cursor.position();
             let line = cursor.line()?;
             let mut words = line.splitn(3, ' ');
-            let dimension = words
-                .next()
-                .and_then(|word| word.parse::<usize>().ok())
-                .filter(|dimension| *dimension <= 3);
+            let dimension =
+                words.next().and_then(|word| word.parse::<usize>().ok()).filter(|dimension| *dimension <= 3);
             let tag = words.next().and_then(|word| word.parse::<i32>().ok());
-            let name = words
-                .next()
-                .and_then(|word| word.trim().strip_prefix('"')?.strip_suffix('"'));
+            let name = words.next().and_then(|word| word.trim().strip_prefix('"')?.strip_suffix('"'));
             let (Some(dimension), Some(tag), Some(name)) = (dimension, tag, name) else {
-                return Err(cursor.error_at(
-                    start,
-                    "dimension, tag and \"name\" of a physical group should stand here",
-                ));
+                return Err(cursor.error_at(start, "dimension, tag and \"name\" of a physical group should stand here"));
             };
             let thing = THINGS[dimension];
             if name.trim().is_empty() {
-                let error = cursor.error_at(
-                    start,
-                    format!("physical {} {tag} has an empty name", thing.to_lowercase()),
-                );
-                return Err(error.help(format!(
-                    "name it: Physical {thing}(\"name\", {tag}) = {{...}};"
-                )));
+                let error =
+                    cursor.error_at(start, format!("physical {} {tag} has an empty name", thing.to_lowercase()));
+                return Err(error.help(format!("name it: Physical {thing}(\"name\", {tag}) = {{...}};")));
             }
             if dimension > space {
-                let message = format!(
-                    "group `{name}` is made of volumes, but the scene has dimension = {space}"
-                );
-                return Err(cursor
-                    .error_at(start, message)
-                    .help("set `dimension = 3`, or remove the group"));
+                let message = format!("group `{name}` is made of volumes, but the scene has dimension = {space}");
+                return Err(cursor.error_at(start, message).help("set `dimension = 3`, or remove the group"));
             }
             if self.groups.iter().any(|group| group.name == name) {
-                let error =
-                    cursor.error_at(start, format!("two physical groups are named `{name}`"));
+                let error = cursor.error_at(start, format!("two physical groups are named `{name}`"));
                 return Err(error.help("rename one: a name alone must tell which group is meant"));
             }
-            if self
-                .group_of
-                .insert((dimension, tag), self.groups.len())
-                .is_some()
-            {
+            if self.group_of.insert((dimension, tag), self.groups.len()).is_some() {
                 let message = format!("two names for physical {} {tag}", thing.to_lowercase());
                 return Err(cursor.error_at(start, message));
             }
@@ -103,11 +82,7 @@ impl Physical {
         cursor.begin();
         let mut counts = [0; 4];
         for (dimension, count) in counts.iter_mut().enumerate() {
-            *count = if dimension == 0 {
-                cursor.count(5, 36)?
-            } else {
-                cursor.count(9, 68)?
-            };
+            *count = if dimension == 0 { cursor.count(5, 36)? } else { cursor.count(9, 68)? };
         }
         cursor.end()?;
         for (dimension, count) in counts.into_iter().enumerate() {
@@ -125,10 +100,8 @@ impl Physical {
                     let physical = i32::try_from(cursor.int()?.unsigned_abs()).unwrap_or(i32::MAX);
                     let Some(group) = self.group_of.get(&(dimension, physical)) else {
                         let thing = THINGS[dimension];
-                        let message =
-                            format!("physical {} {physical} has no name", thing.to_lowercase());
-                        let help =
-                            format!("name it: Physical {thing}(\"name\", {physical}) = {{...}};");
+                        let message = format!("physical {} {physical} has no name", thing.to_lowercase());
+                        let help = format!("name it: Physical {thing}(\"name\", {physical}) = {{...}};");
                         return Err(cursor.error_at(start, message).help(help));
                     };
                     if !members.contains(group) {
@@ -142,8 +115,7 @@ impl Physical {
                 }
                 cursor.end()?;
                 if self.entities.insert((dimension, tag), members).is_some() {
-                    let message =
-                        format!("{} {tag} stands twice", THINGS[dimension].to_lowercase());
+                    let message = format!("{} {tag} stands twice", THINGS[dimension].to_lowercase());
                     return Err(cursor.error_at(start, message));
                 }
             }

@@ -43,9 +43,7 @@ impl Script {
             mentioned: BTreeSet::new(),
         };
         // Canonical paths, since scripts may include each other along ever longer ones.
-        let canonical = path
-            .canonicalize()
-            .map_err(|cause| Error::file(path, "read", &cause))?;
+        let canonical = path.canonicalize().map_err(|cause| Error::file(path, "read", &cause))?;
         let mut found: Vec<PathBuf> = vec![canonical];
         let mut next = 0;
         while let Some(path) = found.get(next).cloned() {
@@ -103,10 +101,7 @@ impl Script {
                     constant = Some(name);
                     self.settable.insert((*name).to_owned());
                 }
-                Name(name)
-                    if depth == 0
-                        && matches!(after, [Sign('='), second, ..] if *second != Sign('=')) =>
-                {
+                Name(name) if depth == 0 && matches!(after, [Sign('='), second, ..] if *second != Sign('=')) => {
                     self.assigned.insert((*name).to_owned());
                 }
                 _ => {}
@@ -131,36 +126,27 @@ impl Script {
         let error = |message: String| Error::scene(&file.place, message);
         let shown = file.value.display();
         if let Some((_, label)) = self.aliases.iter().find(|(constant, _)| constant == name) {
-            return Err(
-                error(format!("Gmsh knows `{name}` of {shown} as `{label}`")).help(format!(
-                    "set `\"{label}\"`, or write `Name \"{name}\"` in the script"
-                )),
-            );
+            return Err(error(format!("Gmsh knows `{name}` of {shown} as `{label}`"))
+                .help(format!("set `\"{label}\"`, or write `Name \"{name}\"` in the script")));
         }
         if self.assigned.contains(name) {
-            return Err(error(format!(
-                "{shown} gives `{name}` a value itself, so setting it has no effect"
-            ))
-            .help(format!(
-                "write `DefineConstant[ {name} = {{..., Name \"{name}\"}} ];` in the script"
-            )));
+            return Err(error(format!("{shown} gives `{name}` a value itself, so setting it has no effect"))
+                .help(format!("write `DefineConstant[ {name} = {{..., Name \"{name}\"}} ];` in the script")));
         }
         if self.mentioned.contains(name) {
             return Ok(());
         }
         let error = error(format!("{shown} has no number `{name}` to set"));
-        Err(
-            match nearest(name, self.settable.iter().map(String::as_str)) {
-                Some(near) => error.help(format!("did you mean `{near}`?")),
-                None if self.settable.is_empty() => error.help(format!(
-                    "write `DefineConstant[ {name} = {{..., Name \"{name}\"}} ];` in the script"
-                )),
-                None => {
-                    let known: Vec<&str> = self.settable.iter().map(String::as_str).collect();
-                    error.help(format!("it has: {}", known.join(", ")))
-                }
-            },
-        )
+        Err(match nearest(name, self.settable.iter().map(String::as_str)) {
+            Some(near) => error.help(format!("did you mean `{near}`?")),
+            None if self.settable.is_empty() => {
+                error.help(format!("write `DefineConstant[ {name} = {{..., Name \"{name}\"}} ];` in the script"))
+            }
+            None => {
+                let known: Vec<&str> = self.settable.iter().map(String::as_str).collect();
+                error.help(format!("it has: {}", known.join(", ")))
+            }
+        })
     }
 }
 
@@ -179,15 +165,12 @@ fn tokens(text: &str) -> Vec<Token<'_>> {
             tokens.push(Token::Text(&body[..end]));
             rest.len().min(end + 2)
         } else if first.is_ascii_alphabetic() || first == '_' {
-            let end = rest
-                .find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
-                .unwrap_or(rest.len());
+            let end = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len());
             tokens.push(Token::Name(&rest[..end]));
             end
         } else if first.is_ascii_digit() {
             // With the exponent, whose `e` is not a name.
-            rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '.'))
-                .unwrap_or(rest.len())
+            rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '.')).unwrap_or(rest.len())
         } else {
             if !first.is_whitespace() {
                 tokens.push(Token::Sign(first));
@@ -205,17 +188,8 @@ mod tests {
     use crate::error::{Place, Source};
 
     fn located(path: &Path) -> Located<PathBuf> {
-        let source = Source {
-            name: "scene.toml".into(),
-            text: "mesh".into(),
-        };
-        Located::new(
-            path.to_owned(),
-            Place {
-                source: source.into(),
-                span: 0..4,
-            },
-        )
+        let source = Source { name: "scene.toml".into(), text: "mesh".into() };
+        Located::new(path.to_owned(), Place { source: source.into(), span: 0..4 })
     }
 
     fn verdict(text: &str, name: &str) -> Option<String> {
@@ -223,10 +197,7 @@ mod tests {
         let path = folder.path().join("a.geo");
         std::fs::write(&path, text).unwrap();
         let script = Script::read(&path).unwrap();
-        script
-            .check(name, &located(&path))
-            .err()
-            .map(|error| error.to_string())
+        script.check(name, &located(&path)).err().map(|error| error.to_string())
     }
 
     const SCRIPT: &str = r#"
@@ -258,27 +229,15 @@ mod tests {
             let error = verdict(SCRIPT, name).unwrap_or_default();
             assert!(error.contains(expected), "{name}: {error}");
         }
-        assert!(
-            verdict("Point(1) = {0, 0, 0};", "n")
-                .unwrap()
-                .contains("write `DefineConstant[ n")
-        );
+        assert!(verdict("Point(1) = {0, 0, 0};", "n").unwrap().contains("write `DefineConstant[ n"));
     }
 
     #[test]
     fn files_are_followed_once_and_through_folders() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("parts")).unwrap();
-        std::fs::write(
-            folder.path().join("a.geo"),
-            "Include \"parts/b.geo\"; Merge 'parts/c.stl';",
-        )
-        .unwrap();
-        std::fs::write(
-            folder.path().join("parts/b.geo"),
-            "n = 1; Include \"c.stl\"; Include \"../a.geo\";",
-        )
-        .unwrap();
+        std::fs::write(folder.path().join("a.geo"), "Include \"parts/b.geo\"; Merge 'parts/c.stl';").unwrap();
+        std::fs::write(folder.path().join("parts/b.geo"), "n = 1; Include \"c.stl\"; Include \"../a.geo\";").unwrap();
         std::fs::write(folder.path().join("parts/c.stl"), [0xff, b'"', 0x80]).unwrap();
         let script = Script::read(&folder.path().join("a.geo")).unwrap();
         assert!(script.assigned.contains("n"));

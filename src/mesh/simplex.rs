@@ -29,20 +29,14 @@ impl Kind {
             11 => (3, Some(Order::P2), 10),
             _ => return None,
         };
-        Some(Kind {
-            dimension,
-            order,
-            stride,
-        })
+        Some(Kind { dimension, order, stride })
     }
 }
 
 /// What Gmsh calls an element type and its number of nodes, for types 1 to 31.
 pub fn type_name(number: i32) -> Option<(&'static str, usize)> {
-    const NODES: [usize; 31] = [
-        2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4,
-        5, 6, 20, 35, 56,
-    ];
+    const NODES: [usize; 31] =
+        [2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5, 6, 20, 35, 56];
     let nodes = *NODES.get(usize::try_from(number).ok()?.checked_sub(1)?)?;
     let name = match number {
         1 | 8 | 26..=28 => "line",
@@ -110,11 +104,7 @@ pub fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -129,12 +119,7 @@ fn norm(a: [f64; 3]) -> f64 {
 mod tests {
     use super::*;
 
-    const TETRAHEDRON: [[f64; 3]; 4] = [
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.0, 0.0, 1.0],
-    ];
+    const TETRAHEDRON: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
     #[test]
     fn measures_have_their_sign() {
@@ -160,21 +145,12 @@ mod tests {
     /// Mid-edges must stay between the same two vertices, whatever their order.
     #[test]
     fn mirrored_cells_keep_their_edges() {
-        let edges: [(usize, &[[usize; 2]]); 2] = [
-            (3, &[[0, 1], [1, 2], [0, 2]]),
-            (4, &[[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]),
-        ];
+        let edges: [(usize, &[[usize; 2]]); 2] =
+            [(3, &[[0, 1], [1, 2], [0, 2]]), (4, &[[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])];
         for (vertices, edges) in edges {
             // The number of a mid-edge point is the sum of the powers of ten of its vertices, so it names them.
-            let mut cell: Vec<u32> = (0..vertices)
-                .map(|vertex| 10_u32.pow(vertex as u32))
-                .collect();
-            cell.extend(
-                edges
-                    .iter()
-                    .map(|[a, b]| 10_u32.pow(*a as u32) + 10_u32.pow(*b as u32))
-                    .collect::<Vec<_>>(),
-            );
+            let mut cell: Vec<u32> = (0..vertices).map(|vertex| 10_u32.pow(vertex as u32)).collect();
+            cell.extend(edges.iter().map(|[a, b]| 10_u32.pow(*a as u32) + 10_u32.pow(*b as u32)).collect::<Vec<_>>());
             let before = cell.clone();
             mirror(&mut cell);
             assert_ne!(before, cell);

@@ -42,17 +42,8 @@ Physical Point("pin") = Point In BoundingBox{-1e-3, -1e-3, -1e-3, 1e-3, 1e-3, 1e
 "#;
 
 fn located(path: PathBuf) -> Located<PathBuf> {
-    let source = Source {
-        name: "scene.toml".into(),
-        text: "mesh = 1".into(),
-    };
-    Located::new(
-        path,
-        Place {
-            source: source.into(),
-            span: 0..4,
-        },
-    )
+    let source = Source { name: "scene.toml".into(), text: "mesh = 1".into() };
+    Located::new(path, Place { source: source.into(), span: 0..4 })
 }
 
 /// Bytes of the mesh of a script in another form than the program asks for.
@@ -80,11 +71,9 @@ fn extent<const D: usize>(mesh: &Mesh<D>, group: &Group) -> f64 {
     group
         .simplices()
         .map(|simplex| {
-            let place = |point: &u32| {
-                std::array::from_fn(|k| mesh.points[*point as usize].get(k).copied().unwrap_or(0.0))
-            };
-            let vertices: Vec<[f64; 3]> =
-                simplex[..group.dimension + 1].iter().map(place).collect();
+            let place =
+                |point: &u32| std::array::from_fn(|k| mesh.points[*point as usize].get(k).copied().unwrap_or(0.0));
+            let vertices: Vec<[f64; 3]> = simplex[..group.dimension + 1].iter().map(place).collect();
             simplex::measure(&vertices, D)
         })
         .sum()
@@ -101,12 +90,7 @@ fn assert_mid_edges<const D: usize>(mesh: &Mesh<D>) {
                 for k in 0..D {
                     let at = |point: u32| mesh.points[point as usize][k];
                     let between = 0.5 * (at(simplex[a]) + at(simplex[b]));
-                    assert!(
-                        (at(*middle) - between).abs() < 1e-9,
-                        "{} of `{}`",
-                        middle,
-                        group.name
-                    );
+                    assert!((at(*middle) - between).abs() < 1e-9, "{} of `{}`", middle, group.name);
                 }
             }
         }
@@ -117,8 +101,7 @@ fn assert_mid_edges<const D: usize>(mesh: &Mesh<D>) {
 fn squares_of_both_forms_and_orders() {
     for order in ["1", "2"] {
         let [text, binary] = [&[][..], &["-bin"]].map(|form| {
-            let mesh: Mesh<2> =
-                parse(&gmsh(SQUARE, &[&["-2", "-order", order], form].concat())).unwrap();
+            let mesh: Mesh<2> = parse(&gmsh(SQUARE, &[&["-2", "-order", order], form].concat())).unwrap();
             mesh
         });
         // Text has 16 digits, so coordinates may differ in the last.
@@ -126,40 +109,19 @@ fn squares_of_both_forms_and_orders() {
         for mesh in [&text, &binary] {
             let count = |name| mesh.group(name).unwrap().len();
             assert_eq!(
-                [
-                    count("soft rock"),
-                    count("steel"),
-                    count("left"),
-                    count("outside"),
-                    count("corner")
-                ],
+                [count("soft rock"), count("steel"), count("left"), count("outside"), count("corner")],
                 [8, 8, 2, 12, 1]
             );
-            assert_eq!(
-                mesh.group_names(2).collect::<Vec<_>>(),
-                ["soft rock", "steel"]
-            );
+            assert_eq!(mesh.group_names(2).collect::<Vec<_>>(), ["soft rock", "steel"]);
             assert_eq!(mesh.points.len(), if order == "1" { 15 } else { 45 });
             let size = |name| extent(mesh, mesh.group(name).unwrap());
-            for (name, expected) in [
-                ("soft rock", 0.5),
-                ("steel", 1.5),
-                ("left", 1.0),
-                ("outside", 4.0),
-            ] {
-                assert!(
-                    (size(name) - expected).abs() < 1e-9,
-                    "{name}: {}",
-                    size(name)
-                );
+            for (name, expected) in [("soft rock", 0.5), ("steel", 1.5), ("left", 1.0), ("outside", 4.0)] {
+                assert!((size(name) - expected).abs() < 1e-9, "{name}: {}", size(name));
             }
             // All cells positive one by one, although one surface is drawn clockwise.
             for group in mesh.groups.iter().filter(|group| group.dimension == 2) {
                 for cell in group.connectivity.chunks(group.stride) {
-                    let one = Group {
-                        connectivity: cell.to_vec(),
-                        ..group.clone()
-                    };
+                    let one = Group { connectivity: cell.to_vec(), ..group.clone() };
                     assert!(extent(mesh, &one) > 0.0);
                 }
             }
@@ -180,15 +142,10 @@ fn squares_of_both_forms_and_orders() {
 fn cubes_of_both_forms_and_orders() {
     for order in ["1", "2"] {
         for form in [&[][..], &["-bin"]] {
-            let mesh: Mesh<3> =
-                parse(&gmsh(CUBE, &[&["-3", "-order", order], form].concat())).unwrap();
+            let mesh: Mesh<3> = parse(&gmsh(CUBE, &[&["-3", "-order", order], form].concat())).unwrap();
             let size = |name| extent(&mesh, mesh.group(name).unwrap());
             for (name, expected) in [("soft", 1.5), ("hard", 4.5), ("bottom", 2.0)] {
-                assert!(
-                    (size(name) - expected).abs() < 1e-9,
-                    "{name}: {}",
-                    size(name)
-                );
+                assert!((size(name) - expected).abs() < 1e-9, "{name}: {}", size(name));
             }
             assert_eq!(mesh.group("pin").unwrap().len(), 1);
             if order == "2" {
@@ -206,24 +163,9 @@ fn inverted_cells_are_turned_and_order_two_with_them() {
         let mesh: Mesh<2> = parse(&gmsh(&script, &["-2", "-order", order])).unwrap();
         assert!((extent(&mesh, mesh.group("soft rock").unwrap()) - 0.5).abs() < 1e-9);
         // A reflection through the origin.
-        let cube: Mesh<3> = parse(&gmsh(
-            CUBE,
-            &[
-                "-3",
-                "-order",
-                order,
-                "-setnumber",
-                "Mesh.ScalingFactor",
-                "-1",
-            ],
-        ))
-        .unwrap();
-        assert!(
-            cube.points
-                .iter()
-                .flatten()
-                .all(|coordinate| *coordinate <= 0.0)
-        );
+        let cube: Mesh<3> =
+            parse(&gmsh(CUBE, &["-3", "-order", order, "-setnumber", "Mesh.ScalingFactor", "-1"])).unwrap();
+        assert!(cube.points.iter().flatten().all(|coordinate| *coordinate <= 0.0));
         assert!((extent(&cube, cube.group("soft").unwrap()) - 1.5).abs() < 1e-9);
         if order == "2" {
             assert_mid_edges(&mesh);

@@ -83,12 +83,7 @@ impl Canvas<'_> {
             return Ok(());
         }
         let path: Vec<_> = points.iter().map(|&point| fine(point)).collect();
-        self.0
-            .draw(&PathElement::new(
-                path,
-                color.stroke_width(scaled(width) as u32),
-            ))
-            .map_err(io::Error::other)
+        self.0.draw(&PathElement::new(path, color.stroke_width(scaled(width) as u32))).map_err(io::Error::other)
     }
 
     /// A dashed line through points.
@@ -101,27 +96,20 @@ impl Canvas<'_> {
 
     /// A filled rectangle between two corners.
     pub fn fill(&self, from: Pixel, to: Pixel, color: RGBAColor) -> io::Result<()> {
-        self.0
-            .draw(&Rectangle::new([fine(from), fine(to)], color.filled()))
-            .map_err(io::Error::other)
+        self.0.draw(&Rectangle::new([fine(from), fine(to)], color.filled())).map_err(io::Error::other)
     }
 
     /// A mark with a white rim, so that overlapping marks stay apart; `radius` in pixels.
     pub fn mark(&self, (x, y): Pixel, radius: f64, mark: Mark, color: RGBColor) -> io::Result<()> {
         for (radius, color) in [(radius + 0.8, WHITE), (radius, color)] {
             let polygon = |corners: &[Pixel]| {
-                let corners = corners
-                    .iter()
-                    .map(|&(u, v)| fine((x + u * radius, y + v * radius)));
-                self.0
-                    .draw(&Polygon::new(corners.collect::<Vec<_>>(), color.filled()))
-                    .map_err(io::Error::other)
+                let corners = corners.iter().map(|&(u, v)| fine((x + u * radius, y + v * radius)));
+                self.0.draw(&Polygon::new(corners.collect::<Vec<_>>(), color.filled())).map_err(io::Error::other)
             };
             match mark {
-                Mark::Circle => self
-                    .0
-                    .draw(&Circle::new(fine((x, y)), scaled(radius), color.filled()))
-                    .map_err(io::Error::other)?,
+                Mark::Circle => {
+                    self.0.draw(&Circle::new(fine((x, y)), scaled(radius), color.filled())).map_err(io::Error::other)?
+                }
                 Mark::Square => {
                     polygon(&[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)])?;
                 }
@@ -149,12 +137,8 @@ impl Canvas<'_> {
         if font.upward {
             style = style.transform(FontTransform::Rotate270);
         }
-        let style = style
-            .pos(Pos::new(horizontal, VPos::Center))
-            .color(&font.color);
-        self.0
-            .draw_text(&text, &style, fine(at))
-            .map_err(io::Error::other)
+        let style = style.pos(Pos::new(horizontal, VPos::Center)).color(&font.color);
+        self.0.draw_text(&text, &style, fine(at)).map_err(io::Error::other)
     }
 }
 
@@ -241,11 +225,8 @@ mod tests {
     #[test]
     fn dashes_have_equal_length_round_a_corner() {
         let dashes = cut_into_dashes(&[(0.0, 0.0), (10.0, 0.0), (10.0, 11.0)], 4.0, 2.0);
-        let length = |dash: &Vec<Pixel>| -> f64 {
-            dash.windows(2)
-                .map(|p| (p[1].0 - p[0].0).hypot(p[1].1 - p[0].1))
-                .sum()
-        };
+        let length =
+            |dash: &Vec<Pixel>| -> f64 { dash.windows(2).map(|p| (p[1].0 - p[0].0).hypot(p[1].1 - p[0].1)).sum() };
         let lengths: Vec<_> = dashes.iter().map(length).collect();
         assert_eq!(lengths, [4.0, 4.0, 4.0, 3.0]);
         assert_eq!(dashes[1][..2], [(6.0, 0.0), (10.0, 0.0)]);
@@ -256,22 +237,13 @@ mod tests {
     fn long_texts_are_cut() {
         assert_eq!(shorten("short", 10.0, 100.0), "short");
         let short = shorten(&"long text ".repeat(20), 10.0, 100.0);
-        assert!(
-            short.ends_with('…') && text_width(&short, 10.0) <= 100.0,
-            "{short}"
-        );
+        assert!(short.ends_with('…') && text_width(&short, 10.0) <= 100.0, "{short}");
     }
 
     #[test]
     fn the_picture_is_one_element_of_the_shown_size() {
         let text = svg(|canvas| {
-            let font = Font {
-                size: 12.0,
-                bold: false,
-                color: BLACK,
-                hold: Hold::Left,
-                upward: false,
-            };
+            let font = Font { size: 12.0, bold: false, color: BLACK, hold: Hold::Left, upward: false };
             canvas.text("a < b & \u{1}c", (450.0, 280.0), font)
         })
         .unwrap();

@@ -33,11 +33,7 @@ pub(super) struct Frame {
 /// # Errors
 /// Those of plotters; drawing to memory has none that are known.
 pub(super) fn draw(plot: &Plot) -> io::Result<String> {
-    let points = || {
-        plot.series
-            .iter()
-            .flat_map(|series| series.points.iter().copied())
-    };
+    let points = || plot.series.iter().flat_map(|series| series.points.iter().copied());
     // A point that one axis cannot show must not stretch the other.
     let shown = |(x, y): &(f64, f64)| drawable(*x, plot.x.log) && drawable(*y, plot.y.log);
     let x_scale = |ticks| {
@@ -45,21 +41,14 @@ pub(super) fn draw(plot: &Plot) -> io::Result<String> {
         Scale::new(values, plot.x.log, ticks)
     };
     let x = x_scale(TICKS);
-    let y = Scale::new(
-        points().filter(shown).map(|point| point.1),
-        plot.y.log,
-        TICKS,
-    );
+    let y = Scale::new(points().filter(shown).map(|point| point.1), plot.y.log, TICKS);
     let looks = looks(&plot.series);
     let entries: Vec<Entry> = plot
         .series
         .iter()
         .zip(&looks)
         .filter(|(series, _)| !series.label.is_empty())
-        .map(|(series, &look)| Entry {
-            label: series.label.clone(),
-            look,
-        })
+        .map(|(series, &look)| Entry { label: series.label.clone(), look })
         .collect();
 
     let above = y.power != 0;
@@ -81,9 +70,7 @@ pub(super) fn draw(plot: &Plot) -> io::Result<String> {
     let corner = if outside {
         (frame.right + 14.0, frame.top)
     } else {
-        legend
-            .corner(frame, &curves)
-            .unwrap_or((frame.left, frame.top))
+        legend.corner(frame, &curves).unwrap_or((frame.left, frame.top))
     };
 
     // Long numbers get fewer ticks.
@@ -101,18 +88,9 @@ pub(super) fn draw(plot: &Plot) -> io::Result<String> {
             }
         }
         if curves.iter().all(Vec::is_empty) {
-            let middle = (
-                (frame.left + frame.right) / 2.0,
-                (frame.top + frame.bottom) / 2.0,
-            );
+            let middle = ((frame.left + frame.right) / 2.0, (frame.top + frame.bottom) / 2.0);
             let (size, hold) = (LABEL_SIZE, Hold::Middle);
-            let font = Font {
-                size,
-                bold: false,
-                color: GREY,
-                hold,
-                upward: false,
-            };
+            let font = Font { size, bold: false, color: GREY, hold, upward: false };
             canvas.text("nothing to show", middle, font)?;
         }
         legend.draw(canvas, corner, frame)
@@ -123,21 +101,12 @@ pub(super) fn draw(plot: &Plot) -> io::Result<String> {
 fn curves(plot: &Plot, x: &Scale, y: &Scale, frame: Frame) -> Vec<Vec<Vec<Pixel>>> {
     let pixel = |&(u, v): &(f64, f64)| {
         let (u, v) = (x.fraction(x.at(u)?), y.fraction(y.at(v)?));
-        Some((
-            frame.left + u * (frame.right - frame.left),
-            frame.bottom - v * (frame.bottom - frame.top),
-        ))
+        Some((frame.left + u * (frame.right - frame.left), frame.bottom - v * (frame.bottom - frame.top)))
     };
     let pieces = |series: &Series| {
         let pixels: Vec<Option<Pixel>> = series.points.iter().map(pixel).collect();
-        let pieces = pixels
-            .split(Option::is_none)
-            .map(|piece| piece.iter().flatten().copied());
-        pieces
-            .map(Iterator::collect)
-            .filter(|p: &Vec<_>| !p.is_empty())
-            .map(thin)
-            .collect()
+        let pieces = pixels.split(Option::is_none).map(|piece| piece.iter().flatten().copied());
+        pieces.map(Iterator::collect).filter(|p: &Vec<_>| !p.is_empty()).map(thin).collect()
     };
     plot.series.iter().map(pieces).collect()
 }
@@ -152,10 +121,7 @@ fn thin(points: Vec<Pixel>) -> Vec<Pixel> {
     let mut thinned = Vec::new();
     for group in points.chunk_by(|a, b| column(a) == column(b)) {
         let by_height = |a: &usize, b: &usize| group[*a].1.total_cmp(&group[*b].1);
-        let extremes = [
-            (0..group.len()).min_by(by_height),
-            (0..group.len()).max_by(by_height),
-        ];
+        let extremes = [(0..group.len()).min_by(by_height), (0..group.len()).max_by(by_height)];
         let mut kept: Vec<usize> = extremes.into_iter().flatten().collect();
         kept.extend([0, group.len() - 1]);
         kept.sort_unstable();
@@ -167,12 +133,7 @@ fn thin(points: Vec<Pixel>) -> Vec<Pixel> {
 
 /// Grid, frame, ticks, labels and title.
 fn draw_axes(canvas: &Canvas, frame: Frame, plot: &Plot, x: &Scale, y: &Scale) -> io::Result<()> {
-    let Frame {
-        left,
-        right,
-        top,
-        bottom,
-    } = frame;
+    let Frame { left, right, top, bottom } = frame;
     let (width, height) = (right - left, bottom - top);
     let across = |at: f64| left + x.fraction(at) * width;
     let up = |at: f64| bottom - y.fraction(at) * height;
@@ -192,22 +153,10 @@ fn draw_axes(canvas: &Canvas, frame: Frame, plot: &Plot, x: &Scale, y: &Scale) -
     for (at, _) in &y.major {
         canvas.line(&[(left, up(*at)), (right, up(*at))], 0.9, grid)?;
     }
-    let corners = [
-        (left, top),
-        (right, top),
-        (right, bottom),
-        (left, bottom),
-        (left, top),
-    ];
+    let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
     canvas.line(&corners, 1.0, frame_color)?;
 
-    let font = |size, hold| Font {
-        size,
-        bold: false,
-        color: BLACK,
-        hold,
-        upward: false,
-    };
+    let font = |size, hold| Font { size, bold: false, color: BLACK, hold, upward: false };
     for (at, label) in &x.major {
         let at = across(*at);
         canvas.line(&[(at, bottom), (at, bottom + 5.0)], 1.0, frame_color)?;
@@ -219,11 +168,7 @@ fn draw_axes(canvas: &Canvas, frame: Frame, plot: &Plot, x: &Scale, y: &Scale) -
         canvas.text(label, (left - 9.0, at), font(TICK_SIZE, Hold::Right))?;
     }
     for &at in &x.minor {
-        canvas.line(
-            &[(across(at), bottom), (across(at), bottom + 3.0)],
-            0.8,
-            frame_color,
-        )?;
+        canvas.line(&[(across(at), bottom), (across(at), bottom + 3.0)], 0.8, frame_color)?;
     }
     for &at in &y.minor {
         canvas.line(&[(left - 3.0, up(at)), (left, up(at))], 0.8, frame_color)?;
@@ -241,26 +186,14 @@ fn draw_axes(canvas: &Canvas, frame: Frame, plot: &Plot, x: &Scale, y: &Scale) -
     let text = shorten(&plot.x.label, LABEL_SIZE, 0.8 * width);
     canvas.text(&text, (left + width / 2.0, bottom + 40.0), label)?;
     let text = shorten(&plot.y.label, LABEL_SIZE, height);
-    canvas.text(
-        &text,
-        (18.0, top + height / 2.0),
-        Font {
-            upward: true,
-            ..label
-        },
-    )?;
+    canvas.text(&text, (18.0, top + height / 2.0), Font { upward: true, ..label })?;
     // Bold letters are wider.
     let size = 1.12 * TITLE_SIZE;
     let text = shorten(&plot.title, size, WIDTH - 24.0);
-    let heading = Font {
-        bold: true,
-        ..font(TITLE_SIZE, Hold::Middle)
-    };
+    let heading = Font { bold: true, ..font(TITLE_SIZE, Hold::Middle) };
     // Over the axes, unless the title is too long for that.
     let half = text_width(&text, size) / 2.0;
-    let middle = (left + width / 2.0)
-        .min(WIDTH - 12.0 - half)
-        .max(12.0 + half);
+    let middle = (left + width / 2.0).min(WIDTH - 12.0 - half).max(12.0 + half);
     canvas.text(&text, (middle, 25.0), heading)
 }
 
@@ -273,10 +206,7 @@ mod tests {
         Plot {
             title: String::new(),
             x: Axis::default(),
-            y: Axis {
-                label: String::new(),
-                log,
-            },
+            y: Axis { label: String::new(), log },
             series: vec![Series::new("", points, Style::Line)],
         }
     }
@@ -285,23 +215,14 @@ mod tests {
         let values = || plot.series[0].points.iter();
         let x = Scale::new(values().map(|p| p.0), false, TICKS);
         let y = Scale::new(values().map(|p| p.1), plot.y.log, TICKS);
-        let frame = Frame {
-            left: 100.0,
-            right: 800.0,
-            top: 50.0,
-            bottom: 500.0,
-        };
+        let frame = Frame { left: 100.0, right: 800.0, top: 50.0, bottom: 500.0 };
         curves(plot, &x, &y, frame).remove(0)
     }
 
     #[test]
     fn values_that_cannot_be_shown_leave_gaps() {
         let heights = [1.0, f64::NAN, 0.1, 0.01, 0.0, -1.0, 0.1, f64::INFINITY];
-        let points = heights
-            .iter()
-            .enumerate()
-            .map(|(k, &v)| (k as f64, v))
-            .collect();
+        let points = heights.iter().enumerate().map(|(k, &v)| (k as f64, v)).collect();
         let lengths: Vec<_> = pieces(&plot(points, true)).iter().map(Vec::len).collect();
         assert_eq!(lengths, [1, 2, 1]);
     }
@@ -314,9 +235,7 @@ mod tests {
         points[43_210].1 = 7.0;
         points[56_789].1 = -7.0;
         let whole = pieces(&plot(points.clone(), false));
-        let [thinned] = &whole[..] else {
-            panic!("one piece")
-        };
+        let [thinned] = &whole[..] else { panic!("one piece") };
         assert!(thinned.len() < 6000, "{}", thinned.len());
         let bound = |f: fn(f64, f64) -> f64, y: fn(&Pixel) -> f64| thinned.iter().map(y).reduce(f);
         let (top, bottom) = (bound(f64::min, |p| p.1), bound(f64::max, |p| p.1));
@@ -335,16 +254,9 @@ mod tests {
             plot.series[0].label = "a curve".into();
             let text = draw(&plot).unwrap();
             // The frame is the only closed line with five corners in its colour.
-            let frame = text
-                .lines()
-                .find(|l| l.contains("#3C3C3C") && l.contains("polyline"));
+            let frame = text.lines().find(|l| l.contains("#3C3C3C") && l.contains("polyline"));
             let corners = frame.unwrap().split("points=\"").nth(1).unwrap().to_owned();
-            corners
-                .split([' ', ','])
-                .nth(2)
-                .unwrap()
-                .parse::<f64>()
-                .unwrap()
+            corners.split([' ', ',']).nth(2).unwrap().parse::<f64>().unwrap()
         };
         let inside = right_end(f64::from);
         let outside = right_end(|k| f64::from(k % 2));

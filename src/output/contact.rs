@@ -45,27 +45,16 @@ impl ContactTable {
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let [of_a, of_b] = &self.displacement;
         let columns = [&self.gap, &self.compression, &self.pressure, of_a, of_b];
-        if columns
-            .iter()
-            .any(|column| column.len() != self.points.len())
-        {
-            return Err(io::Error::new(
-                io::ErrorKind::InvalidInput,
-                "contact table with columns of different length",
-            ));
+        if columns.iter().any(|column| column.len() != self.points.len()) {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "contact table with columns of different length"));
         }
         let mut csv = csv::Writer::from_writer(out);
         let sides = self.side_names.each_ref().map(|side| format!("u_n_{side}"));
         csv.write_record(
-            ["x", "y", "z", "gap", "compression", "pressure"]
-                .into_iter()
-                .chain(sides.iter().map(String::as_str)),
+            ["x", "y", "z", "gap", "compression", "pressure"].into_iter().chain(sides.iter().map(String::as_str)),
         )?;
         for (q, point) in self.points.iter().enumerate() {
-            let values = point
-                .iter()
-                .copied()
-                .chain(columns.iter().map(|column| column[q]));
+            let values = point.iter().copied().chain(columns.iter().map(|column| column[q]));
             csv.write_record(values.map(field))?;
         }
         csv.flush()
@@ -96,28 +85,14 @@ mod tests {
         assert_eq!(path, base.path().join("contact-upper_bottom-lower.csv"));
         let mut csv = csv::Reader::from_path(&path).unwrap();
         let header: Vec<_> = csv.headers().unwrap().iter().map(String::from).collect();
-        assert_eq!(
-            header.join(","),
-            "x,y,z,gap,compression,pressure,u_n_upper bottom,u_n_lower"
-        );
-        let rows: Vec<Vec<f64>> = csv
-            .records()
-            .map(|row| row.unwrap().iter().map(|v| v.parse().unwrap()).collect())
-            .collect();
+        assert_eq!(header.join(","), "x,y,z,gap,compression,pressure,u_n_upper bottom,u_n_lower");
+        let rows: Vec<Vec<f64>> =
+            csv.records().map(|row| row.unwrap().iter().map(|v| v.parse().unwrap()).collect()).collect();
         assert_eq!(rows.len(), 2);
         for (q, row) in rows.iter().enumerate() {
             let [x, y, z] = table.points[q];
             let [a, b] = &table.displacement;
-            let expected = [
-                x,
-                y,
-                z,
-                table.gap[q],
-                table.compression[q],
-                table.pressure[q],
-                a[q],
-                b[q],
-            ];
+            let expected = [x, y, z, table.gap[q], table.compression[q], table.pressure[q], a[q], b[q]];
             assert_eq!(row[..], expected);
         }
     }
@@ -135,9 +110,6 @@ mod tests {
     fn short_columns_are_refused() {
         let mut table = table();
         table.pressure.pop();
-        assert_eq!(
-            table.write(&mut Vec::new()).unwrap_err().kind(),
-            io::ErrorKind::InvalidInput
-        );
+        assert_eq!(table.write(&mut Vec::new()).unwrap_err().kind(), io::ErrorKind::InvalidInput);
     }
 }

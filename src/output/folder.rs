@@ -21,20 +21,14 @@ impl Folder {
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref().to_owned();
         fs::create_dir_all(&path).map_err(|cause| {
-            Error::file(&path, "create the folder", &cause)
-                .help("name a folder that can be made with `-o FOLDER`")
+            Error::file(&path, "create the folder", &cause).help("name a folder that can be made with `-o FOLDER`")
         })?;
         let probe = path.join(format!(".winkler-{}", std::process::id()));
-        File::create(&probe)
-            .and_then(|_| fs::remove_file(&probe))
-            .map_err(|cause| {
-                Error::file(&path, "write to the folder", &cause)
-                    .help("give yourself write permission, or name another folder with `-o FOLDER`")
-            })?;
-        Ok(Self {
-            path,
-            files: RefCell::new(Vec::new()),
-        })
+        File::create(&probe).and_then(|_| fs::remove_file(&probe)).map_err(|cause| {
+            Error::file(&path, "write to the folder", &cause)
+                .help("give yourself write permission, or name another folder with `-o FOLDER`")
+        })?;
+        Ok(Self { path, files: RefCell::new(Vec::new()) })
     }
 
     /// The folder as it was named.
@@ -53,11 +47,7 @@ impl Folder {
     ///
     /// # Errors
     /// [`Kind::File`](crate::error::Kind::File) with the path and the cause; then nothing was changed.
-    pub fn write(
-        &self,
-        name: &str,
-        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<PathBuf> {
+    pub fn write(&self, name: &str, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<PathBuf> {
         let path = self.path.join(name);
         write_whole(&path, fill)?;
         self.add(&path);
@@ -96,10 +86,7 @@ impl Folder {
 }
 
 /// Writes a whole file or nothing: fills a temporary file beside `path` and renames it.
-pub(super) fn write_whole(
-    path: &Path,
-    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<()> {
+pub(super) fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(path.file_name().unwrap_or_default());
     hidden.push(format!(".{}.part", std::process::id()));
@@ -137,21 +124,8 @@ pub(super) fn failed(path: &Path, cause: &io::Error) -> Error {
 /// A name that is safe in a file name: characters other than letters, digits, `-`, `_` and `.` become `_`.
 /// An empty name, or one that begins with a dot, gets a `_` in front.
 pub fn safe_name(name: &str) -> String {
-    let safe: String = name
-        .chars()
-        .map(|c| {
-            if c.is_alphanumeric() || "-_.".contains(c) {
-                c
-            } else {
-                '_'
-            }
-        })
-        .collect();
-    if safe.is_empty() || safe.starts_with('.') {
-        format!("_{safe}")
-    } else {
-        safe
-    }
+    let safe: String = name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
+    if safe.is_empty() || safe.starts_with('.') { format!("_{safe}") } else { safe }
 }
 
 #[cfg(test)]
@@ -160,10 +134,8 @@ mod tests {
     use crate::error::Kind;
 
     fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<_> = fs::read_dir(folder)
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
         names
     }
@@ -176,10 +148,7 @@ mod tests {
         for text in ["first", "second"] {
             folder.write("x.txt", |out| write!(out, "{text}")).unwrap();
         }
-        assert_eq!(
-            fs::read_to_string(folder.path().join("x.txt")).unwrap(),
-            "second"
-        );
+        assert_eq!(fs::read_to_string(folder.path().join("x.txt")).unwrap(), "second");
         assert_eq!(folder.files(), [folder.path().join("x.txt")]);
         assert_eq!(names(folder.path()), ["x.txt"]);
         assert_eq!(folder.unused("x", "txt"), "x-2.txt");
@@ -190,9 +159,7 @@ mod tests {
     fn a_failure_keeps_the_old_file_and_no_part() {
         let base = tempfile::tempdir().unwrap();
         let folder = Folder::create(base.path()).unwrap();
-        folder
-            .write("x.txt", |out| out.write_all(b"whole"))
-            .unwrap();
+        folder.write("x.txt", |out| out.write_all(b"whole")).unwrap();
         let error = folder
             .write("x.txt", |out| {
                 out.write_all(&[b'h'; 100_000])?;
@@ -202,10 +169,7 @@ mod tests {
         assert_eq!(error.kind(), Kind::File);
         assert!(error.message().contains("x.txt"), "{error}");
         assert!(error.advice().unwrap().contains("space"), "{error}");
-        assert_eq!(
-            fs::read_to_string(folder.path().join("x.txt")).unwrap(),
-            "whole"
-        );
+        assert_eq!(fs::read_to_string(folder.path().join("x.txt")).unwrap(), "whole");
         assert_eq!(names(folder.path()), ["x.txt"]);
     }
 

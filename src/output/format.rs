@@ -30,11 +30,7 @@ pub fn seconds(value: f64) -> String {
 
 /// A number for programs: the shortest text that reads back as the same number; NaN is an empty field.
 pub(super) fn field(value: f64) -> String {
-    if value.is_nan() {
-        String::new()
-    } else {
-        format!("{value:?}")
-    }
+    if value.is_nan() { String::new() } else { format!("{value:?}") }
 }
 
 /// An integer in superscript digits, for powers of ten.
@@ -47,9 +43,7 @@ pub(super) fn superscript(value: i32) -> String {
             '1' => '¹',
             '2' => '²',
             '3' => '³',
-            '0' | '4'..='9' => {
-                char::from_u32('⁰' as u32 + digit as u32 - '0' as u32).unwrap_or(digit)
-            }
+            '0' | '4'..='9' => char::from_u32('⁰' as u32 + digit as u32 - '0' as u32).unwrap_or(digit),
             other => other,
         })
         .collect()

@@ -24,33 +24,13 @@ impl HistoryWriter {
     pub fn create<S: AsRef<str>>(folder: &Folder, bodies: &[S]) -> Result<Self> {
         let (path, file) = folder.open("history.csv")?;
         let csv = csv::Writer::from_writer(file);
-        let mut header: Vec<String> = ["iteration", "residual", "increment"]
-            .map(String::from)
-            .into();
+        let mut header: Vec<String> = ["iteration", "residual", "increment"].map(String::from).into();
+        header.extend(bodies.iter().map(|body| format!("increment_{}", body.as_ref())));
         header.extend(
-            bodies
-                .iter()
-                .map(|body| format!("increment_{}", body.as_ref())),
+            ["gamma", "energy", "closed", "points", "sweeps", "factorizations", "inner_iterations", "seconds"]
+                .map(String::from),
         );
-        header.extend(
-            [
-                "gamma",
-                "energy",
-                "closed",
-                "points",
-                "sweeps",
-                "factorizations",
-                "inner_iterations",
-                "seconds",
-            ]
-            .map(String::from),
-        );
-        let mut history = Self {
-            path,
-            csv,
-            bodies: bodies.len(),
-            failure: None,
-        };
+        let mut history = Self { path, csv, bodies: bodies.len(), failure: None };
         history.line(&header);
         history.failure.take().map_or(Ok(history), Err)
     }
@@ -68,38 +48,20 @@ impl HistoryWriter {
         if self.failure.is_some() {
             return;
         }
-        let written = self
-            .csv
-            .write_record(fields)
-            .map_err(Into::into)
-            .and_then(|()| self.csv.flush());
+        let written = self.csv.write_record(fields).map_err(Into::into).and_then(|()| self.csv.flush());
         self.failure = written.err().map(|cause| failed(&self.path, &cause));
     }
 }
 
 impl Observer for HistoryWriter {
     fn row(&mut self, row: &Row) {
-        let mut fields = vec![
-            row.iteration.to_string(),
-            field(row.residual),
-            field(row.increment),
-        ];
+        let mut fields = vec![row.iteration.to_string(), field(row.residual), field(row.increment)];
         // Row 0 may come without increments.
-        fields.extend((0..self.bodies).map(|body| {
-            row.increments
-                .get(body)
-                .map_or(String::new(), |&v| field(v))
-        }));
+        fields.extend((0..self.bodies).map(|body| row.increments.get(body).map_or(String::new(), |&v| field(v))));
         fields.extend([field(row.gamma), field(row.energy)]);
         fields.extend(
-            [
-                row.closed,
-                row.points,
-                row.sweeps,
-                row.factorizations,
-                row.inner_iterations,
-            ]
-            .map(|count| count.to_string()),
+            [row.closed, row.points, row.sweeps, row.factorizations, row.inner_iterations]
+                .map(|count| count.to_string()),
         );
         fields.push(field(row.seconds));
         self.line(&fields);
@@ -157,12 +119,8 @@ mod tests {
     #[test]
     fn a_full_disk_is_told_once_at_the_end() {
         let file = File::options().write(true).open("/dev/full").unwrap();
-        let mut history = HistoryWriter {
-            path: "history.csv".into(),
-            csv: csv::Writer::from_writer(file),
-            bodies: 0,
-            failure: None,
-        };
+        let mut history =
+            HistoryWriter { path: "history.csv".into(), csv: csv::Writer::from_writer(file), bodies: 0, failure: None };
         history.row(&Row::default());
         history.row(&Row::default());
         let error = history.finish().unwrap_err();

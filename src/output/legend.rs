@@ -42,11 +42,7 @@ impl Legend {
 
     /// Width in pixels.
     pub fn width(&self) -> f64 {
-        let widest = self
-            .0
-            .iter()
-            .map(|entry| text_width(&entry.label, SIZE))
-            .fold(0.0, f64::max);
+        let widest = self.0.iter().map(|entry| text_width(&entry.label, SIZE)).fold(0.0, f64::max);
         widest + SAMPLE + 3.0 * PADDING
     }
 
@@ -83,23 +79,13 @@ impl Legend {
             return Ok(());
         }
         let room = ((frame.bottom - y - PADDING) / LINE) as usize;
-        let shown = if self.0.len() > room {
-            room.saturating_sub(1)
-        } else {
-            self.0.len()
-        };
+        let shown = if self.0.len() > room { room.saturating_sub(1) } else { self.0.len() };
         let lines = shown + usize::from(shown < self.0.len());
         let (right, bottom) = (x + self.width(), y + lines as f64 * LINE + PADDING);
         canvas.fill((x, y), (right, bottom), WHITE.to_rgba())?;
         let corners = [(x, y), (right, y), (right, bottom), (x, bottom), (x, y)];
         canvas.line(&corners, 0.8, RGBColor(190, 190, 190).to_rgba())?;
-        let font = Font {
-            size: SIZE,
-            bold: false,
-            color: BLACK,
-            hold: Hold::Left,
-            upward: false,
-        };
+        let font = Font { size: SIZE, bold: false, color: BLACK, hold: Hold::Left, upward: false };
         let text_x = x + 2.0 * PADDING + SAMPLE;
         for (index, entry) in self.0.iter().take(shown).enumerate() {
             let middle = y + PADDING / 2.0 + (index as f64 + 0.5) * LINE;
@@ -108,11 +94,7 @@ impl Legend {
         }
         if shown < self.0.len() {
             let middle = y + PADDING / 2.0 + (shown as f64 + 0.5) * LINE;
-            canvas.text(
-                &format!("and {} more", self.0.len() - shown),
-                (text_x, middle),
-                font,
-            )?;
+            canvas.text(&format!("and {} more", self.0.len() - shown), (text_x, middle), font)?;
         }
         Ok(())
     }
@@ -128,18 +110,13 @@ impl Entry {
 fn meets(points: &[Pixel], low: Pixel, high: Pixel) -> bool {
     let [first, ..] = points else { return false };
     let pairs = points.windows(2).map(|pair| (pair[0], pair[1]));
-    pairs
-        .chain([(*first, *first)])
-        .any(|(a, b)| segment_meets(a, b, low, high))
+    pairs.chain([(*first, *first)]).any(|(a, b)| segment_meets(a, b, low, high))
 }
 
 /// Clips the segment at the four sides: it meets the rectangle if something is left.
 fn segment_meets(a: Pixel, b: Pixel, low: Pixel, high: Pixel) -> bool {
     let (mut from, mut to) = (0.0f64, 1.0f64);
-    for (start, step, low, high) in [
-        (a.0, b.0 - a.0, low.0, high.0),
-        (a.1, b.1 - a.1, low.1, high.1),
-    ] {
+    for (start, step, low, high) in [(a.0, b.0 - a.0, low.0, high.0), (a.1, b.1 - a.1, low.1, high.1)] {
         if step == 0.0 {
             if start < low || start > high {
                 return false;
@@ -173,12 +150,7 @@ mod tests {
     #[test]
     fn an_empty_legend_takes_no_room() {
         let legend = Legend::new(Vec::new());
-        let frame = Frame {
-            left: 0.0,
-            right: 800.0,
-            top: 0.0,
-            bottom: 500.0,
-        };
+        let frame = Frame { left: 0.0, right: 800.0, top: 0.0, bottom: 500.0 };
         assert!(!legend.needs_room_outside());
         assert!(legend.corner(frame, &[]).is_some());
     }

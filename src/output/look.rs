@@ -39,11 +39,7 @@ pub(super) fn looks(series: &[Series]) -> Vec<Look> {
                 (palette(next - 1), next - 1)
             }
         };
-        Look {
-            style: series.style,
-            color,
-            mark: MARKS[number % MARKS.len()],
-        }
+        Look { style: series.style, color, mark: MARKS[number % MARKS.len()] }
     };
     series.iter().enumerate().map(look).collect()
 }
@@ -58,11 +54,7 @@ impl Look {
             Style::Markers => {}
         }
         let marked = matches!(self.style, Style::Markers | Style::LineMarkers);
-        let (radius, mark) = if marked {
-            (4.0, self.mark)
-        } else {
-            (2.2, Mark::Circle)
-        };
+        let (radius, mark) = if marked { (4.0, self.mark) } else { (2.2, Mark::Circle) };
         if marked || points.len() == 1 {
             for &point in points {
                 canvas.mark(point, radius, mark, self.color)?;
@@ -78,18 +70,10 @@ impl Look {
             other => other,
         };
         if line != Style::Markers {
-            Look {
-                style: line,
-                ..*self
-            }
-            .draw(canvas, &[(x, y), (x + length, y)])?;
+            Look { style: line, ..*self }.draw(canvas, &[(x, y), (x + length, y)])?;
         }
         if matches!(self.style, Style::Markers | Style::LineMarkers) {
-            Look {
-                style: Style::Markers,
-                ..*self
-            }
-            .draw(canvas, &[(x + length / 2.0, y)])?;
+            Look { style: Style::Markers, ..*self }.draw(canvas, &[(x + length / 2.0, y)])?;
         }
         Ok(())
     }

@@ -70,12 +70,7 @@ pub enum Color {
 impl Series {
     /// A series in the next colour.
     pub fn new(label: impl Into<String>, points: Vec<(f64, f64)>, style: Style) -> Self {
-        Self {
-            label: label.into(),
-            points,
-            style,
-            color: Color::Next,
-        }
+        Self { label: label.into(), points, style, color: Color::Next }
     }
 
     /// The same in another colour.
@@ -114,18 +109,10 @@ impl Plot {
         let has_increments = runs.iter().flat_map(|run| &run.rows).any(|row| row.2 > 0.0);
         for (index, run) in runs.iter().enumerate() {
             let curve = |label: &str, style, value: fn(&(usize, f64, f64)) -> f64| {
-                let points = run
-                    .rows
-                    .iter()
-                    .map(|row| (row.0 as f64, value(row)))
-                    .collect();
+                let points = run.rows.iter().map(|row| (row.0 as f64, value(row))).collect();
                 Series::new(label, points, style).color(Color::Palette(index))
             };
-            let (residual, increment) = if runs.len() == 1 {
-                (solid, dashed)
-            } else {
-                (run.label.as_str(), "")
-            };
+            let (residual, increment) = if runs.len() == 1 { (solid, dashed) } else { (run.label.as_str(), "") };
             series.push(curve(residual, Style::Line, |row| row.1));
             if has_increments {
                 series.push(curve(increment, Style::Dashed, |row| row.2));
@@ -142,14 +129,8 @@ impl Plot {
         };
         Self {
             title: title.into(),
-            x: Axis {
-                label: "iteration".into(),
-                log: false,
-            },
-            y: Axis {
-                label: y.into(),
-                log: true,
-            },
+            x: Axis { label: "iteration".into(), log: false },
+            y: Axis { label: y.into(), log: true },
             series,
         }
     }
@@ -158,12 +139,7 @@ impl Plot {
     pub fn pressure(title: &str, x_label: &str, curves: &[PressureSeries]) -> Self {
         let (references, results): (Vec<_>, Vec<_>) = curves.iter().partition(|curve| curve.dashed);
         let series = results.into_iter().chain(references).map(|curve| {
-            let mut points: Vec<_> = curve
-                .s
-                .iter()
-                .copied()
-                .zip(curve.p.iter().copied())
-                .collect();
+            let mut points: Vec<_> = curve.s.iter().copied().zip(curve.p.iter().copied()).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let (style, color) = match curve.dashed {
                 true => (Style::Dashed, Color::Grey),
@@ -173,14 +149,8 @@ impl Plot {
         });
         Self {
             title: title.into(),
-            x: Axis {
-                label: x_label.into(),
-                log: false,
-            },
-            y: Axis {
-                label: "contact pressure".into(),
-                log: false,
-            },
+            x: Axis { label: x_label.into(), log: false },
+            y: Axis { label: "contact pressure".into(), log: false },
             series: series.collect(),
         }
     }
@@ -232,20 +202,13 @@ mod tests {
 
     fn run(label: &str) -> ConvergenceSeries {
         let rows = vec![(0, 1.0, f64::NAN), (1, 0.1, 0.5), (2, 0.0, 0.05)];
-        ConvergenceSeries {
-            label: label.into(),
-            rows,
-        }
+        ConvergenceSeries { label: label.into(), rows }
     }
 
     #[test]
     fn several_runs_share_one_explanation_of_the_line_styles() {
         let labels = |plot: &Plot| -> Vec<String> {
-            plot.series
-                .iter()
-                .map(|s| s.label.clone())
-                .filter(|l| !l.is_empty())
-                .collect()
+            plot.series.iter().map(|s| s.label.clone()).filter(|l| !l.is_empty()).collect()
         };
         let one = Plot::convergence("", &[run("a")]);
         assert_eq!(labels(&one), ["residual", "increment"]);
@@ -258,12 +221,8 @@ mod tests {
 
     #[test]
     fn references_come_last_and_points_in_order() {
-        let curve = |label: &str, dashed| PressureSeries {
-            label: label.into(),
-            s: vec![1.0, 0.0],
-            p: vec![5.0, 7.0],
-            dashed,
-        };
+        let curve =
+            |label: &str, dashed| PressureSeries { label: label.into(), s: vec![1.0, 0.0], p: vec![5.0, 7.0], dashed };
         let plot = Plot::pressure("", "x, m", &[curve("exact", true), curve("run", false)]);
         assert_eq!(plot.series[0].label, "run");
         assert_eq!(plot.series[0].points, [(0.0, 7.0), (1.0, 5.0)]);
@@ -276,10 +235,7 @@ mod tests {
         let path = base.path().join("convergence.svg");
         convergence(&path, "Two blocks", &[run("a")]).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
-        assert!(
-            text.contains("Two blocks") && text.contains("10⁻¹"),
-            "{text}"
-        );
+        assert!(text.contains("Two blocks") && text.contains("10⁻¹"), "{text}");
         let error = convergence(&base.path().join("no/x.svg"), "", &[]).unwrap_err();
         assert!(error.message().contains("x.svg"));
     }

@@ -51,20 +51,8 @@ impl IterationTable {
         Self::on(table, Box::new(io::stderr()), bar, target)
     }
 
-    fn on(
-        table: Option<Box<dyn Write>>,
-        notes: Box<dyn Write>,
-        bar: ProgressBar,
-        target: &str,
-    ) -> Self {
-        Self {
-            table,
-            notes,
-            bar,
-            target: target.into(),
-            columns: None,
-            waiting: None,
-        }
+    fn on(table: Option<Box<dyn Write>>, notes: Box<dyn Write>, bar: ProgressBar, target: &str) -> Self {
+        Self { table, notes, bar, target: target.into(), columns: None, waiting: None }
     }
 
     /// Prints the last row, if it is not there yet, and takes the progress line away. Dropping does the same.
@@ -140,34 +128,15 @@ struct Columns {
 impl Columns {
     fn new(first: &Row) -> Self {
         let digits = first.points.to_string().len();
-        Self {
-            contact: (2 * digits + 1).max("closed".len()),
-            inner: first.inner_iterations > 0,
-        }
+        Self { contact: (2 * digits + 1).max("closed".len()), inner: first.inner_iterations > 0 }
     }
 
     fn header(&self) -> String {
-        self.join(
-            [
-                "k",
-                "residual",
-                "increment",
-                "gamma",
-                "F1",
-                "closed",
-                "factored",
-            ],
-            "inner",
-            "seconds",
-        )
+        self.join(["k", "residual", "increment", "gamma", "F1", "closed", "factored"], "inner", "seconds")
     }
 
     fn line(&self, row: &Row) -> String {
-        let gamma = if row.gamma.is_nan() {
-            "-".into()
-        } else {
-            format!("{:.4}", row.gamma)
-        };
+        let gamma = if row.gamma.is_nan() { "-".into() } else { format!("{:.4}", row.gamma) };
         self.join(
             [
                 &row.iteration.to_string(),
@@ -186,11 +155,7 @@ impl Columns {
     fn join(&self, fields: [&str; 7], inner: &str, seconds: &str) -> String {
         let [k, residual, increment, gamma, energy, contact, factored] = fields;
         let width = self.contact;
-        let inner = if self.inner {
-            format!("  {inner:>7}")
-        } else {
-            String::new()
-        };
+        let inner = if self.inner { format!("  {inner:>7}") } else { String::new() };
         format!(
             "{k:>5}  {residual:>9}  {increment:>9}  {gamma:>6}  {energy:>13}  {contact:>width$}  \
              {factored:>8}{inner}  {seconds:>7}"
@@ -219,10 +184,7 @@ mod tests {
     impl Screen {
         fn lines(&self) -> Vec<String> {
             let bytes = self.0.borrow();
-            String::from_utf8_lossy(&bytes)
-                .lines()
-                .map(String::from)
-                .collect()
+            String::from_utf8_lossy(&bytes).lines().map(String::from).collect()
         }
     }
 
@@ -250,59 +212,25 @@ mod tests {
             "residual < 1e-8",
         );
         for k in 0..=iterations {
-            table.row(&Row {
-                inner_iterations: first_inner * (k + 1),
-                ..row(k)
-            });
+            table.row(&Row { inner_iterations: first_inner * (k + 1), ..row(k) });
         }
         drop(table);
         screen.lines()
     }
 
     fn iterations(lines: &[String]) -> Vec<usize> {
-        lines
-            .iter()
-            .skip(1)
-            .map(|l| l.split_whitespace().next().unwrap().parse().unwrap())
-            .collect()
+        lines.iter().skip(1).map(|l| l.split_whitespace().next().unwrap().parse().unwrap()).collect()
     }
 
     #[test]
     fn one_header_and_aligned_lines() {
         let lines = run(3, 0);
         assert_eq!(lines.len(), 5);
-        assert!(
-            lines.iter().all(|line| line.len() == lines[0].len()),
-            "{lines:#?}"
-        );
+        assert!(lines.iter().all(|line| line.len() == lines[0].len()), "{lines:#?}");
         let words: Vec<_> = lines[1].split_whitespace().collect();
-        assert_eq!(
-            words,
-            [
-                "0",
-                "1.000e+00",
-                "-",
-                "-",
-                "-1.230000e-02",
-                "0/128",
-                "0",
-                "0.00"
-            ]
-        );
+        assert_eq!(words, ["0", "1.000e+00", "-", "-", "-1.230000e-02", "0/128", "0", "0.00"]);
         let words: Vec<_> = lines[4].split_whitespace().collect();
-        assert_eq!(
-            words,
-            [
-                "3",
-                "1.250e-01",
-                "2.500e-01",
-                "0.6000",
-                "-1.230000e-02",
-                "3/128",
-                "6",
-                "0.00"
-            ]
-        );
+        assert_eq!(words, ["3", "1.250e-01", "2.500e-01", "0.6000", "-1.230000e-02", "3/128", "6", "0.00"]);
     }
 
     #[test]
@@ -310,10 +238,7 @@ mod tests {
         assert!(!run(1, 0)[0].contains("inner"));
         let lines = run(1, 5);
         assert!(lines[0].contains("inner"));
-        assert!(
-            lines.iter().all(|line| line.len() == lines[0].len()),
-            "{lines:#?}"
-        );
+        assert!(lines.iter().all(|line| line.len() == lines[0].len()), "{lines:#?}");
         assert_eq!(lines[2].split_whitespace().rev().nth(1), Some("10"));
     }
 
@@ -331,8 +256,7 @@ mod tests {
     #[test]
     fn without_a_terminal_only_notes() {
         let screen = Screen::default();
-        let mut table =
-            IterationTable::on(None, Box::new(screen.clone()), ProgressBar::hidden(), "");
+        let mut table = IterationTable::on(None, Box::new(screen.clone()), ProgressBar::hidden(), "");
         table.row(&row(0));
         table.note("body `upper` is held by contact alone");
         table.row(&row(1));

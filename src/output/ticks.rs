@@ -33,11 +33,7 @@ impl Scale {
             whole &= value.fract() == 0.0;
         }
         let (low, high) = bounds.unwrap_or(if log { (0.1, 10.0) } else { (0.0, 1.0) });
-        let mut scale = if log {
-            Self::logarithmic(low, high, count)
-        } else {
-            Self::linear(low, high, whole, count)
-        };
+        let mut scale = if log { Self::logarithmic(low, high, count) } else { Self::linear(low, high, whole, count) };
         // Ticks beyond the ends come from rounding outwards.
         let inside = inside(scale.low, scale.high);
         scale.major.retain(|(at, _)| inside(*at));
@@ -57,10 +53,7 @@ impl Scale {
 
     /// Width of the widest label in pixels.
     pub fn widest_label(&self, size: f64) -> f64 {
-        self.major
-            .iter()
-            .map(|(_, label)| text_width(label, size))
-            .fold(0.0, f64::max)
+        self.major.iter().map(|(_, label)| text_width(label, size)).fold(0.0, f64::max)
     }
 
     /// Smallest distance of two labels as a fraction of the axis; 1 for fewer than two.
@@ -80,55 +73,30 @@ impl Scale {
             // Data that begins near zero shows zero, and nothing beyond.
             let width = high - low;
             let pad = 0.03 * width;
-            low = if low >= 0.0 && low < 0.25 * width {
-                0.0
-            } else {
-                low - pad
-            };
-            high = if high <= 0.0 && -high < 0.25 * width {
-                0.0
-            } else {
-                high + pad
-            };
+            low = if low >= 0.0 && low < 0.25 * width { 0.0 } else { low - pad };
+            high = if high <= 0.0 && -high < 0.25 * width { 0.0 } else { high + pad };
         }
         let mut step = nice_step((high - low) / count as f64);
         if whole {
             step = step.max(1.0);
         }
-        let ticks: Vec<f64> = ((low / step).ceil() as i64..=(high / step).floor() as i64)
-            .map(|tick| tick as f64 * step)
-            .collect();
+        let ticks: Vec<f64> =
+            ((low / step).ceil() as i64..=(high / step).floor() as i64).map(|tick| tick as f64 * step).collect();
         let top = ticks.iter().fold(0.0f64, |top, tick| top.max(tick.abs()));
         let power = match top {
-            top if top >= 99_999.0 || top > 0.0 && top < 0.01 => {
-                (top.log10() + 1e-9).floor() as i32
-            }
+            top if top >= 99_999.0 || top > 0.0 && top < 0.01 => (top.log10() + 1e-9).floor() as i32,
             _ => 0,
         };
         let unit = 10f64.powi(power);
         // Enough decimals to tell neighbours apart.
         let decimals = (-(step / unit * (1.0 + 1e-9)).log10().floor()).clamp(0.0, 12.0) as usize;
-        let major = ticks
-            .iter()
-            .map(|&tick| (tick, minus(format!("{:.decimals$}", tick / unit + 0.0))))
-            .collect();
-        Self {
-            log: false,
-            low,
-            high,
-            major,
-            minor: Vec::new(),
-            power,
-        }
+        let major = ticks.iter().map(|&tick| (tick, minus(format!("{:.decimals$}", tick / unit + 0.0)))).collect();
+        Self { log: false, low, high, major, minor: Vec::new(), power }
     }
 
     fn logarithmic(low: f64, high: f64, count: usize) -> Self {
         let (mut from, mut to) = (low.log10(), high.log10());
-        let pad = if to - from < 1e-9 {
-            0.3
-        } else {
-            0.03 * (to - from)
-        };
+        let pad = if to - from < 1e-9 { 0.3 } else { 0.03 * (to - from) };
         (from, to) = (from - pad, to + pad);
         let (first, last) = (from.floor() as i32, to.ceil() as i32);
         let decades = to - from;
@@ -147,9 +115,7 @@ impl Scale {
         };
         let mut major = Vec::new();
         let mut minor = Vec::new();
-        let stride = (1..)
-            .find(|stride| decades / f64::from(*stride) <= count as f64)
-            .unwrap_or(1);
+        let stride = (1..).find(|stride| decades / f64::from(*stride) <= count as f64).unwrap_or(1);
         for power in first..=last {
             let at = f64::from(power);
             if power.rem_euclid(stride) == 0 {
@@ -168,14 +134,7 @@ impl Scale {
                 }
             }
         }
-        Self {
-            log: true,
-            low: from,
-            high: to,
-            major,
-            minor,
-            power: 0,
-        }
+        Self { log: true, low: from, high: to, major, minor, power: 0 }
     }
 }
 
@@ -194,9 +153,7 @@ fn inside(low: f64, high: f64) -> impl Fn(f64) -> bool {
 /// The smallest of 1, 2, 5 times a power of ten that is not below `step`.
 fn nice_step(step: f64) -> f64 {
     let unit = 10f64.powf(step.log10().floor());
-    let factor = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|factor| factor * unit >= step * (1.0 - 1e-9));
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * unit >= step * (1.0 - 1e-9));
     factor.unwrap_or(10.0) * unit
 }
 
@@ -211,11 +168,7 @@ mod tests {
 
     fn labels(values: &[f64], log: bool) -> (String, Scale) {
         let scale = Scale::new(values.iter().copied(), log, 8);
-        let labels: Vec<_> = scale
-            .major
-            .iter()
-            .map(|(_, label)| label.as_str())
-            .collect();
+        let labels: Vec<_> = scale.major.iter().map(|(_, label)| label.as_str()).collect();
         (labels.join(" "), scale)
     }
 
@@ -224,10 +177,7 @@ mod tests {
         assert_eq!(labels(&[0.0, 0.7, 1.0], false).0, "0.0 0.2 0.4 0.6 0.8 1.0");
         assert_eq!(labels(&[-1.0, 0.1, 1.0], false).0, "−1.0 −0.5 0.0 0.5 1.0");
         assert_eq!(labels(&[0.0, 437.0], false).0, "0 100 200 300 400");
-        assert_eq!(
-            labels(&[1000.0, 1000.3, 1001.0], false).0,
-            "1000.0 1000.2 1000.4 1000.6 1000.8 1001.0"
-        );
+        assert_eq!(labels(&[1000.0, 1000.3, 1001.0], false).0, "1000.0 1000.2 1000.4 1000.6 1000.8 1001.0");
     }
 
     #[test]
@@ -253,14 +203,8 @@ mod tests {
 
     #[test]
     fn powers_of_ten() {
-        assert_eq!(
-            labels(&[1.0, 2e-3, f64::NAN, 0.0, -1.0], true).0,
-            "10⁻² 10⁻¹ 10⁰"
-        );
-        assert_eq!(
-            labels(&[1.0, 1e-16], true).0,
-            "10⁻¹⁵ 10⁻¹² 10⁻⁹ 10⁻⁶ 10⁻³ 10⁰"
-        );
+        assert_eq!(labels(&[1.0, 2e-3, f64::NAN, 0.0, -1.0], true).0, "10⁻² 10⁻¹ 10⁰");
+        assert_eq!(labels(&[1.0, 1e-16], true).0, "10⁻¹⁵ 10⁻¹² 10⁻⁹ 10⁻⁶ 10⁻³ 10⁰");
         assert_eq!(labels(&[3.0, 30.0], true).0, "5 10 20");
         assert_eq!(labels(&[0.03, 0.3], true).0, "0.05 0.1 0.2");
         assert_eq!(labels(&[3e-7, 3e-6], true).0, "5·10⁻⁷ 10⁻⁶ 2·10⁻⁶");
@@ -284,10 +228,7 @@ mod tests {
                 assert!(!scale.major.is_empty(), "{a} {b} {log} {scale:?}");
                 assert!(scale.major.len() <= 12, "{a} {b} {log} {scale:?}");
                 for at in [a, b].into_iter().filter_map(|value| scale.at(value)) {
-                    assert!(
-                        (0.0..=1.0).contains(&scale.fraction(at)),
-                        "{a} {b} {log} {scale:?}"
-                    );
+                    assert!((0.0..=1.0).contains(&scale.fraction(at)), "{a} {b} {log} {scale:?}");
                 }
             }
         }

@@ -3,8 +3,8 @@
 use super::folder::safe_name;
 use std::io::{self, Write};
 use vtkio::model::{
-    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, ElementType,
-    UnstructuredGridPiece, Version, VertexNumbers, Vtk,
+    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, ElementType, UnstructuredGridPiece, Version,
+    VertexNumbers, Vtk,
 };
 
 /// Kind of the cells of a body; local numbering of the points is VTK's.
@@ -72,8 +72,7 @@ impl BodyField {
     /// # Errors
     /// Those of `out`, and `InvalidInput` when the arrays do not fit each other.
     pub fn write(self, out: &mut dyn Write) -> io::Result<()> {
-        self.check()
-            .map_err(|what| io::Error::new(io::ErrorKind::InvalidInput, what))?;
+        self.check().map_err(|what| io::Error::new(io::ErrorKind::InvalidInput, what))?;
         let stride = self.cell.stride();
         let cells = self.connectivity.len() / stride;
         let array = |name: &str, components: u32, data: Vec<f64>| {
@@ -120,28 +119,17 @@ impl BodyField {
     /// Says what does not fit: ParaView would crash on it, or show another body's values.
     fn check(&self) -> Result<(), String> {
         let points = self.points.len();
-        let lengths = [
-            self.displacement.len(),
-            self.stress.len(),
-            self.von_mises.len(),
-        ];
+        let lengths = [self.displacement.len(), self.stress.len(), self.von_mises.len()];
         if lengths != [points; 3] {
-            return Err(format!(
-                "body `{}`: {points} points, {lengths:?} values",
-                self.name
-            ));
+            return Err(format!("body `{}`: {points} points, {lengths:?} values", self.name));
         }
         if !self.connectivity.len().is_multiple_of(self.cell.stride()) {
-            return Err(format!(
-                "body `{}`: the last cell is not complete",
-                self.name
-            ));
+            return Err(format!("body `{}`: the last cell is not complete", self.name));
         }
         match self.connectivity.iter().max() {
-            Some(&last) if last as usize >= points => Err(format!(
-                "body `{}`: a cell has point {last} of {points}",
-                self.name
-            )),
+            Some(&last) if last as usize >= points => {
+                Err(format!("body `{}`: a cell has point {last} of {points}", self.name))
+            }
             _ => Ok(()),
         }
     }
@@ -173,14 +161,7 @@ impl Write for Whole<'_> {
 /// `<title>.pvd`, safe as a file name; `bodies.pvd` without a title.
 pub fn pvd_name(title: &str) -> String {
     let title = title.trim();
-    format!(
-        "{}.pvd",
-        if title.is_empty() {
-            "bodies".into()
-        } else {
-            safe_name(title)
-        }
-    )
+    format!("{}.pvd", if title.is_empty() { "bodies".into() } else { safe_name(title) })
 }
 
 /// Writes the collection that opens the `.vtu` files of all bodies at once: one part per body, at time 0.
@@ -194,10 +175,7 @@ pub fn write_pvd<S: AsRef<str>>(bodies: &[S], out: &mut dyn Write) -> io::Result
     for (part, body) in bodies.iter().enumerate() {
         let file = escape(&vtu_name(body.as_ref()));
         let name = escape(body.as_ref());
-        writeln!(
-            out,
-            r#"    <DataSet timestep="0" group="" part="{part}" name="{name}" file="{file}"/>"#
-        )?;
+        writeln!(out, r#"    <DataSet timestep="0" group="" part="{part}" name="{name}" file="{file}"/>"#)?;
     }
     writeln!(out, "  </Collection>")?;
     writeln!(out, "</VTKFile>")
@@ -208,9 +186,7 @@ fn vtu_name(body: &str) -> String {
 }
 
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('"', "&quot;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -224,17 +200,11 @@ mod tests {
         let number = |base: f64, i: usize, c: usize| base + i as f64 + c as f64 / 7.0;
         BodyField {
             name: "upper".into(),
-            points: (0..n)
-                .map(|i| std::array::from_fn(|c| number(0.0, i, c)))
-                .collect(),
+            points: (0..n).map(|i| std::array::from_fn(|c| number(0.0, i, c))).collect(),
             cell,
             connectivity: (0..n as u32).rev().collect(),
-            displacement: (0..n)
-                .map(|i| std::array::from_fn(|c| number(-100.0, i, c)))
-                .collect(),
-            stress: (0..n)
-                .map(|i| std::array::from_fn(|c| number(1e9, i, c)))
-                .collect(),
+            displacement: (0..n).map(|i| std::array::from_fn(|c| number(-100.0, i, c))).collect(),
+            stress: (0..n).map(|i| std::array::from_fn(|c| number(1e9, i, c))).collect(),
             von_mises: (0..n).map(|i| number(1e-9, i, 0)).collect(),
         }
     }
@@ -250,14 +220,10 @@ mod tests {
             let body = body(cell);
             let mut bytes = Vec::new();
             body.clone().write(&mut bytes).unwrap();
-            let DataSet::UnstructuredGrid { pieces, .. } =
-                Vtk::parse_xml(bytes.as_slice()).unwrap().data
-            else {
+            let DataSet::UnstructuredGrid { pieces, .. } = Vtk::parse_xml(bytes.as_slice()).unwrap().data else {
                 panic!("not an unstructured grid")
             };
-            let [Piece::Inline(piece)] = &pieces[..] else {
-                panic!("not one piece")
-            };
+            let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
             let points: IOBuffer = body.points.into_flattened().into();
             assert_eq!(piece.points, points);
             assert_eq!(piece.cells.types, [code]);
@@ -270,11 +236,9 @@ mod tests {
                 .point
                 .iter()
                 .map(|attribute| match attribute {
-                    Attribute::DataArray(array) => (
-                        array.name.as_str(),
-                        array.num_comp(),
-                        array.data.cast_into::<f64>(),
-                    ),
+                    Attribute::DataArray(array) => {
+                        (array.name.as_str(), array.num_comp(), array.data.cast_into::<f64>())
+                    }
                     Attribute::Field { .. } => panic!("a field"),
                 })
                 .collect();
@@ -327,12 +291,7 @@ mod tests {
         body(CellKind::Tetra).write(&mut bytes).unwrap();
         for room in [0, 50, bytes.len() / 2, bytes.len() - 1] {
             let error = body(CellKind::Tetra).write(&mut Disk(room)).unwrap_err();
-            assert_eq!(
-                error.kind(),
-                io::ErrorKind::StorageFull,
-                "{room} of {}",
-                bytes.len()
-            );
+            assert_eq!(error.kind(), io::ErrorKind::StorageFull, "{room} of {}", bytes.len());
         }
         body(CellKind::Tetra).write(&mut Disk(bytes.len())).unwrap();
     }
@@ -343,10 +302,7 @@ mod tests {
         write_pvd(&["upper", "a<b"], &mut bytes).unwrap();
         let text = String::from_utf8(bytes).unwrap();
         assert!(text.contains(r#"timestep="0" group="" part="0" name="upper" file="upper.vtu""#));
-        assert!(
-            text.contains(r#"part="1" name="a&lt;b" file="a_b.vtu""#),
-            "{text}"
-        );
+        assert!(text.contains(r#"part="1" name="a&lt;b" file="a_b.vtu""#), "{text}");
         assert_eq!(pvd_name("Two blocks / a"), "Two_blocks___a.pvd");
         assert_eq!(pvd_name(" "), "bodies.pvd");
     }

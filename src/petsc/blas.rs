@@ -61,10 +61,7 @@ fn name_of(path: &str) -> String {
         ("libblas.so", "reference BLAS"),
         ("libblas.dylib", "reference BLAS"),
     ];
-    known
-        .iter()
-        .find(|(part, _)| lower.contains(part))
-        .map_or_else(|| path.to_owned(), |(_, name)| (*name).to_owned())
+    known.iter().find(|(part, _)| lower.contains(part)).map_or_else(|| path.to_owned(), |(_, name)| (*name).to_owned())
 }
 
 #[cfg(test)]

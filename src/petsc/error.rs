@@ -36,11 +36,7 @@ pub(super) fn check(function: &str, call: impl FnOnce() -> ffi::PetscErrorCode) 
     TRACE.take();
     let code = call();
     // PETSc 3.18 has an int here, newer ones an enum; both fit.
-    if code as i64 == 0 {
-        Ok(())
-    } else {
-        Err(failure(function, code))
-    }
+    if code as i64 == 0 { Ok(()) } else { Err(failure(function, code)) }
 }
 
 /// The error of a failed call.
@@ -80,9 +76,7 @@ pub(super) unsafe fn string(text: *const c_char) -> String {
         return String::new();
     }
     // SAFETY: the caller's promise.
-    unsafe { CStr::from_ptr(text) }
-        .to_string_lossy()
-        .into_owned()
+    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
 /// The handler given to `PetscPushErrorHandler`.

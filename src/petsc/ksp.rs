@@ -4,11 +4,13 @@ use super::error::{petsc, string};
 use super::matrix::same;
 use super::options::text;
 use super::vector::Vector;
-use super::{ConvergedReason, Int, Matrix, Session, ffi, print};
+use super::{ConvergedReason, FAMILIES, Int, Matrix, Session, ffi, print};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::RSMPI_COMM_SELF;
+use std::cell::Cell;
 use std::ffi::c_char;
 use std::ptr::{null, null_mut};
+use std::rc::Rc;
 
 /// What a linear solve reached.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +37,7 @@ pub struct Solved {
 /// ksp.set_operator(&a)?;
 /// ksp.set_from_options()?;
 /// ksp.set_up()?;
+/// assert_eq!(ksp.failure(), None);
 /// let mut x = [0.0; 2];
 /// let solved = ksp.solve(&[1.0, 2.0], &mut x)?;
 /// assert!((x[0] - 1.0 / 11.0).abs() < 1e-12 && (x[1] - 7.0 / 11.0).abs() < 1e-12);
@@ -55,10 +58,16 @@ pub struct Solved {
 /// # Ok::<(), winkler::error::Error>(())
 /// ```
 pub struct Ksp {
-    ksp: ffi::KSP,
+    pub(super) ksp: ffi::KSP,
     /// Right-hand side and solution, made with the operator.
     vectors: Option<[Vector; 2]>,
     rows: usize,
+    /// Number of updates of the matrix.
+    pub(super) updates: Rc<Cell<u64>>,
+    /// That number when the preconditioner failed, if it did.
+    pub(super) failed_at: Cell<Option<u64>>,
+    /// Whether a solve writes to its right-hand side.
+    writes_to_b: bool,
     prefix: String,
     session: Session,
 }
@@ -77,6 +86,9 @@ impl Ksp {
             ksp,
             vectors: None,
             rows: 0,
+            updates: Rc::default(),
+            failed_at: Cell::new(None),
+            writes_to_b: false,
             prefix: prefix.to_owned(),
             session: session.clone(),
         };
@@ -97,6 +109,9 @@ impl Ksp {
             self.vectors = Some([new()?, new()?]);
             self.rows = matrix.rows();
         }
+        self.updates = matrix.updates();
+        // A failure with another matrix says nothing about this one.
+        self.failed_at.set(self.failed_at.get().map(|_| u64::MAX));
         Ok(())
     }
 
@@ -104,26 +119,42 @@ impl Ksp {
     /// its answer would be wrong.
     ///
     /// # Errors
-    /// When PETSc refuses an option, and for `-ksp_diagonal_scale`, which changes the matrix itself.
+    /// When PETSc refuses an option; for the options that change the matrix itself, `-ksp_diagonal_scale` and
+    /// `-pc_factor_in_place`; and for `preonly` over a nested solver that keeps a preconditioner.
     pub fn set_from_options(&mut self) -> Result<()> {
-        let options = self.own_options();
-        petsc!(KSPSetFromOptions(self.ksp))
-            .map_err(|error| error.help(format!("correct one of {options}*")))?;
-        let mut scaled = ffi::PetscBool_PETSC_FALSE;
-        petsc!(KSPGetDiagonalScale(self.ksp, &mut scaled))?;
-        if scaled != ffi::PetscBool_PETSC_FALSE {
-            return Err(Error::new(
-                Kind::Solver,
-                format!("{options}ksp_diagonal_scale cannot be used here"),
-            )
-            .because("it changes the values of the matrix, which belong to the program")
-            .help(format!("leave it out, or take `{options}pc_type jacobi`")));
+        petsc!(KSPSetFromOptions(self.ksp)).map_err(|error| {
+            let own = match self.prefix.as_str() {
+                "" => String::new(),
+                prefix => format!("options of this solver begin with `-{prefix}`; "),
+            };
+            error.help(format!("{own}-help lists all options and types"))
+        })?;
+        let typed = self.session.options().all()?;
+        let start = self.own_options();
+        let own = typed.iter().filter_map(|(name, value)| {
+            let bare = name.strip_prefix(&start)?;
+            FAMILIES.iter().any(|family| bare.starts_with(family)).then_some((bare, value.as_deref()))
+        });
+        self.writes_to_b = own.clone().any(|(_, value)| value == Some("eisenstat"));
+        for (name, value) in own {
+            if matches!(value, Some("0" | "no" | "false" | "off")) {
+                continue;
+            }
+            let refused = |inside: &str, cause: &str| {
+                Error::new(Kind::Solver, format!("{start}{name} cannot be used {inside}")).because(cause)
+            };
+            if CHANGING.iter().any(|end| name.ends_with(end)) {
+                let cause = "it changes the values of the matrix, which belong to the program";
+                return Err(refused("here", cause).help("leave it out"));
+            }
+            if self.applies_only() && name.ends_with("_ksp_reuse_preconditioner") {
+                let cause = "the solution would be that of an older matrix";
+                return Err(refused(&format!("inside `{}`", self.ksp_type()), cause)
+                    .help(format!("take an iterative method, e.g. `{start}ksp_type cg`")));
+            }
         }
         if self.applies_only() {
-            petsc!(KSPSetReusePreconditioner(
-                self.ksp,
-                ffi::PetscBool_PETSC_FALSE
-            ))?;
+            petsc!(KSPSetReusePreconditioner(self.ksp, ffi::PetscBool_PETSC_FALSE))?;
         }
         Ok(())
     }
@@ -134,38 +165,12 @@ impl Ksp {
     /// # Errors
     /// When PETSc cannot use the matrix with the types chosen.
     pub fn set_up(&self) -> Result<()> {
-        let advise = |error: Error| {
-            error.help(format!(
-                "choose other {0}ksp_type, {0}pc_type, ...",
-                self.own_options()
-            ))
-        };
+        let advise =
+            |error: Error| error.help(format!("choose other {0}ksp_type, {0}pc_type, ...", self.own_options()));
+        self.recover()?;
         petsc!(KSPSetUp(self.ksp)).map_err(advise)?;
-        petsc!(KSPSetUpOnBlocks(self.ksp)).map_err(advise)
-    }
-
-    /// What went wrong in making the preconditioner, such as a zero pivot; `None` if nothing did.
-    pub fn failure(&self) -> Option<String> {
-        let pc = self.pc().ok()?;
-        let mut reason = ffi::PCFailedReason_PC_NOERROR;
-        petsc!(PCGetFailedReason(pc, &mut reason)).ok()?;
-        let text = match reason {
-            ffi::PCFailedReason_PC_NOERROR => return None,
-            ffi::PCFailedReason_PC_FACTOR_STRUCT_ZEROPIVOT => {
-                "a zero pivot in the pattern of the factorisation"
-            }
-            ffi::PCFailedReason_PC_FACTOR_NUMERIC_ZEROPIVOT => "a zero pivot in the factorisation",
-            ffi::PCFailedReason_PC_FACTOR_OUTMEMORY => "not enough memory for the factorisation",
-            ffi::PCFailedReason_PC_FACTOR_OTHER => "the factorisation failed",
-            ffi::PCFailedReason_PC_SUBPC_ERROR => "a preconditioner inside it failed",
-            _ => "its set-up failed",
-        };
-        Some(match self.mumps_info(pc) {
-            Some((first, second)) => {
-                format!("{text}; MUMPS says INFOG(1)={first}, INFOG(2)={second}")
-            }
-            None => text.to_owned(),
-        })
+        petsc!(KSPSetUpOnBlocks(self.ksp)).map_err(advise)?;
+        self.note_failure()
     }
 
     /// Solves `A x = b` from a zero guess, without copies.
@@ -174,36 +179,33 @@ impl Ksp {
     /// When a slice has not one entry a row, or no matrix was set. Divergence is told in [`Solved::reason`].
     pub fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<Solved> {
         let Some([right, left]) = &self.vectors else {
-            return Err(Error::new(
-                Kind::Solver,
-                "a linear solver was called before it had a matrix",
-            ));
+            return Err(Error::new(Kind::Solver, "a linear solver was called before it had a matrix"));
         };
         same("b", b.len(), self.rows)?;
         same("x", x.len(), self.rows)?;
+        // Nothing in PETSc writes to the right-hand side but this preconditioner, which restores it.
+        let copy = self.writes_to_b.then(|| b.to_vec());
+        let b = copy.as_deref().unwrap_or(b);
         let mut guess = ffi::PetscBool_PETSC_FALSE;
         petsc!(KSPGetInitialGuessNonzero(self.ksp, &mut guess))?;
         if guess != ffi::PetscBool_PETSC_FALSE {
             x.fill(0.0);
         }
+        self.recover()?;
         {
             let right = right.place(b.as_ptr())?;
             let left = left.place(x.as_mut_ptr())?;
             petsc!(KSPSolve(self.ksp, right.vec(), left.vec()))?;
         }
+        self.note_failure()?;
         let (mut iterations, mut reason, mut residual) = (0, 0, 0.0);
         petsc!(KSPGetIterationNumber(self.ksp, &mut iterations))?;
         petsc!(KSPGetConvergedReason(self.ksp, &mut reason))?;
         petsc!(KSPGetResidualNorm(self.ksp, &mut residual))?;
         let reason = ConvergedReason::from_raw(reason, || {
-            self.failure()
-                .unwrap_or_else(|| "it is infinite or not a number where it was applied".to_owned())
+            self.failure().unwrap_or_else(|| "it is infinite or not a number where it was applied".to_owned())
         });
-        Ok(Solved {
-            iterations: iterations as usize,
-            reason,
-            residual,
-        })
+        Ok(Solved { iterations: iterations as usize, reason, residual })
     }
 
     /// Sets the relative tolerance.
@@ -211,23 +213,19 @@ impl Ksp {
     /// # Errors
     /// When it is not between 0 and 1.
     pub fn set_tolerance(&self, rtol: f64) -> Result<()> {
-        let [_, atol, dtol] = self.tolerances()?.0;
-        let limit = self.tolerances()?.1;
+        let ([_, atol, dtol], limit) = self.tolerances()?;
         petsc!(KSPSetTolerances(self.ksp, rtol, atol, dtol, limit))
     }
 
     /// The relative tolerance in force.
     pub fn tolerance(&self) -> f64 {
-        self.tolerances()
-            .map_or(f64::NAN, |(tolerances, _)| tolerances[0])
+        self.tolerances().map_or(f64::NAN, |(tolerances, _)| tolerances[0])
     }
 
     /// Relative, absolute and divergence tolerance; iteration limit.
     fn tolerances(&self) -> Result<([f64; 3], Int)> {
         let ([mut rtol, mut atol, mut dtol], mut limit) = ([0.0; 3], 0);
-        petsc!(KSPGetTolerances(
-            self.ksp, &mut rtol, &mut atol, &mut dtol, &mut limit
-        ))?;
+        petsc!(KSPGetTolerances(self.ksp, &mut rtol, &mut atol, &mut dtol, &mut limit))?;
         Ok(([rtol, atol, dtol], limit))
     }
 
@@ -268,15 +266,9 @@ impl Ksp {
     pub fn set_reuse_preconditioner(&self, reuse: bool) -> Result<()> {
         if reuse && self.applies_only() {
             let name = self.ksp_type();
-            return Err(Error::new(
-                Kind::Solver,
-                format!("`{name}` cannot keep the factorisation of an older matrix"),
-            )
-            .because("it applies it once and would return the solution of the older system")
-            .help(format!(
-                "take an iterative method, e.g. `{}ksp_type cg`",
-                self.own_options()
-            )));
+            return Err(Error::new(Kind::Solver, format!("`{name}` cannot keep the factorisation of an older matrix"))
+                .because("it applies it once and would return the solution of the older system")
+                .help(format!("take an iterative method, e.g. `{}ksp_type cg`", self.own_options())));
         }
         petsc!(KSPSetReusePreconditioner(self.ksp, reuse as ffi::PetscBool))
     }
@@ -307,25 +299,15 @@ impl Ksp {
     }
 
     /// PETSc's preconditioner, which belongs to the solver.
-    fn pc(&self) -> Result<ffi::PC> {
+    pub(super) fn pc(&self) -> Result<ffi::PC> {
         let mut pc = null_mut();
         petsc!(KSPGetPC(self.ksp, &mut pc))?;
         Ok(pc)
     }
-
-    /// MUMPS' INFOG(1) and INFOG(2), where MUMPS factors.
-    fn mumps_info(&self, pc: ffi::PC) -> Option<(Int, Int)> {
-        if self.factor_package()? != "mumps" {
-            return None;
-        }
-        let mut factor = null_mut();
-        petsc!(PCFactorGetMatrix(pc, &mut factor)).ok()?;
-        let (mut first, mut second) = (0, 0);
-        petsc!(MatMumpsGetInfog(factor, 1, &mut first)).ok()?;
-        petsc!(MatMumpsGetInfog(factor, 2, &mut second)).ok()?;
-        Some((first, second))
-    }
 }
+
+/// Ends of the options that change the matrix of the system itself.
+const CHANGING: [&str; 3] = ["ksp_diagonal_scale", "ksp_diagonal_scale_fix", "pc_factor_in_place"];
 
 impl Drop for Ksp {
     fn drop(&mut self) {

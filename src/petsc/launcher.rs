@@ -19,11 +19,8 @@ const LAUNCHERS: [&str; 9] = [
 ];
 
 /// What Open MPI is told when it runs alone.
-const ALONE: [(&str, &str); 3] = [
-    ("OMPI_MCA_ess_singleton_isolated", "1"),
-    ("OMPI_MCA_pml", "ob1"),
-    ("OMPI_MCA_btl", "self"),
-];
+const ALONE: [(&str, &str); 3] =
+    [("OMPI_MCA_ess_singleton_isolated", "1"), ("OMPI_MCA_pml", "ob1"), ("OMPI_MCA_btl", "self")];
 
 /// Whether a launcher such as `mpiexec` started this process.
 pub(super) fn seen() -> bool {

@@ -22,8 +22,10 @@
 //! ```
 #![allow(unsafe_code)]
 
+mod arrays;
 mod blas;
 mod error;
+mod failure;
 mod ffi;
 mod ksp;
 mod launcher;
@@ -38,11 +40,19 @@ mod vector;
 
 pub use ksp::{Ksp, Solved};
 pub use matrix::{Int, Matrix};
-pub use options::{Entry, Options};
+pub use options::{Entry, FAMILIES, Options};
 pub use reason::ConvergedReason;
 pub use session::Session;
 
 /// Runs `action` and returns its result and all that PETSc printed meanwhile, which is not shown.
+///
+/// ```
+/// use winkler::petsc::{Ksp, Session, printed};
+/// let session = Session::start(&["-help".to_owned()])?;
+/// let (read, text) = printed(&session, || Ksp::new(&session, "up_")?.set_from_options());
+/// assert!(read.is_ok() && text.contains("-up_ksp_rtol"));
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
 pub fn printed<T>(_session: &Session, action: impl FnOnce() -> T) -> (T, String) {
     print::caught(action)
 }

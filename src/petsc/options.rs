@@ -7,6 +7,27 @@ use std::collections::BTreeMap;
 use std::ffi::{CString, c_char};
 use std::ptr::null_mut;
 
+/// How the options of a solver begin after its prefix: objects, and objects nested in them.
+pub const FAMILIES: [&str; 17] = [
+    "ksp_",
+    "pc_",
+    "mat_",
+    "sub_",
+    "mg_",
+    "fieldsplit_",
+    "vec_",
+    "esteig_",
+    "redundant_",
+    "telescope_",
+    "deflation_",
+    "hpddm_",
+    "lsc_",
+    "matmatmult_",
+    "matproduct_",
+    "matptap_",
+    "mattransposematmult_",
+];
+
 /// PETSc's table of options, filled from the command line, `PETSC_OPTIONS`, `.petscrc` and `-options_file`.
 ///
 /// Names may be given with or without their dash and come back with it; PETSc does not tell capital from small letters
@@ -43,9 +64,7 @@ pub type Entry = (String, Option<String>);
 impl Options {
     /// The table of the running session.
     pub(super) fn new(session: &Session) -> Self {
-        Options {
-            _session: session.clone(),
-        }
+        Options { _session: session.clone() }
     }
 
     /// Sets an option, replacing its value.
@@ -55,20 +74,14 @@ impl Options {
     pub fn set(&self, name: &str, value: Option<&str>) -> Result<()> {
         let name = key(name)?;
         let value = value.map(text).transpose()?;
-        petsc!(PetscOptionsSetValue(
-            null_mut(),
-            name.as_ptr(),
-            value.as_ref().map_or(null_mut(), |v| v.as_ptr())
-        ))
+        petsc!(PetscOptionsSetValue(null_mut(), name.as_ptr(), value.as_ref().map_or(null_mut(), |v| v.as_ptr())))
     }
 
     /// Value of an option; empty for one without a value, `None` for one that is not set.
     pub fn get(&self, name: &str) -> Option<String> {
         let name = dashed(name);
         let all = self.all().ok()?;
-        all.into_iter()
-            .find(|(known, _)| known.eq_ignore_ascii_case(&name))
-            .map(|(_, value)| value.unwrap_or_default())
+        all.into_iter().find(|(known, _)| known.eq_ignore_ascii_case(&name)).map(|(_, value)| value.unwrap_or_default())
     }
 
     /// Whether an option is set.
@@ -100,19 +113,11 @@ impl Options {
         let words = unsafe {
             let words = string(whole);
             if let Some(free) = ffi::PetscTrFree {
-                free(
-                    whole.cast(),
-                    0,
-                    c"Options::all".as_ptr(),
-                    c"options.rs".as_ptr(),
-                );
+                free(whole.cast(), 0, c"Options::all".as_ptr(), c"options.rs".as_ptr());
             }
             words
         };
-        for word in words
-            .split_whitespace()
-            .filter(|word| word.starts_with('-'))
-        {
+        for word in words.split_whitespace().filter(|word| word.starts_with('-')) {
             if !entries.contains_key(word) && self.used(word) {
                 entries.insert(word.to_owned(), self.read(word)?);
             }
@@ -126,12 +131,7 @@ impl Options {
         let mut used = ffi::PetscBool_PETSC_FALSE;
         // This one PETSc function wants the name without its dash.
         let bare = &name.as_c_str().to_bytes_with_nul()[1..];
-        petsc!(PetscOptionsUsed(
-            null_mut(),
-            bare.as_ptr().cast(),
-            &mut used
-        ))
-        .is_ok()
+        petsc!(PetscOptionsUsed(null_mut(), bare.as_ptr().cast(), &mut used)).is_ok()
             && used == ffi::PetscBool_PETSC_TRUE
     }
 
@@ -150,29 +150,16 @@ impl Options {
     pub fn left(&self) -> Result<Vec<Entry>> {
         let mut count = 0;
         let (mut names, mut values) = (null_mut(), null_mut());
-        petsc!(PetscOptionsLeftGet(
-            null_mut(),
-            &mut count,
-            &mut names,
-            &mut values
-        ))?;
+        petsc!(PetscOptionsLeftGet(null_mut(), &mut count, &mut names, &mut values))?;
         // SAFETY: PETSc gives `count` names and as many values; a value is null where there is none. They are copied
         // before PETSc takes its two lists back.
         let mut entries: Vec<Entry> = (0..count as usize)
             .map(|i| unsafe {
                 let value = *values.add(i);
-                (
-                    format!("-{}", string(*names.add(i))),
-                    (!value.is_null()).then(|| string(value)),
-                )
+                (format!("-{}", string(*names.add(i))), (!value.is_null()).then(|| string(value)))
             })
             .collect();
-        petsc!(PetscOptionsLeftRestore(
-            null_mut(),
-            &mut count,
-            &mut names,
-            &mut values
-        ))?;
+        petsc!(PetscOptionsLeftRestore(null_mut(), &mut count, &mut names, &mut values))?;
         entries.sort();
         Ok(entries)
     }
@@ -182,13 +169,7 @@ impl Options {
         let name = key(name)?;
         let mut value: *const c_char = std::ptr::null();
         let mut set = ffi::PetscBool_PETSC_FALSE;
-        petsc!(PetscOptionsFindPair(
-            null_mut(),
-            std::ptr::null(),
-            name.as_ptr(),
-            &mut value,
-            &mut set
-        ))?;
+        petsc!(PetscOptionsFindPair(null_mut(), std::ptr::null(), name.as_ptr(), &mut value, &mut set))?;
         // SAFETY: null, or a text that PETSc keeps till the option changes; it is copied.
         Ok((!value.is_null()).then(|| unsafe { string(value) }))
     }
@@ -196,35 +177,22 @@ impl Options {
 
 /// The name with its dash.
 fn dashed(name: &str) -> String {
-    if name.starts_with('-') {
-        name.to_owned()
-    } else {
-        format!("-{name}")
-    }
+    if name.starts_with('-') { name.to_owned() } else { format!("-{name}") }
 }
 
 /// The name as PETSc wants it, checked: PETSc takes any text and never finds it again.
 fn key(name: &str) -> Result<CString> {
     let name = dashed(name);
-    let valid = name.strip_prefix('-').is_some_and(|bare| {
-        bare.trim_start_matches('-')
-            .starts_with(char::is_alphabetic)
-    }) && !name.contains(char::is_whitespace);
+    let valid =
+        name.strip_prefix('-').is_some_and(|bare| bare.trim_start_matches('-').starts_with(char::is_alphabetic))
+            && !name.contains(char::is_whitespace);
     if !valid {
-        return Err(Error::new(
-            Kind::Solver,
-            format!("`{name}` is not the name of a PETSc option"),
-        ));
+        return Err(Error::new(Kind::Solver, format!("`{name}` is not the name of a PETSc option")));
     }
     text(&name)
 }
 
 /// A C text.
 pub(super) fn text(text: &str) -> Result<CString> {
-    CString::new(text).map_err(|_| {
-        Error::new(
-            Kind::Solver,
-            format!("a zero byte in a PETSc option: {text:?}"),
-        )
-    })
+    CString::new(text).map_err(|_| Error::new(Kind::Solver, format!("a zero byte in a PETSc option: {text:?}")))
 }

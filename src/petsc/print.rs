@@ -34,17 +34,11 @@ pub(super) fn caught<T>(action: impl FnOnce() -> T) -> (T, String) {
 }
 
 /// The printer in force while [`caught`] runs.
-unsafe extern "C" fn append(
-    _file: *mut c_void,
-    format: *const c_char,
-    list: *mut c_void,
-) -> ffi::PetscErrorCode {
+unsafe extern "C" fn append(_file: *mut c_void, format: *const c_char, list: *mut c_void) -> ffi::PetscErrorCode {
     let mut text = vec![0_u8; LONGEST];
     let mut length = 0;
     // SAFETY: PETSc writes at most `LONGEST` bytes with the final zero; format and list come from PETSc as they are.
-    let code = unsafe {
-        ffi::PetscVSNPrintf(text.as_mut_ptr().cast(), LONGEST, format, &mut length, list)
-    };
+    let code = unsafe { ffi::PetscVSNPrintf(text.as_mut_ptr().cast(), LONGEST, format, &mut length, list) };
     let end = text.iter().position(|byte| *byte == 0).unwrap_or(0);
     CAUGHT.with_borrow_mut(|caught| caught.extend_from_slice(&text[..end]));
     code

@@ -50,8 +50,9 @@ impl ConvergedReason {
             ffi::KSPConvergedReason_KSP_CONVERGED_ITS => Self::Iterations,
             ffi::KSPConvergedReason_KSP_DIVERGED_ITS => Self::IterationLimit,
             ffi::KSPConvergedReason_KSP_DIVERGED_DTOL => Self::DivergenceTolerance,
-            ffi::KSPConvergedReason_KSP_DIVERGED_BREAKDOWN
-            | ffi::KSPConvergedReason_KSP_DIVERGED_BREAKDOWN_BICG => Self::Breakdown,
+            ffi::KSPConvergedReason_KSP_DIVERGED_BREAKDOWN | ffi::KSPConvergedReason_KSP_DIVERGED_BREAKDOWN_BICG => {
+                Self::Breakdown
+            }
             ffi::KSPConvergedReason_KSP_DIVERGED_NONSYMMETRIC => Self::NotSymmetric,
             ffi::KSPConvergedReason_KSP_DIVERGED_INDEFINITE_PC => Self::IndefinitePreconditioner,
             ffi::KSPConvergedReason_KSP_DIVERGED_INDEFINITE_MAT => Self::IndefiniteMatrix,
@@ -64,13 +65,7 @@ impl ConvergedReason {
 
     /// Whether the solution is to the tolerance asked for.
     pub fn converged(&self) -> bool {
-        matches!(
-            self,
-            Self::RelativeTolerance
-                | Self::AbsoluteTolerance
-                | Self::Iterations
-                | Self::OtherConverged(_)
-        )
+        matches!(self, Self::RelativeTolerance | Self::AbsoluteTolerance | Self::Iterations | Self::OtherConverged(_))
     }
 }
 
@@ -81,9 +76,7 @@ impl fmt::Display for ConvergedReason {
             Self::AbsoluteTolerance => "the absolute tolerance was reached",
             Self::Iterations => "the asked number of iterations was done",
             Self::IterationLimit => "the iteration limit was reached (-ksp_max_it)",
-            Self::DivergenceTolerance => {
-                "the residual grew beyond the divergence tolerance (-ksp_divtol)"
-            }
+            Self::DivergenceTolerance => "the residual grew beyond the divergence tolerance (-ksp_divtol)",
             Self::Breakdown => "the Krylov method broke down",
             Self::NotSymmetric => "the Krylov method needs a symmetric matrix and preconditioner",
             Self::IndefinitePreconditioner => "the preconditioner is not positive definite",

@@ -49,17 +49,12 @@ pub fn check_version(petscversion: &str) -> Result<(), String> {
             found.then(|| words.next()?.parse::<u32>().ok()).flatten()
         })
     };
-    let (Some(major), Some(minor)) = (number("PETSC_VERSION_MAJOR"), number("PETSC_VERSION_MINOR"))
-    else {
-        return Err(format!(
-            "petscversion.h of this PETSc does not tell its version: {ADVICE}"
-        ));
+    let (Some(major), Some(minor)) = (number("PETSC_VERSION_MAJOR"), number("PETSC_VERSION_MINOR")) else {
+        return Err(format!("petscversion.h of this PETSc does not tell its version: {ADVICE}"));
     };
     if (major, minor) < OLDEST {
         let (a, b) = OLDEST;
-        return Err(format!(
-            "this PETSc is {major}.{minor}, but winkler needs {a}.{b} or newer: {ADVICE}"
-        ));
+        return Err(format!("this PETSc is {major}.{minor}, but winkler needs {a}.{b} or newer: {ADVICE}"));
     }
     Ok(())
 }
@@ -80,10 +75,7 @@ mod tests {
     fn each_shortcoming_has_its_own_sentence() {
         let refusals = [
             (format!("{GOOD}#define PETSC_USE_COMPLEX 1\n"), "complex"),
-            (
-                GOOD.replace("REAL_DOUBLE", "REAL_SINGLE"),
-                "double precision",
-            ),
+            (GOOD.replace("REAL_DOUBLE", "REAL_SINGLE"), "double precision"),
             (GOOD.replace("HAVE_MUMPS", "HAVE_MUMPSX"), "without MUMPS"),
             (GOOD.replace("HAVE_HYPRE", "HAVE_HYPREX"), "without hypre"),
         ];
@@ -97,9 +89,7 @@ mod tests {
     #[test]
     fn the_version_is_compared_by_numbers() {
         let text = |major: u32, minor: u32| {
-            format!(
-                "#define PETSC_VERSION_MAJOR      {major}\n#define PETSC_VERSION_MINOR      {minor}\n"
-            )
+            format!("#define PETSC_VERSION_MAJOR      {major}\n#define PETSC_VERSION_MINOR      {minor}\n")
         };
         assert_eq!(check_version(&text(3, 18)), Ok(()));
         assert_eq!(check_version(&text(3, 100)), Ok(()));

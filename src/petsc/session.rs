@@ -51,10 +51,7 @@ impl Session {
         let nul = |_| Error::new(Kind::Solver, "a PETSc option contains a zero byte");
         // PETSc keeps a pointer to these words till its end; they are leaked, once.
         let mut arguments = Vec::with_capacity(words.len() + 3);
-        for word in std::iter::once("winkler")
-            .chain(words.iter().map(String::as_str))
-            .chain([NO_SIGNALS])
-        {
+        for word in std::iter::once("winkler").chain(words.iter().map(String::as_str)).chain([NO_SIGNALS]) {
             arguments.push(CString::new(word).map_err(nul)?.into_raw());
         }
         let mut count = arguments.len() as c_int;
@@ -62,33 +59,19 @@ impl Session {
         let mut arguments: *mut *mut c_char = Vec::leak(arguments).as_mut_ptr();
 
         if STARTED.swap(true, Ordering::SeqCst) {
-            return Err(
-                Error::new(Kind::Solver, "PETSc was already started in this process")
-                    .help("start one session and clone it"),
-            );
+            return Err(Error::new(Kind::Solver, "PETSc was already started in this process")
+                .help("start one session and clone it"));
         }
-        let universe = launcher::quick(mpi::initialize).ok_or_else(|| {
-            Error::new(
-                Kind::Solver,
-                "MPI was already started in this process by other code",
-            )
-        })?;
+        let universe = launcher::quick(mpi::initialize)
+            .ok_or_else(|| Error::new(Kind::Solver, "MPI was already started in this process by other code"))?;
         let world = SimpleCommunicator::world();
         abort_on_panic(world.size() > 1);
         // Pushed first, so that errors of the start are recorded too and handlers that the user asks for
         // (-on_error_abort, -start_in_debugger) come on top.
         petsc!(PetscPushErrorHandler(Some(record), std::ptr::null_mut()))?;
         let (count, arguments) = (&raw mut count, &raw mut arguments);
-        petsc!(PetscInitialize(
-            count,
-            arguments,
-            std::ptr::null(),
-            std::ptr::null()
-        ))?;
-        let session = Session(Rc::new(Running {
-            world,
-            _universe: universe,
-        }));
+        petsc!(PetscInitialize(count, arguments, std::ptr::null(), std::ptr::null()))?;
+        let session = Session(Rc::new(Running { world, _universe: universe }));
         session.options().clear(NO_SIGNALS)?;
         Ok(session)
     }
@@ -116,12 +99,7 @@ impl Session {
     /// Version of PETSc at run time, such as `3.18.5`.
     pub fn petsc_version(&self) -> String {
         let (mut major, mut minor, mut patch, mut release) = (0, 0, 0, 0);
-        match petsc!(PetscGetVersionNumber(
-            &mut major,
-            &mut minor,
-            &mut patch,
-            &mut release
-        )) {
+        match petsc!(PetscGetVersionNumber(&mut major, &mut minor, &mut patch, &mut release)) {
             Ok(()) => format!("{major}.{minor}.{patch}"),
             Err(_) => "unknown".to_owned(),
         }

@@ -18,17 +18,8 @@ impl Vector {
         // SAFETY: the constant of MPI itself.
         let comm = unsafe { RSMPI_COMM_SELF };
         let mut vec = null_mut();
-        petsc!(VecCreateSeqWithArray(
-            comm,
-            block_size as Int,
-            rows as Int,
-            null(),
-            &mut vec
-        ))?;
-        Ok(Vector {
-            vec,
-            _session: session.clone(),
-        })
+        petsc!(VecCreateSeqWithArray(comm, block_size as Int, rows as Int, null(), &mut vec))?;
+        Ok(Vector { vec, _session: session.clone() })
     }
 
     /// A vector with memory of its own.
@@ -37,10 +28,7 @@ impl Vector {
         let comm = unsafe { RSMPI_COMM_SELF };
         let mut vec = null_mut();
         petsc!(VecCreateSeq(comm, values.len() as Int, &mut vec))?;
-        let vector = Vector {
-            vec,
-            _session: session.clone(),
-        };
+        let vector = Vector { vec, _session: session.clone() };
         petsc!(VecSetBlockSize(vec, block_size as Int))?;
         let mut array = null_mut();
         petsc!(VecGetArray(vec, &mut array))?;

@@ -14,30 +14,13 @@ use std::path::{Path, PathBuf};
 
 /// Checks a whole scene, read from `path`. Looks whether the mesh file is there.
 pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
-    const KEYS: &[&str] = &[
-        "title",
-        "dimension",
-        "plane",
-        "mesh",
-        "body",
-        "contact",
-        "method",
-        "solver",
-        "output",
-    ];
+    const KEYS: &[&str] = &["title", "dimension", "plane", "mesh", "body", "contact", "method", "solver", "output"];
     let keys = Keys::open(tree, "the scene", KEYS)?;
     let dimension = dimension(&keys)?;
-    let decoder = Decoder {
-        dimension: dimension.value,
-        folder: path.parent().unwrap_or(Path::new("")),
-    };
+    let decoder = Decoder { dimension: dimension.value, folder: path.parent().unwrap_or(Path::new("")) };
     let title = match keys.get("title") {
         Some(node) => node.string()?.to_owned(),
-        None => path
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned(),
+        None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
     };
     Ok(Scene {
         path: path.to_owned(),
@@ -75,16 +58,9 @@ impl Decoder<'_> {
     fn vector(&self, node: &Node) -> Result<[Field; 3]> {
         let items = node.list()?;
         if items.len() != self.dimension {
-            let place = items
-                .get(self.dimension)
-                .map_or(&node.place, |extra| &extra.place);
-            let count = format!(
-                "a vector has {} components here, not {}",
-                self.dimension,
-                items.len()
-            );
-            return Err(Error::scene(place, count)
-                .help(format!("the dimension of the scene is {}", self.dimension)));
+            let place = items.get(self.dimension).map_or(&node.place, |extra| &extra.place);
+            let count = format!("a vector has {} components here, not {}", self.dimension, items.len());
+            return Err(Error::scene(place, count).help(format!("the dimension of the scene is {}", self.dimension)));
         }
         let mut vector = [const { Field::Constant(0.0) }; 3];
         for (component, item) in vector.iter_mut().zip(items) {
@@ -98,27 +74,18 @@ impl Decoder<'_> {
             return Ok(Plane::Strain);
         };
         if self.dimension == 3 {
-            return Err(
-                Error::scene(&entry.key_place, "`plane` in a problem in space")
-                    .label("only plane problems have it")
-                    .help("remove it, or set dimension = 2"),
-            );
+            return Err(Error::scene(&entry.key_place, "`plane` in a problem in space")
+                .label("only plane problems have it")
+                .help("remove it, or set dimension = 2"));
         }
-        choose(
-            &entry.node,
-            "plane",
-            &[("strain", Plane::Strain), ("stress", Plane::Stress)],
-        )
+        choose(&entry.node, "plane", &[("strain", Plane::Strain), ("stress", Plane::Stress)])
     }
 
     fn mesh(&self, node: &Node) -> Result<MeshSource> {
         if let Value::String(name) = &node.value {
             let file = self.file(node)?;
             return Ok(match name.ends_with(".geo") {
-                true => MeshSource::Geo {
-                    file,
-                    set: Vec::new(),
-                },
+                true => MeshSource::Geo { file, set: Vec::new() },
                 false => MeshSource::Msh { file },
             });
         }
@@ -129,21 +96,13 @@ impl Decoder<'_> {
         keys.exclude("geo", "msh")?;
         if let Some(file) = keys.get("msh") {
             return match keys.entry("set") {
-                None => Ok(MeshSource::Msh {
-                    file: self.file(file)?,
-                }),
-                Some(set) => Err(
-                    Error::scene(&set.key_place, "`set` for a finished mesh").help(
-                        "numbers can be set in a Gmsh script: mesh = { geo = \"...\", set = ... }",
-                    ),
-                ),
+                None => Ok(MeshSource::Msh { file: self.file(file)? }),
+                Some(set) => Err(Error::scene(&set.key_place, "`set` for a finished mesh")
+                    .help("numbers can be set in a Gmsh script: mesh = { geo = \"...\", set = ... }")),
             };
         }
         let file = self.file(keys.require("geo")?)?;
-        Ok(MeshSource::Geo {
-            file,
-            set: keys.get("set").map_or(Ok(Vec::new()), numbers)?,
-        })
+        Ok(MeshSource::Geo { file, set: keys.get("set").map_or(Ok(Vec::new()), numbers)? })
     }
 
     /// The path of a file that must exist, joined with the folder of the scene.
@@ -154,26 +113,19 @@ impl Decoder<'_> {
             Ok(found) if found.is_file() => Ok(Located::new(path, node.place.clone())),
             Ok(_) => Err(node.refuse(format!("{} is not a file", path.display()))),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                let folder = path
-                    .parent()
-                    .filter(|folder| !folder.as_os_str().is_empty())
-                    .unwrap_or(Path::new("."));
+                let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
                 let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
-                let names: Vec<_> = files
-                    .map(|file| file.file_name().to_string_lossy().into_owned())
-                    .collect();
+                let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
                 let wanted = path.file_name().unwrap_or_default().to_string_lossy();
-                Err(node
-                    .refuse(format!("there is no file {}", path.display()))
-                    .label("not there")
-                    .help(match nearest(&wanted, names.iter().map(String::as_str)) {
-                        Some(near) => format!("did you mean `{near}`?"),
-                        None => "paths are relative to the folder of the scene file".to_owned(),
-                    }))
+                Err(node.refuse(format!("there is no file {}", path.display())).label("not there").help(match nearest(
+                    &wanted,
+                    names.iter().map(String::as_str),
+                ) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => "paths are relative to the folder of the scene file".to_owned(),
+                }))
             }
-            Err(error) => Err(node
-                .refuse(format!("cannot look at {}", path.display()))
-                .because(error.to_string())),
+            Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
         }
     }
 }
@@ -183,9 +135,7 @@ fn dimension(keys: &Keys) -> Result<Located<usize>> {
     match node.whole()? {
         2 => Ok(Located::new(2, node.place.clone())),
         3 => Ok(Located::new(3, node.place.clone())),
-        other => Err(node
-            .refuse(format!("the dimension is {other}"))
-            .label("must be 2 or 3")),
+        other => Err(node.refuse(format!("the dimension is {other}")).label("must be 2 or 3")),
     }
 }
 
@@ -197,15 +147,8 @@ fn numbers(node: &Node) -> Result<Vec<(String, f64)>> {
     let mut numbers = Vec::new();
     for entry in entries {
         let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-        if !entry.key.chars().all(word)
-            || !entry
-                .key
-                .starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
-        {
-            return Err(Error::scene(
-                &entry.key_place,
-                format!("`{}` is no name of a Gmsh number", entry.key),
-            ));
+        if !entry.key.chars().all(word) || !entry.key.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
+            return Err(Error::scene(&entry.key_place, format!("`{}` is no name of a Gmsh number", entry.key)));
         }
         numbers.push((entry.key.clone(), entry.node.number()?));
     }
@@ -220,20 +163,14 @@ fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Result<T>
         return Ok(choice.clone());
     }
     let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
-    Err(node.refuse(format!("unknown {what} `{word}`")).help(
-        match nearest(word, names.iter().copied()) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => format!("it is one of {}", names.join(", ")),
-        },
-    ))
+    Err(node.refuse(format!("unknown {what} `{word}`")).help(match nearest(word, names.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("it is one of {}", names.join(", ")),
+    }))
 }
 
 fn preset(node: &Node) -> Result<Preset> {
-    choose(
-        node,
-        "solver",
-        &[("mumps", Preset::Mumps), ("hypre", Preset::Hypre)],
-    )
+    choose(node, "solver", &[("mumps", Preset::Mumps), ("hypre", Preset::Hypre)])
 }
 
 fn solver(node: Option<&Node>) -> Result<SolverSpec> {
@@ -241,10 +178,7 @@ fn solver(node: Option<&Node>) -> Result<SolverSpec> {
         return Ok(SolverSpec::default());
     };
     if let Value::String(_) = node.value {
-        return Ok(SolverSpec {
-            preset: Some(preset(node)?),
-            options: Vec::new(),
-        });
+        return Ok(SolverSpec { preset: Some(preset(node)?), options: Vec::new() });
     }
     let keys = Keys::open(node, "the solver", &["preset", "options"])?;
     let mut options = Vec::new();
@@ -256,10 +190,7 @@ fn solver(node: Option<&Node>) -> Result<SolverSpec> {
                 .help("options start with a dash: -ksp_rtol 1e-10"));
         }
     }
-    Ok(SolverSpec {
-        preset: keys.get("preset").map(preset).transpose()?,
-        options,
-    })
+    Ok(SolverSpec { preset: keys.get("preset").map(preset).transpose()?, options })
 }
 
 fn output(node: Option<&Node>) -> Result<OutputSpec> {
@@ -267,10 +198,7 @@ fn output(node: Option<&Node>) -> Result<OutputSpec> {
     let Some(node) = node else { return Ok(default) };
     let keys = Keys::open(node, "[output]", &["dir", "vtu", "plots"])?;
     Ok(OutputSpec {
-        dir: keys
-            .get("dir")
-            .map(|dir| dir.name().map(|name| name.value.into()))
-            .transpose()?,
+        dir: keys.get("dir").map(|dir| dir.name().map(|name| name.value.into())).transpose()?,
         vtu: keys.get("vtu").map_or(Ok(default.vtu), Node::boolean)?,
         plots: keys.get("plots").map_or(Ok(default.plots), Node::boolean)?,
     })

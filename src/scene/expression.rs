@@ -58,9 +58,7 @@ impl Expression {
         for (used, slot) in used.iter_mut().zip(self.slots.iter()) {
             *used = values.get(*slot).copied().unwrap_or(f64::NAN);
         }
-        self.flat
-            .eval(&used[..self.slots.len()])
-            .unwrap_or(f64::NAN)
+        self.flat.eval(&used[..self.slots.len()]).unwrap_or(f64::NAN)
     }
 
     /// Whether the expression uses no variable.
@@ -111,18 +109,10 @@ impl Field {
             let value = expression.eval(&[]);
             return match value.is_finite() {
                 true => Ok(Field::Constant(value)),
-                false => Err(Error::scene(
-                    place,
-                    format!("the expression is not a finite number but {value}"),
-                )),
+                false => Err(Error::scene(place, format!("the expression is not a finite number but {value}"))),
             };
         }
-        expression.slots = expression
-            .flat
-            .var_names()
-            .iter()
-            .filter_map(|name| coordinate(name))
-            .collect();
+        expression.slots = expression.flat.var_names().iter().filter_map(|name| coordinate(name)).collect();
         Ok(Field::Expression(expression))
     }
 
@@ -146,11 +136,7 @@ impl Field {
     /// Value at a point, refused if it is not finite; `what` names the quantity in the message ("gap").
     pub fn eval_finite(&self, what: &str, x: [f64; 3]) -> Result<f64> {
         let value = self.eval(x);
-        if value.is_finite() {
-            Ok(value)
-        } else {
-            Err(self.refuse(what, &x, value))
-        }
+        if value.is_finite() { Ok(value) } else { Err(self.refuse(what, &x, value)) }
     }
 
     /// Whether it holds at a point in iteration `k`: true, or a number > 0. Where it is not defined it is false.
@@ -161,11 +147,7 @@ impl Field {
     /// Like [`Field::is_true_at`], but refuses a place where it is not defined.
     pub fn check_true_at(&self, what: &str, x: [f64; 3], k: usize) -> Result<bool> {
         let value = self.eval_at(x, k);
-        if value.is_nan() {
-            Err(self.refuse(what, &[x[0], x[1], x[2], k as f64], value))
-        } else {
-            Ok(value > 0.0)
-        }
+        if value.is_nan() { Err(self.refuse(what, &[x[0], x[1], x[2], k as f64], value)) } else { Ok(value > 0.0) }
     }
 
     /// Whether it is the constant zero.
@@ -216,12 +198,7 @@ struct Slip {
 
 impl Slip {
     fn new(span: Range<usize>, message: impl Into<String>) -> Self {
-        Self {
-            span,
-            message: message.into(),
-            label: String::new(),
-            help: None,
-        }
+        Self { span, message: message.into(), label: String::new(), help: None }
     }
 
     fn label(mut self, label: &str) -> Self {
@@ -236,21 +213,11 @@ impl Slip {
 
     /// The error, with the caret inside the string where its text is verbatim in the source (no escapes).
     fn into_error(self, text: &str, place: &Place) -> Error {
-        let written = place
-            .source
-            .text
-            .get(place.span.clone())
-            .unwrap_or_default();
-        let exact = written
-            .find(text)
-            .filter(|_| !text.is_empty())
-            .map(|offset| {
-                let start = place.span.start + offset;
-                Place {
-                    source: place.source.clone(),
-                    span: start + self.span.start..start + self.span.end,
-                }
-            });
+        let written = place.source.text.get(place.span.clone()).unwrap_or_default();
+        let exact = written.find(text).filter(|_| !text.is_empty()).map(|offset| {
+            let start = place.span.start + offset;
+            Place { source: place.source.clone(), span: start + self.span.start..start + self.span.end }
+        });
         let error = Error::scene(exact.as_ref().unwrap_or(place), self.message).label(self.label);
         match self.help {
             Some(help) => error.help(help),

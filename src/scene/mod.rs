@@ -21,10 +21,7 @@ use std::sync::Arc;
 ///
 /// Errors point at the words in the scene or the override; a file that cannot be read is [`Kind::File`].
 pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
-    let source = Arc::new(Source {
-        name: path.display().to_string(),
-        text: read_text(path)?,
-    });
+    let source = Arc::new(Source { name: path.display().to_string(), text: read_text(path)? });
     let mut tree = read::document(&source)?;
     for text in overrides {
         overrides::apply(&mut tree, text)?;
@@ -34,10 +31,7 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
 
 fn read_text(path: &Path) -> Result<String> {
     if path.is_dir() {
-        let error = Error::new(
-            Kind::File,
-            format!("{} is a folder, not a scene file", path.display()),
-        );
+        let error = Error::new(Kind::File, format!("{} is a folder, not a scene file", path.display()));
         let inside = path.join("scene.toml");
         return Err(match inside.is_file() {
             true => error.help(format!("did you mean {}?", inside.display())),
@@ -47,14 +41,8 @@ fn read_text(path: &Path) -> Result<String> {
     let bytes = std::fs::read(path).map_err(|cause| Error::file(path, "read", &cause))?;
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
-        let line = 1 + error.as_bytes()[..valid]
-            .iter()
-            .filter(|byte| **byte == b'\n')
-            .count();
-        Error::new(
-            Kind::File,
-            format!("{} is not UTF-8 text, see line {line}", path.display()),
-        )
-        .help("save the scene file as UTF-8")
+        let line = 1 + error.as_bytes()[..valid].iter().filter(|byte| **byte == b'\n').count();
+        Error::new(Kind::File, format!("{} is not UTF-8 text, see line {line}", path.display()))
+            .help("save the scene file as UTF-8")
     })
 }

@@ -10,15 +10,9 @@ use std::sync::Arc;
 
 /// Applies one override to the tree of a scene.
 pub(super) fn apply(tree: &mut Node, text: &str) -> Result<()> {
-    let source = Arc::new(Source {
-        name: "--set".into(),
-        text: text.trim_end().into(),
-    });
+    let source = Arc::new(Source { name: "--set".into(), text: text.trim_end().into() });
     let text = source.text.as_str();
-    let at = |span: Range<usize>| Place {
-        source: source.clone(),
-        span,
-    };
+    let at = |span: Range<usize>| Place { source: source.clone(), span };
     let Some(equals) = text.find('=') else {
         return Err(Error::new(Kind::Usage, "--set without `=`")
             .at(&at(0..text.len()))
@@ -27,28 +21,17 @@ pub(super) fn apply(tree: &mut Node, text: &str) -> Result<()> {
     let path = segments(&text[..equals]);
     for span in &path {
         let key = &text[span.clone()];
-        if key.is_empty()
-            || !key
-                .chars()
-                .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
-        {
-            return Err(
-                Error::scene(&at(0..equals), "this is not a key of the scene")
-                    .help("a key is names and numbers joined by points: body.1.young"),
-            );
+        if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
+            return Err(Error::scene(&at(0..equals), "this is not a key of the scene")
+                .help("a key is names and numbers joined by points: body.1.young"));
         }
     }
     let new = value(&source, equals + 1)?;
     let mut node = tree;
     for (depth, span) in path.iter().enumerate() {
-        let key = Key {
-            name: &text[span.clone()],
-            place: at(span.clone()),
-        };
+        let key = Key { name: &text[span.clone()], place: at(span.clone()) };
         let parent = &text[..span.start.saturating_sub(1)];
-        let indexed = path
-            .get(depth + 1)
-            .is_some_and(|next| is_number(&text[next.clone()]));
+        let indexed = path.get(depth + 1).is_some_and(|next| is_number(&text[next.clone()]));
         node = descend(node, &key, parent, indexed)?;
     }
     *node = new;
@@ -75,40 +58,22 @@ fn segments(path: &str) -> Vec<Range<usize>> {
 fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
     let bare = source.text[offset..].trim_start();
     let span = source.text.len() - bare.len()..source.text.len();
-    let place = Place {
-        source: source.clone(),
-        span,
-    };
+    let place = Place { source: source.clone(), span };
     if bare.is_empty() {
-        return Err(
-            Error::scene(&place, "the value is missing").help("an empty text is written \"\"")
-        );
+        return Err(Error::scene(&place, "the value is missing").help("an empty text is written \"\""));
     }
     match read::value(source, place.span.start) {
         Ok(node) => Ok(node),
         // What was meant as TOML: a table, a list, a quoted text, a number too large to hold.
-        Err(error) if bare.starts_with(['{', '[', '"', '\'']) || bare.parse::<f64>().is_ok() => {
-            Err(error)
-        }
-        Err(_) => Ok(Node {
-            place,
-            value: Value::String(bare.to_owned()),
-        }),
+        Err(error) if bare.starts_with(['{', '[', '"', '\'']) || bare.parse::<f64>().is_ok() => Err(error),
+        Err(_) => Ok(Node { place, value: Value::String(bare.to_owned()) }),
     }
 }
 
 /// The child of a node that a key names; made if it is not there. `indexed` says that an item of it is wanted next.
-fn descend<'a>(
-    node: &'a mut Node,
-    key: &Key<'_>,
-    parent: &str,
-    indexed: bool,
-) -> Result<&'a mut Node> {
+fn descend<'a>(node: &'a mut Node, key: &Key<'_>, parent: &str, indexed: bool) -> Result<&'a mut Node> {
     if !matches!(node.value, Value::List(_) | Value::Table(_)) {
-        *node = Node {
-            place: key.place.clone(),
-            value: Value::Table(Vec::new()),
-        };
+        *node = Node { place: key.place.clone(), value: Value::Table(Vec::new()) };
     }
     match &mut node.value {
         Value::List(items) => {
@@ -125,41 +90,22 @@ fn descend<'a>(
                 }
             };
             if !is_number(key.name) {
-                return Err(refuse(format!(
-                    "`{parent}` is a list of {count}; `{}` is no number",
-                    key.name
-                )));
+                return Err(refuse(format!("`{parent}` is a list of {count}; `{}` is no number", key.name)));
             }
             match key.name.parse::<usize>() {
                 Ok(index) if index < items.len() => Ok(&mut items[index]),
-                _ => Err(refuse(format!(
-                    "`{parent}` has {count}, there is no number {}",
-                    key.name
-                ))),
+                _ => Err(refuse(format!("`{parent}` has {count}, there is no number {}", key.name))),
             }
         }
         Value::Table(entries) => {
-            let index = entries
-                .iter()
-                .position(|entry| entry.key == key.name)
-                .unwrap_or(entries.len());
+            let index = entries.iter().position(|entry| entry.key == key.name).unwrap_or(entries.len());
             if index == entries.len() {
                 if indexed {
-                    return Err(Error::scene(
-                        &key.place,
-                        format!("`{}` has no items to choose from", key.name),
-                    )
-                    .help("the scene has no such list"));
+                    return Err(Error::scene(&key.place, format!("`{}` has no items to choose from", key.name))
+                        .help("the scene has no such list"));
                 }
-                let node = Node {
-                    place: key.place.clone(),
-                    value: Value::Table(Vec::new()),
-                };
-                entries.push(Entry {
-                    key: key.name.to_owned(),
-                    key_place: key.place.clone(),
-                    node,
-                });
+                let node = Node { place: key.place.clone(), value: Value::Table(Vec::new()) };
+                entries.push(Entry { key: key.name.to_owned(), key_place: key.place.clone(), node });
             }
             Ok(&mut entries[index].node)
         }

@@ -38,16 +38,12 @@ pub(super) fn document(source: &Arc<Source>) -> Result<Node> {
     let table = DeTable::parse(&source.text).map_err(|error| syntax(source, 0, &error))?;
     let convert = Convert { source, offset: 0 };
     let value = Value::Table(convert.entries(table.get_ref())?);
-    Ok(Node {
-        place: convert.place(table.span()),
-        value,
-    })
+    Ok(Node { place: convert.place(table.span()), value })
 }
 
 /// Parses the value that stands at `offset` of the source up to its end.
 pub(super) fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
-    let value =
-        DeValue::parse(&source.text[offset..]).map_err(|error| syntax(source, offset, &error))?;
+    let value = DeValue::parse(&source.text[offset..]).map_err(|error| syntax(source, offset, &error))?;
     Convert { source, offset }.node(&value)
 }
 
@@ -58,9 +54,7 @@ fn syntax(source: &Arc<Source>, offset: usize, error: &toml::de::Error) -> Error
     let marked = &source.text[place.span.clone()];
     let refusal = Error::scene(&place, format!("this is not TOML: {}", error.message()));
     let quotable = !marked.is_empty() && !marked.contains(['"', '\'', '\n', '=', '[', '{']);
-    let after_equals = source.text[..place.span.start]
-        .trim_end()
-        .ends_with(['=', '[', ',']);
+    let after_equals = source.text[..place.span.start].trim_end().ends_with(['=', '[', ',']);
     match quotable && after_equals {
         true => refusal.help(format!("texts and expressions need quotes: \"{marked}\"")),
         false => refusal,
@@ -76,29 +70,17 @@ impl Convert<'_> {
     /// A place, kept inside the text and on character borders.
     fn place(&self, span: Range<usize>) -> Place {
         let text = &self.source.text;
-        let border = |from: usize| {
-            (0..=from.min(text.len()))
-                .rev()
-                .find(|at| text.is_char_boundary(*at))
-                .unwrap_or(0)
-        };
+        let border = |from: usize| (0..=from.min(text.len())).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
         let start = border(span.start + self.offset);
         let end = border(span.end + self.offset).max(start);
-        Place {
-            source: self.source.clone(),
-            span: start..end,
-        }
+        Place { source: self.source.clone(), span: start..end }
     }
 
     fn entries(&self, table: &DeTable<'_>) -> Result<Vec<Entry>> {
         let entry = |(key, value): (&toml::Spanned<_>, &_)| {
             let key: &toml::Spanned<toml::de::DeString<'_>> = key;
             let node = self.node(value)?;
-            Ok(Entry {
-                key: key.get_ref().to_string(),
-                key_place: self.place(key.span()),
-                node,
-            })
+            Ok(Entry { key: key.get_ref().to_string(), key_place: self.place(key.span()), node })
         };
         let mut entries = table.iter().map(entry).collect::<Result<Vec<_>>>()?;
         entries.sort_by_key(|entry| entry.key_place.span.start);
@@ -109,24 +91,17 @@ impl Convert<'_> {
         let place = self.place(value.span());
         let value = match value.get_ref() {
             DeValue::String(text) => Value::String(text.to_string()),
-            DeValue::Integer(digits) => {
-                match i64::from_str_radix(digits.as_str(), digits.radix()) {
-                    Ok(value) => Value::Integer(value),
-                    Err(_) => return Err(Error::scene(&place, "the number is too large")),
-                }
-            }
+            DeValue::Integer(digits) => match i64::from_str_radix(digits.as_str(), digits.radix()) {
+                Ok(value) => Value::Integer(value),
+                Err(_) => return Err(Error::scene(&place, "the number is too large")),
+            },
             DeValue::Float(digits) => match digits.as_str().parse() {
                 Ok(value) => Value::Float(value),
                 Err(_) => return Err(Error::scene(&place, "not a number")),
             },
             DeValue::Boolean(value) => Value::Boolean(*value),
             DeValue::Datetime(_) => Value::Date,
-            DeValue::Array(items) => Value::List(
-                items
-                    .iter()
-                    .map(|item| self.node(item))
-                    .collect::<Result<_>>()?,
-            ),
+            DeValue::Array(items) => Value::List(items.iter().map(|item| self.node(item)).collect::<Result<_>>()?),
             DeValue::Table(table) => Value::Table(self.entries(table)?),
         };
         Ok(Node { place, value })
@@ -145,12 +120,9 @@ impl Node {
             Value::List(_) => "a list",
             Value::Table(_) => "a table",
         };
-        let error = Error::scene(&self.place, format!("expected {what}, found {found}"))
-            .label(format!("not {what}"));
+        let error = Error::scene(&self.place, format!("expected {what}, found {found}")).label(format!("not {what}"));
         match &self.value {
-            Value::String(text) if text.parse::<f64>().is_ok() => {
-                error.help("write the number without quotes")
-            }
+            Value::String(text) if text.parse::<f64>().is_ok() => error.help("write the number without quotes"),
             Value::Integer(_) | Value::Float(_) | Value::Boolean(_) if what == "a string" => {
                 error.help("write it in quotes")
             }
@@ -192,9 +164,7 @@ impl Node {
     pub fn positive(&self, what: &str) -> Result<f64> {
         match self.number()? {
             value if value > 0.0 => Ok(value),
-            value => Err(self
-                .refuse(format!("{what} is {value}"))
-                .label("must be greater than 0")),
+            value => Err(self.refuse(format!("{what} is {value}")).label("must be greater than 0")),
         }
     }
 
@@ -232,22 +202,12 @@ impl<'a> Keys<'a> {
     /// Opens a table; `what` names it in messages. The first key outside `known` is refused.
     pub fn open(node: &'a Node, what: &'a str, known: &[&str]) -> Result<Self> {
         let Value::Table(entries) = &node.value else {
-            return Err(node
-                .expected("a table")
-                .help(format!("its keys are {}", known.join(", "))));
+            return Err(node.expected("a table").help(format!("its keys are {}", known.join(", "))));
         };
-        match entries
-            .iter()
-            .find(|entry| !known.contains(&entry.key.as_str()))
-        {
-            None => Ok(Self {
-                node,
-                entries,
-                what,
-            }),
+        match entries.iter().find(|entry| !known.contains(&entry.key.as_str())) {
+            None => Ok(Self { node, entries, what }),
             Some(Entry { key, key_place, .. }) => {
-                let error = Error::scene(key_place, format!("unknown key `{key}` in {what}"))
-                    .label("unknown key");
+                let error = Error::scene(key_place, format!("unknown key `{key}` in {what}")).label("unknown key");
                 Err(error.help(match nearest(key, known.iter().copied()) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => format!("its keys are {}", known.join(", ")),
@@ -272,26 +232,20 @@ impl<'a> Keys<'a> {
     /// The value of a key that must be there.
     pub fn require(&self, key: &str) -> Result<&'a Node> {
         self.get(key).ok_or_else(|| {
-            Error::scene(&self.node.place, format!("{} has no `{key}`", self.what))
-                .label(format!("`{key}` is missing"))
+            Error::scene(&self.node.place, format!("{} has no `{key}`", self.what)).label(format!("`{key}` is missing"))
         })
     }
 
     /// Refuses a table with two keys of which only one can hold; points at the later one, or the overriding one.
     pub fn exclude(&self, first: &str, second: &str) -> Result<()> {
-        let mut both = self
-            .entries
-            .iter()
-            .filter(|entry| entry.key == first || entry.key == second)
-            .skip(1);
+        let mut both = self.entries.iter().filter(|entry| entry.key == first || entry.key == second).skip(1);
         match both.next() {
             None => Ok(()),
-            Some(Entry { key_place, .. }) => Err(Error::scene(
-                key_place,
-                format!("{} has both `{first}` and `{second}`", self.what),
-            )
-            .label("only one of them can hold")
-            .help(format!("remove `{first}` or `{second}`"))),
+            Some(Entry { key_place, .. }) => {
+                Err(Error::scene(key_place, format!("{} has both `{first}` and `{second}`", self.what))
+                    .label("only one of them can hold")
+                    .help(format!("remove `{first}` or `{second}`")))
+            }
         }
     }
 }

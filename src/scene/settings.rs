@@ -2,8 +2,8 @@
 
 use super::expression::Field;
 use super::{
-    BodySpec, ContactSpec, LayerSpec, LoadKind, MeshSource, MethodSpec, Order, Plane, Preset,
-    Scene, SolverSpec, Start, StopSpec, Zone,
+    BodySpec, ContactSpec, LayerSpec, LoadKind, MeshSource, MethodSpec, Order, Plane, Preset, Scene, SolverSpec, Start,
+    StopSpec, Zone,
 };
 use serde_json::{Map, Value, json};
 
@@ -24,28 +24,12 @@ impl Scene {
         }
         settings.insert("mesh".into(), mesh(&self.mesh));
         let dimension = self.dimension.value;
-        settings.insert(
-            "body".into(),
-            self.bodies
-                .iter()
-                .map(|item| body(item, dimension))
-                .collect(),
-        );
-        settings.insert(
-            "contact".into(),
-            self.contacts.iter().map(contact).collect(),
-        );
+        settings.insert("body".into(), self.bodies.iter().map(|item| body(item, dimension)).collect());
+        settings.insert("contact".into(), self.contacts.iter().map(contact).collect());
         settings.insert("method".into(), method(&self.method));
         settings.insert("solver".into(), solver(&self.solver));
         let mut output = Map::new();
-        insert(
-            &mut output,
-            "dir",
-            self.output
-                .dir
-                .as_ref()
-                .map(|dir| json!(dir.display().to_string())),
-        );
+        insert(&mut output, "dir", self.output.dir.as_ref().map(|dir| json!(dir.display().to_string())));
         output.insert("vtu".into(), json!(self.output.vtu));
         output.insert("plots".into(), json!(self.output.plots));
         settings.insert("output".into(), output.into());
@@ -74,10 +58,7 @@ fn mesh(mesh: &MeshSource) -> Value {
     match mesh {
         MeshSource::Msh { file } => json!({ "msh": file.value.display().to_string() }),
         MeshSource::Geo { file, set } => {
-            let set: Map<_, _> = set
-                .iter()
-                .map(|(name, value)| (name.clone(), json!(value)))
-                .collect();
+            let set: Map<_, _> = set.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
             json!({ "geo": file.value.display().to_string(), "set": set })
         }
     }
@@ -109,11 +90,7 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
     map.insert("order".into(), json!(order));
     map.insert("fix".into(), fix.collect());
     map.insert("load".into(), load.collect());
-    insert(
-        &mut map,
-        "force",
-        body.force.as_ref().map(|force| vector(force, dimension)),
-    );
+    insert(&mut map, "force", body.force.as_ref().map(|force| vector(force, dimension)));
     map.into()
 }
 
@@ -123,14 +100,7 @@ fn contact(contact: &ContactSpec) -> Value {
         LayerSpec::Linear { stiffness } => json!({ "linear": { "stiffness": stiffness } }),
     };
     let mut map = Map::new();
-    map.insert(
-        "between".into(),
-        contact
-            .between
-            .iter()
-            .map(|name| json!(name.value))
-            .collect(),
-    );
+    map.insert("between".into(), contact.between.iter().map(|name| json!(name.value)).collect());
     map.insert("gap".into(), field(&contact.gap));
     map.insert("layer".into(), layer);
     insert(&mut map, "reference", contact.reference.as_ref().map(field));
@@ -149,11 +119,7 @@ fn method(method: &MethodSpec) -> Value {
         Start::Zero => json!("zero"),
         Start::Normal(normal) => json!({ "normal": field(normal) }),
     };
-    let StopSpec {
-        residual,
-        increment,
-        iterations,
-    } = &method.stop;
+    let StopSpec { residual, increment, iterations } = &method.stop;
     let mut stop = Map::new();
     insert(&mut stop, "residual", residual.map(|value| json!(value)));
     insert(&mut stop, "increment", increment.map(|value| json!(value)));

@@ -209,22 +209,13 @@ pub enum Preset {
 
 impl Default for MethodSpec {
     fn default() -> Self {
-        Self {
-            psi: Zone::Active,
-            gamma: 0.6,
-            start: Start::Zero,
-            stop: StopSpec::default(),
-        }
+        Self { psi: Zone::Active, gamma: 0.6, start: Start::Zero, stop: StopSpec::default() }
     }
 }
 
 impl Default for StopSpec {
     fn default() -> Self {
-        Self {
-            residual: Some(1e-8),
-            increment: None,
-            iterations: 2000,
-        }
+        Self { residual: Some(1e-8), increment: None, iterations: 2000 }
     }
 }
 
@@ -241,10 +232,6 @@ pub struct OutputSpec {
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self {
-            dir: None,
-            vtu: true,
-            plots: true,
-        }
+        Self { dir: None, vtu: true, plots: true }
     }
 }

@@ -47,21 +47,12 @@ fn load_text(text: &str, overrides: &[&str]) -> Result<Scene> {
 pub(super) fn caret(error: &Error) -> String {
     let shown = error.render(false);
     let lines: Vec<&str> = shown.lines().collect();
-    let marks = lines.iter().position(|line| {
-        line.trim_start()
-            .trim_start_matches('|')
-            .trim_start()
-            .starts_with('^')
-    });
+    let marks = lines.iter().position(|line| line.trim_start().trim_start_matches('|').trim_start().starts_with('^'));
     let Some(marks) = marks.filter(|at| *at > 0) else {
         return String::new();
     };
     let start = lines[marks].chars().position(|c| c == '^').unwrap_or(0);
-    let length = lines[marks]
-        .chars()
-        .skip(start)
-        .take_while(|c| *c == '^')
-        .count();
+    let length = lines[marks].chars().skip(start).take_while(|c| *c == '^').count();
     lines[marks - 1].chars().skip(start).take(length).collect()
 }
 
@@ -70,84 +61,34 @@ fn the_groove_is_read() {
     let scene = load_text(GROOVE, &[]).unwrap();
     assert_eq!(scene.title, "Groove with a nonlinear Winkler layer");
     assert_eq!((scene.dimension.value, scene.plane), (2, Plane::Strain));
-    let MeshSource::Geo { file, set } = &scene.mesh else {
-        panic!("{:?}", scene.mesh)
-    };
+    let MeshSource::Geo { file, set } = &scene.mesh else { panic!("{:?}", scene.mesh) };
     assert_eq!(file.value, scene.path.parent().unwrap().join("groove.geo"));
     assert_eq!(set, &[("n".to_owned(), 32.0)]);
 
-    let [lower, upper] = &scene.bodies[..] else {
-        panic!("{:?}", scene.bodies)
-    };
-    assert_eq!(
-        (lower.young.value, lower.poisson.value, lower.order),
-        (2.1e5, 0.3, Order::P1)
-    );
+    let [lower, upper] = &scene.bodies[..] else { panic!("{:?}", scene.bodies) };
+    assert_eq!((lower.young.value, lower.poisson.value, lower.order), (2.1e5, 0.3, Order::P1));
     assert_eq!(lower.fix[0].value, [Some(0.0), None, None]);
     assert_eq!(lower.fix[1].on.value, "lower_end");
-    assert!(matches!(
-        lower.load[0].kind,
-        LoadKind::Pressure(Field::Constant(10.0))
-    ));
+    assert!(matches!(lower.load[0].kind, LoadKind::Pressure(Field::Constant(10.0))));
     assert!(lower.force.is_none());
     let force = upper.force.as_ref().unwrap();
-    assert_eq!(
-        force
-            .each_ref()
-            .map(|component| component.eval([0.0, 1.0, 0.0])),
-        [0.0, -9.81e-6 * 2.0, 0.0]
-    );
-    let LoadKind::Traction(traction) = &upper.load[0].kind else {
-        panic!("{:?}", upper.load)
-    };
-    assert_eq!(
-        traction
-            .each_ref()
-            .map(|component| component.eval([3.0, 1.0, 0.0])),
-        [6.0, -10.0, 0.0]
-    );
+    assert_eq!(force.each_ref().map(|component| component.eval([0.0, 1.0, 0.0])), [0.0, -9.81e-6 * 2.0, 0.0]);
+    let LoadKind::Traction(traction) = &upper.load[0].kind else { panic!("{:?}", upper.load) };
+    assert_eq!(traction.each_ref().map(|component| component.eval([3.0, 1.0, 0.0])), [6.0, -10.0, 0.0]);
 
-    let [contact] = &scene.contacts[..] else {
-        panic!("{:?}", scene.contacts)
-    };
+    let [contact] = &scene.contacts[..] else { panic!("{:?}", scene.contacts) };
     assert_eq!(contact.between[1].value, "upper_bottom");
-    assert_eq!(
-        contact.between[1].place.source.text[contact.between[1].place.span.clone()],
-        *"\"upper_bottom\""
-    );
+    assert_eq!(contact.between[1].place.source.text[contact.between[1].place.span.clone()], *"\"upper_bottom\"");
     assert_eq!(contact.gap.eval([4.0, 0.0, 0.0]), 5e-4);
     assert_eq!(contact.gap.eval([5.5, 0.0, 0.0]), 0.0);
     assert_eq!(contact.layer, LayerSpec::Power { b: 2.5e-5, a: 0.5 });
 
     assert!(matches!(scene.method.psi, Zone::Active));
     assert_eq!(scene.method.gamma, 0.7);
-    assert!(matches!(
-        scene.method.start,
-        Start::Normal(Field::Constant(1e-4))
-    ));
-    assert_eq!(
-        scene.method.stop,
-        StopSpec {
-            residual: None,
-            increment: Some(1e-3),
-            iterations: 2000
-        }
-    );
-    assert_eq!(
-        scene.solver,
-        SolverSpec {
-            preset: None,
-            options: vec![]
-        }
-    );
-    assert_eq!(
-        scene.output,
-        OutputSpec {
-            dir: None,
-            vtu: true,
-            plots: true
-        }
-    );
+    assert!(matches!(scene.method.start, Start::Normal(Field::Constant(1e-4))));
+    assert_eq!(scene.method.stop, StopSpec { residual: None, increment: Some(1e-3), iterations: 2000 });
+    assert_eq!(scene.solver, SolverSpec { preset: None, options: vec![] });
+    assert_eq!(scene.output, OutputSpec { dir: None, vtu: true, plots: true });
 }
 
 #[test]
@@ -159,37 +100,14 @@ fn defaults_and_a_scene_in_space() {
     assert!(matches!(&scene.mesh, MeshSource::Msh { .. }));
     assert_eq!(scene.bodies[0].order, Order::P2);
     assert_eq!(scene.bodies[0].fix[0].value, [None, None, Some(0.5)]);
-    assert_eq!(
-        scene.bodies[0].force.as_ref().unwrap()[0].eval([1.0, 2.0, 3.0]),
-        3.0
-    );
+    assert_eq!(scene.bodies[0].force.as_ref().unwrap()[0].eval([1.0, 2.0, 3.0]), 3.0);
     assert!(scene.contacts.is_empty());
     assert!(matches!(scene.method.start, Start::Zero));
     assert_eq!(scene.method.gamma, 0.6);
-    assert_eq!(
-        scene.method.stop,
-        StopSpec {
-            residual: Some(1e-8),
-            increment: None,
-            iterations: 2000
-        }
-    );
+    assert_eq!(scene.method.stop, StopSpec { residual: Some(1e-8), increment: None, iterations: 2000 });
     let options = vec!["-ksp_rtol".to_owned(), "1e-10".to_owned()];
-    assert_eq!(
-        scene.solver,
-        SolverSpec {
-            preset: Some(Preset::Hypre),
-            options
-        }
-    );
-    assert_eq!(
-        scene.output,
-        OutputSpec {
-            dir: Some("out".into()),
-            vtu: false,
-            plots: true
-        }
-    );
+    assert_eq!(scene.solver, SolverSpec { preset: Some(Preset::Hypre), options });
+    assert_eq!(scene.output, OutputSpec { dir: Some("out".into()), vtu: false, plots: true });
 }
 
 #[test]
@@ -219,39 +137,20 @@ fn overrides_replace_and_add() {
     .unwrap();
     assert_eq!(scene.bodies[1].young.value, 1e5);
     assert_eq!(scene.bodies[1].young.place.source.name, "--set");
-    let LoadKind::Traction(traction) = &scene.bodies[1].load[0].kind else {
-        panic!()
-    };
+    let LoadKind::Traction(traction) = &scene.bodies[1].load[0].kind else { panic!() };
     assert_eq!(traction[1].eval([0.0; 3]), 2.0);
-    assert_eq!(
-        scene.contacts[0].layer,
-        LayerSpec::Linear { stiffness: 1.0 }
-    );
+    assert_eq!(scene.contacts[0].layer, LayerSpec::Linear { stiffness: 1.0 });
     assert_eq!(scene.contacts[0].gap.eval([2.0, 0.0, 0.0]), 2e-4);
-    assert_eq!(
-        scene.contacts[0]
-            .reference
-            .as_ref()
-            .unwrap()
-            .eval([3.0, 0.0, 0.0]),
-        -2.0
-    );
-    let Zone::Subset(zone) = &scene.method.psi else {
-        panic!()
-    };
+    assert_eq!(scene.contacts[0].reference.as_ref().unwrap().eval([3.0, 0.0, 0.0]), -2.0);
+    let Zone::Subset(zone) = &scene.method.psi else { panic!() };
     assert!(zone.is_true_at([2.0, 0.0, 0.0], 4) && !zone.is_true_at([2.0, 0.0, 0.0], 5));
     assert_eq!(scene.method.stop.residual, Some(1e-6));
     assert_eq!(scene.method.stop.increment, Some(1e-3));
-    let MeshSource::Geo { set, .. } = &scene.mesh else {
-        panic!()
-    };
+    let MeshSource::Geo { set, .. } = &scene.mesh else { panic!() };
     assert_eq!(set, &[("m".to_owned(), 2.0), ("n".to_owned(), 64.0)]);
     assert_eq!(scene.solver.preset, Some(Preset::Hypre));
     assert_eq!(scene.solver.options, ["-ksp_rtol", "1e-10"]);
-    assert_eq!(
-        (scene.title.as_str(), scene.plane),
-        ("Ein anderer Titel", Plane::Stress)
-    );
+    assert_eq!((scene.title.as_str(), scene.plane), ("Ein anderer Titel", Plane::Stress));
     assert!(!scene.output.vtu && scene.output.plots);
     assert_eq!(scene.method.gamma, 0.2);
 }
@@ -259,38 +158,19 @@ fn overrides_replace_and_add() {
 /// The echo, written as a scene again, gives the same echo: nothing is lost and no key is misspelt.
 #[test]
 fn settings_are_a_scene() {
-    let scene = load_text(
-        GROOVE,
-        &["solver=hypre", "output.dir=out", "contact.0.reference=x"],
-    )
-    .unwrap();
+    let scene = load_text(GROOVE, &["solver=hypre", "output.dir=out", "contact.0.reference=x"]).unwrap();
     let settings = scene.settings();
-    assert_eq!(
-        settings["method"]["stop"],
-        serde_json::json!({ "increment": 1e-3, "iterations": 2000 })
-    );
-    assert_eq!(
-        settings["contact"][0]["gap"],
-        "5e-4 * max(0, 1 - (x - 4)^2)^1.5"
-    );
+    assert_eq!(settings["method"]["stop"], serde_json::json!({ "increment": 1e-3, "iterations": 2000 }));
+    assert_eq!(settings["contact"][0]["gap"], "5e-4 * max(0, 1 - (x - 4)^2)^1.5");
     assert_eq!(settings["body"][1]["order"], 1);
-    assert_eq!(
-        settings["body"][1]["load"][0]["traction"],
-        serde_json::json!(["2*x", -10.0])
-    );
+    assert_eq!(settings["body"][1]["load"][0]["traction"], serde_json::json!(["2*x", -10.0]));
     let mut again = settings.clone();
     again.as_object_mut().unwrap().remove("scene");
     again["mesh"]["geo"] = "groove.geo".into();
-    let overrides: Vec<String> = again
-        .as_object()
-        .unwrap()
-        .iter()
-        .map(|(key, value)| format!("{key}={}", inline(value)))
-        .collect();
+    let overrides: Vec<String> =
+        again.as_object().unwrap().iter().map(|(key, value)| format!("{key}={}", inline(value))).collect();
     let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-    let mut second = load_text("", &overrides)
-        .unwrap_or_else(|error| panic!("{error}"))
-        .settings();
+    let mut second = load_text("", &overrides).unwrap_or_else(|error| panic!("{error}")).settings();
     second["mesh"]["geo"] = settings["mesh"]["geo"].clone();
     second["scene"] = settings["scene"].clone();
     assert_eq!(settings, second);
@@ -300,16 +180,10 @@ fn settings_are_a_scene() {
 fn inline(value: &serde_json::Value) -> String {
     match value {
         serde_json::Value::Object(map) => {
-            let entries: Vec<_> = map
-                .iter()
-                .map(|(key, value)| format!("{key} = {}", inline(value)))
-                .collect();
+            let entries: Vec<_> = map.iter().map(|(key, value)| format!("{key} = {}", inline(value))).collect();
             format!("{{ {} }}", entries.join(", "))
         }
-        serde_json::Value::Array(items) => format!(
-            "[{}]",
-            items.iter().map(inline).collect::<Vec<_>>().join(", ")
-        ),
+        serde_json::Value::Array(items) => format!("[{}]", items.iter().map(inline).collect::<Vec<_>>().join(", ")),
         other => other.to_string(),
     }
 }
@@ -319,28 +193,12 @@ fn files_that_are_no_scene() {
     let folder = tempfile::tempdir().unwrap();
     let error = load(folder.path(), &[]).expect_err("a folder");
     assert_eq!(error.kind(), Kind::File);
-    assert!(
-        error.message().ends_with("is a folder, not a scene file"),
-        "{error}"
-    );
-    std::fs::write(
-        folder.path().join("scene.toml"),
-        b"title = \"a\"\nx = \"\xff\"\n",
-    )
-    .unwrap();
-    assert!(
-        load(folder.path(), &[])
-            .expect_err("a folder")
-            .advice()
-            .unwrap()
-            .contains("scene.toml")
-    );
+    assert!(error.message().ends_with("is a folder, not a scene file"), "{error}");
+    std::fs::write(folder.path().join("scene.toml"), b"title = \"a\"\nx = \"\xff\"\n").unwrap();
+    assert!(load(folder.path(), &[]).expect_err("a folder").advice().unwrap().contains("scene.toml"));
     let error = load(&folder.path().join("scene.toml"), &[]).expect_err("Latin-1");
     assert_eq!(error.kind(), Kind::File);
-    assert!(
-        error.message().ends_with("is not UTF-8 text, see line 2"),
-        "{error}"
-    );
+    assert!(error.message().ends_with("is not UTF-8 text, see line 2"), "{error}");
     let error = load(&folder.path().join("other.toml"), &[]).expect_err("nothing");
     assert_eq!(error.kind(), Kind::File);
     assert!(error.message().starts_with("cannot read "), "{error}");

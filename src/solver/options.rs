@@ -17,32 +17,9 @@ pub use split::split;
 pub use unread::{Unread, UnreadKind, unread};
 
 use crate::error::Result;
-use crate::petsc::{Options, Session};
+use crate::petsc::{FAMILIES, Options, Session};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-
-/// How options of a body begin, without its prefix: objects, and objects nested in them.
-const FAMILIES: [&str; 19] = [
-    "ksp_",
-    "pc_",
-    "mat_",
-    "sub_",
-    "mg_",
-    "fieldsplit_",
-    "vec_",
-    "esteig_",
-    "redundant_",
-    "telescope_",
-    "deflation_",
-    "hpddm_",
-    "lsc_",
-    "schur_",
-    "matmatmult_",
-    "matproduct_",
-    "matptap_",
-    "mattransposematmult_",
-    "inner_",
-];
 
 /// Why an option is in the table although nobody typed it.
 #[derive(Clone, Copy)]
@@ -71,9 +48,7 @@ fn is_plain(name: &str, bodies: &[&str]) -> bool {
 /// The body whose prefix an option has, and the option without it.
 fn body_of<'a, 'b>(name: &'a str, bodies: &[&'b str]) -> Option<(&'b str, &'a str)> {
     let bare = name.trim_start_matches('-');
-    bodies
-        .iter()
-        .find_map(|body| Some((*body, bare.strip_prefix(body)?.strip_prefix('_')?)))
+    bodies.iter().find_map(|body| Some((*body, bare.strip_prefix(body)?.strip_prefix('_')?)))
 }
 
 /// Sets an option that nobody typed and remembers why.
@@ -118,26 +93,13 @@ pub fn distribute(session: &Session, bodies: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// Takes back what this module put into the table, so that another scene of the process starts from the typed options.
-///
-/// # Errors
-/// When PETSc refuses, which it does not for options it has taken before.
-pub fn withdraw(session: &Session) -> Result<()> {
-    let ours = OURS.take();
-    ours.keys().try_for_each(|name| session.options().clear(name))
-}
-
 /// Sets `-<body>_<name>` unless it is set: a choice of the program, which never counts as typed or unread.
 ///
 /// # Errors
 /// When `name` is not one of an option.
 pub fn set_default(session: &Session, body: &str, name: &str, value: Option<&str>) -> Result<()> {
     let (options, own) = (session.options(), key(body, name));
-    if options.has(&own) {
-        Ok(())
-    } else {
-        put(&options, &own, value, Origin::Default)
-    }
+    if options.has(&own) { Ok(()) } else { put(&options, &own, value, Origin::Default) }
 }
 
 /// What the user typed as option `name` for this body, under its prefix or plainly; empty without a value.
@@ -158,9 +120,7 @@ pub fn typed(session: &Session, body: &str, name: &str) -> Option<String> {
     if matches!(origin(&own), Some(Origin::Default)) {
         return None;
     }
-    options
-        .get(&own)
-        .or_else(|| is_plain(name, &[body]).then(|| options.get(name)).flatten())
+    options.get(&own).or_else(|| is_plain(name, &[body]).then(|| options.get(name)).flatten())
 }
 
 /// Lets `cholesky` and `lu` mean MUMPS, in the solver of a body and in those nested in it (`-sub_pc_type lu`), where
@@ -190,15 +150,8 @@ pub fn prefer_mumps(session: &Session, body: &str) -> Result<()> {
         let Some(nest) = bare.strip_suffix("pc_type") else {
             continue;
         };
-        if (nest.is_empty() || nest.ends_with('_'))
-            && matches!(value.as_deref(), Some("cholesky" | "lu"))
-        {
-            set_default(
-                session,
-                body,
-                &format!("{nest}pc_factor_mat_solver_type"),
-                Some("mumps"),
-            )?;
+        if (nest.is_empty() || nest.ends_with('_')) && matches!(value.as_deref(), Some("cholesky" | "lu")) {
+            set_default(session, body, &format!("{nest}pc_factor_mat_solver_type"), Some("mumps"))?;
         }
     }
     Ok(())
@@ -226,11 +179,7 @@ pub fn mark_copies(session: &Session, bodies: &[&str]) -> Result<()> {
         if !is_plain(&name, bodies) || bodies.is_empty() {
             continue;
         }
-        let mut copies = bodies
-            .iter()
-            .map(|body| key(body, &name))
-            .filter(|own| origin(own).is_some())
-            .peekable();
+        let mut copies = bodies.iter().map(|body| key(body, &name)).filter(|own| origin(own).is_some()).peekable();
         if copies.peek().is_none() || copies.any(|own| options.used(&own)) {
             options.mark_used(&name)?;
         }
@@ -248,25 +197,21 @@ pub fn mark_copies(session: &Session, bodies: &[&str]) -> Result<()> {
 /// assert!(forbidden_body_name("mg").is_some_and(|reason| reason.contains("PETSc")));
 /// ```
 pub fn forbidden_body_name(name: &str) -> Option<&'static str> {
-    let letters = name
-        .bytes()
-        .all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit());
+    let letters = name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit());
     if !letters || !name.starts_with(|first: char| first.is_ascii_lowercase()) {
         return Some(
             "it begins the PETSc options of the body, so it has small letters and digits only, a letter first",
         );
     }
-    let family = FAMILIES
-        .iter()
-        .any(|family| family.strip_suffix('_') == Some(name));
-    if family || unread::GLOBAL.contains(&name) || MORE_WORDS.contains(&name) {
+    let family = FAMILIES.iter().any(|family| family.strip_suffix('_') == Some(name));
+    if family || unread::is_global_word(name) || MORE_WORDS.contains(&name) {
         return Some("options of PETSc itself begin with this word");
     }
     None
 }
 
 /// Words that begin options of PETSc, besides [`FAMILIES`] and those of PETSc as a whole.
-const MORE_WORDS: [&str; 32] = [
+const MORE_WORDS: [&str; 29] = [
     "snes",
     "ts",
     "tao",
@@ -295,9 +240,6 @@ const MORE_WORDS: [&str; 32] = [
     "npc",
     "no",
     "not",
-    "coarse",
-    "levels",
-    "winkler",
     "winklerprobe",
 ];
 
@@ -310,29 +252,18 @@ mod tests {
         assert!(is_plain("-mat_view", &["upper"]));
         assert!(!is_plain("-upper_mat_view", &["upper"]));
         assert!(!is_plain("-log_view", &["upper"]));
-        assert_eq!(
-            body_of("-up_ksp_type", &["u", "up"]),
-            Some(("up", "ksp_type"))
-        );
+        assert_eq!(body_of("-up_ksp_type", &["u", "up"]), Some(("up", "ksp_type")));
         assert_eq!(body_of("-upper_ksp_type", &["up"]), None);
     }
 
     #[test]
     fn forbidden_names_have_their_reason() {
-        for name in [
-            "ksp", "pc", "mat", "vec", "sub", "mg", "snes", "ts", "tao", "dm", "is", "log",
-            "options", "help",
-        ] {
-            assert!(
-                forbidden_body_name(name).is_some_and(|reason| reason.contains("PETSc itself")),
-                "{name}"
-            );
+        for name in ["ksp", "pc", "mat", "vec", "sub", "mg", "snes", "ts", "tao", "dm", "is", "log", "options", "help"]
+        {
+            assert!(forbidden_body_name(name).is_some_and(|reason| reason.contains("PETSc itself")), "{name}");
         }
         for name in ["", "2up", "up_per", "üb", "a b"] {
-            assert!(
-                forbidden_body_name(name).is_some_and(|reason| reason.contains("letter")),
-                "{name}"
-            );
+            assert!(forbidden_body_name(name).is_some_and(|reason| reason.contains("letter")), "{name}");
         }
         assert_eq!(forbidden_body_name("punch"), None);
     }

@@ -11,10 +11,6 @@ pub struct Linear {
 
 impl LayerLaw for Linear {
     fn compressed(&self, _point: usize, c: f64) -> Response {
-        Response {
-            pressure: self.stiffness * c,
-            tangent: self.stiffness,
-            energy: 0.5 * self.stiffness * c * c,
-        }
+        Response { pressure: self.stiffness * c, tangent: self.stiffness, energy: 0.5 * self.stiffness * c * c }
     }
 }

@@ -19,10 +19,6 @@ impl Power {
 impl LayerLaw for Power {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         let pressure = (c / self.b).powf(self.exponent);
-        Response {
-            pressure,
-            tangent: self.exponent * pressure / c,
-            energy: pressure * c / (self.exponent + 1.0),
-        }
+        Response { pressure, tangent: self.exponent * pressure / c, energy: pressure * c / (self.exponent + 1.0) }
     }
 }

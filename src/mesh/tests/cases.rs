@@ -6,15 +6,9 @@ use crate::mesh::load::from_script;
 
 fn case(script: &str, set: &[(&str, f64)]) -> Mesh<2> {
     let folder = tempfile::tempdir().unwrap();
-    let file = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("meshes")
-        .join(script);
-    let set: Vec<(String, f64)> = set
-        .iter()
-        .map(|(name, value)| (name.to_string(), *value))
-        .collect();
-    let loaded: Loaded<2> =
-        from_script(&located(file), &set, Order::P1, &[folder.path().to_owned()]).unwrap();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes").join(script);
+    let set: Vec<(String, f64)> = set.iter().map(|(name, value)| (name.to_string(), *value)).collect();
+    let loaded: Loaded<2> = from_script(&located(file), &set, Order::P1, &[folder.path().to_owned()]).unwrap();
     loaded.mesh
 }
 
@@ -48,12 +42,7 @@ fn assert_mirrored(mesh: &Mesh<2>, middle: f64) {
     let upper = mesh.group("upper").unwrap();
     assert!(triangles(mesh, "lower", None) == triangles(mesh, "upper", Some(middle)));
     assert!(triangles(mesh, "lower", None) != triangles(mesh, "upper", None));
-    assert!(
-        !lower
-            .connectivity
-            .iter()
-            .any(|point| upper.connectivity.contains(point))
-    );
+    assert!(!lower.connectivity.iter().any(|point| upper.connectivity.contains(point)));
 }
 
 fn count(mesh: &Mesh<2>, group: &str) -> usize {
@@ -70,26 +59,12 @@ fn the_groove_has_the_papers_triangles() {
     assert_eq!([count(&mesh, "lower"), count(&mesh, "upper")], [8192, 8192]);
     let mesh = case("groove/groove.geo", &[("n", 8.0)]);
     assert_eq!(count(&mesh, "lower"), 2 * 4 * 8 * 8);
-    assert_eq!(
-        [
-            count(&mesh, "lower_top"),
-            count(&mesh, "upper_bottom"),
-            count(&mesh, "upper_axis")
-        ],
-        [32, 32, 8]
-    );
-    assert!(
-        (area(&mesh, "lower") - 4.0).abs() < PLACES && (area(&mesh, "upper") - 4.0).abs() < PLACES
-    );
+    assert_eq!([count(&mesh, "lower_top"), count(&mesh, "upper_bottom"), count(&mesh, "upper_axis")], [32, 32, 8]);
+    assert!((area(&mesh, "lower") - 4.0).abs() < PLACES && (area(&mesh, "upper") - 4.0).abs() < PLACES);
     assert_mirrored(&mesh, 1.0);
     let at = |group: &str, k: usize, value: f64| {
         let points = &mesh.group(group).unwrap().connectivity;
-        assert!(
-            points
-                .iter()
-                .all(|point| (mesh.points[*point as usize][k] - value).abs() < PLACES),
-            "{group}"
-        );
+        assert!(points.iter().all(|point| (mesh.points[*point as usize][k] - value).abs() < PLACES), "{group}");
     };
     at("lower_top", 1, 1.0);
     at("upper_bottom", 1, 1.0);
@@ -105,15 +80,9 @@ fn the_groove_has_the_papers_triangles() {
 fn the_patch_takes_any_two_meshes() {
     let mesh = case("patch/patch.geo", &[("nl", 2.0), ("nu", 3.0)]);
     assert_eq!([count(&mesh, "lower"), count(&mesh, "upper")], [8, 18]);
-    assert_eq!(
-        [count(&mesh, "lower_top"), count(&mesh, "upper_bottom")],
-        [2, 3]
-    );
+    assert_eq!([count(&mesh, "lower_top"), count(&mesh, "upper_bottom")], [2, 3]);
     let pin = |name: &str| mesh.points[mesh.group(name).unwrap().connectivity[0] as usize];
-    assert_eq!(
-        [pin("lower_pin"), pin("upper_pin")],
-        [[0.0, 0.0], [0.0, 2.0]]
-    );
+    assert_eq!([pin("lower_pin"), pin("upper_pin")], [[0.0, 0.0], [0.0, 2.0]]);
     assert_mirrored(&case("patch/patch.geo", &[]), 1.0);
 }
 
@@ -121,10 +90,7 @@ fn the_patch_takes_any_two_meshes() {
 fn waves_of_any_length_keep_their_triangles_in_shape() {
     for (length, rows) in [(2.0, 8), (8.0, 2)] {
         let mesh = case("wavy/wavy.geo", &[("L", length), ("n", 8.0)]);
-        assert_eq!(
-            [count(&mesh, "lower_top"), count(&mesh, "lower_sides")],
-            [8, 2 * rows]
-        );
+        assert_eq!([count(&mesh, "lower_top"), count(&mesh, "lower_sides")], [8, 2 * rows]);
         assert!((area(&mesh, "upper") - 0.5 * length).abs() < PLACES);
         assert_mirrored(&mesh, 1.0);
     }
@@ -145,12 +111,7 @@ fn half_planes_are_fine_at_the_groove_and_coarse_far_away() {
             (16.0 - a.max(b), (a - b).abs())
         })
         .collect();
-    assert!(
-        edges
-            .iter()
-            .filter(|(from, _)| *from < 1.99)
-            .all(|(_, length)| (length - 1.0 / 16.0).abs() < PLACES)
-    );
+    assert!(edges.iter().filter(|(from, _)| *from < 1.99).all(|(_, length)| (length - 1.0 / 16.0).abs() < PLACES));
     let longest = edges.iter().map(|(_, length)| *length).fold(0.0, f64::max);
     assert!((0.9..1.1).contains(&longest), "{longest}");
     // The edge of the groove, where the pressure has a kink, is a node.

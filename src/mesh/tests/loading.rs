@@ -13,9 +13,7 @@ fn scripts_are_meshed_once_for_each_key() {
     let part = folder.path().join("part.geo");
     std::fs::write(&geo, "Include \"part.geo\";\n").unwrap();
     std::fs::write(&part, SQUARE).unwrap();
-    let run = |n: f64, order| {
-        from_script::<2>(&located(geo.clone()), &[("n".into(), n)], order, &cache).unwrap()
-    };
+    let run = |n: f64, order| from_script::<2>(&located(geo.clone()), &[("n".into(), n)], order, &cache).unwrap();
 
     let first = run(4.0, Order::P1);
     assert_eq!(first.origin, Origin::Gmsh);
@@ -23,16 +21,10 @@ fn scripts_are_meshed_once_for_each_key() {
     assert_eq!(first.mesh.path, geo);
     let again = run(4.0, Order::P1);
     assert_eq!((again.origin, &again.file), (Origin::Cache, &first.file));
-    assert_eq!(
-        (again.mesh.points, &again.mesh.groups),
-        (first.mesh.points, &first.mesh.groups)
-    );
+    assert_eq!((again.mesh.points, &again.mesh.groups), (first.mesh.points, &first.mesh.groups));
     assert_eq!(run(3.0, Order::P1).origin, Origin::Gmsh);
     let quadratic = run(4.0, Order::P2);
-    assert_eq!(
-        (quadratic.origin, quadratic.mesh.order),
-        (Origin::Gmsh, Order::P2)
-    );
+    assert_eq!((quadratic.origin, quadratic.mesh.order), (Origin::Gmsh, Order::P2));
 
     // A damaged file is made again.
     let whole = std::fs::read(&first.file).unwrap();
@@ -57,28 +49,19 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
     let refuse = |script: &str, set: &[(String, f64)], order| {
         let geo = folder.path().join("a.geo");
         std::fs::write(&geo, script).unwrap();
-        from_script::<2>(&located(geo), set, order, &cache)
-            .unwrap_err()
-            .to_string()
+        from_script::<2>(&located(geo), set, order, &cache).unwrap_err().to_string()
     };
     let message = refuse("Line(1) = {1, 7};", &[], Order::P1);
-    assert!(
-        message.contains("a.geo: Gmsh cannot mesh this script"),
-        "{message}"
-    );
+    assert!(message.contains("a.geo: Gmsh cannot mesh this script"), "{message}");
     assert!(message.contains("Unknown control point"), "{message}");
     let message = refuse(SQUARE, &[("m".into(), 1.0)], Order::P1);
-    assert!(
-        message.contains("did you mean `n`?") && message.contains("scene.toml"),
-        "{message}"
-    );
+    assert!(message.contains("did you mean `n`?") && message.contains("scene.toml"), "{message}");
     let message = refuse(&format!("{SQUARE}Mesh.ElementOrder = 1;"), &[], Order::P2);
     assert!(message.contains("remove `Mesh.ElementOrder`"), "{message}");
     // Its lines and bytes mean nothing to someone who wrote a script.
     let message = refuse(&format!("{SQUARE}Recombine Surface{{1}};"), &[], Order::P1);
     assert!(
-        message.contains("a.geo: group `soft rock` has quadrangle elements")
-            && !message.contains("byte"),
+        message.contains("a.geo: group `soft rock` has quadrangle elements") && !message.contains("byte"),
         "{message}"
     );
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 0);
@@ -87,35 +70,17 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
 #[test]
 fn mesh_files_serve_lower_orders_but_not_higher_ones() {
     let folder = tempfile::tempdir().unwrap();
-    let source = |name: &str| MeshSource::Msh {
-        file: located(folder.path().join(name)),
-    };
+    let source = |name: &str| MeshSource::Msh { file: located(folder.path().join(name)) };
     for order in ["1", "2"] {
-        std::fs::write(
-            folder.path().join(order),
-            gmsh(SQUARE, &["-2", "-order", order]),
-        )
-        .unwrap();
+        std::fs::write(folder.path().join(order), gmsh(SQUARE, &["-2", "-order", order])).unwrap();
     }
     let loaded = load::<2>(&source("2"), Order::P1).unwrap();
-    assert_eq!(
-        (loaded.origin, loaded.mesh.order, loaded.mesh.points.len()),
-        (Origin::File, Order::P1, 15)
-    );
-    assert_eq!(
-        load::<2>(&source("2"), Order::P2).unwrap().mesh.order,
-        Order::P2
-    );
+    assert_eq!((loaded.origin, loaded.mesh.order, loaded.mesh.points.len()), (Origin::File, Order::P1, 15));
+    assert_eq!(load::<2>(&source("2"), Order::P2).unwrap().mesh.order, Order::P2);
     let message = load::<2>(&source("1"), Order::P2).unwrap_err().to_string();
-    assert!(
-        message.contains("the mesh is of order 1") && message.contains("scene.toml"),
-        "{message}"
-    );
+    assert!(message.contains("the mesh is of order 1") && message.contains("scene.toml"), "{message}");
     let message = load::<2>(&source("3"), Order::P2).unwrap_err().to_string();
-    assert!(
-        message.contains("cannot read") && message.contains("scene.toml"),
-        "{message}"
-    );
+    assert!(message.contains("cannot read") && message.contains("scene.toml"), "{message}");
 }
 
 #[test]

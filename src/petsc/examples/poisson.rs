@@ -40,10 +40,7 @@ fn run(words: &[String]) -> Result<()> {
         Some(text) => match text.parse() {
             Ok(n) if n > 0 => n,
             _ => {
-                return Err(Error::new(
-                    Kind::Usage,
-                    format!("-n takes a positive number, not `{text}`"),
-                ));
+                return Err(Error::new(Kind::Usage, format!("-n takes a positive number, not `{text}`")));
             }
         },
     };
@@ -66,19 +63,10 @@ fn run(words: &[String]) -> Result<()> {
     let mut u = vec![0.0; n * n];
     let solved = ksp.solve(&b, &mut u)?;
 
-    let error = u
-        .iter()
-        .zip(&exact)
-        .map(|(u, exact)| (u - exact).abs())
-        .fold(0.0, f64::max);
+    let error = u.iter().zip(&exact).map(|(u, exact)| (u - exact).abs()).fold(0.0, f64::max);
     if session.rank() == 0 {
         println!("PETSc {}, {}", session.petsc_version(), session.blas_name());
-        println!(
-            "{} unknowns, {} with {}",
-            n * n,
-            ksp.ksp_type(),
-            ksp.pc_type()
-        );
+        println!("{} unknowns, {} with {}", n * n, ksp.ksp_type(), ksp.pc_type());
         println!("{} iterations: {}", solved.iterations, solved.reason);
         println!("largest error {error:.3e}");
     }

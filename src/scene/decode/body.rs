@@ -11,8 +11,8 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// Whether PETSc options start with this word, so that a body of this name could not have options of its own.
 pub fn reserved(name: &str) -> bool {
     const WORDS: &[&str] = &[
-        "ksp", "pc", "mat", "vec", "sub", "mg", "snes", "ts", "tao", "dm", "is", "log", "options",
-        "help", "malloc", "info", "on", "fp",
+        "ksp", "pc", "mat", "vec", "sub", "mg", "snes", "ts", "tao", "dm", "is", "log", "options", "help", "malloc",
+        "info", "on", "fp",
     ];
     WORDS.contains(&name)
 }
@@ -20,24 +20,15 @@ pub fn reserved(name: &str) -> bool {
 impl Decoder<'_> {
     /// The bodies: at least one, with different names.
     pub(super) fn bodies(&self, keys: &Keys) -> Result<Vec<BodySpec>> {
-        let list = keys
-            .require("body")
-            .map_err(|error| error.help("a body starts with the line [[body]]"))?;
-        let items = list
-            .list()
-            .map_err(|error| error.help("a body starts with the line [[body]]"))?;
+        let list = keys.require("body").map_err(|error| error.help("a body starts with the line [[body]]"))?;
+        let items = list.list().map_err(|error| error.help("a body starts with the line [[body]]"))?;
         if items.is_empty() {
-            return Err(list
-                .refuse("the scene has no body")
-                .help("a body starts with the line [[body]]"));
+            return Err(list.refuse("the scene has no body").help("a body starts with the line [[body]]"));
         }
         let mut bodies: Vec<BodySpec> = Vec::new();
         for item in items {
             let body = self.body(item)?;
-            if bodies
-                .iter()
-                .any(|other| other.name.value == body.name.value)
-            {
+            if bodies.iter().any(|other| other.name.value == body.name.value) {
                 let message = format!("two bodies are called `{}`", body.name.value);
                 return Err(Error::scene(&body.name.place, message)
                     .label("taken by an earlier body")
@@ -49,11 +40,7 @@ impl Decoder<'_> {
     }
 
     fn body(&self, node: &Node) -> Result<BodySpec> {
-        let keys = Keys::open(
-            node,
-            "[[body]]",
-            &["name", "young", "poisson", "order", "fix", "load", "force"],
-        )?;
+        let keys = Keys::open(node, "[[body]]", &["name", "young", "poisson", "order", "fix", "load", "force"])?;
         let items = |key: &str| keys.get(key).map_or(Ok(&[][..]), Node::list);
         let young = keys.require("young")?;
         let poisson = keys.require("poisson")?;
@@ -62,18 +49,9 @@ impl Decoder<'_> {
             young: Located::new(young.positive("Young's modulus")?, young.place.clone()),
             poisson: Located::new(poisson_ratio(poisson)?, poisson.place.clone()),
             order: keys.get("order").map_or(Ok(Order::P1), order)?,
-            fix: items("fix")?
-                .iter()
-                .map(|item| self.support(item))
-                .collect::<Result<_>>()?,
-            load: items("load")?
-                .iter()
-                .map(|item| self.load(item))
-                .collect::<Result<_>>()?,
-            force: keys
-                .get("force")
-                .map(|force| self.vector(force))
-                .transpose()?,
+            fix: items("fix")?.iter().map(|item| self.support(item)).collect::<Result<_>>()?,
+            load: items("load")?.iter().map(|item| self.load(item)).collect::<Result<_>>()?,
+            force: keys.get("force").map(|force| self.vector(force)).transpose()?,
         })
     }
 
@@ -81,11 +59,9 @@ impl Decoder<'_> {
         let keys = Keys::open(node, "a support", &["on", "x", "y", "z"])?;
         let on = keys.require("on")?.name()?;
         if let (2, Some(entry)) = (self.dimension, keys.entry("z")) {
-            return Err(
-                Error::scene(&entry.key_place, "a support in `z` in a plane problem")
-                    .label("there is no z")
-                    .help("remove it, or set dimension = 3"),
-            );
+            return Err(Error::scene(&entry.key_place, "a support in `z` in a plane problem")
+                .label("there is no z")
+                .help("remove it, or set dimension = 3"));
         }
         let mut value = [None; 3];
         for (value, axis) in value.iter_mut().zip(AXES) {
@@ -95,10 +71,7 @@ impl Decoder<'_> {
             let axes = &AXES[..self.dimension];
             return Err(node
                 .refuse(format!("the support on `{}` holds no component", on.value))
-                .help(format!(
-                    "give the displacement in some of {}: x = 0",
-                    axes.join(", ")
-                )));
+                .help(format!("give the displacement in some of {}: x = 0", axes.join(", "))));
         }
         Ok(Support { on, value })
     }
@@ -114,10 +87,7 @@ impl Decoder<'_> {
                 let components = &["tx", "ty", "tz"][..self.dimension];
                 return Err(node
                     .refuse(format!("the load on `{}` has no component", on.value))
-                    .help(format!(
-                        "give pressure = p or traction = [{}]",
-                        components.join(", ")
-                    )));
+                    .help(format!("give pressure = p or traction = [{}]", components.join(", "))));
             }
         };
         Ok(Load { on, kind })
@@ -130,9 +100,7 @@ fn name(node: &Node) -> Result<Located<String>> {
     if !name.value.starts_with(|c: char| c.is_ascii_lowercase()) || !name.value.chars().all(word) {
         return Err(node
             .refuse(format!("`{}` cannot be the name of a body", name.value))
-            .help(
-                "it is a prefix of PETSc options: a small letter, then small letters and digits",
-            ));
+            .help("it is a prefix of PETSc options: a small letter, then small letters and digits"));
     }
     if reserved(&name.value) {
         return Err(node
@@ -147,9 +115,7 @@ fn poisson_ratio(node: &Node) -> Result<f64> {
     match node.number()? {
         value if value > -1.0 && value < 0.5 => Ok(value),
         value => {
-            let error = node
-                .refuse(format!("Poisson's ratio is {value}"))
-                .label("must lie between -1 and 0.5");
+            let error = node.refuse(format!("Poisson's ratio is {value}")).label("must lie between -1 and 0.5");
             Err(match value == 0.5 {
                 true => error.help("incompressible bodies are not possible; take 0.49, say"),
                 false => error,
@@ -162,8 +128,6 @@ fn order(node: &Node) -> Result<Order> {
     match node.whole()? {
         1 => Ok(Order::P1),
         2 => Ok(Order::P2),
-        other => Err(node
-            .refuse(format!("the order is {other}"))
-            .label("must be 1 or 2")),
+        other => Err(node.refuse(format!("the order is {other}")).label("must be 1 or 2")),
     }
 }

@@ -13,10 +13,7 @@ impl Decoder<'_> {
             return Ok(Vec::new());
         };
         let mut contacts: Vec<ContactSpec> = Vec::new();
-        for item in list
-            .list()
-            .map_err(|error| error.help("a contact starts with the line [[contact]]"))?
-        {
+        for item in list.list().map_err(|error| error.help("a contact starts with the line [[contact]]"))? {
             let contact = self.contact(item)?;
             let names = |contact: &ContactSpec| {
                 let mut names = contact.between.each_ref().map(|name| name.value.clone());
@@ -25,11 +22,8 @@ impl Decoder<'_> {
             };
             if contacts.iter().any(|other| names(other) == names(&contact)) {
                 let [a, b] = &contact.between;
-                return Err(Error::scene(
-                    &a.place,
-                    format!("a second contact of `{}` and `{}`", a.value, b.value),
-                )
-                .help("remove one of the two"));
+                return Err(Error::scene(&a.place, format!("a second contact of `{}` and `{}`", a.value, b.value))
+                    .help("remove one of the two"));
             }
             contacts.push(contact);
         }
@@ -37,11 +31,7 @@ impl Decoder<'_> {
     }
 
     fn contact(&self, node: &Node) -> Result<ContactSpec> {
-        let keys = Keys::open(
-            node,
-            "[[contact]]",
-            &["between", "gap", "layer", "reference"],
-        )?;
+        let keys = Keys::open(node, "[[contact]]", &["between", "gap", "layer", "reference"])?;
         let between = keys.require("between")?;
         let [a, b] = between.list()? else {
             return Err(between
@@ -56,32 +46,23 @@ impl Decoder<'_> {
         }
         Ok(ContactSpec {
             between: [first, second],
-            gap: keys
-                .get("gap")
-                .map_or(Ok(Field::Constant(0.0)), |gap| self.field(gap))?,
+            gap: keys.get("gap").map_or(Ok(Field::Constant(0.0)), |gap| self.field(gap))?,
             layer: layer(keys.require("layer")?)?,
-            reference: keys
-                .get("reference")
-                .map(|reference| self.field(reference))
-                .transpose()?,
+            reference: keys.get("reference").map(|reference| self.field(reference)).transpose()?,
         })
     }
 }
 
 fn layer(node: &Node) -> Result<LayerSpec> {
     const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
-    let keys = Keys::open(node, "the layer", &["power", "linear"]).map_err(|error| match error
-        .advice()
-    {
+    let keys = Keys::open(node, "the layer", &["power", "linear"]).map_err(|error| match error.advice() {
         Some(advice) if advice.starts_with("did") => error,
         _ => error.help(EXAMPLE),
     })?;
     keys.exclude("power", "linear")?;
     if let Some(linear) = keys.get("linear") {
         let keys = Keys::open(linear, "the linear layer", &["stiffness"])?;
-        return Ok(LayerSpec::Linear {
-            stiffness: keys.require("stiffness")?.positive("the stiffness")?,
-        });
+        return Ok(LayerSpec::Linear { stiffness: keys.require("stiffness")?.positive("the stiffness")? });
     }
     let Some(power) = keys.get("power") else {
         return Err(keys.node().refuse("the layer has no law").help(EXAMPLE));

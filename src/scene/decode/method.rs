@@ -13,15 +13,9 @@ impl Decoder<'_> {
         let Some(node) = node else { return Ok(default) };
         let keys = Keys::open(node, "[method]", &["psi", "gamma", "start", "stop"])?;
         Ok(MethodSpec {
-            psi: keys
-                .get("psi")
-                .map_or(Ok(default.psi), |psi| self.zone(psi))?,
-            gamma: keys
-                .get("gamma")
-                .map_or(Ok(default.gamma), |gamma| gamma.positive("gamma"))?,
-            start: keys
-                .get("start")
-                .map_or(Ok(default.start), |start| self.start(start))?,
+            psi: keys.get("psi").map_or(Ok(default.psi), |psi| self.zone(psi))?,
+            gamma: keys.get("gamma").map_or(Ok(default.gamma), |gamma| gamma.positive("gamma"))?,
+            start: keys.get("start").map_or(Ok(default.start), |start| self.start(start))?,
             stop: keys.get("stop").map_or(Ok(default.stop), stop)?,
         })
     }
@@ -40,8 +34,7 @@ impl Decoder<'_> {
             let error = node.refuse(format!("unknown zone `{text}`"));
             return Err(match nearest(text, WORDS) {
                 Some(near) => error.help(format!("did you mean `{near}`?")),
-                None => error
-                    .help("psi is none, full, active, or a condition such as \"x > 1 && k < 5\""),
+                None => error.help("psi is none, full, active, or a condition such as \"x > 1 && k < 5\""),
             });
         }
         Field::parse(text, &node.place, self.dimension, true).map(Zone::Subset)
@@ -59,25 +52,15 @@ impl Decoder<'_> {
 
 fn stop(node: &Node) -> Result<StopSpec> {
     let default = StopSpec::default();
-    let keys = Keys::open(
-        node,
-        "the stop rule",
-        &["residual", "increment", "iterations"],
-    )?;
-    let tolerance = |key: &str| {
-        keys.get(key)
-            .map(|node| node.positive("the tolerance"))
-            .transpose()
-    };
+    let keys = Keys::open(node, "the stop rule", &["residual", "increment", "iterations"])?;
+    let tolerance = |key: &str| keys.get(key).map(|node| node.positive("the tolerance")).transpose();
     let increment = tolerance("increment")?;
     let iterations = match keys.get("iterations") {
         None => default.iterations,
         Some(node) => match usize::try_from(node.whole()?) {
             Ok(count) if count > 0 => count,
             _ => {
-                return Err(node
-                    .refuse("no iteration is allowed")
-                    .label("must be 1 or more"));
+                return Err(node.refuse("no iteration is allowed").label("must be 1 or more"));
             }
         },
     };
@@ -85,9 +68,5 @@ fn stop(node: &Node) -> Result<StopSpec> {
         (None, None) => default.residual,
         (given, _) => given,
     };
-    Ok(StopSpec {
-        residual,
-        increment,
-        iterations,
-    })
+    Ok(StopSpec { residual, increment, iterations })
 }

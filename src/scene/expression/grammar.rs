@@ -20,14 +20,7 @@ pub(super) fn parse(text: &str, variables: &[&'static str]) -> Result<String, Sl
     if token == Token::End {
         return Err(Slip::new(0..text.len(), "the expression is empty"));
     }
-    let mut parser = Parser {
-        text,
-        variables,
-        token,
-        span,
-        depth: 0,
-        operations: 0,
-    };
+    let mut parser = Parser { text, variables, token, span, depth: 0, operations: 0 };
     let tree = parser.expression(0)?;
     match parser.token {
         Token::End => Ok(tree),
@@ -51,20 +44,14 @@ impl<'a> Parser<'a> {
     /// Moves on, and gives back the word left behind and its place.
     fn step(&mut self) -> Result<(Token<'a>, Range<usize>), Slip> {
         let (token, span) = token::next(self.text, self.span.end)?;
-        Ok((
-            std::mem::replace(&mut self.token, token),
-            std::mem::replace(&mut self.span, span),
-        ))
+        Ok((std::mem::replace(&mut self.token, token), std::mem::replace(&mut self.span, span)))
     }
 
     /// Operands joined by operators that bind at least as tightly as `least`.
     fn expression(&mut self, least: u8) -> Result<String, Slip> {
         self.depth += 1;
         if self.depth > DEEPEST {
-            return Err(Slip::new(
-                self.span.clone(),
-                "the expression is nested too deeply",
-            ));
+            return Err(Slip::new(self.span.clone(), "the expression is nested too deeply"));
         }
         let mut left = self.operand()?;
         let mut compared = false;
@@ -74,9 +61,7 @@ impl<'a> Parser<'a> {
         {
             let (_, span) = self.step()?;
             if *power == COMPARISON && std::mem::replace(&mut compared, true) {
-                return Err(
-                    Slip::new(span, "comparisons do not chain").help("write 0 < x && x < 1")
-                );
+                return Err(Slip::new(span, "comparisons do not chain").help("write 0 < x && x < 1"));
             }
             let right = self.expression(if *power == POWER { SIGN } else { power + 1 })?;
             left = self.made(format!("({left} {symbol} {right})"), &span)?;
@@ -103,28 +88,18 @@ impl<'a> Parser<'a> {
                 let operand = self.expression(SIGN)?;
                 self.made(format!("({sign}({operand}))"), &span)
             }
-            Token::Symbol(symbol) => Err(Slip::new(
-                span,
-                format!("expected a value before `{symbol}`"),
-            )),
-            Token::End => Err(Slip::new(
-                self.text.len().saturating_sub(1)..self.text.len(),
-                "the expression stops short",
-            )
-            .help("after this a number, a variable or a function is missing")),
+            Token::Symbol(symbol) => Err(Slip::new(span, format!("expected a value before `{symbol}`"))),
+            Token::End => {
+                Err(Slip::new(self.text.len().saturating_sub(1)..self.text.len(), "the expression stops short")
+                    .help("after this a number, a variable or a function is missing"))
+            }
         }
     }
 
     /// A function of the values in parentheses; the name was read, `(` comes next.
     fn call(&mut self, name: &str, span: Range<usize>) -> Result<String, Slip> {
-        let unary = UNARY
-            .iter()
-            .find(|(known, _)| *known == name)
-            .map(|(known, _)| *known);
-        let binary = BINARY
-            .iter()
-            .find(|(known, _)| *known == name)
-            .map(|(known, _)| *known);
+        let unary = UNARY.iter().find(|(known, _)| *known == name).map(|(known, _)| *known);
+        let binary = BINARY.iter().find(|(known, _)| *known == name).map(|(known, _)| *known);
         let Some(function) = unary.or(binary) else {
             return Err(self.unknown_function(name, span));
         };
@@ -149,10 +124,7 @@ impl<'a> Parser<'a> {
             _ => values.len() >= 2,
         };
         if !fits {
-            return Err(Slip::new(
-                span,
-                format!("`{name}` takes {wanted}, not {}", values.len()),
-            ));
+            return Err(Slip::new(span, format!("`{name}` takes {wanted}, not {}", values.len())));
         }
         if unary.is_some() {
             return self.made(format!("({function}({}))", values[0]), &span);
@@ -173,8 +145,7 @@ impl<'a> Parser<'a> {
         }
         if functions().any(|known| known == name) {
             return Err(
-                Slip::new(span, format!("`{name}` needs its value in parentheses"))
-                    .help(format!("write {name}(...)")),
+                Slip::new(span, format!("`{name}` needs its value in parentheses")).help(format!("write {name}(...)"))
             );
         }
         let slip = Slip::new(span, format!("unknown variable `{name}`")).label("not known here");
@@ -188,8 +159,7 @@ impl<'a> Parser<'a> {
 
     fn unknown_function(&self, name: &str, span: Range<usize>) -> Slip {
         if self.variables.contains(&name) || name == "pi" {
-            return Slip::new(span, format!("`{name}` is not a function"))
-                .help("write `*` to multiply");
+            return Slip::new(span, format!("`{name}` is not a function")).help("write `*` to multiply");
         }
         let slip = Slip::new(span, format!("unknown function `{name}`")).label("not known here");
         match (name, nearest(name, functions())) {
@@ -202,11 +172,7 @@ impl<'a> Parser<'a> {
     /// All names that an expression may use here.
     fn known(&self) -> String {
         let functions: Vec<_> = functions().collect();
-        format!(
-            "known are {}, pi, and the functions {}",
-            self.variables.join(", "),
-            functions.join(", ")
-        )
+        format!("known are {}, pi, and the functions {}", self.variables.join(", "), functions.join(", "))
     }
 
     fn close(&mut self, open: &Range<usize>) -> Result<(), Slip> {
@@ -220,11 +186,7 @@ impl<'a> Parser<'a> {
 
     fn missing_operator(&self) -> Slip {
         let found = &self.text[self.span.clone()];
-        Slip::new(
-            self.span.clone(),
-            format!("expected an operator before `{found}`"),
-        )
-        .help("write `*` to multiply")
+        Slip::new(self.span.clone(), format!("expected an operator before `{found}`")).help("write `*` to multiply")
     }
 
     /// Counts an operation.
@@ -232,17 +194,11 @@ impl<'a> Parser<'a> {
         self.operations += 1;
         match self.operations <= LONGEST {
             true => Ok(text),
-            false => Err(Slip::new(
-                span.clone(),
-                format!("the expression has more than {LONGEST} operations"),
-            )),
+            false => Err(Slip::new(span.clone(), format!("the expression has more than {LONGEST} operations"))),
         }
     }
 }
 
 fn functions() -> impl Iterator<Item = &'static str> {
-    UNARY
-        .iter()
-        .map(|(name, _)| *name)
-        .chain(BINARY.iter().map(|(name, _)| *name))
+    UNARY.iter().map(|(name, _)| *name).chain(BINARY.iter().map(|(name, _)| *name))
 }

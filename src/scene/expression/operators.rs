@@ -62,20 +62,9 @@ pub(super) struct Operators;
 
 impl MakeOperators<f64> for Operators {
     fn make<'a>() -> Vec<Operator<'a, f64>> {
-        let binary = |apply| BinOp {
-            apply,
-            prio: 0,
-            is_commutative: false,
-        };
-        let mut operators: Vec<_> = UNARY
-            .iter()
-            .map(|(name, apply)| Operator::make_unary(name, *apply))
-            .collect();
-        operators.extend(
-            BINARY
-                .iter()
-                .map(|(name, apply)| Operator::make_bin(name, binary(*apply))),
-        );
+        let binary = |apply| BinOp { apply, prio: 0, is_commutative: false };
+        let mut operators: Vec<_> = UNARY.iter().map(|(name, apply)| Operator::make_unary(name, *apply)).collect();
+        operators.extend(BINARY.iter().map(|(name, apply)| Operator::make_bin(name, binary(*apply))));
         operators.extend(INFIX.iter().map(|(symbol, _, apply)| match *symbol {
             "-" => Operator::make_bin_unary(symbol, binary(*apply), |a| -a),
             _ => Operator::make_bin(symbol, binary(*apply)),
@@ -92,29 +81,17 @@ fn number(truth: bool) -> f64 {
 }
 
 fn compare(a: f64, b: f64, truth: bool) -> f64 {
-    if a.is_nan() || b.is_nan() {
-        f64::NAN
-    } else {
-        number(truth)
-    }
+    if a.is_nan() || b.is_nan() { f64::NAN } else { number(truth) }
 }
 
 /// False if one side is, whatever the other: `x > 0 && log(x) > 1` is defined for all x.
 fn and(a: f64, b: f64) -> f64 {
-    if a <= 0.0 || b <= 0.0 {
-        0.0
-    } else {
-        compare(a, b, true)
-    }
+    if a <= 0.0 || b <= 0.0 { 0.0 } else { compare(a, b, true) }
 }
 
 /// True if one side is, whatever the other.
 fn or(a: f64, b: f64) -> f64 {
-    if a > 0.0 || b > 0.0 {
-        1.0
-    } else {
-        compare(a, b, false)
-    }
+    if a > 0.0 || b > 0.0 { 1.0 } else { compare(a, b, false) }
 }
 
 fn not(a: f64) -> f64 {

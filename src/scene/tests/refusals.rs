@@ -4,13 +4,7 @@ use super::{GROOVE, caret, load_text};
 use crate::error::Kind;
 
 /// Replacement in the groove scene; text under the caret; message; part of the help (empty: whatever).
-type Case = (
-    &'static str,
-    &'static str,
-    &'static str,
-    &'static str,
-    &'static str,
-);
+type Case = (&'static str, &'static str, &'static str, &'static str, &'static str);
 
 #[rustfmt::skip]
 const CASES: &[Case] = &[
@@ -106,14 +100,8 @@ fn refusals_point_at_the_word() {
         assert!(GROOVE.contains(from), "{from}");
         let error = load_text(&GROOVE.replacen(from, to, 1), &[]).expect_err(to);
         assert_eq!(error.kind(), Kind::Scene);
-        assert!(
-            error.message().contains(message),
-            "{from} -> {to}: not {message:?} in\n{error}"
-        );
-        assert!(
-            error.advice().unwrap_or_default().contains(help),
-            "{from} -> {to}: not {help:?} in\n{error}"
-        );
+        assert!(error.message().contains(message), "{from} -> {to}: not {message:?} in\n{error}");
+        assert!(error.advice().unwrap_or_default().contains(help), "{from} -> {to}: not {help:?} in\n{error}");
         if !marked.is_empty() {
             assert_eq!(&caret(&error), marked, "{from} -> {to}:\n{error}");
         }
@@ -126,14 +114,8 @@ fn empty_scenes_are_refused() {
     for (text, message) in [
         ("", "the scene has no `dimension`"),
         ("dimension = 2", "the scene has no `mesh`"),
-        (
-            "dimension = 2\nmesh = 'groove.msh'",
-            "the scene has no `body`",
-        ),
-        (
-            "dimension = 2\nmesh = 'groove.msh'\nbody = []",
-            "the scene has no body",
-        ),
+        ("dimension = 2\nmesh = 'groove.msh'", "the scene has no `body`"),
+        ("dimension = 2\nmesh = 'groove.msh'\nbody = []", "the scene has no body"),
     ] {
         assert_eq!(load_text(text, &[]).expect_err(text).message(), message);
     }
@@ -166,14 +148,8 @@ fn refusals_of_overrides_point_into_them() {
     for (text, marked, message, help) in cases {
         let error = load_text(GROOVE, &[text]).expect_err(text);
         assert_eq!(error.kind(), Kind::Scene);
-        assert!(
-            error.message().contains(message),
-            "{text}: not {message:?} in\n{error}"
-        );
-        assert!(
-            error.advice().unwrap_or_default().contains(help),
-            "{text}: not {help:?} in\n{error}"
-        );
+        assert!(error.message().contains(message), "{text}: not {message:?} in\n{error}");
+        assert!(error.advice().unwrap_or_default().contains(help), "{text}: not {help:?} in\n{error}");
         if !marked.is_empty() {
             assert_eq!(caret(&error), marked, "{text}:\n{error}");
         }

@@ -23,13 +23,17 @@ const PRECONDITIONERS: &str = "none jacobi pbjacobi vpbjacobi sor eisenstat ilu 
     lu:factor_mat_solver_type=umfpack cholesky:factor_mat_solver_type=cholmod lu:factor_mat_solver_type=klu";
 
 /// Options that objects read without telling so in their help.
-const SILENT: [&str; 6] = [
+const SILENT: [&str; 10] = [
     "mat_type",
-    "vec_type",
+    "mat_view",
     "mat_no_inode",
     "mat_inode_limit",
-    "mat_view",
-    "pc_view",
+    "mat_product_algorithm",
+    "matmatmult_via",
+    "matptap_via",
+    "vec_type",
+    "vec_view",
+    "ksp_converged_reason",
 ];
 
 /// The option names of solvers.
@@ -44,22 +48,15 @@ impl Names {
     pub(super) fn collect(session: &Session, in_use: &[Vec<Entry>]) -> Result<Names> {
         let matrix = tiny(session)?;
         let mut names: BTreeSet<String> = SILENT.map(String::from).into();
-        let mut combinations: Vec<Vec<Entry>> =
-            in_use.iter().map(|options| types_of(options)).collect();
+        let mut combinations: Vec<Vec<Entry>> = in_use.iter().map(|options| types_of(options)).collect();
         combinations.dedup();
         let entry = |name: &str, value: &str| (name.to_owned(), Some(value.to_owned()));
-        combinations.extend(
-            METHODS
-                .split_whitespace()
-                .map(|name| vec![entry("ksp_type", name), entry("pc_type", "jacobi")]),
-        );
+        combinations
+            .extend(METHODS.split_whitespace().map(|name| vec![entry("ksp_type", name), entry("pc_type", "jacobi")]));
         combinations.extend(PRECONDITIONERS.split_whitespace().map(|word| {
             let (name, more) = word.split_once(':').unwrap_or((word, ""));
             let mut options = vec![entry("ksp_type", "cg"), entry("pc_type", name)];
-            options.extend(
-                more.split_once('=')
-                    .map(|(more, value)| entry(&format!("pc_{more}"), value)),
-            );
+            options.extend(more.split_once('=').map(|(more, value)| entry(&format!("pc_{more}"), value)));
             options
         }));
         for options in combinations {
@@ -80,24 +77,16 @@ impl Names {
         if self.names.contains(&name) {
             return true;
         }
-        let nests = self
-            .names
-            .iter()
-            .filter_map(|known| known.strip_suffix("ksp_type"));
-        nests.filter(|nest| !nest.is_empty()).any(|nest| {
-            name.strip_prefix(nest)
-                .is_some_and(|leaf| self.names.contains(leaf))
-        })
+        let nests = self.names.iter().filter_map(|known| known.strip_suffix("ksp_type"));
+        nests
+            .filter(|nest| !nest.is_empty())
+            .any(|nest| name.strip_prefix(nest).is_some_and(|leaf| self.names.contains(leaf)))
     }
 }
 
 /// The options that choose types, of which the others depend.
 fn types_of(options: &[Entry]) -> Vec<Entry> {
-    options
-        .iter()
-        .filter(|(name, _)| name.ends_with("_type"))
-        .cloned()
-        .collect()
+    options.iter().filter(|(name, _)| name.ends_with("_type")).cloned().collect()
 }
 
 /// Makes one solver with these options and returns the names in its help.
@@ -136,11 +125,7 @@ fn names_in(text: &str, prefix: &str) -> BTreeSet<String> {
     let start = format!("-{prefix}");
     text.split(&start)
         .skip(1)
-        .map(|rest| {
-            rest.split(|c: char| !c.is_ascii_alphanumeric() && c != '_')
-                .next()
-                .unwrap_or_default()
-        })
+        .map(|rest| rest.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next().unwrap_or_default())
         .filter(|name| !name.is_empty())
         .map(without_numbers)
         .collect()
@@ -180,7 +165,8 @@ mod tests {
 
     #[test]
     fn names_are_found_in_a_help_text() {
-        let text = "  -p1_ksp_type <now gmres> (one of) cg (KSPSetType)\n  -p1_mg_levels_1_pc_type: x\n -ksp_other: y\n";
+        let text =
+            "  -p1_ksp_type <now gmres> (one of) cg (KSPSetType)\n  -p1_mg_levels_1_pc_type: x\n -ksp_other: y\n";
         let names: Vec<String> = names_in(text, "p1_").into_iter().collect();
         assert_eq!(names, ["ksp_type", "mg_levels_pc_type"]);
         assert_eq!(without_numbers("mat_mumps_icntl_4"), "mat_mumps_icntl_4");
@@ -188,11 +174,7 @@ mod tests {
 
     #[test]
     fn nested_names_are_put_together() {
-        let names = Names {
-            names: ["ksp_type", "pc_sor_its", "mg_levels_ksp_type"]
-                .map(String::from)
-                .into(),
-        };
+        let names = Names { names: ["ksp_type", "pc_sor_its", "mg_levels_ksp_type"].map(String::from).into() };
         assert!(names.contains("pc_sor_its"));
         assert!(names.contains("mg_levels_3_pc_sor_its"));
         assert!(!names.contains("mg_coarse_pc_sor_its"));

@@ -27,9 +27,7 @@ pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<Strin
         }
         let file = word == "-options_file";
         petsc.push(word);
-        if let Some(value) =
-            words.next_if(|next| !is_option(next) && (file || !next.ends_with(".toml")))
-        {
+        if let Some(value) = words.next_if(|next| !is_option(next) && (file || !next.ends_with(".toml"))) {
             petsc.push(value);
         }
     }
@@ -38,14 +36,12 @@ pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<Strin
 
 /// One dash, then two or more signs of which the first is a letter.
 fn is_petsc(word: &str) -> bool {
-    word.strip_prefix('-')
-        .is_some_and(|bare| bare.starts_with(|c: char| c.is_ascii_alphabetic()) && bare.len() >= 2)
+    word.strip_prefix('-').is_some_and(|bare| bare.starts_with(|c: char| c.is_ascii_alphabetic()) && bare.len() >= 2)
 }
 
 /// A dash and a letter, or two dashes.
 fn is_option(word: &str) -> bool {
-    word.strip_prefix('-')
-        .is_some_and(|rest| rest.starts_with(|c: char| c == '-' || c.is_ascii_alphabetic()))
+    word.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c == '-' || c.is_ascii_alphabetic()))
 }
 
 #[cfg(test)]
@@ -54,38 +50,18 @@ mod tests {
 
     fn check(words: &str, program: &str, petsc: &str) {
         let (p, q) = split(words.split_whitespace().map(String::from));
-        assert_eq!(
-            (p.join(" "), q.join(" ")),
-            (program.to_owned(), petsc.to_owned()),
-            "{words}"
-        );
+        assert_eq!((p.join(" "), q.join(" ")), (program.to_owned(), petsc.to_owned()), "{words}");
     }
 
     #[test]
     fn words_go_where_they_belong() {
         check("solve s.toml", "solve s.toml", "");
-        check(
-            "-options_file all.toml solve s.toml",
-            "solve s.toml",
-            "-options_file all.toml",
-        );
+        check("-options_file all.toml solve s.toml", "solve s.toml", "-options_file all.toml");
         check("solve -ksp_view s.toml", "solve s.toml", "-ksp_view");
-        check(
-            "solve s.toml -ksp_view -o x -log_view --quiet",
-            "solve s.toml -o x --quiet",
-            "-ksp_view -log_view",
-        );
-        check(
-            "-up_mat_shift -.5 -v s.toml",
-            "-v s.toml",
-            "-up_mat_shift -.5",
-        );
+        check("solve s.toml -ksp_view -o x -log_view --quiet", "solve s.toml -o x --quiet", "-ksp_view -log_view");
+        check("-up_mat_shift -.5 -v s.toml", "-v s.toml", "-up_mat_shift -.5");
         check("-1e-3 - -o", "-1e-3 - -o", "");
-        check(
-            "-ksp_type cg -- -ksp_type x",
-            "-- -ksp_type x",
-            "-ksp_type cg",
-        );
+        check("-ksp_type cg -- -ksp_type x", "-- -ksp_type x", "-ksp_type cg");
         check("-ksp_monitor", "", "-ksp_monitor");
     }
 }

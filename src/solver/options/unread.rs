@@ -27,53 +27,29 @@ pub enum UnreadKind {
     NotInUse,
 }
 
-/// How options begin that PETSc reads for itself, some of them only at its end.
-pub(super) const GLOBAL: [&str; 41] = [
-    "log",
-    "options",
-    "malloc",
-    "on",
-    "help",
-    "h",
-    "version",
-    "v",
-    "info",
-    "memory",
-    "objects",
-    "error",
-    "debug",
-    "debugger",
-    "debuggers",
-    "start",
-    "stop",
-    "fp",
-    "no",
-    "citations",
-    "history",
-    "get",
-    "check",
-    "shared",
-    "not",
-    "tmp",
-    "mpi",
-    "saws",
-    "nox",
-    "display",
-    "draw",
-    "x",
-    "cuda",
-    "hip",
-    "device",
-    "root",
-    "skip",
-    "process",
-    "petsc",
-    "use",
-    "viewer",
-];
+/// Options of PETSc as a whole, some of which it reads only at its end.
+const GLOBAL: &str = "log log_all log_exclude log_exclude_actions log_exclude_objects log_mpe log_nvtx log_perfstubs \
+    log_summary log_sync log_threshold log_trace log_view log_view_gpu_energy log_view_gpu_time log_view_memory \
+    options_file options_file_yaml options_left options_monitor options_monitor_cancel options_string_yaml \
+    options_suppress_deprecated_warnings options_view malloc malloc_coalesce malloc_debug malloc_dump malloc_hbw \
+    malloc_info malloc_requested_size malloc_test malloc_view malloc_view_threshold on_error_abort \
+    on_error_attach_debugger on_error_emacs on_error_malloc_dump on_error_mpiabort help version info info_exclude \
+    memory_view objects_dump error_output_none error_output_stdout debug_terminal debugger_nodes debugger_pause \
+    debugger_ranks start_in_debugger stop_for_debugger fp_trap no_signal_handler check_pointer_intensity citations \
+    history get_total_flops shared_tmp not_shared_tmp tmp mpi_return_on_error nox nox_warning display x_virtual \
+    skip_petscrc process_view petsc_ci petsc_ci_portable_error_output petsc_sleep use_gpu_aware_mpi saws_options \
+    splitreduction_async vecscatter_view build_twosided";
 
-/// Options of bodies that are read only during or after a solve.
-const LATE: [&str; 0] = [];
+/// First words of options that PETSc reads when it makes a device, a window or a file.
+const GLOBAL_WORDS: [&str; 8] = ["draw", "drawaxis", "viewer", "device", "cuda", "hip", "lg", "prefix"];
+
+/// Options of solvers that are read only in a solve.
+const LATE: &str = "ksp_converged_reason";
+
+/// Whether options of PETSc as a whole begin with this word.
+pub(super) fn is_global_word(word: &str) -> bool {
+    GLOBAL_WORDS.contains(&word) || GLOBAL.split_whitespace().any(|name| name.split('_').next() == Some(word))
+}
 
 /// The options that the user typed and that nobody has read on any rank. Call it on every rank with the same bodies,
 /// after all solvers are set up; `all_reduce` combines the flags of all ranks by "or". What is returned counts as read
@@ -102,38 +78,33 @@ const LATE: [&str; 0] = [];
 ///
 /// # Errors
 /// When PETSc is out of memory.
-pub fn unread(
-    session: &Session,
-    bodies: &[&str],
-    all_reduce: &dyn Fn(&mut [u8]),
-) -> Result<Vec<Unread>> {
+pub fn unread(session: &Session, bodies: &[&str], all_reduce: &dyn Fn(&mut [u8])) -> Result<Vec<Unread>> {
     mark_copies(session, bodies)?;
     let options = session.options();
     let all = options.all()?;
+    // Ours are nobody's mistake; -options_left shall not list them.
+    for (name, _) in all.iter().filter(|(name, _)| origin(name).is_some()) {
+        options.mark_used(name)?;
+    }
     // What the user typed is the same on every rank, unlike our defaults.
-    let candidates: Vec<&Entry> = all
-        .iter()
-        .filter(|(name, _)| origin(name).is_none() && !is_late(name, bodies))
-        .collect();
-    let mut read: Vec<u8> = candidates
-        .iter()
-        .map(|(name, _)| u8::from(options.used(name)))
-        .collect();
+    let candidates: Vec<&Entry> =
+        all.iter().filter(|(name, _)| origin(name).is_none() && !is_late(name, bodies)).collect();
+    let mut read: Vec<u8> = candidates.iter().map(|(name, _)| u8::from(options.used(name))).collect();
     all_reduce(&mut read);
-    let left: Vec<&Entry> = candidates
-        .into_iter()
-        .zip(read)
-        .filter(|(_, read)| *read == 0)
-        .map(|(e, _)| e)
-        .collect();
+    let mut left: Vec<&Entry> = Vec::new();
+    for (entry, read) in candidates.into_iter().zip(read) {
+        // Here for all ranks: PETSc's -options_left knows only its own.
+        options.mark_used(&entry.0)?;
+        if read == 0 {
+            left.push(entry);
+        }
+    }
     if left.is_empty() {
         return Ok(Vec::new());
     }
 
     let of_body = |body: &&str| {
-        all.iter()
-            .filter_map(|(name, value)| Some((body_of(name, &[body])?.1.to_owned(), value.clone())))
-            .collect()
+        all.iter().filter_map(|(name, value)| Some((body_of(name, &[body])?.1.to_owned(), value.clone()))).collect()
     };
     let in_use: Vec<Vec<Entry>> = bodies.iter().map(of_body).collect();
     let names = Names::collect(session, &in_use)?;
@@ -141,39 +112,32 @@ pub fn unread(
         .chain(bodies.iter().map(|body| format!("{body}_")))
         .flat_map(|prefix| names.iter().map(move |name| format!("-{prefix}{name}")))
         .collect();
-    left.into_iter()
-        .map(|(name, value)| {
-            let bare = body_of(name, bodies).map_or(name.trim_start_matches('-'), |(_, bare)| bare);
-            let valid = names.contains(bare);
-            options.mark_used(name)?;
-            Ok(Unread {
-                name: name.clone(),
-                value: value.clone(),
-                kind: if valid {
-                    UnreadKind::NotInUse
-                } else {
-                    UnreadKind::Unknown
-                },
-                nearest: (!valid)
-                    .then(|| nearest(name, known.iter().map(String::as_str)))
-                    .flatten()
-                    .map(String::from),
-            })
-        })
-        .collect()
+    let found = left.into_iter().map(|(name, value)| {
+        let bare = body_of(name, bodies).map_or(name.trim_start_matches('-'), |(_, bare)| bare);
+        let valid = names.contains(bare);
+        Unread {
+            name: name.clone(),
+            value: value.clone(),
+            kind: if valid { UnreadKind::NotInUse } else { UnreadKind::Unknown },
+            nearest: (!valid).then(|| nearest(name, known.iter().map(String::as_str))).flatten().map(String::from),
+        }
+    });
+    Ok(found.collect())
 }
 
 /// Whether an option is not read by the objects at set-up: one of PETSc as a whole, or one read later.
 fn is_late(name: &str, bodies: &[&str]) -> bool {
-    let bare = name.trim_start_matches('-');
-    match body_of(name, bodies) {
-        Some((_, own)) => LATE.contains(&own),
+    let bare = match body_of(name, bodies) {
+        Some((_, own)) => own,
         None => {
-            LATE.contains(&bare)
-                || bare
-                    .split('_')
-                    .next()
-                    .is_some_and(|first| GLOBAL.contains(&first))
+            let bare = name.trim_start_matches('-');
+            let global = GLOBAL.split_whitespace().any(|known| known == bare);
+            if global || bare.split('_').next().is_some_and(|first| GLOBAL_WORDS.contains(&first)) {
+                return true;
+            }
+            bare
         }
-    }
+    };
+    // Also in a nested solver, as sub_ksp_converged_reason.
+    bare.strip_suffix(LATE).is_some_and(|nest| nest.is_empty() || nest.ends_with('_'))
 }

@@ -1,0 +1,76 @@
+//! Preconditioners and factorisations that fail, and getting over it.
+
+use super::error::petsc;
+use super::{Int, Ksp, ffi};
+use crate::error::Result;
+use std::ptr::null_mut;
+
+impl Ksp {
+    /// What went wrong in making the preconditioner, such as a zero pivot; `None` if nothing did.
+    pub fn failure(&self) -> Option<String> {
+        let pc = self.pc().ok()?;
+        let text = match self.failed_reason().ok()? {
+            ffi::PCFailedReason_PC_NOERROR => return None,
+            ffi::PCFailedReason_PC_FACTOR_STRUCT_ZEROPIVOT => "a zero pivot in the pattern of the factorisation",
+            ffi::PCFailedReason_PC_FACTOR_NUMERIC_ZEROPIVOT => "a zero pivot in the factorisation",
+            ffi::PCFailedReason_PC_FACTOR_OUTMEMORY => "not enough memory for the factorisation",
+            ffi::PCFailedReason_PC_FACTOR_OTHER => "the factorisation failed",
+            ffi::PCFailedReason_PC_SUBPC_ERROR => "a preconditioner inside it failed",
+            _ => "its set-up failed",
+        };
+        Some(match self.mumps_info(pc) {
+            Some((first, second)) => {
+                format!("{text}; MUMPS says INFOG(1)={first}, INFOG(2)={second}")
+            }
+            None => text.to_owned(),
+        })
+    }
+
+    /// Forgets a preconditioner that failed if the matrix has changed since: PETSc's interface to MUMPS never factors
+    /// again after a failure.
+    pub(super) fn recover(&self) -> Result<()> {
+        let Some(before) = self.failed_at.get() else {
+            return Ok(());
+        };
+        if self.updates.get() == before {
+            return Ok(());
+        }
+        let pc = self.pc()?;
+        let (mut matrix, mut same) = (null_mut(), null_mut());
+        petsc!(PCGetOperators(pc, &mut matrix, &mut same))?;
+        // The reset lets the matrix go; our reference keeps it till it is set again.
+        petsc!(PetscObjectReference(matrix.cast()))?;
+        let set = petsc!(PCReset(pc)).and_then(|()| petsc!(KSPSetOperators(self.ksp, matrix, matrix)));
+        petsc!(PetscObjectDereference(matrix.cast()))?;
+        self.failed_at.set(None);
+        set
+    }
+
+    /// Remembers with which matrix the preconditioner failed, if it did.
+    pub(super) fn note_failure(&self) -> Result<()> {
+        let failed = self.failed_reason()? != ffi::PCFailedReason_PC_NOERROR;
+        self.failed_at.set(failed.then(|| self.updates.get()));
+        Ok(())
+    }
+
+    /// PETSc's number for a failure of the preconditioner.
+    fn failed_reason(&self) -> Result<ffi::PCFailedReason> {
+        let mut reason = ffi::PCFailedReason_PC_NOERROR;
+        let pc = self.pc()?;
+        petsc!(PCGetFailedReason(pc, &mut reason))?;
+        Ok(reason)
+    }
+
+    /// MUMPS' INFOG(1) and INFOG(2), where MUMPS factors.
+    fn mumps_info(&self, pc: ffi::PC) -> Option<(Int, Int)> {
+        if self.factor_package()? != "mumps" {
+            return None;
+        }
+        let mut factor = null_mut();
+        petsc!(PCFactorGetMatrix(pc, &mut factor)).ok()?;
+        let (mut first, mut second) = (0, 0);
+        petsc!(MatMumpsGetInfog(factor, 1, &mut first)).ok()?;
+        petsc!(MatMumpsGetInfog(factor, 2, &mut second)).ok()?;
+        Some((first, second))
+    }
+}

@@ -1,0 +1,282 @@
+//! PETSc in earnest: failing factorisations, stale ones, several ranks, PETSc's own options.
+//!
+//! A process holds one session, so each test starts this program once more, for itself alone.
+
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+use winkler::error::Result;
+use winkler::petsc::{ConvergedReason, Int, Ksp, Matrix, Session};
+use winkler::solver::options::{UnreadKind, distribute, set_default, unread};
+
+/// After this, ranks that wait for each other are ended.
+const TIMEOUT: Duration = Duration::from_secs(60);
+
+/// Runs `body` in a process of its own, under `mpiexec` if `ranks` is not 0; returns what that printed, or `None` in
+/// the inner process.
+fn alone(test: &str, ranks: usize, environment: &[(&str, &str)], body: impl FnOnce() -> Result<()>) -> Option<Output> {
+    if std::env::var("WINKLER_ALONE").as_deref() == Ok(test) {
+        body().unwrap_or_else(|error| panic!("{error}"));
+        return None;
+    }
+    let program = std::env::current_exe().expect("the path of this program");
+    let mut command = match ranks {
+        0 => Command::new(program),
+        ranks => {
+            let mut command = Command::new("mpiexec");
+            command.args(["--oversubscribe", "-n", &ranks.to_string()]).arg(program);
+            // A hang ends the test instead of stopping it for ever.
+            command
+                .env("MPIEXEC_TIMEOUT", TIMEOUT.as_secs().to_string())
+                .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+                .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
+            command
+        }
+    };
+    command.args([test, "--exact", "--nocapture", "--test-threads=1"]);
+    let output = command
+        .env("WINKLER_ALONE", test)
+        .envs(environment.iter().copied())
+        .output()
+        .expect("this program or mpiexec can be started");
+    Some(output)
+}
+
+/// Expects that the inner process went well and that PETSc did not print an error by itself.
+fn expect_success(output: Option<Output>) -> String {
+    let Some(output) = output else {
+        return String::new();
+    };
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{out}\n{err}");
+    assert!(!err.contains("PETSC ERROR"), "{err}");
+    out.into_owned()
+}
+
+fn words(line: &str) -> Vec<String> {
+    line.split_whitespace().map(String::from).collect()
+}
+
+/// A chain of `n` springs, held at both ends.
+fn chain(session: &Session, n: usize) -> Result<Matrix> {
+    let (mut row_ptr, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
+    for row in 0..n as Int {
+        for column in (row - 1).max(0)..=(row + 1).min(n as Int - 1) {
+            columns.push(column);
+            values.push(if column == row { 2.0 } else { -1.0 });
+        }
+        row_ptr.push(columns.len() as Int);
+    }
+    let mut matrix = Matrix::from_csr(session, 1, row_ptr, columns, values)?;
+    matrix.set_spd()?;
+    Ok(matrix)
+}
+
+fn solver(session: &Session, prefix: &str, matrix: &Matrix) -> Result<Ksp> {
+    let mut ksp = Ksp::new(session, prefix)?;
+    ksp.set_operator(matrix)?;
+    ksp.set_from_options()?;
+    Ok(ksp)
+}
+
+/// Largest entry of `b - A x`.
+fn residual(matrix: &Matrix, b: &[f64], x: &[f64]) -> Result<f64> {
+    let mut ax = vec![0.0; b.len()];
+    matrix.multiply(x, &mut ax)?;
+    Ok(ax.iter().zip(b).map(|(ax, b)| (b - ax).abs()).fold(0.0, f64::max))
+}
+
+#[test]
+fn a_failed_factorisation_is_a_reason_and_not_the_end() {
+    for (test, line) in [
+        ("mumps", "-ksp_type preonly -pc_type cholesky -pc_factor_mat_solver_type mumps"),
+        ("petsc", "-ksp_type preonly -pc_type cholesky -pc_factor_mat_solver_type petsc"),
+        ("lu", "-ksp_type cg -pc_type lu -pc_factor_mat_solver_type petsc"),
+    ] {
+        let environment = [("WINKLER_WORDS", line)];
+        let output = alone("a_failed_factorisation_is_a_reason_and_not_the_end", 0, &environment, || {
+            let line = std::env::var("WINKLER_WORDS").unwrap_or_default();
+            let session = Session::start(&words(&line))?;
+            let mut matrix = chain(&session, 2)?;
+            // 1 -1 -1 1 is singular.
+            matrix.update(|values| values.copy_from_slice(&[1.0, -1.0, -1.0, 1.0]))?;
+            let ksp = solver(&session, "", &matrix)?;
+            ksp.set_up()?;
+            assert!(ksp.failure().is_some());
+            let (b, mut x) = ([1.0, 1.0], [0.0; 2]);
+            let solved = ksp.solve(&b, &mut x)?;
+            println!("REASON {}", solved.reason);
+            assert!(matches!(solved.reason, ConvergedReason::PreconditionerFailed(_)), "{}", solved.reason);
+            // Repaired, it works again.
+            matrix.update(|values| values.copy_from_slice(&[2.0, -1.0, -1.0, 2.0]))?;
+            assert!(ksp.solve(&b, &mut x)?.reason.converged());
+            assert_eq!(ksp.failure(), None);
+            assert!(residual(&matrix, &b, &x)? < 1e-12);
+            Ok(())
+        });
+        if output.is_none() {
+            return;
+        }
+        let out = expect_success(output);
+        assert!(out.contains("zero pivot"), "{out}");
+        assert_eq!(out.contains("INFOG(1)=-10"), test == "mumps", "{out}");
+    }
+}
+
+#[test]
+fn preonly_never_solves_with_an_old_factor() {
+    expect_success(alone("preonly_never_solves_with_an_old_factor", 0, &[], || {
+        let line = "-ksp_type preonly -pc_type cholesky -ksp_reuse_preconditioner -in_ksp_type preonly -in_pc_type bjacobi \
+                    -in_sub_ksp_reuse_preconditioner -cg_ksp_type cg -cg_pc_type cholesky -cg_ksp_rtol 1e-12";
+        let session = Session::start(&words(line))?;
+        let mut matrix = chain(&session, 50)?;
+        let direct = solver(&session, "", &matrix)?;
+        let lagged = solver(&session, "cg_", &matrix)?;
+        let (b, mut x) = (vec![1.0; 50], vec![0.0; 50]);
+        direct.solve(&b, &mut x)?;
+        lagged.set_reuse_preconditioner(true)?;
+        assert_eq!(lagged.solve(&b, &mut x)?.iterations, 1);
+        matrix.update(|values| values[0] = 30.0)?;
+        direct.solve(&b, &mut x)?;
+        assert!(residual(&matrix, &b, &x)? < 1e-10);
+        // The kept factor is one of another matrix: more iterations, the same solution.
+        let solved = lagged.solve(&b, &mut x)?;
+        assert!(solved.iterations > 1 && residual(&matrix, &b, &x)? < 1e-8, "{solved:?}");
+        assert!(direct.set_reuse_preconditioner(true).is_err());
+        assert!(solver(&session, "in_", &matrix).is_err_and(|error| error.message().contains("-in_sub_ksp")));
+        Ok(())
+    }));
+}
+
+#[test]
+fn options_that_change_the_matrix_are_refused() {
+    expect_success(alone("options_that_change_the_matrix_are_refused", 0, &[], || {
+        let line = "-a_ksp_diagonal_scale -b_pc_type lu -b_pc_factor_in_place -c_pc_type eisenstat -c_ksp_type cg \
+                    -c_ksp_initial_guess_nonzero -d_pc_type nosuch";
+        let session = Session::start(&words(line))?;
+        let matrix = chain(&session, 9)?;
+        for (prefix, word) in [("a_", "diagonal_scale"), ("b_", "in_place"), ("d_", "KSPSetFromOptions")] {
+            let error = solver(&session, prefix, &matrix).err().expect(prefix);
+            assert!(error.message().contains(word), "{error}");
+        }
+        let error = solver(&session, "d_", &matrix).err().expect("no such type");
+        assert!(error.to_string().contains("requested PC type nosuch"), "{error}");
+        let (b, mut x) = ([1.0; 9], [f64::NAN; 9]);
+        assert!(solver(&session, "c_", &matrix)?.solve(&b, &mut x)?.reason.converged());
+        assert_eq!(b, [1.0; 9]);
+        assert!(residual(&matrix, &b, &x)? < 1e-4);
+        Ok(())
+    }));
+}
+
+#[test]
+fn a_solver_keeps_its_matrix_and_the_session() {
+    expect_success(alone("a_solver_keeps_its_matrix_and_the_session", 0, &[], || {
+        let session = Session::start(&words("-ksp_type cg -pc_type none -ksp_rtol 1e-12"))?;
+        let matrix = chain(&session, 1000)?;
+        let ksp = solver(&session, "", &matrix)?;
+        drop(matrix);
+        drop(session);
+        // Memory that was given back would be taken by these.
+        let others: Vec<Vec<f64>> = (0..20).map(|_| vec![7.0; 3000]).collect();
+        let mut x = vec![0.0; 1000];
+        assert!(ksp.solve(&[1.0; 1000], &mut x)?.reason.converged());
+        assert!((x[499] - 500.0 * 501.0 / 2.0).abs() < 1e-3, "{}", x[499]);
+        drop(others);
+        Ok(())
+    }));
+}
+
+#[test]
+fn options_come_from_line_file_and_environment() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("petsc.opt");
+    std::fs::write(&file, "# a comment\n-pc_type sor\n-ksp_rtol 1e-3\n").expect("a file");
+    let file = file.to_str().expect("a plain path");
+    let environment = [("PETSC_OPTIONS", "-ksp_max_it 7"), ("WINKLER_FILE", file)];
+    expect_success(alone("options_come_from_line_file_and_environment", 0, &environment, || {
+        let file = std::env::var("WINKLER_FILE").unwrap_or_default();
+        let session = Session::start(&words(&format!("-ksp_type cg -options_file {file} -shift -1e-3")))?;
+        distribute(&session, &["upper"])?;
+        let options = session.options();
+        for (name, value) in [("ksp_type", "cg"), ("pc_type", "sor"), ("ksp_rtol", "1e-3"), ("ksp_max_it", "7")] {
+            assert_eq!(options.get(&format!("-upper_{name}")).as_deref(), Some(value));
+        }
+        assert_eq!(options.get("-shift").as_deref(), Some("-1e-3"));
+        let left = unread(&session, &["upper"], &|_| ())?;
+        assert!(left.iter().any(|option| option.name == "-shift" && option.kind == UnreadKind::Unknown), "{left:?}");
+        assert!(left.iter().all(|option| !option.name.starts_with("-upper")), "{left:?}");
+        Ok(())
+    }));
+}
+
+#[test]
+fn a_missing_options_file_is_told_in_petscs_words() {
+    expect_success(alone("a_missing_options_file_is_told_in_petscs_words", 0, &[], || {
+        let error = Session::start(&words("-options_file nosuch.opt")).err().expect("no such file");
+        assert!(error.to_string().contains("Unable to open options file nosuch.opt"), "{error}");
+        assert_eq!(error.kind().exit_code(), 5);
+        Ok(())
+    }));
+}
+
+#[test]
+fn settings_of_open_mpi_by_the_user_are_kept() {
+    let environment = [("OMPI_MCA_btl", "self,tcp")];
+    expect_success(alone("settings_of_open_mpi_by_the_user_are_kept", 0, &environment, || {
+        let _session = Session::start(&[])?;
+        assert_eq!(std::env::var("OMPI_MCA_btl").as_deref(), Ok("self,tcp"));
+        assert!(std::env::var_os("OMPI_MCA_pml").is_none());
+        Ok(())
+    }));
+}
+
+#[test]
+fn an_option_read_on_one_rank_is_read() {
+    expect_success(alone("an_option_read_on_one_rank_is_read", 2, &[], || {
+        use mpi::collective::SystemOperation;
+        use mpi::traits::CommunicatorCollectives;
+        let line =
+            "-ksp_type cg -lower_ksp_rtol 1e-3 -upper_ksp_rtol 1e-9 -upper_ksp_rtoll 1e-9 -pc_sor_its 2 -log_veiw";
+        let session = Session::start(&words(line))?;
+        let bodies = ["upper", "lower"];
+        distribute(&session, &bodies)?;
+        // Each rank has one body, and tells PETSc only what concerns that.
+        let body = bodies[session.rank()];
+        set_default(&session, body, "pc_type", Some("jacobi"))?;
+        let matrix = chain(&session, 9)?;
+        let ksp = solver(&session, &format!("{body}_"), &matrix)?;
+        ksp.set_up()?;
+        let or = |flags: &mut [u8]| {
+            let mine = flags.to_vec();
+            session.world().all_reduce_into(&mine[..], flags, SystemOperation::bitwise_or());
+        };
+        let found: Vec<(String, UnreadKind)> =
+            unread(&session, &bodies, &or)?.into_iter().map(|option| (option.name, option.kind)).collect();
+        let expected = [
+            ("-log_veiw", UnreadKind::Unknown),
+            ("-pc_sor_its", UnreadKind::NotInUse),
+            ("-upper_ksp_rtoll", UnreadKind::Unknown),
+        ];
+        assert_eq!(found, expected.map(|(name, kind)| (name.to_owned(), kind)));
+        assert_eq!(session.options().left()?, []);
+        Ok(())
+    }));
+}
+
+#[test]
+fn a_panic_on_one_rank_ends_the_others() {
+    let test = "a_panic_on_one_rank_ends_the_others";
+    let start = Instant::now();
+    let output = alone(test, 2, &[], || {
+        use mpi::traits::CommunicatorCollectives;
+        let session = Session::start(&[])?;
+        assert!(session.rank() == 0, "the planted panic");
+        session.world().barrier();
+        Ok(())
+    });
+    if let Some(output) = output {
+        assert!(!output.status.success());
+        assert!(start.elapsed() < TIMEOUT, "the other rank waited");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("the planted panic"));
+    }
+}
