@@ -7,7 +7,7 @@ use mpi::ffi::RSMPI_COMM_SELF;
 use std::ffi::c_void;
 use std::ptr::null_mut;
 
-/// The arrays that PETSc works on. They live exactly as long as PETSc's matrix, which may outlive [`Matrix`] inside a
+/// The arrays that PETSc works on. They live exactly as long as PETSc's matrix, which may outlive `Matrix` inside a
 /// solver: PETSc calls [`free`] at the end.
 pub(super) struct Arrays {
     pub(super) row_ptr: Vec<Int>,

@@ -70,7 +70,7 @@ impl Options {
     /// Sets an option, replacing its value.
     ///
     /// # Errors
-    /// When the name is not one or two dashes, a letter and letters, digits or underscores, or a text has a zero byte.
+    /// When the name does not begin with a letter after its dash or has a blank, or a text has a zero byte.
     pub fn set(&self, name: &str, value: Option<&str>) -> Result<()> {
         let name = key(name)?;
         let value = value.map(text).transpose()?;

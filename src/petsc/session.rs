@@ -6,6 +6,7 @@ use crate::error::{Error, Kind, Result};
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
 use std::ffi::{CString, c_char, c_int};
+use std::io::Write;
 use std::rc::Rc;
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -70,7 +71,14 @@ impl Session {
         // (-on_error_abort, -start_in_debugger) come on top.
         petsc!(PetscPushErrorHandler(Some(record), std::ptr::null_mut()))?;
         let (count, arguments) = (&raw mut count, &raw mut arguments);
-        petsc!(PetscInitialize(count, arguments, std::ptr::null(), std::ptr::null()))?;
+        let started = petsc!(PetscInitialize(count, arguments, std::ptr::null(), std::ptr::null()));
+        if let Err(error) = started {
+            // The other ranks may still wait for this one inside PETSc; ending MPI here would wait for them.
+            if world.size() > 1 {
+                std::mem::forget(universe);
+            }
+            return Err(error);
+        }
         let session = Session(Rc::new(Running { world, _universe: universe }));
         session.options().clear(NO_SIGNALS)?;
         Ok(session)
@@ -118,6 +126,8 @@ impl Session {
     /// session.abort(5);
     /// ```
     pub fn abort(&self, code: i32) -> ! {
+        // Nothing can be done about an output that is closed.
+        let _ = std::io::stdout().flush();
         // SAFETY: a null file means all files of the C library.
         unsafe { ffi::fflush(std::ptr::null_mut()) };
         if self.size() > 1 || launcher::seen() {

@@ -7,7 +7,7 @@
 //! 1. [`distribute`] copies each plain option of the object families to every body that has not its own;
 //! 2. [`set_default`] and [`prefer_mumps`] add what the program chooses where nothing was typed;
 //! 3. the objects are made and set up;
-//! 4. [`mark_copies`] and [`unread`] find what nobody read: a slip of the keyboard ends the run before it starts.
+//! 4. [`mark_copies`] and [`unread()`] find what nobody read: a slip of the keyboard ends the run before it starts.
 
 mod probe;
 mod split;
@@ -91,6 +91,15 @@ pub fn distribute(session: &Session, bodies: &[&str]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Takes back what this module put into the table, so that another scene of the process starts from the typed options.
+///
+/// # Errors
+/// When PETSc refuses, which it does not for options it has taken before.
+pub fn withdraw(session: &Session) -> Result<()> {
+    let ours = OURS.take();
+    ours.keys().try_for_each(|name| session.options().clear(name))
 }
 
 /// Sets `-<body>_<name>` unless it is set: a choice of the program, which never counts as typed or unread.

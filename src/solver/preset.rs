@@ -49,7 +49,8 @@ pub fn apply(session: &Session, body: &str, preset: Preset) -> Result<()> {
     if ksp != "preonly" {
         default("ksp_rtol", TOLERANCE)?;
         if matches!(ksp.as_str(), "cg" | "fcg" | "pipecg") {
-            default("ksp_norm_type", "unpreconditioned")?;
+            // r'M^-1 r: with a good preconditioner the energy of the error, which the outer residual measures
+            default("ksp_norm_type", "natural")?;
         }
     }
     if pc == "hypre" && matches!(in_force("pc_hypre_type").as_str(), "" | "boomeramg") {

@@ -77,6 +77,12 @@ impl Names {
         if self.names.contains(&name) {
             return true;
         }
+        // Fields have any name: fieldsplit_x_ksp_type.
+        let field = name.strip_prefix("fieldsplit_");
+        let fields = field.into_iter().flat_map(|rest| [Some(rest), rest.split_once('_').map(|(_, leaf)| leaf)]);
+        if fields.flatten().any(|leaf| self.names.contains(leaf)) {
+            return true;
+        }
         let nests = self.names.iter().filter_map(|known| known.strip_suffix("ksp_type"));
         nests
             .filter(|nest| !nest.is_empty())
@@ -120,14 +126,15 @@ fn ask(session: &Session, matrix: &Matrix, types: &[Entry]) -> Result<BTreeSet<S
     Ok(names_in(&text, &prefix))
 }
 
-/// The names that follow `-<prefix>` in a help text.
+/// The names in a help text: the words that begin its lines, without the prefix that most of them have.
 fn names_in(text: &str, prefix: &str) -> BTreeSet<String> {
-    let start = format!("-{prefix}");
-    text.split(&start)
-        .skip(1)
-        .map(|rest| rest.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next().unwrap_or_default())
+    text.lines()
+        .filter_map(|line| {
+            let word = line.trim_start().strip_prefix('-')?;
+            let end = word.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(word.len());
+            Some(without_numbers(word[..end].strip_prefix(prefix).unwrap_or(&word[..end])))
+        })
         .filter(|name| !name.is_empty())
-        .map(without_numbers)
         .collect()
 }
 
@@ -165,10 +172,10 @@ mod tests {
 
     #[test]
     fn names_are_found_in_a_help_text() {
-        let text =
-            "  -p1_ksp_type <now gmres> (one of) cg (KSPSetType)\n  -p1_mg_levels_1_pc_type: x\n -ksp_other: y\n";
+        let text = "  -p1_ksp_type <now gmres> (one of) cg (KSPSetType)\n  -p1_mg_levels_1_pc_type: x\n\
+                    KLU Options:\n -mat_klu_tol <1 : 1>: see -ksp_other\n";
         let names: Vec<String> = names_in(text, "p1_").into_iter().collect();
-        assert_eq!(names, ["ksp_type", "mg_levels_pc_type"]);
+        assert_eq!(names, ["ksp_type", "mat_klu_tol", "mg_levels_pc_type"]);
         assert_eq!(without_numbers("mat_mumps_icntl_4"), "mat_mumps_icntl_4");
     }
 
@@ -177,7 +184,8 @@ mod tests {
         let names = Names { names: ["ksp_type", "pc_sor_its", "mg_levels_ksp_type"].map(String::from).into() };
         assert!(names.contains("pc_sor_its"));
         assert!(names.contains("mg_levels_3_pc_sor_its"));
-        assert!(!names.contains("mg_coarse_pc_sor_its"));
+        assert!(names.contains("fieldsplit_0_ksp_type") && names.contains("fieldsplit_u_ksp_type"));
+        assert!(!names.contains("fieldsplit_u_ksp_typ") && !names.contains("mg_coarse_pc_sor_its"));
         assert!(!names.contains("mg_levels_pc_sor_it"));
     }
 }
