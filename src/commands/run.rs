@@ -13,6 +13,9 @@ use mpi::traits::CommunicatorCollectives;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+/// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
+const LARGE_FRONTS: usize = 30_000;
+
 /// Wall seconds of the phases of a run.
 #[derive(Debug, Clone)]
 pub struct Clock {
@@ -74,6 +77,10 @@ pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Pr
             (preset, format!("{preset:?}: {why}"))
         }
     };
+    // small fronts and several ranks lose by BLAS threads, large factorisations gain
+    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
+    let threads = if scene.dimension.value == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
+    session.set_blas_threads(threads);
     for name in &names {
         preset::apply(session, name, chosen)?;
     }

@@ -121,12 +121,7 @@ pub fn assemble<const D: usize>(
             let mut entries = Vec::new();
             let mut resultant = [0.0; D];
             let mut known = 0.0;
-            for (&n, &value) in &sum.sides[side] {
-                let share = value / sum.weight;
-                // the dual basis is nodal on its own side: the rest of the row is rounding
-                if share.abs() < 1e-13 {
-                    continue;
-                }
+            for (n, share) in shares(&sum.sides[side], sum.weight) {
                 let x = space.nodes[n as usize];
                 for c in 0..D {
                     if side == 0 {
@@ -166,6 +161,21 @@ pub fn assemble<const D: usize>(
 pub fn pad<const D: usize>(v: [f64; D]) -> [f64; 3] {
     std::array::from_fn(|c| if c < D { v[c] } else { 0.0 })
 }
+
+/// A side's nodal shares of a point, which sum to one. Shares that are only noise of the mesher's coordinates go to the
+/// largest one: surfaces that match to nine digits have nodal rows on both sides.
+fn shares(values: &std::collections::BTreeMap<u32, f64>, weight: f64) -> Vec<(u32, f64)> {
+    let (mut kept, noise): (Vec<_>, Vec<_>) =
+        values.iter().map(|(&node, value)| (node, value / weight)).partition(|(_, share)| share.abs() > NOISE);
+    let lost: f64 = noise.iter().map(|(_, share)| share).sum();
+    if let Some(largest) = kept.iter_mut().max_by(|p, q| p.1.total_cmp(&q.1)) {
+        largest.1 += lost;
+    }
+    kept
+}
+
+/// Share of a node in a point below which it is noise.
+const NOISE: f64 = 1e-9;
 
 #[derive(Default)]
 struct Accumulator {

@@ -48,6 +48,20 @@ pub(super) fn name() -> String {
     }
 }
 
+/// Asks OpenBLAS for a number of threads; false if another BLAS is in use, which keeps its own number.
+pub(super) fn set_threads(count: usize) -> bool {
+    // SAFETY: the name is looked up in the loaded libraries; OpenBLAS declares it as void (int).
+    unsafe {
+        let address = dlsym(std::ptr::null_mut(), c"openblas_set_num_threads".as_ptr());
+        if address.is_null() {
+            return false;
+        }
+        let set: extern "C" fn(c_int) = std::mem::transmute(address);
+        set(count.clamp(1, 1024) as c_int);
+    }
+    true
+}
+
 /// The BLAS that lives in a file, told by its path: Debian's alternatives all end in `libblas.so.3`.
 fn name_of(path: &str) -> String {
     let lower = path.to_lowercase();

@@ -89,6 +89,13 @@ impl Session {
         Options::new(self)
     }
 
+    /// Lets OpenBLAS use `count` threads in this process, unless the user set OPENBLAS_NUM_THREADS or OMP_NUM_THREADS.
+    /// Returns whether the number is in force.
+    pub fn set_blas_threads(&self, count: usize) -> bool {
+        let typed = ["OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"].iter().any(|name| std::env::var_os(name).is_some());
+        !typed && super::blas::set_threads(count)
+    }
+
     /// Number of this process among [`size`](Self::size), from 0.
     pub fn rank(&self) -> usize {
         self.0.world.rank() as usize
