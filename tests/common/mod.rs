@@ -1,0 +1,280 @@
+//! Runs the program as a user does, in a folder of its own, and reads what it wrote.
+#![allow(dead_code)] // every test program uses its own part of this
+
+use serde_json::Value;
+use std::fs::{self, File};
+use std::ops::Index;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// The program under test.
+pub const WINKLER: &str = env!("CARGO_BIN_EXE_winkler");
+
+/// After this a run counts as hanging and is ended.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// What came of one run.
+pub struct Run {
+    /// Exit code.
+    pub code: i32,
+    /// What it printed.
+    pub stdout: String,
+    /// What it complained about.
+    pub stderr: String,
+    /// `report.json`; null if there is none.
+    pub report: Value,
+    /// Folder of results; it may not exist.
+    pub folder: PathBuf,
+    _scratch: TempDir,
+}
+
+impl Run {
+    /// A number of the report, by name or path (`"times/total"`).
+    pub fn number(&self, path: &str) -> f64 {
+        let value = self.report.pointer(&format!("/{path}")).unwrap_or(&Value::Null);
+        value.as_f64().unwrap_or_else(|| panic!("`{path}` of the report is {value}\n{}", self.said()))
+    }
+
+    /// A whole number of the report.
+    pub fn count(&self, path: &str) -> usize {
+        let number = self.number(path);
+        assert_eq!(number, number.trunc(), "{path}");
+        number as usize
+    }
+
+    /// A text of the report.
+    pub fn text(&self, path: &str) -> &str {
+        let value = self.report.pointer(&format!("/{path}")).unwrap_or(&Value::Null);
+        value.as_str().unwrap_or_else(|| panic!("`{path}` of the report is {value}\n{}", self.said()))
+    }
+
+    /// Inner solver of each body, as the report has it.
+    pub fn solvers(&self) -> Vec<&str> {
+        let bodies = self.report["bodies"].as_array().unwrap_or_else(|| panic!("no bodies\n{}", self.said()));
+        bodies.iter().map(|body| body["solver"].as_str().unwrap_or_default()).collect()
+    }
+
+    /// All warnings of the report, a line each.
+    pub fn warnings(&self) -> String {
+        let warnings = self.report["warnings"].as_array().unwrap_or_else(|| panic!("no report\n{}", self.said()));
+        warnings.iter().filter_map(Value::as_str).collect::<Vec<_>>().join("\n")
+    }
+
+    /// A table among the results.
+    pub fn table(&self, name: &str) -> Table {
+        Table::read(&self.folder.join(name))
+    }
+
+    /// The contact table of the first pair.
+    pub fn contact(&self) -> Table {
+        let name = |side: usize| self.text(&format!("pairs/0/bodies/{side}"));
+        self.table(&format!("contact-{}-{}.csv", name(0), name(1)))
+    }
+
+    /// `history.csv`.
+    pub fn history(&self) -> Table {
+        self.table("history.csv")
+    }
+
+    /// The run itself, which must have ended with status `converged`.
+    pub fn converged(self) -> Self {
+        assert_eq!((self.code, self.report["status"].as_str()), (0, Some("converged")), "{}", self.said());
+        self
+    }
+
+    /// All that was said, for messages of tests.
+    pub fn said(&self) -> String {
+        format!("exit code {}\n--- stdout\n{}--- stderr\n{}", self.code, self.stdout, self.stderr)
+    }
+}
+
+/// Solves a scene with `-o` a folder of its own and further arguments.
+pub fn solve(scene: impl AsRef<Path>, args: &[&str]) -> Run {
+    solve_on(1, scene, args)
+}
+
+/// Solves a scene on a number of ranks; one rank starts without `mpiexec`.
+pub fn solve_on(ranks: usize, scene: impl AsRef<Path>, args: &[&str]) -> Run {
+    let scratch = TempDir::new().expect("a temporary folder");
+    let folder = scratch.path().join("results");
+    let mut command = program(ranks);
+    command.arg("solve").arg(scene.as_ref()).arg("-o").arg(&folder).args(args);
+    finish(command, scratch, folder)
+}
+
+/// Runs the program with these words, in an empty folder.
+pub fn winkler(args: &[&str]) -> Run {
+    let scratch = TempDir::new().expect("a temporary folder");
+    let folder = scratch.path().to_owned();
+    let mut command = program(1);
+    command.args(args);
+    finish(command, scratch, folder)
+}
+
+/// The program, on a number of ranks, with the environment of all tests.
+fn program(ranks: usize) -> Command {
+    let mut command = if ranks == 1 {
+        Command::new(WINKLER)
+    } else {
+        let mut command = Command::new("mpiexec");
+        command.args(["--oversubscribe", "-n", &ranks.to_string(), WINKLER]);
+        command
+    };
+    environment(&mut command);
+    command
+}
+
+/// Sets what tests need: Open MPI as root, one thread a rank, a cache of meshes for all tests, no options from outside.
+pub fn environment(command: &mut Command) {
+    command
+        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+        .env("OPENBLAS_NUM_THREADS", "1")
+        .env("WINKLER_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("meshes"))
+        .env_remove("PETSC_OPTIONS");
+}
+
+fn finish(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
+    command.current_dir(scratch.path());
+    let (status, stdout, stderr) = output(command, PATIENCE);
+    let report = match fs::read(folder.join("report.json")) {
+        Ok(bytes) => serde_json::from_slice(&bytes).expect("report.json is JSON"),
+        Err(_) => Value::Null,
+    };
+    let run = Run { code: status.code().unwrap_or(-1), stdout, stderr, report, folder, _scratch: scratch };
+    assert!(!run.stderr.contains("panicked"), "the program panicked\n{}", run.said());
+    run
+}
+
+/// Runs a command to its end, which must come before `patience` is over; gives its exit status, output and complaints.
+pub fn output(mut command: Command, patience: Duration) -> (ExitStatus, String, String) {
+    // Files, unlike pipes, take all output without anybody reading.
+    let texts = TempDir::new().expect("a temporary folder");
+    let [out, err] = ["out", "err"].map(|name| texts.path().join(name));
+    let file = |path: &Path| Stdio::from(File::create(path).expect("a temporary file"));
+    command.stdin(Stdio::null()).stdout(file(&out)).stderr(file(&err));
+    let began = Instant::now();
+    let mut child = command.spawn().unwrap_or_else(|cause| panic!("{command:?}: {cause}"));
+    let read = |path: &Path| String::from_utf8_lossy(&fs::read(path).unwrap_or_default()).into_owned();
+    loop {
+        if let Some(status) = child.try_wait().expect("a child can be waited for") {
+            return (status, read(&out), read(&err));
+        }
+        if began.elapsed() > patience {
+            // mpiexec ends its ranks at this signal, and would leave them at a harder one
+            let _ = Command::new("kill").arg(child.id().to_string()).status();
+            let _ = child.wait();
+            panic!("{command:?} does not end\n--- stdout\n{}--- stderr\n{}", read(&out), read(&err));
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// The project's folder.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The scene of a case in `meshes/`.
+pub fn case(name: &str) -> PathBuf {
+    root().join("meshes").join(name).join("scene.toml")
+}
+
+/// A scene file of a test, gone with this value.
+pub struct Scene {
+    /// The file.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+    _folder: TempDir,
+}
+
+impl Scene {
+    /// Writes a scene.
+    pub fn new(text: impl Into<String>) -> Self {
+        let folder = TempDir::new().expect("a temporary folder");
+        let (path, text) = (folder.path().join("scene.toml"), text.into());
+        fs::write(&path, &text).expect("a scene can be written");
+        Self { path, text, _folder: folder }
+    }
+
+    /// A case of `meshes/` with one text in it replaced by another.
+    pub fn edited(name: &str, from: &str, to: &str) -> Self {
+        let text = text_of(name);
+        assert_eq!(text.matches(from).count(), 1, "`{from}` must stand once in the scene of {name}");
+        Self::new(text.replace(from, to))
+    }
+
+    /// Number of the line where a text stands first.
+    pub fn line_of(&self, text: &str) -> usize {
+        let found = self.text.lines().position(|line| line.contains(text));
+        1 + found.unwrap_or_else(|| panic!("`{text}` does not stand in the scene"))
+    }
+}
+
+impl AsRef<Path> for Scene {
+    fn as_ref(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// The scene of a case, with a path of its script that holds from everywhere.
+pub fn text_of(name: &str) -> String {
+    let path = case(name);
+    let text = fs::read_to_string(&path).unwrap_or_else(|cause| panic!("{}: {cause}", path.display()));
+    let folder = root().join("meshes").join(name);
+    text.replace("geo = \"", &format!("geo = \"{}/", folder.display()))
+}
+
+/// A CSV file as columns; an empty field is NaN.
+pub struct Table {
+    /// Names of the columns, in order.
+    pub names: Vec<String>,
+    columns: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// Reads a file.
+    pub fn read(path: &Path) -> Self {
+        let mut file = csv::Reader::from_path(path).unwrap_or_else(|cause| panic!("{}: {cause}", path.display()));
+        let names: Vec<String> = file.headers().expect("a header").iter().map(String::from).collect();
+        let mut columns = vec![Vec::new(); names.len()];
+        for row in file.records() {
+            for (column, field) in columns.iter_mut().zip(&row.expect("rows as long as the header")) {
+                let number = if field.is_empty() { Ok(f64::NAN) } else { field.parse() };
+                column.push(number.unwrap_or_else(|_| panic!("{}: `{field}` is no number", path.display())));
+            }
+        }
+        Self { names, columns }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.columns[0].len()
+    }
+
+    /// A column of whole numbers.
+    pub fn counts(&self, name: &str) -> Vec<usize> {
+        self[name].iter().map(|&value| value as usize).collect()
+    }
+}
+
+impl Index<&str> for Table {
+    type Output = [f64];
+
+    fn index(&self, name: &str) -> &[f64] {
+        let found = self.names.iter().position(|known| known == name);
+        &self.columns[found.unwrap_or_else(|| panic!("no column `{name}` among {:?}", self.names))]
+    }
+}
+
+/// Largest difference over the largest value of the second one.
+pub fn distance(ours: &[f64], theirs: &[f64]) -> f64 {
+    assert_eq!(ours.len(), theirs.len());
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |max: f64, v| if v > max { v } else { max });
+    let difference: Vec<f64> = ours.iter().zip(theirs).map(|(a, b)| (a - b).abs()).collect();
+    assert!(difference.iter().all(|d| d.is_finite()), "a value is not finite");
+    largest(&mut difference.into_iter()) / largest(&mut theirs.iter().map(|v| v.abs()))
+}

@@ -1,0 +1,119 @@
+//! The work that the program does is the work that the method needs: exact counts.
+//!
+//! For two bodies: the start solves with springs of its own, 4 steps a body, after one factorisation; every sweep solves
+//! each body once; a body is factored when its Robin term changed.
+
+mod common;
+
+use common::{Run, case, distance, solve};
+
+const COARSE: [&str; 2] = ["--set", "mesh.set.n=8"];
+
+fn coarse(name: &str, args: &[&str]) -> Run {
+    solve(case(name), &[&COARSE, args].concat()).converged()
+}
+
+/// Counts of a run, by name.
+fn counts<const N: usize>(run: &Run, names: [&str; N]) -> [usize; N] {
+    names.map(|name| run.count(name))
+}
+
+#[test]
+fn a_nonlinear_layer_factors_every_body_in_every_sweep() {
+    let run = solve(case("groove"), &[]).converged();
+    assert_eq!(counts(&run, ["iterations", "sweeps"]), [7, 8]);
+    // 2 for the start, 2 in each sweep; the pattern once a body
+    assert_eq!(counts(&run, ["factorizations", "symbolic_factorizations", "assemblies"]), [18, 2, 2]);
+    // the lift asks for the springs that set-up has given already
+    assert_eq!(counts(&run, ["robin_updates", "robin_updates_skipped"]), [18, 2]);
+    assert_eq!(counts(&run, ["body_solves", "body_solves_skipped"]), [2 * 4 + 2 * 8, 0]);
+    assert_eq!(counts(&run, ["inner_iterations", "messages"]), [0, 0]);
+    let history = run.history();
+    assert_eq!(history.counts("iteration"), (0..8).collect::<Vec<_>>());
+    assert_eq!(history.counts("sweeps"), (1..=8).collect::<Vec<_>>());
+    assert_eq!(history.counts("factorizations"), (2..=9).map(|k| 2 * k).collect::<Vec<_>>());
+}
+
+#[test]
+fn without_a_robin_term_stiffness_is_factored_once() {
+    let layer = "contact.0.layer={linear={stiffness=1e3}}";
+    let rules = ["method.psi=none", "method.gamma=0.5", "method.stop={residual=1e-8}", layer];
+    let run = coarse("groove", &rules.map(|rule| ["--set", rule]).concat());
+    let sweeps = run.count("sweeps");
+    assert!(sweeps > 5, "{sweeps} sweeps tell nothing");
+    assert_eq!(run.count("iterations") + 1, sweeps);
+    assert_eq!(counts(&run, ["factorizations", "symbolic_factorizations", "robin_updates"]), [4, 2, 4]);
+    assert_eq!(run.count("robin_updates_skipped"), 2 + 2 * (sweeps - 1));
+    assert_eq!(run.count("body_solves"), 2 * 4 + 2 * sweeps);
+}
+
+#[test]
+fn a_linear_layer_in_full_contact_is_factored_once() {
+    let linear: &[&str] = &["--set", "method.start.normal=3e-4"];
+    let power: &[&str] = &["--set", "contact.0.layer={power={B=1e-5,a=1}}"]; // the same layer
+    for layer in [linear, &[linear, power].concat()] {
+        let run = coarse("wavy", layer);
+        let history = run.history();
+        assert_eq!(history["closed"], history["points"], "the contact must be full in all iterations");
+        let sweeps = run.count("sweeps");
+        assert_eq!(counts(&run, ["factorizations", "robin_updates"]), [4, 4]);
+        assert_eq!(run.count("robin_updates_skipped"), 2 + 2 * (sweeps - 1));
+        assert_eq!(run.count("body_solves"), 2 * 4 + 2 * sweeps);
+    }
+}
+
+#[test]
+fn a_linear_layer_is_factored_again_only_when_the_contact_set_changes() {
+    let rules = ["--set", "contact.0.layer.power.a=1", "--set", "method.stop={residual=1e-10}"];
+    let run = coarse("groove", &rules);
+    let history = run.history();
+    let (closed, factored) = (history.counts("closed"), history.counts("factorizations"));
+    assert_eq!(factored[0], 4);
+    let mut changes = 0;
+    for k in 1..closed.len() {
+        let new = factored[k] - factored[k - 1];
+        assert!(new == 0 || new == 2, "row {k}: {new} factorisations");
+        if closed[k] != closed[k - 1] {
+            assert_eq!(new, 2, "row {k}: the contact set changed");
+            changes += 1;
+        }
+    }
+    assert!(changes > 0, "a contact set that never changes tells nothing");
+    let last = factored.len() - 1;
+    assert_eq!(factored[last], factored[last - 3], "the contact set has settled by then");
+    assert_eq!(run.count("robin_updates"), run.count("factorizations"));
+    assert_eq!(run.count("robin_updates") + run.count("robin_updates_skipped"), 2 * (run.count("sweeps") + 2));
+}
+
+/// r = (1 - gamma) r_last with the same G needs no solve. One sweep with gamma = 1 gives the answer without that.
+#[test]
+fn bodies_that_never_touch_are_solved_once() {
+    let apart = ["--set", "contact.0.gap=1", "--set", "method.stop={residual=1e-11}"];
+    let run = coarse("groove", &apart);
+    let direct = coarse("groove", &[&apart[..], &["--set", "method.gamma=1"]].concat());
+    let sweeps = run.count("sweeps");
+    assert!(sweeps > 10, "{sweeps} sweeps tell nothing");
+    assert_eq!(counts(&run, ["body_solves", "body_solves_skipped"]), [2 * 4 + 2, 2 * (sweeps - 1)]);
+    // the start, then K
+    assert_eq!(counts(&run, ["factorizations", "robin_updates"]), [4, 4]);
+    assert_eq!(counts(&direct, ["iterations", "body_solves"]), [1, 2 * 4 + 2]);
+    let (skipped, solved) = (run.contact(), direct.contact());
+    for column in ["u_n_lower", "u_n_upper", "compression"] {
+        assert!(distance(&skipped[column], &solved[column]) < 1e-9, "{column}");
+    }
+    assert!((run.number("F1") / direct.number("F1") - 1.0).abs() < 1e-9);
+    assert!(run.contact()["pressure"].iter().all(|&p| p == 0.0));
+}
+
+/// Preconditioners count as factorisations, Krylov iterations are counted, and direct solves have none.
+#[test]
+fn krylov_iterations_are_counted() {
+    let run = coarse("groove", &["-ksp_type", "cg", "-pc_type", "hypre"]);
+    let history = run.history();
+    assert_eq!(run.count("factorizations"), 2 + 2 * run.count("sweeps"));
+    let iterations = history.counts("inner_iterations");
+    assert!(iterations.windows(2).all(|pair| pair[0] < pair[1]), "{iterations:?}");
+    assert_eq!(iterations.last(), Some(&run.count("inner_iterations")));
+    let mixed = coarse("groove", &["-upper_ksp_type", "cg", "-upper_pc_type", "hypre"]);
+    assert!(mixed.count("inner_iterations") < run.count("inner_iterations"));
+}

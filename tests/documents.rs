@@ -1,0 +1,142 @@
+//! What the documents tell a reader to type works.
+
+mod common;
+
+use common::{WINKLER, output, root};
+use std::fs;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+/// Beginnings of lines that are commands of this program.
+const COMMANDS: [&str; 3] = ["winkler ", "target/release/winkler ", "scripts/run "];
+
+/// A command in a document.
+struct Typed {
+    /// Line where it begins.
+    line: usize,
+    /// The command, its continuation lines joined.
+    text: String,
+}
+
+/// The commands in the `sh` blocks of a document.
+fn commands(text: &str) -> Vec<Typed> {
+    let mut found: Vec<Typed> = Vec::new();
+    let (mut inside, mut open) = (false, false);
+    for (number, line) in text.lines().enumerate() {
+        let bare = line.trim();
+        if bare.starts_with("```") {
+            inside = !inside && bare == "```sh";
+            open = false;
+            continue;
+        }
+        if !inside {
+            continue;
+        }
+        let (part, more) = bare.strip_suffix('\\').map_or((bare, false), |part| (part, true));
+        // `mpiexec -n 2 winkler ...` is one of ours, too
+        let words = match bare.strip_prefix("mpiexec -n ") {
+            Some(rest) => rest.split_once(' ').map_or("", |(_, words)| words),
+            None => bare,
+        };
+        if open {
+            if let Some(last) = found.last_mut() {
+                last.text = format!("{} {}", last.text.trim_end(), part.trim());
+            }
+        } else if COMMANDS.iter().any(|command| words.starts_with(command)) {
+            found.push(Typed { line: number + 1, text: part.trim_end().to_owned() });
+        } else {
+            continue;
+        }
+        open = more;
+    }
+    found
+}
+
+/// A folder like the project's, with the program under the names that readers type.
+fn scratch() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let base = folder.path();
+    copy(&root().join("meshes"), &base.join("meshes"));
+    for name in ["bin", "scripts", "target/release"] {
+        fs::create_dir_all(base.join(name)).expect("a folder");
+    }
+    symlink(WINKLER, base.join("bin/winkler")).expect("a link");
+    symlink(WINKLER, base.join("target/release/winkler")).expect("a link");
+    // what scripts/run does after set-up and build
+    let run = base.join("scripts/run");
+    fs::write(&run, "#!/bin/sh\nexec winkler solve \"$@\"\n").expect("a script");
+    fs::set_permissions(&run, fs::Permissions::from_mode(0o755)).expect("a script that runs");
+    folder
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("a folder");
+    for entry in fs::read_dir(from).expect("a folder").flatten() {
+        let (from, to) = (entry.path(), to.join(entry.file_name()));
+        if from.is_dir() {
+            copy(&from, &to);
+        } else {
+            fs::copy(&from, &to).expect("a copy");
+        }
+    }
+}
+
+/// Runs the commands of a document in order; gives what failed.
+fn failures(document: &Path, commands: &[Typed]) -> Vec<String> {
+    let folder = scratch();
+    let path = std::env::var("PATH").unwrap_or_default();
+    let run = |typed: &Typed| {
+        let mut shell = Command::new("bash");
+        common::environment(&mut shell);
+        shell.env("PATH", format!("{}:{path}", folder.path().join("bin").display()));
+        shell.current_dir(folder.path()).args(["-o", "pipefail", "-c", &typed.text]);
+        let (status, _, complaint) = output(shell, Duration::from_secs(120));
+        let place = format!("{}:{}", document.display(), typed.line);
+        (!status.success()).then(|| format!("{place}: `{}` ended with {status}\n{complaint}", typed.text))
+    };
+    commands.iter().filter_map(run).collect()
+}
+
+fn documents() -> Vec<PathBuf> {
+    let in_docs = fs::read_dir(root().join("docs")).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut found: Vec<PathBuf> = in_docs.filter(|path| path.extension().is_some_and(|end| end == "md")).collect();
+    found.sort();
+    found.insert(0, root().join("README.md"));
+    found
+}
+
+#[test]
+fn every_command_in_the_documents_works() {
+    let mut seen: Vec<String> = Vec::new();
+    let mut failed = Vec::new();
+    for document in documents() {
+        let text = fs::read_to_string(&document).unwrap_or_else(|cause| panic!("{}: {cause}", document.display()));
+        let mut typed = commands(&text);
+        typed.retain(|typed| !seen.contains(&typed.text));
+        seen.extend(typed.iter().map(|typed| typed.text.clone()));
+        failed.extend(failures(&document, &typed));
+    }
+    assert!(seen.iter().any(|text| text.starts_with("scripts/run ")), "the README begins with scripts/run");
+    assert!(failed.is_empty(), "{} of {} commands fail:\n{}", failed.len(), seen.len(), failed.join("\n"));
+}
+
+#[test]
+fn commands_are_found_in_their_blocks() {
+    let text = "winkler no\n```sh\n# winkler no\nwinkler a \\\n    b  # c\ncd x\nscripts/run d\nmpiexec -n 2 winkler e\n\
+                mpiexec -n 2 other\n```\nscripts/run no\n```text\nwinkler no\n```\n";
+    let found: Vec<(usize, String)> = commands(text).into_iter().map(|typed| (typed.line, typed.text)).collect();
+    let expected = [(4, "winkler a b  # c"), (7, "scripts/run d"), (8, "mpiexec -n 2 winkler e")];
+    assert_eq!(found, expected.map(|(line, text)| (line, text.to_owned())));
+}
+
+/// A command that fails is told of, with its place.
+#[test]
+fn a_wrong_command_fails() {
+    let typed = |text: &str| Typed { line: 3, text: text.to_owned() };
+    let wrong = [typed("winkler check meshes/patch/scene.toml"), typed("scripts/run meshes/pach/scene.toml | cat")];
+    let failed = failures(Path::new("README.md"), &wrong);
+    assert_eq!(failed.len(), 1, "{failed:?}");
+    assert!(failed[0].starts_with("README.md:3: `scripts/run") && failed[0].contains("pach"), "{failed:?}");
+}

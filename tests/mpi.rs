@@ -1,0 +1,95 @@
+//! Several ranks give what one gives.
+
+mod common;
+
+use common::{case, solve, solve_on};
+use std::fs;
+
+#[test]
+fn two_ranks_give_the_serial_history_and_files() {
+    let serial = solve(case("groove"), &[]).converged();
+    let parallel = solve_on(2, case("groove"), &[]).converged();
+    let lines = |run: &common::Run, name: &str| -> Vec<String> {
+        let text = fs::read_to_string(run.folder.join(name)).expect("a result");
+        text.lines().map(str::to_owned).collect()
+    };
+    // seconds come last
+    let history = |run: &common::Run| -> Vec<String> {
+        let cut = |line: String| line.rsplit_once(',').map(|(front, _)| front.to_owned());
+        lines(run, "history.csv").into_iter().map(|line| cut(line).expect("several columns")).collect()
+    };
+    assert_eq!(serial.history().names.last().map(String::as_str), Some("seconds"));
+    assert_eq!(history(&serial), history(&parallel));
+    assert_eq!(history(&serial).len(), 1 + 8);
+    for name in ["contact-lower-upper.csv", "lower.vtu", "upper.vtu", "bodies.pvd", "pressure.svg"] {
+        assert_eq!(lines(&serial, name), lines(&parallel, name), "{name}");
+    }
+    assert_eq!(serial.report["files"], parallel.report["files"]);
+    let names = |run: &common::Run| {
+        let mut names: Vec<_> =
+            fs::read_dir(&run.folder).expect("results").flatten().map(|file| file.file_name()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(&serial), names(&parallel));
+    assert_eq!(parallel.stderr, "");
+}
+
+#[test]
+fn two_ranks_report_what_one_reports() {
+    let serial = solve(case("groove"), &[]).converged();
+    let parallel = solve_on(2, case("groove"), &[]).converged();
+    assert_eq!((serial.count("ranks"), parallel.count("ranks")), (1, 2));
+    let differ = ["ranks", "messages", "times", "bodies"];
+    let (ours, theirs) = (serial.report.as_object(), parallel.report.as_object());
+    let (ours, theirs) = (ours.expect("a table"), theirs.expect("a table"));
+    assert!(ours.keys().eq(theirs.keys()));
+    for (key, value) in ours.iter().filter(|(key, _)| !differ.contains(&key.as_str())) {
+        assert_eq!(value, &theirs[key], "{key}");
+    }
+    let ranks = |run: &common::Run| [run.count("bodies/0/rank"), run.count("bodies/1/rank")];
+    assert_eq!(ranks(&serial), [0, 0]);
+    assert_eq!(ranks(&parallel), [0, 1]);
+    // a body of another rank has a solver, too
+    assert_eq!(parallel.solvers(), serial.solvers());
+}
+
+/// One collective call a sweep. Besides: largest stiffness of each body, trace of the start, counts of the report.
+#[test]
+fn messages_are_one_a_sweep_and_three() {
+    for (ranks, gamma) in [(2, "0.6"), (2, "0.3")] {
+        let gamma = format!("method.gamma={gamma}");
+        let run = solve_on(ranks, case("groove"), &["--set", "mesh.set.n=8", "--set", &gamma]).converged();
+        assert_eq!(run.count("messages"), run.count("sweeps") + 3, "{gamma}");
+    }
+    assert_eq!(solve(case("groove"), &["--set", "mesh.set.n=8"]).converged().count("messages"), 0);
+}
+
+#[test]
+fn a_rank_without_a_body_is_told_of() {
+    let run = solve_on(3, case("groove"), &["--set", "mesh.set.n=8"]).converged();
+    assert!(run.warnings().contains("1 of 3 ranks"), "{}", run.warnings());
+    assert_eq!([run.count("bodies/0/rank"), run.count("bodies/1/rank")], [0, 1]);
+    let serial = solve(case("groove"), &["--set", "mesh.set.n=8"]).converged();
+    assert_eq!(serial.warnings(), "");
+    assert_eq!(run.contact()["pressure"], serial.contact()["pressure"]);
+}
+
+#[test]
+fn json_is_printed_once() {
+    let run = solve_on(2, case("groove"), &["--set", "mesh.set.n=8", "--json"]).converged();
+    let printed: serde_json::Value = serde_json::from_str(&run.stdout).expect("one JSON text and nothing else");
+    assert_eq!(printed, run.report);
+    let table = solve_on(2, case("groove"), &["--set", "mesh.set.n=8"]).converged();
+    assert_eq!(table.stdout.matches("converged in 7 iterations").count(), 1, "{}", table.stdout);
+}
+
+#[test]
+fn krylov_solvers_run_on_two_ranks() {
+    let options = ["--set", "mesh.set.n=8", "-ksp_type", "cg", "-pc_type", "hypre", "-upper_pc_type", "gamg"];
+    let (serial, parallel) = (solve(case("groove"), &options), solve_on(2, case("groove"), &options));
+    let (serial, parallel) = (serial.converged(), parallel.converged());
+    assert_eq!(serial.solvers(), ["cg + hypre", "cg + gamg"]);
+    assert_eq!(parallel.count("inner_iterations"), serial.count("inner_iterations"));
+    assert_eq!(parallel.contact()["pressure"], serial.contact()["pressure"]);
+}

@@ -1,0 +1,193 @@
+//! PETSc options, typed as in any PETSc program, reach the bodies.
+
+mod common;
+
+use common::{Run, Scene, case, distance, solve, solve_on, text_of, winkler};
+use std::fs;
+
+const SCENE: [&str; 2] = ["--set", "mesh.set.n=8"];
+const TIGHT: [&str; 2] = ["--set", "method.stop={residual=1e-8,iterations=5000}"];
+
+/// Solves the groove on a coarse mesh with PETSc options.
+fn groove(options: &str) -> Run {
+    let words: Vec<&str> = options.split_whitespace().collect();
+    solve(case("groove"), &[&SCENE[..], &words].concat())
+}
+
+/// The same, down to a small residual.
+fn tight(options: &str) -> Run {
+    let words: Vec<&str> = options.split_whitespace().collect();
+    solve(case("groove"), &[&SCENE[..], &TIGHT, &words].concat()).converged()
+}
+
+/// The groove on a coarse mesh with a `solver` in the scene.
+fn with_solver(solver: &str) -> Scene {
+    let text = text_of("groove").replace("n = 32", "n = 8");
+    Scene::new(text.replace("dimension = 2", &format!("dimension = 2\nsolver = {solver}")))
+}
+
+#[test]
+fn options_reach_all_bodies_or_one() {
+    let cases = [
+        ("", ["preonly + cholesky by mumps"; 2]),
+        ("-ksp_type cg -pc_type hypre", ["cg + hypre"; 2]),
+        ("-pc_type gamg", ["cg + gamg"; 2]),
+        ("-ksp_type cg", ["cg + cholesky by mumps"; 2]),
+        ("-pc_type lu", ["preonly + lu by mumps"; 2]),
+        ("-pc_type lu -pc_factor_mat_solver_type petsc", ["preonly + lu by petsc"; 2]),
+        ("-upper_pc_type cholesky", ["preonly + cholesky by mumps"; 2]),
+        ("-upper_ksp_type cg -lower_pc_type gamg", ["cg + gamg", "cg + cholesky by mumps"]),
+        ("-ksp_type cg -pc_type hypre -upper_pc_type jacobi -lower_ksp_type gmres", ["gmres + hypre", "cg + jacobi"]),
+        (
+            "-upper_ksp_type preonly -upper_pc_type cholesky -pc_type hypre -ksp_type fcg",
+            ["fcg + hypre", "preonly + cholesky by mumps"],
+        ),
+    ];
+    for (options, solvers) in cases {
+        let run = groove(options).converged();
+        assert_eq!(run.solvers(), solvers, "{options}");
+        assert_eq!(run.warnings(), "", "{options}");
+    }
+}
+
+/// The line that ends a run must not name a solver that did not run.
+#[test]
+fn the_terminal_names_the_solver_that_ran() {
+    let run = groove("-ksp_type cg -pc_type hypre").converged();
+    assert!(!run.stdout.contains("MUMPS"), "{}", run.stdout);
+    let run = groove("").converged();
+    assert!(run.stdout.contains("MUMPS"), "{}", run.stdout);
+}
+
+#[test]
+fn every_solver_ends_at_the_same_answer() {
+    let direct = tight("").contact();
+    let all = [
+        "-upper_ksp_type cg -lower_pc_type gamg",
+        "-ksp_type cg -pc_type hypre",
+        // the residual is exact whatever the inner solve
+        "-ksp_type cg -pc_type hypre -ksp_rtol 0.03",
+        "-ksp_type preonly -pc_type icc",
+        // neither a stale factor nor a stale preconditioner changes the answer
+        "-ksp_reuse_preconditioner",
+        "-ksp_type cg -ksp_reuse_preconditioner",
+    ];
+    for options in all {
+        let run = tight(options);
+        assert!(distance(&run.contact()["pressure"], &direct["pressure"]) < 1e-6, "{options}");
+    }
+}
+
+/// preonly never runs on a stale factor: the history is the same to rounding.
+#[test]
+fn preonly_factors_anew_although_told_to_reuse() {
+    let (fresh, told) = (tight(""), tight("-ksp_reuse_preconditioner"));
+    assert_eq!(fresh.count("iterations"), told.count("iterations"));
+    assert_eq!(fresh.history()["residual"], told.history()["residual"]);
+}
+
+/// With CG a stale preconditioner is the user's good right: then nothing is factored again, and the counter says so.
+#[test]
+fn a_preconditioner_that_is_reused_is_counted_once() {
+    let run = tight("-ksp_type cg -ksp_reuse_preconditioner");
+    assert_eq!(run.count("factorizations"), 2, "the factors of the start serve all sweeps");
+}
+
+#[test]
+fn a_file_of_options_is_read() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("my.opts");
+    fs::write(&file, "# a comment\n-ksp_type cg\n-pc_type hypre\n-upper_pc_type gamg\n").expect("a file");
+    let path = file.display().to_string();
+    assert_eq!(groove(&format!("-options_file {path}")).converged().solvers(), ["cg + hypre", "cg + gamg"]);
+    let run = groove(&format!("-options_file {path} -lower_pc_type jacobi")).converged();
+    assert_eq!(run.solvers(), ["cg + jacobi", "cg + gamg"]);
+    let run = groove("-options_file missing.opts");
+    assert_eq!(run.code, 5, "{}", run.said());
+    assert!(run.stderr.contains("missing.opts"), "{}", run.stderr);
+}
+
+#[test]
+fn options_of_the_scene_are_weaker_than_typed_ones() {
+    let scene = with_solver("{ preset = \"hypre\", options = \"-ksp_type fcg -lower_pc_type gamg\" }");
+    let solvers = |args: &[&str]| -> Vec<String> {
+        solve(&scene, args).converged().solvers().into_iter().map(str::to_owned).collect()
+    };
+    assert_eq!(solvers(&[]), ["fcg + gamg", "fcg + hypre"]);
+    assert_eq!(solvers(&["-ksp_type", "cg"]), ["cg + gamg", "cg + hypre"]);
+    assert_eq!(solvers(&["-lower_pc_type", "jacobi"]), ["fcg + jacobi", "fcg + hypre"]);
+    assert_eq!(solvers(&["-upper_ksp_type", "gmres"]), ["fcg + gamg", "gmres + hypre"]);
+    let presets = [("mumps", "preonly + cholesky by mumps"), ("hypre", "cg + hypre")];
+    for (preset, solver) in presets {
+        let run = solve(with_solver(&format!("\"{preset}\"")), &[]).converged();
+        assert_eq!(run.solvers(), [solver; 2]);
+    }
+}
+
+#[test]
+fn every_run_of_a_sweep_has_its_own_options() {
+    let scene = with_solver("\"mumps\"");
+    let path = scene.path.display().to_string();
+    let over = "solver.options=\"-ksp_type cg\",\"-ksp_type gmres\",\"\"";
+    let run = winkler(&["sweep", &path, "--over", over, "--json", "-o", "out"]);
+    assert_eq!(run.code, 0, "{}", run.said());
+    let list: serde_json::Value = serde_json::from_str(&run.stdout).expect("a list of reports");
+    let solvers: Vec<_> = (0..3).map(|i| list[i]["bodies"][0]["solver"].as_str().unwrap_or_default()).collect();
+    assert_eq!(solvers, ["cg + cholesky by mumps", "gmres + cholesky by mumps", "preonly + cholesky by mumps"]);
+}
+
+#[test]
+fn a_good_option_of_a_solver_not_in_use_is_a_warning() {
+    for options in ["-pc_gamg_threshold 0.1", "-upper_pc_hypre_type euclid", "-pc_hypre_boomeramg_max_iter 2"] {
+        let run = groove(options).converged();
+        let name = options.split_whitespace().next().unwrap_or_default();
+        assert!(run.warnings().contains(name), "{}", run.warnings());
+        assert!(run.stdout.contains("warning") && run.stdout.contains(name), "{}", run.stdout);
+    }
+    // it is in use in one body of two
+    assert_eq!(groove("-pc_gamg_threshold 0.1 -lower_pc_type gamg").converged().warnings(), "");
+    let run =
+        solve_on(2, case("groove"), &[&SCENE[..], &["-pc_gamg_threshold", "0.1", "-upper_pc_type", "gamg"]].concat());
+    assert_eq!(run.converged().warnings(), "");
+}
+
+#[test]
+fn petsc_prints_what_it_is_asked_for() {
+    let monitor = groove("-ksp_type cg -ksp_monitor").converged();
+    assert!(monitor.stdout.contains("KSP Residual norm"), "{}", monitor.stdout);
+    let one = groove("-ksp_type cg -upper_ksp_monitor").converged();
+    let count = |run: &Run| run.stdout.matches("KSP Residual norm").count();
+    assert!(count(&one) > 0 && 2 * count(&one) <= count(&monitor) + 4, "{}", one.stdout);
+    let view = groove("-ksp_view").converged();
+    assert!(view.stdout.contains("KSP Object: (upper_)") && view.stdout.contains("mumps"), "{}", view.stdout);
+    let log = groove("-log_view").converged();
+    assert!(log.stdout.contains("Performance Summary") || log.stdout.contains("MatCholFctrNum"), "{}", log.stdout);
+    let reason = groove("-ksp_type cg -ksp_converged_reason").converged();
+    assert!(reason.stdout.contains("Linear upper_ solve converged"), "{}", reason.stdout);
+    let help = groove("-help");
+    assert_eq!(help.code, 0, "{}", help.stderr);
+    assert!(help.stdout.contains("-upper_ksp_type") && help.stdout.contains("-log_view"), "{}", help.stdout);
+    for run in [monitor, one, view, log, reason, help] {
+        assert_eq!(run.stderr, "");
+    }
+}
+
+#[test]
+fn flags_of_the_program_are_none_of_petscs_business() {
+    let run = groove("-options_left --json -ksp_type cg").converged();
+    let table = run.stdout.split("Option Table entries").nth(1).unwrap_or_else(|| panic!("no table\n{}", run.stdout));
+    assert!(table.contains("-ksp_type cg"), "{table}");
+    assert!(run.stdout.contains("There are no unused options"), "{}", run.stdout);
+    for own in ["-o ", "--set", "-json", "mesh.set.n", "signal_handler", "results"] {
+        assert!(!table.contains(own), "{own}\n{table}");
+    }
+}
+
+#[test]
+fn help_is_shown_without_a_scene() {
+    for word in ["--help", "-h", "-help"] {
+        let run = winkler(&[word]);
+        assert_eq!(run.code, 0, "{word}: {}", run.said());
+        assert!(run.stdout.contains("Usage: winkler"), "{word}: {}", run.said());
+    }
+}

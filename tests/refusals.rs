@@ -1,0 +1,316 @@
+//! Wrong input ends in one message that names the place and the way out, and in the exit code of its kind.
+
+mod common;
+
+use common::{Run, Scene, case, output, root, solve, solve_on, text_of, winkler};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+const SCENE: i32 = 3;
+const MESH: i32 = 4;
+const SOLVER: i32 = 5;
+const FILE: i32 = 6;
+
+/// Asserts that a run was refused with this exit code, one message, and these words in it.
+fn refused(run: &Run, code: i32, words: &[&str]) {
+    assert_eq!(run.code, code, "{}", run.said());
+    let messages = run.stderr.lines().filter(|line| line.starts_with("error")).count();
+    assert_eq!(messages, 1, "one message is enough\n{}", run.said());
+    for word in words {
+        assert!(run.stderr.contains(word), "no `{word}`\n{}", run.said());
+    }
+    assert!(run.report.is_null() && run.stdout.is_empty(), "a refusal has no results\n{}", run.said());
+}
+
+/// Solves the groove with one text of its scene replaced; the refusal must point at the line where `at` stands.
+fn groove_refused(from: &str, to: &str, at: &str, words: &[&str]) {
+    let scene = Scene::edited("groove", from, to);
+    let run = solve(&scene, &[]);
+    refused(&run, SCENE, words);
+    let place = format!("{}:{}:", scene.path.display(), scene.line_of(at));
+    assert!(run.stderr.contains(&place), "it must point at {place}\n{}", run.stderr);
+    assert!(run.stderr.contains('^'), "no caret\n{}", run.stderr);
+}
+
+#[test]
+fn a_scene_that_is_not_there() {
+    let folder = case("groove").parent().expect("a folder").to_owned();
+    refused(&solve(folder.join("scenes.toml"), &[]), FILE, &["scenes.toml", "No such file"]);
+    refused(&solve(folder, &[]), FILE, &["folder", "scene.toml"]);
+    assert_eq!(winkler(&["solve"]).code, 2);
+    assert_eq!(winkler(&["solv", "scene.toml"]).code, 2);
+}
+
+#[test]
+fn keys_and_types() {
+    groove_refused("gamma = 0.6", "gama = 0.6", "gama", &["unknown key `gama`", "did you mean `gamma`?"]);
+    groove_refused("psi = \"active\"", "psi = \"activ\"", "activ\"", &["`activ`", "did you mean `active`?"]);
+    groove_refused("gamma = 0.6", "gamma = \"big\"", "big", &["expected a number", "string"]);
+    groove_refused("gamma = 0.6", "gamma = -0.6", "-0.6", &["gamma"]);
+    groove_refused("a = 0.5", "a = 1.5", "a = 1.5", &["a is 1.5", "must not exceed 1"]);
+    groove_refused("[method]", "[method", "[method", &["TOML"]);
+    groove_refused("dimension = 2 ", "dimension = 3 ", "dimension", &["dimension = 2"]);
+    groove_refused("(x - 4)^2", "(x - 4^2", "gap", &["gap"]);
+}
+
+#[test]
+fn names_that_the_mesh_does_not_have() {
+    groove_refused("on = \"lower_axis\"", "on = \"lower_axle\"", "lower_axle", &["`lower_axle`", "lower_axis"]);
+    groove_refused("\"upper_bottom\"]", "\"uper_bottom\"]", "uper_bottom", &["`uper_bottom`", "upper_bottom"]);
+    groove_refused("name = \"upper\"", "name = \"uper\"", "\"uper\"", &["`uper`", "upper"]);
+    groove_refused("groove.geo", "grove.geo", "grove.geo", &["there is no file", "did you mean `groove.geo`?"]);
+    groove_refused("n = 32 }", "m = 32 }", "m = 32", &["`m`", "did you mean `n`?"]);
+}
+
+#[test]
+fn names_of_bodies_that_are_words_of_petsc() {
+    for word in ["mat", "log", "draw"] {
+        groove_refused("name = \"lower\"", &format!("name = \"{word}\""), word, &[&format!("`{word}`"), "PETSc"]);
+    }
+    groove_refused("name = \"lower\"", "name = \"Lower\"", "Lower", &["`Lower`", "small letter"]);
+}
+
+#[test]
+fn supports_and_loads() {
+    let on = "on = \"lower_axis\"";
+    groove_refused(on, "on = \"upper_axis\"", "upper_axis", &["`upper_axis` does not touch body `lower`"]);
+    let on = "on = \"lower_face\"";
+    groove_refused(on, "on = \"upper_face\"", "\"upper_face\", p", &["`upper_face` does not touch body `lower`"]);
+    let meeting = "{ on = \"lower_face\", x = 1 }, { on = \"lower_end\"";
+    groove_refused("{ on = \"lower_end\"", meeting, "lower_end", &["body `lower`", "two values", "x displacement"]);
+    let root = "on = \"lower_face\", pressure = \"sqrt(x - 2)\"";
+    groove_refused("on = \"lower_face\", pressure = 10", root, "sqrt", &["body `lower`", "not finite"]);
+}
+
+#[test]
+fn contacts() {
+    let between = "[\"lower_top\", \"upper_bottom\"]";
+    let away = "[\"lower_axis\", \"upper_axis\"]";
+    groove_refused(between, away, "between", &["`lower_axis`", "`upper_axis`", "do not face each other"]);
+    let itself = "[\"lower_top\", \"lower_end\"]";
+    groove_refused(between, itself, "between", &["both surfaces belong to body `lower`"]);
+    groove_refused(between, "[\"lower_top\", \"lower_top\"]", "between", &["`lower_top` and itself"]);
+    let gap = "5e-4 * max(0, 1 - (x - 4)^2)^1.5";
+    groove_refused(gap, "sqrt(x - 1)", "gap", &["the gap is not finite at (0, 1, 0)"]);
+    groove_refused(gap, "1e-3 / x", "gap", &["the gap is not finite at (0, 1, 0)"]);
+    groove_refused("normal = 1e-4", "normal = \"log(x - 1)\"", "log", &["the start is", "at (0, 1, 0)"]);
+}
+
+#[test]
+fn overrides() {
+    let set = |text: &str, code: i32, words: &[&str]| {
+        refused(&solve(case("groove"), &["--set", text]), code, &[&["--set"], words].concat());
+    };
+    set("method.gama=1", SCENE, &["--set:1:8", "`gama`", "did you mean `gamma`?"]);
+    set("contact.5.gap=1", SCENE, &["--set:1:9", "no number 5"]);
+    set("method.gamma=abc", SCENE, &["--set:1:14", "expected a number"]);
+    set("body.0.fix.0.on=nothing", SCENE, &["--set:1:17", "`nothing`"]);
+    set("method.gamma", 2, &["without `=`"]);
+    // the place is where the user wrote the name
+    set("mesh.set.m=3", SCENE, &["--set:1:10", "`m`", "did you mean `n`?"]);
+}
+
+/// The patch with another mesh.
+fn patch_with(mesh: &Path) -> Scene {
+    let text = text_of("patch");
+    let line = text.lines().find(|line| line.starts_with("mesh =")).expect("a mesh");
+    Scene::new(text.replace(line, &format!("mesh = \"{}\"", mesh.display())))
+}
+
+fn gmsh(format: &[&str], to: &Path) {
+    let script = root().join("meshes/patch/patch.geo");
+    let mut command = Command::new("gmsh");
+    command.args(["-v", "0", "-2"]).args(format).arg("-o").arg(to).arg(script);
+    assert!(output(command, Duration::from_secs(60)).0.success());
+}
+
+#[test]
+fn damaged_meshes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| folder.path().join(name);
+    gmsh(&["-format", "msh22"], &file("old.msh"));
+    let run = solve(patch_with(&file("old.msh")), &[]);
+    refused(&run, MESH, &["old.msh:2:", "2.2", "4.1", "gmsh", "-format msh41"]);
+    for (name, format) in [("text.msh", &["-format", "msh41"][..]), ("binary.msh", &["-format", "msh41", "-bin"])] {
+        gmsh(format, &file(name));
+        let whole = patch_with(&file(name));
+        solve(&whole, &["--set", "method.stop.residual=1e-3"]).converged();
+        let bytes = std::fs::read(file(name)).expect("a mesh");
+        for part in [40, bytes.len() / 2, bytes.len() - 20] {
+            std::fs::write(file(name), &bytes[..part]).expect("a shorter mesh");
+            refused(&solve(&whole, &[]), MESH, &[name]);
+        }
+    }
+    std::fs::write(file("empty.msh"), "").expect("a file");
+    refused(&solve(patch_with(&file("empty.msh")), &[]), MESH, &["empty.msh", "$MeshFormat"]);
+}
+
+#[test]
+fn a_script_that_gmsh_refuses() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let script = std::fs::read_to_string(root().join("meshes/patch/patch.geo")).expect("a script");
+    let wrong = script.replace("Line(3) = {3, 4};", "Line(3) = {3, 4;");
+    assert_ne!(script, wrong);
+    let file = folder.path().join("wrong.geo");
+    std::fs::write(&file, &wrong).expect("a script");
+    let line = 1 + wrong.lines().position(|line| line.contains("{3, 4;")).expect("the line");
+    let run = solve(patch_with(&file), &[]);
+    refused(&run, MESH, &["wrong.geo", &format!("line {line}"), "syntax error"]);
+}
+
+#[test]
+fn petsc_options() {
+    let typed = |options: &[&str], words: &[&str]| refused(&solve(case("groove"), options), SOLVER, words);
+    typed(&["-ksp_tpye", "cg"], &["-ksp_tpye", "did you mean -ksp_type?"]);
+    typed(&["-uper_ksp_type", "cg"], &["-uper_ksp_type", "did you mean -upper_ksp_type?"]);
+    typed(&["-upper_ksp_tpye", "cg"], &["-upper_ksp_tpye", "did you mean -upper_ksp_type?"]);
+    typed(&["-ksp_type", "cg", "-pc_hypre_tpe", "euclid"], &["-pc_hypre_tpe", "did you mean -pc_hypre_type?"]);
+    typed(&["-ksp_type", "nonsense"], &["nonsense", "KSP"]);
+    typed(&["-pc_type", "nonsense"], &["nonsense", "PC"]);
+    typed(&["-ksp_type", "cg", "-ksp_rtol", "abc"], &["abc"]);
+    // in the scene as well
+    let scene = Scene::edited("groove", "dimension = 2", "solver = { options = \"-ksp_tpye cg\" }\ndimension = 2");
+    refused(&solve(&scene, &[]), SOLVER, &["-ksp_tpye", "did you mean -ksp_type?"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_made() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("file");
+    std::fs::write(&file, "").expect("a file");
+    let scene = case("groove").display().to_string();
+    for to in [file.clone(), file.join("below")] {
+        let to = to.display().to_string();
+        let run = winkler(&["solve", &scene, "-o", &to]);
+        refused(&run, FILE, &[&to, "-o"]);
+    }
+}
+
+/// Asserts that a run ended without an answer: this status, these words in its message, every file of it written.
+fn failed(run: &Run, status: &[&str], words: &[&str]) {
+    assert_eq!(run.code, 1, "{}", run.said());
+    assert!(status.contains(&run.text("status")), "{}: {}", run.text("status"), run.said());
+    for word in words {
+        assert!(run.text("message").contains(word), "no `{word}` in: {}", run.text("message"));
+        assert!(run.stdout.contains(word), "no `{word}`\n{}", run.said());
+    }
+    let files: Vec<&str> = run.report["files"].as_array().expect("files").iter().filter_map(|f| f.as_str()).collect();
+    for name in ["report.json", "history.csv", "contact-lower-upper.csv", "lower.vtu", "upper.vtu", "bodies.pvd"] {
+        assert!(files.contains(&name), "{name} is not in {files:?}");
+    }
+    for name in files {
+        assert!(run.folder.join(name).is_file(), "{name} is not there");
+    }
+    let rows = run.history();
+    assert_eq!(rows.rows(), run.count("sweeps"), "one row a sweep");
+    // null is honest, zero is not
+    assert!(run.report["residual"].as_f64().is_none_or(|residual| residual > 0.0), "{}", run.report["residual"]);
+}
+
+#[test]
+fn a_body_that_nothing_holds() {
+    let free = Scene::edited("patch", "fix = [{ on = \"upper_pin\", x = 0 }]\n", "");
+    let run = solve(&free, &[]);
+    failed(&run, &["unheld"], &["`upper`", "translation along x", "iteration 0", "support"]);
+    // not even contact, at first
+    let apart = Scene::edited("patch", "start = { normal = 1e-4 }", "start = \"zero\"");
+    failed(&solve(&apart, &[]), &["unheld"], &["`upper`", "iteration 0", "method.start"]);
+}
+
+const COARSE: [&str; 2] = ["--set", "mesh.set.n=8"];
+
+#[test]
+fn a_gamma_that_is_too_large() {
+    for (gamma, status) in [
+        ("1.5", &["cycle"][..]),
+        ("2.5", &["cycle", "not-finite", "iteration-limit"]),
+        ("3", &["cycle", "not-finite", "iteration-limit"]),
+        ("1e200", &["not-finite"]),
+    ] {
+        let gamma = format!("method.gamma={gamma}");
+        let run = solve(case("groove"), &[&COARSE[..], &["--set", &gamma]].concat());
+        failed(&run, status, &["iteration", "method.gamma"]);
+    }
+    let stiff = ["--set", "method.gamma=1", "--set", "contact.0.layer={linear={stiffness=1e9}}"];
+    let run = solve(case("groove"), &[&COARSE[..], &stiff].concat());
+    failed(&run, &["cycle"], &["every 2 iterations", "smaller method.gamma"]);
+}
+
+#[test]
+fn too_few_iterations() {
+    let run = solve(case("groove"), &[&COARSE[..], &["--set", "method.stop.iterations=3"]].concat());
+    failed(&run, &["iteration-limit"], &["3 iterations", "method.stop.iterations"]);
+    assert_eq!((run.count("iterations"), run.count("sweeps")), (3, 4));
+}
+
+/// p(1) = (1e6)^10 = 1e60: nothing of what follows has a right digit, so it must not pass for an answer.
+#[test]
+fn a_start_so_large_that_the_law_overflows() {
+    for start in ["1", "1e20", "1e40"] {
+        let start = format!("method.start.normal={start}");
+        let law = ["--set", "contact.0.layer.power={a=0.1,B=1e-6}", "--set", &start];
+        let rules = ["--set", "method.stop={residual=1e-8,iterations=200}"];
+        let run = solve(case("groove"), &[&COARSE[..], &law, &rules].concat());
+        failed(&run, &["not-finite", "cycle", "iteration-limit"], &["iteration"]);
+    }
+}
+
+#[test]
+fn an_inner_solver_that_gives_up() {
+    let options = ["-ksp_type", "cg", "-pc_type", "none", "-upper_ksp_max_it", "2"];
+    let run = solve(case("groove"), &[&COARSE[..], &options].concat());
+    failed(&run, &["inner-solver"], &["`upper`", "iteration 0"]);
+}
+
+/// Two ranks: one message, the right code, and no waiting for each other.
+#[test]
+fn refusals_on_two_ranks() {
+    let scene = Scene::edited("groove", "gamma = 0.6", "gama = 0.6");
+    refused(&solve_on(2, &scene, &[]), SCENE, &["`gama`", "did you mean `gamma`?", "scene.toml"]);
+    let scene = Scene::edited("groove", "on = \"lower_axis\"", "on = \"upper_axis\"");
+    refused(&solve_on(2, &scene, &[]), SCENE, &["`upper_axis` does not touch body `lower`"]);
+    // a load that only the owner of the upper body looks at
+    let root = "on = \"upper_face\", pressure = \"sqrt(x - 2)\"";
+    let scene = Scene::edited("groove", "on = \"upper_face\", pressure = 10", root);
+    refused(&solve_on(2, &scene, &[]), SCENE, &["body `upper`", "not finite"]);
+    for (options, words) in [
+        (["-ksp_tpye", "cg"], ["-ksp_tpye", "did you mean -ksp_type?"]),
+        (["-upper_ksp_tpye", "cg"], ["-upper_ksp_tpye", "did you mean -upper_ksp_type?"]),
+        (["-pc_type", "nonsense"], ["nonsense", "PC"]),
+        (["-upper_pc_type", "nonsense"], ["nonsense", "upper"]),
+    ] {
+        refused(&solve_on(2, case("groove"), &options), SOLVER, &words);
+    }
+    let file = tempfile::NamedTempFile::new().expect("a file");
+    let below = file.path().join("below").display().to_string();
+    let scene = Scene::edited("groove", "dimension = 2", &format!("output.dir = \"{below}\"\ndimension = 2"));
+    assert!(solve_on(2, &scene, &[]).report.is_object(), "-o wins over the scene");
+}
+
+#[test]
+fn not_converging_on_two_ranks() {
+    let run = solve_on(2, case("groove"), &[&COARSE[..], &["--set", "method.stop.iterations=3"]].concat());
+    failed(&run, &["iteration-limit"], &["3 iterations"]);
+    let free = Scene::edited("patch", "fix = [{ on = \"upper_pin\", x = 0 }]\n", "");
+    failed(&solve_on(2, &free, &[]), &["unheld"], &["`upper`", "translation along x"]);
+    let options = ["-ksp_type", "cg", "-pc_type", "none", "-upper_ksp_max_it", "2"];
+    let run = solve_on(2, case("groove"), &[&COARSE[..], &options].concat());
+    failed(&run, &["inner-solver"], &["`upper`", "iteration 0"]);
+}
+
+/// `winkler ... | head` ends in silence.
+#[test]
+fn a_reader_that_goes_away() {
+    for args in [&["check"][..], &["solve", "-o", "out"]] {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut command = Command::new(common::WINKLER);
+        common::environment(&mut command);
+        command.args(args).arg(case("groove")).args(COARSE).current_dir(folder.path());
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("the program ends");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!said.contains("panicked"), "{args:?}: {said}");
+    }
+}
