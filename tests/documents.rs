@@ -7,6 +7,7 @@ use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::thread;
 use std::time::Duration;
 
 /// Beginnings of lines that are commands of this program.
@@ -110,14 +111,19 @@ fn documents() -> Vec<PathBuf> {
 #[test]
 fn every_command_in_the_documents_works() {
     let mut seen: Vec<String> = Vec::new();
-    let mut failed = Vec::new();
+    let mut work = Vec::new();
     for document in documents() {
         let text = fs::read_to_string(&document).unwrap_or_else(|cause| panic!("{}: {cause}", document.display()));
         let mut typed = commands(&text);
         typed.retain(|typed| !seen.contains(&typed.text));
         seen.extend(typed.iter().map(|typed| typed.text.clone()));
-        failed.extend(failures(&document, &typed));
+        work.push((document, typed));
     }
+    // documents at once, the commands of each in order
+    let failed: Vec<String> = thread::scope(|scope| {
+        let runs: Vec<_> = work.iter().map(|(document, typed)| scope.spawn(|| failures(document, typed))).collect();
+        runs.into_iter().flat_map(|run| run.join().expect("a document was tried")).collect()
+    });
     assert!(seen.iter().any(|text| text.starts_with("scripts/run ")), "the README begins with scripts/run");
     assert!(failed.is_empty(), "{} of {} commands fail:\n{}", failed.len(), seen.len(), failed.join("\n"));
 }

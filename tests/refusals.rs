@@ -51,7 +51,7 @@ fn keys_and_types() {
     groove_refused("a = 0.5", "a = 1.5", "a = 1.5", &["a is 1.5", "must not exceed 1"]);
     groove_refused("[method]", "[method", "[method", &["TOML"]);
     groove_refused("dimension = 2 ", "dimension = 3 ", "dimension", &["dimension = 2"]);
-    groove_refused("(x - 4)^2", "(x - 4^2", "gap", &["gap"]);
+    groove_refused("(x - 4)^2", "(x - 4^2", "gap =", &["^"]);
 }
 
 #[test]
@@ -87,14 +87,14 @@ fn supports_and_loads() {
 fn contacts() {
     let between = "[\"lower_top\", \"upper_bottom\"]";
     let away = "[\"lower_axis\", \"upper_axis\"]";
-    groove_refused(between, away, "between", &["`lower_axis`", "`upper_axis`", "do not face each other"]);
+    groove_refused(between, away, "between =", &["`lower_axis`", "`upper_axis`", "do not face each other"]);
     let itself = "[\"lower_top\", \"lower_end\"]";
-    groove_refused(between, itself, "between", &["both surfaces belong to body `lower`"]);
-    groove_refused(between, "[\"lower_top\", \"lower_top\"]", "between", &["`lower_top` and itself"]);
+    groove_refused(between, itself, "between =", &["both surfaces belong to body `lower`"]);
+    groove_refused(between, "[\"lower_top\", \"lower_top\"]", "between =", &["`lower_top` and itself"]);
     let gap = "5e-4 * max(0, 1 - (x - 4)^2)^1.5";
-    groove_refused(gap, "sqrt(x - 1)", "gap", &["the gap is not finite at (0, 1, 0)"]);
-    groove_refused(gap, "1e-3 / x", "gap", &["the gap is not finite at (0, 1, 0)"]);
-    groove_refused("normal = 1e-4", "normal = \"log(x - 1)\"", "log", &["the start is", "at (0, 1, 0)"]);
+    groove_refused(gap, "sqrt(x - 1)", "gap =", &["the gap is not finite at (0, "]);
+    groove_refused(gap, "1e-3 / x", "gap =", &["the gap is not finite at (0, "]);
+    groove_refused("normal = 1e-4", "normal = \"log(x - 1)\"", "log", &["the start is", "at (0, "]);
 }
 
 #[test]
@@ -263,29 +263,48 @@ fn an_inner_solver_that_gives_up() {
     failed(&run, &["inner-solver"], &["`upper`", "iteration 0"]);
 }
 
-/// Two ranks: one message, the right code, and no waiting for each other.
+// Two ranks: one message, the right code, and no waiting for each other.
+
 #[test]
-fn refusals_on_two_ranks() {
+fn a_scene_refused_on_two_ranks() {
     let scene = Scene::edited("groove", "gamma = 0.6", "gama = 0.6");
     refused(&solve_on(2, &scene, &[]), SCENE, &["`gama`", "did you mean `gamma`?", "scene.toml"]);
     let scene = Scene::edited("groove", "on = \"lower_axis\"", "on = \"upper_axis\"");
     refused(&solve_on(2, &scene, &[]), SCENE, &["`upper_axis` does not touch body `lower`"]);
-    // a load that only the owner of the upper body looks at
-    let root = "on = \"upper_face\", pressure = \"sqrt(x - 2)\"";
-    let scene = Scene::edited("groove", "on = \"upper_face\", pressure = 10", root);
-    refused(&solve_on(2, &scene, &[]), SCENE, &["body `upper`", "not finite"]);
+    let wrong = ["--set", "contact.0.gap=sqrt(x-1)"];
+    refused(&solve_on(2, case("groove"), &wrong), SCENE, &["the gap is not finite"]);
+}
+
+/// Only the owner of a body looks at its loads.
+#[test]
+fn a_load_refused_on_one_of_two_ranks() {
+    for body in ["lower", "upper"] {
+        let load = format!("on = \"{body}_face\", pressure = ");
+        let scene = Scene::edited("groove", &format!("{load}10"), &format!("{load}\"sqrt(x - 2)\""));
+        refused(&solve_on(2, &scene, &[]), SCENE, &[&format!("body `{body}`"), "not finite"]);
+    }
+}
+
+#[test]
+fn an_option_refused_on_two_ranks() {
     for (options, words) in [
         (["-ksp_tpye", "cg"], ["-ksp_tpye", "did you mean -ksp_type?"]),
         (["-upper_ksp_tpye", "cg"], ["-upper_ksp_tpye", "did you mean -upper_ksp_type?"]),
         (["-pc_type", "nonsense"], ["nonsense", "PC"]),
-        (["-upper_pc_type", "nonsense"], ["nonsense", "upper"]),
     ] {
         refused(&solve_on(2, case("groove"), &options), SOLVER, &words);
     }
-    let file = tempfile::NamedTempFile::new().expect("a file");
-    let below = file.path().join("below").display().to_string();
-    let scene = Scene::edited("groove", "dimension = 2", &format!("output.dir = \"{below}\"\ndimension = 2"));
-    assert!(solve_on(2, &scene, &[]).report.is_object(), "-o wins over the scene");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let missing = folder.path().join("missing.opts").display().to_string();
+    refused(&solve_on(2, case("groove"), &["-options_file", &missing]), SOLVER, &["missing.opts"]);
+}
+
+/// Only the owner of a body makes its solver.
+#[test]
+fn an_option_refused_on_one_of_two_ranks() {
+    for option in ["-lower_pc_type", "-upper_pc_type"] {
+        refused(&solve_on(2, case("groove"), &[option, "nonsense"]), SOLVER, &["nonsense", "PC"]);
+    }
 }
 
 #[test]
@@ -294,9 +313,16 @@ fn not_converging_on_two_ranks() {
     failed(&run, &["iteration-limit"], &["3 iterations"]);
     let free = Scene::edited("patch", "fix = [{ on = \"upper_pin\", x = 0 }]\n", "");
     failed(&solve_on(2, &free, &[]), &["unheld"], &["`upper`", "translation along x"]);
-    let options = ["-ksp_type", "cg", "-pc_type", "none", "-upper_ksp_max_it", "2"];
-    let run = solve_on(2, case("groove"), &[&COARSE[..], &options].concat());
-    failed(&run, &["inner-solver"], &["`upper`", "iteration 0"]);
+}
+
+#[test]
+fn an_inner_solver_that_gives_up_on_one_of_two_ranks() {
+    for body in ["lower", "upper"] {
+        let limit = format!("-{body}_ksp_max_it");
+        let options = ["-ksp_type", "cg", "-pc_type", "none", &limit, "2"];
+        let run = solve_on(2, case("groove"), &[&COARSE[..], &options].concat());
+        failed(&run, &["inner-solver"], &[&format!("`{body}`"), "iteration 0"]);
+    }
 }
 
 /// `winkler ... | head` ends in silence.

@@ -1,4 +1,4 @@
-//! The walls between the rooms (docs/design.md), held by reading the sources.
+//! The walls between the rooms, held by reading the sources.
 
 mod common;
 

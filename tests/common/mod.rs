@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fs::{self, File};
 use std::ops::Index;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -163,13 +163,26 @@ pub fn output(mut command: Command, patience: Duration) -> (ExitStatus, String, 
             return (status, read(&out), read(&err));
         }
         if began.elapsed() > patience {
-            // mpiexec ends its ranks at this signal, and would leave them at a harder one
-            let _ = Command::new("kill").arg(child.id().to_string()).status();
-            let _ = child.wait();
+            end(&mut child);
             panic!("{command:?} does not end\n--- stdout\n{}--- stderr\n{}", read(&out), read(&err));
         }
         std::thread::sleep(Duration::from_millis(2));
     }
+}
+
+/// Ends a process that hangs.
+fn end(child: &mut Child) {
+    // mpiexec ends its ranks at this signal, and would leave them at a harder one
+    let _ = Command::new("kill").arg(child.id().to_string()).status();
+    let began = Instant::now();
+    while began.elapsed() < Duration::from_secs(3) {
+        if child.try_wait().is_ok_and(|status| status.is_some()) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let _ = child.kill();
+    let _ = child.wait();
 }
 
 /// The project's folder.
