@@ -67,13 +67,15 @@ pub struct Problem {
     pub bodies: Vec<BodyInfo>,
     /// For each pair, whether side a (which carries the points) is the second surface in the scene.
     pub swapped: Vec<bool>,
+    /// Stiffness matrix and contact rows of every body, kept only when a method asked for them.
+    pub kept: Vec<(Csr, Csr)>,
     /// Stiffness matrices assembled on this rank.
     pub assemblies: usize,
 }
 
 /// Turns a scene and its mesh into a model.
 ///
-/// `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `make` turns each assembled body that `owner` gives to `rank` into one that
+/// `ranks` is (this rank, number of ranks); `keep` keeps matrices and rows for a method that needs them; `cut` finds the common pieces of surfaces in this dimension. `make` turns each assembled body that `owner` gives to `rank` into one that
 /// solves.
 ///
 /// # Errors
@@ -84,6 +86,7 @@ pub fn discretize<const D: usize>(
     mesh: &Mesh<D>,
     cut: contact::pieces::Cut<D>,
     ranks: (usize, usize),
+    keep: bool,
     exchange: Box<dyn Exchange>,
     make: &mut dyn FnMut(Assembled) -> Result<Box<dyn Body>>,
 ) -> Result<Problem> {
@@ -97,7 +100,7 @@ pub fn discretize<const D: usize>(
     }
     let loads: Vec<usize> = parts.iter().map(|part| part.space.dofs()).collect();
     let owner = crate::parallel::owners(&loads, ranks.1);
-    let (mut slots, mut infos, mut assemblies) = (Vec::new(), Vec::new(), 0);
+    let (mut slots, mut infos, mut kept, mut assemblies) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for (index, part) in parts.into_iter().enumerate() {
         let (segments, rows) = rows_of(index, &pairs, part.space.dofs());
         let free = rigid::modes(&part.space.nodes);
@@ -120,6 +123,9 @@ pub fn discretize<const D: usize>(
             slot.scale = (0..body.load.len()).map(diagonal).fold(0.0, f64::max);
             slot.row_stiffness =
                 (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum()).collect();
+            if keep {
+                kept.push((body.stiffness.clone(), rows.clone()));
+            }
             slot.local =
                 Some(make(Assembled { name: slot.name.clone(), index, dimension: D, body, rows, motions: free })?);
         }
@@ -139,7 +145,7 @@ pub fn discretize<const D: usize>(
     let mut scales: Vec<f64> = slots.iter().map(|slot| slot.scale).collect();
     exchange.sum(&mut scales);
     slots.iter_mut().zip(scales).for_each(|(slot, scale)| slot.scale = scale);
-    Ok(Problem { model: Model::new(slots, pairs, exchange), bodies: infos, swapped, assemblies })
+    Ok(Problem { model: Model::new(slots, pairs, exchange), bodies: infos, swapped, kept, assemblies })
 }
 
 /// psi of the scene for the method.

@@ -130,13 +130,13 @@ impl Model {
         }
     }
 
-    /// Gives every body its Robin term `weight` = omega psi kappa at the points (37)-(38).
+    /// Gives every body its Robin term `weight` = omega psi kappa of each contact row (37)-(38).
     ///
     /// # Errors
     /// Failures of the solver library.
     pub fn robin(&mut self, weight: &[f64]) -> Result<()> {
         for body in 0..self.bodies.len() {
-            let rows = self.at_rows(body, weight);
+            let rows = self.of_body(body, weight);
             if let Some(local) = &mut self.bodies[body].local {
                 local.robin(&rows)?;
             }
