@@ -171,6 +171,10 @@ fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> 
             session.size()
         ));
     }
+    for body in problem.bodies.iter().filter(|body| !body.gauged.is_empty()) {
+        let motions = body.gauged.join("; ");
+        warnings.push(format!("body {}: nothing holds its {motions}, no load works on it: fixed at one node", body.name));
+    }
     for (pair, spec) in problem.model.pairs.iter().zip(&scene.contacts) {
         let (without, all) = pair.uncovered;
         if without > 0 {

@@ -4,6 +4,7 @@
 //! bodies that answer the verbs of [`Body`]; it knows no dimension, no element, no mesh and no PETSc.
 
 pub mod body;
+mod closing;
 pub mod field;
 pub mod gamma;
 pub mod held;
@@ -19,6 +20,7 @@ pub mod stop;
 pub mod sweep;
 pub mod zone;
 
+pub use closing::rigid_closing;
 pub use body::{Body, BodyCounts, Energy, Solved};
 pub use field::Field;
 pub use iterate::{Outcome, Settings, Status, solve};

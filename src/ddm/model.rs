@@ -44,6 +44,8 @@ pub struct Motion {
     pub name: String,
     /// Its trace on the body's contact rows; largest displacement in the body about one.
     pub trace: Vec<f64>,
+    /// Work of the loads on it.
+    pub work: f64,
 }
 
 /// A body in the model; the arrays are known on every rank, the body itself where it lives.

@@ -3,7 +3,7 @@
 //! Any symmetric positive definite G leads to the same solution; it decides how fast. Weights are kept for each contact row,
 //! in the layout of a trace vector, because the two bodies of a pair may need different ones.
 
-use super::held::{self, FreeMotion};
+use super::held;
 use super::layer::Layer;
 use super::model::Model;
 use super::zone::RobinZone;
@@ -13,7 +13,7 @@ use super::zone::RobinZone;
 pub enum RobinRule {
     /// kappa = p'(c^k), as in the paper.
     Tangent,
-    /// kappa = p'(c^0) on the zone of the start, all the way: one factorisation a run (Theorem 3 allows it).
+    /// That of the start all the way, made safe as in `Auto`: one factorisation a run (Theorem 3 allows it).
     Frozen,
     /// kappa = max(p'(c^k), floor) everywhere on the contact surfaces.
     Floor(f64),
@@ -42,7 +42,7 @@ impl Robin {
         };
         match &self.rule {
             RobinRule::Tangent => tangent(),
-            RobinRule::Frozen => self.frozen.get_or_insert_with(tangent).clone(),
+            RobinRule::Frozen => self.frozen.get_or_insert_with(|| held_safely(model, tangent())).clone(),
             RobinRule::Floor(floor) => {
                 let mut weight = tangent();
                 let points = model.points();
@@ -51,17 +51,19 @@ impl Robin {
                 }
                 weight
             }
-            RobinRule::Auto => {
-                let mut weight = tangent();
-                for body in 0..model.bodies.len() {
-                    if let Some(FreeMotion { .. }) = held::weak_motion(model, body, &weight, WEAK) {
-                        hold(model, body, &mut weight);
-                    }
-                }
-                weight
-            }
+            RobinRule::Auto => held_safely(model, tangent()),
         }
     }
+}
+
+/// The weights, with more for every body that they do not hold safely.
+fn held_safely(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
+    for body in 0..model.bodies.len() {
+        if held::weak_motion(model, body, &weight, WEAK).is_some() {
+            hold(model, body, &mut weight);
+        }
+    }
+    weight
 }
 
 /// A motion held by less than this share of what [`hold`] gives is not held safely.

@@ -116,6 +116,7 @@ fn method(method: &MethodSpec) -> Value {
         Zone::Subset(condition) => json!(condition.text()),
     };
     let start = match &method.start {
+        Start::Auto => json!("auto"),
         Start::Zero => json!("zero"),
         Start::Normal(normal) => json!({ "normal": field(normal) }),
     };

@@ -248,6 +248,8 @@ pub enum Zone {
 /// Start of the iteration, given on the contact surfaces.
 #[derive(Debug, Clone)]
 pub enum Start {
+    /// Zero, and bodies that contact alone holds moved rigidly until the layers carry their loads.
+    Auto,
     /// Zero normal displacement.
     Zero,
     /// Outer normal displacement on every contact surface.
@@ -291,7 +293,7 @@ impl Default for MethodSpec {
             robin: RobinSpec::Auto,
             gamma: Gamma::Stationary(0.6),
             depth: 5,
-            start: Start::Zero,
+            start: Start::Auto,
             stop: StopSpec::default(),
         }
     }

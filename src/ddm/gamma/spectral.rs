@@ -22,7 +22,6 @@ pub struct Lanczos {
 #[derive(Debug)]
 struct Stored {
     residual: Vec<Vec<f64>>,
-    correction: Vec<Vec<f64>>,
     gamma: f64,
 }
 
@@ -41,14 +40,16 @@ impl Lanczos {
         if self.steps.len() == self.depth {
             self.steps.pop_front();
             self.gram.pop_front();
-            self.gram.iter_mut().for_each(|row| drop(row.pop_front()));
+            for row in &mut self.gram {
+                row.pop_front();
+            }
             products.remove(0);
         }
         for (row, product) in self.gram.iter_mut().zip(&products) {
             row.push_back(*product);
         }
         self.gram.push_back(products.into());
-        self.steps.push_back(Stored { residual: r.clone(), correction: z.clone(), gamma: f64::NAN });
+        self.steps.push_back(Stored { residual: r.clone(), gamma: f64::NAN });
         if let Some(bounds) = self.ritz() {
             self.bounds = Some(bounds);
         }

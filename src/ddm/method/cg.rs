@@ -5,7 +5,8 @@ use crate::ddm::field::{Field, apply_stiffness, local_dot};
 use crate::error::Result;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// What conjugate gradients found.
+/// What conjugate gradients found. A direction without stiffness (a body that its contact does not hold now) ends them; if
+/// it is the first one, it is the result: a line search along it closes the contact.
 pub struct Solution {
     /// x with F1'' x = r, approximately.
     pub x: Field,
@@ -13,9 +14,6 @@ pub struct Solution {
     pub energy: f64,
     /// Bounds of the spectrum of G^-1 F1'' from the Lanczos matrix of the iteration.
     pub spectrum: Option<(f64, f64)>,
-    /// Whether a direction without stiffness was met: a body that its contact does not hold now. Then x is that direction
-    /// if nothing else was found before.
-    pub flat: bool,
 }
 
 /// Solves (K + B' diag(omega kappa) B) x = r until r'G^-1 r has fallen by `reduction` squared, or after `most` steps. The sweep
@@ -32,7 +30,6 @@ pub fn solve(here: &mut Here, kappa_weight: &[f64], reduction: f64, most: usize)
     let mut x = z.zero_like();
     let mut energy = 0.0;
     let (mut alphas, mut betas) = (Vec::new(), Vec::new());
-    let mut flat = false;
     for step in 0..most {
         let mut image = apply_stiffness(here.model, &direction);
         let closing = direction.closing();
@@ -43,7 +40,6 @@ pub fn solve(here: &mut Here, kappa_weight: &[f64], reduction: f64, most: usize)
         let curvature = stiffness[0] + layer;
         // p'Gp of the direction is at least r'z: a flat direction has a curvature that is nothing beside it
         if curvature.is_nan() || curvature <= 1e-13 * rz {
-            flat = true;
             if step == 0 {
                 x = direction;
             }
@@ -80,7 +76,7 @@ pub fn solve(here: &mut Here, kappa_weight: &[f64], reduction: f64, most: usize)
         rz = new;
         direction.add_to(beta, &z);
     }
-    Ok(Solution { x, energy, spectrum: ritz(&alphas, &betas), flat })
+    Ok(Solution { x, energy, spectrum: ritz(&alphas, &betas) })
 }
 
 /// Extreme eigenvalues of the Lanczos matrix of a conjugate gradient iteration.
