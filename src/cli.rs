@@ -114,10 +114,13 @@ fn dispatch(session: &Session, command: Command) -> Result<i32> {
         Command::Check { scene } => {
             let overrides = scene.overrides();
             check::check(session, scene.scene, overrides, scene.json)
-        },
+        }
         Command::Sweep { scene, output, over } => {
             let overrides = scene.overrides();
-            sweep::sweep(session, sweep::Request { scene: scene.scene, folder: output, overrides, over, json: scene.json })
+            sweep::sweep(
+                session,
+                sweep::Request { scene: scene.scene, folder: output, overrides, over, json: scene.json },
+            )
         }
     }
 }

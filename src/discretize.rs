@@ -241,4 +241,3 @@ fn field_maker<const D: usize>(name: String, space: Space<D>, material: Material
         }
     })
 }
-

@@ -88,7 +88,18 @@ pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Pr
     let mut make = |assembled: Assembled| solver(session, assembled);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
-    let problem = agree(session, discretize::discretize::<2>(scene, &mesh, pieces::plane, ranks, method::keeps_matrices(scene), exchange, &mut make))?;
+    let problem = agree(
+        session,
+        discretize::discretize::<2>(
+            scene,
+            &mesh,
+            pieces::plane,
+            ranks,
+            method::keeps_matrices(scene),
+            exchange,
+            &mut make,
+        ),
+    )?;
     clock.phase("discretize");
     let warnings = warnings(session, scene, &problem);
     Ok(Prepared { problem, choice: describe(chosen, choice), warnings })
@@ -173,7 +184,8 @@ fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> 
     }
     for body in problem.bodies.iter().filter(|body| !body.gauged.is_empty()) {
         let motions = body.gauged.join("; ");
-        warnings.push(format!("body {}: nothing holds its {motions}, no load works on it: fixed at one node", body.name));
+        warnings
+            .push(format!("body {}: nothing holds its {motions}, no load works on it: fixed at one node", body.name));
     }
     for (pair, spec) in problem.model.pairs.iter().zip(&scene.contacts) {
         let (without, all) = pair.uncovered;

@@ -78,7 +78,11 @@ fn minimum(slope: impl Fn(f64) -> f64) -> Option<f64> {
     }
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if slope(middle) < 0.0 { low = middle } else { high = middle }
+        if slope(middle) < 0.0 {
+            low = middle
+        } else {
+            high = middle
+        }
         if high - low <= 1e-3 * high {
             break;
         }

@@ -108,8 +108,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         let layer = Layer::at(model, &iterate.trace);
         let weight = robin.weight(model, &settings.zone, &layer, k);
         if early.is_none() {
-            early = held::unheld(model, &weight)
-                .map(|free| Status::Unheld { body: free.body, motion: free.name });
+            early = held::unheld(model, &weight).map(|free| Status::Unheld { body: free.body, motion: free.name });
         }
         if let Some(status) = early {
             break (status, layer);
@@ -194,14 +193,7 @@ struct Watch {
 
 impl Watch {
     /// The row of an iterate: residual and F1 from the sweep at it, increments from the `step` that led to it.
-    fn measure(
-        &mut self,
-        model: &Model,
-        iterate: &Field,
-        layer: &Layer,
-        sweep: &Sweep,
-        last: Option<&Last>,
-    ) -> Row {
+    fn measure(&mut self, model: &Model, iterate: &Field, layer: &Layer, sweep: &Sweep, last: Option<&Last>) -> Row {
         let strain: f64 = sweep.energy.iter().map(|e| e.strain).sum();
         let potential: f64 = sweep.energy.iter().map(|e| e.potential).sum();
         let decrement: f64 = sweep.decrement.iter().sum();

@@ -5,8 +5,8 @@
 //! the body, whose error shrinks by their ratio in every step.
 
 use super::body::Solved;
-use super::model::{BodySlot, Model};
 use super::field::Field;
+use super::model::{BodySlot, Model};
 use crate::error::Result;
 
 /// Springs of the constraint B u = t over the stiffness of the nodes under them.

@@ -20,15 +20,15 @@ pub mod stop;
 pub mod sweep;
 pub mod zone;
 
-pub use closing::rigid_closing;
 pub use body::{Body, BodyCounts, Energy, Solved};
+pub use closing::rigid_closing;
 pub use field::Field;
 pub use iterate::{Outcome, Settings, Status, solve};
 pub use layer::Layer;
 pub use lift::prepare;
 pub use model::{BodySlot, Exchange, Model, Motion, Segment, Serial};
 pub use progress::{Observer, Row, Silent};
-pub use stop::StopRule;
 pub use robin::RobinRule;
+pub use stop::StopRule;
 pub use sweep::Sweep;
 pub use zone::RobinZone;

@@ -101,11 +101,10 @@ impl Cycle {
 
     fn period_of_traces(&mut self, trace: &[f64]) -> Option<usize> {
         let size = crate::linalg::dot(trace, trace).sqrt();
-        let apart =
-            |other: &[f64]| trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt() / size;
+        let apart = |other: &[f64]| trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt() / size;
         let moved = self.recent.back().is_some_and(|last| apart(last) > 1e-7);
-        let found = (2..=self.recent.len())
-            .find(|&period| moved && apart(&self.recent[self.recent.len() - period]) < 1e-12);
+        let found =
+            (2..=self.recent.len()).find(|&period| moved && apart(&self.recent[self.recent.len() - period]) < 1e-12);
         if self.recent.len() == Self::LONGEST {
             self.recent.pop_front();
         }
@@ -146,7 +145,9 @@ mod tests {
         let found = (0..99).find_map(|k| growing.period(&[grow(k).0], [grow(k).1, true].into_iter(), 1.0));
         assert_eq!(found, Some(2));
         let mut slow = Cycle::default();
-        assert!((0..100).all(|k| slow.period(&[1.0 + 0.999f64.powi(k)], [true].into_iter(), 0.999f64.powi(k)).is_none()));
+        assert!(
+            (0..100).all(|k| slow.period(&[1.0 + 0.999f64.powi(k)], [true].into_iter(), 0.999f64.powi(k)).is_none())
+        );
         let mut still = Cycle::default();
         assert!((0..20).all(|_| still.period(&[1.0], [true].into_iter(), 1.0).is_none()));
     }

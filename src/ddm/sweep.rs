@@ -82,7 +82,8 @@ impl Sweeper {
         }
         let known = |index: usize| {
             let (last, gamma) = last?;
-            let same = open[index] && last.open[index] && is_multiple(&residual[index], 1.0 - gamma, &last.residual[index]);
+            let same =
+                open[index] && last.open[index] && is_multiple(&residual[index], 1.0 - gamma, &last.residual[index]);
             same.then(|| {
                 let mut z = vec![0.0; iterate.states[index].len()];
                 axpy(1.0 - gamma, &last.correction.states[index], &mut z);
@@ -99,12 +100,7 @@ impl Sweeper {
     ///
     /// # Errors
     /// Failures of the solver library.
-    pub fn precondition(
-        &mut self,
-        model: &mut Model,
-        residual: Vec<Vec<f64>>,
-        other: &[Vec<f64>],
-    ) -> Result<Sweep> {
+    pub fn precondition(&mut self, model: &mut Model, residual: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Result<Sweep> {
         let bodies = model.bodies.len();
         self.solve(model, residual, vec![None; bodies], vec![Energy::default(); bodies], Some(other))
     }

@@ -2,8 +2,8 @@
 
 use super::expression::Field;
 use super::{
-    BodySpec, ContactSpec, Gamma, LayerSpec, LoadKind, MeshSource, MethodName, MethodSpec, Order, Plane, Preset, RobinSpec, Scene, SolverSpec, Start,
-    StopSpec, Zone,
+    BodySpec, ContactSpec, Gamma, LayerSpec, LoadKind, MeshSource, MethodName, MethodSpec, Order, Plane, Preset,
+    RobinSpec, Scene, SolverSpec, Start, StopSpec, Zone,
 };
 use serde_json::{Map, Value, json};
 

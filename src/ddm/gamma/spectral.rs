@@ -111,7 +111,8 @@ impl GammaRule for Spectral {
     fn gamma(&mut self, here: &mut Here) -> Result<f64, Unbounded> {
         self.lanczos.observe(here);
         // a residual that grows, or contact that moves, makes the estimate one of the past
-        let steady = self.last.is_some_and(|(residual, closed)| here.residual < residual && here.layer.closed == closed);
+        let steady =
+            self.last.is_some_and(|(residual, closed)| here.residual < residual && here.layer.closed == closed);
         self.last = Some((here.residual, here.layer.closed));
         let gamma = match self.lanczos.bounds() {
             Some((low, high)) if steady && here.k > 5 => 2.0 / (low + high),

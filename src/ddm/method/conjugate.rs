@@ -28,10 +28,8 @@ impl Method for Conjugate {
         let z = &here.sweep.correction;
         let mut direction = z.clone();
         if let Some(last) = self.last.take().filter(|last| last.closed == closed) {
-            let mut products = [
-                local_dot(&last.residual, &z.states),
-                local_dot(&here.sweep.residual, &last.direction.states),
-            ];
+            let mut products =
+                [local_dot(&last.residual, &z.states), local_dot(&here.sweep.residual, &last.direction.states)];
             here.model.exchange.sum(&mut products);
             let beta = ((here.decrement() - products[0]) / last.decrement).max(0.0);
             // a direction that does not descend is not conjugate any more

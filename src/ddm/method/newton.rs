@@ -46,8 +46,8 @@ impl Newton {
     fn forcing(&mut self, here: &Here) -> f64 {
         let ratio = here.residual / self.last;
         self.last = here.residual;
-        let wish = (0.5 * ratio * ratio).clamp(1e-4, 0.1);
-        wish.max(0.2 * here.target / here.residual).min(0.1)
+        let wish = (0.9 * ratio * ratio).clamp(1e-3, 0.3);
+        wish.max(0.5 * here.target / here.residual).min(0.3)
     }
 }
 

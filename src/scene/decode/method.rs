@@ -68,7 +68,9 @@ fn gamma(node: &Node) -> Result<Gamma> {
         Value::List(items) if items.is_empty() => {
             Err(node.refuse("gamma has no value").help("write a number, a list of numbers, or the name of a rule"))
         }
-        Value::List(items) => items.iter().map(|item| item.positive("gamma")).collect::<Result<_>>().map(Gamma::Schedule),
+        Value::List(items) => {
+            items.iter().map(|item| item.positive("gamma")).collect::<Result<_>>().map(Gamma::Schedule)
+        }
         _ => node.positive("gamma").map(Gamma::Stationary),
     }
 }
