@@ -58,9 +58,20 @@ struct SceneArgs {
     /// Replace a key of the scene, for example method.gamma=0.3 or contact.0.layer.power.a=0.3; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
+    /// Method: auto, robin, ncg, anderson, newton-robin or newton (short for --set method.name=NAME)
+    #[arg(long, value_name = "NAME")]
+    method: Option<String>,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
+}
+
+impl SceneArgs {
+    /// All overrides, the method's last.
+    fn overrides(&self) -> Vec<String> {
+        let method = self.method.iter().map(|name| format!("method.name={name}"));
+        self.overrides.iter().cloned().chain(method).collect()
+    }
 }
 
 /// Runs the program with the words of its command line, the name first; returns the exit code.
@@ -97,13 +108,19 @@ pub fn run(words: Vec<String>) -> i32 {
 fn dispatch(session: &Session, command: Command) -> Result<i32> {
     match command {
         Command::Solve { scene, output } => {
-            let SceneArgs { scene, overrides, json } = scene;
-            solve::solve(session, solve::Request { scene, folder: output, overrides, json })
+            let overrides = scene.overrides();
+            solve::solve(session, solve::Request { scene: scene.scene, folder: output, overrides, json: scene.json })
         }
-        Command::Check { scene } => check::check(session, scene.scene, scene.overrides, scene.json),
+        Command::Check { scene } => {
+            let overrides = scene.overrides();
+            check::check(session, scene.scene, overrides, scene.json)
+        }
         Command::Sweep { scene, output, over } => {
-            let SceneArgs { scene, overrides, json } = scene;
-            sweep::sweep(session, sweep::Request { scene, folder: output, overrides, over, json })
+            let overrides = scene.overrides();
+            sweep::sweep(
+                session,
+                sweep::Request { scene: scene.scene, folder: output, overrides, over, json: scene.json },
+            )
         }
     }
 }

@@ -17,6 +17,7 @@ pub fn status_name(status: &Status) -> &'static str {
         Status::NotFinite { .. } => "not-finite",
         Status::Cycle { .. } => "cycle",
         Status::Unheld { .. } => "unheld",
+        Status::Unbounded => "unbounded",
         Status::InnerSolver { .. } => "inner-solver",
     }
 }
@@ -55,6 +56,10 @@ fn message(outcome: &Outcome, model: &Model) -> String {
              or a start that closes the contact (method.start)",
             name(body)
         ),
+        Status::Unbounded => format!(
+            "in iteration {k} the energy falls for ever: the loads push a body away from its contact, and no support stops it; \
+             add a support, or turn the load"
+        ),
         Status::InnerSolver { body, reason } => {
             let reason = if reason.is_empty() { "its rank knows more" } else { reason };
             format!("body `{}`: its inner solver failed in iteration {k}: {reason}", name(body))
@@ -73,7 +78,10 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
         message: message(outcome, model),
         iterations: outcome.iterations,
         sweeps: outcome.sweeps,
-        factorizations: counts[0],
+        method: outcome.method.to_owned(),
+        spectrum: outcome.spectrum.map(|(low, high)| [low, high]),
+        error_estimate: finite(last.map(|row| row.error)),
+        factorizations: counts[0] + outcome.coupled_factorizations,
         symbolic_factorizations: counts[1],
         body_solves: counts[2],
         inner_iterations: counts[3],
@@ -146,9 +154,9 @@ fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) 
     let model = &prepared.problem.model;
     let (pair, layer, range) = (&model.pairs[i], &outcome.layer, model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
-    let length = |closed: bool| (0..pair.len()).filter(|&q| (c[q] > 0.0) == closed).map(|q| pair.weight[q]).sum();
+    let length = |is: fn(f64) -> bool| (0..pair.len()).filter(|&q| is(c[q])).fold(0.0, |sum, q| sum + pair.weight[q]);
     let on_side = |side: usize| -> [f64; 3] {
-        std::array::from_fn(|k| -(0..pair.len()).map(|q| force[q] * pair.resultant[side][q][k]).sum::<f64>())
+        std::array::from_fn(|k| (0..pair.len()).fold(0.0, |sum, q| sum - force[q] * pair.resultant[side][q][k]))
     };
     let sides = sides(prepared, i);
     let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
@@ -162,8 +170,8 @@ fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) 
         force: sides.map(on_side),
         peak_pressure: p[peak],
         peak_at: pair.position[peak],
-        contact_length: length(true),
-        open_length: length(false),
+        contact_length: length(|c| c > 0.0),
+        open_length: length(|c| c < 0.0),
         contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
     }
 }
@@ -172,7 +180,7 @@ fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) 
 fn ends(pair: &ContactPair, c: &[f64]) -> Vec<[f64; 3]> {
     let mut ends = Vec::new();
     for q in 1..pair.len() {
-        if (c[q - 1] > 0.0) != (c[q] > 0.0) {
+        if c[q - 1] * c[q] < 0.0 {
             let s = c[q - 1] / (c[q - 1] - c[q]);
             ends.push(std::array::from_fn(|k| pair.position[q - 1][k] * (1.0 - s) + pair.position[q][k] * s));
         }

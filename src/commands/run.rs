@@ -1,12 +1,13 @@
 //! From a scene to a solved problem: mesh, discretisation, inner solvers, options, iteration.
 
+use super::method;
 use crate::contact::pieces;
-use crate::ddm::{self, Model, Observer, Outcome, Settings, Stationary, StopRule};
+use crate::ddm::{self, Observer, Outcome, RobinRule, Settings, StopRule};
 use crate::discretize::{self, Assembled, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
-use crate::scene::{MeshSource, Order, Preset, Scene};
+use crate::scene::{MeshSource, Order, Preset, RobinSpec, Scene};
 use crate::solver::{Krylov, SparseBody, options, preset};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
@@ -87,7 +88,18 @@ pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Pr
     let mut make = |assembled: Assembled| solver(session, assembled);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
-    let problem = agree(session, discretize::discretize::<2>(scene, &mesh, pieces::plane, ranks, exchange, &mut make))?;
+    let problem = agree(
+        session,
+        discretize::discretize::<2>(
+            scene,
+            &mesh,
+            pieces::plane,
+            ranks,
+            method::keeps_matrices(scene),
+            exchange,
+            &mut make,
+        ),
+    )?;
     clock.phase("discretize");
     let warnings = warnings(session, scene, &problem);
     Ok(Prepared { problem, choice: describe(chosen, choice), warnings })
@@ -170,6 +182,11 @@ fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> 
             session.size()
         ));
     }
+    for body in problem.bodies.iter().filter(|body| !body.gauged.is_empty()) {
+        let motions = body.gauged.join("; ");
+        warnings
+            .push(format!("body {}: nothing holds its {motions}, no load works on it: fixed at one node", body.name));
+    }
     for (pair, spec) in problem.model.pairs.iter().zip(&scene.contacts) {
         let (without, all) = pair.uncovered;
         if without > 0 {
@@ -227,15 +244,27 @@ pub fn set_up(session: &Session, prepared: &mut Prepared, clock: &mut Clock) -> 
 ///
 /// # Errors
 /// Failures of PETSc; not converging is a status of the outcome.
-pub fn iterate(scene: &Scene, model: &mut Model, observer: &mut dyn Observer, clock: &mut Clock) -> Result<Outcome> {
+pub fn iterate(
+    session: &Session,
+    scene: &Scene,
+    problem: &mut Problem,
+    observer: &mut dyn Observer,
+    clock: &mut Clock,
+) -> Result<Outcome> {
     let stop = &scene.method.stop;
     let mut settings = Settings {
         zone: discretize::robin_zone(scene),
-        gamma: Box::new(Stationary(scene.method.gamma)),
+        robin: match scene.method.robin {
+            RobinSpec::Tangent => RobinRule::Tangent,
+            RobinSpec::Frozen => RobinRule::Frozen,
+            RobinSpec::Floor(floor) => RobinRule::Floor(floor),
+            RobinSpec::Auto => RobinRule::Auto,
+        },
+        methods: method::make(session, scene, problem)?,
         stop: StopRule { residual: stop.residual, increment: stop.increment, iterations: stop.iterations },
-        start: discretize::start(scene, model)?,
+        start: discretize::start(scene, &problem.model)?,
     };
-    let outcome = ddm::solve(model, &mut settings, observer)?;
+    let outcome = ddm::solve(&mut problem.model, &mut settings, observer)?;
     clock.phase("iterate");
     Ok(outcome)
 }

@@ -40,7 +40,7 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
         table: IterationTable::new(verbosity, &run::targets(&scene)),
         history: if first { Some(history(&folder, &scene)?) } else { None },
     };
-    let outcome = run::iterate(&scene, &mut prepared.problem.model, &mut watchers, &mut clock)?;
+    let outcome = run::iterate(session, &scene, &mut prepared.problem, &mut watchers, &mut clock)?;
     watchers.table.finish();
     let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
     let written = failed.and(write(session, &scene, &prepared, &outcome, &folder));

@@ -48,7 +48,7 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
         let mut clock = Clock::default();
         let mut prepared = run::prepare(session, scene, &mut clock)?;
         run::set_up(session, &mut prepared, &mut clock)?;
-        let outcome = run::iterate(scene, &mut prepared.problem.model, &mut Silent, &mut clock)?;
+        let outcome = run::iterate(session, scene, &mut prepared.problem, &mut Silent, &mut clock)?;
         clock.total();
         let report = report::report(session, scene, &prepared, &outcome, &clock);
         options::withdraw(session)?;

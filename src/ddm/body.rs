@@ -56,6 +56,9 @@ pub trait Body {
     /// t = B u: outer normal displacement at each row, without what prescribed dofs contribute.
     fn trace(&self, u: &[f64], t: &mut [f64]);
 
+    /// y += B' rows: forces at the contact rows as forces at the dofs.
+    fn add_rows(&self, rows: &[f64], y: &mut [f64]);
+
     /// r = f - K u - B' force, `force` = omega p at each row: the equilibrium residual (26). Also returns the
     /// energies of u.
     fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy;

@@ -7,28 +7,59 @@ use nalgebra::DMatrix;
 /// A spring stiffness below this share of the largest stiffness in the body drowns in rounding.
 const SAFE: f64 = 1e-13;
 
-/// The first body that nothing holds under the Robin term `weight` (omega psi kappa at the points), and the name of
-/// the motion.
-pub fn unheld(model: &Model, weight: &[f64]) -> Option<(usize, String)> {
+/// A rigid motion that nothing holds, or not enough.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeMotion {
+    /// Number of the body.
+    pub body: usize,
+    /// Name of the motion.
+    pub name: String,
+}
+
+/// The first body that nothing holds under the Robin term `weight` (omega psi kappa of the contact rows), and its motion.
+pub fn unheld(model: &Model, weight: &[f64]) -> Option<FreeMotion> {
     (0..model.bodies.len()).find_map(|body| {
         let slot = &model.bodies[body];
-        if slot.motions.is_empty() {
-            return None;
-        }
-        free_motion(slot, &model.at_rows(body, weight)).map(|name| (body, name))
+        let free = kernel(&springs(slot, &model.of_body(body, weight)), slot.scale, SAFE);
+        Some(FreeMotion { body, name: name(slot, free.first()?) })
     })
 }
 
-fn free_motion(slot: &BodySlot, weight: &[f64]) -> Option<String> {
+/// A motion of a body that `weight` holds with less than `share` of the stiffness that [`natural_springs`] give it, if
+/// these hold it at all.
+pub fn weak_motion(model: &Model, body: usize, weight: &[f64], share: f64) -> Option<FreeMotion> {
+    let slot = &model.bodies[body];
+    if slot.motions.is_empty() {
+        return None;
+    }
+    let natural = springs(slot, &natural_springs(model, body));
+    let have = springs(slot, &model.of_body(body, weight));
+    // motions that even the natural springs do not feel are not a matter of the Robin term
+    let difference = have - share * &natural;
+    let largest = natural.diagonal().max().max(f64::MIN_POSITIVE);
+    let weak = kernel(&difference, largest, -1e-9);
+    Some(FreeMotion { body, name: name(slot, weak.first()?) })
+}
+
+/// Springs at a body's contact rows that together are about as stiff as the body: the stiffness under each point, spread
+/// over all of them.
+pub fn natural_springs(model: &Model, body: usize) -> Vec<f64> {
+    let slot = &model.bodies[body];
+    let rows = slot.row_stiffness.len().max(1) as f64;
+    slot.row_stiffness.iter().map(|stiffness| stiffness / rows).collect()
+}
+
+/// Stiffness of the springs in terms of the body's free motions.
+fn springs(slot: &BodySlot, weight: &[f64]) -> DMatrix<f64> {
     let count = slot.motions.len();
-    let springs = DMatrix::from_fn(count, count, |i, j| {
+    DMatrix::from_fn(count, count, |i, j| {
         let (s, t) = (&slot.motions[i].trace, &slot.motions[j].trace);
         (0..weight.len()).map(|q| weight[q] * s[q] * t[q]).sum()
-    });
-    let free = kernel(&springs, slot.scale, SAFE);
-    let motion = free.first()?;
+    })
+}
+
+fn name(slot: &BodySlot, motion: &nalgebra::DVector<f64>) -> String {
     let largest = motion.amax();
-    let parts: Vec<&str> =
-        (0..count).filter(|&i| motion[i].abs() > 1e-6 * largest).map(|i| slot.motions[i].name.as_str()).collect();
-    Some(parts.join(" with "))
+    let parts = (0..slot.motions.len()).filter(|&i| motion[i].abs() > 1e-6 * largest);
+    parts.map(|i| slot.motions[i].name.as_str()).collect::<Vec<_>>().join(" with ")
 }

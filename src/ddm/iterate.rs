@@ -1,13 +1,15 @@
 //! The outer loop (41)-(42).
 
-use super::gamma::GammaRule;
+use super::field::Field;
 use super::held;
 use super::layer::Layer;
 use super::lift::lift;
+use super::method::{Here, Method, Step};
 use super::model::Model;
 use super::progress::{Observer, Row};
+use super::robin::{Robin, RobinRule};
 use super::stop::{Cycle, Floor, Reference, StopRule, relative_increment};
-use super::sweep::{Iterate, Sweep, Sweeper};
+use super::sweep::{Sweep, Sweeper};
 use super::zone::RobinZone;
 use crate::error::Result;
 use std::time::Instant;
@@ -16,8 +18,10 @@ use std::time::Instant;
 pub struct Settings {
     /// Robin zone psi.
     pub zone: RobinZone,
-    /// Relaxation.
-    pub gamma: Box<dyn GammaRule>,
+    /// Robin coefficient on it.
+    pub robin: RobinRule,
+    /// How steps are made: the first method, and those to change to when progress stops.
+    pub methods: Vec<Box<dyn Method>>,
     /// When to stop.
     pub stop: StopRule,
     /// Start: outer normal displacement of all contact rows (layout of a trace vector).
@@ -50,6 +54,8 @@ pub enum Status {
         /// Name of its free rigid motion.
         motion: String,
     },
+    /// F1 falls for ever: loads push a body where neither a support nor a contact stops it.
+    Unbounded,
     /// A body's inner solver failed.
     InnerSolver {
         /// The body.
@@ -70,14 +76,20 @@ pub struct Outcome {
     /// Solves of a body that were not needed.
     pub solves_skipped: usize,
     /// The last iterate.
-    pub iterate: Iterate,
+    pub iterate: Field,
     /// The layers at that iterate.
     pub layer: Layer,
     /// History, one row an iterate.
     pub rows: Vec<Row>,
+    /// Name of the method that made the last step.
+    pub method: &'static str,
+    /// Factorisations beyond those of the sweeps (a Newton matrix of all bodies).
+    pub coupled_factorizations: usize,
+    /// Estimated bounds of the spectrum of G^-1 F1'', if the method saw enough.
+    pub spectrum: Option<(f64, f64)>,
 }
 
-/// Runs the iteration: residual, stop, relaxation and update of equations (41)-(42), until a rule ends it.
+/// Runs the iteration: residual, stop, step and update of equations (41)-(42), until a rule ends it.
 ///
 /// # Errors
 /// Failures of the solver library. Not converging is a [`Status`].
@@ -85,47 +97,90 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     let clock = Instant::now();
     let (mut iterate, failed) = lift(model, &settings.start)?;
     let mut early = failed.map(|(body, reason)| Status::InnerSolver { body, reason });
+    let mut robin = Robin::new(settings.robin.clone());
     let mut watch = Watch::default();
     let mut sweeper = Sweeper::default();
-    let mut last: Option<(Sweep, f64)> = None;
+    let mut last: Option<Last> = None;
     let mut rows: Vec<Row> = Vec::new();
-    for k in 0.. {
+    let mut active = 0;
+    let (status, layer) = loop {
+        let k = rows.len();
         let layer = Layer::at(model, &iterate.trace);
-        let weight = settings.zone.robin_weight(model, &layer, k);
+        let weight = robin.weight(model, &settings.zone, &layer, k);
         if early.is_none() {
-            early = held::unheld(model, &weight).map(|(body, motion)| Status::Unheld { body, motion });
+            early = held::unheld(model, &weight).map(|free| Status::Unheld { body: free.body, motion: free.name });
         }
         if let Some(status) = early {
-            return Ok(end(status, k, &sweeper, iterate, layer, rows));
+            break (status, layer);
         }
         model.robin(&weight)?;
-        let step = last.as_ref().map(|(sweep, gamma)| (sweep, *gamma));
-        let sweep = sweeper.sweep(model, &iterate, &layer, &weight, step)?;
-        let mut row = watch.measure(model, &iterate, &layer, &sweep, step);
+        let relaxed = last.as_ref().and_then(|last| Some((&last.sweep, last.gamma?)));
+        let sweep = sweeper.sweep(model, &iterate, &layer, &weight, relaxed)?;
+        let method = &mut settings.methods[active];
+        let mut row = watch.measure(model, &iterate, &layer, &sweep, last.as_ref());
         (row.iteration, row.sweeps, row.seconds) = (k, sweeper.sweeps, clock.elapsed().as_secs_f64());
-        let status = watch.judge(model, &settings.stop, &row, &iterate, &layer, &sweep);
+        row.factorizations += method.factorizations();
+        row.error = row.residual * method.amplification().sqrt();
+        let judged = watch.judge(model, &settings.stop, &row, &iterate, &layer, &sweep);
         observer.row(&row);
+        let residual = row.residual;
         rows.push(row);
-        if let Some(status) = status {
-            return Ok(end(status, k, &sweeper, iterate, layer, rows));
+        match judged {
+            Verdict::End(status) => break (status, layer),
+            Verdict::Stalled if active + 1 < settings.methods.len() => {
+                active += 1;
+                observer.note(&format!("iteration {k}: no progress, {} takes over", settings.methods[active].name()));
+            }
+            Verdict::Stalled | Verdict::Go => {}
         }
-        let gamma = settings.gamma.gamma(k, &sweep);
-        iterate.advance(gamma, &sweep);
-        last = Some((sweep, gamma));
-    }
-    unreachable!("the loop ends by a status")
+        let target = settings.stop.residual.unwrap_or(0.0);
+        let mut here =
+            Here { model, sweeper: &mut sweeper, k, layer: &layer, weight: &weight, sweep: &sweep, residual, target };
+        let step = settings.methods[active].step(&mut here)?;
+        last = match step {
+            Step::Unbounded => break (Status::Unbounded, layer),
+            Step::Sweep(gamma) => {
+                iterate.add(gamma, &sweep.correction);
+                let moved = sweep.correction.trace.iter().map(|t| gamma * t).collect();
+                Some(Last { sweep, gamma: Some(gamma), length: gamma, moved })
+            }
+            Step::Along(direction, length) => {
+                iterate.add(length, &direction);
+                let moved = direction.trace.iter().map(|t| length * t).collect();
+                Some(Last { sweep, gamma: None, length, moved })
+            }
+        };
+    };
+    let method = &settings.methods[active];
+    Ok(Outcome {
+        status,
+        iterations: last.map_or(0, |_| rows.len().saturating_sub(1)),
+        sweeps: sweeper.sweeps,
+        solves_skipped: sweeper.solves_skipped,
+        iterate,
+        layer,
+        rows,
+        method: method.name(),
+        coupled_factorizations: settings.methods.iter().map(|method| method.factorizations()).sum(),
+        spectrum: method.spectrum(),
+    })
 }
 
-fn end(
-    status: Status,
-    iterations: usize,
-    sweeper: &Sweeper,
-    iterate: Iterate,
-    layer: Layer,
-    rows: Vec<Row>,
-) -> Outcome {
-    let (sweeps, solves_skipped) = (sweeper.sweeps, sweeper.solves_skipped);
-    Outcome { status, iterations, sweeps, solves_skipped, iterate, layer, rows }
+/// The step that led to an iterate.
+struct Last {
+    sweep: Sweep,
+    /// gamma, if it went along the sweep's correction.
+    gamma: Option<f64>,
+    length: f64,
+    /// Change of the traces.
+    moved: Vec<f64>,
+}
+
+/// What is to be done after an iterate was measured.
+enum Verdict {
+    End(Status),
+    Stalled,
+    Go,
 }
 
 /// Measures each iterate and decides whether to go on.
@@ -138,31 +193,23 @@ struct Watch {
 
 impl Watch {
     /// The row of an iterate: residual and F1 from the sweep at it, increments from the `step` that led to it.
-    fn measure(
-        &mut self,
-        model: &Model,
-        iterate: &Iterate,
-        layer: &Layer,
-        sweep: &Sweep,
-        step: Option<(&Sweep, f64)>,
-    ) -> Row {
+    fn measure(&mut self, model: &Model, iterate: &Field, layer: &Layer, sweep: &Sweep, last: Option<&Last>) -> Row {
         let strain: f64 = sweep.energy.iter().map(|e| e.strain).sum();
         let potential: f64 = sweep.energy.iter().map(|e| e.potential).sum();
         let decrement: f64 = sweep.decrement.iter().sum();
         let increments: Vec<f64> = (0..model.bodies.len())
-            .map(|body| match step {
+            .map(|body| match last {
                 None => f64::NAN,
-                Some((last, gamma)) => {
-                    let step: Vec<f64> = model.of_body(body, &last.trace).iter().map(|t| gamma * t).collect();
-                    relative_increment(&step, &model.of_body(body, &iterate.trace))
+                Some(last) => {
+                    relative_increment(&model.of_body(body, &last.moved), &model.of_body(body, &iterate.trace))
                 }
             })
             .collect();
         Row {
-            residual: self.reference.relative(decrement, strain + layer.work),
+            residual: self.reference.relative(decrement, strain + layer.work, strain),
             increment: increments.iter().copied().fold(f64::NAN, f64::max),
             increments,
-            gamma: step.map_or(f64::NAN, |(_, gamma)| gamma),
+            gamma: last.map_or(f64::NAN, |last| last.length),
             energy: potential + layer.energy.iter().sum::<f64>(),
             closed: layer.closed,
             points: model.points(),
@@ -172,42 +219,47 @@ impl Watch {
         }
     }
 
-    /// The status that ends the run at this iterate, if one does.
+    /// Whether the run ends at this iterate, and how.
     fn judge(
         &mut self,
         model: &Model,
         stop: &StopRule,
         row: &Row,
-        iterate: &Iterate,
+        iterate: &Field,
         layer: &Layer,
         sweep: &Sweep,
-    ) -> Option<Status> {
+    ) -> Verdict {
         let broken = |body: &usize| {
             let finite = |value: f64| value.is_finite();
-            let trace_is_finite = model.trace_ranges(*body).flatten().all(|i| finite(sweep.trace[i]));
+            let trace_is_finite = model.trace_ranges(*body).flatten().all(|i| finite(sweep.correction.trace[i]));
             !(finite(sweep.decrement[*body]) && finite(sweep.energy[*body].potential) && trace_is_finite)
         };
         if let Some(body) = (0..model.bodies.len()).find(broken) {
-            return Some(Status::NotFinite { body });
+            return Verdict::End(Status::NotFinite { body });
         }
         if let Some((body, reason)) = &sweep.failed {
-            return Some(Status::InnerSolver { body: *body, reason: reason.clone() });
+            return Verdict::End(Status::InnerSolver { body: *body, reason: reason.clone() });
         }
         if stop.is_met(row.residual, row.increment) {
-            return Some(Status::Converged);
+            return Verdict::End(Status::Converged);
         }
-        if let Some(period) = self.cycle.period(&iterate.trace) {
-            return Some(Status::Cycle { period });
+        let closed = layer.compression.iter().map(|&c| c > 0.0);
+        if let Some(period) = self.cycle.period(&iterate.trace, closed, row.residual) {
+            return Verdict::End(Status::Cycle { period });
         }
-        if self.floor.is_suspected(row.residual) && is_rounding(model, iterate, layer, sweep) {
-            return Some(Status::Attainable);
+        let stalled = self.floor.is_suspected(row.residual);
+        if stalled && is_rounding(model, iterate, layer, sweep) {
+            return Verdict::End(Status::Attainable);
         }
-        (row.iteration >= stop.iterations).then_some(Status::IterationLimit)
+        if row.iteration >= stop.iterations {
+            return Verdict::End(Status::IterationLimit);
+        }
+        if stalled { Verdict::Stalled } else { Verdict::Go }
     }
 }
 
 /// Whether the residual is no larger than what rounding alone can make.
-fn is_rounding(model: &Model, iterate: &Iterate, layer: &Layer, sweep: &Sweep) -> bool {
+fn is_rounding(model: &Model, iterate: &Field, layer: &Layer, sweep: &Sweep) -> bool {
     let mut floor = [0.0];
     for (index, slot) in model.bodies.iter().enumerate() {
         if let Some(body) = &slot.local {

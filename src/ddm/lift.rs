@@ -5,8 +5,8 @@
 //! the body, whose error shrinks by their ratio in every step.
 
 use super::body::Solved;
+use super::field::Field;
 use super::model::{BodySlot, Model};
-use super::sweep::Iterate;
 use crate::error::Result;
 
 /// Springs of the constraint B u = t over the stiffness of the nodes under them.
@@ -39,8 +39,8 @@ fn springs(slot: &BodySlot) -> Vec<f64> {
 ///
 /// # Errors
 /// Failures of the solver library.
-pub fn lift(model: &mut Model, trace: &[f64]) -> Result<(Iterate, Option<(usize, String)>)> {
-    let mut iterate = Iterate { states: Vec::new(), trace: vec![0.0; trace.len()] };
+pub fn lift(model: &mut Model, trace: &[f64]) -> Result<(Field, Option<(usize, String)>)> {
+    let mut iterate = Field { states: Vec::new(), trace: vec![0.0; trace.len()] };
     let mut failed = None;
     for index in 0..model.bodies.len() {
         let target = model.of_body(index, trace);

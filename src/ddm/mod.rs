@@ -4,24 +4,31 @@
 //! bodies that answer the verbs of [`Body`]; it knows no dimension, no element, no mesh and no PETSc.
 
 pub mod body;
+mod closing;
+pub mod field;
 pub mod gamma;
 pub mod held;
 pub mod iterate;
 pub mod layer;
 mod lift;
+pub mod line;
+pub mod method;
 pub mod model;
 mod progress;
+pub mod robin;
 pub mod stop;
 pub mod sweep;
 pub mod zone;
 
 pub use body::{Body, BodyCounts, Energy, Solved};
-pub use gamma::{GammaRule, Stationary};
+pub use closing::rigid_closing;
+pub use field::Field;
 pub use iterate::{Outcome, Settings, Status, solve};
 pub use layer::Layer;
 pub use lift::prepare;
 pub use model::{BodySlot, Exchange, Model, Motion, Segment, Serial};
 pub use progress::{Observer, Row, Silent};
+pub use robin::RobinRule;
 pub use stop::StopRule;
-pub use sweep::{Iterate, Sweep};
+pub use sweep::Sweep;
 pub use zone::RobinZone;

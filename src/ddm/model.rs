@@ -44,6 +44,8 @@ pub struct Motion {
     pub name: String,
     /// Its trace on the body's contact rows; largest displacement in the body about one.
     pub trace: Vec<f64>,
+    /// Work of the loads on it.
+    pub work: f64,
 }
 
 /// A body in the model; the arrays are known on every rank, the body itself where it lives.
@@ -130,13 +132,13 @@ impl Model {
         }
     }
 
-    /// Gives every body its Robin term `weight` = omega psi kappa at the points (37)-(38).
+    /// Gives every body its Robin term `weight` = omega psi kappa of each contact row (37)-(38).
     ///
     /// # Errors
     /// Failures of the solver library.
     pub fn robin(&mut self, weight: &[f64]) -> Result<()> {
         for body in 0..self.bodies.len() {
-            let rows = self.at_rows(body, weight);
+            let rows = self.of_body(body, weight);
             if let Some(local) = &mut self.bodies[body].local {
                 local.robin(&rows)?;
             }

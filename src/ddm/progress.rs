@@ -9,6 +9,8 @@ pub struct Row {
     pub residual: f64,
     /// Largest of `increments`; NaN in row 0, before the first update.
     pub increment: f64,
+    /// Estimate of the relative error of the iterate in the energy norm; NaN while nothing is known of the spectrum.
+    pub error: f64,
     /// The paper's rho of each body, in the order of the scene: relative increment of the normal displacements
     /// that led to this iterate.
     pub increments: Vec<f64>,

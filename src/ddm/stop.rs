@@ -1,6 +1,7 @@
 //! When to stop: residual, the paper's increment rule, rounding floor, cycles.
 
 use std::collections::VecDeque;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Rules of a run; the first one met ends it.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,19 +32,19 @@ pub fn relative_increment(step: &[f64], now: &[f64]) -> f64 {
 
 /// Numerator over reference, where a zero reference asks for an absolute zero.
 ///
-/// The reference is at least 1e-8 of the largest one of the run, so that a solution that is zero is reached.
+/// The reference is at least 1e-8 of the strain energy norm of the start, so that a solution that is zero is reached. The
+/// start's strain is bounded whatever the laws do; energies of later iterates are not.
 #[derive(Debug, Default)]
 pub struct Reference {
-    largest: f64,
+    least: Option<f64>,
 }
 
 impl Reference {
-    /// sqrt(numerator / reference), both squared norms.
-    pub fn relative(&mut self, numerator: f64, reference: f64) -> f64 {
-        self.largest = self.largest.max(reference);
-        let reference = reference.max(1e-16 * self.largest);
+    /// sqrt(numerator / reference), both squared norms; `strain` is the part of the reference in the bodies.
+    pub fn relative(&mut self, numerator: f64, reference: f64, strain: f64) -> f64 {
+        let least = *self.least.get_or_insert(1e-16 * strain.abs());
         // rounding can make a tiny numerator negative
-        if numerator.abs() == 0.0 { 0.0 } else { (numerator.max(0.0) / reference).sqrt() }
+        if numerator.abs() == 0.0 { 0.0 } else { (numerator.max(0.0) / reference.max(least)).sqrt() }
     }
 }
 
@@ -76,18 +77,29 @@ impl Floor {
     }
 }
 
-/// Recognises traces that come back: the iteration runs in a circle.
+/// Recognises an iteration that runs in a circle: the same traces again, or the same contact sets again and again without
+/// progress.
 #[derive(Debug, Default)]
 pub struct Cycle {
     recent: VecDeque<Vec<f64>>,
+    /// Contact sets of the last iterates, as hashes, and the best residual before each.
+    sets: VecDeque<(u64, f64)>,
+    best: f64,
 }
 
 impl Cycle {
     /// Longest period looked for.
     const LONGEST: usize = 8;
+    /// Iterates whose contact sets must repeat.
+    const WATCHED: usize = 64;
 
-    /// The period, if `trace` equals one seen 2 to 8 updates ago while the last update moved it.
-    pub fn period(&mut self, trace: &[f64]) -> Option<usize> {
+    /// The period, if `trace` equals one seen 2 to 8 updates ago while the last update moved it, or if the contact sets
+    /// `closed` of the last 64 iterates repeat with that period and the residual has not fallen meanwhile.
+    pub fn period(&mut self, trace: &[f64], closed: impl Iterator<Item = bool>, residual: f64) -> Option<usize> {
+        self.period_of_traces(trace).or_else(|| self.period_of_sets(closed, residual))
+    }
+
+    fn period_of_traces(&mut self, trace: &[f64]) -> Option<usize> {
         let size = crate::linalg::dot(trace, trace).sqrt();
         let apart = |other: &[f64]| trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt() / size;
         let moved = self.recent.back().is_some_and(|last| apart(last) > 1e-7);
@@ -99,6 +111,22 @@ impl Cycle {
         self.recent.push_back(trace.to_vec());
         found
     }
+
+    fn period_of_sets(&mut self, closed: impl Iterator<Item = bool>, residual: f64) -> Option<usize> {
+        let mut hash = DefaultHasher::new();
+        closed.for_each(|closed| closed.hash(&mut hash));
+        self.best = if self.sets.is_empty() { residual } else { self.best.min(residual) };
+        self.sets.push_back((hash.finish(), self.best));
+        if self.sets.len() <= Self::WATCHED {
+            return None;
+        }
+        self.sets.pop_front();
+        let stuck = self.sets[0].1 <= self.best;
+        let sets: Vec<u64> = self.sets.iter().map(|set| set.0).collect();
+        let repeats = |period: &usize| sets.windows(period + 1).all(|window| window[0] == window[*period]);
+        let constant = repeats(&1);
+        (2..=Self::LONGEST).find(|period| stuck && !constant && repeats(period))
+    }
 }
 
 #[cfg(test)]
@@ -108,20 +136,31 @@ mod tests {
     #[test]
     fn a_cycle_is_seen_and_a_slow_approach_is_not() {
         let mut cycle = Cycle::default();
-        let found: Vec<_> = (0..9).map(|k| cycle.period(&[(k % 3) as f64, 1.0])).collect();
+        let none = || std::iter::empty();
+        let found: Vec<_> = (0..9).map(|k| cycle.period(&[(k % 3) as f64, 1.0], none(), 1.0)).collect();
         assert_eq!(found.iter().flatten().next(), Some(&3));
+        // the same contact sets again, with peaks that grow
+        let mut growing = Cycle::default();
+        let grow = |k: i32| (1.1f64.powi(k) * f64::from(k % 2), k % 2 == 0);
+        let found = (0..99).find_map(|k| growing.period(&[grow(k).0], [grow(k).1, true].into_iter(), 1.0));
+        assert_eq!(found, Some(2));
         let mut slow = Cycle::default();
-        assert!((0..100).all(|k| slow.period(&[1.0 + 0.999f64.powi(k)]).is_none()));
+        assert!(
+            (0..100).all(|k| slow.period(&[1.0 + 0.999f64.powi(k)], [true].into_iter(), 0.999f64.powi(k)).is_none())
+        );
         let mut still = Cycle::default();
-        assert!((0..20).all(|_| still.period(&[1.0]).is_none()));
+        assert!((0..20).all(|_| still.period(&[1.0], [true].into_iter(), 1.0).is_none()));
     }
 
     #[test]
-    fn a_vanishing_solution_is_reached_and_a_zero_is_zero() {
+    fn a_vanishing_solution_is_reached_and_a_blown_up_iterate_does_not_excuse_a_residual() {
         let mut reference = Reference::default();
-        assert_eq!(reference.relative(0.0, 0.0), 0.0);
-        assert_eq!(reference.relative(4.0, 1.0), 2.0);
-        assert!(reference.relative(1e-40, 1e-40) < 1e-11);
+        assert_eq!(reference.relative(0.0, 0.0, 0.0), 0.0);
+        let mut reference = Reference::default();
+        assert_eq!(reference.relative(4.0, 1.0, 1.0), 2.0);
+        assert!(reference.relative(1e-40, 1e-40, 1e-40) < 1e-11);
+        assert_eq!(reference.relative(1e60, 1e60, 1e60), 1.0);
+        assert_eq!(reference.relative(1.0, 1.0, 0.5), 1.0);
     }
 
     #[test]

@@ -1,41 +1,23 @@
 //! One sweep (41): every body solves its own linear problem, independently.
 
 use super::body::{Energy, Solved};
+use super::field::Field;
 use super::layer::Layer;
 use super::model::Model;
 use crate::error::Result;
 use crate::linalg::{axpy, dot};
 
-/// An iterate u^k: states of the bodies that live here, traces of all.
-#[derive(Debug, Clone)]
-pub struct Iterate {
-    /// State of each body; empty where the body lives on another rank.
-    pub states: Vec<Vec<f64>>,
-    /// B u of all contact rows (see [`super::model`] for the layout).
-    pub trace: Vec<f64>,
-}
-
-impl Iterate {
-    /// u <- u + gamma z (42).
-    pub fn advance(&mut self, gamma: f64, sweep: &Sweep) {
-        for (u, z) in self.states.iter_mut().zip(&sweep.corrections) {
-            axpy(gamma, z, u);
-        }
-        axpy(gamma, &sweep.trace, &mut self.trace);
-    }
-}
-
 /// Numbers that a body adds to the message of a sweep: decrement, strain, potential, failed, skipped,
-/// factorisations, inner iterations.
-const SCALARS: usize = 7;
+/// factorisations, inner iterations, and a product with another residual.
+const SCALARS: usize = 8;
 
 /// Result of a sweep at an iterate: G z = r in every body.
 #[derive(Debug, Clone, Default)]
 pub struct Sweep {
-    /// z of each body; empty where the body lives on another rank.
-    pub corrections: Vec<Vec<f64>>,
-    /// B z of all contact rows.
-    pub trace: Vec<f64>,
+    /// r of each body that lives here.
+    pub residual: Vec<Vec<f64>>,
+    /// z.
+    pub correction: Field,
     /// r'z = r'G^-1 r of each body.
     pub decrement: Vec<f64>,
     /// Energies of the iterate in each body.
@@ -46,8 +28,16 @@ pub struct Sweep {
     pub factorizations: usize,
     /// Krylov iterations so far, all bodies.
     pub inner_iterations: usize,
+    /// y'z for another residual y, if one was given.
+    pub product: f64,
     /// Whether each body was open: no pressure and no Robin term.
     open: Vec<bool>,
+}
+
+/// Whether r = s r0 to rounding of r0.
+fn is_multiple(r: &[f64], s: f64, r0: &[f64]) -> bool {
+    let difference: f64 = r.iter().zip(r0).map(|(r, r0)| (r - s * r0).powi(2)).sum();
+    difference <= 1e-16 * dot(r, r)
 }
 
 /// Does sweeps and remembers what need not be done again.
@@ -61,20 +51,67 @@ pub struct Sweeper {
 
 impl Sweeper {
     /// Solves G_s z_s = r_s in every body, at `iterate` with its `layer` and the Robin term that the model carries
-    /// (`weight` = omega psi kappa at the points).
+    /// (`weight` = omega psi kappa of the contact rows).
     ///
     /// A body without pressure and Robin term now and in the `last` sweep (which led here with relaxation gamma) has
-    /// r = (1 - gamma) r_last and the same G: its z is known and nothing is solved.
+    /// r = (1 - gamma) r_last and the same G: its z is known and nothing is solved, as long as rounding is far below r.
     ///
     /// # Errors
     /// Failures of the solver library.
     pub fn sweep(
         &mut self,
         model: &mut Model,
-        iterate: &Iterate,
+        iterate: &Field,
         layer: &Layer,
         weight: &[f64],
         last: Option<(&Sweep, f64)>,
+    ) -> Result<Sweep> {
+        let mut energies = Vec::new();
+        let mut open = Vec::new();
+        let mut residual = Vec::new();
+        for index in 0..model.bodies.len() {
+            let force = model.at_rows(index, &layer.force);
+            let springs = model.of_body(index, weight);
+            open.push(force.iter().chain(&springs).all(|&value| value == 0.0));
+            let mut r = vec![0.0; iterate.states[index].len()];
+            energies.push(match &mut model.bodies[index].local {
+                Some(body) => body.residual(&iterate.states[index], &force, &mut r),
+                None => Energy::default(),
+            });
+            residual.push(r);
+        }
+        let known = |index: usize| {
+            let (last, gamma) = last?;
+            let same =
+                open[index] && last.open[index] && is_multiple(&residual[index], 1.0 - gamma, &last.residual[index]);
+            same.then(|| {
+                let mut z = vec![0.0; iterate.states[index].len()];
+                axpy(1.0 - gamma, &last.correction.states[index], &mut z);
+                z
+            })
+        };
+        let known: Vec<_> = (0..model.bodies.len()).map(known).collect();
+        let mut sweep = self.solve(model, residual, known, energies, None)?;
+        sweep.open = open;
+        Ok(sweep)
+    }
+
+    /// G^-1 r for any r (consumed into the result): a sweep as preconditioner. `product` of the result is `other`'z.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn precondition(&mut self, model: &mut Model, residual: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Result<Sweep> {
+        let bodies = model.bodies.len();
+        self.solve(model, residual, vec![None; bodies], vec![Energy::default(); bodies], Some(other))
+    }
+
+    fn solve(
+        &mut self,
+        model: &mut Model,
+        residual: Vec<Vec<f64>>,
+        mut known: Vec<Option<Vec<f64>>>,
+        energies: Vec<Energy>,
+        other: Option<&[Vec<f64>]>,
     ) -> Result<Sweep> {
         let (bodies, rows) = (model.bodies.len(), 2 * model.points());
         // one message: traces, then SCALARS of each body
@@ -82,40 +119,40 @@ impl Sweeper {
         let mut sweep = Sweep::default();
         let mut reasons = vec![String::new(); bodies];
         for index in 0..bodies {
-            let force = model.at_rows(index, &layer.force);
-            let springs = model.at_rows(index, weight);
-            let open = force.iter().chain(&springs).all(|&value| value == 0.0);
-            sweep.open.push(open);
             let Some(body) = &mut model.bodies[index].local else {
-                sweep.corrections.push(Vec::new());
+                sweep.correction.states.push(Vec::new());
                 continue;
             };
-            let u = &iterate.states[index];
-            let mut r = vec![0.0; u.len()];
-            let energy = body.residual(u, &force, &mut r);
-            let mut z = vec![0.0; u.len()];
-            let known = last.filter(|(last, _)| open && last.open[index]);
+            let r = &residual[index];
             let scalars = &mut buffer[rows + SCALARS * index..rows + SCALARS * (index + 1)];
-            if let Some((last, gamma)) = known {
-                axpy(1.0 - gamma, &last.corrections[index], &mut z);
-                scalars[4] = 1.0;
-            } else {
-                let Solved { failure, .. } = body.solve(&r, &mut z)?;
-                if let Some(reason) = failure {
-                    reasons[index] = reason;
-                    scalars[3] = 1.0;
+            let z = match known[index].take() {
+                Some(z) => {
+                    scalars[4] = 1.0;
+                    z
                 }
-            }
-            scalars[0] = dot(&r, &z);
-            scalars[1] = energy.strain;
-            scalars[2] = energy.potential;
+                None => {
+                    let mut z = vec![0.0; r.len()];
+                    let Solved { failure, .. } = body.solve(r, &mut z)?;
+                    if let Some(reason) = failure {
+                        reasons[index] = reason;
+                        scalars[3] = 1.0;
+                    }
+                    z
+                }
+            };
+            scalars[0] = dot(r, &z);
+            scalars[1] = energies[index].strain;
+            scalars[2] = energies[index].potential;
             let counts = body.counts();
             scalars[5] = counts.factorizations as f64;
             scalars[6] = counts.inner_iterations as f64;
-            let mut trace = vec![0.0; force.len()];
-            body.trace(&z, &mut trace);
+            scalars[7] = other.map_or(0.0, |other| dot(&other[index], &z));
+            let mut trace = vec![0.0; model.bodies[index].row_stiffness.len()];
+            if let Some(body) = &model.bodies[index].local {
+                body.trace(&z, &mut trace);
+            }
             model.put(index, &trace, &mut buffer[..rows]);
-            sweep.corrections.push(z);
+            sweep.correction.states.push(z);
         }
         model.exchange.sum(&mut buffer);
         for (index, scalars) in buffer[rows..].chunks_exact(SCALARS).enumerate() {
@@ -127,9 +164,11 @@ impl Sweeper {
             self.solves_skipped += usize::from(scalars[4] != 0.0);
             sweep.factorizations += scalars[5] as usize;
             sweep.inner_iterations += scalars[6] as usize;
+            sweep.product += scalars[7];
         }
         buffer.truncate(rows);
-        sweep.trace = buffer;
+        sweep.correction.trace = buffer;
+        sweep.residual = residual;
         self.sweeps += 1;
         Ok(sweep)
     }

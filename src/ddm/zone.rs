@@ -28,7 +28,8 @@ impl RobinZone {
         for pair in 0..model.pairs.len() {
             for q in model.range(pair) {
                 if inside(pair, q) {
-                    weight[q] = model.weight[q] * layer.tangent[q];
+                    let law = &model.pairs[pair].law;
+                    weight[q] = model.weight[q] * law.robin_tangent(q - model.offset[pair], layer.compression[q]);
                 }
             }
         }

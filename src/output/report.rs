@@ -19,10 +19,12 @@ pub struct Report {
     /// Title of the scene.
     pub title: String,
     /// How the run ended: `converged`, `attainable`, `iteration-limit`, `not-finite`, `cycle`, `unheld`,
-    /// `inner-solver`.
+    /// `unbounded`, `inner-solver`.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
     pub message: String,
+    /// Method that made the last step: `robin`, `ncg`, `anderson`, `newton-robin`, `newton`.
+    pub method: String,
     /// Updates of the iterate.
     pub iterations: usize,
     /// Times that every body was solved.
@@ -47,6 +49,10 @@ pub struct Report {
     pub messages: usize,
     /// Relative residual of the result.
     pub residual: Option<f64>,
+    /// Estimate of the relative error of the iteration in the energy norm.
+    pub error_estimate: Option<f64>,
+    /// Estimated bounds of the spectrum of G^-1 F1''.
+    pub spectrum: Option<[f64; 2]>,
     /// Relative increment of the last update, the largest of the bodies.
     pub increment: Option<f64>,
     /// Functional F1 (25).
@@ -108,7 +114,7 @@ pub struct PairReport {
     pub peak_at: [f64; 3],
     /// Length (area) with c > 0.
     pub contact_length: f64,
-    /// Length (area) that is covered by both surfaces and open.
+    /// Length (area) that is covered by both surfaces and has c < 0.
     pub open_length: f64,
     /// Plane problems: where contact begins or ends, c = 0 between two points, interpolated linearly.
     pub contact_ends: Vec<[f64; 3]>,
@@ -120,29 +126,37 @@ impl Report {
         let mut lines = vec![format!("{}: {}", self.title, self.message)];
         let number = |value: Option<f64>| sci(value.unwrap_or(f64::NAN), 2);
         lines.push(format!(
-            "  {} iterations, {} sweeps, {} factorizations, residual {}, increment {}, {} dofs, {} s",
+            "  {}: {} iterations, {} sweeps, {} factorizations, residual {}, estimated error {}, {} dofs, {} s",
+            self.method,
             self.iterations,
             self.sweeps,
             self.factorizations,
             number(self.residual),
-            number(self.increment),
+            number(self.error_estimate),
             self.dofs,
             seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
         ));
         for pair in &self.pairs {
-            lines.push(format!(
-                "  {} - {}: peak pressure {:.6} at ({:.4}, {:.4}, {:.4}), contact {:.6}, open {:.6}",
-                pair.bodies[0],
-                pair.bodies[1],
-                pair.peak_pressure,
-                pair.peak_at[0],
-                pair.peak_at[1],
-                pair.peak_at[2],
-                pair.contact_length,
-                pair.open_length,
-            ));
+            let names = format!("  {} - {}", pair.bodies[0], pair.bodies[1]);
+            lines.push(if pair.peak_pressure > 0.0 {
+                let [x, y, z] = pair.peak_at.map(|x| readable(x, 4));
+                format!(
+                    "{names}: peak pressure {} at ({x}, {y}, {z}), contact {}, open {}",
+                    readable(pair.peak_pressure, 6),
+                    readable(pair.contact_length, 6),
+                    readable(pair.open_length, 6)
+                )
+            } else {
+                format!("{names}: no contact")
+            });
         }
         lines.extend(self.warnings.iter().map(|warning| format!("  warning: {warning}")));
         lines.join("\n")
     }
+}
+
+/// A number with `digits` after the point, or with an exponent where that would not show it.
+fn readable(value: f64, digits: usize) -> String {
+    let size = value.abs();
+    if value == 0.0 || (1e-3..1e6).contains(&size) { format!("{value:.digits$}") } else { sci(value, digits) }
 }

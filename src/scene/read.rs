@@ -135,6 +135,11 @@ impl Node {
         Error::scene(&self.place, message)
     }
 
+    /// Whether it is a table with this key.
+    pub fn holds(&self, key: &str) -> bool {
+        matches!(&self.value, Value::Table(entries) if entries.iter().any(|entry| entry.key == key))
+    }
+
     pub fn string(&self) -> Result<&str> {
         match &self.value {
             Value::String(text) => Ok(text),

@@ -2,8 +2,8 @@
 
 use super::expression::Field;
 use super::{
-    BodySpec, ContactSpec, LayerSpec, LoadKind, MeshSource, MethodSpec, Order, Plane, Preset, Scene, SolverSpec, Start,
-    StopSpec, Zone,
+    BodySpec, ContactSpec, Gamma, LayerSpec, LoadKind, MeshSource, MethodName, MethodSpec, Order, Plane, Preset,
+    RobinSpec, Scene, SolverSpec, Start, StopSpec, Zone,
 };
 use serde_json::{Map, Value, json};
 
@@ -116,6 +116,7 @@ fn method(method: &MethodSpec) -> Value {
         Zone::Subset(condition) => json!(condition.text()),
     };
     let start = match &method.start {
+        Start::Auto => json!("auto"),
         Start::Zero => json!("zero"),
         Start::Normal(normal) => json!({ "normal": field(normal) }),
     };
@@ -124,7 +125,26 @@ fn method(method: &MethodSpec) -> Value {
     insert(&mut stop, "residual", residual.map(|value| json!(value)));
     insert(&mut stop, "increment", increment.map(|value| json!(value)));
     stop.insert("iterations".into(), json!(iterations));
-    json!({ "psi": psi, "gamma": method.gamma, "start": start, "stop": stop })
+    let gamma = match &method.gamma {
+        Gamma::Stationary(gamma) => json!(gamma),
+        Gamma::Schedule(list) => json!(list),
+        rule => json!(Gamma::NAMED.iter().find(|(_, named)| named == rule).map(|(name, _)| name)),
+    };
+    let robin = match method.robin {
+        RobinSpec::Tangent => json!("tangent"),
+        RobinSpec::Frozen => json!("frozen"),
+        RobinSpec::Floor(floor) => json!({ "floor": floor }),
+        RobinSpec::Auto => json!("auto"),
+    };
+    let name = MethodName::ALL.iter().find(|(_, named)| *named == method.name).map(|(name, _)| name);
+    let mut map = json!({ "name": name, "psi": psi, "robin": robin, "start": start, "stop": stop });
+    if method.name == MethodName::Robin {
+        map["gamma"] = gamma;
+    }
+    if method.name == MethodName::Anderson {
+        map["depth"] = json!(method.depth);
+    }
+    map
 }
 
 fn solver(solver: &SolverSpec) -> Value {

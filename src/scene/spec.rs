@@ -146,14 +146,90 @@ pub enum LayerSpec {
 /// The outer iteration.
 #[derive(Debug, Clone)]
 pub struct MethodSpec {
+    /// How steps are made. Without a name it is [`MethodName::Robin`] where psi, gamma, robin or the increment rule are given,
+    /// else [`MethodName::Auto`].
+    pub name: MethodName,
     /// Robin zone psi.
     pub psi: Zone,
-    /// Stationary relaxation gamma > 0.
-    pub gamma: f64,
+    /// Robin coefficient on the zone.
+    pub robin: RobinSpec,
+    /// Relaxation of the method `robin`.
+    pub gamma: Gamma,
+    /// Earlier steps that the method `anderson` mixes.
+    pub depth: usize,
     /// Start of the iteration.
     pub start: Start,
     /// When to stop.
     pub stop: StopSpec,
+}
+
+/// Methods by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MethodName {
+    /// The program's choice, and its change when progress stops.
+    Auto,
+    /// The paper's iteration (41)-(42).
+    Robin,
+    /// Nonlinear conjugate gradients over the sweep.
+    Ncg,
+    /// Anderson acceleration of the sweep.
+    Anderson,
+    /// Semismooth Newton (35), its systems by conjugate gradients over the sweep.
+    NewtonRobin,
+    /// Semismooth Newton (35), its systems by one factorisation of all bodies together.
+    Newton,
+}
+
+impl MethodName {
+    /// Every method with its name in the scene.
+    pub const ALL: [(&'static str, MethodName); 6] = [
+        ("auto", MethodName::Auto),
+        ("robin", MethodName::Robin),
+        ("ncg", MethodName::Ncg),
+        ("anderson", MethodName::Anderson),
+        ("newton-robin", MethodName::NewtonRobin),
+        ("newton", MethodName::Newton),
+    ];
+}
+
+/// Relaxation gamma^k.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Gamma {
+    /// The same number > 0 all the way.
+    Stationary(f64),
+    /// Numbers > 0 for k = 0, 1, ...; the last one stays.
+    Schedule(Vec<f64>),
+    /// Exact line search on F1.
+    LineSearch,
+    /// Aitken's rule.
+    Aitken,
+    /// The rule of Barzilai and Borwein.
+    BarzilaiBorwein,
+    /// Best stationary value for the estimated spectrum.
+    Spectral,
+}
+
+impl Gamma {
+    /// Rules with a name in the scene.
+    pub const NAMED: [(&'static str, Gamma); 4] = [
+        ("line-search", Gamma::LineSearch),
+        ("aitken", Gamma::Aitken),
+        ("barzilai-borwein", Gamma::BarzilaiBorwein),
+        ("spectral", Gamma::Spectral),
+    ];
+}
+
+/// Robin coefficient kappa on the zone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RobinSpec {
+    /// The layer's tangent, as in the paper.
+    Tangent,
+    /// The tangent of the start, all the way.
+    Frozen,
+    /// The tangent, but at least this number > 0 on the whole contact surfaces.
+    Floor(f64),
+    /// The tangent, and more where a body would not be held safely.
+    Auto,
 }
 
 /// Robin zone: where psi = 1 in (38).
@@ -172,6 +248,8 @@ pub enum Zone {
 /// Start of the iteration, given on the contact surfaces.
 #[derive(Debug, Clone)]
 pub enum Start {
+    /// Zero, and bodies that contact alone holds moved rigidly until the layers carry their loads.
+    Auto,
     /// Zero normal displacement.
     Zero,
     /// Outer normal displacement on every contact surface.
@@ -209,7 +287,15 @@ pub enum Preset {
 
 impl Default for MethodSpec {
     fn default() -> Self {
-        Self { psi: Zone::Active, gamma: 0.6, start: Start::Zero, stop: StopSpec::default() }
+        Self {
+            name: MethodName::Auto,
+            psi: Zone::Active,
+            robin: RobinSpec::Auto,
+            gamma: Gamma::Stationary(0.6),
+            depth: 5,
+            start: Start::Auto,
+            stop: StopSpec::default(),
+        }
     }
 }
 

@@ -5,12 +5,14 @@
 
 pub mod dense;
 pub mod krylov;
+pub mod monolithic;
 pub mod options;
 pub mod preset;
 mod sparse;
 
 pub use dense::Dense;
 pub use krylov::Krylov;
+pub use monolithic::{Monolithic, Union};
 pub use sparse::SparseBody;
 
 use crate::ddm::Solved;

@@ -97,6 +97,10 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         self.rows.multiply(u, t);
     }
 
+    fn add_rows(&self, rows: &[f64], y: &mut [f64]) {
+        self.rows.add_transpose(1.0, rows, y);
+    }
+
     fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
         self.body.stiffness.multiply(u, &mut self.product);
         for i in 0..r.len() {

@@ -31,6 +31,12 @@ pub trait LayerLaw: std::fmt::Debug {
     fn response(&self, point: usize, c: f64) -> Response {
         if c <= 0.0 { Response::default() } else { self.compressed(point, c) }
     }
+
+    /// g'(-c) of (38): the tangent of the paper's law g, which also runs through tension as an odd function. For `c > 0` it is
+    /// p'(c). Robin terms of open points use it; pressure never does.
+    fn robin_tangent(&self, point: usize, c: f64) -> f64 {
+        self.response(point, c.abs()).tangent
+    }
 }
 
 /// The law that a scene asks for.

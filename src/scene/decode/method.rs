@@ -4,17 +4,29 @@ use super::{Decoder, choose};
 use crate::error::{Result, nearest};
 use crate::scene::expression::Field;
 use crate::scene::read::{Keys, Node, Value};
-use crate::scene::{MethodSpec, Start, StopSpec, Zone};
+use crate::scene::{Gamma, MethodName, MethodSpec, RobinSpec, Start, StopSpec, Zone};
 
 impl Decoder<'_> {
     /// The method, defaults where nothing is said.
     pub(super) fn method(&self, node: Option<&Node>) -> Result<MethodSpec> {
         let default = MethodSpec::default();
         let Some(node) = node else { return Ok(default) };
-        let keys = Keys::open(node, "[method]", &["psi", "gamma", "start", "stop"])?;
+        let keys = Keys::open(node, "[method]", &["name", "psi", "gamma", "robin", "depth", "start", "stop"])?;
+        let name = match keys.get("name") {
+            Some(name) => choose(name, "method", &MethodName::ALL)?,
+            None => {
+                let says = |key: &str| keys.get(key).is_some();
+                let rule = keys.get("stop").is_some_and(|stop| stop.holds("increment"));
+                if says("psi") || says("gamma") || says("robin") || rule { MethodName::Robin } else { default.name }
+            }
+        };
+        let usual = if name == MethodName::Robin { RobinSpec::Tangent } else { default.robin };
         Ok(MethodSpec {
+            name,
             psi: keys.get("psi").map_or(Ok(default.psi), |psi| self.zone(psi))?,
-            gamma: keys.get("gamma").map_or(Ok(default.gamma), |gamma| gamma.positive("gamma"))?,
+            robin: keys.get("robin").map_or(Ok(usual), robin)?,
+            gamma: keys.get("gamma").map_or(Ok(default.gamma), gamma)?,
+            depth: keys.get("depth").map_or(Ok(default.depth), depth)?,
             start: keys.get("start").map_or(Ok(default.start), |start| self.start(start))?,
             stop: keys.get("stop").map_or(Ok(default.stop), stop)?,
         })
@@ -42,11 +54,40 @@ impl Decoder<'_> {
 
     fn start(&self, node: &Node) -> Result<Start> {
         if let Value::String(_) = node.value {
-            return choose(node, "start", &[("zero", Start::Zero)])
-                .map_err(|error| error.help("it is \"zero\" or { normal = 1e-4 }"));
+            return choose(node, "start", &[("auto", Start::Auto), ("zero", Start::Zero)])
+                .map_err(|error| error.help("it is \"auto\", \"zero\" or { normal = 1e-4 }"));
         }
         let keys = Keys::open(node, "the start", &["normal"])?;
         Ok(Start::Normal(self.field(keys.require("normal")?)?))
+    }
+}
+
+fn gamma(node: &Node) -> Result<Gamma> {
+    match &node.value {
+        Value::String(_) => choose(node, "rule for gamma", &Gamma::NAMED),
+        Value::List(items) if items.is_empty() => {
+            Err(node.refuse("gamma has no value").help("write a number, a list of numbers, or the name of a rule"))
+        }
+        Value::List(items) => {
+            items.iter().map(|item| item.positive("gamma")).collect::<Result<_>>().map(Gamma::Schedule)
+        }
+        _ => node.positive("gamma").map(Gamma::Stationary),
+    }
+}
+
+fn robin(node: &Node) -> Result<RobinSpec> {
+    if let Value::String(_) = node.value {
+        let words = [("tangent", RobinSpec::Tangent), ("frozen", RobinSpec::Frozen), ("auto", RobinSpec::Auto)];
+        return choose(node, "Robin coefficient", &words);
+    }
+    let keys = Keys::open(node, "the Robin coefficient", &["floor"])?;
+    keys.require("floor")?.positive("the floor").map(RobinSpec::Floor)
+}
+
+fn depth(node: &Node) -> Result<usize> {
+    match usize::try_from(node.whole()?) {
+        Ok(depth) if (1..=50).contains(&depth) => Ok(depth),
+        _ => Err(node.refuse("the depth must lie between 1 and 50")),
     }
 }
 

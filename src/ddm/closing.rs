@@ -1,0 +1,91 @@
+//! The automatic start: bodies that contact alone holds are pushed, rigidly, until the layers carry their loads.
+
+use super::layer::Layer;
+use super::model::Model;
+use crate::linalg::{axpy, dot};
+use nalgebra::{DMatrix, DVector};
+
+/// Newton steps of the small problem.
+const STEPS: usize = 200;
+
+/// The trace of the rigid displacements that minimise F1 over the motions that supports leave free: no body is solved.
+/// Zero where supports hold everything or where nothing balances the loads.
+pub fn rigid_closing(model: &Model) -> Vec<f64> {
+    let points = model.points();
+    let motions: Vec<(Vec<f64>, f64)> = (0..model.bodies.len())
+        .flat_map(|body| model.bodies[body].motions.iter().map(move |motion| (body, motion)))
+        .map(|(body, motion)| {
+            let mut trace = vec![0.0; 2 * points];
+            model.put(body, &motion.trace, &mut trace);
+            (trace, motion.work)
+        })
+        .collect();
+    let mut trace = vec![0.0; 2 * points];
+    if motions.is_empty() || motions.iter().all(|(_, work)| *work == 0.0) {
+        return trace;
+    }
+    let closing = |trace: &[f64], q: usize| trace[q] + trace[points + q];
+    let soft = model.bodies.iter().map(|body| body.scale).fold(0.0, f64::max) * 1e-9;
+    let count = motions.len();
+    let load = motions.iter().map(|(_, work)| work.abs()).fold(0.0, f64::max);
+    for _ in 0..STEPS {
+        let layer = Layer::at(model, &trace);
+        if layer.force.iter().any(|force| !force.is_finite()) {
+            return vec![0.0; 2 * points];
+        }
+        let gradient = DVector::from_fn(count, |i, _| {
+            (0..points).map(|q| layer.force[q] * closing(&motions[i].0, q)).sum::<f64>() - motions[i].1
+        });
+        if gradient.amax() <= 1e-6 * load {
+            break;
+        }
+        let mut stiffness = DMatrix::from_fn(count, count, |i, j| {
+            let spring = |q: usize| model.weight[q] * layer.tangent[q];
+            (0..points).map(|q| spring(q) * closing(&motions[i].0, q) * closing(&motions[j].0, q)).sum::<f64>()
+        });
+        for i in 0..count {
+            stiffness[(i, i)] += soft;
+        }
+        let Some(factor) = stiffness.cholesky() else { break };
+        let step = factor.solve(&(-&gradient));
+        let mut direction = vec![0.0; 2 * points];
+        motions.iter().zip(step.iter()).for_each(|((motion, _), &s)| axpy(s, motion, &mut direction));
+        let work = dot(step.as_slice(), &motions.iter().map(|(_, work)| *work).collect::<Vec<_>>());
+        let slope = |t: f64| {
+            let mut moved = trace.clone();
+            axpy(t, &direction, &mut moved);
+            let layer = Layer::at(model, &moved);
+            let push: f64 = (0..points).map(|q| layer.force[q] * closing(&direction, q)).sum();
+            if push.is_nan() { f64::INFINITY } else { push - work }
+        };
+        match minimum(slope) {
+            Some(t) => axpy(t, &direction, &mut trace),
+            None => return vec![0.0; 2 * points],
+        }
+    }
+    trace
+}
+
+/// Zero of an increasing function that is negative at 0, roughly; `None` if there is none below 1e12.
+fn minimum(slope: impl Fn(f64) -> f64) -> Option<f64> {
+    let (mut low, mut high) = (0.0, 1.0);
+    while slope(high) < 0.0 {
+        low = high;
+        high *= 4.0;
+        if high > 1e12 {
+            return None;
+        }
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if slope(middle) < 0.0 {
+            low = middle
+        } else {
+            high = middle
+        }
+        if high - low <= 1e-3 * high {
+            break;
+        }
+    }
+    Some(high)
+}

@@ -1,0 +1,65 @@
+//! Vectors over all bodies: iterates, corrections, directions.
+
+use super::model::Model;
+use crate::linalg::{axpy, dot};
+
+/// A displacement of all bodies: states of the bodies that live here, traces of all.
+#[derive(Debug, Clone, Default)]
+pub struct Field {
+    /// State of each body; empty where the body lives on another rank.
+    pub states: Vec<Vec<f64>>,
+    /// B u of all contact rows (see [`super::model`] for the layout).
+    pub trace: Vec<f64>,
+}
+
+impl Field {
+    /// self += t other.
+    pub fn add(&mut self, t: f64, other: &Field) {
+        for (u, z) in self.states.iter_mut().zip(&other.states) {
+            axpy(t, z, u);
+        }
+        axpy(t, &other.trace, &mut self.trace);
+    }
+
+    /// self = other + t self.
+    pub fn add_to(&mut self, t: f64, other: &Field) {
+        let update = |mine: &mut [f64], other: &[f64]| {
+            mine.iter_mut().zip(other).for_each(|(mine, other)| *mine = other + t * *mine);
+        };
+        for (u, z) in self.states.iter_mut().zip(&other.states) {
+            update(u, z);
+        }
+        update(&mut self.trace, &other.trace);
+    }
+
+    /// The zero of the same shape.
+    pub fn zero_like(&self) -> Field {
+        Field {
+            states: self.states.iter().map(|state| vec![0.0; state.len()]).collect(),
+            trace: vec![0.0; self.trace.len()],
+        }
+    }
+
+    /// Change of compression at each point: B_a v_a + B_b v_b.
+    pub fn closing(&self) -> Vec<f64> {
+        let points = self.trace.len() / 2;
+        (0..points).map(|q| self.trace[q] + self.trace[points + q]).collect()
+    }
+}
+
+/// Sums over the bodies that live here of x_s'y_s; the caller exchanges.
+pub fn local_dot(x: &[Vec<f64>], y: &[Vec<f64>]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| dot(x, y)).sum()
+}
+
+/// K v in every body that lives here.
+pub fn apply_stiffness(model: &mut Model, v: &Field) -> Vec<Vec<f64>> {
+    let apply = |(slot, v): (&mut super::BodySlot, &Vec<f64>)| {
+        let mut y = vec![0.0; v.len()];
+        if let Some(body) = &mut slot.local {
+            body.apply_stiffness(v, &mut y);
+        }
+        y
+    };
+    model.bodies.iter_mut().zip(&v.states).map(apply).collect()
+}

@@ -1,0 +1,29 @@
+//! Aitken's rule.
+
+use super::{GammaRule, Here, LineSearch, Unbounded};
+use crate::linalg::dot;
+
+/// gamma^k = -gamma^{k-1} z^{k-1}.(z^k - z^{k-1}) / |z^k - z^{k-1}|^2 on the traces: the secant of the fixed point map.
+///
+/// A value that is not positive, or where contact changes the most, is replaced by the exact line search.
+#[derive(Debug, Default)]
+pub struct Aitken {
+    last: Option<(f64, Vec<f64>)>,
+}
+
+impl GammaRule for Aitken {
+    fn gamma(&mut self, here: &mut Here) -> Result<f64, Unbounded> {
+        let z = &here.sweep.correction.trace;
+        let secant = self.last.as_ref().map(|(gamma, before)| {
+            let change: Vec<f64> = z.iter().zip(before).map(|(z, before)| z - before).collect();
+            -gamma * dot(before, &change) / dot(&change, &change)
+        });
+        let trace = z.clone();
+        let gamma = match secant {
+            Some(gamma) if gamma > 0.0 && gamma < 10.0 => gamma,
+            _ => LineSearch.gamma(here)?,
+        };
+        self.last = Some((gamma, trace));
+        Ok(gamma)
+    }
+}

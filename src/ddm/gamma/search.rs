@@ -1,0 +1,14 @@
+//! Exact line search.
+
+use super::{GammaRule, Here, Unbounded};
+use crate::ddm::line::Line;
+
+/// gamma^k minimises F1 along the correction. F1 is convex, so every step descends.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct LineSearch;
+
+impl GammaRule for LineSearch {
+    fn gamma(&mut self, here: &mut Here) -> Result<f64, Unbounded> {
+        Line::new(here.model, here.layer, &here.sweep.residual, &here.sweep.correction).minimize(1e-6)
+    }
+}

@@ -1,0 +1,95 @@
+//! F1 along a line: exact line search on a convex function.
+
+use super::field::{Field, apply_stiffness, local_dot};
+use super::layer::Layer;
+use super::model::Model;
+
+/// The derivative of F1(u + t v): linear and quadratic terms of the bodies, laws of the layers at every point.
+pub struct Line<'a> {
+    model: &'a Model,
+    compression: &'a [f64],
+    closing: Vec<f64>,
+    /// (K u - f)'v.
+    slope: f64,
+    /// v'K v.
+    curvature: f64,
+}
+
+/// A line along which F1 falls for ever: something is not held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unbounded;
+
+impl<'a> Line<'a> {
+    /// The line from an iterate with `layer` and equilibrium residual `r` along `v`. One message.
+    pub fn new(model: &'a mut Model, layer: &'a Layer, r: &[Vec<f64>], v: &Field) -> Self {
+        let kv = apply_stiffness(model, v);
+        let mut sums = [local_dot(r, &v.states), local_dot(&kv, &v.states)];
+        model.exchange.sum(&mut sums);
+        let closing = v.closing();
+        let pushed: f64 = layer.force.iter().zip(&closing).map(|(force, s)| force * s).sum();
+        Self { model, compression: &layer.compression, closing, slope: -sums[0] - pushed, curvature: sums[1] }
+    }
+
+    /// d/dt F1(u + t v).
+    pub fn derivative(&self, t: f64) -> f64 {
+        let mut sum = self.slope + t * self.curvature;
+        for (i, pair) in self.model.pairs.iter().enumerate() {
+            for q in self.model.range(i) {
+                let s = self.closing[q];
+                if s != 0.0 {
+                    let c = self.compression[q] + t * s;
+                    sum += self.model.weight[q] * pair.law.response(q - self.model.offset[i], c).pressure * s;
+                }
+            }
+        }
+        // a law beyond the range of numbers pushes back
+        if sum.is_nan() { f64::INFINITY } else { sum }
+    }
+
+    /// The minimiser t >= 0 of F1 along the line, to `accuracy` relative to the derivative at 0; 0 if the line does not
+    /// descend.
+    ///
+    /// # Errors
+    /// [`Unbounded`] if F1 still falls at t = 1e18.
+    pub fn minimize(&self, accuracy: f64) -> Result<f64, Unbounded> {
+        let start = self.derivative(0.0);
+        if start >= 0.0 {
+            return Ok(0.0);
+        }
+        let target = accuracy * start.abs();
+        let (mut low, mut high) = ((0.0, start), (1.0, self.derivative(1.0)));
+        while high.1 < -target {
+            if high.0 > 1e18 {
+                return Err(Unbounded);
+            }
+            low = high;
+            high.0 *= 4.0;
+            high.1 = self.derivative(high.0);
+        }
+        // Illinois variant of the secant rule, bisection where a law is too steep for it
+        let (mut weight_low, mut weight_high) = (low.1, high.1);
+        for _ in 0..200 {
+            if high.1 <= target {
+                return Ok(high.0);
+            }
+            let secant = (low.0 * weight_high - high.0 * weight_low) / (weight_high - weight_low);
+            let middle = 0.5 * (low.0 + high.0);
+            let steep = !high.1.is_finite() || high.1 > 1e3 * low.1.abs();
+            let t = if steep || !(secant > low.0 && secant < high.0) { middle } else { secant };
+            let value = self.derivative(t);
+            if value.abs() <= target || high.0 - low.0 <= 1e-15 * high.0 {
+                return Ok(t);
+            }
+            if value < 0.0 {
+                low = (t, value);
+                weight_low = value;
+                weight_high *= 0.5;
+            } else {
+                high = (t, value);
+                weight_high = value;
+                weight_low *= 0.5;
+            }
+        }
+        Ok(low.0)
+    }
+}

@@ -1,0 +1,47 @@
+//! Nonlinear conjugate gradients, preconditioned by the Robin sweep.
+
+use super::{Here, Method, Step};
+use crate::ddm::field::{Field, local_dot};
+use crate::ddm::line::Line;
+use crate::error::Result;
+
+/// Polak and Ribière's rule with exact line search on F1, restarted when the contact set changes.
+#[derive(Default)]
+pub struct Conjugate {
+    last: Option<Last>,
+}
+
+struct Last {
+    direction: Field,
+    residual: Vec<Vec<f64>>,
+    decrement: f64,
+    closed: Vec<bool>,
+}
+
+impl Method for Conjugate {
+    fn name(&self) -> &'static str {
+        "ncg"
+    }
+
+    fn step(&mut self, here: &mut Here) -> Result<Step> {
+        let closed: Vec<bool> = here.layer.compression.iter().map(|&c| c > 0.0).collect();
+        let z = &here.sweep.correction;
+        let mut direction = z.clone();
+        if let Some(last) = self.last.take().filter(|last| last.closed == closed) {
+            let mut products =
+                [local_dot(&last.residual, &z.states), local_dot(&here.sweep.residual, &last.direction.states)];
+            here.model.exchange.sum(&mut products);
+            let beta = ((here.decrement() - products[0]) / last.decrement).max(0.0);
+            // a direction that does not descend is not conjugate any more
+            if here.decrement() + beta * products[1] > 0.0 {
+                direction = last.direction;
+                direction.add_to(beta, z);
+            }
+        }
+        let line = Line::new(here.model, here.layer, &here.sweep.residual, &direction);
+        let Ok(length) = line.minimize(1e-8) else { return Ok(Step::Unbounded) };
+        let residual = here.sweep.residual.clone();
+        self.last = Some(Last { direction: direction.clone(), residual, decrement: here.decrement(), closed });
+        Ok(Step::Along(direction, length))
+    }
+}

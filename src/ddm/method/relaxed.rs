@@ -1,0 +1,50 @@
+//! The paper's iteration: u <- u + gamma z.
+
+use super::{Here, Method, Step};
+use crate::ddm::gamma::GammaRule;
+use crate::error::Result;
+
+/// The relaxed Robin-Robin iteration (41)-(42) with any rule for gamma.
+pub struct Relaxed {
+    rule: Box<dyn GammaRule>,
+    /// Norm of the last correction and the gamma that followed it.
+    last: Option<(f64, f64)>,
+    amplification: f64,
+}
+
+impl Relaxed {
+    /// With this rule.
+    pub fn new(rule: Box<dyn GammaRule>) -> Self {
+        Self { rule, last: None, amplification: f64::NAN }
+    }
+}
+
+impl Method for Relaxed {
+    fn name(&self) -> &'static str {
+        "robin"
+    }
+
+    fn step(&mut self, here: &mut Here) -> Result<Step> {
+        let size = here.decrement().sqrt();
+        // the slowest mode survives: its factor 1 - gamma lambda_min shows in the decrease of the corrections
+        if let Some((before, gamma)) = self.last {
+            let factor = size / before;
+            self.amplification = if factor < 1.0 { (gamma / (1.0 - factor)).max(1.0) } else { f64::NAN };
+        }
+        Ok(match self.rule.gamma(here) {
+            Ok(gamma) => {
+                self.last = Some((size, gamma));
+                Step::Sweep(gamma)
+            }
+            Err(_) => Step::Unbounded,
+        })
+    }
+
+    fn amplification(&self) -> f64 {
+        self.rule.spectrum().map_or(self.amplification, |(low, _)| low.recip().max(1.0))
+    }
+
+    fn spectrum(&self) -> Option<(f64, f64)> {
+        self.rule.spectrum()
+    }
+}

@@ -1,0 +1,82 @@
+//! The Robin coefficient: what stands in diag(omega psi kappa) of G.
+//!
+//! Any symmetric positive definite G leads to the same solution; it decides how fast. Weights are kept for each contact row,
+//! in the layout of a trace vector, because the two bodies of a pair may need different ones.
+
+use super::held;
+use super::layer::Layer;
+use super::model::Model;
+use super::zone::RobinZone;
+
+/// Rule for the Robin coefficient kappa on the zone.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RobinRule {
+    /// kappa = p'(c^k), as in the paper.
+    Tangent,
+    /// That of the start all the way, made safe as in `Auto`: one factorisation a run (Theorem 3 allows it).
+    Frozen,
+    /// kappa = max(p'(c^k), floor) everywhere on the contact surfaces.
+    Floor(f64),
+    /// The tangent on the zone, and enough more for a body that it does not hold safely.
+    Auto,
+}
+
+/// The rule with what it remembers.
+#[derive(Debug)]
+pub struct Robin {
+    rule: RobinRule,
+    frozen: Option<Vec<f64>>,
+}
+
+impl Robin {
+    /// Starts with nothing remembered.
+    pub fn new(rule: RobinRule) -> Self {
+        Self { rule, frozen: None }
+    }
+
+    /// omega psi kappa of every contact row in iteration `k`.
+    pub fn weight(&mut self, model: &Model, zone: &RobinZone, layer: &Layer, k: usize) -> Vec<f64> {
+        let tangent = || {
+            let points = zone.robin_weight(model, layer, k);
+            [&points[..], &points[..]].concat()
+        };
+        match &self.rule {
+            RobinRule::Tangent => tangent(),
+            RobinRule::Frozen => self.frozen.get_or_insert_with(|| held_safely(model, tangent())).clone(),
+            RobinRule::Floor(floor) => {
+                let mut weight = tangent();
+                let points = model.points();
+                for (q, weight) in weight.iter_mut().enumerate() {
+                    *weight = weight.max(floor * model.weight[q % points]);
+                }
+                weight
+            }
+            RobinRule::Auto => held_safely(model, tangent()),
+        }
+    }
+}
+
+/// The weights, with more for every body that they do not hold safely.
+fn held_safely(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
+    for body in 0..model.bodies.len() {
+        if held::weak_motion(model, body, &weight, WEAK).is_some() {
+            hold(model, body, &mut weight);
+        }
+    }
+    weight
+}
+
+/// A motion held by less than this share of what [`hold`] gives is not held safely.
+const WEAK: f64 = 1e-3;
+
+/// Gives every contact row of a body at least the stiffness of the body's own surface as a whole.
+fn hold(model: &Model, body: usize, weight: &mut [f64]) {
+    let springs = held::natural_springs(model, body);
+    let mut next = 0;
+    for range in model.trace_ranges(body).collect::<Vec<_>>() {
+        for i in range {
+            weight[i] = weight[i].max(springs[next]);
+            next += 1;
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Mesh groups by name, and refusals that point into the scene.
+
+use crate::error::{Error, Kind, Located, Result};
+use crate::mesh::{Group, Mesh};
+use crate::scene::expression::Field;
+
+/// A mesh group by name, of one of the dimensions in order of preference.
+pub fn find_group<'m, const D: usize>(
+    mesh: &'m Mesh<D>,
+    name: &Located<String>,
+    dimensions: &[usize],
+    what: &str,
+) -> Result<&'m Group> {
+    let of = |dimension: usize| mesh.groups.iter().filter(move |group| group.dimension == dimension);
+    if let Some(group) = dimensions.iter().find_map(|&d| of(d).find(|group| group.name == name.value)) {
+        return Ok(group);
+    }
+    let known: Vec<&str> = dimensions.iter().flat_map(|&d| of(d)).map(|group| group.name.as_str()).collect();
+    let kind = |dimension: usize| match (D - dimension, dimension) {
+        (0, _) => "region",
+        (1, 1) => "curve",
+        (1, _) => "surface",
+        (_, 0) => "point group",
+        _ => "curve",
+    };
+    let error =
+        Error::scene(&name.place, format!("the mesh has no {} `{}` for this {what}", kind(dimensions[0]), name.value))
+            .because(format!("mesh {}", mesh.path.display()));
+    if let Some(other) = mesh.groups.iter().find(|group| group.name == name.value) {
+        return Err(error.help(format!("`{}` is a {} there", name.value, kind(other.dimension))));
+    }
+    Err(match crate::error::nearest(&name.value, known.iter().copied()) {
+        Some(near) => error.help(format!("did you mean `{near}`?")),
+        None => error.help(format!("physical groups of that kind: {}", known.join(", "))),
+    })
+}
+
+/// The refusal of a support or load on another body's group.
+pub fn not_on_body(on: &Located<String>, body: &str) -> Error {
+    Error::scene(&on.place, format!("`{}` does not touch body `{body}`", on.value))
+        .help("a support or load acts on a physical group of its own body")
+}
+
+/// A refusal that points at an expression of the scene.
+pub fn placed(field: &Field, message: String) -> Error {
+    let error =
+        Error::new(Kind::Scene, message).help("mind roots of negative numbers and divisions by zero in the expression");
+    match field.place() {
+        Some(place) => error.at(place),
+        None => error,
+    }
+}
+
+/// A point as text.
+pub fn point(x: [f64; 3]) -> String {
+    format!("({}, {}, {})", x[0], x[1], x[2])
+}
