@@ -22,6 +22,7 @@ const FUNCTIONS: &[&str] = &[
     "KSPSetFromOptions",
     "KSPSetOperators",
     "KSPSetOptionsPrefix",
+    "KSPGetReusePreconditioner",
     "KSPSetReusePreconditioner",
     "KSPSetTolerances",
     "KSPSetUp",

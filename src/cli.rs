@@ -79,6 +79,13 @@ pub fn run(words: Vec<String>) -> i32 {
     let mut words = words.into_iter();
     let name = words.next().unwrap_or_else(|| "winkler".to_owned());
     let (program, petsc) = options::split(words);
+    if let Some(flag) = ["-set", "-json", "-method", "-over"].iter().find(|flag| petsc.iter().any(|word| word == *flag))
+    {
+        let error = Error::new(Kind::Usage, format!("PETSc knows no option {flag}"));
+        return complain(&error.help(format!("did you mean -{flag}?")));
+    }
+    let bare_help = program.is_empty() && petsc.iter().any(|word| word == "-help");
+    let program = if bare_help { vec!["--help".to_owned()] } else { program };
     let cli = match Cli::try_parse_from(std::iter::once(name).chain(program)) {
         Ok(cli) => cli,
         Err(refusal) => {

@@ -152,10 +152,16 @@ pub fn discretize<const D: usize>(
         });
         slots.push(slot);
     }
-    let mut scales: Vec<f64> = slots.iter().map(|slot| slot.scale).collect();
-    exchange.sum(&mut scales);
-    slots.iter_mut().zip(scales).for_each(|(slot, scale)| slot.scale = scale);
     Ok(Problem { model: Model::new(slots, pairs, exchange), bodies: infos, swapped, kept, assemblies })
+}
+
+impl Problem {
+    /// Tells every rank what only the owner of a body knows of it. Collective, after all ranks have made their problem.
+    pub fn share(&mut self) {
+        let mut scales: Vec<f64> = self.model.bodies.iter().map(|slot| slot.scale).collect();
+        self.model.exchange.sum(&mut scales);
+        self.model.bodies.iter_mut().zip(scales).for_each(|(slot, scale)| slot.scale = scale);
+    }
 }
 
 /// psi of the scene for the method.

@@ -1,7 +1,7 @@
 //! Compressed sparse rows with the few operations that the method needs.
 //!
 //! Dense algebra comes from `nalgebra`. The sparse type is our own because its index type must be PETSc's
-//! 32-bit integer, so that the arrays of a stiffness matrix are shared and never copied.
+//! 32-bit integer, so that a pattern goes to PETSc as it is.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 

@@ -3,7 +3,7 @@
 use super::run::{self, Clock, Prepared};
 use super::{load, report};
 use crate::error::Result;
-use crate::output::sci;
+use crate::output::{say, sci};
 use crate::petsc::Session;
 use serde_json::json;
 use std::path::PathBuf;
@@ -18,11 +18,12 @@ pub fn check(session: &Session, path: PathBuf, overrides: Vec<String>, as_json: 
     let scene = load(session, &path, &overrides)?;
     let prepared = run::prepare(session, &scene, &mut clock)?;
     clock.total();
+    let shared = report::Shared::gather(&prepared);
     if session.rank() != 0 {
         return Ok(0);
     }
     if as_json {
-        let mut value = json!(report::headline(session, &scene, &prepared, &clock));
+        let mut value = json!(report::headline(session, &scene, &prepared, &shared.solvers, &clock));
         value["status"] = json!("checked");
         value["message"] = json!(prepared.choice);
         for (info, body) in prepared.problem.bodies.iter().zip(0..) {
@@ -31,9 +32,9 @@ pub fn check(session: &Session, path: PathBuf, overrides: Vec<String>, as_json: 
             value["bodies"][body]["rigid_motions_unheld"] = json!(info.left_by_all);
         }
         value["pairs"] = pairs(&prepared);
-        println!("{value:#}");
+        say(format_args!("{value:#}"));
     } else {
-        print(&scene.title, &prepared);
+        print(&scene.title, &prepared, &report::solvers_in_words(&shared.solvers));
     }
     Ok(0)
 }
@@ -58,23 +59,23 @@ fn gap_range(gap: &[f64]) -> (f64, f64) {
     (gap.iter().copied().fold(f64::INFINITY, f64::min), gap.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
-fn print(title: &str, prepared: &Prepared) {
-    println!("{title}");
+fn print(title: &str, prepared: &Prepared, solvers: &str) {
+    say(format_args!("{title}"));
     for info in &prepared.problem.bodies {
-        println!(
+        say(format_args!(
             "  body {}: {} cells, {} nodes, {} dofs, {} of them supported",
             info.name, info.cells, info.nodes, info.dofs, info.supported
-        );
+        ));
         if !info.left_by_supports.is_empty() {
-            println!("    rigid motions left to contact: {}", info.left_by_supports.join("; "));
+            say(format_args!("    rigid motions left to contact: {}", info.left_by_supports.join("; ")));
         }
         if !info.left_by_all.is_empty() {
-            println!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; "));
+            say(format_args!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")));
         }
     }
     for pair in &prepared.problem.model.pairs {
         let (low, high) = gap_range(&pair.gap);
-        println!(
+        say(format_args!(
             "  contact {} - {}: {} points on {}, length {:.6}, gap {} to {}",
             pair.surfaces[0],
             pair.surfaces[1],
@@ -83,10 +84,10 @@ fn print(title: &str, prepared: &Prepared) {
             pair.weight.iter().sum::<f64>(),
             sci(low, 3),
             sci(high, 3)
-        );
+        ));
     }
-    println!("  inner solver: {}", prepared.choice);
+    say(format_args!("  inner solver: {} ({})", solvers, prepared.choice));
     for warning in &prepared.warnings {
-        println!("  warning: {warning}");
+        say(format_args!("  warning: {warning}"));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::run::{Clock, Prepared};
 use crate::contact::ContactPair;
-use crate::ddm::{Model, Outcome, Status};
+use crate::ddm::{BodyCounts, Model, Outcome, Status};
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::{BodyReport, ContactTable, PairReport, Report, sci};
 use crate::petsc::Session;
@@ -70,7 +70,8 @@ fn message(outcome: &Outcome, model: &Model) -> String {
 /// Fills the report of a run.
 pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &Outcome, clock: &Clock) -> Report {
     let model = &prepared.problem.model;
-    let counts = global_counts(model);
+    let shared = Shared::gather(prepared);
+    let counts = &shared.counts;
     let last = outcome.rows.last();
     let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
     Report {
@@ -81,25 +82,25 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
         method: outcome.method.to_owned(),
         spectrum: outcome.spectrum.map(|(low, high)| [low, high]),
         error_estimate: finite(last.map(|row| row.error)),
-        factorizations: counts[0] + outcome.coupled_factorizations,
-        symbolic_factorizations: counts[1],
-        body_solves: counts[2],
-        inner_iterations: counts[3],
-        robin_updates: counts[4],
-        robin_updates_skipped: counts[5],
-        assemblies: prepared.problem.bodies.len(),
+        factorizations: counts.factorizations + outcome.coupled_factorizations,
+        symbolic_factorizations: counts.symbolic,
+        body_solves: counts.solves,
+        inner_iterations: counts.inner_iterations,
+        robin_updates: counts.robin_updates,
+        robin_updates_skipped: counts.robin_skipped,
+        assemblies: shared.assemblies,
         body_solves_skipped: outcome.solves_skipped,
         messages: model.exchange.messages(),
         residual: finite(last.map(|row| row.residual)),
         increment: finite(last.map(|row| row.increment)),
         f1: finite(last.map(|row| row.energy)),
         pairs: (0..model.pairs.len()).map(|i| pair_report(scene, prepared, outcome, i)).collect(),
-        ..headline(session, scene, prepared, clock)
+        ..headline(session, scene, prepared, &shared.solvers, clock)
     }
 }
 
-/// The part of the report that is known before the first sweep.
-pub fn headline(session: &Session, scene: &Scene, prepared: &Prepared, clock: &Clock) -> Report {
+/// The part of the report that is known before the first sweep; `solvers` are the inner solvers in words.
+pub fn headline(session: &Session, scene: &Scene, prepared: &Prepared, solvers: &[String], clock: &Clock) -> Report {
     let bodies = &prepared.problem.bodies;
     Report {
         winkler: env!("CARGO_PKG_VERSION").to_owned(),
@@ -110,13 +111,13 @@ pub fn headline(session: &Session, scene: &Scene, prepared: &Prepared, clock: &C
         dofs: bodies.iter().map(|body| body.dofs).sum(),
         bodies: bodies
             .iter()
-            .zip(&prepared.problem.model.bodies)
-            .map(|(info, slot)| BodyReport {
+            .zip(solvers)
+            .map(|(info, solver)| BodyReport {
                 name: info.name.clone(),
                 nodes: info.nodes,
                 cells: info.cells,
                 dofs: info.dofs,
-                solver: slot.local.as_ref().map_or(String::new(), |body| body.describe()),
+                solver: solver.clone(),
                 rank: info.rank,
             })
             .collect(),
@@ -127,22 +128,66 @@ pub fn headline(session: &Session, scene: &Scene, prepared: &Prepared, clock: &C
     }
 }
 
-/// Counts of all bodies on all ranks: factorisations, symbolic ones, solves, inner iterations, Robin updates and skips.
-fn global_counts(model: &Model) -> [usize; 6] {
-    let mut sums = [0.0; 6];
-    for counts in model.bodies.iter().filter_map(|slot| slot.local.as_ref()).map(|body| body.counts()) {
-        let mine = [
-            counts.factorizations,
-            counts.symbolic,
-            counts.solves,
-            counts.inner_iterations,
-            counts.robin_updates,
-            counts.robin_skipped,
-        ];
-        sums.iter_mut().zip(mine).for_each(|(sum, count)| *sum += count as f64);
+/// What only the owner of a body knows: counts over all bodies and the inner solver of each in words. One message.
+pub struct Shared {
+    counts: BodyCounts,
+    assemblies: usize,
+    /// Inner solver of each body.
+    pub solvers: Vec<String>,
+}
+
+/// Inner solvers in words: once if all bodies have the same.
+pub fn solvers_in_words(solvers: &[String]) -> String {
+    match solvers {
+        [first, rest @ ..] if rest.iter().all(|other| other == first) => first.clone(),
+        all => all.join(", "),
     }
-    model.exchange.sum(&mut sums);
-    sums.map(|sum| sum as usize)
+}
+
+/// Most bytes of the words about a solver.
+const WORDS: usize = 64;
+
+impl Shared {
+    /// Collects it on every rank; collective.
+    pub fn gather(prepared: &Prepared) -> Self {
+        let model = &prepared.problem.model;
+        let mut message = vec![0.0; 7 + WORDS * model.bodies.len()];
+        message[6] = prepared.problem.assemblies as f64;
+        for (index, slot) in model.bodies.iter().enumerate() {
+            let Some(body) = &slot.local else { continue };
+            let counts = body.counts();
+            let mine = [
+                counts.factorizations,
+                counts.symbolic,
+                counts.solves,
+                counts.inner_iterations,
+                counts.robin_updates,
+                counts.robin_skipped,
+            ];
+            message.iter_mut().zip(mine).for_each(|(sum, count)| *sum += count as f64);
+            let place = &mut message[7 + WORDS * index..];
+            place
+                .iter_mut()
+                .zip(body.describe().bytes().take(WORDS))
+                .for_each(|(place, byte)| *place = f64::from(byte));
+        }
+        model.exchange.sum(&mut message);
+        let count = |i: usize| message[i] as usize;
+        let words =
+            |bytes: &[f64]| bytes.iter().take_while(|&&byte| byte != 0.0).map(|&byte| char::from(byte as u8)).collect();
+        Self {
+            counts: BodyCounts {
+                factorizations: count(0),
+                symbolic: count(1),
+                solves: count(2),
+                inner_iterations: count(3),
+                robin_updates: count(4),
+                robin_skipped: count(5),
+            },
+            assemblies: count(6),
+            solvers: message[7..].chunks_exact(WORDS).map(words).collect(),
+        }
+    }
 }
 
 /// Sides of pair `i` in the order of the scene.

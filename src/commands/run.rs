@@ -7,7 +7,7 @@ use crate::discretize::{self, Assembled, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
-use crate::scene::{MeshSource, Order, Preset, RobinSpec, Scene};
+use crate::scene::{MeshSource, Order, RobinSpec, Scene};
 use crate::solver::{Krylov, SparseBody, options, preset};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
@@ -53,7 +53,7 @@ impl Clock {
 pub struct Prepared {
     /// The discrete problem.
     pub problem: Problem,
-    /// Inner solver in words, with the reason of the choice.
+    /// Why the inner solver is what it is where no PETSc option was typed.
     pub choice: String,
     /// Warnings.
     pub warnings: Vec<String>,
@@ -72,10 +72,10 @@ pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Pr
     clock.phase("mesh");
     let largest = mesh.points.len() * scene.dimension.value;
     let (chosen, choice) = match scene.solver.preset {
-        Some(preset) => (preset, format!("{preset:?} as the scene asks")),
+        Some(preset) => (preset, "the scene asks for it".to_owned()),
         None => {
             let (preset, why) = preset::choose(scene.dimension.value, largest);
-            (preset, format!("{preset:?}: {why}"))
+            (preset, why)
         }
     };
     // small fronts and several ranks lose by BLAS threads, large factorisations gain
@@ -88,29 +88,13 @@ pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Pr
     let mut make = |assembled: Assembled| solver(session, assembled);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
-    let problem = agree(
-        session,
-        discretize::discretize::<2>(
-            scene,
-            &mesh,
-            pieces::plane,
-            ranks,
-            method::keeps_matrices(scene),
-            exchange,
-            &mut make,
-        ),
-    )?;
+    let keep = method::keeps_matrices(scene);
+    let problem = discretize::discretize::<2>(scene, &mesh, pieces::plane, ranks, keep, exchange, &mut make);
+    let mut problem = agree(session, problem)?;
+    problem.share();
     clock.phase("discretize");
     let warnings = warnings(session, scene, &problem);
-    Ok(Prepared { problem, choice: describe(chosen, choice), warnings })
-}
-
-fn describe(preset: Preset, why: String) -> String {
-    let what = match preset {
-        Preset::Mumps => "sparse Cholesky by MUMPS",
-        Preset::Hypre => "CG preconditioned by hypre's BoomerAMG",
-    };
-    format!("{what} ({why})")
+    Ok(Prepared { problem, choice, warnings })
 }
 
 /// What the decoder of the scene cannot know.
@@ -131,7 +115,7 @@ fn refuse(scene: &Scene) -> Result<()> {
 
 /// PETSc options of the scene, weaker than typed ones.
 fn scene_options(session: &Session, scene: &Scene) -> Result<()> {
-    let table = session.options();
+    let bodies: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
     let mut words = scene.solver.options.iter().peekable();
     while let Some(word) = words.next() {
         if !word.starts_with('-') {
@@ -140,9 +124,7 @@ fn scene_options(session: &Session, scene: &Scene) -> Result<()> {
         }
         let is_value = |next: &&String| !next.starts_with('-') || next.parse::<f64>().is_ok();
         let value = words.next_if(is_value).map(String::as_str);
-        if !table.has(word) {
-            table.set(word, value)?;
-        }
+        options::set_of_scene(session, &bodies, word, value)?;
     }
     Ok(())
 }
@@ -236,6 +218,15 @@ pub fn set_up(session: &Session, prepared: &mut Prepared, clock: &mut Clock) -> 
         }
     }
     agree(session, unknown.map_or(Ok(()), Err))?;
+    for name in &names {
+        let in_force = |option: &str| session.options().get(&format!("-{name}_{option}")).unwrap_or_default();
+        if in_force("ksp_type") == "preonly" && !matches!(in_force("pc_type").as_str(), "cholesky" | "lu") {
+            prepared.warnings.push(format!(
+                "body {name}: preonly applies {} once instead of solving; the residual is measured by it",
+                in_force("pc_type")
+            ));
+        }
+    }
     clock.phase("set-up");
     Ok(())
 }

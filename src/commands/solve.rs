@@ -4,7 +4,7 @@ use super::run::{self, Clock, Prepared};
 use super::{folder_of, load, report};
 use crate::ddm::{Observer, Outcome, Row};
 use crate::error::{Error, Kind, Result};
-use crate::output::{Folder, HistoryWriter, IterationTable, Plot, Report, Verbosity, vtu};
+use crate::output::{Folder, HistoryWriter, IterationTable, Plot, Report, Verbosity, say, vtu};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::scene::Scene;
@@ -52,14 +52,16 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
         let json = to_json(&report)?;
         folder.write("report.json", |out| out.write_all(json.as_bytes()))?;
         if request.json {
-            print!("{json}");
+            say(json.trim_end());
         } else {
-            println!(
-                "{}\n  inner solver: {}\n  results in {}",
+            let solvers: Vec<String> = report.bodies.iter().map(|body| body.solver.clone()).collect();
+            say(format_args!(
+                "{}\n  inner solver: {} ({})\n  results in {}",
                 report.summary(),
+                report::solvers_in_words(&solvers),
                 prepared.choice,
                 folder.path().display()
-            );
+            ));
         }
     }
     written?;

@@ -5,7 +5,7 @@ use super::{folder_of, report};
 use crate::ddm::Silent;
 use crate::error::{Error, Kind, Result};
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
-use crate::output::{Folder, Plot, Report, sci};
+use crate::output::{Folder, Plot, Report, say, sci};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::solver::options;
@@ -62,12 +62,12 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
         }
         row(&mut table, &folder, line(values, &report))?;
         if !request.json {
-            println!(
+            say(format_args!(
                 "{label}: {}, {} iterations, residual {}",
                 report.status,
                 report.iterations,
                 sci(report.residual.unwrap_or(f64::NAN), 2)
-            );
+            ));
         }
         histories.push(report::convergence(&label, &outcome));
         for i in 0..prepared.problem.model.pairs.len() {
@@ -88,9 +88,9 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
             let list = serde_json::to_string_pretty(&reports).map_err(|cause| {
                 Error::new(Kind::File, "the reports cannot be written as JSON").because(cause.to_string())
             })?;
-            println!("{list}");
+            say(format_args!("{list}"));
         } else {
-            println!("results in {}", folder.path().display());
+            say(format_args!("results in {}", folder.path().display()));
         }
     }
     Ok(exit)
@@ -137,7 +137,9 @@ fn combinations(axes: &[(String, Vec<String>)]) -> Vec<Vec<String>> {
 
 fn label(axes: &[(String, Vec<String>)], values: &[String]) -> String {
     let parts = axes.iter().zip(values).map(|((key, _), value)| {
-        let short = key.rsplit('.').next().unwrap_or(key);
+        let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
+        let ambiguous = axes.iter().filter(|(other, _)| last(other) == last(key)).count() > 1;
+        let short = if ambiguous { key.clone() } else { last(key) };
         format!("{short} = {value}")
     });
     parts.collect::<Vec<_>>().join(", ")

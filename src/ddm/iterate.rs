@@ -248,7 +248,7 @@ impl Watch {
             return Verdict::End(Status::Cycle { period });
         }
         let stalled = self.floor.is_suspected(row.residual);
-        if stalled && is_rounding(model, iterate, layer, sweep) {
+        if stalled && row.residual <= ROUNDING && is_rounding(model, iterate, layer, sweep) {
             return Verdict::End(Status::Attainable);
         }
         if row.iteration >= stop.iterations {
@@ -257,6 +257,9 @@ impl Watch {
         if stalled { Verdict::Stalled } else { Verdict::Go }
     }
 }
+
+/// A relative residual above this is never put down to rounding.
+const ROUNDING: f64 = 1e-5;
 
 /// Whether the residual is no larger than what rounding alone can make.
 fn is_rounding(model: &Model, iterate: &Field, layer: &Layer, sweep: &Sweep) -> bool {

@@ -29,7 +29,8 @@ impl Layer {
         for (i, pair) in model.pairs.iter().enumerate() {
             let mut energy = 0.0;
             for q in model.range(i) {
-                let c = trace[q] + trace[points + q] - model.gap[q];
+                // + 0.0 turns -0.0, which depends on the order of a sum, into 0.0
+                let c = trace[q] + trace[points + q] - model.gap[q] + 0.0;
                 let response = pair.law.response(q - model.offset[i], c);
                 let force = model.weight[q] * response.pressure;
                 energy += model.weight[q] * response.energy;

@@ -41,7 +41,8 @@ fn springs(slot: &BodySlot) -> Vec<f64> {
 /// Failures of the solver library.
 pub fn lift(model: &mut Model, trace: &[f64]) -> Result<(Field, Option<(usize, String)>)> {
     let mut iterate = Field { states: Vec::new(), trace: vec![0.0; trace.len()] };
-    let mut failed = None;
+    let mut failed = vec![0.0; model.bodies.len()];
+    let mut reasons = vec![String::new(); model.bodies.len()];
     for index in 0..model.bodies.len() {
         let target = model.of_body(index, trace);
         let slot = &mut model.bodies[index];
@@ -75,7 +76,8 @@ pub fn lift(model: &mut Model, trace: &[f64]) -> Result<(Field, Option<(usize, S
             body.residual(&u, &force, &mut r);
             let Solved { failure, .. } = body.solve(&r, &mut z)?;
             if let Some(reason) = failure {
-                failed.get_or_insert((index, reason));
+                failed[index] = 1.0;
+                reasons[index] = reason;
             }
             crate::linalg::axpy(1.0, &z, &mut u);
         }
@@ -83,6 +85,11 @@ pub fn lift(model: &mut Model, trace: &[f64]) -> Result<(Field, Option<(usize, S
         model.put(index, &rows, &mut iterate.trace);
         iterate.states.push(u);
     }
-    model.exchange.sum(&mut iterate.trace);
-    Ok((iterate, failed))
+    // one message: traces, then which inner solvers failed
+    let mut message = [&iterate.trace[..], &failed[..]].concat();
+    model.exchange.sum(&mut message);
+    let failed = message.split_off(trace.len());
+    iterate.trace = message;
+    let first = failed.iter().position(|&failed| failed != 0.0);
+    Ok((iterate, first.map(|body| (body, std::mem::take(&mut reasons[body])))))
 }

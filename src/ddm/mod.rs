@@ -1,4 +1,4 @@
-//! The method: Robin-Robin domain decomposition for the nonlinear variational equation (29).
+//! The method: Robin-Robin domain decomposition for the nonlinear variational equation (26).
 //!
 //! Start with [`iterate`]: the loop. It works on point arrays (compression, pressure, tangent, weight) and on
 //! bodies that answer the verbs of [`Body`]; it knows no dimension, no element, no mesh and no PETSc.

@@ -43,8 +43,11 @@ impl Reference {
     /// sqrt(numerator / reference), both squared norms; `strain` is the part of the reference in the bodies.
     pub fn relative(&mut self, numerator: f64, reference: f64, strain: f64) -> f64 {
         let least = *self.least.get_or_insert(1e-16 * strain.abs());
+        if numerator.is_nan() || reference.is_nan() {
+            return f64::NAN;
+        }
         // rounding can make a tiny numerator negative
-        if numerator.abs() == 0.0 { 0.0 } else { (numerator.max(0.0) / reference.max(least)).sqrt() }
+        if numerator <= 0.0 { 0.0 } else { (numerator / reference.max(least)).sqrt() }
     }
 }
 

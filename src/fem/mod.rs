@@ -1,6 +1,6 @@
 //! Finite elements on one body: P1 and P2 simplices, linear elasticity, assembly into sparse rows.
 //!
-//! Data flow: [`Mesh`](crate::mesh::Mesh) group -> [`Space`] -> [`assemble()`](assemble::assemble) ->
+//! Data flow: [`Mesh`](crate::mesh::Mesh) group -> [`Space`] -> [`assemble`] ->
 //! [`ElasticBody`] {K, f, supports}; afterwards [`stress`] recovers nodal stresses from displacements.
 //! Degree of freedom `D * node + component` everywhere.
 

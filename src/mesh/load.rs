@@ -40,7 +40,13 @@ pub enum Origin {
 /// of named simplices in `D` dimensions (see [`read`](super::read)), or of too low an order.
 pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<D>> {
     match source {
-        MeshSource::Geo { file, set } => from_script(file, set, order, &folders()),
+        MeshSource::Geo { file, set, places } => {
+            let script = Script::read(&file.value).map_err(|error| error.at(&file.place))?;
+            for ((name, _), place) in set.iter().zip(places) {
+                script.check(name, &Located::new(file.value.clone(), place.clone()))?;
+            }
+            from_script(file, set, order, &folders())
+        }
         MeshSource::Msh { file } => from_file(file, order),
     }
 }

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// The result on one pair of contact surfaces; all vectors have one entry per contact point.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ContactTable {
-    /// Names of the two contact surfaces, side a and side b.
+    /// Names of the two sides: their bodies.
     pub side_names: [String; 2],
     /// Contact points, before deformation.
     pub points: Vec<[f64; 3]>,

@@ -16,6 +16,12 @@ pub mod table;
 mod ticks;
 pub mod vtu;
 
+/// Prints a line to standard output. A reader that has gone is no reason to stop.
+pub fn say(text: impl std::fmt::Display) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stdout(), "{text}");
+}
+
 pub use contact::ContactTable;
 pub use folder::{Folder, safe_name};
 pub use format::{sci, seconds};

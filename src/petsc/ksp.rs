@@ -159,6 +159,12 @@ impl Ksp {
         Ok(())
     }
 
+    /// Whether the preconditioner is kept when the matrix changes.
+    pub fn reuses_preconditioner(&self) -> bool {
+        let mut reuse = ffi::PetscBool_PETSC_FALSE;
+        petsc!(KSPGetReusePreconditioner(self.ksp, &mut reuse)).is_ok() && reuse != ffi::PetscBool_PETSC_FALSE
+    }
+
     /// Makes the preconditioner or factorisation of the current matrix, if it is not there yet; every solve does it too.
     /// A factorisation that fails is told by [`failure`](Self::failure) and by the next solve.
     ///

@@ -9,7 +9,7 @@ pub use body::reserved;
 use super::expression::Field;
 use super::read::{Keys, Node, Value};
 use super::{MeshSource, OutputSpec, Plane, Preset, Scene, SolverSpec};
-use crate::error::{Error, Located, Result, nearest};
+use crate::error::{Error, Located, Place, Result, nearest};
 use std::path::{Path, PathBuf};
 
 /// Checks a whole scene, read from `path`. Looks whether the mesh file is there.
@@ -85,7 +85,7 @@ impl Decoder<'_> {
         if let Value::String(name) = &node.value {
             let file = self.file(node)?;
             return Ok(match name.ends_with(".geo") {
-                true => MeshSource::Geo { file, set: Vec::new() },
+                true => MeshSource::Geo { file, set: Vec::new(), places: Vec::new() },
                 false => MeshSource::Msh { file },
             });
         }
@@ -102,7 +102,9 @@ impl Decoder<'_> {
             };
         }
         let file = self.file(keys.require("geo")?)?;
-        Ok(MeshSource::Geo { file, set: keys.get("set").map_or(Ok(Vec::new()), numbers)? })
+        let set = keys.get("set").map_or(Ok(Vec::new()), numbers)?;
+        let (places, set) = set.into_iter().map(|(place, name, value)| (place, (name, value))).unzip();
+        Ok(MeshSource::Geo { file, set, places })
     }
 
     /// The path of a file that must exist, joined with the folder of the scene.
@@ -140,7 +142,7 @@ fn dimension(keys: &Keys) -> Result<Located<usize>> {
 }
 
 /// Named numbers for Gmsh, sorted by name.
-fn numbers(node: &Node) -> Result<Vec<(String, f64)>> {
+fn numbers(node: &Node) -> Result<Vec<(Place, String, f64)>> {
     let Value::Table(entries) = &node.value else {
         return Err(node.expected("a table").help("write set = { n = 32 }"));
     };
@@ -150,9 +152,9 @@ fn numbers(node: &Node) -> Result<Vec<(String, f64)>> {
         if !entry.key.chars().all(word) || !entry.key.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
             return Err(Error::scene(&entry.key_place, format!("`{}` is no name of a Gmsh number", entry.key)));
         }
-        numbers.push((entry.key.clone(), entry.node.number()?));
+        numbers.push((entry.key_place.clone(), entry.key.clone(), entry.node.number()?));
     }
-    numbers.sort_by(|a, b| a.0.cmp(&b.0));
+    numbers.sort_by(|a, b| a.1.cmp(&b.1));
     Ok(numbers)
 }
 

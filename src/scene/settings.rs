@@ -57,7 +57,7 @@ fn vector(components: &[Field; 3], dimension: usize) -> Value {
 fn mesh(mesh: &MeshSource) -> Value {
     match mesh {
         MeshSource::Msh { file } => json!({ "msh": file.value.display().to_string() }),
-        MeshSource::Geo { file, set } => {
+        MeshSource::Geo { file, set, .. } => {
             let set: Map<_, _> = set.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
             json!({ "geo": file.value.display().to_string(), "set": set })
         }

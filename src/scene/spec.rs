@@ -4,7 +4,7 @@
 //! read (missing group, surface of the wrong body) still points into the scene file.
 
 use super::expression::Field;
-use crate::error::Located;
+use crate::error::{Located, Place};
 use std::path::PathBuf;
 
 /// A checked scene.
@@ -50,6 +50,8 @@ pub enum MeshSource {
         file: Located<PathBuf>,
         /// Names and numbers, sorted by name.
         set: Vec<(String, f64)>,
+        /// Where each name stands.
+        places: Vec<Place>,
     },
     /// A mesh file, format 4.1, text or binary.
     Msh {

@@ -61,7 +61,7 @@ fn the_groove_is_read() {
     let scene = load_text(GROOVE, &[]).unwrap();
     assert_eq!(scene.title, "Groove with a nonlinear Winkler layer");
     assert_eq!((scene.dimension.value, scene.plane), (2, Plane::Strain));
-    let MeshSource::Geo { file, set } = &scene.mesh else { panic!("{:?}", scene.mesh) };
+    let MeshSource::Geo { file, set, .. } = &scene.mesh else { panic!("{:?}", scene.mesh) };
     assert_eq!(file.value, scene.path.parent().unwrap().join("groove.geo"));
     assert_eq!(set, &[("n".to_owned(), 32.0)]);
 

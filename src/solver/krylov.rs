@@ -54,8 +54,10 @@ impl InnerSolver for Krylov {
 
     fn set_up(&mut self) -> Result<()> {
         if self.changed {
-            self.set_ups += 1;
             self.changed = false;
+            if self.set_ups == 0 || !self.ksp.reuses_preconditioner() {
+                self.set_ups += 1;
+            }
             self.ksp.set_up()?;
         }
         Ok(())

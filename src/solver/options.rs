@@ -28,6 +28,8 @@ enum Origin {
     Copy,
     /// Our own choice.
     Default,
+    /// Written in the scene: as good as typed, but weaker, and gone with the scene.
+    Scene,
 }
 
 thread_local! {
@@ -58,8 +60,25 @@ fn put(options: &Options, name: &str, value: Option<&str>, origin: Origin) -> Re
     Ok(())
 }
 
+/// Why the program put an option into the table; `None` for what the user wrote, in the scene or on the command line.
 fn origin(name: &str) -> Option<Origin> {
-    OURS.with_borrow(|ours| ours.get(name).copied())
+    OURS.with_borrow(|ours| ours.get(name).copied()).filter(|origin| !matches!(origin, Origin::Scene))
+}
+
+/// Sets an option that stands in the scene, unless the command line says something else: that option, or the plain one for
+/// one of a body.
+///
+/// # Errors
+/// When PETSc refuses the name.
+pub fn set_of_scene(session: &Session, bodies: &[&str], name: &str, value: Option<&str>) -> Result<()> {
+    let options = session.options();
+    let typed =
+        |name: &str| options.has(name) && !OURS.with_borrow(|ours| matches!(ours.get(name), Some(Origin::Scene)));
+    let plain = body_of(name, bodies).map(|(_, bare)| format!("-{bare}"));
+    if typed(name) || plain.is_some_and(|plain| typed(&plain)) {
+        return Ok(());
+    }
+    put(&options, name, value, Origin::Scene)
 }
 
 /// Copies each plain option of the object families to `-<body>_<option>`, unless that is set. Give all bodies of the

@@ -19,6 +19,10 @@ impl Power {
 impl LayerLaw for Power {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         let pressure = (c / self.b).powf(self.exponent);
-        Response { pressure, tangent: self.exponent * pressure / c, energy: pressure * c / (self.exponent + 1.0) }
+        Response {
+            pressure, // exact for a = 1, so that a settled contact set changes no matrix
+            tangent: if self.exponent == 1.0 { 1.0 / self.b } else { self.exponent * pressure / c },
+            energy: pressure * c / (self.exponent + 1.0),
+        }
     }
 }

@@ -3,7 +3,7 @@
 /// Splits the arguments (without the program's name) into words of the program and words of PETSc, each in order.
 ///
 /// A PETSc option has one dash and two or more letters; it takes the next word as its value unless that looks like an
-/// option. A scene file (`*.toml`) is never a value, except of `-options_file`. After `--` all belongs to the program.
+/// option. A scene file (`*.toml`) or a command is never a value, except of `-options_file`. After `--` all belongs to the program.
 ///
 /// ```
 /// use winkler::solver::options::split;
@@ -27,11 +27,16 @@ pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<Strin
         }
         let file = word == "-options_file";
         petsc.push(word);
-        if let Some(value) = words.next_if(|next| !is_option(next) && (file || !next.ends_with(".toml"))) {
+        if let Some(value) = words.next_if(|next| !is_option(next) && (file || !is_ours(next))) {
             petsc.push(value);
         }
     }
     (program, petsc)
+}
+
+/// A scene file or a command: never meant as the value of an option.
+fn is_ours(word: &str) -> bool {
+    word.ends_with(".toml") || ["solve", "check", "sweep"].contains(&word)
 }
 
 /// One dash, then two or more signs of which the first is a letter.
