@@ -24,7 +24,7 @@ impl HistoryWriter {
     pub fn create<S: AsRef<str>>(folder: &Folder, bodies: &[S]) -> Result<Self> {
         let (path, file) = folder.open("history.csv")?;
         let csv = csv::Writer::from_writer(file);
-        let mut header: Vec<String> = ["iteration", "residual", "increment"].map(String::from).into();
+        let mut header: Vec<String> = ["iteration", "residual", "error", "increment"].map(String::from).into();
         header.extend(bodies.iter().map(|body| format!("increment_{}", body.as_ref())));
         header.extend(
             ["gamma", "energy", "closed", "points", "sweeps", "factorizations", "inner_iterations", "seconds"]
@@ -55,7 +55,7 @@ impl HistoryWriter {
 
 impl Observer for HistoryWriter {
     fn row(&mut self, row: &Row) {
-        let mut fields = vec![row.iteration.to_string(), field(row.residual), field(row.increment)];
+        let mut fields = vec![row.iteration.to_string(), field(row.residual), field(row.error), field(row.increment)];
         // Row 0 may come without increments.
         fields.extend((0..self.bodies).map(|body| row.increments.get(body).map_or(String::new(), |&v| field(v))));
         fields.extend([field(row.gamma), field(row.energy)]);
@@ -79,6 +79,7 @@ mod tests {
         let mut history = HistoryWriter::create(&folder, &["upper", "lower"]).unwrap();
         history.row(&Row {
             residual: 1.0,
+            error: f64::NAN,
             increment: f64::NAN,
             gamma: f64::NAN,
             energy: -0.1,
@@ -89,6 +90,7 @@ mod tests {
         history.row(&Row {
             iteration: 1,
             residual: 1e-9,
+            error: 2e-9,
             increment: 0.5,
             increments: vec![0.5, 1.0 / 3.0],
             gamma: 0.25,
@@ -105,10 +107,10 @@ mod tests {
         assert_eq!(
             lines,
             [
-                "iteration,residual,increment,increment_upper,increment_lower,gamma,energy,closed,points,\
+                "iteration,residual,error,increment,increment_upper,increment_lower,gamma,energy,closed,points,\
                  sweeps,factorizations,inner_iterations,seconds",
-                "0,1.0,,,,,-0.1,0,9,1,0,0,0.0",
-                "1,1e-9,0.5,0.5,0.3333333333333333,0.25,-0.2,4,9,2,3,7,1.5",
+                "0,1.0,,,,,,-0.1,0,9,1,0,0,0.0",
+                "1,1e-9,2e-9,0.5,0.5,0.3333333333333333,0.25,-0.2,4,9,2,3,7,1.5",
             ]
         );
         assert_eq!(history.finish().unwrap(), base.path().join("history.csv"));

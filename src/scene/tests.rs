@@ -84,7 +84,7 @@ fn the_groove_is_read() {
     assert_eq!(contact.layer, LayerSpec::Power { b: 2.5e-5, a: 0.5 });
 
     assert!(matches!(scene.method.psi, Zone::Active));
-    assert_eq!(scene.method.gamma, 0.7);
+    assert_eq!(scene.method.gamma, Gamma::Stationary(0.7));
     assert!(matches!(scene.method.start, Start::Normal(Field::Constant(1e-4))));
     assert_eq!(scene.method.stop, StopSpec { residual: None, increment: Some(1e-3), iterations: 2000 });
     assert_eq!(scene.solver, SolverSpec { preset: None, options: vec![] });
@@ -102,8 +102,9 @@ fn defaults_and_a_scene_in_space() {
     assert_eq!(scene.bodies[0].fix[0].value, [None, None, Some(0.5)]);
     assert_eq!(scene.bodies[0].force.as_ref().unwrap()[0].eval([1.0, 2.0, 3.0]), 3.0);
     assert!(scene.contacts.is_empty());
-    assert!(matches!(scene.method.start, Start::Zero));
-    assert_eq!(scene.method.gamma, 0.6);
+    assert!(matches!(scene.method.start, Start::Auto));
+    assert_eq!((scene.method.name, scene.method.robin), (MethodName::Auto, RobinSpec::Auto));
+    assert_eq!(scene.method.gamma, Gamma::Stationary(0.6));
     assert_eq!(scene.method.stop, StopSpec { residual: Some(1e-8), increment: None, iterations: 2000 });
     let options = vec!["-ksp_rtol".to_owned(), "1e-10".to_owned()];
     assert_eq!(scene.solver, SolverSpec { preset: Some(Preset::Hypre), options });
@@ -152,7 +153,7 @@ fn overrides_replace_and_add() {
     assert_eq!(scene.solver.options, ["-ksp_rtol", "1e-10"]);
     assert_eq!((scene.title.as_str(), scene.plane), ("Ein anderer Titel", Plane::Stress));
     assert!(!scene.output.vtu && scene.output.plots);
-    assert_eq!(scene.method.gamma, 0.2);
+    assert_eq!(scene.method.gamma, Gamma::Stationary(0.2));
 }
 
 /// The echo, written as a scene again, gives the same echo: nothing is lost and no key is misspelt.

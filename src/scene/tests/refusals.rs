@@ -133,7 +133,7 @@ fn refusals_of_overrides_point_into_them() {
         ("metod.gamma=1", "metod", "unknown key `metod` in the scene", "`method`"),
         ("method.gama=1", "gama", "unknown key `gama` in [method]", "`gamma`"),
         ("method.gamma = -1", "-1", "gamma is -1", ""),
-        ("method.gamma=much", "much", "expected a number, found a string", ""),
+        ("method.gamma=much", "much", "unknown rule for gamma `much`", "line-search"),
         ("method.gamma=", "", "the value is missing", ""),
         ("method..gamma=1", "method..gamma", "this is not a key of the scene", "joined by points"),
         ("mesh.msh=groove.msh", "msh", "the mesh has both `geo` and `msh`", ""),
