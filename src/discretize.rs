@@ -56,8 +56,11 @@ pub struct BodyInfo {
     pub gauged: Vec<String>,
     /// Rank that owns the body.
     pub rank: usize,
-    field: Box<dyn Fn(&[f64]) -> BodyField>,
+    field: FieldMaker,
 }
+
+/// Displacements of all dofs -> fields for output.
+type FieldMaker = Box<dyn Fn(&[f64]) -> BodyField>;
 
 impl BodyInfo {
     /// Displacements and recovered stresses for output, from displacements of all dofs.
@@ -225,7 +228,7 @@ fn trace_of(motion: &RigidMotion, rows: &Csr, load: &[f64]) -> Motion {
     Motion { name: motion.name.clone(), trace, work }
 }
 
-fn field_maker<const D: usize>(name: String, space: Space<D>, material: Material) -> Box<dyn Fn(&[f64]) -> BodyField> {
+fn field_maker<const D: usize>(name: String, space: Space<D>, material: Material) -> FieldMaker {
     Box::new(move |u| {
         let stress = stress::nodal(&space, &material, u);
         BodyField {

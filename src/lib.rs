@@ -3,6 +3,8 @@
 //! Data flows one way: scene file -> [`scene::Scene`] -> [`mesh::Mesh`] -> [`fem`] bodies and [`contact`] pairs ->
 //! [`ddm::Model`] -> sweeps -> [`ddm::Outcome`] -> [`report`](commands::report). The loop is [`ddm::iterate`].
 #![deny(unsafe_code)]
+// indices of tensors, rows and nodes read like the formulas
+#![allow(clippy::needless_range_loop)]
 #![warn(missing_docs)]
 
 pub mod cli;
@@ -16,7 +18,6 @@ pub mod linalg;
 pub mod mesh;
 pub mod output;
 pub mod parallel;
-#[allow(unsafe_code)]
 pub mod petsc;
 pub mod scene;
 pub mod solver;

@@ -106,7 +106,7 @@ fn a_power_layer_that_is_linear_is_factored_like_one() {
 /// r = (1 - gamma) r_last with the same G needs no solve. One sweep with gamma = 1 gives the answer without that.
 #[test]
 fn bodies_that_never_touch_are_solved_once() {
-    let apart = ["--set", "contact.0.gap=1", "--set", "method.stop={residual=1e-11}"];
+    let apart = ["--set", "contact.0.gap=1", "--set", "method.stop={residual=1e-5}"];
     let run = coarse("groove", &apart);
     let direct = coarse("groove", &[&apart[..], &["--set", "method.gamma=1"]].concat());
     let sweeps = run.count("sweeps");
@@ -118,9 +118,12 @@ fn bodies_that_never_touch_are_solved_once() {
     assert_eq!(counts(&direct, ["iterations", "body_solves_skipped"]), [1, 2]);
     let (skipped, solved) = (run.contact(), direct.contact());
     for column in ["u_n_lower", "u_n_upper", "compression"] {
-        assert!(distance(&skipped[column], &solved[column]) < 1e-9, "{column}");
+        assert!(distance(&skipped[column], &solved[column]) < 1e-4, "{column}");
     }
     assert!((run.number("F1") / direct.number("F1") - 1.0).abs() < 1e-9);
+    // where rounding is a part of the residual the solves are done again
+    let far = coarse("groove", &[&apart[..2], &["--set", "method.stop={residual=1e-12}"]].concat());
+    assert!(far.count("body_solves_skipped") < 2 * (far.count("sweeps") - 1));
     assert!(run.contact()["pressure"].iter().all(|&p| p == 0.0));
 }
 

@@ -54,9 +54,9 @@ fn options_reach_all_bodies_or_one() {
 #[test]
 fn the_terminal_names_the_solver_that_ran() {
     let run = groove("-ksp_type cg -pc_type hypre").converged();
-    assert!(!run.stdout.contains("MUMPS"), "{}", run.stdout);
+    assert!(!run.stdout.contains("mumps"), "{}", run.stdout);
     let run = groove("").converged();
-    assert!(run.stdout.contains("MUMPS"), "{}", run.stdout);
+    assert!(run.stdout.contains("mumps"), "{}", run.stdout);
 }
 
 #[test]

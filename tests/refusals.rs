@@ -46,7 +46,7 @@ fn a_scene_that_is_not_there() {
 fn keys_and_types() {
     groove_refused("gamma = 0.6", "gama = 0.6", "gama", &["unknown key `gama`", "did you mean `gamma`?"]);
     groove_refused("psi = \"active\"", "psi = \"activ\"", "activ\"", &["`activ`", "did you mean `active`?"]);
-    groove_refused("gamma = 0.6", "gamma = \"big\"", "big", &["expected a number", "string"]);
+    groove_refused("gamma = 0.6", "gamma = \"big\"", "big", &["unknown rule for gamma `big`", "line-search"]);
     groove_refused("gamma = 0.6", "gamma = -0.6", "-0.6", &["gamma"]);
     groove_refused("a = 0.5", "a = 1.5", "a = 1.5", &["a is 1.5", "must not exceed 1"]);
     groove_refused("[method]", "[method", "[method", &["TOML"]);
@@ -104,7 +104,7 @@ fn overrides() {
     };
     set("method.gama=1", SCENE, &["--set:1:8", "`gama`", "did you mean `gamma`?"]);
     set("contact.5.gap=1", SCENE, &["--set:1:9", "no number 5"]);
-    set("method.gamma=abc", SCENE, &["--set:1:14", "expected a number"]);
+    set("method.gamma=abc", SCENE, &["--set:1:14", "unknown rule for gamma"]);
     set("body.0.fix.0.on=nothing", SCENE, &["--set:1:17", "`nothing`"]);
     set("method.gamma", 2, &["without `=`"]);
     // the place is where the user wrote the name
@@ -208,10 +208,24 @@ fn failed(run: &Run, status: &[&str], words: &[&str]) {
     assert!(run.report["residual"].as_f64().is_none_or(|residual| residual > 0.0), "{}", run.report["residual"]);
 }
 
+/// The patch with an upper body that slides freely and is pushed aside.
+fn pushed_aside() -> Scene {
+    let free = common::text_of("patch").replace("fix = [{ on = \"upper_pin\", x = 0 }]\n", "");
+    Scene::new(free.replace("{ on = \"upper_face\", pressure = 10 }", "{ on = \"upper_face\", traction = [1, -10] }"))
+}
+
+/// The same body without the push keeps its place: one node is fixed, nothing else changes.
+#[test]
+fn a_body_that_slides_freely_without_load() {
+    let free = Scene::edited("patch", "fix = [{ on = \"upper_pin\", x = 0 }]\n", "");
+    let run = solve(&free, &[]).converged();
+    assert!(run.warnings().contains("body upper: nothing holds its translation along x"), "{}", run.warnings());
+    assert!(run.contact()["pressure"].iter().all(|p| (p / 10.0 - 1.0).abs() < 1e-10));
+}
+
 #[test]
 fn a_body_that_nothing_holds() {
-    let free = Scene::edited("patch", "fix = [{ on = \"upper_pin\", x = 0 }]\n", "");
-    let run = solve(&free, &[]);
+    let run = solve(pushed_aside(), &[]);
     failed(&run, &["unheld"], &["`upper`", "translation along x", "iteration 0", "support"]);
     // not even contact, at first
     let apart = Scene::edited("patch", "start = { normal = 1e-4 }", "start = \"zero\"");
@@ -247,7 +261,12 @@ fn too_few_iterations() {
 /// p(1) = (1e6)^10 = 1e60: nothing of what follows has a right digit, so it must not pass for an answer.
 #[test]
 fn a_start_so_large_that_the_law_overflows() {
-    for start in ["1", "1e20", "1e40"] {
+    // far away, but not lost: what it says has converged is the answer
+    let far = ["--set", "contact.0.layer.power={a=0.1,B=1e-6}", "--set", "method.stop={residual=1e-9}"];
+    let near = solve(case("groove"), &[&COARSE[..], &far, &["--method", "newton"]].concat()).converged();
+    let run = solve(case("groove"), &[&COARSE[..], &far, &["--set", "method.start.normal=1"]].concat()).converged();
+    assert!(common::distance(&run.contact()["pressure"], &near.contact()["pressure"]) < 1e-6);
+    for start in ["1e20", "1e40"] {
         let start = format!("method.start.normal={start}");
         let law = ["--set", "contact.0.layer.power={a=0.1,B=1e-6}", "--set", &start];
         let rules = ["--set", "method.stop={residual=1e-8,iterations=200}"];
@@ -311,8 +330,7 @@ fn an_option_refused_on_one_of_two_ranks() {
 fn not_converging_on_two_ranks() {
     let run = solve_on(2, case("groove"), &[&COARSE[..], &["--set", "method.stop.iterations=3"]].concat());
     failed(&run, &["iteration-limit"], &["3 iterations"]);
-    let free = Scene::edited("patch", "fix = [{ on = \"upper_pin\", x = 0 }]\n", "");
-    failed(&solve_on(2, &free, &[]), &["unheld"], &["`upper`", "translation along x"]);
+    failed(&solve_on(2, pushed_aside(), &[]), &["unheld"], &["`upper`", "translation along x"]);
 }
 
 #[test]

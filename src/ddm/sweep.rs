@@ -37,7 +37,7 @@ pub struct Sweep {
 /// Whether r = s r0 to rounding of r0.
 fn is_multiple(r: &[f64], s: f64, r0: &[f64]) -> bool {
     let difference: f64 = r.iter().zip(r0).map(|(r, r0)| (r - s * r0).powi(2)).sum();
-    difference <= 1e-16 * dot(r, r)
+    difference <= 1e-12 * dot(r, r)
 }
 
 /// Does sweeps and remembers what need not be done again.

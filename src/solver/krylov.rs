@@ -4,7 +4,7 @@ use super::InnerSolver;
 use crate::ddm::Solved;
 use crate::error::Result;
 use crate::linalg::Csr;
-use crate::petsc::{Ksp, Matrix, Session};
+use crate::petsc::{Int, Ksp, Matrix, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
 pub struct Krylov {
@@ -27,7 +27,7 @@ impl Krylov {
         stiffness: &Csr,
         near_null_space: &[Vec<f64>],
     ) -> Result<Self> {
-        let pattern = |part: &[i32]| part.iter().map(|&i| i.into()).collect();
+        let pattern = |part: &[i32]| part.iter().map(|&i| Int::from(i)).collect();
         let mut matrix = Matrix::from_csr(
             session,
             dimension,

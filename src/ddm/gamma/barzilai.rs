@@ -29,7 +29,7 @@ impl GammaRule for BarzilaiBorwein {
             last.gamma * last.decrement / (last.decrement - product[0])
         });
         let gamma = match quotient {
-            Some(gamma) if gamma > 0.0 && gamma.is_finite() && here.k % 10 != 0 => gamma,
+            Some(gamma) if gamma > 0.0 && gamma.is_finite() && !here.k.is_multiple_of(10) => gamma,
             _ => LineSearch.gamma(here)?,
         };
         let z = here.sweep.correction.states.clone();
