@@ -115,7 +115,8 @@ fn bodies_that_never_touch_are_solved_once() {
     assert_eq!(run.count("body_solves_skipped"), 2 * (sweeps - 1));
     // the start, then K
     assert_eq!(counts(&run, ["factorizations", "robin_updates"]), [4, 4]);
-    assert_eq!(counts(&direct, ["iterations", "body_solves_skipped"]), [1, 2]);
+    // with gamma = 1 all that is left is rounding, which is nobody's multiple
+    assert_eq!(counts(&direct, ["iterations", "body_solves_skipped"]), [1, 0]);
     let (skipped, solved) = (run.contact(), direct.contact());
     for column in ["u_n_lower", "u_n_upper", "compression"] {
         assert!(distance(&skipped[column], &solved[column]) < 1e-4, "{column}");
