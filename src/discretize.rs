@@ -54,6 +54,11 @@ pub struct BodyInfo {
     pub left_by_all: Vec<String>,
     /// Names of the rigid motions without work that a gauge fixes at one node each.
     pub gauged: Vec<String>,
+    /// Stiffness of the body against a uniform contact pressure, per area: modulus over depth (area or volume over the length
+    /// or area of its contact surfaces); zero if supports leave it a motion that contact feels.
+    pub stiffness: f64,
+    /// Sum of its loads.
+    pub load: [f64; 3],
     /// Rank that owns the body.
     pub rank: usize,
     field: FieldMaker,
@@ -127,6 +132,11 @@ pub fn discretize<const D: usize>(
             row_stiffness: Vec::new(),
             motions,
         };
+        let resultant = std::array::from_fn(|c| if c < D { load.iter().skip(c).step_by(D).sum() } else { 0.0 });
+        let surface: f64 = slot.segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
+        let modulus = part.spec.young.value / (1.0 - part.spec.poisson.value.powi(2));
+        let held = slot.motions.len() == gauge::felt_by_none(&slot.motions).len();
+        let stiffness = if held && surface > 0.0 { modulus * surface / part.space.measure() } else { 0.0 };
         let material = Material::isotropic(part.spec.young.value, part.spec.poisson.value, D, scene.plane);
         if owner[index] == ranks.0 {
             let body = part.assemble(mesh, &rows, &material, load, prescribed)?;
@@ -150,6 +160,8 @@ pub fn discretize<const D: usize>(
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: gauge::felt_by_none(&slot.motions).into_iter().map(|(name, _)| name).collect(),
             gauged,
+            stiffness,
+            load: resultant,
             rank: owner[index],
             field: field_maker(slot.name.clone(), part.space, material),
         });

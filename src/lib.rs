@@ -18,6 +18,7 @@ pub mod linalg;
 pub mod mesh;
 pub mod output;
 pub mod parallel;
+#[allow(unsafe_code)]
 pub mod petsc;
 pub mod scene;
 pub mod solver;

@@ -1,10 +1,11 @@
 //! `winkler check`: builds everything, solves nothing, says what is there.
 
 use super::run::{self, Clock, Prepared};
-use super::{load, report};
+use super::{load, preflight, report};
 use crate::error::Result;
 use crate::output::{say, sci};
 use crate::petsc::Session;
+use crate::scene::Scene;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -31,18 +32,19 @@ pub fn check(session: &Session, path: PathBuf, overrides: Vec<String>, as_json: 
             value["bodies"][body]["rigid_motions"] = json!(info.left_by_supports);
             value["bodies"][body]["rigid_motions_unheld"] = json!(info.left_by_all);
         }
-        value["pairs"] = pairs(&prepared);
+        value["pairs"] = pairs(&scene, &prepared);
         say(format_args!("{value:#}"));
     } else {
-        print(&scene.title, &prepared, &report::solvers_in_words(&shared.solvers));
+        print(&scene, &prepared, &report::solvers_in_words(&shared.solvers));
     }
     Ok(0)
 }
 
-fn pairs(prepared: &Prepared) -> serde_json::Value {
+fn pairs(scene: &Scene, prepared: &Prepared) -> serde_json::Value {
     let describe = |i: usize| {
         let pair = &prepared.problem.model.pairs[i];
         let (low, high) = gap_range(&pair.gap);
+        let coupling = preflight::coupling(scene, prepared, i);
         json!({
             "surfaces": pair.surfaces,
             "carrier": pair.surfaces[0],
@@ -50,6 +52,9 @@ fn pairs(prepared: &Prepared) -> serde_json::Value {
             "length": pair.weight.iter().sum::<f64>(),
             "gap": [low, high],
             "facets_uncovered": pair.uncovered.0,
+            "mean_pressure": coupling.pressure,
+            "theta": coupling.theta,
+            "expected_sweeps": coupling.sweeps.iter().map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
         })
     };
     (0..prepared.problem.model.pairs.len()).map(describe).collect()
@@ -59,8 +64,8 @@ fn gap_range(gap: &[f64]) -> (f64, f64) {
     (gap.iter().copied().fold(f64::INFINITY, f64::min), gap.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
-fn print(title: &str, prepared: &Prepared, solvers: &str) {
-    say(format_args!("{title}"));
+fn print(scene: &Scene, prepared: &Prepared, solvers: &str) {
+    say(&scene.title);
     for info in &prepared.problem.bodies {
         say(format_args!(
             "  body {}: {} cells, {} nodes, {} dofs, {} of them supported",
@@ -73,7 +78,7 @@ fn print(title: &str, prepared: &Prepared, solvers: &str) {
             say(format_args!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")));
         }
     }
-    for pair in &prepared.problem.model.pairs {
+    for (i, pair) in prepared.problem.model.pairs.iter().enumerate() {
         let (low, high) = gap_range(&pair.gap);
         say(format_args!(
             "  contact {} - {}: {} points on {}, length {:.6}, gap {} to {}",
@@ -84,6 +89,14 @@ fn print(title: &str, prepared: &Prepared, solvers: &str) {
             pair.weight.iter().sum::<f64>(),
             sci(low, 3),
             sci(high, 3)
+        ));
+        let coupling = preflight::coupling(scene, prepared, i);
+        say(format_args!(
+            "    mean pressure {}, theta {:.3} and {:.3}; sweeps to expect for a residual of 1e-8: {}",
+            sci(coupling.pressure, 3),
+            coupling.theta[0],
+            coupling.theta[1],
+            coupling.sweeps.iter().map(|(method, count)| format!("{method} {count:.0}")).collect::<Vec<_>>().join(", ")
         ));
     }
     say(format_args!("  inner solver: {} ({})", solvers, prepared.choice));

@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod method;
+pub mod preflight;
 pub mod report;
 pub mod run;
 pub mod solve;

@@ -87,6 +87,22 @@ impl<const D: usize> Space<D> {
         self.cells.len() / self.stride
     }
 
+    /// Area (volume) of all cells, by their corners.
+    pub fn measure(&self) -> f64 {
+        let simplex = |i: usize| {
+            let x = self.cell_nodes(i);
+            let edge = |j: usize| -> [f64; D] { std::array::from_fn(|c| x[j][c] - x[0][c]) };
+            let (a, b) = (edge(1), edge(2));
+            if D == 2 {
+                return 0.5 * (a[0] * b[1] - a[1] * b[0]).abs();
+            }
+            let c = edge(3);
+            let normal = [0, 1, 2].map(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
+            (0..3).map(|i| normal[i] * c[i]).sum::<f64>().abs() / 6.0
+        };
+        (0..self.cell_count()).map(simplex).sum()
+    }
+
     /// Coordinates of the nodes of cell `i`.
     pub fn cell_nodes(&self, i: usize) -> Vec<[f64; D]> {
         self.cells[i * self.stride..(i + 1) * self.stride].iter().map(|&node| self.nodes[node as usize]).collect()

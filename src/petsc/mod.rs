@@ -20,7 +20,6 @@
 //! assert!((x[0] - 1.0).abs() < 1e-12 && (x[1] - 1.0).abs() < 1e-12);
 //! # Ok::<(), winkler::error::Error>(())
 //! ```
-#![allow(unsafe_code)]
 
 mod arrays;
 mod blas;

@@ -1,0 +1,74 @@
+//! What can be said before the first sweep: how strongly the bodies of a pair are coupled, and what that costs each method.
+//!
+//! A mode of the interface with body stiffness k and layer tangent kappa has theta = kappa/(k + kappa); the pair has
+//! theta = sqrt(theta_a theta_b). The plain iteration has the error factors 1 - gamma (1 +- theta), conjugate gradients over
+//! the same sweep the condition (1 + theta)/(1 - theta). The estimate takes the stiffest single mode that is known without a
+//! solve, uniform pressure, at the pressure that the loads would give if they were spread evenly: an order of magnitude.
+
+use super::run::Prepared;
+use crate::contact::ContactPair;
+use crate::scene::{Gamma, Scene};
+
+/// Estimates for a pair.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coupling {
+    /// Mean pressure that the loads give.
+    pub pressure: f64,
+    /// theta of side a and side b.
+    pub theta: [f64; 2],
+    /// Expected sweeps to a relative residual of 1e-8: method and number; infinite where the estimate sees no convergence.
+    pub sweeps: Vec<(&'static str, f64)>,
+}
+
+/// Digits that the estimates are for: ln(1e8).
+const DIGITS: f64 = 18.42;
+
+/// The coupling of pair `i`.
+pub fn coupling(scene: &Scene, prepared: &Prepared, i: usize) -> Coupling {
+    let pair = &prepared.problem.model.pairs[i];
+    let length: f64 = pair.weight.iter().sum();
+    let pushed = |body: usize| {
+        let load = prepared.problem.bodies[body].load;
+        let normal: [f64; 3] =
+            std::array::from_fn(|c| (0..pair.len()).map(|q| pair.weight[q] * pair.normal[q][c]).sum());
+        let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+        (0..3).map(|c| load[c] * normal[c]).sum::<f64>().abs() / size.max(f64::MIN_POSITIVE)
+    };
+    let pressure = pair.bodies.map(pushed).into_iter().fold(0.0, f64::max) / length;
+    let tangent = tangent_at(pair, pressure);
+    let theta = pair.bodies.map(|body| {
+        let stiffness = prepared.problem.bodies[body].stiffness;
+        if tangent == 0.0 { 0.0 } else { tangent / (stiffness + tangent) }
+    });
+    let both = (theta[0] * theta[1]).sqrt();
+    let gamma = match scene.method.gamma {
+        Gamma::Stationary(gamma) => gamma,
+        _ => 1.0,
+    };
+    let factor = (1.0 - gamma * (1.0 - both)).abs().max((1.0 - gamma * (1.0 + both)).abs());
+    let relaxed = if factor < 1.0 { (DIGITS / -factor.ln()).max(2.0) } else { f64::INFINITY };
+    let condition = (1.0 + both) / (1.0 - both);
+    let gradients = if both < 1.0 { (0.5 * condition.sqrt() * (DIGITS + 0.7)).max(2.0) } else { f64::INFINITY };
+    let sweeps = vec![("robin", relaxed), ("ncg", gradients), ("newton-robin", 1.5 * gradients + 5.0), ("newton", 6.0)];
+    Coupling { pressure, theta, sweeps }
+}
+
+/// p' of the layer (at the pair's first point) where it carries `pressure`.
+fn tangent_at(pair: &ContactPair, pressure: f64) -> f64 {
+    if pressure <= 0.0 {
+        return 0.0;
+    }
+    let (mut low, mut high) = (0.0, f64::MIN_POSITIVE.sqrt());
+    while pair.law.response(0, high).pressure < pressure {
+        low = high;
+        high *= 4.0;
+        if !high.is_finite() {
+            return 0.0;
+        }
+    }
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if pair.law.response(0, middle).pressure < pressure { low = middle } else { high = middle }
+    }
+    pair.law.response(0, high).tangent
+}
