@@ -256,7 +256,7 @@ impl Watch {
             return Verdict::End(Status::Cycle { period });
         }
         let stalled = self.floor.is_suspected(row.residual);
-        if stalled && is_rounding(model, iterate, layer, sweep) {
+        if stalled && row.residual <= BELIEVABLE && is_rounding(model, iterate, layer, sweep) {
             return Verdict::End(Status::Attainable);
         }
         if row.iteration >= stop.iterations {
@@ -265,6 +265,9 @@ impl Watch {
         if stalled { Verdict::Stalled } else { Verdict::Go }
     }
 }
+
+/// Largest residual that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
+const BELIEVABLE: f64 = 1e-4;
 
 /// Whether the residual is no larger than what rounding alone can make.
 fn is_rounding(model: &Model, iterate: &Field, layer: &Layer, sweep: &Sweep) -> bool {
