@@ -122,7 +122,8 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         (row.iteration, row.sweeps, row.seconds) = (k, sweeper.sweeps, clock.elapsed().as_secs_f64());
         row.factorizations += method.factorizations();
         row.error = row.residual * method.amplification().sqrt();
-        let judged = watch.judge(model, &settings.stop, &row, &iterate, &layer, &sweep);
+        let steady = last.as_ref().is_none_or(|last| is_steady(&last.pressure, &layer.pressure, &settings.stop));
+        let judged = watch.judge(model, &settings.stop, &row, &iterate, &layer, &sweep, steady);
         observer.row(&row);
         let residual = row.residual;
         rows.push(row);
@@ -143,12 +144,12 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
             Step::Sweep(gamma) => {
                 iterate.add(gamma, &sweep.correction);
                 let moved = sweep.correction.trace.iter().map(|t| gamma * t).collect();
-                Some(Last { sweep, gamma: Some(gamma), length: gamma, moved })
+                Some(Last { sweep, gamma: Some(gamma), length: gamma, moved, pressure: layer.pressure.clone() })
             }
             Step::Along(direction, length) => {
                 iterate.add(length, &direction);
                 let moved = direction.trace.iter().map(|t| length * t).collect();
-                Some(Last { sweep, gamma: None, length, moved })
+                Some(Last { sweep, gamma: None, length, moved, pressure: layer.pressure.clone() })
             }
         };
     };
@@ -175,6 +176,8 @@ struct Last {
     length: f64,
     /// Change of the traces.
     moved: Vec<f64>,
+    /// Pressures before it.
+    pressure: Vec<f64>,
 }
 
 /// What is to be done after an iterate was measured.
@@ -236,6 +239,7 @@ impl Watch {
         iterate: &Field,
         layer: &Layer,
         sweep: &Sweep,
+        steady: bool,
     ) -> Verdict {
         let broken = |body: &usize| {
             let finite = |value: f64| value.is_finite();
@@ -248,7 +252,8 @@ impl Watch {
         if let Some((body, reason)) = &sweep.failed {
             return Verdict::End(Status::InnerSolver { body: *body, reason: reason.clone() });
         }
-        if stop.is_met(row.residual, row.increment) {
+        let met = stop.is_met(row.residual, row.increment);
+        if met && steady {
             return Verdict::End(Status::Converged);
         }
         let closed = layer.compression.iter().map(|&c| c > 0.0);
@@ -256,6 +261,9 @@ impl Watch {
             return Verdict::End(Status::Cycle { period });
         }
         let stalled = self.floor.is_suspected(row.residual);
+        if stalled && met {
+            return Verdict::End(Status::Attainable);
+        }
         if stalled && row.residual <= BELIEVABLE && is_rounding(model, iterate, layer, sweep) {
             return Verdict::End(Status::Attainable);
         }
@@ -264,6 +272,14 @@ impl Watch {
         }
         if stalled { Verdict::Stalled } else { Verdict::Go }
     }
+}
+
+/// Whether the last step changed no pressure by more than ten times the residual that is asked for, relative to the largest.
+/// The residual is one of energies: where a layer is stiff, or hardly holds a body, it sees too little of the pressure.
+fn is_steady(before: &[f64], now: &[f64], stop: &StopRule) -> bool {
+    let Some(tolerance) = stop.residual else { return true };
+    let peak = now.iter().copied().fold(0.0, f64::max);
+    before.iter().zip(now).all(|(before, now)| (now - before).abs() <= 10.0 * tolerance * peak)
 }
 
 /// Largest residual that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
