@@ -123,7 +123,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         row.factorizations += method.factorizations();
         row.error = row.residual * method.amplification().sqrt();
         let steady = last.as_ref().is_none_or(|last| is_steady(&last.pressure, &layer.pressure, &settings.stop));
-        let judged = watch.judge(model, &settings.stop, &row, &iterate, &layer, &sweep, steady);
+        let judged = watch.judge(model, &settings.stop, &row, &iterate, &layer, &sweep, steady, imbalance(model, &iterate, &layer, &weight, &sweep));
         observer.row(&row);
         let residual = row.residual;
         rows.push(row);
@@ -240,6 +240,7 @@ impl Watch {
         layer: &Layer,
         sweep: &Sweep,
         steady: bool,
+        imbalance: f64,
     ) -> Verdict {
         let broken = |body: &usize| {
             let finite = |value: f64| value.is_finite();
@@ -253,7 +254,8 @@ impl Watch {
             return Verdict::End(Status::InnerSolver { body: *body, reason: reason.clone() });
         }
         let met = stop.is_met(row.residual, row.increment);
-        if met && steady {
+        let balanced = stop.residual.is_none_or(|tolerance| imbalance <= 10.0 * tolerance);
+        if met && steady && balanced {
             return Verdict::End(Status::Converged);
         }
         let closed = layer.compression.iter().map(|&c| c > 0.0);
@@ -261,10 +263,10 @@ impl Watch {
             return Verdict::End(Status::Cycle { period });
         }
         let stalled = self.floor.is_suspected(row.residual);
-        if stalled && met {
+        if stalled && met && imbalance <= UNBALANCED {
             return Verdict::End(Status::Attainable);
         }
-        if stalled && row.residual <= BELIEVABLE && is_rounding(model, iterate, layer, sweep) {
+        if stalled && imbalance <= UNBALANCED && row.residual <= BELIEVABLE && is_rounding(model, iterate, layer, sweep) {
             return Verdict::End(Status::Attainable);
         }
         if row.iteration >= stop.iterations {
@@ -280,6 +282,32 @@ fn is_steady(before: &[f64], now: &[f64], stop: &StopRule) -> bool {
     let Some(tolerance) = stop.residual else { return true };
     let peak = now.iter().copied().fold(0.0, f64::max);
     before.iter().zip(now).all(|(before, now)| (now - before).abs() <= 10.0 * tolerance * peak)
+}
+
+/// Largest share of its contact forces that a body may lack in balance where rounding allows no less.
+const UNBALANCED: f64 = 1e-3;
+
+/// What the forces on a body lack in balance, as a share of those of its contacts, the most over all rigid motions that
+/// supports leave free.
+///
+/// For such a motion m, K m = 0, so that m'r = m'G z = sum weight m z on the contact rows. The residual sees too little of
+/// this where a Robin term much stiffer than the layer holds the body.
+fn imbalance(model: &Model, iterate: &Field, layer: &Layer, weight: &[f64], sweep: &Sweep) -> f64 {
+    let mut most = 0.0f64;
+    for (index, slot) in model.bodies.iter().enumerate() {
+        let (weight, z) = (model.of_body(index, weight), model.of_body(index, &sweep.correction.trace));
+        let (force, u) = (model.at_rows(index, &layer.force), model.of_body(index, &iterate.trace));
+        let size = u.iter().fold(0.0f64, |max, u| max.max(u.abs()));
+        let rounding = f64::EPSILON * slot.scale * size;
+        for motion in &slot.motions {
+            let lacking: f64 = (0..z.len()).map(|q| weight[q] * motion.trace[q] * z[q]).sum();
+            let acting: f64 = (0..z.len()).map(|q| force[q] * motion.trace[q].abs()).sum();
+            if lacking.abs() > rounding {
+                most = most.max(lacking.abs() / acting);
+            }
+        }
+    }
+    most
 }
 
 /// Largest residual that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
