@@ -103,15 +103,21 @@ fn run(arguments: &Arguments) -> Result<bool> {
             let wrong = matches!(verdict, Verdict::Wrong(_));
             sound &= !wrong && (name != "auto" || verdict != Verdict::Failed);
             if arguments.only.is_some() {
-                println!("{name}: {verdict:?}: {} iterations, {} sweeps; {}", answer.iterations, answer.sweeps, answer.message);
+                println!(
+                    "{name}: {verdict:?}: {} iterations, {} sweeps; {}",
+                    answer.iterations, answer.sweeps, answer.message
+                );
             }
             if wrong || verdict == Verdict::Failed {
                 let why = match &verdict {
-                    Verdict::Wrong(why) => format!("WRONG, {why}"),
+                    Verdict::Wrong(why) => format!("WRONG ({why})"),
                     _ => answer.status.clone(),
                 };
-                let peak = runs::peak(&reference) / case.pressure;
-                let line = format!("{index} {name}: {why}, peak {peak:.1e}, residual {:.1e}, {} sweeps: {}", answer.residual, answer.sweeps, answer.message);
+                let (peak, off) = (runs::peak(&reference) / case.pressure, runs::difference(&case, &reference, answer));
+                let line = format!(
+                    "{index} {name}: {why}, peak {peak:.1e}, pressure {off:.1e} off, residual {:.1e}, {} sweeps: {}",
+                    answer.residual, answer.sweeps, answer.message
+                );
                 eprintln!("{line}");
                 failures.push((index, name.clone(), line, case.line.clone()));
             }
@@ -135,7 +141,8 @@ fn solve_all(session: &Session, arguments: &Arguments, case: &Case, path: &Path)
         answers.push(runs::by_method(session, path, &Recipe::new(name, case))?);
     }
     if !reference.claims
-        && let Some(best) = answers.iter().filter(|answer| answer.claims).min_by(|a, b| a.residual.total_cmp(&b.residual))
+        && let Some(best) =
+            answers.iter().filter(|answer| answer.claims).min_by(|a, b| a.residual.total_cmp(&b.residual))
     {
         reference = best.clone();
     }
@@ -162,15 +169,26 @@ impl Tally {
 }
 
 fn print(arguments: &Arguments, tallies: &HashMap<&str, Tally>, failures: &[(usize, String, String, String)]) {
-    println!("| method | converged | sweeps: median | worst | iterations: median | worst | factorizations: median | wrong | rest named | seconds |");
+    println!(
+        "| method | converged | sweeps: median | worst | iterations: median | worst | factorizations: median | wrong | rest named | seconds |"
+    );
     println!("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- | ---: |");
     for name in &arguments.methods {
         let Some(tally) = tallies.get(name.as_str()) else { continue };
         let (sweeps, iterations) = (spread(&tally.sweeps), spread(&tally.iterations));
         println!(
             "| {name} | {} of {} | {} | {} | {} | {} | {} | {} | {} of {} | {:.0} |",
-            tally.right, tally.solvable, sweeps.0, sweeps.1, iterations.0, iterations.1,
-            spread(&tally.factorizations).0, tally.wrong, tally.named, tally.unsolvable, tally.seconds
+            tally.right,
+            tally.solvable,
+            sweeps.0,
+            sweeps.1,
+            iterations.0,
+            iterations.1,
+            spread(&tally.factorizations).0,
+            tally.wrong,
+            tally.named,
+            tally.unsolvable,
+            tally.seconds
         );
     }
     let mut last = usize::MAX;

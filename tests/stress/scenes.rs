@@ -208,19 +208,19 @@ pub fn scene(seed: u64, index: usize, meshes: &Path) -> Case {
     let mut pressure_scale = level;
     let mut compliance = 0.0;
     for &([a, b], upright) in between {
-        let stiff = young[random.pick(&[a, b]) - 1];
-        let kappa = random.power_of_ten(-6.0, 6.0) * stiff / shape.height;
+        // kappa h/E from 1e-6 to 1e6 for both bodies
+        let (soft, stiff) = (young[a - 1].min(young[b - 1]), young[a - 1].max(young[b - 1]));
+        let kappa = random.power_of_ten(-6.0 + (stiff / soft).log10(), 6.0) * soft / shape.height;
         let (law, closing) = if random.chance(0.3) {
-            let _ = write!(line, " | kappa {:.1e}", kappa * shape.height / stiff);
+            let _ = write!(line, " | kappa {:.1e}", kappa * shape.height / soft);
             (format!("linear = {{ stiffness = {kappa:e} }}"), level / kappa)
         } else {
             let exponent = random.pick(&[0.1, 0.3, 0.5, 1.0, random_exponent(index)]);
             // p' = p^(1-a) / (a B) = kappa where the pressure is `level`
             let b = level.powf(1.0 - exponent) / (exponent * kappa);
-            let _ = write!(line, " | kappa {:.1e} a {exponent:.2}", kappa * shape.height / stiff);
+            let _ = write!(line, " | kappa {:.1e} a {exponent:.2}", kappa * shape.height / soft);
             (format!("power = {{ B = {b:e}, a = {exponent} }}"), level / (exponent * kappa))
         };
-        let soft = young[a - 1].min(young[b - 1]);
         let shortening = level * shape.height / soft;
         compliance += shortening + closing;
         let (axis, length) = if upright { ("y", shape.height) } else { ("x", shape.width) };
@@ -238,7 +238,14 @@ pub fn scene(seed: u64, index: usize, meshes: &Path) -> Case {
             2 => format!("{depth:e} * (1 - cos(2*pi*{}*{s}))", random.pick(&[0.5, 1.0, 2.0])),
             3 => format!("{depth:e} * {s}"),
             // never touches, where a support holds the blocks; else they fall far, by what rounding leaves of it
-            4 => format!("{:e}", if matches!(hold, Hold::Ends | Hold::Lifted | Hold::Pressed) { 10.0 * shape.height.max(1e2 * (shortening + closing)) } else { 1e3 * (shortening + closing) }),
+            4 => format!(
+                "{:e}",
+                if matches!(hold, Hold::Ends | Hold::Lifted | Hold::Pressed) {
+                    10.0 * shape.height.max(1e2 * (shortening + closing))
+                } else {
+                    1e3 * (shortening + closing)
+                }
+            ),
             _ => {
                 let overlap = (shortening + closing) * random.power_of_ten(-2.0, 0.3);
                 pressure_scale = f64::max(pressure_scale, softest * overlap / shape.height);
@@ -305,7 +312,7 @@ pub fn scene(seed: u64, index: usize, meshes: &Path) -> Case {
             if block == top && hold == Hold::Pressed {
                 let depth = if load == 0.0 { 0.0 } else { compliance };
                 fix.push(on("top", format!("y = {:e}", -depth)));
-                continue_body(&mut text, block, young[block - 1], poisson[block - 1], order[block - 1], &fix, &loads);
+                body(&mut text, block, young[block - 1], poisson[block - 1], order[block - 1], &fix, &loads);
                 continue;
             }
             hanging = true;
@@ -316,7 +323,7 @@ pub fn scene(seed: u64, index: usize, meshes: &Path) -> Case {
                 }
             }
         }
-        continue_body(&mut text, block, young[block - 1], poisson[block - 1], order[block - 1], &fix, &loads);
+        body(&mut text, block, young[block - 1], poisson[block - 1], order[block - 1], &fix, &loads);
     }
     text.push_str(&contacts);
     let expect = match hold {
@@ -345,15 +352,7 @@ fn random_exponent(index: usize) -> f64 {
     (Random::new(7, index).uniform(0.1, 1.0) * 100.0).round() / 100.0
 }
 
-fn continue_body(
-    text: &mut String,
-    block: usize,
-    young: f64,
-    poisson: f64,
-    order: usize,
-    fix: &[String],
-    loads: &[String],
-) {
+fn body(text: &mut String, block: usize, young: f64, poisson: f64, order: usize, fix: &[String], loads: &[String]) {
     let _ = writeln!(text, "\n[[body]]\nname = \"b{block}\"\nyoung = {young:e}\npoisson = {poisson}\norder = {order}");
     let _ = writeln!(text, "fix = [{}]", fix.join(", "));
     if !loads.is_empty() {
