@@ -121,7 +121,8 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         (row.iteration, row.sweeps, row.seconds) = (k, sweeper.sweeps, clock.elapsed().as_secs_f64());
         row.factorizations += method.factorizations();
         row.error = row.residual * method.amplification().sqrt();
-        let judged = watch.judge(model, &settings.stop, &row, &iterate, &layer, &sweep);
+        let steady = last.as_ref().is_none_or(|last| is_steady(&last.pressure, &layer.pressure, &settings.stop));
+        let judged = watch.judge(model, &settings.stop, &row, &iterate, &layer, &sweep, steady, imbalance(model, &iterate, &layer, &weight, &sweep));
         observer.row(&row);
         let residual = row.residual;
         rows.push(row);
@@ -142,12 +143,12 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
             Step::Sweep(gamma) => {
                 iterate.add(gamma, &sweep.correction);
                 let moved = sweep.correction.trace.iter().map(|t| gamma * t).collect();
-                Some(Last { sweep, gamma: Some(gamma), length: gamma, moved })
+                Some(Last { sweep, gamma: Some(gamma), length: gamma, moved, pressure: layer.pressure.clone() })
             }
             Step::Along(direction, length) => {
                 iterate.add(length, &direction);
                 let moved = direction.trace.iter().map(|t| length * t).collect();
-                Some(Last { sweep, gamma: None, length, moved })
+                Some(Last { sweep, gamma: None, length, moved, pressure: layer.pressure.clone() })
             }
         };
     };
@@ -174,6 +175,8 @@ struct Last {
     length: f64,
     /// Change of the traces.
     moved: Vec<f64>,
+    /// Pressures before it.
+    pressure: Vec<f64>,
 }
 
 /// What is to be done after an iterate was measured.
@@ -228,6 +231,8 @@ impl Watch {
         iterate: &Field,
         layer: &Layer,
         sweep: &Sweep,
+        steady: bool,
+        imbalance: f64,
     ) -> Verdict {
         let broken = |body: &usize| {
             let finite = |value: f64| value.is_finite();
@@ -240,7 +245,9 @@ impl Watch {
         if let Some((body, reason)) = &sweep.failed {
             return Verdict::End(Status::InnerSolver { body: *body, reason: reason.clone() });
         }
-        if stop.is_met(row.residual, row.increment) {
+        let met = stop.is_met(row.residual, row.increment);
+        let balanced = stop.residual.is_none_or(|tolerance| imbalance <= 10.0 * tolerance);
+        if met && steady && balanced {
             return Verdict::End(Status::Converged);
         }
         let closed = layer.compression.iter().map(|&c| c > 0.0);
@@ -248,7 +255,10 @@ impl Watch {
             return Verdict::End(Status::Cycle { period });
         }
         let stalled = self.floor.is_suspected(row.residual);
-        if stalled && row.residual <= ROUNDING && is_rounding(model, iterate, layer, sweep) {
+        if stalled && met && imbalance <= UNBALANCED {
+            return Verdict::End(Status::Attainable);
+        }
+        if stalled && imbalance <= UNBALANCED && row.residual <= BELIEVABLE && is_rounding(model, iterate, layer, sweep) {
             return Verdict::End(Status::Attainable);
         }
         if row.iteration >= stop.iterations {
@@ -258,8 +268,42 @@ impl Watch {
     }
 }
 
-/// A relative residual above this is never put down to rounding.
-const ROUNDING: f64 = 1e-5;
+/// Whether the last step changed no pressure by more than ten times the residual that is asked for, relative to the largest.
+/// The residual is one of energies: where a layer is stiff, or hardly holds a body, it sees too little of the pressure.
+fn is_steady(before: &[f64], now: &[f64], stop: &StopRule) -> bool {
+    let Some(tolerance) = stop.residual else { return true };
+    let peak = now.iter().copied().fold(0.0, f64::max);
+    before.iter().zip(now).all(|(before, now)| (now - before).abs() <= 10.0 * tolerance * peak)
+}
+
+/// Largest share of its contact forces that a body may lack in balance where rounding allows no less.
+const UNBALANCED: f64 = 1e-3;
+
+/// What the forces on a body lack in balance, as a share of those of its contacts, the most over all rigid motions that
+/// supports leave free.
+///
+/// For such a motion m, K m = 0, so that m'r = m'G z = sum weight m z on the contact rows. The residual sees too little of
+/// this where a Robin term much stiffer than the layer holds the body.
+fn imbalance(model: &Model, iterate: &Field, layer: &Layer, weight: &[f64], sweep: &Sweep) -> f64 {
+    let mut most = 0.0f64;
+    for (index, slot) in model.bodies.iter().enumerate() {
+        let (weight, z) = (model.of_body(index, weight), model.of_body(index, &sweep.correction.trace));
+        let (force, u) = (model.at_rows(index, &layer.force), model.of_body(index, &iterate.trace));
+        let size = u.iter().fold(0.0f64, |max, u| max.max(u.abs()));
+        let rounding = f64::EPSILON * slot.scale * size;
+        for motion in &slot.motions {
+            let lacking: f64 = (0..z.len()).map(|q| weight[q] * motion.trace[q] * z[q]).sum();
+            let acting: f64 = (0..z.len()).map(|q| force[q] * motion.trace[q].abs()).sum();
+            if lacking.abs() > rounding {
+                most = most.max(lacking.abs() / acting);
+            }
+        }
+    }
+    most
+}
+
+/// Largest residual that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
+const BELIEVABLE: f64 = 1e-4;
 
 /// Whether the residual is no larger than what rounding alone can make.
 fn is_rounding(model: &Model, iterate: &Field, layer: &Layer, sweep: &Sweep) -> bool {

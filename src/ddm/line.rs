@@ -46,6 +46,19 @@ impl<'a> Line<'a> {
         if sum.is_nan() { f64::INFINITY } else { sum }
     }
 
+    /// F1(u + t v) - F1(u); infinite beyond the range of numbers.
+    pub fn change(&self, t: f64) -> f64 {
+        let mut sum = t * (self.slope + 0.5 * t * self.curvature);
+        for (i, pair) in self.model.pairs.iter().enumerate() {
+            for q in self.model.range(i) {
+                let energy = |c: f64| pair.law.response(q - self.model.offset[i], c).energy;
+                let c = self.compression[q];
+                sum += self.model.weight[q] * (energy(c + t * self.closing[q]) - energy(c));
+            }
+        }
+        if sum.is_nan() { f64::INFINITY } else { sum }
+    }
+
     /// The minimiser t >= 0 of F1 along the line, to `accuracy` relative to the derivative at 0; 0 if the line does not
     /// descend.
     ///

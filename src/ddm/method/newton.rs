@@ -1,7 +1,9 @@
 //! Semismooth Newton (35) with exact line search on F1.
 
 use super::{Here, Method, Step, cg};
-use crate::ddm::field::Field;
+use crate::ddm::field::{Field, local_dot};
+use crate::ddm::held;
+use crate::ddm::line::Line;
 use crate::error::Result;
 
 /// How the Newton system is solved.
@@ -51,6 +53,109 @@ impl Newton {
     }
 }
 
+impl Newton {
+    /// Solves (K + B' diag(omega slope) B) x = r; returns x and x'r.
+    fn solve(&mut self, here: &mut Here, slope: &[f64], forcing: f64) -> Result<(Field, f64)> {
+        let weight: Vec<f64> = here.model.weight.iter().zip(slope).map(|(w, k)| w * k).collect();
+        let direct = match &mut self.inner {
+            Inner::Direct(coupled) => coupled.solve(&weight, &here.sweep.residual)?,
+            Inner::Sweep => None,
+        };
+        Ok(match direct {
+            Some(x) => {
+                let mut product = [local_dot(&x.states, &here.sweep.residual)];
+                here.model.exchange.sum(&mut product);
+                (x, product[0])
+            }
+            None => {
+                let solution = cg::solve(here, &weight, forcing, MOST)?;
+                self.spectrum = solution.spectrum.or(self.spectrum);
+                (solution.x, solution.energy)
+            }
+        })
+    }
+
+    /// As `solve`, roughly, for slopes that differ much from the tangents: the bodies get Robin terms that fit them.
+    fn solve_stiffer(&mut self, here: &mut Here, slope: &[f64]) -> Result<Field> {
+        let points = here.model.points();
+        let fit = |i: usize| here.weight[i].max(here.model.weight[i % points] * slope[i % points]);
+        let weight: Vec<f64> = (0..2 * points).map(fit).collect();
+        if matches!(self.inner, Inner::Direct(_)) {
+            return Ok(self.solve(here, slope, ROUGH)?.0);
+        }
+        here.model.robin(&weight)?;
+        let residual = here.sweep.residual.clone();
+        let sweep = here.sweeper.precondition(here.model, residual, &here.sweep.residual)?;
+        let mut there = Here {
+            model: here.model,
+            sweeper: here.sweeper,
+            k: here.k,
+            layer: here.layer,
+            weight: &weight,
+            sweep: &sweep,
+            residual: here.residual,
+            target: here.target,
+        };
+        Ok(self.solve(&mut there, slope, ROUGH)?.0)
+    }
+}
+
+/// Most solves with secants in a step.
+const ROUNDS: usize = 12;
+
+/// Forcing term of solves with secants.
+const ROUGH: f64 = 0.1;
+
+/// A step that is cut to this share of its direction or less comes from a law that stiffens on the way.
+const SHORT: f64 = 0.1;
+
+/// What F1 changes by along a direction.
+fn change(here: &mut Here, direction: &Field, length: f64) -> f64 {
+    Line::new(here.model, here.layer, &here.sweep.residual, direction).change(length)
+}
+
+/// Slopes of the layer from the iterate to where its law gives the pressures that the linear model predicts at the end of
+/// a direction.
+///
+/// A law that stiffens is far too soft at its foot: a direction from its tangent there goes much too far. The predicted
+/// pressure is nearly right all the same, and the secant to it leads there. Any slopes give a direction of descent.
+fn secants(here: &Here, slope: &[f64], direction: &Field) -> Vec<f64> {
+    let closing = direction.closing();
+    let mut secants = slope.to_vec();
+    let points = here.model.points();
+    // stiffness of the bodies' surfaces, where an open point has none to predict with
+    let mut springs = vec![0.0; 2 * points];
+    for body in 0..here.model.bodies.len() {
+        here.model.put(body, &held::natural_springs(here.model, body), &mut springs);
+    }
+    for (i, pair) in here.model.pairs.iter().enumerate() {
+        for q in here.model.range(i) {
+            let law = |c: f64| pair.law.response(q - here.model.offset[i], c).pressure;
+            let (c, p) = (here.layer.compression[q], here.layer.pressure[q]);
+            let end = c + closing[q];
+            // what opens, or follows its line, is modelled well
+            if closing[q] <= 0.0 || end <= 0.0 {
+                continue;
+            }
+            let mut predicted = p + slope[q] * closing[q];
+            if slope[q] == 0.0 {
+                // an open point that closes: at most what the bodies' own stiffness pushes back
+                predicted = end * springs[q].min(springs[points + q]) / here.model.weight[q];
+            }
+            if law(end) <= 1.01 * predicted {
+                continue;
+            }
+            let (mut low, mut high) = (c.max(0.0), end);
+            for _ in 0..100 {
+                let middle = 0.5 * (low + high);
+                if law(middle) < predicted { low = middle } else { high = middle }
+            }
+            secants[q] = (predicted - p) / (high - c);
+        }
+    }
+    secants
+}
+
 impl Method for Newton {
     fn name(&self) -> &'static str {
         match self.inner {
@@ -61,32 +166,35 @@ impl Method for Newton {
 
     fn step(&mut self, here: &mut Here) -> Result<Step> {
         let forcing = self.forcing(here);
-        let weight: Vec<f64> = here.model.weight.iter().zip(&here.layer.tangent).map(|(w, k)| w * k).collect();
-        let direct = match &mut self.inner {
-            Inner::Direct(coupled) => coupled.solve(&weight, &here.sweep.residual)?,
-            Inner::Sweep => None,
-        };
-        let (direction, energy) = match direct {
-            Some(x) => {
-                let mut product = [crate::ddm::field::local_dot(&x.states, &here.sweep.residual)];
-                here.model.exchange.sum(&mut product);
-                (x, product[0])
-            }
-            None => {
-                let solution = cg::solve(here, &weight, forcing, MOST)?;
-                self.spectrum = solution.spectrum.or(self.spectrum);
-                (solution.x, solution.energy)
-            }
-        };
+        let tangent = here.layer.tangent.clone();
+        let (mut direction, energy) = self.solve(here, &tangent, forcing)?;
         self.amplification = (energy / here.decrement()).max(1.0);
-        Ok(match here.search(&direction) {
-            Ok(0.0) => match here.search(&here.sweep.correction.clone()) {
+        let Ok(mut length) = here.search(&direction) else { return Ok(Step::Unbounded) };
+        let mut slope = tangent;
+        let mut best = change(here, &direction, length);
+        let mut last = direction.clone();
+        for _ in 0..ROUNDS {
+            if length > SHORT {
+                break;
+            }
+            slope = secants(here, &slope, &last);
+            last = self.solve_stiffer(here, &slope)?;
+            let Ok(other) = here.search(&last) else { break };
+            let gain = change(here, &last, other);
+            if gain < best {
+                (best, length, direction) = (gain, other, last.clone());
+            }
+            if other > SHORT {
+                break;
+            }
+        }
+        if length == 0.0 {
+            return Ok(match here.search(&here.sweep.correction.clone()) {
                 Ok(gamma) => Step::Sweep(gamma),
                 Err(_) => Step::Unbounded,
-            },
-            Ok(length) => Step::Along(direction, length),
-            Err(_) => Step::Unbounded,
-        })
+            });
+        }
+        Ok(Step::Along(direction, length))
     }
 
     fn factorizations(&self) -> usize {

@@ -1,0 +1,209 @@
+//! Random scenes of the box V9 by every method, as a Markdown table with every failure below. `scripts/stress --help`.
+
+#[path = "../tests/stress/random.rs"]
+mod random;
+#[path = "../tests/stress/runs.rs"]
+mod runs;
+#[path = "../tests/stress/scenes.rs"]
+mod scenes;
+
+use clap::Parser;
+use runs::{Answer, NAMES, Recipe, Verdict};
+use scenes::{Case, Expect};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use winkler::error::{Error, Kind, Result};
+use winkler::petsc::Session;
+
+/// Runs random scenes by every method and compares the pressures with those of Newton's method.
+///
+/// Exits with 1 if the default method fails on a scene that has a solution, or if any method is wrong.
+#[derive(Parser)]
+#[command(name = "scripts/stress")]
+struct Arguments {
+    /// Number of scenes
+    #[arg(long, default_value_t = 500)]
+    scenes: usize,
+    /// First scene of the series
+    #[arg(long, default_value_t = 0)]
+    first: usize,
+    /// Seed of the series
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Methods, separated by commas; a number is a stationary gamma, `any` the scene's own
+    #[arg(long, value_delimiter = ',', default_values_t = NAMES.map(String::from))]
+    methods: Vec<String>,
+    /// This scene alone
+    #[arg(long, value_name = "INDEX")]
+    only: Option<usize>,
+    /// Writes the scene files into this folder
+    #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "stress-scenes")]
+    keep: Option<PathBuf>,
+}
+
+/// What a method did on all scenes.
+#[derive(Default)]
+struct Tally {
+    sweeps: Vec<usize>,
+    iterations: Vec<usize>,
+    factorizations: Vec<usize>,
+    right: usize,
+    solvable: usize,
+    named: usize,
+    unsolvable: usize,
+    wrong: usize,
+    seconds: f64,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprint!("{}", error.render(false));
+            ExitCode::from(error.kind().exit_code() as u8)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<bool> {
+    let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes");
+    let scratch = tempfile::tempdir().map_err(|cause| Error::file(&std::env::temp_dir(), "write", &cause))?;
+    let folder = arguments.keep.as_deref().unwrap_or(scratch.path());
+    std::fs::create_dir_all(folder).map_err(|cause| Error::file(folder, "create", &cause))?;
+    for name in &arguments.methods {
+        let gamma = name.parse::<f64>().is_ok_and(|gamma| gamma > 0.0);
+        if !gamma && !NAMES.contains(&name.as_str()) {
+            let help = format!("it is a number or one of {}", NAMES.join(", "));
+            return Err(Error::new(Kind::Usage, format!("unknown method `{name}`")).help(help));
+        }
+    }
+    let session = Session::start(&[])?;
+    let indices = match arguments.only {
+        Some(index) => index..index + 1,
+        None => arguments.first..arguments.first + arguments.scenes,
+    };
+    let mut tallies: HashMap<&str, Tally> = HashMap::new();
+    let mut failures = Vec::new();
+    let mut sound = true;
+    for index in indices {
+        let case = scenes::scene(arguments.seed, index, &meshes);
+        let path = folder.join(format!("scene-{}-{index}.toml", arguments.seed));
+        let text = format!("# {}\n{}", case.line, case.text);
+        std::fs::write(&path, text).map_err(|cause| Error::file(&path, "write", &cause))?;
+        if arguments.keep.is_some() {
+            println!("{}", path.display());
+        }
+        let (reference, answers) = solve_all(&session, arguments, &case, &path)?;
+        for (name, answer) in arguments.methods.iter().zip(&answers) {
+            let verdict = runs::judge(&case, &reference, answer);
+            let solvable = case.expect == Expect::Solution && verdict != Verdict::Named;
+            tallies.entry(name).or_default().take(answer, &verdict, solvable);
+            let wrong = matches!(verdict, Verdict::Wrong(_));
+            sound &= !wrong && (name != "auto" || verdict != Verdict::Failed);
+            if arguments.only.is_some() {
+                println!(
+                    "{name}: {verdict:?}: {} iterations, {} sweeps; {}",
+                    answer.iterations, answer.sweeps, answer.message
+                );
+            }
+            if wrong || verdict == Verdict::Failed {
+                let why = match &verdict {
+                    Verdict::Wrong(why) => format!("WRONG ({why})"),
+                    _ => answer.status.clone(),
+                };
+                let (peak, off) = (runs::peak(&reference) / case.pressure, runs::difference(&case, &reference, answer));
+                let line = format!(
+                    "{index} {name}: {why}, peak {peak:.1e}, pressure {off:.1e} off, residual {:.1e}, {} sweeps: {}",
+                    answer.residual, answer.sweeps, answer.message
+                );
+                eprintln!("{line}");
+                failures.push((index, name.clone(), line, case.line.clone()));
+            }
+        }
+        if !reference.claims && case.expect == Expect::Solution && !reference.status.starts_with("un") {
+            eprintln!("{index} reference: {} residual {:.1e}", reference.message, reference.residual);
+        }
+        if index % 50 == 49 {
+            eprintln!("{} scenes done", index + 1);
+        }
+    }
+    print(arguments, &tallies, &failures);
+    Ok(sound)
+}
+
+/// The reference, then every method. Without a reference that claims to be one, the best answer is.
+fn solve_all(session: &Session, arguments: &Arguments, case: &Case, path: &Path) -> Result<(Answer, Vec<Answer>)> {
+    let mut reference = runs::reference(session, path, case)?;
+    let mut answers = Vec::new();
+    for name in &arguments.methods {
+        answers.push(runs::by_method(session, path, &Recipe::new(name, case))?);
+    }
+    if !reference.claims
+        && let Some(best) =
+            answers.iter().filter(|answer| answer.claims).min_by(|a, b| a.residual.total_cmp(&b.residual))
+    {
+        reference = best.clone();
+    }
+    Ok((reference, answers))
+}
+
+impl Tally {
+    fn take(&mut self, answer: &Answer, verdict: &Verdict, solvable: bool) {
+        self.seconds += answer.seconds;
+        self.wrong += usize::from(matches!(verdict, Verdict::Wrong(_)));
+        if !solvable {
+            self.unsolvable += 1;
+            self.named += usize::from(matches!(verdict, Verdict::Named | Verdict::Right));
+            return;
+        }
+        self.solvable += 1;
+        if *verdict == Verdict::Right {
+            self.right += 1;
+            self.sweeps.push(answer.sweeps);
+            self.iterations.push(answer.iterations);
+            self.factorizations.push(answer.factorizations);
+        }
+    }
+}
+
+fn print(arguments: &Arguments, tallies: &HashMap<&str, Tally>, failures: &[(usize, String, String, String)]) {
+    println!(
+        "| method | converged | sweeps: median | worst | iterations: median | worst | factorizations: median | wrong | rest named | seconds |"
+    );
+    println!("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- | ---: |");
+    for name in &arguments.methods {
+        let Some(tally) = tallies.get(name.as_str()) else { continue };
+        let (sweeps, iterations) = (spread(&tally.sweeps), spread(&tally.iterations));
+        println!(
+            "| {name} | {} of {} | {} | {} | {} | {} | {} | {} | {} of {} | {:.0} |",
+            tally.right,
+            tally.solvable,
+            sweeps.0,
+            sweeps.1,
+            iterations.0,
+            iterations.1,
+            spread(&tally.factorizations).0,
+            tally.wrong,
+            tally.named,
+            tally.unsolvable,
+            tally.seconds
+        );
+    }
+    let mut last = usize::MAX;
+    for (index, _, line, scene) in failures {
+        if *index != last {
+            println!("\n`scripts/stress --seed {} --only {index} --keep`: {scene}\n", arguments.seed);
+            last = *index;
+        }
+        println!("- {line}");
+    }
+}
+
+/// Median and largest.
+fn spread(values: &[usize]) -> (usize, usize) {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable();
+    (sorted.get(sorted.len() / 2).copied().unwrap_or(0), sorted.last().copied().unwrap_or(0))
+}

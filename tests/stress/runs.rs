@@ -1,0 +1,211 @@
+//! One scene by one method, and what to think of the answer.
+
+use crate::scenes::{Case, Expect};
+use std::path::Path;
+use winkler::commands::report;
+use winkler::commands::run::{self, Clock};
+use winkler::ddm::{Silent, Status};
+use winkler::error::Result;
+use winkler::petsc::Session;
+use winkler::scene;
+use winkler::solver::options;
+
+/// Relative residual that methods are asked for.
+const RESIDUAL: f64 = 1e-8;
+/// Relative residual of the reference.
+const REFERENCE: f64 = 1e-11;
+/// Pressures that differ by more, relative to the largest, are wrong.
+const TOLERANCE: f64 = 1e-6;
+
+/// A method with the words that choose it in a scene.
+#[derive(Debug, Clone)]
+pub struct Recipe {
+    /// Name in the table.
+    pub name: String,
+    /// `[method]` as a value of TOML; without braces, and without the stop rule.
+    pub words: String,
+    /// Most iterations; the program's own limit if none.
+    pub limit: Option<usize>,
+}
+
+/// Every method, by the name in the table. `any` is robin with the scene's own gamma.
+pub const NAMES: [&str; 11] = [
+    "auto",
+    "newton-robin",
+    "newton",
+    "ncg",
+    "anderson",
+    "line-search",
+    "aitken",
+    "barzilai-borwein",
+    "spectral",
+    "0.6",
+    "any",
+];
+
+impl Recipe {
+    /// The method of a name, for a scene.
+    pub fn new(name: &str, case: &Case) -> Self {
+        let robin = |gamma: String| (format!("name = \"robin\", robin = \"auto\", gamma = {gamma}"), Some(300));
+        let (words, limit) = match name {
+            "auto" => (String::new(), None),
+            "newton-robin" | "newton" => (format!("name = \"{name}\""), Some(500)),
+            "ncg" | "anderson" => (format!("name = \"{name}\""), Some(300)),
+            "line-search" | "aitken" | "barzilai-borwein" | "spectral" => robin(format!("\"{name}\"")),
+            "any" => robin(format!("{}", case.gamma)),
+            number => robin(number.to_owned()),
+        };
+        Self { name: name.to_owned(), words, limit }
+    }
+
+    /// The key `method` of the scene.
+    pub fn value(&self, residual: f64) -> String {
+        let mut parts = Vec::new();
+        if !self.words.is_empty() {
+            parts.push(self.words.clone());
+        }
+        let limit = self.limit.map_or(String::new(), |limit| format!(", iterations = {limit}"));
+        parts.push(format!("stop = {{ residual = {residual:e}{limit} }}"));
+        format!("{{ {} }}", parts.join(", "))
+    }
+}
+
+/// What a run gave.
+#[derive(Debug, Clone, Default)]
+pub struct Answer {
+    /// Name of the status; `refused` if the program refused the scene.
+    pub status: String,
+    /// The status in words.
+    pub message: String,
+    /// Relative residual at the end.
+    pub residual: f64,
+    /// Updates.
+    pub iterations: usize,
+    /// Sweeps.
+    pub sweeps: usize,
+    /// Numeric factorisations.
+    pub factorizations: usize,
+    /// Seconds.
+    pub seconds: f64,
+    /// Contact pressure at all points.
+    pub pressure: Vec<f64>,
+    /// Force of every contact.
+    pub force: Vec<f64>,
+    /// Whether the run says that this is the solution.
+    pub claims: bool,
+}
+
+/// Runs a scene file by a method.
+///
+/// # Errors
+/// Failures of the session that make further runs pointless; a refusal of the scene is an answer.
+pub fn solve(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Result<Answer> {
+    let answer = attempt(session, path, recipe, residual);
+    options::withdraw(session)?;
+    Ok(answer.unwrap_or_else(|error| Answer {
+        status: "refused".to_owned(),
+        message: error.message().to_owned(),
+        residual: f64::NAN,
+        ..Answer::default()
+    }))
+}
+
+fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Result<Answer> {
+    let mut clock = Clock::default();
+    let scene = scene::load(path, &[format!("method={}", recipe.value(residual))])?;
+    let mut prepared = run::prepare(session, &scene, &mut clock)?;
+    run::set_up(session, &mut prepared, &mut clock)?;
+    let outcome = run::iterate(session, &scene, &mut prepared.problem, &mut Silent, &mut clock)?;
+    let seconds = clock.total();
+    let report = report::report(session, &scene, &prepared, &outcome, &clock);
+    let model = &prepared.problem.model;
+    Ok(Answer {
+        status: report.status,
+        message: report.message,
+        residual: report.residual.unwrap_or(f64::NAN),
+        iterations: report.iterations,
+        sweeps: report.sweeps,
+        factorizations: report.factorizations,
+        seconds,
+        force: (0..model.pairs.len()).map(|i| model.range(i).map(|q| outcome.layer.force[q]).sum()).collect(),
+        pressure: outcome.layer.pressure,
+        claims: matches!(outcome.status, Status::Converged | Status::Attainable),
+    })
+}
+
+/// The reference of a scene: Newton with one factorisation of all bodies, to a small residual.
+///
+/// # Errors
+/// As [`solve`].
+pub fn reference(session: &Session, path: &Path, case: &Case) -> Result<Answer> {
+    solve(session, path, &Recipe::new("newton", case), REFERENCE)
+}
+
+/// A scene by a method at the usual accuracy.
+///
+/// # Errors
+/// As [`solve`].
+pub fn by_method(session: &Session, path: &Path, recipe: &Recipe) -> Result<Answer> {
+    solve(session, path, recipe, RESIDUAL)
+}
+
+/// What to think of an answer.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// The solution, and said so.
+    Right,
+    /// No solution, and the status names why.
+    Named,
+    /// The run ended without the solution, or as near as rounding lets it, which is not near.
+    Failed,
+    /// The run says that it has the solution, and it has not; the words say why.
+    Wrong(String),
+}
+
+/// Judges an answer by the reference.
+pub fn judge(case: &Case, reference: &Answer, answer: &Answer) -> Verdict {
+    let named = ["unheld", "unbounded", "refused"].contains(&answer.status.as_str());
+    if !answer.claims {
+        let may = match case.expect {
+            Expect::Solution => floats(case, reference),
+            Expect::Gauge | Expect::Nothing => true,
+        };
+        return if named && may { Verdict::Named } else { Verdict::Failed };
+    }
+    if case.expect == Expect::Nothing {
+        return Verdict::Wrong("there is no solution".to_owned());
+    }
+    // a run that says that rounding stops it makes no promise of accuracy
+    let off_is = |why: String| if answer.status == "attainable" { Verdict::Failed } else { Verdict::Wrong(why) };
+    if let Some(carried) = case.carried {
+        let off = answer.force.iter().map(|force| (force - carried).abs() / carried).fold(0.0, f64::max);
+        if carried > 0.0 && off > TOLERANCE {
+            return off_is(format!("a contact carries a force that is {off:.1e} off"));
+        }
+    }
+    let off = difference(case, reference, answer);
+    if reference.claims && (off.is_nan() || off > TOLERANCE) {
+        return off_is(format!("pressure {off:.1e} off"));
+    }
+    Verdict::Right
+}
+
+/// Largest difference of pressures relative to the largest of the reference.
+pub fn difference(case: &Case, reference: &Answer, answer: &Answer) -> f64 {
+    if reference.pressure.len() != answer.pressure.len() {
+        return f64::NAN;
+    }
+    let pairs = reference.pressure.iter().zip(&answer.pressure);
+    let apart = pairs.map(|(p, q)| (p - q).abs()).fold(0.0, |max, d| if d > max || d.is_nan() { d } else { max });
+    apart / peak(reference).max(1e-6 * case.pressure)
+}
+
+/// Whether a body that contact alone holds touches nothing in the solution.
+fn floats(case: &Case, reference: &Answer) -> bool {
+    case.hanging && peak(reference) == 0.0
+}
+
+/// Largest pressure.
+pub fn peak(answer: &Answer) -> f64 {
+    answer.pressure.iter().copied().fold(0.0, f64::max)
+}
