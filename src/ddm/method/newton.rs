@@ -104,10 +104,10 @@ impl Newton {
 const ROUNDS: usize = 12;
 
 /// Forcing term of solves with secants.
-const ROUGH: f64 = 0.1;
+const ROUGH: f64 = 0.3;
 
 /// A step that is cut to this share of its direction or less comes from a law that stiffens on the way.
-const SHORT: f64 = 0.1;
+const SHORT: f64 = 0.01;
 
 /// What F1 changes by along a direction.
 fn change(here: &mut Here, direction: &Field, length: f64) -> f64 {
