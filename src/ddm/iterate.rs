@@ -122,7 +122,16 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         row.factorizations += method.factorizations();
         row.error = row.residual * method.amplification().sqrt();
         let steady = last.as_ref().is_none_or(|last| is_steady(&last.pressure, &layer.pressure, &settings.stop));
-        let judged = watch.judge(model, &settings.stop, &row, &iterate, &layer, &sweep, steady, imbalance(model, &iterate, &layer, &weight, &sweep));
+        let judged = watch.judge(
+            model,
+            &settings.stop,
+            &row,
+            &iterate,
+            &layer,
+            &sweep,
+            steady,
+            imbalance(model, &iterate, &layer, &weight, &sweep),
+        );
         observer.row(&row);
         let residual = row.residual;
         rows.push(row);
@@ -258,7 +267,8 @@ impl Watch {
         if stalled && met && imbalance <= UNBALANCED {
             return Verdict::End(Status::Attainable);
         }
-        if stalled && imbalance <= UNBALANCED && row.residual <= BELIEVABLE && is_rounding(model, iterate, layer, sweep) {
+        if stalled && imbalance <= UNBALANCED && row.residual <= BELIEVABLE && is_rounding(model, iterate, layer, sweep)
+        {
             return Verdict::End(Status::Attainable);
         }
         if row.iteration >= stop.iterations {

@@ -1,6 +1,6 @@
 //! Quick start of Open MPI without a launcher.
 //!
-//! Alone, Open MPI spends 0.3 s on starting a daemon and searching networks. Three settings spare that; they may hold
+//! Alone, Open MPI spends 0.3 s on starting a daemon and searching networks. Some settings spare that; they may hold
 //! only while MPI starts, since a child process under `mpiexec` would inherit them and break.
 
 use std::env;
@@ -19,8 +19,15 @@ const LAUNCHERS: [&str; 9] = [
 ];
 
 /// What Open MPI is told when it runs alone.
-const ALONE: [(&str, &str); 3] =
-    [("OMPI_MCA_ess_singleton_isolated", "1"), ("OMPI_MCA_pml", "ob1"), ("OMPI_MCA_btl", "self")];
+///
+/// Lone processes all take the same name for their session folder in /tmp; without one they cannot collide when several
+/// start at once.
+const ALONE: [(&str, &str); 4] = [
+    ("OMPI_MCA_ess_singleton_isolated", "1"),
+    ("OMPI_MCA_pml", "ob1"),
+    ("OMPI_MCA_btl", "self"),
+    ("OMPI_MCA_orte_create_session_dirs", "0"),
+];
 
 /// Whether a launcher such as `mpiexec` started this process.
 pub(super) fn seen() -> bool {
