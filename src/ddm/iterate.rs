@@ -300,7 +300,8 @@ fn imbalance(model: &Model, iterate: &Field, layer: &Layer, weight: &[f64], swee
         let (weight, z) = (model.of_body(index, weight), model.of_body(index, &sweep.correction.trace));
         let (force, u) = (model.at_rows(index, &layer.force), model.of_body(index, &iterate.trace));
         let size = u.iter().fold(0.0f64, |max, u| max.max(u.abs()));
-        let rounding = f64::EPSILON * slot.scale * size;
+        // K u is rounded entry by entry, and a motion sums over all of them
+        let rounding = 10.0 * f64::EPSILON * slot.scale * size;
         for motion in &slot.motions {
             let lacking: f64 = (0..z.len()).map(|q| weight[q] * motion.trace[q] * z[q]).sum();
             let acting: f64 = (0..z.len()).map(|q| force[q] * motion.trace[q].abs()).sum();
