@@ -8,8 +8,9 @@ use super::method::{Here, Method, Step};
 use super::model::Model;
 use super::progress::{Observer, Row};
 use super::robin::{Robin, RobinRule};
-use super::stop::{Cycle, Floor, Reference, StopRule, relative_increment};
-use super::sweep::{Sweep, Sweeper};
+use super::stop::StopRule;
+use super::sweep::Sweeper;
+use super::watch::{Last, Seen, Verdict, Watch};
 use super::zone::RobinZone;
 use crate::error::Result;
 use std::time::Instant;
@@ -102,9 +103,9 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     let mut sweeper = Sweeper::default();
     let mut last: Option<Last> = None;
     let mut rows: Vec<Row> = Vec::new();
-    let mut active = 0;
+    let (mut active, mut updates) = (0, 0);
     let (status, layer) = loop {
-        let k = rows.len();
+        let k = updates;
         let layer = Layer::at(model, &iterate.trace);
         let weight = robin.weight(model, &settings.zone, &layer, k);
         if early.is_none() {
@@ -114,28 +115,20 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
             break (status, layer);
         }
         model.robin(&weight)?;
-        let relaxed = last.as_ref().and_then(|last| Some((&last.sweep, last.gamma?)));
+        let relaxed = last.as_ref().filter(|last| last.relaxed).map(|last| (&last.sweep, last.length));
         let sweep = sweeper.sweep(model, &iterate, &layer, &weight, relaxed)?;
-        let method = &mut settings.methods[active];
-        let mut row = watch.measure(model, &iterate, &layer, &sweep, last.as_ref());
+        let method = &settings.methods[active];
+        let seen =
+            Seen { model, iterate: &iterate, layer: &layer, weight: &weight, sweep: &sweep, last: last.as_ref() };
+        let mut row = watch.measure(&seen);
         (row.iteration, row.sweeps, row.seconds) = (k, sweeper.sweeps, clock.elapsed().as_secs_f64());
         row.factorizations += method.factorizations();
         row.error = row.residual * method.amplification().sqrt();
-        let steady = last.as_ref().is_none_or(|last| is_steady(&last.pressure, &layer.pressure, &settings.stop));
-        let judged = watch.judge(
-            model,
-            &settings.stop,
-            &row,
-            &iterate,
-            &layer,
-            &sweep,
-            steady,
-            imbalance(model, &iterate, &layer, &weight, &sweep),
-        );
+        let verdict = watch.judge(&seen, &settings.stop, &row);
         observer.row(&row);
         let residual = row.residual;
         rows.push(row);
-        match judged {
+        match verdict {
             Verdict::End(status) => break (status, layer),
             Verdict::Stalled if active + 1 < settings.methods.len() => {
                 active += 1;
@@ -147,24 +140,21 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         let mut here =
             Here { model, sweeper: &mut sweeper, k, layer: &layer, weight: &weight, sweep: &sweep, residual, target };
         let step = settings.methods[active].step(&mut here)?;
-        last = match step {
+        let (direction, length, relaxed) = match step {
             Step::Unbounded => break (Status::Unbounded, layer),
-            Step::Sweep(gamma) => {
-                iterate.add(gamma, &sweep.correction);
-                let moved = sweep.correction.trace.iter().map(|t| gamma * t).collect();
-                Some(Last { sweep, gamma: Some(gamma), length: gamma, moved, pressure: layer.pressure.clone() })
-            }
-            Step::Along(direction, length) => {
-                iterate.add(length, &direction);
-                let moved = direction.trace.iter().map(|t| length * t).collect();
-                Some(Last { sweep, gamma: None, length, moved, pressure: layer.pressure.clone() })
-            }
+            Step::Sweep(gamma) => (None, gamma, true),
+            Step::Along(direction, length) => (Some(direction), length, false),
         };
+        let direction = direction.as_ref().unwrap_or(&sweep.correction);
+        iterate.add(length, direction);
+        updates += 1;
+        let moved = direction.trace.iter().map(|t| length * t).collect();
+        last = Some(Last { sweep, relaxed, length, moved, pressure: layer.pressure });
     };
     let method = &settings.methods[active];
     Ok(Outcome {
         status,
-        iterations: last.map_or(0, |_| rows.len().saturating_sub(1)),
+        iterations: updates,
         sweeps: sweeper.sweeps,
         solves_skipped: sweeper.solves_skipped,
         iterate,
@@ -174,157 +164,4 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         coupled_factorizations: settings.methods.iter().map(|method| method.factorizations()).sum(),
         spectrum: method.spectrum(),
     })
-}
-
-/// The step that led to an iterate.
-struct Last {
-    sweep: Sweep,
-    /// gamma, if it went along the sweep's correction.
-    gamma: Option<f64>,
-    length: f64,
-    /// Change of the traces.
-    moved: Vec<f64>,
-    /// Pressures before it.
-    pressure: Vec<f64>,
-}
-
-/// What is to be done after an iterate was measured.
-enum Verdict {
-    End(Status),
-    Stalled,
-    Go,
-}
-
-/// Measures each iterate and decides whether to go on.
-#[derive(Default)]
-struct Watch {
-    reference: Reference,
-    floor: Floor,
-    cycle: Cycle,
-}
-
-impl Watch {
-    /// The row of an iterate: residual and F1 from the sweep at it, increments from the `step` that led to it.
-    fn measure(&mut self, model: &Model, iterate: &Field, layer: &Layer, sweep: &Sweep, last: Option<&Last>) -> Row {
-        let strain: f64 = sweep.energy.iter().map(|e| e.strain).sum();
-        let potential: f64 = sweep.energy.iter().map(|e| e.potential).sum();
-        let decrement: f64 = sweep.decrement.iter().sum();
-        let increments: Vec<f64> = (0..model.bodies.len())
-            .map(|body| match last {
-                None => f64::NAN,
-                Some(last) => {
-                    relative_increment(&model.of_body(body, &last.moved), &model.of_body(body, &iterate.trace))
-                }
-            })
-            .collect();
-        Row {
-            residual: self.reference.relative(decrement, strain + layer.work, strain),
-            increment: increments.iter().copied().fold(f64::NAN, f64::max),
-            increments,
-            gamma: last.map_or(f64::NAN, |last| last.length),
-            energy: potential + layer.energy.iter().sum::<f64>(),
-            closed: layer.closed,
-            points: model.points(),
-            factorizations: sweep.factorizations,
-            inner_iterations: sweep.inner_iterations,
-            ..Row::default()
-        }
-    }
-
-    /// Whether the run ends at this iterate, and how.
-    fn judge(
-        &mut self,
-        model: &Model,
-        stop: &StopRule,
-        row: &Row,
-        iterate: &Field,
-        layer: &Layer,
-        sweep: &Sweep,
-        steady: bool,
-        imbalance: f64,
-    ) -> Verdict {
-        let broken = |body: &usize| {
-            let finite = |value: f64| value.is_finite();
-            let trace_is_finite = model.trace_ranges(*body).flatten().all(|i| finite(sweep.correction.trace[i]));
-            !(finite(sweep.decrement[*body]) && finite(sweep.energy[*body].potential) && trace_is_finite)
-        };
-        if let Some(body) = (0..model.bodies.len()).find(broken) {
-            return Verdict::End(Status::NotFinite { body });
-        }
-        if let Some((body, reason)) = &sweep.failed {
-            return Verdict::End(Status::InnerSolver { body: *body, reason: reason.clone() });
-        }
-        let met = stop.is_met(row.residual, row.increment);
-        let balanced = stop.residual.is_none_or(|tolerance| imbalance <= 10.0 * tolerance);
-        if met && steady && balanced {
-            return Verdict::End(Status::Converged);
-        }
-        let closed = layer.compression.iter().map(|&c| c > 0.0);
-        if let Some(period) = self.cycle.period(&iterate.trace, closed, row.residual) {
-            return Verdict::End(Status::Cycle { period });
-        }
-        let stalled = self.floor.is_suspected(row.residual);
-        if stalled && met && imbalance <= UNBALANCED {
-            return Verdict::End(Status::Attainable);
-        }
-        if stalled && imbalance <= UNBALANCED && row.residual <= BELIEVABLE && is_rounding(model, iterate, layer, sweep)
-        {
-            return Verdict::End(Status::Attainable);
-        }
-        if row.iteration >= stop.iterations {
-            return Verdict::End(Status::IterationLimit);
-        }
-        if stalled { Verdict::Stalled } else { Verdict::Go }
-    }
-}
-
-/// Whether the last step changed no pressure by more than ten times the residual that is asked for, relative to the largest.
-/// The residual is one of energies: where a layer is stiff, or hardly holds a body, it sees too little of the pressure.
-fn is_steady(before: &[f64], now: &[f64], stop: &StopRule) -> bool {
-    let Some(tolerance) = stop.residual else { return true };
-    let peak = now.iter().copied().fold(0.0, f64::max);
-    before.iter().zip(now).all(|(before, now)| (now - before).abs() <= 10.0 * tolerance * peak)
-}
-
-/// Largest share of its contact forces that a body may lack in balance where rounding allows no less.
-const UNBALANCED: f64 = 1e-3;
-
-/// What the forces on a body lack in balance, as a share of those of its contacts, the most over all rigid motions that
-/// supports leave free.
-///
-/// For such a motion m, K m = 0, so that m'r = m'G z = sum weight m z on the contact rows. The residual sees too little of
-/// this where a Robin term much stiffer than the layer holds the body.
-fn imbalance(model: &Model, iterate: &Field, layer: &Layer, weight: &[f64], sweep: &Sweep) -> f64 {
-    let mut most = 0.0f64;
-    for (index, slot) in model.bodies.iter().enumerate() {
-        let (weight, z) = (model.of_body(index, weight), model.of_body(index, &sweep.correction.trace));
-        let (force, u) = (model.at_rows(index, &layer.force), model.of_body(index, &iterate.trace));
-        let size = u.iter().fold(0.0f64, |max, u| max.max(u.abs()));
-        // K u is rounded entry by entry, and a motion sums over all of them
-        let rounding = 10.0 * f64::EPSILON * slot.scale * size;
-        for motion in &slot.motions {
-            let lacking: f64 = (0..z.len()).map(|q| weight[q] * motion.trace[q] * z[q]).sum();
-            let acting: f64 = (0..z.len()).map(|q| force[q] * motion.trace[q].abs()).sum();
-            if lacking.abs() > rounding {
-                most = most.max(lacking.abs() / acting);
-            }
-        }
-    }
-    most
-}
-
-/// Largest residual that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
-const BELIEVABLE: f64 = 1e-4;
-
-/// Whether the residual is no larger than what rounding alone can make.
-fn is_rounding(model: &Model, iterate: &Field, layer: &Layer, sweep: &Sweep) -> bool {
-    let mut floor = [0.0];
-    for (index, slot) in model.bodies.iter().enumerate() {
-        if let Some(body) = &slot.local {
-            floor[0] += body.rounding(&iterate.states[index], &model.at_rows(index, &layer.force));
-        }
-    }
-    model.exchange.sum(&mut floor);
-    // the estimate counts each row's worst case once; smooth errors weigh more in G^-1
-    sweep.decrement.iter().sum::<f64>() <= 1e4 * floor[0]
 }

@@ -18,6 +18,7 @@ mod progress;
 pub mod robin;
 pub mod stop;
 pub mod sweep;
+mod watch;
 pub mod zone;
 
 pub use body::{Body, BodyCounts, Energy, Solved};

@@ -1,5 +1,7 @@
 //! One scene by one method, and what to think of the answer.
 
+#![allow(dead_code)] // the example and the test each use their own part
+
 use crate::scenes::{Case, Expect};
 use std::path::Path;
 use winkler::commands::report;

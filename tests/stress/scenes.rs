@@ -1,5 +1,7 @@
 //! Random scenes of the box V9 as scene files.
 
+#![allow(dead_code)] // the example and the test each use their own part
+
 use crate::random::Random;
 use std::fmt::Write;
 use std::path::Path;

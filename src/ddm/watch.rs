@@ -1,0 +1,174 @@
+//! Watches an iteration: measures each iterate, and decides whether it is good enough, hopeless, or to be improved.
+
+use super::field::Field;
+use super::iterate::Status;
+use super::layer::Layer;
+use super::model::Model;
+use super::progress::Row;
+use super::stop::{Cycle, Floor, Reference, StopRule, relative_increment};
+use super::sweep::Sweep;
+
+/// The step that led to an iterate.
+pub(super) struct Last {
+    /// The sweep before it.
+    pub sweep: Sweep,
+    /// Whether it went along the sweep's correction.
+    pub relaxed: bool,
+    /// How far it went along its direction.
+    pub length: f64,
+    /// Change of the traces.
+    pub moved: Vec<f64>,
+    /// Pressures before it.
+    pub pressure: Vec<f64>,
+}
+
+/// An iterate and all that is known of it.
+pub(super) struct Seen<'a> {
+    pub model: &'a Model,
+    pub iterate: &'a Field,
+    pub layer: &'a Layer,
+    /// omega psi kappa of the contact rows.
+    pub weight: &'a [f64],
+    pub sweep: &'a Sweep,
+    /// The step that led here.
+    pub last: Option<&'a Last>,
+}
+
+/// What is to be done after an iterate was measured.
+pub(super) enum Verdict {
+    /// The run ends.
+    End(Status),
+    /// It goes on, but another method may do better.
+    Stalled,
+    /// It goes on.
+    Go,
+}
+
+/// Measures each iterate and decides whether to go on.
+#[derive(Default)]
+pub(super) struct Watch {
+    reference: Reference,
+    floor: Floor,
+    cycle: Cycle,
+}
+
+impl Watch {
+    /// The row of an iterate: residual and F1 from the sweep at it, increments from the `step` that led to it.
+    pub fn measure(&mut self, seen: &Seen) -> Row {
+        let Seen { model, iterate, layer, sweep, last, .. } = *seen;
+        let strain: f64 = sweep.energy.iter().map(|e| e.strain).sum();
+        let potential: f64 = sweep.energy.iter().map(|e| e.potential).sum();
+        let decrement: f64 = sweep.decrement.iter().sum();
+        let increments: Vec<f64> = (0..model.bodies.len())
+            .map(|body| match last {
+                None => f64::NAN,
+                Some(last) => {
+                    relative_increment(&model.of_body(body, &last.moved), &model.of_body(body, &iterate.trace))
+                }
+            })
+            .collect();
+        Row {
+            residual: self.reference.relative(decrement, strain + layer.work, strain),
+            increment: increments.iter().copied().fold(f64::NAN, f64::max),
+            increments,
+            gamma: last.map_or(f64::NAN, |last| last.length),
+            energy: potential + layer.energy.iter().sum::<f64>(),
+            closed: layer.closed,
+            points: model.points(),
+            factorizations: sweep.factorizations,
+            inner_iterations: sweep.inner_iterations,
+            ..Row::default()
+        }
+    }
+
+    /// Whether the run ends at this iterate, and how.
+    pub fn judge(&mut self, seen: &Seen, stop: &StopRule, row: &Row) -> Verdict {
+        let Seen { model, iterate, layer, sweep, last, .. } = *seen;
+        let broken = |body: &usize| {
+            let finite = |value: f64| value.is_finite();
+            let trace_is_finite = model.trace_ranges(*body).flatten().all(|i| finite(sweep.correction.trace[i]));
+            !(finite(sweep.decrement[*body]) && finite(sweep.energy[*body].potential) && trace_is_finite)
+        };
+        if let Some(body) = (0..model.bodies.len()).find(broken) {
+            return Verdict::End(Status::NotFinite { body });
+        }
+        if let Some((body, reason)) = &sweep.failed {
+            return Verdict::End(Status::InnerSolver { body: *body, reason: reason.clone() });
+        }
+        let met = stop.is_met(row.residual, row.increment);
+        let steady = last.is_none_or(|last| is_steady(&last.pressure, &layer.pressure, stop));
+        let imbalance = imbalance(seen);
+        let balanced = stop.residual.is_none_or(|tolerance| imbalance <= 10.0 * tolerance);
+        if met && steady && balanced {
+            return Verdict::End(Status::Converged);
+        }
+        let closed = layer.compression.iter().map(|&c| c > 0.0);
+        if let Some(period) = self.cycle.period(&iterate.trace, closed, row.residual) {
+            return Verdict::End(Status::Cycle { period });
+        }
+        let stalled = self.floor.is_suspected(row.residual);
+        if stalled && met && imbalance <= UNBALANCED {
+            return Verdict::End(Status::Attainable);
+        }
+        if stalled && imbalance <= UNBALANCED && row.residual <= BELIEVABLE && is_rounding(seen) {
+            return Verdict::End(Status::Attainable);
+        }
+        if row.iteration >= stop.iterations {
+            return Verdict::End(Status::IterationLimit);
+        }
+        if stalled { Verdict::Stalled } else { Verdict::Go }
+    }
+}
+
+/// Whether the last step changed no pressure by more than ten times the residual that is asked for, relative to the largest.
+/// The residual is one of energies: where a layer is stiff, or hardly holds a body, it sees too little of the pressure.
+fn is_steady(before: &[f64], now: &[f64], stop: &StopRule) -> bool {
+    let Some(tolerance) = stop.residual else { return true };
+    let peak = now.iter().copied().fold(0.0, f64::max);
+    before.iter().zip(now).all(|(before, now)| (now - before).abs() <= 10.0 * tolerance * peak)
+}
+
+/// Largest share of its contact forces that a body may lack in balance where rounding allows no less.
+const UNBALANCED: f64 = 1e-3;
+
+/// What the forces on a body lack in balance, as a share of those of its contacts, the most over all rigid motions that
+/// supports leave free.
+///
+/// For such a motion m, K m = 0, so that m'r = m'G z = sum weight m z on the contact rows. The residual sees too little of
+/// this where a Robin term much stiffer than the layer holds the body.
+fn imbalance(seen: &Seen) -> f64 {
+    let Seen { model, iterate, layer, weight, sweep, .. } = *seen;
+    let mut most = 0.0f64;
+    for (index, slot) in model.bodies.iter().enumerate() {
+        let (weight, z) = (model.of_body(index, weight), model.of_body(index, &sweep.correction.trace));
+        let (force, u) = (model.at_rows(index, &layer.force), model.of_body(index, &iterate.trace));
+        let size = u.iter().fold(0.0f64, |max, u| max.max(u.abs()));
+        // K u is rounded entry by entry, and a motion sums over all of them
+        let rounding = 10.0 * f64::EPSILON * slot.scale * size;
+        for motion in &slot.motions {
+            let lacking: f64 = (0..z.len()).map(|q| weight[q] * motion.trace[q] * z[q]).sum();
+            let acting: f64 = (0..z.len()).map(|q| force[q] * motion.trace[q].abs()).sum();
+            if lacking.abs() > rounding {
+                most = most.max(lacking.abs() / acting);
+            }
+        }
+    }
+    most
+}
+
+/// Largest residual that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
+const BELIEVABLE: f64 = 1e-4;
+
+/// Whether the residual is no larger than what rounding alone can make.
+fn is_rounding(seen: &Seen) -> bool {
+    let Seen { model, iterate, layer, sweep, .. } = *seen;
+    let mut floor = [0.0];
+    for (index, slot) in model.bodies.iter().enumerate() {
+        if let Some(body) = &slot.local {
+            floor[0] += body.rounding(&iterate.states[index], &model.at_rows(index, &layer.force));
+        }
+    }
+    model.exchange.sum(&mut floor);
+    // the estimate counts each row's worst case once; smooth errors weigh more in G^-1
+    sweep.decrement.iter().sum::<f64>() <= 1e4 * floor[0]
+}
