@@ -171,11 +171,22 @@ pub fn discretize<const D: usize>(
 }
 
 impl Problem {
-    /// Tells every rank what only the owner of a body knows of it. Collective, after all ranks have made their problem.
+    /// Tells every rank what only the owner of a body knows of it: largest stiffness, and stiffness at the contact rows. Collective, after all ranks have made their problem.
     pub fn share(&mut self) {
-        let mut scales: Vec<f64> = self.model.bodies.iter().map(|slot| slot.scale).collect();
-        self.model.exchange.sum(&mut scales);
-        self.model.bodies.iter_mut().zip(scales).for_each(|(slot, scale)| slot.scale = scale);
+        let count = self.model.bodies.len();
+        let mut message = vec![0.0; count + 2 * self.model.points()];
+        for (body, slot) in self.model.bodies.iter().enumerate() {
+            message[body] = slot.scale;
+            if slot.local.is_some() {
+                self.model.put(body, &slot.row_stiffness, &mut message[count..]);
+            }
+        }
+        self.model.exchange.sum(&mut message);
+        for body in 0..count {
+            let rows = self.model.of_body(body, &message[count..]);
+            let slot = &mut self.model.bodies[body];
+            (slot.scale, slot.row_stiffness) = (message[body], rows);
+        }
     }
 }
 
@@ -200,7 +211,8 @@ pub fn start(scene: &Scene, model: &Model) -> Result<Vec<f64>> {
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
     if let Start::Auto = &scene.method.start {
-        return Ok(ddm::rigid_closing(model));
+        // without a minimum any start does: the run ends before its first sweep
+        return Ok(ddm::rigid_closing(model).unwrap_or(trace));
     }
     if let Start::Normal(field) = &scene.method.start {
         let positions = model.pairs.iter().flat_map(|pair| &pair.position);

@@ -1,6 +1,7 @@
 //! The automatic start: bodies that contact alone holds are pushed, rigidly, until the layers carry their loads.
 
 use super::layer::Layer;
+use super::line::Unbounded;
 use super::model::Model;
 use crate::linalg::{axpy, dot};
 use nalgebra::{DMatrix, DVector};
@@ -8,9 +9,13 @@ use nalgebra::{DMatrix, DVector};
 /// Newton steps of the small problem.
 const STEPS: usize = 200;
 
-/// The trace of the rigid displacements that minimise F1 over the motions that supports leave free: no body is solved.
-/// Zero where supports hold everything or where nothing balances the loads.
-pub fn rigid_closing(model: &Model) -> Vec<f64> {
+/// The trace of the rigid displacements that minimise F1 over the motions that supports leave free: no body is solved. Zero
+/// where supports hold everything, or where the layers answer beyond the range of numbers.
+///
+/// # Errors
+/// [`Unbounded`] if F1 falls for ever along such a motion. As bodies are elastic, F1 as a whole then has no minimum either:
+/// loads push a body away from all its contacts.
+pub fn rigid_closing(model: &Model) -> Result<Vec<f64>, Unbounded> {
     let points = model.points();
     let motions: Vec<(Vec<f64>, f64)> = (0..model.bodies.len())
         .flat_map(|body| model.bodies[body].motions.iter().map(move |motion| (body, motion)))
@@ -22,7 +27,7 @@ pub fn rigid_closing(model: &Model) -> Vec<f64> {
         .collect();
     let mut trace = vec![0.0; 2 * points];
     if motions.is_empty() || motions.iter().all(|(_, work)| *work == 0.0) {
-        return trace;
+        return Ok(trace);
     }
     let closing = |trace: &[f64], q: usize| trace[q] + trace[points + q];
     let soft = model.bodies.iter().map(|body| body.scale).fold(0.0, f64::max) * 1e-9;
@@ -31,7 +36,7 @@ pub fn rigid_closing(model: &Model) -> Vec<f64> {
     for _ in 0..STEPS {
         let layer = Layer::at(model, &trace);
         if layer.force.iter().any(|force| !force.is_finite()) {
-            return vec![0.0; 2 * points];
+            return Ok(vec![0.0; 2 * points]);
         }
         let gradient = DVector::from_fn(count, |i, _| {
             (0..points).map(|q| layer.force[q] * closing(&motions[i].0, q)).sum::<f64>() - motions[i].1
@@ -60,10 +65,10 @@ pub fn rigid_closing(model: &Model) -> Vec<f64> {
         };
         match minimum(slope) {
             Some(t) => axpy(t, &direction, &mut trace),
-            None => return vec![0.0; 2 * points],
+            None => return Err(Unbounded),
         }
     }
-    trace
+    Ok(trace)
 }
 
 /// Zero of an increasing function that is negative at 0, roughly; `None` if there is none below 1e12.

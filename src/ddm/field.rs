@@ -13,6 +13,12 @@ pub struct Field {
 }
 
 impl Field {
+    /// All bodies at rest, with the traces of that.
+    pub fn rest(model: &Model) -> Field {
+        let state = |slot: &super::BodySlot| slot.local.as_ref().map_or(Vec::new(), |body| body.rest());
+        Field { states: model.bodies.iter().map(state).collect(), trace: vec![0.0; 2 * model.points()] }
+    }
+
     /// self += t other.
     pub fn add(&mut self, t: f64, other: &Field) {
         for (u, z) in self.states.iter_mut().zip(&other.states) {

@@ -1,5 +1,6 @@
 //! The outer loop (41)-(42).
 
+use super::closing::rigid_closing;
 use super::field::Field;
 use super::held;
 use super::layer::Layer;
@@ -90,14 +91,30 @@ pub struct Outcome {
     pub spectrum: Option<(f64, f64)>,
 }
 
+/// Why no method can find a solution: a motion that nothing can hold, or loads that push a body off for ever.
+fn hopeless(model: &Model) -> Option<Status> {
+    let all: Vec<Vec<f64>> = model.bodies.iter().map(|slot| slot.row_stiffness.clone()).collect();
+    let mut springs = vec![0.0; 2 * model.points()];
+    all.iter().enumerate().for_each(|(body, rows)| model.put(body, rows, &mut springs));
+    if let Some(free) = held::unheld(model, &springs) {
+        return Some(Status::Unheld { body: free.body, motion: free.name });
+    }
+    rigid_closing(model).is_err().then_some(Status::Unbounded)
+}
+
 /// Runs the iteration: residual, stop, step and update of equations (41)-(42), until a rule ends it.
 ///
 /// # Errors
 /// Failures of the solver library. Not converging is a [`Status`].
 pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Observer) -> Result<Outcome> {
     let clock = Instant::now();
-    let (mut iterate, failed) = lift(model, &settings.start)?;
-    let mut early = failed.map(|(body, reason)| Status::InnerSolver { body, reason });
+    let mut early = hopeless(model);
+    let mut iterate = Field::rest(model);
+    if early.is_none() {
+        let (lifted, failed) = lift(model, &settings.start)?;
+        iterate = lifted;
+        early = failed.map(|(body, reason)| Status::InnerSolver { body, reason });
+    }
     let mut robin = Robin::new(settings.robin.clone());
     let mut watch = Watch::default();
     let mut sweeper = Sweeper::default();

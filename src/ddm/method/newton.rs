@@ -58,6 +58,7 @@ impl Newton {
     fn solve(&mut self, here: &mut Here, slope: &[f64], forcing: f64) -> Result<(Field, f64)> {
         let weight: Vec<f64> = here.model.weight.iter().zip(slope).map(|(w, k)| w * k).collect();
         let direct = match &mut self.inner {
+            Inner::Direct(_) if held::joint_is_weak(here.model, &weight) => None,
             Inner::Direct(coupled) => coupled.solve(&weight, &here.sweep.residual)?,
             Inner::Sweep => None,
         };
