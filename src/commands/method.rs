@@ -9,7 +9,7 @@ use crate::scene::{Gamma, MethodName, Preset, Scene};
 use crate::solver::{Krylov, Monolithic, Union, preset};
 
 /// Prefix of the PETSc options of the Newton matrix of all bodies.
-const WHOLE: &str = "newton";
+pub const WHOLE: &str = "newton";
 
 /// Whether the scene's method needs the matrices of the bodies besides the bodies.
 pub fn keeps_matrices(scene: &Scene) -> bool {

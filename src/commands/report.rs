@@ -35,22 +35,24 @@ fn message(outcome: &Outcome, model: &Model) -> String {
     let k = outcome.iterations;
     let name = |body: &usize| &model.bodies[*body].name;
     let residual = outcome.rows.last().map_or(f64::NAN, |row| row.residual);
+    // what turns the step shorter in the paper's iteration; other methods choose it themselves
+    let other = if outcome.method == "robin" { "a smaller method.gamma, or --method auto" } else { "another --method" };
     match &outcome.status {
         Status::Converged => format!("converged in {k} iterations"),
         Status::Attainable => {
             format!("residual {} after {k} iterations: rounding allows no less", sci(residual, 1))
         }
         Status::IterationLimit => format!(
-            "not converged in {k} iterations, residual {}: allow more (method.stop.iterations) or choose another method.gamma",
+            "not converged in {k} iterations, residual {}: allow more (method.stop.iterations) or try {other}",
             sci(residual, 1)
         ),
         Status::NotFinite { body } => format!(
-            "body `{}`: a number is not finite in iteration {k}: a smaller start (method.start) or method.gamma may help",
+            "body `{}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}",
             name(body)
         ),
-        Status::Cycle { period } => format!(
-            "the iterates repeat every {period} iterations (seen in iteration {k}): choose a smaller method.gamma"
-        ),
+        Status::Cycle { period } => {
+            format!("the iterates repeat every {period} iterations (seen in iteration {k}): try {other}")
+        }
         Status::Unheld { body, motion } => format!(
             "body `{}`: nothing holds its {motion} in iteration {k}: neither a support nor the Robin zone; add a support, \
              or a start that closes the contact (method.start)",

@@ -2,6 +2,7 @@
 
 use super::method;
 use crate::contact::pieces;
+use crate::ddm::method::Method;
 use crate::ddm::{self, Observer, Outcome, RobinRule, Settings, StopRule};
 use crate::discretize::{self, Assembled, Problem};
 use crate::error::{Error, Kind, Result};
@@ -53,6 +54,8 @@ impl Clock {
 pub struct Prepared {
     /// The discrete problem.
     pub problem: Problem,
+    /// The methods, made by [`set_up`].
+    pub methods: Vec<Box<dyn Method>>,
     /// Why the inner solver is what it is where no PETSc option was typed.
     pub choice: String,
     /// Warnings.
@@ -94,7 +97,7 @@ pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Pr
     problem.share();
     clock.phase("discretize");
     let warnings = warnings(session, scene, &problem);
-    Ok(Prepared { problem, choice, warnings })
+    Ok(Prepared { problem, methods: Vec::new(), choice, warnings })
 }
 
 /// What the decoder of the scene cannot know.
@@ -190,11 +193,15 @@ fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> 
 ///
 /// # Errors
 /// Unknown PETSc options, failures of PETSc.
-pub fn set_up(session: &Session, prepared: &mut Prepared, clock: &mut Clock) -> Result<()> {
+pub fn set_up(session: &Session, scene: &Scene, prepared: &mut Prepared, clock: &mut Clock) -> Result<()> {
     let failed = ddm::prepare(&mut prepared.problem.model);
     agree(session, failed)?;
+    prepared.methods = agree(session, method::make(session, scene, &mut prepared.problem))?;
     let names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let mut names: Vec<&str> = names.iter().map(String::as_str).collect();
+    if method::keeps_matrices(scene) {
+        names.push(method::WHOLE);
+    }
     let any = |flags: &mut [u8]| {
         if session.size() > 1 && !flags.is_empty() {
             let mine = flags.to_vec();
@@ -236,9 +243,8 @@ pub fn set_up(session: &Session, prepared: &mut Prepared, clock: &mut Clock) -> 
 /// # Errors
 /// Failures of PETSc; not converging is a status of the outcome.
 pub fn iterate(
-    session: &Session,
     scene: &Scene,
-    problem: &mut Problem,
+    prepared: &mut Prepared,
     observer: &mut dyn Observer,
     clock: &mut Clock,
 ) -> Result<Outcome> {
@@ -251,11 +257,11 @@ pub fn iterate(
             RobinSpec::Floor(floor) => RobinRule::Floor(floor),
             RobinSpec::Auto => RobinRule::Auto,
         },
-        methods: method::make(session, scene, problem)?,
+        methods: std::mem::take(&mut prepared.methods),
         stop: StopRule { residual: stop.residual, increment: stop.increment, iterations: stop.iterations },
-        start: discretize::start(scene, &problem.model)?,
+        start: discretize::start(scene, &prepared.problem.model)?,
     };
-    let outcome = ddm::solve(&mut problem.model, &mut settings, observer)?;
+    let outcome = ddm::solve(&mut prepared.problem.model, &mut settings, observer)?;
     clock.phase("iterate");
     Ok(outcome)
 }

@@ -32,7 +32,7 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
     let scene = load(session, &request.scene, &request.overrides)?;
     let folder = agree(session, Folder::create(folder_of(&scene, request.folder)))?;
     let mut prepared = run::prepare(session, &scene, &mut clock)?;
-    run::set_up(session, &mut prepared, &mut clock)?;
+    run::set_up(session, &scene, &mut prepared, &mut clock)?;
     let first = session.rank() == 0;
     let monitored = session.options().all()?.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
     let verbosity = if request.json || monitored || !first { Verbosity::Quiet } else { Verbosity::Table };
@@ -40,7 +40,7 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
         table: IterationTable::new(verbosity, &run::targets(&scene)),
         history: if first { Some(history(&folder, &scene)?) } else { None },
     };
-    let outcome = run::iterate(session, &scene, &mut prepared.problem, &mut watchers, &mut clock)?;
+    let outcome = run::iterate(&scene, &mut prepared, &mut watchers, &mut clock)?;
     watchers.table.finish();
     let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
     let written = failed.and(write(session, &scene, &prepared, &outcome, &folder));

@@ -47,8 +47,8 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
     for (scene, values) in scenes.iter().zip(&runs) {
         let mut clock = Clock::default();
         let mut prepared = run::prepare(session, scene, &mut clock)?;
-        run::set_up(session, &mut prepared, &mut clock)?;
-        let outcome = run::iterate(session, scene, &mut prepared.problem, &mut Silent, &mut clock)?;
+        run::set_up(session, scene, &mut prepared, &mut clock)?;
+        let outcome = run::iterate(scene, &mut prepared, &mut Silent, &mut clock)?;
         clock.total();
         let report = report::report(session, scene, &prepared, &outcome, &clock);
         options::withdraw(session)?;
@@ -83,7 +83,9 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
         reports.push(report);
     }
     if first {
-        plots(&folder, &scenes[0].title, histories, pressures, reference)?;
+        if scenes[0].output.plots {
+            plots(&folder, &scenes[0].title, histories, pressures, reference)?;
+        }
         if request.json {
             let list = serde_json::to_string_pretty(&reports).map_err(|cause| {
                 Error::new(Kind::File, "the reports cannot be written as JSON").because(cause.to_string())

@@ -85,9 +85,9 @@ impl Floor {
 #[derive(Debug, Default)]
 pub struct Cycle {
     recent: VecDeque<Vec<f64>>,
-    /// Contact sets of the last iterates, as hashes, and the best residual before each.
-    sets: VecDeque<(u64, f64)>,
-    best: f64,
+    /// Contact sets of the last iterates, as hashes, and the least residual and F1 up to each.
+    sets: VecDeque<(u64, (f64, f64))>,
+    best: (f64, f64),
 }
 
 impl Cycle {
@@ -97,9 +97,15 @@ impl Cycle {
     const WATCHED: usize = 64;
 
     /// The period, if `trace` equals one seen 2 to 8 updates ago while the last update moved it, or if the contact sets
-    /// `closed` of the last 64 iterates repeat with that period and the residual has not fallen meanwhile.
-    pub fn period(&mut self, trace: &[f64], closed: impl Iterator<Item = bool>, residual: f64) -> Option<usize> {
-        self.period_of_traces(trace).or_else(|| self.period_of_sets(closed, residual))
+    /// `closed` of the last 64 iterates repeat with that period and neither the residual nor F1 has fallen meanwhile.
+    pub fn period(
+        &mut self,
+        trace: &[f64],
+        closed: impl Iterator<Item = bool>,
+        residual: f64,
+        energy: f64,
+    ) -> Option<usize> {
+        self.period_of_traces(trace).or_else(|| self.period_of_sets(closed, residual, energy))
     }
 
     fn period_of_traces(&mut self, trace: &[f64]) -> Option<usize> {
@@ -115,16 +121,18 @@ impl Cycle {
         found
     }
 
-    fn period_of_sets(&mut self, closed: impl Iterator<Item = bool>, residual: f64) -> Option<usize> {
+    fn period_of_sets(&mut self, closed: impl Iterator<Item = bool>, residual: f64, energy: f64) -> Option<usize> {
         let mut hash = DefaultHasher::new();
         closed.for_each(|closed| closed.hash(&mut hash));
-        self.best = if self.sets.is_empty() { residual } else { self.best.min(residual) };
+        let start = self.sets.is_empty();
+        self.best = if start { (residual, energy) } else { (self.best.0.min(residual), self.best.1.min(energy)) };
         self.sets.push_back((hash.finish(), self.best));
         if self.sets.len() <= Self::WATCHED {
             return None;
         }
         self.sets.pop_front();
-        let stuck = self.sets[0].1 <= self.best;
+        let (then, now) = (self.sets[0].1, self.best);
+        let stuck = then.0 <= now.0 && then.1 <= now.1;
         let sets: Vec<u64> = self.sets.iter().map(|set| set.0).collect();
         let repeats = |period: &usize| sets.windows(period + 1).all(|window| window[0] == window[*period]);
         let constant = repeats(&1);
@@ -140,19 +148,27 @@ mod tests {
     fn a_cycle_is_seen_and_a_slow_approach_is_not() {
         let mut cycle = Cycle::default();
         let none = || std::iter::empty();
-        let found: Vec<_> = (0..9).map(|k| cycle.period(&[(k % 3) as f64, 1.0], none(), 1.0)).collect();
+        let found: Vec<_> = (0..9).map(|k| cycle.period(&[(k % 3) as f64, 1.0], none(), 1.0, 0.0)).collect();
         assert_eq!(found.iter().flatten().next(), Some(&3));
         // the same contact sets again, with peaks that grow
         let mut growing = Cycle::default();
         let grow = |k: i32| (1.1f64.powi(k) * f64::from(k % 2), k % 2 == 0);
-        let found = (0..99).find_map(|k| growing.period(&[grow(k).0], [grow(k).1, true].into_iter(), 1.0));
+        let found = (0..99).find_map(|k| growing.period(&[grow(k).0], [grow(k).1, true].into_iter(), 1.0, 0.0));
         assert_eq!(found, Some(2));
         let mut slow = Cycle::default();
         assert!(
-            (0..100).all(|k| slow.period(&[1.0 + 0.999f64.powi(k)], [true].into_iter(), 0.999f64.powi(k)).is_none())
+            (0..100)
+                .all(|k| slow.period(&[1.0 + 0.999f64.powi(k)], [true].into_iter(), 0.999f64.powi(k), 0.0).is_none())
+        );
+        // contact flickers, but the energy falls
+        let mut falling = Cycle::default();
+        let fall = |k: i32| (1.0 + 0.9f64.powi(k % 2), 0.99f64.powi(k));
+        assert!(
+            (0..200)
+                .all(|k| falling.period(&[fall(k).0 + fall(k).1], [k % 2 == 0].into_iter(), 1.0, fall(k).1).is_none())
         );
         let mut still = Cycle::default();
-        assert!((0..20).all(|_| still.period(&[1.0], [true].into_iter(), 1.0).is_none()));
+        assert!((0..20).all(|_| still.period(&[1.0], [true].into_iter(), 1.0, 0.0).is_none()));
     }
 
     #[test]

@@ -103,7 +103,7 @@ impl Watch {
             return Verdict::End(Status::Converged);
         }
         let closed = layer.compression.iter().map(|&c| c > 0.0);
-        if let Some(period) = self.cycle.period(&iterate.trace, closed, row.residual) {
+        if let Some(period) = self.cycle.period(&iterate.trace, closed, row.residual, row.energy) {
             return Verdict::End(Status::Cycle { period });
         }
         let stalled = self.floor.is_suspected(row.residual);

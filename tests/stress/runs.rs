@@ -116,8 +116,8 @@ fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Re
     let mut clock = Clock::default();
     let scene = scene::load(path, &[format!("method={}", recipe.value(residual))])?;
     let mut prepared = run::prepare(session, &scene, &mut clock)?;
-    run::set_up(session, &mut prepared, &mut clock)?;
-    let outcome = run::iterate(session, &scene, &mut prepared.problem, &mut Silent, &mut clock)?;
+    run::set_up(session, &scene, &mut prepared, &mut clock)?;
+    let outcome = run::iterate(&scene, &mut prepared, &mut Silent, &mut clock)?;
     let seconds = clock.total();
     let report = report::report(session, &scene, &prepared, &outcome, &clock);
     let model = &prepared.problem.model;

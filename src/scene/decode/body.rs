@@ -12,7 +12,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 pub fn reserved(name: &str) -> bool {
     const WORDS: &[&str] = &[
         "ksp", "pc", "mat", "vec", "sub", "mg", "snes", "ts", "tao", "dm", "is", "log", "options", "help", "malloc",
-        "info", "on", "fp",
+        "info", "on", "fp", "newton",
     ];
     WORDS.contains(&name)
 }
