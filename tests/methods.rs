@@ -1,0 +1,117 @@
+//! Every method minimises the same functional: one answer, and the sweeps that each may take.
+
+mod common;
+
+use common::{Run, Scene, case, distance, solve, solve_on, text_of};
+
+/// The relaxed iteration with each rule, and the other methods.
+const METHODS: [&str; 10] = [
+    "{name=\"robin\", gamma=0.6}",
+    "{name=\"robin\", gamma=[0.9, 0.5, 0.6]}",
+    "{name=\"robin\", gamma=\"line-search\"}",
+    "{name=\"robin\", gamma=\"aitken\"}",
+    "{name=\"robin\", gamma=\"barzilai-borwein\"}",
+    "{name=\"robin\", gamma=\"spectral\"}",
+    "{name=\"ncg\"}",
+    "{name=\"anderson\", depth=4}",
+    "{name=\"newton-robin\"}",
+    "{name=\"newton\"}",
+];
+
+fn with(scene: &str, method: &str, more: &[&str]) -> Run {
+    let method = format!("method={method}");
+    solve(case(scene), &[&["--set", "mesh.set.n=16", "--set", &method][..], more].concat()).converged()
+}
+
+#[test]
+fn all_methods_give_one_pressure() {
+    for scene in ["groove", "groove-held"] {
+        let stop = ["--set", "method.stop={residual=1e-9}"];
+        let reference = with(scene, "{name=\"newton\"}", &["--set", "method.stop={residual=1e-12}"]).contact();
+        for method in METHODS {
+            let run = with(scene, method, &stop);
+            let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
+            assert!(apart < 1e-7, "{scene} by {method}: {apart:e}");
+            // the bodies transmit the load whatever the method
+            if scene == "groove-held" {
+                assert!((run.number("pairs/0/force/0/1") + 40.0).abs() < 1e-5, "{method}");
+            }
+        }
+    }
+}
+
+/// Robin coefficients change the way, not the goal; a frozen one is factored once a body besides the start.
+#[test]
+fn robin_coefficients_give_one_pressure() {
+    let stop = ["--set", "method.stop={residual=1e-9}"];
+    let reference = with("groove-held", "{name=\"newton\"}", &stop).contact();
+    for robin in ["\"tangent\"", "\"frozen\"", "\"auto\"", "{floor=1e4}"] {
+        let run = with("groove-held", &format!("{{name=\"ncg\", robin={robin}, start={{normal=1e-4}}}}"), &stop);
+        let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
+        assert!(apart < 1e-6, "{robin}: {apart:e}");
+        if robin == "\"frozen\"" {
+            assert_eq!(run.count("factorizations"), 4);
+        }
+    }
+}
+
+/// psi changes the way as well: full Robin acts on open points too, so it is not the active zone.
+#[test]
+fn zones_give_one_pressure() {
+    let stop = ["--set", "method.stop={residual=1e-9}"];
+    let run = |psi: &str| with("groove", &format!("{{psi=\"{psi}\", gamma=\"line-search\"}}"), &stop);
+    let [active, full, none, half] = ["active", "full", "none", "x > 2"].map(run);
+    for other in [&full, &none, &half] {
+        assert!(distance(&other.contact()["pressure"], &active.contact()["pressure"]) < 1e-6);
+    }
+    assert_ne!(full.count("iterations"), active.count("iterations"));
+    assert!(none.count("factorizations") == 4, "K is factored once a body, and the start");
+}
+
+/// What issue and guide promise of the default on the paper's mesh.
+#[test]
+fn the_default_is_fast() {
+    let plain = |scene: &str| text_of(scene).split("[method]").next().unwrap_or_default().to_owned();
+    let groove = solve(Scene::new(plain("groove")), &[]).converged();
+    assert!(groove.number("residual") <= 1e-8 && groove.count("sweeps") <= 30, "{}", groove.count("sweeps"));
+    let held = Scene::new(plain("groove-held"));
+    let easy = solve(&held, &[]).converged();
+    assert!(easy.count("sweeps") <= 60, "{}", easy.count("sweeps"));
+    let stiff = solve(&held, &["--set", "contact.0.layer.power={B=1e-6, a=0.1}"]).converged();
+    assert!(stiff.number("residual") <= 1e-8 && stiff.count("sweeps") <= 400, "{}", stiff.count("sweeps"));
+    assert_eq!(stiff.text("method"), "newton-robin");
+}
+
+/// The estimated spectrum of G^-1 F1'' lies around one: 1 - theta and 1 + theta.
+#[test]
+fn the_spectrum_is_symmetric_about_one() {
+    let run = with("groove-held", "{name=\"robin\", gamma=\"spectral\"}", &["--set", "method.stop={residual=1e-8}"]);
+    let (low, high) = (run.number("spectrum/0"), run.number("spectrum/1"));
+    // Ritz values come from inside
+    assert!(high < 2.0 - low + 1e-6 && high > 1.7 && low > 0.26 && low < 0.27, "{low} {high}");
+    let error = run.number("error_estimate") / run.number("residual");
+    assert!((error - low.recip().sqrt()).abs() < 1e-6, "{error}");
+}
+
+/// Loads that push a body off its contact have no solution: said at once, by every method.
+#[test]
+fn a_body_that_is_pulled_off() {
+    for method in ["auto", "robin", "newton", "ncg"] {
+        let off = ["--method", method, "--set", "body.1.load.0.pressure=-10", "--set", "mesh.set.n=4"];
+        let run = solve(case("groove-held"), &off);
+        assert_eq!((run.code, run.text("status"), run.count("sweeps")), (1, "unbounded", 0), "{method}");
+    }
+}
+
+/// Two ranks, one body each, give the serial history also by Newton's method.
+#[test]
+fn newton_on_two_ranks() {
+    let args = ["--method", "newton-robin", "--set", "mesh.set.n=8", "--set", "method.start=\"auto\""];
+    let serial = solve(case("groove-held"), &args).converged();
+    let parallel = solve_on(2, case("groove-held"), &args).converged();
+    let (ours, theirs) = (serial.history(), parallel.history());
+    for column in ["residual", "energy", "sweeps", "factorizations", "closed"] {
+        assert_eq!(ours[column], theirs[column], "{column}");
+    }
+    assert_eq!(serial.contact()["pressure"], parallel.contact()["pressure"]);
+}
