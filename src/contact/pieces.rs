@@ -138,40 +138,37 @@ impl Curve {
 
     /// Parameter at which the ray from `x` along `n` meets the curve: cross(x(s) - x, n) = 0.
     fn hit(&self, x: [f64; 2], n: [f64; 2]) -> Option<f64> {
-        let mut s = 0.5;
-        for _ in 0..30 {
+        newton(|s| {
             let here = self.at(s);
-            let slope = cross(self.tangent(s), n);
-            let step = cross([here[0] - x[0], here[1] - x[1]], n) / slope;
-            s -= step;
-            if !s.is_finite() || s.abs() > 1e3 {
-                return None;
-            }
-            if step.abs() < 1e-14 {
-                break;
-            }
-        }
-        Some(s)
+            cross([here[0] - x[0], here[1] - x[1]], n) / cross(self.tangent(s), n)
+        })
     }
 
     /// Parameter whose normal passes through `x`: cross(x - x(s), n(s)) = 0.
     fn foot(&self, x: [f64; 2]) -> Option<f64> {
         let turn: [f64; 2] = std::array::from_fn(|c| self.normals[1][c] - self.normals[0][c]);
-        let mut s = 0.5;
-        for _ in 0..30 {
+        newton(|s| {
             let (here, t, n) = (self.at(s), self.tangent(s), self.normal(s));
             let arm = [x[0] - here[0], x[1] - here[1]];
-            let step = cross(arm, n) / (cross(arm, turn) - cross(t, n));
-            s -= step;
-            if !s.is_finite() || s.abs() > 1e3 {
-                return None;
-            }
-            if step.abs() < 1e-14 {
-                break;
-            }
-        }
-        Some(s)
+            cross(arm, n) / (cross(arm, turn) - cross(t, n))
+        })
     }
+}
+
+/// Zero of a function near the middle of \[0, 1\] by Newton's method; `step(s)` is value over slope. `None` if it runs away.
+fn newton(step: impl Fn(f64) -> f64) -> Option<f64> {
+    let mut s = 0.5;
+    for _ in 0..30 {
+        let step = step(s);
+        s -= step;
+        if !s.is_finite() || s.abs() > 1e3 {
+            return None;
+        }
+        if step.abs() < 1e-14 {
+            break;
+        }
+    }
+    Some(s)
 }
 
 fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
