@@ -24,8 +24,6 @@ use part::Part;
 pub struct Assembled {
     /// Name in the scene.
     pub name: String,
-    /// Number of the body.
-    pub index: usize,
     /// Space dimension: block size of the matrix.
     pub dimension: usize,
     /// K, f and supports.
@@ -148,8 +146,7 @@ pub fn discretize<const D: usize>(
             if keep {
                 kept.push((body.stiffness.clone(), rows.clone()));
             }
-            slot.local =
-                Some(make(Assembled { name: slot.name.clone(), index, dimension: D, body, rows, motions: free })?);
+            slot.local = Some(make(Assembled { name: slot.name.clone(), dimension: D, body, rows, motions: free })?);
         }
         infos.push(BodyInfo {
             name: slot.name.clone(),

@@ -146,7 +146,7 @@ fn mesh(session: &Session, scene: &Scene) -> Result<crate::mesh::Mesh<2>> {
 }
 
 fn solver(session: &Session, assembled: Assembled) -> Result<Box<dyn ddm::Body>> {
-    let Assembled { name, dimension, body, rows, motions, .. } = assembled;
+    let Assembled { name, dimension, body, rows, motions } = assembled;
     let modes: Vec<Vec<f64>> = motions.into_iter().map(|motion| motion.displacement).collect();
     let krylov = Krylov::new(session, &name, dimension, &body.stiffness, &modes)?;
     Ok(Box::new(SparseBody::new(body, rows, krylov)))

@@ -21,10 +21,6 @@ pub struct Space<const D: usize> {
     pub cells: Vec<u32>,
     /// Body node of each mesh point, or `ABSENT`.
     from_mesh: Vec<u32>,
-    /// Mid-edge nodes made here (quadratic space on a linear mesh), by the body nodes of their ends.
-    middles: HashMap<(u32, u32), u32>,
-    /// Order of the mesh that the space was made from.
-    mesh_order: Order,
 }
 
 /// Facets of a body's boundary, oriented so that [`Facets::normal`] points out of the body.
@@ -39,7 +35,7 @@ pub struct Facets<const D: usize> {
 }
 
 impl<const D: usize> Space<D> {
-    /// The space of `order` on the cells of `group` (of dimension `D`).
+    /// The space of `order` on the cells of `group` (of dimension `D`); the mesh is of that order or a higher one.
     pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
         let stride = element::node_count(D + 1, order);
         let mut space = Space {
@@ -48,30 +44,15 @@ impl<const D: usize> Space<D> {
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
             from_mesh: vec![ABSENT; mesh.points.len()],
-            middles: HashMap::new(),
-            mesh_order: mesh.order,
         };
-        let kept = stride.min(group.stride);
         for cell in group.connectivity.chunks_exact(group.stride) {
-            let first = space.cells.len();
-            for &point in &cell[..kept] {
+            for &point in &cell[..stride] {
                 let node = &mut space.from_mesh[point as usize];
                 if *node == ABSENT {
                     *node = space.nodes.len() as u32;
                     space.nodes.push(mesh.points[point as usize]);
                 }
                 space.cells.push(*node);
-            }
-            if stride > kept {
-                for &(i, j) in &element::EDGES[..D * (D + 1) / 2] {
-                    let (a, b) = (space.cells[first + i], space.cells[first + j]);
-                    let node = *space.middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                        let (x, y) = (space.nodes[a as usize], space.nodes[b as usize]);
-                        space.nodes.push(std::array::from_fn(|c| 0.5 * (x[c] + y[c])));
-                        space.nodes.len() as u32 - 1
-                    });
-                    space.cells.push(node);
-                }
             }
         }
         space
@@ -114,20 +95,12 @@ impl<const D: usize> Space<D> {
         let vertices = dimension + 1;
         let wanted = element::node_count(vertices, self.order);
         let mut nodes = Vec::with_capacity(wanted);
-        let kept = if self.order == Order::P1 { vertices } else { points.len() };
-        for &point in &points[..kept] {
+        for &point in &points[..wanted] {
             match self.from_mesh[point as usize] {
                 ABSENT => return None,
                 node => nodes.push(node),
             }
         }
-        if nodes.len() < wanted {
-            for &(i, j) in &element::EDGES[..vertices * (vertices - 1) / 2] {
-                let (a, b) = (nodes[i], nodes[j]);
-                nodes.push(*self.middles.get(&(a.min(b), a.max(b)))?);
-            }
-        }
-        debug_assert!(self.mesh_order == Order::P1 || nodes.len() == wanted);
         Some(nodes)
     }
 
