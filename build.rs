@@ -28,6 +28,7 @@ const FUNCTIONS: &[&str] = &[
     "KSPSetUp",
     "KSPSetUpOnBlocks",
     "KSPSolve",
+    "PCApply",
     "KSPView",
     "MatCreateSeqAIJWithArrays",
     "MatDestroy",

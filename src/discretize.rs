@@ -139,10 +139,9 @@ pub fn discretize<const D: usize>(
         if owner[index] == ranks.0 {
             let body = part.assemble(mesh, &rows, &material, load, prescribed)?;
             assemblies += 1;
-            let diagonal = |i: usize| body.stiffness.position(i, i).map_or(0.0, |k| body.stiffness.values[k]);
-            slot.scale = (0..body.load.len()).map(diagonal).fold(0.0, f64::max);
+            slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
             slot.row_stiffness =
-                (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum()).collect();
+                (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * body.stiffness.diagonal(i)).sum()).collect();
             if keep {
                 kept.push((body.stiffness.clone(), rows.clone()));
             }

@@ -78,6 +78,11 @@ impl Csr {
         let offset = self.col[range.clone()].binary_search(&(j as i32)).ok()?;
         Some(range.start + offset)
     }
+
+    /// Diagonal entry of row i; zero if the pattern does not have it.
+    pub fn diagonal(&self, i: usize) -> f64 {
+        self.position(i, i).map_or(0.0, |k| self.values[k])
+    }
 }
 
 /// Scalar product.

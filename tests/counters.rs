@@ -131,12 +131,27 @@ fn bodies_that_never_touch_are_solved_once() {
 /// Preconditioners count as factorisations, Krylov iterations are counted, and direct solves have none.
 #[test]
 fn krylov_iterations_are_counted() {
-    let run = coarse("groove", &["-ksp_type", "cg", "-pc_type", "hypre"]);
+    let run = coarse("groove", &["-ksp_type", "cg", "-pc_type", "icc"]);
     let history = run.history();
     assert_eq!(run.count("factorizations"), 2 + 2 * run.count("sweeps"));
     let iterations = history.counts("inner_iterations");
     assert!(iterations.windows(2).all(|pair| pair[0] < pair[1]), "{iterations:?}");
     assert_eq!(iterations.last(), Some(&run.count("inner_iterations")));
-    let mixed = coarse("groove", &["-upper_ksp_type", "cg", "-upper_pc_type", "hypre"]);
+    let mixed = coarse("groove", &["-upper_ksp_type", "cg", "-upper_pc_type", "icc"]);
     assert!(mixed.count("inner_iterations") < run.count("inner_iterations"));
+}
+
+#[test]
+fn multigrid_is_kept_while_the_robin_term_moves_a_little_and_cycles_precondition_newton() {
+    let args = ["--method", "newton-robin", "-pc_type", "hypre"];
+    let run = coarse("groove-held", &args);
+    let updates = run.count("robin_updates");
+    assert!(updates > run.count("factorizations"), "{updates} changes, and a set-up for each");
+    let always = coarse("groove-held", &[&args[..], &["-ksp_reuse_preconditioner", "0"]].concat());
+    assert_eq!(always.count("robin_updates"), always.count("factorizations"));
+    assert!(distance(&run.contact()["pressure"], &always.contact()["pressure"]) < 1e-6);
+    // an application of the preconditioner for each step of conjugate gradients, a solve only for each iterate
+    let each = |run: &Run| run.count("inner_iterations") as f64 / run.count("sweeps") as f64;
+    let solves = coarse("groove-held", &["--method", "ncg", "-pc_type", "hypre"]);
+    assert!(each(&run) < 0.7 * each(&solves), "{} and {} in a sweep", each(&run), each(&solves));
 }

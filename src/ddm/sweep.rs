@@ -132,7 +132,10 @@ impl Sweeper {
                 }
                 None => {
                     let mut z = vec![0.0; r.len()];
-                    let Solved { failure, .. } = body.solve(r, &mut z)?;
+                    let Solved { failure, .. } = match other {
+                        Some(_) => body.precondition(r, &mut z)?,
+                        None => body.solve(r, &mut z)?,
+                    };
                     if let Some(reason) = failure {
                         reasons[index] = reason;
                         scalars[3] = 1.0;

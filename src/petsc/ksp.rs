@@ -214,6 +214,24 @@ impl Ksp {
         Ok(Solved { iterations: iterations as usize, reason, residual })
     }
 
+    /// Applies the preconditioner once, `z = M^-1 r`; it is made first if that has not been done.
+    ///
+    /// # Errors
+    /// When a slice has not one entry a row, or no matrix was set.
+    pub fn precondition(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
+        let Some([right, left]) = &self.vectors else {
+            return Err(Error::new(Kind::Solver, "a preconditioner was applied before it had a matrix"));
+        };
+        same("r", r.len(), self.rows)?;
+        same("z", z.len(), self.rows)?;
+        self.set_up()?;
+        let copy = self.writes_to_b.then(|| r.to_vec());
+        let right = right.place(copy.as_deref().unwrap_or(r).as_ptr())?;
+        let left = left.place(z.as_mut_ptr())?;
+        let pc = self.pc()?;
+        petsc!(PCApply(pc, right.vec(), left.vec()))
+    }
+
     /// Sets the relative tolerance.
     ///
     /// # Errors

@@ -32,7 +32,7 @@ impl Dense {
 }
 
 impl InnerSolver for Dense {
-    fn update(&mut self, write: &mut dyn FnMut(&mut [f64])) -> Result<()> {
+    fn update(&mut self, write: &mut dyn FnMut(&mut [f64]), _far: bool) -> Result<()> {
         write(&mut self.pattern.values);
         self.factor = None;
         Ok(())

@@ -12,7 +12,19 @@ pub struct Krylov {
     ksp: Ksp,
     changed: bool,
     set_ups: usize,
+    /// Whether the preconditioner is one that makes a few iterations of whatever size: one application then preconditions
+    /// all bodies together, and making it costs more than using it.
+    multigrid: bool,
+    /// Whether it is kept while G stays near; the user may decide by `-ksp_reuse_preconditioner`.
+    keeps: bool,
+    /// Whether G is far from the matrix of the preconditioner.
+    stale: bool,
+    /// Iterations per digit of the first solve with this preconditioner.
+    fresh: Option<f64>,
 }
+
+/// Growth of the iterations, over those of a fresh preconditioner, at which a new one is made.
+const WORN: f64 = 1.5;
 
 impl Krylov {
     /// Starts from G = K, with the options of prefix `<body>_` that stand in the database now. `near_null_space` are the
@@ -42,21 +54,29 @@ impl Krylov {
         if ksp.pc_type() == "gamg" {
             matrix.set_near_null_space(near_null_space)?;
         }
-        Ok(Self { matrix, ksp, changed: true, set_ups: 0 })
+        let multigrid = matches!(ksp.pc_type().as_str(), "hypre" | "gamg" | "ml" | "mg") && ksp.ksp_type() != "preonly";
+        let keeps = multigrid && session.options().get(&format!("-{body}_ksp_reuse_preconditioner")).is_none();
+        Ok(Self { matrix, ksp, changed: true, set_ups: 0, multigrid, keeps, stale: true, fresh: None })
     }
 }
 
 impl InnerSolver for Krylov {
-    fn update(&mut self, write: &mut dyn FnMut(&mut [f64])) -> Result<()> {
+    fn update(&mut self, write: &mut dyn FnMut(&mut [f64]), far: bool) -> Result<()> {
         self.changed = true;
+        self.stale |= far;
         self.matrix.update(write)
     }
 
     fn set_up(&mut self) -> Result<()> {
         if self.changed {
             self.changed = false;
+            if self.keeps {
+                self.ksp.set_reuse_preconditioner(!self.stale && self.set_ups > 0)?;
+            }
             if self.set_ups == 0 || !self.ksp.reuses_preconditioner() {
                 self.set_ups += 1;
+                self.stale = false;
+                self.fresh = None;
             }
             self.ksp.set_up()?;
         }
@@ -67,10 +87,24 @@ impl InnerSolver for Krylov {
         self.set_up()?;
         let solved = self.ksp.solve(r, z)?;
         let direct = self.ksp.ksp_type() == "preonly";
+        if self.keeps {
+            // the next change of G brings a new preconditioner if this one is worn
+            let pace = solved.iterations as f64 / -self.ksp.tolerance().log10();
+            self.stale |= pace > WORN * *self.fresh.get_or_insert(pace);
+        }
         Ok(Solved {
             iterations: if direct { 0 } else { solved.iterations },
             failure: (!solved.reason.converged()).then(|| solved.reason.to_string()),
         })
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+        if !self.multigrid {
+            return self.solve(r, z);
+        }
+        self.set_up()?;
+        self.ksp.precondition(r, z)?;
+        Ok(Solved { iterations: 1, failure: self.ksp.failure() })
     }
 
     fn factorizations(&self) -> (usize, usize) {

@@ -20,11 +20,13 @@ use crate::error::Result;
 
 /// Owner of the matrix G with a way to solve G z = r.
 pub trait InnerSolver {
-    /// Changes values of G (in the order of the pattern it was made with); the next solve uses the new matrix.
+    /// Changes values of G (in the order of the pattern it was made with); the next solve uses the new matrix. `far` tells
+    /// that it is far from the matrix of the last `far` change (at first: from the one it was made with), so that a
+    /// preconditioner of that one would be poor; else an iterative solver may keep it.
     ///
     /// # Errors
     /// Failures of the solver library.
-    fn update(&mut self, write: &mut dyn FnMut(&mut [f64])) -> Result<()>;
+    fn update(&mut self, write: &mut dyn FnMut(&mut [f64]), far: bool) -> Result<()>;
 
     /// Factors G, or sets its preconditioner up, if it changed since.
     ///
@@ -37,6 +39,15 @@ pub trait InnerSolver {
     /// # Errors
     /// Failures of the solver library; not converging is told in [`Solved`].
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
+
+    /// z = M^-1 r with a fixed symmetric M near G: one application of the preconditioner of an iterative solver, a whole solve
+    /// of a direct one.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+        self.solve(r, z)
+    }
 
     /// (symbolic, numeric) factorisations or preconditioner set-ups so far.
     fn factorizations(&self) -> (usize, usize);

@@ -13,6 +13,10 @@ pub struct SparseBody<S> {
     solver: S,
     /// Robin weight of each row that G has now.
     weight: Vec<f64>,
+    /// Robin weight of each row when G was last far from what its preconditioner was made of.
+    prepared: Vec<f64>,
+    /// b diag(K) b' of each row.
+    row_stiffness: Vec<f64>,
     coupling: Coupling,
     counts: BodyCounts,
     product: Vec<f64>,
@@ -24,8 +28,12 @@ impl<S: InnerSolver> SparseBody<S> {
     pub fn new(body: ElasticBody, rows: Csr, solver: S) -> Self {
         let coupling = Coupling::new(&body.stiffness, &rows);
         let weight = vec![0.0; rows.rows()];
+        let prepared = weight.clone();
+        let row_stiffness =
+            (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * body.stiffness.diagonal(i)).sum());
+        let row_stiffness = row_stiffness.collect();
         let product = vec![0.0; body.load.len()];
-        Self { body, rows, solver, weight, coupling, counts: BodyCounts::default(), product }
+        Self { body, rows, solver, weight, prepared, row_stiffness, coupling, counts: BodyCounts::default(), product }
     }
 
     /// The inner solver.
@@ -80,6 +88,21 @@ impl Coupling {
     }
 }
 
+/// Growth of the stiffness under a contact point, either way, beyond which a preconditioner is poor.
+const FAR: f64 = 3.0;
+
+/// Whether Robin terms `old` and `new` change the stiffness under some contact row by more than [`FAR`]. The eigenvalues of
+/// G_old^-1 G_new lie between the least and the largest ratio of the weights; where the body is stiff beside the Robin term
+/// they do not come near that, and only the sum of both counts.
+fn is_far(rows: &Csr, row_stiffness: &[f64], old: &[f64], new: &[f64]) -> bool {
+    (0..rows.rows()).any(|q| {
+        let square: f64 = rows.row(q).map(|(_, b)| b * b).sum();
+        let (before, after) =
+            (row_stiffness[q] + old[q] * square * square, row_stiffness[q] + new[q] * square * square);
+        after > FAR * before || before > FAR * after
+    })
+}
+
 impl<S: InnerSolver> Body for SparseBody<S> {
     fn len(&self) -> usize {
         self.body.load.len()
@@ -127,7 +150,11 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         self.weight.copy_from_slice(weight);
         self.counts.robin_updates += 1;
         let (coupling, stiffness) = (&self.coupling, &self.body.stiffness.values);
-        self.solver.update(&mut |g| coupling.write(stiffness, weight, g))
+        let far = is_far(&self.rows, &self.row_stiffness, &self.prepared, weight);
+        if far {
+            self.prepared.copy_from_slice(weight);
+        }
+        self.solver.update(&mut |g| coupling.write(stiffness, weight, g), far)
     }
 
     fn set_up(&mut self) -> Result<()> {
@@ -137,6 +164,13 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         self.counts.solves += 1;
         let solved = self.solver.solve(r, z)?;
+        self.counts.inner_iterations += solved.iterations;
+        Ok(solved)
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+        self.counts.solves += 1;
+        let solved = self.solver.precondition(r, z)?;
         self.counts.inner_iterations += solved.iterations;
         Ok(solved)
     }
