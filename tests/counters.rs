@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Run, case, distance, solve};
+use common::{Run, case, distance, solve, winkler};
 
 const COARSE: [&str; 2] = ["--set", "mesh.set.n=8"];
 
@@ -154,4 +154,20 @@ fn multigrid_is_kept_while_the_robin_term_moves_a_little_and_cycles_precondition
     let each = |run: &Run| run.count("inner_iterations") as f64 / run.count("sweeps") as f64;
     let solves = coarse("groove-held", &["--method", "ncg", "-pc_type", "hypre"]);
     assert!(each(&run) < 0.7 * each(&solves), "{} and {} in a sweep", each(&run), each(&solves));
+}
+
+/// The weights of the contact table are the lengths that the report sums up, and theta is that of `check`.
+#[test]
+fn the_table_has_the_lengths_and_the_report_theta() {
+    let run = solve(case("groove-held"), &["--set", "mesh.set.n=4"]).converged();
+    let table = run.contact();
+    let closed = |q: &usize| table["compression"][*q] > 0.0;
+    let length: f64 = (0..table.rows()).filter(closed).map(|q| table["weight"][q]).sum();
+    assert!((length / run.number("pairs/0/contact_length") - 1.0).abs() < 1e-12, "{length}");
+    let check = winkler(&["check", case("groove-held").to_str().expect("a path"), "--set", "mesh.set.n=4", "--json"]);
+    let checked: serde_json::Value = serde_json::from_str(&check.stdout).expect("JSON");
+    assert_eq!(run.report["pairs"][0]["theta"], checked["pairs"][0]["theta"]);
+    // both inner phases were measured, and lie within the run
+    let inner = ["factor", "solve"].map(|phase| run.number(&format!("inner_times/{phase}")));
+    assert!(inner.iter().all(|&seconds| seconds > 0.0) && inner.iter().sum::<f64>() < run.number("times/total"));
 }

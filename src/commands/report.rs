@@ -1,10 +1,11 @@
 //! Outcome -> report, contact tables and plots.
 
+use super::preflight;
 use super::run::{Clock, Prepared};
 use crate::contact::ContactPair;
 use crate::ddm::{BodyCounts, Model, Outcome, Status};
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
-use crate::output::{BodyReport, ContactTable, PairReport, Report, sci};
+use crate::output::{BodyReport, ContactTable, InnerTimes, PairReport, Report, sci};
 use crate::petsc::Session;
 use crate::scene::Scene;
 
@@ -74,6 +75,7 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
     let model = &prepared.problem.model;
     let shared = Shared::gather(prepared);
     let counts = &shared.counts;
+    let coupled = |part: fn(&BodyCounts) -> f64| outcome.coupled.iter().map(part).sum::<f64>();
     let last = outcome.rows.last();
     let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
     Report {
@@ -84,7 +86,11 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
         method: outcome.method.to_owned(),
         spectrum: outcome.spectrum.map(|(low, high)| [low, high]),
         error_estimate: finite(last.map(|row| row.error)),
-        factorizations: counts.factorizations + outcome.coupled_factorizations,
+        factorizations: counts.factorizations + coupled(|counts| counts.factorizations as f64) as usize,
+        inner_times: InnerTimes {
+            factor: counts.factor_seconds + coupled(|counts| counts.factor_seconds),
+            solve: counts.solve_seconds + coupled(|counts| counts.solve_seconds),
+        },
         symbolic_factorizations: counts.symbolic,
         body_solves: counts.solves,
         inner_iterations: counts.inner_iterations,
@@ -146,6 +152,9 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
     }
 }
 
+/// Numbers before the words about the solvers.
+const HEAD: usize = 9;
+
 /// Most bytes of the words about a solver.
 const WORDS: usize = 64;
 
@@ -153,7 +162,7 @@ impl Shared {
     /// Collects it on every rank; collective.
     pub fn gather(prepared: &Prepared) -> Self {
         let model = &prepared.problem.model;
-        let mut message = vec![0.0; 7 + WORDS * model.bodies.len()];
+        let mut message = vec![0.0; HEAD + WORDS * model.bodies.len()];
         message[6] = prepared.problem.assemblies as f64;
         for (index, slot) in model.bodies.iter().enumerate() {
             let Some(body) = &slot.local else { continue };
@@ -167,7 +176,9 @@ impl Shared {
                 counts.robin_skipped,
             ];
             message.iter_mut().zip(mine).for_each(|(sum, count)| *sum += count as f64);
-            let place = &mut message[7 + WORDS * index..];
+            message[7] += counts.factor_seconds;
+            message[8] += counts.solve_seconds;
+            let place = &mut message[HEAD + WORDS * index..];
             place
                 .iter_mut()
                 .zip(body.describe().bytes().take(WORDS))
@@ -185,9 +196,11 @@ impl Shared {
                 inner_iterations: count(3),
                 robin_updates: count(4),
                 robin_skipped: count(5),
+                factor_seconds: message[7],
+                solve_seconds: message[8],
             },
             assemblies: count(6),
-            solvers: message[7..].chunks_exact(WORDS).map(words).collect(),
+            solvers: message[HEAD..].chunks_exact(WORDS).map(words).collect(),
         }
     }
 }
@@ -206,12 +219,14 @@ fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) 
         std::array::from_fn(|k| (0..pair.len()).fold(0.0, |sum, q| sum - force[q] * pair.resultant[side][q][k]))
     };
     let sides = sides(prepared, i);
+    let coupling = preflight::coupling(scene, prepared, i);
     let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
     PairReport {
         surfaces: scene.contacts[i].between.each_ref().map(|name| name.value.clone()),
         bodies: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
         points: pair.len(),
         carrier: pair.surfaces[0].clone(),
+        theta: sides.map(|side| coupling.theta[side]),
         facets_uncovered: pair.uncovered.0,
         layer_energy: layer.energy[i],
         force: sides.map(on_side),
@@ -247,6 +262,7 @@ pub fn contact_table(prepared: &Prepared, outcome: &Outcome, i: usize) -> Contac
     ContactTable {
         side_names: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
         points: pair.position.clone(),
+        weight: pair.weight.clone(),
         gap: pair.gap.clone(),
         compression: outcome.layer.compression[range.clone()].to_vec(),
         pressure: outcome.layer.pressure[range.clone()].to_vec(),

@@ -35,6 +35,10 @@ pub struct BodyCounts {
     pub robin_updates: usize,
     /// Changes asked for that changed nothing and cost nothing.
     pub robin_skipped: usize,
+    /// Wall seconds in factorisations or preconditioner set-ups.
+    pub factor_seconds: f64,
+    /// Wall seconds in solves, set-ups apart.
+    pub solve_seconds: f64,
 }
 
 /// An elastic body with stiffness K, load f and contact rows B (one row a contact point of each of its surfaces).

@@ -1,5 +1,6 @@
 //! The outer loop (41)-(42).
 
+use super::body::BodyCounts;
 use super::closing::rigid_closing;
 use super::field::Field;
 use super::held;
@@ -85,8 +86,8 @@ pub struct Outcome {
     pub rows: Vec<Row>,
     /// Name of the method that made the last step.
     pub method: &'static str,
-    /// Factorisations beyond those of the sweeps (a Newton matrix of all bodies).
-    pub coupled_factorizations: usize,
+    /// What was done with all bodies together (their Newton matrix), for each method.
+    pub coupled: Vec<BodyCounts>,
     /// Estimated bounds of the spectrum of G^-1 F1'', if the method saw enough.
     pub spectrum: Option<(f64, f64)>,
 }
@@ -139,7 +140,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
             Seen { model, iterate: &iterate, layer: &layer, weight: &weight, sweep: &sweep, last: last.as_ref() };
         let mut row = watch.measure(&seen);
         (row.iteration, row.sweeps, row.seconds) = (k, sweeper.sweeps, clock.elapsed().as_secs_f64());
-        row.factorizations += method.factorizations();
+        row.factorizations += method.coupled().factorizations;
         row.error = row.residual * method.amplification().sqrt();
         let verdict = watch.judge(&seen, &settings.stop, &row);
         observer.row(&row);
@@ -178,7 +179,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         layer,
         rows,
         method: method.name(),
-        coupled_factorizations: settings.methods.iter().map(|method| method.factorizations()).sum(),
+        coupled: settings.methods.iter().map(|method| method.coupled()).collect(),
         spectrum: method.spectrum(),
     })
 }

@@ -1,4 +1,4 @@
-//! `contact-<a>-<b>.csv`: gap, compression, pressure and normal displacements at the contact points of one pair.
+//! `contact-<a>-<b>.csv`: weight, gap, compression, pressure and normal displacements at the contact points of one pair.
 
 use super::folder::{Folder, safe_name};
 use super::format::field;
@@ -13,6 +13,8 @@ pub struct ContactTable {
     pub side_names: [String; 2],
     /// Contact points, before deformation.
     pub points: Vec<[f64; 3]>,
+    /// Weight omega of each point: the length or area that belongs to it.
+    pub weight: Vec<f64>,
     /// Initial gap d.
     pub gap: Vec<f64>,
     /// Compression c of the layer; negative where the layer is open.
@@ -44,14 +46,16 @@ impl ContactTable {
     /// Those of `out`, and `InvalidInput` when the vectors differ in length.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let [of_a, of_b] = &self.displacement;
-        let columns = [&self.gap, &self.compression, &self.pressure, of_a, of_b];
+        let columns = [&self.weight, &self.gap, &self.compression, &self.pressure, of_a, of_b];
         if columns.iter().any(|column| column.len() != self.points.len()) {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "contact table with columns of different length"));
         }
         let mut csv = csv::Writer::from_writer(out);
         let sides = self.side_names.each_ref().map(|side| format!("u_n_{side}"));
         csv.write_record(
-            ["x", "y", "z", "gap", "compression", "pressure"].into_iter().chain(sides.iter().map(String::as_str)),
+            ["x", "y", "z", "weight", "gap", "compression", "pressure"]
+                .into_iter()
+                .chain(sides.iter().map(String::as_str)),
         )?;
         for (q, point) in self.points.iter().enumerate() {
             let values = point.iter().copied().chain(columns.iter().map(|column| column[q]));
@@ -69,6 +73,7 @@ mod tests {
         ContactTable {
             side_names: ["upper bottom".into(), "lower".into()],
             points: vec![[1.0, 0.0, -0.5], [0.1 + 0.2, 0.0, 1e-20]],
+            weight: vec![0.5, 1.0 / 7.0],
             gap: vec![0.0, 1.0 / 3.0],
             compression: vec![1e-7, -0.25],
             pressure: vec![2.0f64.sqrt(), 0.0],
@@ -85,14 +90,15 @@ mod tests {
         assert_eq!(path, base.path().join("contact-upper_bottom-lower.csv"));
         let mut csv = csv::Reader::from_path(&path).unwrap();
         let header: Vec<_> = csv.headers().unwrap().iter().map(String::from).collect();
-        assert_eq!(header.join(","), "x,y,z,gap,compression,pressure,u_n_upper bottom,u_n_lower");
+        assert_eq!(header.join(","), "x,y,z,weight,gap,compression,pressure,u_n_upper bottom,u_n_lower");
         let rows: Vec<Vec<f64>> =
             csv.records().map(|row| row.unwrap().iter().map(|v| v.parse().unwrap()).collect()).collect();
         assert_eq!(rows.len(), 2);
         for (q, row) in rows.iter().enumerate() {
             let [x, y, z] = table.points[q];
             let [a, b] = &table.displacement;
-            let expected = [x, y, z, table.gap[q], table.compression[q], table.pressure[q], a[q], b[q]];
+            let expected =
+                [x, y, z, table.weight[q], table.gap[q], table.compression[q], table.pressure[q], a[q], b[q]];
             assert_eq!(row[..], expected);
         }
     }

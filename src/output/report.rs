@@ -66,12 +66,23 @@ pub struct Report {
     pub pairs: Vec<PairReport>,
     /// Wall seconds of each phase.
     pub times: BTreeMap<String, f64>,
+    /// Wall seconds of the inner solvers, summed over the bodies; they lie within the phases `set-up` and `iterate`.
+    pub inner_times: InnerTimes,
     /// What a user should know.
     pub warnings: Vec<String>,
     /// The scene with all defaults filled in.
     pub settings: Value,
     /// Files written, relative to the folder of results.
     pub files: Vec<String>,
+}
+
+/// Wall seconds of the inner solvers.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct InnerTimes {
+    /// Factorisations and preconditioner set-ups.
+    pub factor: f64,
+    /// Solves.
+    pub solve: f64,
 }
 
 /// One body.
@@ -102,6 +113,8 @@ pub struct PairReport {
     pub points: usize,
     /// Surface whose mesh carries the points.
     pub carrier: String,
+    /// Estimated coupling theta of each side (docs/theory.md).
+    pub theta: [f64; 2],
     /// Facets of the carrier without a partner.
     pub facets_uncovered: usize,
     /// Energy of the layer, J.

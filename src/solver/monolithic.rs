@@ -4,7 +4,7 @@
 
 use super::{Krylov, SparseBody};
 use crate::ddm::method::Coupled;
-use crate::ddm::{Body, Field};
+use crate::ddm::{Body, BodyCounts, Field};
 use crate::error::Result;
 use crate::fem::ElasticBody;
 use crate::linalg::Csr;
@@ -70,8 +70,8 @@ impl Coupled for Monolithic {
         Ok(Some(field))
     }
 
-    fn factorizations(&self) -> usize {
-        self.whole.counts().factorizations
+    fn counts(&self) -> BodyCounts {
+        self.whole.counts()
     }
 }
 

@@ -5,6 +5,7 @@ use crate::ddm::{Body, BodyCounts, Energy, Solved};
 use crate::error::Result;
 use crate::fem::ElasticBody;
 use crate::linalg::{Csr, dot};
+use std::time::Instant;
 
 /// A body with assembled K and f, its contact rows B, and a solver for G = K + B' diag(d) B.
 pub struct SparseBody<S> {
@@ -103,6 +104,19 @@ fn is_far(rows: &Csr, row_stiffness: &[f64], old: &[f64], new: &[f64]) -> bool {
     })
 }
 
+impl<S: InnerSolver> SparseBody<S> {
+    /// One solve, or one application of the preconditioner, counted and timed apart from the set-up it may need.
+    fn apply(&mut self, solve: impl FnOnce(&mut S) -> Result<Solved>) -> Result<Solved> {
+        self.set_up()?;
+        self.counts.solves += 1;
+        let began = Instant::now();
+        let solved = solve(&mut self.solver)?;
+        self.counts.solve_seconds += began.elapsed().as_secs_f64();
+        self.counts.inner_iterations += solved.iterations;
+        Ok(solved)
+    }
+}
+
 impl<S: InnerSolver> Body for SparseBody<S> {
     fn len(&self) -> usize {
         self.body.load.len()
@@ -158,21 +172,18 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn set_up(&mut self) -> Result<()> {
-        self.solver.set_up()
+        let began = Instant::now();
+        let done = self.solver.set_up();
+        self.counts.factor_seconds += began.elapsed().as_secs_f64();
+        done
     }
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
-        self.counts.solves += 1;
-        let solved = self.solver.solve(r, z)?;
-        self.counts.inner_iterations += solved.iterations;
-        Ok(solved)
+        self.apply(|solver| solver.solve(r, z))
     }
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
-        self.counts.solves += 1;
-        let solved = self.solver.precondition(r, z)?;
-        self.counts.inner_iterations += solved.iterations;
-        Ok(solved)
+        self.apply(|solver| solver.precondition(r, z))
     }
 
     fn rounding(&self, u: &[f64], force: &[f64]) -> f64 {

@@ -13,6 +13,7 @@ pub use conjugate::Conjugate;
 pub use newton::{Coupled, Inner, Newton};
 pub use relaxed::Relaxed;
 
+use super::body::BodyCounts;
 use super::field::Field;
 use super::layer::Layer;
 use super::line::{Line, Unbounded};
@@ -87,9 +88,9 @@ pub trait Method {
         f64::NAN
     }
 
-    /// Factorisations beyond those of the sweeps.
-    fn factorizations(&self) -> usize {
-        0
+    /// What was done with all bodies together, besides the sweeps.
+    fn coupled(&self) -> BodyCounts {
+        BodyCounts::default()
     }
 
     /// Estimated bounds of the spectrum of G^-1 F1'', if the method has seen enough.

@@ -1,6 +1,7 @@
 //! Semismooth Newton (35) with exact line search on F1.
 
 use super::{Here, Method, Step, cg};
+use crate::ddm::BodyCounts;
 use crate::ddm::field::{Field, local_dot};
 use crate::ddm::held;
 use crate::ddm::line::Line;
@@ -22,8 +23,8 @@ pub trait Coupled {
     /// Failures of the solver library.
     fn solve(&mut self, weight: &[f64], r: &[Vec<f64>]) -> Result<Option<Field>>;
 
-    /// Factorisations of the whole so far.
-    fn factorizations(&self) -> usize;
+    /// What was done so far.
+    fn counts(&self) -> BodyCounts;
 }
 
 /// Newton's method.
@@ -198,10 +199,10 @@ impl Method for Newton {
         Ok(Step::Along(direction, length))
     }
 
-    fn factorizations(&self) -> usize {
+    fn coupled(&self) -> BodyCounts {
         match &self.inner {
-            Inner::Direct(coupled) => coupled.factorizations(),
-            Inner::Sweep => 0,
+            Inner::Direct(coupled) => coupled.counts(),
+            Inner::Sweep => BodyCounts::default(),
         }
     }
 
