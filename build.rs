@@ -1,4 +1,4 @@
-//! Finds PETSc, refuses one that cannot serve, and makes the Rust declarations of the functions that we call.
+//! Finds PETSc and its MUMPS, refuses what cannot serve, and makes the Rust declarations of the functions that we call.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -77,6 +77,7 @@ const FUNCTIONS: &[&str] = &[
     "VecResetArray",
     "VecRestoreArray",
     "VecSetBlockSize",
+    "dmumps_c",
 ];
 
 /// Ends the build with a sentence; cargo shows what a failed build script wrote.
@@ -91,6 +92,7 @@ fn main() {
     println!("cargo:rerun-if-changed=src/petsc/requirements.rs");
     println!("cargo:rerun-if-env-changed=PETSC_DIR");
     println!("cargo:rerun-if-env-changed=PETSC_ARCH");
+    println!("cargo:rerun-if-env-changed=MUMPS_DIR");
 
     let petsc = find();
     for header in ["petscconf.h", "petscversion.h"] {
@@ -112,7 +114,23 @@ fn main() {
     for folder in petsc.link_paths.iter().filter(|folder| !folder.starts_with("/usr")) {
         println!("cargo:rustc-link-arg=-Wl,-rpath,{}", folder.display());
     }
-    declare(&petsc.include_paths);
+    let mumps = mumps(&petsc.include_paths);
+    declare(&[&petsc.include_paths[..], &mumps].concat());
+}
+
+/// Links MUMPS itself, whose Schur complement PETSc does not hand on in full, and returns the folder of its header.
+fn mumps(petsc: &[PathBuf]) -> Vec<PathBuf> {
+    let own = env::var_os("MUMPS_DIR").filter(|root| !root.is_empty()).map(PathBuf::from);
+    let folders = own.iter().map(|root| root.join("include")).chain(petsc.iter().cloned());
+    let Some(folder) = folders.chain(["/usr/include".into()]).find(|folder| folder.join("dmumps_c.h").exists()) else {
+        refuse("dmumps_c.h of MUMPS was not found: `apt-get install libmumps-dev`, or point MUMPS_DIR at its folder");
+    };
+    if let Some(root) = own {
+        println!("cargo:rustc-link-search=native={}", root.join("lib").display());
+        println!("cargo:rustc-link-arg=-Wl,-rpath,{}", root.join("lib").display());
+    }
+    println!("cargo:rustc-link-lib=dmumps");
+    vec![folder]
 }
 
 /// PETSc by its pkg-config file: the one of PETSC_DIR and PETSC_ARCH where these are set, else the system's.
@@ -156,7 +174,7 @@ fn declare(petsc: &[PathBuf]) {
         // One type for communicators in the whole crate: that of the `mpi` crate.
         .blocklist_type("(MPI_Comm|ompi_communicator_t)")
         .raw_line("use mpi::ffi::MPI_Comm;")
-        .allowlist_type("(KSPConvergedReason|MatOption|PCFailedReason|PetscErrorType|PetscBool)")
+        .allowlist_type("(KSPConvergedReason|MatOption|PCFailedReason|PetscErrorType|PetscBool|DMUMPS_STRUC_C)")
         .allowlist_var("PetscTrFree")
         .generate_comments(false)
         .layout_tests(false);

@@ -20,7 +20,36 @@ use crate::scene::{Order, Scene, Start, Zone};
 use find::{placed, point};
 use part::Part;
 
-/// A body ready for its inner solver: what [`Problem::build`] hands to the maker of bodies.
+/// What every rank knows of a body before its owner assembles it.
+pub struct Outline<'a> {
+    /// Name in the scene.
+    pub name: &'a str,
+    /// Space dimension: dofs of a node.
+    pub dimension: usize,
+    /// All contact rows of the body, pair by pair; columns: its dofs.
+    pub rows: &'a Csr,
+    /// Prescribed (dof, value), sorted by dof.
+    pub prescribed: &'a [(usize, f64)],
+    /// Rigid motions of the free body.
+    pub motions: &'a [RigidMotion],
+}
+
+/// Gives bodies their inner solvers.
+pub trait Maker {
+    /// Decides on the solver of a body: called on every rank for every body, in the order of the scene.
+    ///
+    /// # Errors
+    /// Failures of PETSc's options.
+    fn plan(&mut self, outline: &Outline) -> Result<()>;
+
+    /// Makes a body, on the rank that owns it, after its plan.
+    ///
+    /// # Errors
+    /// PETSc's refusal of a matrix or an option value.
+    fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>>;
+}
+
+/// A body ready for its inner solver.
 pub struct Assembled {
     /// Name in the scene.
     pub name: String,
@@ -88,12 +117,12 @@ pub struct Problem {
 
 /// Turns a scene and its mesh into a model.
 ///
-/// `ranks` is (this rank, number of ranks); `keep` keeps matrices and rows for a method that needs them; `cut` finds the common pieces of surfaces in this dimension. `make` turns each assembled body that `owner` gives to `rank` into one that
+/// `ranks` is (this rank, number of ranks); `keep` keeps matrices and rows for a method that needs them; `cut` finds the common pieces of surfaces in this dimension. `maker` turns each body of this rank into one that
 /// solves.
 ///
 /// # Errors
 /// Refusals of the scene against its mesh: missing groups, surfaces of the wrong body, supports that contradict each
-/// other, surfaces that do not face each other; and failures of `make`.
+/// other, surfaces that do not face each other; and failures of `maker`.
 pub fn discretize<const D: usize>(
     scene: &Scene,
     mesh: &Mesh<D>,
@@ -101,7 +130,7 @@ pub fn discretize<const D: usize>(
     ranks: (usize, usize),
     keep: bool,
     exchange: Box<dyn Exchange>,
-    make: &mut dyn FnMut(Assembled) -> Result<Box<dyn Body>>,
+    maker: &mut dyn Maker,
 ) -> Result<Problem> {
     let parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh)).collect::<Result<Vec<_>>>()?;
     let mut pairs = Vec::new();
@@ -136,6 +165,13 @@ pub fn discretize<const D: usize>(
         let held = slot.motions.len() == gauge::felt_by_none(&slot.motions).len();
         let stiffness = if held && surface > 0.0 { modulus * surface / part.space.measure() } else { 0.0 };
         let material = Material::isotropic(part.spec.young.value, part.spec.poisson.value, D, scene.plane);
+        maker.plan(&Outline {
+            name: &slot.name,
+            dimension: D,
+            rows: &rows,
+            prescribed: &prescribed,
+            motions: &free,
+        })?;
         if owner[index] == ranks.0 {
             let body = part.assemble(mesh, &rows, &material, load, prescribed)?;
             assemblies += 1;
@@ -145,7 +181,8 @@ pub fn discretize<const D: usize>(
             if keep {
                 kept.push((body.stiffness.clone(), rows.clone()));
             }
-            slot.local = Some(make(Assembled { name: slot.name.clone(), dimension: D, body, rows, motions: free })?);
+            slot.local =
+                Some(maker.make(Assembled { name: slot.name.clone(), dimension: D, body, rows, motions: free })?);
         }
         infos.push(BodyInfo {
             name: slot.name.clone(),

@@ -7,7 +7,8 @@ mod common;
 
 use common::{Run, case, distance, solve, winkler};
 
-const COARSE: [&str; 2] = ["--set", "mesh.set.n=8"];
+/// Bodies that factor their own G; condensed ones count at the end.
+const COARSE: [&str; 4] = ["--set", "mesh.set.n=8", "--set", "solver=mumps"];
 
 fn coarse(name: &str, args: &[&str]) -> Run {
     solve(case(name), &[&COARSE, args].concat()).converged()
@@ -27,7 +28,7 @@ fn assert_solves(run: &Run, in_sweeps: usize) {
 
 #[test]
 fn a_nonlinear_layer_factors_every_body_in_every_sweep() {
-    let run = solve(case("groove"), &[]).converged();
+    let run = solve(case("groove"), &["--set", "solver=mumps"]).converged();
     assert_eq!(counts(&run, ["iterations", "sweeps"]), [7, 8]);
     // 2 for the start, 2 in each sweep; the pattern once a body
     assert_eq!(counts(&run, ["factorizations", "symbolic_factorizations", "assemblies"]), [18, 2, 2]);
@@ -170,4 +171,19 @@ fn the_table_has_the_lengths_and_the_report_theta() {
     // both inner phases were measured, and lie within the run
     let inner = ["factor", "solve"].map(|phase| run.number(&format!("inner_times/{phase}")));
     assert!(inner.iter().all(|&seconds| seconds > 0.0) && inner.iter().sum::<f64>() < run.number("times/total"));
+}
+
+/// Condensed, K is factored once a body; what a changed Robin term costs is a small dense factorisation.
+#[test]
+fn a_condensed_body_is_factored_once() {
+    let run = solve(case("groove"), &[]).converged();
+    assert_eq!(counts(&run, ["iterations", "sweeps"]), [7, 8]);
+    assert_eq!(counts(&run, ["factorizations", "symbolic_factorizations", "assemblies"]), [2, 2, 2]);
+    // 2 for the start, 2 in each sweep
+    assert_eq!(counts(&run, ["dense_factorizations", "robin_updates", "robin_updates_skipped"]), [18, 18, 2]);
+    assert_solves(&run, 2 * 8);
+    assert_eq!(run.history().counts("factorizations"), [2; 8]);
+    // a linear layer in full contact: the start, and once more
+    let full = solve(case("wavy"), &["--set", "mesh.set.n=8", "--set", "method.start.normal=3e-4"]).converged();
+    assert_eq!(counts(&full, ["factorizations", "dense_factorizations", "robin_updates"]), [2, 4, 4]);
 }

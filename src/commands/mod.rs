@@ -1,6 +1,7 @@
 //! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`]. What they share is in [`run`].
 
 pub mod check;
+pub mod inner;
 pub mod method;
 pub mod preflight;
 pub mod report;

@@ -96,6 +96,7 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
         inner_iterations: counts.inner_iterations,
         robin_updates: counts.robin_updates,
         robin_updates_skipped: counts.robin_skipped,
+        dense_factorizations: counts.dense_factorizations,
         assemblies: shared.assemblies,
         body_solves_skipped: outcome.solves_skipped,
         messages: model.exchange.messages(),
@@ -153,7 +154,7 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
 }
 
 /// Numbers before the words about the solvers.
-const HEAD: usize = 9;
+const HEAD: usize = 10;
 
 /// Most bytes of the words about a solver.
 const WORDS: usize = 64;
@@ -178,6 +179,7 @@ impl Shared {
             message.iter_mut().zip(mine).for_each(|(sum, count)| *sum += count as f64);
             message[7] += counts.factor_seconds;
             message[8] += counts.solve_seconds;
+            message[9] += counts.dense_factorizations as f64;
             let place = &mut message[HEAD + WORDS * index..];
             place
                 .iter_mut()
@@ -198,6 +200,7 @@ impl Shared {
                 robin_skipped: count(5),
                 factor_seconds: message[7],
                 solve_seconds: message[8],
+                dense_factorizations: count(9),
             },
             assemblies: count(6),
             solvers: message[HEAD..].chunks_exact(WORDS).map(words).collect(),

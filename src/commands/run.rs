@@ -1,15 +1,16 @@
 //! From a scene to a solved problem: mesh, discretisation, inner solvers, options, iteration.
 
+use super::inner::Inner;
 use super::method;
 use crate::contact::pieces;
 use crate::ddm::method::Method;
 use crate::ddm::{self, Observer, Outcome, RobinRule, Settings, StopRule};
-use crate::discretize::{self, Assembled, Problem};
+use crate::discretize::{self, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::scene::{MeshSource, Order, RobinSpec, Scene};
-use crate::solver::{Krylov, SparseBody, options, preset};
+use crate::solver::options;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
 use std::collections::BTreeMap;
@@ -74,30 +75,20 @@ pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Pr
     let mesh = mesh(session, scene)?;
     clock.phase("mesh");
     let largest = mesh.points.len() * scene.dimension.value;
-    let (chosen, choice) = match scene.solver.preset {
-        Some(preset) => (preset, "the scene asks for it".to_owned()),
-        None => {
-            let (preset, why) = preset::choose(scene.dimension.value, largest);
-            (preset, why)
-        }
-    };
     // small fronts and several ranks lose by BLAS threads, large factorisations gain
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
     let threads = if scene.dimension.value == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
     session.set_blas_threads(threads);
-    for name in &names {
-        preset::apply(session, name, chosen)?;
-    }
-    let mut make = |assembled: Assembled| solver(session, assembled);
+    let keep = method::keeps_matrices(scene);
+    let mut inner = Inner::new(session, scene, keep);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
-    let keep = method::keeps_matrices(scene);
-    let problem = discretize::discretize::<2>(scene, &mesh, pieces::plane, ranks, keep, exchange, &mut make);
+    let problem = discretize::discretize::<2>(scene, &mesh, pieces::plane, ranks, keep, exchange, &mut inner);
     let mut problem = agree(session, problem)?;
     problem.share();
     clock.phase("discretize");
     let warnings = warnings(session, scene, &problem);
-    Ok(Prepared { problem, methods: Vec::new(), choice, warnings })
+    Ok(Prepared { problem, methods: Vec::new(), choice: inner.reason(), warnings })
 }
 
 /// What the decoder of the scene cannot know.
@@ -143,13 +134,6 @@ fn mesh(session: &Session, scene: &Scene) -> Result<crate::mesh::Mesh<2>> {
         agree(session, if session.rank() == 0 { load().map(|_| ()) } else { Ok(()) })?;
     }
     agree(session, load())
-}
-
-fn solver(session: &Session, assembled: Assembled) -> Result<Box<dyn ddm::Body>> {
-    let Assembled { name, dimension, body, rows, motions } = assembled;
-    let modes: Vec<Vec<f64>> = motions.into_iter().map(|motion| motion.displacement).collect();
-    let krylov = Krylov::new(session, &name, dimension, &body.stiffness, &modes)?;
-    Ok(Box::new(SparseBody::new(body, rows, krylov)))
 }
 
 fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> {

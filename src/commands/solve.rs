@@ -109,7 +109,7 @@ fn write(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &Outcom
     if scene.output.vtu {
         for (index, info) in prepared.problem.bodies.iter().enumerate() {
             if let Some(body) = &model.bodies[index].local {
-                let field = info.field(&body.recover(&outcome.iterate.states[index]));
+                let field = info.field(&body.recover(&outcome.iterate.states[index])?);
                 folder.write(&field.file_name(), |out| field.write(out))?;
             }
         }

@@ -25,6 +25,8 @@ pub struct Solved {
 pub struct BodyCounts {
     /// Numeric factorisations or preconditioner set-ups.
     pub factorizations: usize,
+    /// Dense factorisations of the Robin matrices of condensed bodies.
+    pub dense_factorizations: usize,
     /// Symbolic factorisations (patterns analysed).
     pub symbolic: usize,
     /// Solves G z = r.
@@ -105,7 +107,10 @@ pub trait Body {
     fn counts(&self) -> BodyCounts;
 
     /// Displacements of all nodes for a state.
-    fn recover(&self, u: &[f64]) -> Vec<f64>;
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn recover(&self, u: &[f64]) -> Result<Vec<f64>>;
 
     /// One line about the inner solver.
     fn describe(&self) -> String;

@@ -31,6 +31,8 @@ pub struct Report {
     pub sweeps: usize,
     /// Numeric factorisations or preconditioner set-ups, all bodies.
     pub factorizations: usize,
+    /// Dense factorisations of condensed bodies, all bodies.
+    pub dense_factorizations: usize,
     /// Symbolic factorisations, all bodies.
     pub symbolic_factorizations: usize,
     /// Stiffness matrices assembled.

@@ -1,5 +1,7 @@
-//! Which BLAS the program runs on. The reference one is up to 11 times slower in factorisations, so a run says it.
+//! The BLAS and LAPACK that PETSc runs on: which it is, its threads, and its dense Cholesky factorisation. The reference BLAS is
+//! up to 11 times slower in factorisations, so a run says it.
 
+use crate::error::{Error, Kind, Result};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::path::PathBuf;
 
@@ -47,6 +49,95 @@ pub(super) fn name() -> String {
         None => "unknown BLAS".to_owned(),
     }
 }
+
+// Fortran passes the length of a text behind all arguments.
+type Factor = unsafe extern "C" fn(*const c_char, *const c_int, *mut f64, *const c_int, *mut c_int, usize);
+type Solve = unsafe extern "C" fn(
+    *const c_char,
+    *const c_int,
+    *const c_int,
+    *const f64,
+    *const c_int,
+    *mut f64,
+    *const c_int,
+    *mut c_int,
+    usize,
+);
+
+/// A function of the LAPACK that PETSc runs on.
+fn lapack(name: &CStr) -> Result<*mut c_void> {
+    // SAFETY: a null library means the default search order, and the name ends with a zero byte.
+    let address = unsafe { dlsym(std::ptr::null_mut(), name.as_ptr()) };
+    if address.is_null() {
+        let name = name.to_string_lossy();
+        return Err(Error::new(Kind::Solver, format!("no LAPACK is loaded: `{name}` is not there"))
+            .help("install one that PETSc can use, e.g. `apt-get install libopenblas0-pthread`"));
+    }
+    Ok(address)
+}
+
+/// Checks the size of a dense matrix.
+fn order(matrix: &[f64], n: usize) -> Result<c_int> {
+    match c_int::try_from(n) {
+        Ok(order) if matrix.len() == n * n => Ok(order),
+        _ => Err(Error::new(Kind::Solver, format!("{} numbers are not a dense matrix of {n} rows", matrix.len()))),
+    }
+}
+
+/// Cholesky factorisation of a dense symmetric matrix of `n` rows in place (LAPACK's dpotrf; the other triangle is left as it
+/// is). False if the matrix is not positive definite.
+///
+/// ```
+/// use winkler::petsc::{cholesky, cholesky_solve};
+/// # let session = winkler::petsc::Session::start(&[])?;
+/// let mut g = [4.0, 2.0, 2.0, 5.0];
+/// assert!(cholesky(&mut g, 2)?);
+/// let mut x = [10.0, 13.0];
+/// cholesky_solve(&g, 2, &mut x)?;
+/// assert!((x[0] - 1.5).abs() < 1e-15 && (x[1] - 2.0).abs() < 1e-15);
+/// assert!(!cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2)?);
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+///
+/// # Errors
+/// When no LAPACK is loaded, or the slice has not n^2 entries.
+pub fn cholesky(matrix: &mut [f64], n: usize) -> Result<bool> {
+    let (n, mut info) = (order(matrix, n)?, 0);
+    if n == 0 {
+        return Ok(true);
+    }
+    let address = lapack(c"dpotrf_")?;
+    // SAFETY: LAPACK's dpotrf, with a matrix of n x n numbers.
+    unsafe {
+        let factor: Factor = std::mem::transmute(address);
+        factor(UPPER.as_ptr(), &n, matrix.as_mut_ptr(), &n, &mut info, 1);
+    }
+    Ok(info == 0)
+}
+
+/// Solves with a factor of [`cholesky`], in place.
+///
+/// # Errors
+/// When no LAPACK is loaded, or a slice has the wrong length.
+pub fn cholesky_solve(factor: &[f64], n: usize, x: &mut [f64]) -> Result<()> {
+    let (rows, one, mut info) = (order(factor, n)?, 1, 0);
+    if x.len() != n {
+        return Err(Error::new(Kind::Solver, format!("{} numbers are no right-hand side of {n} rows", x.len())));
+    }
+    if n == 0 {
+        return Ok(());
+    }
+    let address = lapack(c"dpotrs_")?;
+    // SAFETY: LAPACK's dpotrs, with a factor of n x n numbers and one right-hand side of n.
+    unsafe {
+        let solve: Solve = std::mem::transmute(address);
+        solve(UPPER.as_ptr(), &rows, &one, factor.as_ptr(), &rows, x.as_mut_ptr(), &rows, &mut info, 1);
+    }
+    Ok(())
+}
+
+/// The triangle in use.
+const UPPER: &CStr = c"U";
 
 /// Asks OpenBLAS for a number of threads; false if another BLAS is in use, which keeps its own number.
 pub(super) fn set_threads(count: usize) -> bool {

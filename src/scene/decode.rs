@@ -172,7 +172,7 @@ fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Result<T>
 }
 
 fn preset(node: &Node) -> Result<Preset> {
-    choose(node, "solver", &[("mumps", Preset::Mumps), ("hypre", Preset::Hypre)])
+    choose(node, "solver", &Preset::ALL)
 }
 
 fn solver(node: Option<&Node>) -> Result<SolverSpec> {

@@ -2,8 +2,8 @@
 
 use super::expression::Field;
 use super::{
-    BodySpec, ContactSpec, Gamma, LayerSpec, LoadKind, MeshSource, MethodName, MethodSpec, Order, Plane, Preset,
-    RobinSpec, Scene, SolverSpec, Start, StopSpec, Zone,
+    BodySpec, ContactSpec, Gamma, LayerSpec, LoadKind, MeshSource, MethodName, MethodSpec, Order, Plane, RobinSpec,
+    Scene, SolverSpec, Start, StopSpec, Zone,
 };
 use serde_json::{Map, Value, json};
 
@@ -148,12 +148,8 @@ fn method(method: &MethodSpec) -> Value {
 }
 
 fn solver(solver: &SolverSpec) -> Value {
-    let preset = solver.preset.map(|preset| match preset {
-        Preset::Mumps => json!("mumps"),
-        Preset::Hypre => json!("hypre"),
-    });
     let mut map = Map::new();
-    insert(&mut map, "preset", preset);
+    insert(&mut map, "preset", solver.preset.map(|preset| json!(preset.name())));
     map.insert("options".into(), json!(solver.options.join(" ")));
     map.into()
 }

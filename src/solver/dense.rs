@@ -1,65 +1,54 @@
-//! Dense Cholesky factorisation in pure Rust: the reference that tests compare with, without PETSc.
+//! Dense Cholesky factorisation by the LAPACK that PETSc runs on: for matrices without zeros.
 
 use super::InnerSolver;
 use crate::ddm::Solved;
 use crate::error::Result;
-use crate::linalg::Csr;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use crate::petsc::{cholesky, cholesky_solve};
 
 /// G as a dense matrix, factored when it is first needed after a change.
 pub struct Dense {
-    pattern: Csr,
-    factor: Option<Option<Cholesky<f64, Dyn>>>,
+    rows: usize,
+    /// All of G, row by row.
+    values: Vec<f64>,
+    factor: Vec<f64>,
+    /// What the factor is worth: none since the last change, or whether G was positive definite.
+    made: Option<bool>,
     factorizations: usize,
 }
 
 impl Dense {
-    /// Starts from G = K.
-    pub fn new(stiffness: &Csr) -> Self {
-        Self { pattern: stiffness.clone(), factor: None, factorizations: 0 }
-    }
-
-    fn matrix(&self) -> DMatrix<f64> {
-        let n = self.pattern.rows();
-        let mut matrix = DMatrix::zeros(n, n);
-        for i in 0..n {
-            for (j, value) in self.pattern.row(i) {
-                matrix[(i, j)] = value;
-            }
-        }
-        matrix
+    /// Starts from all values of a symmetric matrix, row by row.
+    pub fn new(rows: usize, values: Vec<f64>) -> Self {
+        Self { rows, factor: vec![0.0; values.len()], values, made: None, factorizations: 0 }
     }
 }
 
 impl InnerSolver for Dense {
     fn update(&mut self, write: &mut dyn FnMut(&mut [f64]), _far: bool) -> Result<()> {
-        write(&mut self.pattern.values);
-        self.factor = None;
+        write(&mut self.values);
+        self.made = None;
         Ok(())
     }
 
     fn set_up(&mut self) -> Result<()> {
-        if self.factor.is_none() {
+        if self.made.is_none() {
             self.factorizations += 1;
-            self.factor = Some(self.matrix().cholesky());
+            self.factor.copy_from_slice(&self.values);
+            self.made = Some(cholesky(&mut self.factor, self.rows)?);
         }
         Ok(())
     }
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         self.set_up()?;
-        match self.factor.as_ref().and_then(Option::as_ref) {
-            Some(factor) => {
-                let solution = factor.solve(&DVector::from_column_slice(r));
-                z.copy_from_slice(solution.as_slice());
-                Ok(Solved::default())
-            }
-            None => {
-                z.fill(0.0);
-                let failure = Some("the Robin matrix is not positive definite".to_owned());
-                Ok(Solved { iterations: 0, failure })
-            }
+        if self.made == Some(false) {
+            z.fill(0.0);
+            let failure = Some("the Robin matrix is not positive definite".to_owned());
+            return Ok(Solved { iterations: 0, failure });
         }
+        z.copy_from_slice(r);
+        cholesky_solve(&self.factor, self.rows, z)?;
+        Ok(Solved::default())
     }
 
     fn factorizations(&self) -> (usize, usize) {

@@ -1,18 +1,23 @@
 //! Inner solvers: how a body solves G z = r.
 //!
 //! [`SparseBody`] owns K, f and B and answers the verbs of [`Body`](crate::ddm::Body); an [`InnerSolver`] owns G. A new
-//! way to solve is a new file with that trait.
+//! way to solve is a new file with that trait. [`CondensedBody`] is such a body whose dofs are those of its contact.
 
+mod condensed;
 pub mod dense;
 pub mod krylov;
+pub mod memory;
 pub mod monolithic;
 pub mod options;
 pub mod preset;
+mod retained;
 mod sparse;
 
+pub use condensed::CondensedBody;
 pub use dense::Dense;
 pub use krylov::Krylov;
 pub use monolithic::{Monolithic, Union};
+pub use retained::Retained;
 pub use sparse::SparseBody;
 
 use crate::ddm::Solved;

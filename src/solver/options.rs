@@ -151,6 +151,31 @@ pub fn typed(session: &Session, body: &str, name: &str) -> Option<String> {
     options.get(&own).or_else(|| is_plain(name, &[body]).then(|| options.get(name)).flatten())
 }
 
+/// Whether the user typed an option for the solver or matrix of this body, besides controls of MUMPS: then it is a KSP of
+/// PETSc that is asked for.
+///
+/// ```
+/// use winkler::{petsc::Session, solver::options::*};
+/// let words = ["-up_pc_type", "icc", "-mat_mumps_icntl_14", "50", "-log_view"];
+/// let session = Session::start(&words.map(String::from))?;
+/// distribute(&session, &["up", "low"])?;
+/// set_default(&session, "low", "pc_type", Some("gamg"))?;
+/// assert!(asks_for_ksp(&session, "up")? && !asks_for_ksp(&session, "low")?);
+/// # session.options().clear("-log_view")?;
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+///
+/// # Errors
+/// When PETSc refuses, which it does not for options it has taken before.
+pub fn asks_for_ksp(session: &Session, body: &str) -> Result<bool> {
+    let all = session.options().all()?;
+    let of_body = all.iter().filter(|(name, _)| !matches!(origin(name), Some(Origin::Default)));
+    Ok(of_body.filter_map(|(name, _)| body_of(name, &[body])).any(|(_, bare)| {
+        FAMILIES.iter().any(|family| bare.starts_with(family))
+            && !["mat_mumps_icntl_", "mat_mumps_cntl_"].iter().any(|control| bare.starts_with(control))
+    }))
+}
+
 /// Lets `cholesky` and `lu` mean MUMPS, in the solver of a body and in those nested in it (`-sub_pc_type lu`), where
 /// `-pc_factor_mat_solver_type` was not given: PETSc's own factorisation is over 20 times slower.
 ///

@@ -1,6 +1,6 @@
 //! Which inner solver a body gets when the user typed no PETSc option, and the defaults of each.
 
-use super::options;
+use super::{memory, options};
 use crate::error::Result;
 use crate::petsc::Session;
 use crate::scene::Preset;
@@ -23,16 +23,69 @@ const TOLERANCE: &str = "1e-6";
 /// Dofs of a body in space above which multigrid beats a factorisation.
 const LARGE: usize = 150_000;
 
-/// The preset for a scene that names none, with the reason.
-pub fn choose(dimension: usize, largest_body: usize) -> (Preset, String) {
-    match (dimension, largest_body) {
-        (2, _) => (Preset::Mumps, "plane bodies factor fast".to_owned()),
-        (_, dofs) if dofs <= LARGE => (Preset::Mumps, format!("{dofs} dofs in the largest body, few enough to factor")),
-        (_, dofs) => (Preset::Hypre, format!("{dofs} dofs in the largest body, too many to factor")),
+/// Retained dofs up to which a dense factorisation costs nothing worth comparing.
+const SMALL: usize = 300;
+
+/// What the choice of a solver depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    /// Space dimension.
+    pub dimension: usize,
+    /// Dofs of the body.
+    pub dofs: usize,
+    /// Dofs that a condensed body would retain.
+    pub retained: usize,
+    /// Bytes that the bodies before have left.
+    pub memory: usize,
+}
+
+impl Size {
+    /// Whether an interior is there to be eliminated, and a rest that remains.
+    pub fn can_condense(&self) -> bool {
+        (1..self.dofs).contains(&self.retained)
+    }
+
+    /// Estimated bytes of a solver that factors.
+    pub fn bytes(&self, preset: Preset) -> usize {
+        let dense = if preset == Preset::Condensed { memory::of_condensed(self.retained) } else { 0 };
+        memory::of_factor(self.dimension, self.dofs) + dense
     }
 }
 
-/// Sets the defaults of a body's solver: after the typed options, and only for the KSP and PC in force.
+/// The preset for a body whose scene names none, with the reason.
+///
+/// ```
+/// use winkler::{scene::Preset, solver::preset::{Size, choose}};
+/// let size = Size { dimension: 3, dofs: 98_000, retained: 1024, memory: 8_000_000_000 };
+/// assert_eq!(choose(&size).0, Preset::Condensed);
+/// // too little memory for a factor, or too many dofs: multigrid
+/// assert_eq!(choose(&Size { memory: 500_000_000, ..size }).0, Preset::Hypre);
+/// assert_eq!(choose(&Size { dofs: 1_000_000, ..size }).0, Preset::Hypre);
+/// // a sheet that is nothing but contact has nothing to gain
+/// assert_eq!(choose(&Size { dimension: 2, dofs: 40_000, retained: 20_000, ..size }).0, Preset::Mumps);
+/// ```
+pub fn choose(size: &Size) -> (Preset, String) {
+    let &Size { dimension, dofs, retained, memory } = size;
+    let place = if dimension == 2 { "plane" } else { "space" };
+    let what = format!("{dofs} dofs in the {place}, {retained} of them on the contact");
+    let megabytes = |preset: Preset| size.bytes(preset) / 1_000_000;
+    let fits = |preset: Preset| size.bytes(preset) < memory;
+    let dense = (retained as f64).powi(3) / 3.0;
+    let pays = retained <= SMALL || dense <= memory::work_of_factor(dimension, dofs);
+    if dimension != 2 && dofs > LARGE {
+        (Preset::Hypre, format!("{what}: too many to factor"))
+    } else if size.can_condense() && pays && fits(Preset::Condensed) {
+        (Preset::Condensed, format!("{what}, about {} MB", megabytes(Preset::Condensed)))
+    } else if fits(Preset::Mumps) {
+        (Preset::Mumps, format!("{what}, about {} MB", megabytes(Preset::Mumps)))
+    } else {
+        let free = memory / 1_000_000;
+        (Preset::Hypre, format!("{what}: a factor takes about {} MB, {free} are free", megabytes(Preset::Mumps)))
+    }
+}
+
+/// Sets the defaults of a body's solver: after the typed options, and only for the KSP and PC in force. A condensed body has
+/// no KSP and no defaults.
 ///
 /// # Errors
 /// Failures of PETSc's options database.
@@ -40,7 +93,13 @@ pub fn apply(session: &Session, body: &str, preset: Preset) -> Result<()> {
     let default = |name: &str, value: &str| options::set_default(session, body, name, Some(value));
     let table = session.options();
     let in_force = |name: &str| table.get(&format!("-{body}_{name}")).unwrap_or_default();
-    default("pc_type", if preset == Preset::Mumps { "cholesky" } else { "hypre" })?;
+    match preset {
+        Preset::Condensed => return Ok(()),
+        Preset::Mumps => default("pc_type", "cholesky")?,
+        Preset::Hypre => default("pc_type", "hypre")?,
+        Preset::Gamg => default("pc_type", "gamg")?,
+        Preset::Icc => default("pc_type", "icc")?,
+    }
     let pc = in_force("pc_type");
     let direct = matches!(pc.as_str(), "cholesky" | "lu");
     default("ksp_type", if direct { "preonly" } else { "cg" })?;
@@ -57,6 +116,9 @@ pub fn apply(session: &Session, body: &str, preset: Preset) -> Result<()> {
         for (name, value) in HYPRE {
             default(name, value)?;
         }
+    }
+    if pc == "icc" && preset == Preset::Icc {
+        default("pc_factor_levels", "1")?;
     }
     Ok(())
 }

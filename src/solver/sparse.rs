@@ -207,8 +207,8 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         BodyCounts { symbolic, factorizations, ..self.counts }
     }
 
-    fn recover(&self, u: &[f64]) -> Vec<f64> {
-        u.to_vec()
+    fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
+        Ok(u.to_vec())
     }
 
     fn describe(&self) -> String {

@@ -1,0 +1,105 @@
+//! The inner solver of each body: what was asked for, or the program's choice and its reason.
+
+use crate::ddm::Body;
+use crate::discretize::{Assembled, Maker, Outline};
+use crate::error::Result;
+use crate::petsc::Session;
+use crate::scene::{Preset, Scene};
+use crate::solver::preset::{self, Size};
+use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory, options};
+use mpi::collective::SystemOperation;
+use mpi::traits::CommunicatorCollectives;
+
+/// Chooses and makes the inner solvers of a scene's bodies.
+pub struct Inner<'a> {
+    session: &'a Session,
+    /// What the scene names.
+    asked: Option<Preset>,
+    /// Whether the method needs the matrices of the bodies themselves.
+    joined: bool,
+    /// Bytes that the solvers so far leave, on the rank that has least.
+    memory: usize,
+    plans: Vec<Plan>,
+}
+
+/// The choice for a body.
+struct Plan {
+    name: String,
+    preset: Preset,
+    reason: String,
+    dofs: usize,
+    /// For a condensed body, until it is made.
+    retained: Option<Retained>,
+}
+
+impl<'a> Inner<'a> {
+    /// Starts from the memory that is free now; collective. `joined` tells that the method takes the bodies' own matrices
+    /// together, which a condensed body does not have.
+    pub fn new(session: &'a Session, scene: &Scene, joined: bool) -> Self {
+        let mine = memory::available() as u64;
+        let mut least = mine;
+        if session.size() > 1 {
+            session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
+        }
+        Self { session, asked: scene.solver.preset, joined, memory: least as usize, plans: Vec::new() }
+    }
+
+    /// Why the solvers are what they are, in words: once if all bodies have the same.
+    pub fn reason(&self) -> String {
+        let Some(largest) = self.plans.iter().max_by_key(|plan| plan.dofs) else { return String::new() };
+        if self.plans.iter().all(|plan| plan.preset == largest.preset) {
+            return largest.reason.clone();
+        }
+        let all = self.plans.iter().map(|plan| format!("{}: {}", plan.name, plan.reason));
+        all.collect::<Vec<_>>().join("; ")
+    }
+
+    fn choose(&self, name: &str, size: &Size) -> Result<(Preset, String)> {
+        let typed = options::asks_for_ksp(self.session, name)?;
+        let condensable = size.can_condense() && !self.joined && !typed;
+        Ok(match self.asked {
+            Some(Preset::Condensed) if !condensable => {
+                let why = if typed {
+                    "PETSc options were typed"
+                } else if self.joined {
+                    "the method factors all bodies together"
+                } else {
+                    "there is nothing to condense"
+                };
+                (Preset::Mumps, why.to_owned())
+            }
+            Some(preset) => (preset, "the scene asks for it".to_owned()),
+            None => match preset::choose(size) {
+                (Preset::Condensed, why) if !condensable || self.session.options().has("-help") => (Preset::Mumps, why),
+                chosen => chosen,
+            },
+        })
+    }
+}
+
+impl Maker for Inner<'_> {
+    fn plan(&mut self, outline: &Outline) -> Result<()> {
+        let &Outline { name, dimension, rows, prescribed, motions } = outline;
+        let retained = Retained::new(dimension, rows, prescribed, motions);
+        let size = Size { dimension, dofs: rows.columns, retained: retained.dofs.len(), memory: self.memory };
+        let (preset, reason) = self.choose(name, &size)?;
+        if matches!(preset, Preset::Mumps | Preset::Condensed) {
+            self.memory = self.memory.saturating_sub(size.bytes(preset));
+        }
+        preset::apply(self.session, name, preset)?;
+        let retained = (preset == Preset::Condensed).then_some(retained);
+        self.plans.push(Plan { name: name.to_owned(), preset, reason, dofs: size.dofs, retained });
+        Ok(())
+    }
+
+    fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>> {
+        let Assembled { name, dimension, body, rows, motions } = assembled;
+        let plan = self.plans.iter_mut().find(|plan| plan.name == name);
+        if let Some(retained) = plan.and_then(|plan| plan.retained.take()) {
+            return Ok(Box::new(CondensedBody::new(self.session, &name, dimension, body, retained)));
+        }
+        let modes: Vec<Vec<f64>> = motions.into_iter().map(|motion| motion.displacement).collect();
+        let krylov = Krylov::new(self.session, &name, dimension, &body.stiffness, &modes)?;
+        Ok(Box::new(SparseBody::new(body, rows, krylov)))
+    }
+}

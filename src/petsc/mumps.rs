@@ -1,0 +1,305 @@
+//! Schur complements by MUMPS itself: PETSc forces a poor ordering on it and hands the complement on in part only.
+
+use super::metis;
+use super::{Int, Session, ffi};
+use crate::error::{Error, Kind, Result};
+use mpi::ffi::{MPI_Comm_c2f, RSMPI_COMM_SELF};
+use std::ptr::null_mut;
+
+/// Space beyond what the analysis expects, in per cent, tried one after the other.
+const ROOM: [i32; 4] = [20, 60, 200, 1000];
+
+/// Controls that belong to this binding.
+const OWN: [(usize, &str); 8] = [
+    (5, "format of the matrix"),
+    (10, "iterative refinement, which has no matrix any more"),
+    (11, "error analysis, which has no matrix any more"),
+    (18, "distribution of the matrix"),
+    (19, "Schur complement"),
+    (20, "format of right-hand sides"),
+    (21, "distribution of solutions"),
+    (26, "condensation"),
+];
+
+/// A sparse symmetric positive definite matrix whose interior dofs were eliminated.
+///
+/// With the retained dofs R and the others I: S = K_RR - K_RI K_II^-1 K_IR. One symbolic and one numeric factorisation of
+/// K_II give S, condensed right-hand sides, and the interior back.
+///
+/// ```
+/// use winkler::petsc::{Schur, Session};
+/// // the chain 0 - 1 - 2 of springs, held to the ground at 0 and 2, of which dof 2 is retained
+/// let session = Session::start(&[])?;
+/// let lower = [(0, 0, 2.0), (1, 0, -1.0), (1, 1, 2.0), (2, 1, -1.0), (2, 2, 2.0)];
+/// let mut schur = Schur::analyse(&session, "up", 1, 3, &lower, &[2])?;
+/// schur.factor()?;
+/// assert!((schur.complement()[0] - (2.0 - 2.0 / 3.0)).abs() < 1e-14);
+/// let condensed = schur.condense(&[3.0, 0.0, 1.0])?;
+/// assert!((condensed[0] - 2.0).abs() < 1e-14);
+/// let x = schur.expand(&[3.0, 0.0, 1.0], &[1.5])?;
+/// assert!((x[0] - 2.5).abs() < 1e-14 && (x[1] - 2.0).abs() < 1e-14 && x[2] == 1.5);
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+pub struct Schur {
+    /// MUMPS' own struct; it keeps pointers into the arrays below.
+    mumps: Box<ffi::DMUMPS_STRUC_C>,
+    rows: Vec<Int>,
+    columns: Vec<Int>,
+    values: Vec<f64>,
+    positions: Vec<Int>,
+    retained: Vec<Int>,
+    complement: Vec<f64>,
+    _session: Session,
+}
+
+impl Schur {
+    /// Plans to eliminate all but the `retained` dofs. `lower` holds (row, column, value) of the lower triangle, each place once;
+    /// `block_size` dofs belong to one node. Options `-<body>_mat_mumps_icntl_<i>` and `_cntl_<i>` are honoured.
+    ///
+    /// # Errors
+    /// When METIS is missing, an option cannot be used, or MUMPS refuses the pattern.
+    pub fn analyse(
+        session: &Session,
+        body: &str,
+        block_size: usize,
+        rows: usize,
+        lower: &[(usize, usize, f64)],
+        retained: &[usize],
+    ) -> Result<Schur> {
+        let one = |i: usize| i as Int + 1;
+        let inside = lower.iter().all(|&(i, j, _)| i < rows && j <= i) && retained.iter().all(|&i| i < rows);
+        if !inside || retained.is_empty() || retained.len() >= rows || rows % block_size != 0 {
+            return Err(Error::new(Kind::Solver, "not a lower triangle with retained and interior rows"));
+        }
+        let mut schur = Schur {
+            // SAFETY: MUMPS' struct is plain C data; zeros are null pointers and empty sizes.
+            mumps: Box::new(unsafe { std::mem::zeroed() }),
+            rows: lower.iter().map(|entry| one(entry.0)).collect(),
+            columns: lower.iter().map(|entry| one(entry.1)).collect(),
+            values: lower.iter().map(|entry| entry.2).collect(),
+            positions: positions(block_size, rows, lower, retained)?,
+            retained: retained.iter().map(|&i| one(i)).collect(),
+            complement: vec![0.0; retained.len() * retained.len()],
+            _session: session.clone(),
+        };
+        schur.start()?;
+        schur.read_options(session, body)?;
+        let mumps = &mut schur.mumps;
+        mumps.n = rows as Int;
+        mumps.nnz = schur.values.len() as i64;
+        mumps.irn = schur.rows.as_mut_ptr();
+        mumps.jcn = schur.columns.as_mut_ptr();
+        mumps.a = schur.values.as_mut_ptr();
+        mumps.perm_in = schur.positions.as_mut_ptr();
+        mumps.size_schur = schur.retained.len() as Int;
+        mumps.listvar_schur = schur.retained.as_mut_ptr();
+        mumps.schur = schur.complement.as_mut_ptr();
+        schur.call(1)?;
+        Ok(schur)
+    }
+
+    /// Memory in megabytes that the factorisation will take, S not counted.
+    pub fn expected_megabytes(&self) -> usize {
+        self.mumps.infog[15].max(0) as usize
+    }
+
+    /// Eliminates; what follows needs it.
+    ///
+    /// # Errors
+    /// When the interior is not positive definite, or memory does not suffice.
+    pub fn factor(&mut self) -> Result<()> {
+        let asked = self.mumps.icntl[13];
+        for room in ROOM {
+            self.mumps.icntl[13] = asked.max(room);
+            match self.call(2) {
+                // the space that the analysis foresaw was too small
+                Err(_) if matches!(self.mumps.infog[0], -8 | -9) && room < ROOM[ROOM.len() - 1] => {}
+                done => {
+                    done?;
+                    break;
+                }
+            }
+        }
+        // MUMPS has its own copy by now
+        (self.rows, self.columns, self.values) = Default::default();
+        (self.mumps.irn, self.mumps.jcn, self.mumps.a) = (null_mut(), null_mut(), null_mut());
+        // of a symmetric matrix it writes one triangle, row by row
+        let n = self.retained.len();
+        for i in 0..n {
+            for j in 0..i {
+                self.complement[j * n + i] = self.complement[i * n + j];
+            }
+        }
+        Ok(())
+    }
+
+    /// S, all of it, row by row, in the order of the retained dofs.
+    pub fn complement(&self) -> &[f64] {
+        &self.complement
+    }
+
+    /// Takes S out, which nothing here needs any more.
+    pub fn take_complement(&mut self) -> Vec<f64> {
+        std::mem::take(&mut self.complement)
+    }
+
+    /// b_R - K_RI K_II^-1 b_I.
+    ///
+    /// # Errors
+    /// Failures of MUMPS.
+    pub fn condense(&mut self, b: &[f64]) -> Result<Vec<f64>> {
+        let mut reduced = vec![0.0; self.retained.len()];
+        self.solve(1, &mut b.to_vec(), &mut reduced)?;
+        Ok(reduced)
+    }
+
+    /// x with x_R as given and K_II x_I = b_I - K_IR x_R.
+    ///
+    /// # Errors
+    /// Failures of MUMPS.
+    pub fn expand(&mut self, b: &[f64], x_retained: &[f64]) -> Result<Vec<f64>> {
+        // the expansion goes on from what the condensation of the same right-hand side has left in MUMPS
+        self.condense(b)?;
+        let mut x = b.to_vec();
+        self.solve(2, &mut x, &mut x_retained.to_vec())?;
+        for (&dof, value) in self.retained.iter().zip(x_retained) {
+            x[dof as usize - 1] = *value;
+        }
+        Ok(x)
+    }
+
+    /// One phase of the solution (ICNTL(26)): 1 condenses `b` into `reduced`, 2 expands `reduced` into `b`.
+    fn solve(&mut self, phase: Int, b: &mut [f64], reduced: &mut [f64]) -> Result<()> {
+        let mumps = &mut self.mumps;
+        if b.len() != mumps.n as usize || reduced.len() != self.retained.len() {
+            return Err(Error::new(Kind::Solver, "a right-hand side of the wrong length for a Schur complement"));
+        }
+        (mumps.rhs, mumps.nrhs, mumps.lrhs) = (b.as_mut_ptr(), 1, mumps.n);
+        (mumps.redrhs, mumps.lredrhs) = (reduced.as_mut_ptr(), reduced.len() as Int);
+        mumps.icntl[25] = phase;
+        let called = self.call(3);
+        (self.mumps.rhs, self.mumps.redrhs) = (null_mut(), null_mut());
+        called
+    }
+
+    /// Starts MUMPS on this process alone, silent, for a symmetric positive definite matrix.
+    fn start(&mut self) -> Result<()> {
+        let mumps = &mut self.mumps;
+        (mumps.sym, mumps.par) = (1, 1);
+        // SAFETY: a constant of MPI, which runs as long as the session.
+        mumps.comm_fortran = unsafe { MPI_Comm_c2f(RSMPI_COMM_SELF) };
+        self.call(-1)?;
+        let icntl = &mut self.mumps.icntl;
+        icntl[..4].copy_from_slice(&[-1, -1, -1, 0]);
+        // ordering given, complement asked for
+        (icntl[6], icntl[18]) = (1, 1);
+        Ok(())
+    }
+
+    fn read_options(&mut self, session: &Session, body: &str) -> Result<()> {
+        let options = session.options();
+        for (name, value) in options.all()? {
+            let bare = name.strip_prefix(&format!("-{body}_mat_mumps_")).unwrap_or_default();
+            let number = |start: &str, last: usize| {
+                let number = bare.strip_prefix(start)?.parse::<usize>().ok()?;
+                (1..=last).contains(&number).then_some(number)
+            };
+            let value = value.unwrap_or_default();
+            let refuse = |cause: String| {
+                Error::new(Kind::Solver, format!("{name} {value} cannot be used with the condensed solver"))
+                    .because(cause)
+                    .help("leave it out, or choose -ksp_type and -pc_type for a solver of PETSc")
+            };
+            if let Some(number) = number("icntl_", 60) {
+                if let Some((_, what)) = OWN.iter().find(|own| own.0 == number) {
+                    return Err(refuse(format!("the program itself sets ICNTL({number}), the {what}")));
+                }
+                self.mumps.icntl[number - 1] = value.parse().map_err(|_| refuse("not a whole number".to_owned()))?;
+            } else if let Some(number) = number("cntl_", 15) {
+                self.mumps.cntl[number - 1] = value.parse().map_err(|_| refuse("not a number".to_owned()))?;
+            } else {
+                continue;
+            }
+            options.mark_used(&name)?;
+        }
+        Ok(())
+    }
+
+    /// Lets MUMPS do a job.
+    fn call(&mut self, job: Int) -> Result<()> {
+        self.mumps.job = job;
+        // SAFETY: every pointer in the struct is null or leads to an array of ours that has the length set beside it.
+        unsafe { ffi::dmumps_c(&mut *self.mumps) };
+        let (first, second) = (self.mumps.infog[0], self.mumps.infog[1]);
+        if first >= 0 { Ok(()) } else { Err(failure(job, first, second)) }
+    }
+}
+
+impl Drop for Schur {
+    fn drop(&mut self) {
+        // Nobody is left to tell an error.
+        let _ = self.call(-2);
+    }
+}
+
+/// Position of each dof in the order of elimination, from 1: nested dissection of the nodes, and the retained dofs last, in
+/// their order.
+fn positions(block_size: usize, rows: usize, lower: &[(usize, usize, f64)], retained: &[usize]) -> Result<Vec<Int>> {
+    let nodes = rows / block_size;
+    let mut edges: Vec<(i32, i32)> = lower
+        .iter()
+        .map(|&(i, j, _)| ((i / block_size) as i32, (j / block_size) as i32))
+        .filter(|(i, j)| i != j)
+        .flat_map(|(i, j)| [(i, j), (j, i)])
+        .collect();
+    edges.sort_unstable();
+    edges.dedup();
+    let mut ptr = vec![0; nodes + 1];
+    for &(i, _) in &edges {
+        ptr[i as usize + 1] += 1;
+    }
+    for i in 0..nodes {
+        ptr[i + 1] += ptr[i];
+    }
+    let mut col: Vec<i32> = edges.into_iter().map(|edge| edge.1).collect();
+    let order = metis::nested_dissection(&mut ptr, &mut col)?;
+    let mut node_at = vec![0; nodes];
+    order.iter().enumerate().for_each(|(node, &at)| node_at[at as usize] = node);
+    let mut position = vec![0; rows];
+    for (i, &dof) in retained.iter().enumerate() {
+        position[dof] = (rows - retained.len() + i + 1) as Int;
+    }
+    let mut next = 1;
+    for dof in node_at.into_iter().flat_map(|node| node * block_size..(node + 1) * block_size) {
+        if position[dof] == 0 {
+            position[dof] = next;
+            next += 1;
+        }
+    }
+    Ok(position)
+}
+
+/// The error of a job of MUMPS, by INFOG(1) and INFOG(2).
+fn failure(job: Int, first: Int, second: Int) -> Error {
+    let phase = match job {
+        1 => "analysis",
+        2 => "factorisation",
+        3 => "solution",
+        _ => "start",
+    };
+    // sizes below zero are in millions
+    let size = if second < 0 { format!("{} million", -i64::from(second)) } else { second.to_string() };
+    let error = Error::new(Kind::Solver, format!("MUMPS failed in its {phase} (INFOG(1)={first}, INFOG(2)={second})"));
+    match first {
+        -5 | -7 | -13 | -19 => error
+            .because(format!("it could not get memory for {size} numbers"))
+            .help("take multigrid, which needs far less: --set solver=hypre"),
+        -8 | -9 | -11 | -14 | -15 => error
+            .because(format!("its work space is too small by {size} numbers"))
+            .help("raise -mat_mumps_icntl_14 (per cent), or take multigrid: --set solver=hypre"),
+        -6 | -10 => error
+            .because("the interior of the body is singular to rounding, or not positive definite")
+            .help("look for cells without stiffness, or for parts of the body that nothing joins to it"),
+        _ => error.because("see INFOG in the users' guide of MUMPS"),
+    }
+}

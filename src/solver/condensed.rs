@@ -1,0 +1,179 @@
+//! A body condensed to its contact: the interior is eliminated once, and the method works on what is left.
+//!
+//! With retained dofs R and interior I (in axes turned to the contact normals), S = K_RR - K_RI K_II^-1 K_IR and
+//! g = f_R - K_RI K_II^-1 f_I give a body with the stiffness S, the load g and the same contact rows. Its G is
+//! S + B_R' diag(weight) B_R, dense and small. States are those of the whole body whose interior is in equilibrium: residual,
+//! energies and all that is printed are the same numbers.
+
+use super::{Dense, Retained, SparseBody, memory};
+use crate::ddm::{Body, BodyCounts, Energy, Solved};
+use crate::error::{Error, Kind, Result};
+use crate::fem::ElasticBody;
+use crate::linalg::{Csr, dot};
+use crate::petsc::{Schur, Session};
+use std::cell::RefCell;
+use std::time::Instant;
+
+/// A body whose states are its retained dofs.
+pub struct CondensedBody {
+    session: Session,
+    name: String,
+    retained: Retained,
+    dimension: usize,
+    /// K, f and B of all dofs till they are condensed; f stays.
+    whole: ElasticBody,
+    load: Vec<f64>,
+    /// Made by the first Robin term or set-up.
+    condensed: Option<Condensed>,
+}
+
+struct Condensed {
+    /// Wall seconds of the elimination.
+    seconds: f64,
+    schur: RefCell<Schur>,
+    body: SparseBody<Dense>,
+}
+
+impl CondensedBody {
+    /// A body that will be condensed when it is set up. `name` is the prefix of its PETSc options, of which those of MUMPS are
+    /// read.
+    pub fn new(session: &Session, name: &str, dimension: usize, whole: ElasticBody, retained: Retained) -> Self {
+        let load = retained.turn(&whole.load);
+        Self { session: session.clone(), name: name.to_owned(), retained, dimension, whole, load, condensed: None }
+    }
+
+    /// Eliminates the interior, once.
+    fn condense(&mut self) -> Result<&mut Condensed> {
+        if self.condensed.is_none() {
+            self.condensed = Some(self.eliminate()?);
+            self.whole.stiffness = Csr::new(0);
+        }
+        match &mut self.condensed {
+            Some(condensed) => Ok(condensed),
+            None => unreachable!("it was made above"),
+        }
+    }
+
+    fn eliminate(&self) -> Result<Condensed> {
+        let began = Instant::now();
+        let (dofs, retained) = (&self.retained.dofs, self.retained.dofs.len());
+        let lower = self.retained.lower_triangle(&self.whole.stiffness);
+        let mut schur = Schur::analyse(&self.session, &self.name, self.dimension, self.load.len(), &lower, dofs)?;
+        drop(lower);
+        let (needed, free) = (schur.expected_megabytes(), memory::available() / 1_000_000);
+        if needed > free {
+            let message =
+                format!("body `{}`: its factorisation needs {needed} MB of memory, {free} MB are free", self.name);
+            return Err(Error::new(Kind::Solver, message).help("take multigrid: --set solver=hypre"));
+        }
+        schur.factor()?;
+        let (mut whole_lifting, mut lifting) = (Vec::new(), Vec::new());
+        if !self.whole.lifting.is_empty() {
+            whole_lifting = self.retained.turn(&self.whole.lifting);
+            lifting = schur.condense(&whole_lifting)?;
+        }
+        let load = schur.condense(&self.load)?;
+        // the interior under the loads alone, with the retained dofs at rest
+        let rest = schur.expand(&self.load, &vec![0.0; retained])?;
+        let work = dot(&self.load, &rest);
+        let body = ElasticBody {
+            stiffness: full(retained, schur.complement()),
+            load,
+            prescribed: Vec::new(),
+            energy_constant: self.whole.energy_constant - 0.5 * work,
+            strain_constant: self.whole.strain_constant + work + 2.0 * dot(&whole_lifting, &rest),
+            lifting,
+        };
+        let solver = Dense::new(retained, schur.take_complement());
+        let body = SparseBody::new(body, self.retained.rows.clone(), solver);
+        Ok(Condensed { seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
+    }
+}
+
+/// A matrix without zeros as compressed rows.
+fn full(rows: usize, values: &[f64]) -> Csr {
+    Csr {
+        columns: rows,
+        ptr: (0..=rows).map(|i| (i * rows) as i32).collect(),
+        col: (0..rows).flat_map(|_| 0..rows as i32).collect(),
+        values: values.to_vec(),
+    }
+}
+
+impl Body for CondensedBody {
+    fn len(&self) -> usize {
+        self.retained.dofs.len()
+    }
+
+    fn rest(&self) -> Vec<f64> {
+        vec![0.0; self.len()]
+    }
+
+    fn trace(&self, u: &[f64], t: &mut [f64]) {
+        self.retained.rows.multiply(u, t);
+    }
+
+    fn add_rows(&self, rows: &[f64], y: &mut [f64]) {
+        self.retained.rows.add_transpose(1.0, rows, y);
+    }
+
+    fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
+        match &mut self.condensed {
+            Some(condensed) => condensed.body.residual(u, force, r),
+            None => {
+                r.fill(f64::NAN);
+                Energy { strain: f64::NAN, potential: f64::NAN }
+            }
+        }
+    }
+
+    fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
+        match &mut self.condensed {
+            Some(condensed) => condensed.body.apply_stiffness(u, y),
+            None => y.fill(f64::NAN),
+        }
+    }
+
+    fn robin(&mut self, weight: &[f64]) -> Result<()> {
+        self.condense()?.body.robin(weight)
+    }
+
+    fn set_up(&mut self) -> Result<()> {
+        self.condense()?.body.set_up()
+    }
+
+    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+        self.condense()?.body.solve(r, z)
+    }
+
+    fn rounding(&self, u: &[f64], force: &[f64]) -> f64 {
+        self.condensed.as_ref().map_or(0.0, |condensed| condensed.body.rounding(u, force))
+    }
+
+    fn counts(&self) -> BodyCounts {
+        match &self.condensed {
+            None => BodyCounts::default(),
+            Some(condensed) => {
+                let counts = condensed.body.counts();
+                BodyCounts {
+                    dense_factorizations: counts.factorizations,
+                    factorizations: 1,
+                    symbolic: 1,
+                    factor_seconds: counts.factor_seconds + condensed.seconds,
+                    ..counts
+                }
+            }
+        }
+    }
+
+    fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
+        match &self.condensed {
+            Some(condensed) => Ok(self.retained.turn_back(&condensed.schur.borrow_mut().expand(&self.load, u)?)),
+            None => Ok(self.retained.turn_back(&vec![0.0; self.load.len()])),
+        }
+    }
+
+    fn describe(&self) -> String {
+        format!("condensed to {} dofs by mumps", self.len())
+    }
+}
