@@ -12,8 +12,11 @@ use tempfile::TempDir;
 /// The program under test.
 pub const WINKLER: &str = env!("CARGO_BIN_EXE_winkler");
 
-/// After this a run counts as hanging and is ended.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// After this a run counts as hanging and is ended: a minute, or the seconds in `WINKLER_TEST_PATIENCE` on a busy machine.
+fn patience() -> Duration {
+    let seconds = std::env::var("WINKLER_TEST_PATIENCE").ok().and_then(|seconds| seconds.parse().ok());
+    Duration::from_secs(seconds.unwrap_or(60))
+}
 
 /// What came of one run.
 pub struct Run {
@@ -138,7 +141,7 @@ pub fn environment(command: &mut Command) {
 
 fn finish(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
     command.current_dir(scratch.path());
-    let (status, stdout, stderr) = output(command, PATIENCE);
+    let (status, stdout, stderr) = output(command, patience());
     let report = match fs::read(folder.join("report.json")) {
         Ok(bytes) => serde_json::from_slice(&bytes).expect("report.json is JSON"),
         Err(_) => Value::Null,
