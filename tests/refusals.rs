@@ -50,8 +50,13 @@ fn keys_and_types() {
     groove_refused("gamma = 0.6", "gamma = -0.6", "-0.6", &["gamma"]);
     groove_refused("a = 0.5", "a = 1.5", "a = 1.5", &["a is 1.5", "must not exceed 1"]);
     groove_refused("[method]", "[method", "[method", &["TOML"]);
-    groove_refused("dimension = 2 ", "dimension = 3 ", "dimension", &["dimension = 2"]);
     groove_refused("(x - 4)^2", "(x - 4^2", "gap =", &["^"]);
+}
+
+#[test]
+fn plane_bodies_in_space() {
+    let scene = Scene::edited("groove", "dimension = 2 ", "dimension = 3 ");
+    refused(&solve(&scene, &[]), MESH, &["groove.geo", "no physical group holds volumes", "dimension = 3", "help"]);
 }
 
 #[test]

@@ -29,31 +29,45 @@ fn solve_with(scene: impl AsRef<std::path::Path>, args: &[String]) -> Run {
 }
 
 /// V1: a constant pressure is exact on matching and non-matching surfaces, and the order of the sides does not matter.
-#[test]
-fn patch() {
+fn patch_of(name: &str, shortening: f64, axis: usize, meshes: &[(usize, usize)], orders: &[[usize; 2]]) {
     let closing = 2.5e-5 * 10f64.sqrt();
-    let shortening = 10.0 * (1.0 - 0.09) / 2.1e5;
-    let swapped = Scene::edited("patch", r#"["lower_top", "upper_bottom"]"#, r#"["upper_bottom", "lower_top"]"#);
-    for (lower, upper) in [(4, 4), (2, 3), (7, 5)] {
-        for order in [1, 2] {
-            let mut args = both_orders(order);
-            args.extend(["--set".into(), format!("mesh.set={{nl={lower}, nu={upper}}}")]);
-            let run = solve_with(case("patch"), &args);
+    let swapped = Scene::edited(name, r#"["lower_top", "upper_bottom"]"#, r#"["upper_bottom", "lower_top"]"#);
+    for (lower, upper) in meshes {
+        for [p, r] in orders {
+            let set = [format!("mesh.set={{nl={lower}, nu={upper}}}"), format!("body.0.order={p}")];
+            let set = set.into_iter().chain([format!("body.1.order={r}"), "output.vtu=false".to_owned()]);
+            let args: Vec<String> = set.flat_map(|set| ["--set".to_owned(), set]).collect();
+            let run = solve_with(case(name), &args);
             let table = run.contact();
             for q in 0..table.rows() {
-                assert!((table["pressure"][q] / 10.0 - 1.0).abs() < 1e-10, "{lower}:{upper} P{order} point {q}");
-                assert!((table["compression"][q] / closing - 1.0).abs() < 1e-10);
-                assert!((table["u_n_lower"][q] / -shortening - 1.0).abs() < 1e-9);
+                let told = format!("{name} {lower}:{upper} P{p} P{r} point {q}: {}", table["pressure"][q]);
+                assert!((table["pressure"][q] / 10.0 - 1.0).abs() < 1e-10, "{told}");
+                assert!((table["compression"][q] / closing - 1.0).abs() < 1e-10, "{told}");
+                assert!((table["u_n_lower"][q] / -shortening - 1.0).abs() < 1e-9, "{told}");
             }
             // the lower face carries the load: forces on both sides are opposite to rounding
-            let force = |side: usize| run.number(&format!("pairs/0/force/{side}/1"));
+            let force = |side: usize| run.number(&format!("pairs/0/force/{side}/{axis}"));
             assert!((force(0) + 10.0).abs() < 1e-9 && (force(0) + force(1)).abs() < 1e-13 * 10.0);
             let other = solve_with(&swapped, &args);
             assert_eq!(other.count("iterations"), run.count("iterations"));
             assert!(distance(&other.contact()["pressure"], &table["pressure"]) < 1e-13);
-            assert!((other.number("pairs/0/force/0/1") - force(1)).abs() < 1e-12);
+            assert!((other.number(&format!("pairs/0/force/0/{axis}")) - force(1)).abs() < 1e-12);
         }
     }
+}
+
+#[test]
+fn patch() {
+    let shortening = 10.0 * (1.0 - 0.09) / 2.1e5;
+    patch_of("patch", shortening, 1, &[(4, 4), (2, 3), (7, 5)], &[[1, 1], [2, 2]]);
+    patch_of("patch-2d", shortening, 1, &[(7, 5), (5, 7)], &[[1, 2]]);
+}
+
+#[test]
+fn patch_in_space() {
+    let shortening = 10.0 / 2.1e5;
+    patch_of("patch-3d", shortening, 2, &[(2, 3), (7, 5)], &[[1, 1]]);
+    patch_of("patch-3d", shortening, 2, &[(2, 2), (2, 3), (3, 2)], &[[2, 2], [1, 2]]);
 }
 
 /// V2: order 2 for P1 and 3 for P2, of the wave's amplitude and (a little less on these meshes) at the points, under a wavy gap in full contact, at two stiffnesses of the layer and two wavelengths.

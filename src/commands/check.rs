@@ -81,11 +81,12 @@ fn print(scene: &Scene, prepared: &Prepared, solvers: &str) {
     for (i, pair) in prepared.problem.model.pairs.iter().enumerate() {
         let (low, high) = gap_range(&pair.gap);
         say(format_args!(
-            "  contact {} - {}: {} points on {}, length {:.6}, gap {} to {}",
+            "  contact {} - {}: {} points on {}, {} {:.6}, gap {} to {}",
             pair.surfaces[0],
             pair.surfaces[1],
             pair.len(),
             pair.surfaces[0],
+            if pair.along_curve { "length" } else { "area" },
             pair.weight.iter().sum::<f64>(),
             sci(low, 3),
             sci(high, 3)

@@ -2,7 +2,7 @@
 
 use super::inner::Inner;
 use super::method;
-use crate::contact::pieces;
+use crate::contact::pieces::{self, Cut};
 use crate::ddm::method::Method;
 use crate::ddm::{self, Observer, Outcome, RobinRule, Settings, StopRule};
 use crate::discretize::{self, Problem};
@@ -72,18 +72,26 @@ pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Pr
     agree(session, scene_options(session, scene))?;
     let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
     options::distribute(session, &names)?;
-    let mesh = mesh(session, scene)?;
+    match scene.dimension.value {
+        2 => build::<2>(session, scene, pieces::plane, clock),
+        _ => build::<3>(session, scene, pieces::space, clock),
+    }
+}
+
+/// What [`prepare`] does where the dimension matters.
+fn build<const D: usize>(session: &Session, scene: &Scene, cut: Cut<D>, clock: &mut Clock) -> Result<Prepared> {
+    let mesh = mesh::<D>(session, scene)?;
     clock.phase("mesh");
-    let largest = mesh.points.len() * scene.dimension.value;
+    let largest = mesh.points.len() * D;
     // small fronts and several ranks lose by BLAS threads, large factorisations gain
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-    let threads = if scene.dimension.value == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
+    let threads = if D == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
     session.set_blas_threads(threads);
     let keep = method::keeps_matrices(scene);
     let mut inner = Inner::new(session, scene, keep);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
-    let problem = discretize::discretize::<2>(scene, &mesh, pieces::plane, ranks, keep, exchange, &mut inner);
+    let problem = discretize::discretize(scene, &mesh, cut, ranks, keep, exchange, &mut inner);
     let mut problem = agree(session, problem)?;
     problem.share();
     clock.phase("discretize");
@@ -98,11 +106,6 @@ fn refuse(scene: &Scene) -> Result<()> {
             let message = format!("`{}` cannot name a body: {reason}", body.name.value);
             return Err(Error::scene(&body.name.place, message).help("rename the physical group and the body"));
         }
-    }
-    if scene.dimension.value != 2 {
-        return Err(
-            Error::scene(&scene.dimension.place, "this version solves plane problems only").help("set dimension = 2")
-        );
     }
     Ok(())
 }
@@ -124,9 +127,9 @@ fn scene_options(session: &Session, scene: &Scene) -> Result<()> {
 }
 
 /// The mesh: one rank lets Gmsh work, then every rank reads.
-fn mesh(session: &Session, scene: &Scene) -> Result<crate::mesh::Mesh<2>> {
+fn mesh<const D: usize>(session: &Session, scene: &Scene) -> Result<crate::mesh::Mesh<D>> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let load = || crate::mesh::load::<2>(&scene.mesh, order).map(|loaded| loaded.mesh);
+    let load = || crate::mesh::load::<D>(&scene.mesh, order).map(|loaded| loaded.mesh);
     if session.size() == 1 {
         return load();
     }

@@ -127,7 +127,8 @@ fn write(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &Outcom
     if scene.output.plots {
         let convergence = Plot::convergence(&scene.title, &[report::convergence("", outcome)]);
         folder.write("convergence.svg", |out| convergence.write(out))?;
-        for i in 0..model.pairs.len() {
+        // only along curves: points of a surface over one coordinate would be a cloud
+        for i in (0..model.pairs.len()).filter(|&i| model.pairs[i].along_curve) {
             let mut curves = vec![report::pressure("pressure", prepared, outcome, i)];
             curves.extend(report::reference(scene, model, i));
             let (_, axis) = report::main_axis(&model.pairs[i]);

@@ -70,12 +70,9 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
             ));
         }
         histories.push(report::convergence(&label, &outcome));
-        for i in 0..prepared.problem.model.pairs.len() {
-            pressures.push((
-                i,
-                report::main_axis(&prepared.problem.model.pairs[i]).1,
-                report::pressure(&label, &prepared, &outcome, i),
-            ));
+        let pairs = &prepared.problem.model.pairs;
+        for i in (0..pairs.len()).filter(|&i| pairs[i].along_curve) {
+            pressures.push((i, report::main_axis(&pairs[i]).1, report::pressure(&label, &prepared, &outcome, i)));
             if let Some(curve) = report::reference(scene, &prepared.problem.model, i) {
                 reference.get_or_insert((i, curve));
             }

@@ -87,6 +87,7 @@ pub fn assemble<const D: usize>(
                 }
                 let sum = points.entry(node).or_default();
                 sum.weight += mu;
+                sum.gap += mu * point.gap;
                 nodes.iter().zip(phi).for_each(|(&n, phi)| *sum.sides[0].entry(n).or_default() += mu * phi);
                 others.iter().zip(psi).for_each(|(&n, psi)| *sum.sides[1].entry(n).or_default() += mu * psi);
             }
@@ -97,7 +98,7 @@ pub fn assemble<const D: usize>(
     if order.is_empty() {
         return Err(Fault::NoPartner);
     }
-    let size = order.len() as f64 * a.mean_measure();
+    let size = (order.len() as f64 * a.mean_measure()).powf(1.0 / (D - 1) as f64);
     let mut pair = ContactPair {
         surfaces: [a.name.to_owned(), b.name.to_owned()],
         bodies,
@@ -116,7 +117,6 @@ pub fn assemble<const D: usize>(
         let sum = &points[&node];
         let normal = a.normals[&node];
         let mut position = [0.0; D];
-        let mut distance = 0.0;
         for (side, sign, space, prescribed) in [(0, 1.0, a.space, a.prescribed), (1, -1.0, b.space, b.prescribed)] {
             let mut entries = Vec::new();
             let mut resultant = [0.0; D];
@@ -128,7 +128,6 @@ pub fn assemble<const D: usize>(
                         position[c] += share * x[c];
                     }
                     let entry = sign * share * normal[c];
-                    distance -= entry * x[c];
                     resultant[c] += entry;
                     let dof = D * n as usize + c;
                     match prescribed.get(&dof) {
@@ -141,9 +140,8 @@ pub fn assemble<const D: usize>(
             pair.resultant[side].push(pad(resultant));
             pair.prescribed[side].push(known);
         }
-        if distance.abs() < 1e-12 * size {
-            distance = 0.0;
-        }
+        let distance = sum.gap / sum.weight;
+        let distance = if distance.abs() < 1e-12 * size { 0.0 } else { distance };
         let position = pad(position);
         let own = gap(position);
         if !own.is_finite() {
@@ -180,6 +178,7 @@ const NOISE: f64 = 1e-9;
 #[derive(Default)]
 struct Accumulator {
     weight: f64,
+    gap: f64,
     sides: [std::collections::BTreeMap<u32, f64>; 2],
 }
 

@@ -2,6 +2,7 @@
 
 use super::find::{find_group, placed, point};
 use super::part::Part;
+use crate::contact::pieces::Reach;
 use crate::contact::{self, ContactPair, Fault, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::Facets;
@@ -46,7 +47,7 @@ fn pair_on<const D: usize>(
     b: Side<D>,
     bodies: [usize; 2],
 ) -> Result<ContactPair> {
-    let shared = cut(&a, &b);
+    let shared = cut(&a, &b, &Reach::between(&a, &b));
     let law = contact::law::make(&spec.layer);
     contact::assemble(&a, &b, bodies, &shared, &|x| spec.gap.eval(x), law).map_err(|fault| match fault {
         Fault::NoPartner => {

@@ -146,7 +146,7 @@ fn stiffness_on<const D: usize, const N: usize>(
         for (x, &node) in x.iter_mut().zip(cell) {
             *x = space.nodes[node as usize];
         }
-        let rule = if is_affine::<D>(&x) { &affine } else { &curved };
+        let rule = if is_straight(&x, N) { &affine } else { &curved };
         local.fill([[0.0; D]; D]);
         for (l, weight) in rule.points.iter().zip(&rule.weights) {
             let (gradient, measure) = element::gradients::<D, N>(space.order, &x, l).ok_or(Defect::Inverted(index))?;
@@ -185,14 +185,13 @@ fn stiffness_on<const D: usize, const N: usize>(
     Ok(matrix)
 }
 
-/// Whether the mid-edge nodes of a cell lie on the straight edges (to rounding of the coordinates).
-fn is_affine<const D: usize>(x: &[[f64; D]]) -> bool {
-    let edges = D * (D + 1) / 2;
-    x.len() == D + 1
-        || element::EDGES[..edges].iter().enumerate().all(|(k, &(i, j))| {
-            let length: f64 = (0..D).map(|c| (x[i][c] - x[j][c]).abs()).sum();
-            (0..D).all(|c| (2.0 * x[D + 1 + k][c] - x[i][c] - x[j][c]).abs() <= 1e-9 * length)
-        })
+/// Whether the mid-edge nodes of a simplex with `vertices` vertices lie in the middle of straight edges (to rounding of the
+/// coordinates).
+pub fn is_straight<const D: usize>(x: &[[f64; D]], vertices: usize) -> bool {
+    element::EDGES[..x.len() - vertices].iter().enumerate().all(|(k, &(i, j))| {
+        let length: f64 = (0..D).map(|c| (x[i][c] - x[j][c]).abs()).sum();
+        (0..D).all(|c| (2.0 * x[vertices + k][c] - x[i][c] - x[j][c]).abs() <= 1e-9 * length)
+    })
 }
 
 /// Adds a body force density (per volume) to `load`.

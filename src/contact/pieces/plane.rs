@@ -1,63 +1,24 @@
-//! Common pieces of two surfaces: where facets face each other along the normals of side a, cut so that
-//! products of shape functions of both sides are integrated exactly.
-//!
-//! In the plane a piece is an interval of a facet of side a. Normals are interpolated between the nodes of
-//! side a, so that curved surfaces are covered without gaps or overlaps between neighbouring facets.
+//! Common pieces of two plane curves: intervals of the facets of side a.
 
-use super::side::{Side, length};
+use super::search::{Reach, Search};
+use super::{SNAP, Shared};
+use crate::contact::side::{Side, length};
 use crate::fem::{element, quadrature};
 use crate::scene::Order;
-use rstar::primitives::{GeomWithData, Rectangle};
-use rstar::{AABB, RTree};
-
-/// An integration point that both surfaces share.
-#[derive(Debug, Clone, Copy)]
-pub struct Shared<const D: usize> {
-    /// Facet of side a.
-    pub facet_a: usize,
-    /// Barycentric coordinates in it.
-    pub at_a: [f64; D],
-    /// Facet of side b.
-    pub facet_b: usize,
-    /// Barycentric coordinates of the projection along the normal of side a.
-    pub at_b: [f64; D],
-    /// Length (area) that belongs to the point, measured on side a.
-    pub weight: f64,
-}
-
-/// Parameters closer than this to a facet's end are its end: surfaces that match do match.
-const SNAP: f64 = 1e-9;
-
-/// Finds the common pieces of two surfaces: integration points grouped by facet of side a.
-pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>) -> Vec<Shared<D>>;
 
 /// Integration points of the common pieces of two plane curves, grouped by facet of side a.
-pub fn plane(a: &Side<2>, b: &Side<2>) -> Vec<Shared<2>> {
-    let tree = RTree::bulk_load(
-        (0..b.facets.count())
-            .map(|i| {
-                let (low, high) = b.bounds(i);
-                GeomWithData::new(Rectangle::from_corners(low, high), i)
-            })
-            .collect(),
-    );
-    // faces farther apart than the smaller surface is long are not a pair
-    let extent = |side: &Side<2>| side.mean_measure() * side.facets.count() as f64;
-    let reach = extent(a).min(extent(b));
+pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Vec<Shared<2>> {
+    let search = Search::new(b);
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = quadrature::gauss(if quadratic { 4 } else { 3 });
     let mut points = Vec::new();
     for i in 0..a.facets.count() {
         let facet = Curve::of(a, i);
-        let (low, high) = a.bounds(i);
-        let middle = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])];
-        let Some(nearest) = tree.nearest_neighbor(middle) else { continue };
-        let margin = distance_to(nearest.geom(), middle) + length(a.area(i));
-        let window = AABB::from_corners(low.map(|x| x - margin), high.map(|x| x + margin));
-        let mut found: Vec<Piece> = tree
-            .locate_in_envelope_intersecting(window)
-            .filter_map(|candidate| Piece::between(&facet, Curve::of(b, candidate.data), candidate.data))
-            .filter(|piece| piece.gap.abs() <= reach)
+        let mut found: Vec<Piece> = search
+            .around(a, i, reach)
+            .into_iter()
+            .filter_map(|index| Piece::between(&facet, Curve::of(b, index), index))
+            .filter(|piece| reach.holds(piece.gap))
             .collect();
         found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
         let mut free = vec![(0.0, 1.0)];
@@ -71,23 +32,20 @@ pub fn plane(a: &Side<2>, b: &Side<2>) -> Vec<Shared<2>> {
         for (low, high, index, other) in pieces {
             for &(position, weight) in &rule {
                 let s = low + (high - low) * position;
-                let Some(t) = other.hit(facet.at(s), facet.normal(s)) else { continue };
+                let (from, normal) = (facet.at(s), facet.normal(s));
+                let Some(t) = other.hit(from, normal) else { continue };
                 points.push(Shared {
                     facet_a: i,
                     at_a: [1.0 - s, s],
                     facet_b: index,
                     at_b: [1.0 - t, t],
                     weight: weight * (high - low) * length(facet.tangent(s)),
+                    gap: other.distance(t, from, normal),
                 });
             }
         }
     }
     points
-}
-
-fn distance_to(rectangle: &Rectangle<[f64; 2]>, point: [f64; 2]) -> f64 {
-    let (low, high) = (rectangle.lower(), rectangle.upper());
-    length([0, 1].map(|c| (low[c] - point[c]).max(point[c] - high[c]).max(0.0)))
 }
 
 /// Removes `range` from the free intervals and returns what it got of them.
@@ -142,6 +100,12 @@ impl Curve {
             let here = self.at(s);
             cross([here[0] - x[0], here[1] - x[1]], n) / cross(self.tangent(s), n)
         })
+    }
+
+    /// Distance of the point at `s` from `x` along `n`, signed.
+    fn distance(&self, s: f64, x: [f64; 2], n: [f64; 2]) -> f64 {
+        let here = self.at(s);
+        (0..2).map(|c| (here[c] - x[c]) * n[c]).sum::<f64>() / length(n)
     }
 
     /// Parameter whose normal passes through `x`: cross(x - x(s), n(s)) = 0.
@@ -205,8 +169,7 @@ impl Piece {
         }
         let middle = 0.5 * (low + high);
         let (from, normal) = (a.at(middle), a.normal(middle));
-        let to = b.at(b.hit(from, normal)?);
-        let gap = (0..2).map(|c| (to[c] - from[c]) * normal[c]).sum::<f64>() / length(normal);
+        let gap = b.distance(b.hit(from, normal)?, from, normal);
         Some(Self { range: (low, high), index, gap })
     }
 }

@@ -1,0 +1,40 @@
+//! Common pieces of two surfaces: where facets face each other along the normals of side a, cut so that
+//! products of shape functions of both sides are integrated exactly.
+//!
+//! Normals are interpolated between the vertices of side a, so that curved surfaces are covered without gaps or
+//! overlaps between neighbouring facets. A piece is an interval ([`plane`]) or a convex polygon ([`space`]) in the
+//! parameters of one facet of side a.
+
+mod plane;
+mod polygon;
+mod search;
+mod space;
+
+pub use plane::plane;
+pub use search::Reach;
+pub use space::space;
+
+use super::side::Side;
+
+/// An integration point that both surfaces share.
+#[derive(Debug, Clone, Copy)]
+pub struct Shared<const D: usize> {
+    /// Facet of side a.
+    pub facet_a: usize,
+    /// Barycentric coordinates in it.
+    pub at_a: [f64; D],
+    /// Facet of side b.
+    pub facet_b: usize,
+    /// Barycentric coordinates of the projection along the normal of side a.
+    pub at_b: [f64; D],
+    /// Length (area) that belongs to the point, measured on side a.
+    pub weight: f64,
+    /// Distance to the projection, negative where the surfaces overlap.
+    pub gap: f64,
+}
+
+/// Finds the common pieces of two surfaces: integration points grouped by facet of side a.
+pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach) -> Vec<Shared<D>>;
+
+/// Parameters closer than this to a facet's end are its end: surfaces that match do match.
+const SNAP: f64 = 1e-9;

@@ -1,0 +1,85 @@
+//! Which facets of side b may face a facet of side a.
+
+use crate::contact::side::{Side, length};
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, Point, RTree};
+
+/// How far apart two surfaces may be and still face each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    /// Largest distance along the normal.
+    pub gap: f64,
+    /// Largest overlap.
+    pub overlap: f64,
+}
+
+impl Reach {
+    /// What is sensible for two surfaces: no gap larger than the smaller surface, and no overlap larger than a body is
+    /// thick behind its surface (volume over area): beyond that one would look at the far side of a thin body.
+    pub fn between<const D: usize>(a: &Side<D>, b: &Side<D>) -> Self {
+        let area = |side: &Side<D>| side.mean_measure() * side.facets.count() as f64;
+        let extent = |side: &Side<D>| area(side).powf(1.0 / (D - 1) as f64);
+        let thickness = |side: &Side<D>| side.space.measure() / area(side);
+        let gap = extent(a).min(extent(b));
+        Self { gap, overlap: gap.min(thickness(a)).min(thickness(b)) }
+    }
+
+    /// Whether a signed distance is within reach.
+    pub fn holds(&self, gap: f64) -> bool {
+        gap <= self.gap && -gap <= self.overlap
+    }
+}
+
+/// The facets of side b, found by their boxes.
+pub struct Search<const D: usize>
+where
+    [f64; D]: Point<Scalar = f64>,
+{
+    tree: RTree<GeomWithData<Rectangle<[f64; D]>, usize>>,
+}
+
+impl<const D: usize> Search<D>
+where
+    [f64; D]: Point<Scalar = f64>,
+{
+    /// Sorts the facets of a side.
+    pub fn new(b: &Side<D>) -> Self {
+        let boxed = |i: usize| {
+            let (low, high) = b.bounds(i);
+            GeomWithData::new(Rectangle::from_corners(low, high), i)
+        };
+        Self { tree: RTree::bulk_load((0..b.facets.count()).map(boxed).collect()) }
+    }
+
+    /// Facets near the prism of facet `i` of side a along its normals. The prism is somewhat more than twice as high as the
+    /// nearest facet is away, so that tilted surfaces are met too, and no higher than `reach`. Empty if nothing is there.
+    pub fn around(&self, a: &Side<D>, i: usize, reach: &Reach) -> Vec<usize> {
+        let (low, high) = a.bounds(i);
+        let middle: [f64; D] = std::array::from_fn(|c| 0.5 * (low[c] + high[c]));
+        let size = length(std::array::from_fn::<f64, D, _>(|c| high[c] - low[c]));
+        let Some(nearest) = self.tree.nearest_neighbor(middle) else { return Vec::new() };
+        let (from, to) = (nearest.geom().lower(), nearest.geom().upper());
+        let away: [f64; D] = std::array::from_fn(|c| (from[c] - middle[c]).max(middle[c] - to[c]).max(0.0));
+        let height = 2.0 * length(away) + size;
+        let found = self.within(a, i, reach.overlap.min(height) + size, reach.gap.min(height) + size);
+        // something that does not face the facet may be nearer than what does
+        if found.is_empty() { self.within(a, i, reach.overlap, reach.gap) } else { found }
+    }
+
+    /// Facets whose boxes meet that of the prism of facet `i` from `below` behind it to `above` before it.
+    fn within(&self, a: &Side<D>, i: usize, below: f64, above: f64) -> Vec<usize> {
+        let (mut low, mut high) = a.bounds(i);
+        for &node in &a.facets.facet(i)[..D] {
+            let (x, n) = (a.space.nodes[node as usize], a.normals[&node]);
+            for c in 0..D {
+                for end in [x[c] - below * n[c], x[c] + above * n[c]] {
+                    low[c] = low[c].min(end);
+                    high[c] = high[c].max(end);
+                }
+            }
+        }
+        let slack = 1e-9 * length(std::array::from_fn::<f64, D, _>(|c| high[c] - low[c]));
+        let window = AABB::from_corners(low.map(|x| x - slack), high.map(|x| x + slack));
+        self.tree.locate_in_envelope_intersecting(window).map(|candidate| candidate.data).collect()
+    }
+}

@@ -1,0 +1,216 @@
+//! Common pieces of two triangulated surfaces: convex polygons in the parameters of the facets of side a.
+//!
+//! The corners of a facet of side b are brought to the parameters of a facet of side a along the normals of a: x = x_a(u, v)
+//! + t n(u, v). There the image is clipped by the facet. Straight edges of the image stand for what may be slightly curved;
+//! each facet of a is still covered once, since neighbours in b share their edges. A curved facet of b is
+//! split into four at its mid-edges.
+
+use super::polygon::{self, Polygon};
+use super::search::{Reach, Search};
+use super::{SNAP, Shared};
+use crate::contact::side::{Side, length, unit};
+use crate::fem::space::area_vector;
+use crate::fem::{assemble, element, quadrature};
+use crate::scene::Order;
+
+/// Pieces smaller than this share of a facet are rounding.
+const TINY: f64 = 1e-11;
+
+/// Triangles of a facet, by its nodes: the facet itself, or four between its mid-edges.
+const WHOLE: [[usize; 3]; 1] = [[0, 1, 2]];
+const QUARTERS: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
+
+/// Integration points of the common pieces of two surfaces in space, grouped by facet of side a.
+pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Vec<Shared<3>> {
+    let search = Search::new(b);
+    let facets_b: Vec<Facet> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
+    let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
+    let rule = quadrature::simplex::<3>(if quadratic { 5 } else { 2 });
+    let mut points = Vec::new();
+    for i in 0..a.facets.count() {
+        let facet = Facet::of(a, i);
+        let mut found: Vec<Piece> = Vec::new();
+        for index in search.around(a, i, reach) {
+            found.extend(Piece::between(&facet, &facets_b[index], index).into_iter().filter(|p| reach.holds(p.gap)));
+        }
+        found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
+        // the nearest facets take what they face, and nobody else gets it
+        let mut taken: Vec<Polygon> = Vec::new();
+        for Piece { polygon, index, .. } in found {
+            let free = taken.iter().fold(vec![polygon], |parts, other| {
+                parts.into_iter().flat_map(|part| polygon::difference(part, other, 0.5 * TINY)).collect()
+            });
+            for part in &free {
+                for triangle in polygon::fan(part) {
+                    let share = 2.0 * polygon::area(&triangle);
+                    for (l, weight) in rule.points.iter().zip(&rule.weights) {
+                        let [u, v] = [0, 1].map(|c| (0..3).map(|k| l[k] * triangle[k][c]).sum());
+                        let at_a = [1.0 - u - v, u, v];
+                        let normal = facet.normal(u, v);
+                        let Some((at_b, t)) = facets_b[index].hit(facet.at(u, v), normal) else { continue };
+                        let weight = weight * share * length(facet.area(u, v));
+                        let gap = t * length(normal);
+                        points.push(Shared { facet_a: i, at_a, facet_b: index, at_b, weight, gap });
+                    }
+                }
+            }
+            taken.extend(free);
+        }
+    }
+    points
+}
+
+/// A facet as a parametrised surface x(u, v), u, v >= 0, u + v <= 1: barycentric coordinates 1 - u - v, u, v.
+struct Facet {
+    order: Order,
+    x: Vec<[f64; 3]>,
+    normals: [[f64; 3]; 3],
+    /// Outer unit normal in the middle.
+    direction: [f64; 3],
+    straight: bool,
+}
+
+impl Facet {
+    fn of(side: &Side<3>, i: usize) -> Self {
+        let nodes = side.facets.facet(i);
+        let x = side.facets.coordinates(i, side.space);
+        Self {
+            order: side.facets.order,
+            straight: assemble::is_straight(&x, 3),
+            x,
+            normals: [0, 1, 2].map(|k| side.normals[&nodes[k]]),
+            direction: unit(side.area(i)),
+        }
+    }
+
+    fn at(&self, u: f64, v: f64) -> [f64; 3] {
+        assemble::interpolate(&self.x, &element::values(self.order, &[1.0 - u - v, u, v]))
+    }
+
+    fn area(&self, u: f64, v: f64) -> [f64; 3] {
+        area_vector(self.order, &self.x, &[1.0 - u - v, u, v])
+    }
+
+    fn normal(&self, u: f64, v: f64) -> [f64; 3] {
+        let [n, m, o] = self.normals;
+        std::array::from_fn(|c| (1.0 - u - v) * n[c] + u * m[c] + v * o[c])
+    }
+
+    /// dx/du and dx/dv.
+    fn tangents(&self, u: f64, v: f64) -> [[f64; 3]; 2] {
+        let d = element::derivatives(self.order, &[1.0 - u - v, u, v]);
+        [1, 2].map(|k| std::array::from_fn(|c| (0..self.x.len()).map(|n| (d[n][k] - d[n][0]) * self.x[n][c]).sum()))
+    }
+
+    /// Where the ray x + t n meets the surface: barycentric coordinates and t.
+    fn hit(&self, x: [f64; 3], n: [f64; 3]) -> Option<([f64; 3], f64)> {
+        let middle = self.at(1.0 / 3.0, 1.0 / 3.0);
+        let [u, v, t] = newton(dot(minus(middle, x), n) / dot(n, n), |[u, v, t]| {
+            let here = self.at(u, v);
+            let [along_u, along_v] = self.tangents(u, v);
+            let miss = std::array::from_fn(|c| here[c] - x[c] - t * n[c]);
+            (miss, [along_u, along_v, n.map(|n| -n)])
+        })?;
+        Some(([1.0 - u - v, u, v], t))
+    }
+
+    /// Parameters (u, v) whose normal passes through `x`.
+    fn foot(&self, x: [f64; 3]) -> Option<[f64; 2]> {
+        let [n, m, o] = self.normals;
+        let turns = [minus(m, n), minus(o, n)];
+        let third = 1.0 / 3.0;
+        let (middle, normal) = (self.at(third, third), self.normal(third, third));
+        let [u, v, _] = newton(dot(minus(x, middle), normal) / dot(normal, normal), |[u, v, t]| {
+            let (here, n, tangents) = (self.at(u, v), self.normal(u, v), self.tangents(u, v));
+            let column = |k: usize| std::array::from_fn(|c| tangents[k][c] + t * turns[k][c]);
+            (std::array::from_fn(|c| here[c] + t * n[c] - x[c]), [column(0), column(1), n])
+        })?;
+        Some([u, v])
+    }
+}
+
+/// Zero (u, v, t) of three functions by Newton's method from the middle of a facet; `system` gives values and columns of
+/// derivatives. `None` if it runs away.
+fn newton(t: f64, system: impl Fn([f64; 3]) -> ([f64; 3], [[f64; 3]; 3])) -> Option<[f64; 3]> {
+    let mut at = [1.0 / 3.0, 1.0 / 3.0, t];
+    let mut last = f64::INFINITY;
+    for _ in 0..30 {
+        let (value, [p, q, r]) = system(at);
+        let det = dot(cross(p, q), r);
+        let step = [dot(cross(q, r), value), dot(cross(r, p), value), dot(cross(p, q), value)].map(|d| d / det);
+        at = minus(at, step);
+        let moved = step[0].abs().max(step[1].abs());
+        if !moved.is_finite() || !at[2].is_finite() || at[0].abs().max(at[1].abs()) > 1e3 {
+            return None;
+        }
+        // the last digits of t come with those of u and v
+        if moved < 1e-14 || (moved < 1e-11 && moved >= last) {
+            return Some(at);
+        }
+        last = moved;
+    }
+    None
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|c| a[c] * b[c]).sum()
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[c] - b[c])
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Part of a facet of side a that faces (a part of) one facet of side b.
+struct Piece {
+    polygon: Polygon,
+    index: usize,
+    gap: f64,
+}
+
+impl Piece {
+    fn between(a: &Facet, b: &Facet, index: usize) -> Vec<Self> {
+        if dot(a.direction, b.direction) >= 0.0 {
+            return Vec::new();
+        }
+        let flat = |n: &[f64; 3]| length(minus(*n, a.normals[0])) < SNAP;
+        let whole = b.order == Order::P1 || (a.straight && b.straight && a.normals.iter().all(flat));
+        let corners = if whole { 3 } else { 6 };
+        let feet: Option<Vec<[f64; 2]>> = b.x[..corners].iter().map(|&x| a.foot(x).map(snap)).collect();
+        let Some(feet) = feet else { return Vec::new() };
+        let triangles = if whole { &WHOLE[..] } else { &QUARTERS[..] };
+        triangles.iter().filter_map(|nodes| Self::of(a, b, index, nodes.map(|node| feet[node]))).collect()
+    }
+
+    /// The piece under the image of one triangle of b, which looks the other way.
+    fn of(a: &Facet, b: &Facet, index: usize, [p, q, r]: [[f64; 2]; 3]) -> Option<Self> {
+        let image = [p, r, q];
+        if polygon::area(&image) <= 0.0 {
+            return None;
+        }
+        let polygon = polygon::intersection(&image, &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+        if polygon::area(&polygon) <= 0.5 * TINY {
+            return None;
+        }
+        let [u, v] = polygon::middle(&polygon);
+        let normal = a.normal(u, v);
+        let (_, t) = b.hit(a.at(u, v), normal)?;
+        Some(Self { polygon, index, gap: t * length(normal) })
+    }
+}
+
+/// Moves what almost lies on an edge of the parameter triangle there.
+fn snap([u, v]: [f64; 2]) -> [f64; 2] {
+    let near = |x: f64| if x.abs() < SNAP { 0.0 } else { x };
+    let (u, v) = (near(u), near(v));
+    if (1.0 - u - v).abs() >= SNAP {
+        [u, v]
+    } else if u == 0.0 || v == 0.0 {
+        [u.round(), v.round()]
+    } else {
+        [u, 1.0 - u]
+    }
+}
