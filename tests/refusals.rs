@@ -103,6 +103,18 @@ fn contacts() {
 }
 
 #[test]
+fn layers() {
+    let law = "power = { B = 2.5e-5, a = 0.5 }";
+    let varying = "power = { B = \"1e-5*(1.45 - x)\", a = 0.5 }";
+    groove_refused(law, varying, "layer =", &["B is -0.00000", "at (1.4", "must be greater than 0"]);
+    let missing = "power = { B = \"sqrt(x - 1)\", a = 0.5 }";
+    groove_refused(law, missing, "layer =", &["B is not a finite number at x = 0"]);
+    groove_refused(law, "pressure = \"1e5*c + x\"", "layer =", &["no law of a layer", "p(0) is 0.03"]);
+    groove_refused(law, "pressure = \"1e5*c^0.5\"", "layer =", &["no law of a layer", "p'(0) = infinity"]);
+    groove_refused(law, "pressure = \"1e5*c - c^2\"", "layer =", &["does not increase at c =", "up_to = 1e-3"]);
+}
+
+#[test]
 fn overrides() {
     let set = |text: &str, code: i32, words: &[&str]| {
         refused(&solve(case("groove"), &["--set", text]), code, &[&["--set"], words].concat());

@@ -1,11 +1,12 @@
 //! The arrays of a contact pair: all that the method knows of two surfaces.
 
-use super::law::LayerLaw;
+use super::law::{self, LayerLaw};
 use super::pieces::Shared;
 use super::side::Side;
+use crate::error::Error;
 use crate::fem::element;
 use crate::linalg::Csr;
-use crate::scene::Order;
+use crate::scene::{LayerSpec, Order};
 use nalgebra::DMatrix;
 use std::collections::HashMap;
 
@@ -44,12 +45,14 @@ pub struct ContactPair {
 }
 
 /// Why a pair could not be made.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub enum Fault {
     /// The surfaces do not face each other anywhere.
     NoPartner,
     /// The scene's gap is not finite at a point.
     Gap([f64; 3]),
+    /// The scene's law is none at a point.
+    Law(Error),
 }
 
 /// Makes the arrays of a pair from shared integration points.
@@ -59,14 +62,14 @@ pub enum Fault {
 /// that gives a weight that is not positive (quadratic, partly covered) takes the hats of its vertices.
 ///
 /// # Errors
-/// [`Fault`] if nothing is covered or the gap is not finite.
+/// [`Fault`] if nothing is covered, the gap is not finite, or the law is none.
 pub fn assemble<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
     bodies: [usize; 2],
     shared: &[Shared<D>],
     gap: &dyn Fn([f64; 3]) -> f64,
-    law: Box<dyn LayerLaw>,
+    law: &LayerSpec,
 ) -> Result<ContactPair, Fault> {
     let mut points: HashMap<u32, Accumulator> = HashMap::new();
     let mut covered = vec![false; a.facets.count()];
@@ -99,10 +102,16 @@ pub fn assemble<const D: usize>(
         return Err(Fault::NoPartner);
     }
     let size = (order.len() as f64 * a.mean_measure()).powf(1.0 / (D - 1) as f64);
+    let mean = |sum: &Accumulator| {
+        let nodes = shares(&sum.sides[0], sum.weight);
+        std::array::from_fn(|c| nodes.iter().map(|&(n, share)| share * a.space.nodes[n as usize][c]).sum())
+    };
+    let position: Vec<[f64; 3]> = order.iter().map(|node| pad::<D>(mean(&points[node]))).collect();
+    let law = law::make(law, &position).map_err(Fault::Law)?;
     let mut pair = ContactPair {
         surfaces: [a.name.to_owned(), b.name.to_owned()],
         bodies,
-        position: Vec::new(),
+        position,
         weight: Vec::new(),
         normal: Vec::new(),
         gap: Vec::new(),
@@ -113,10 +122,9 @@ pub fn assemble<const D: usize>(
         law,
         uncovered: (covered.iter().filter(|&&c| !c).count(), covered.len()),
     };
-    for node in order {
+    for (q, node) in order.into_iter().enumerate() {
         let sum = &points[&node];
         let normal = a.normals[&node];
-        let mut position = [0.0; D];
         for (side, sign, space, prescribed) in [(0, 1.0, a.space, a.prescribed), (1, -1.0, b.space, b.prescribed)] {
             let mut entries = Vec::new();
             let mut resultant = [0.0; D];
@@ -124,9 +132,6 @@ pub fn assemble<const D: usize>(
             for (n, share) in shares(&sum.sides[side], sum.weight) {
                 let x = space.nodes[n as usize];
                 for c in 0..D {
-                    if side == 0 {
-                        position[c] += share * x[c];
-                    }
                     let entry = sign * share * normal[c];
                     resultant[c] += entry;
                     let dof = D * n as usize + c;
@@ -142,12 +147,10 @@ pub fn assemble<const D: usize>(
         }
         let distance = sum.gap / sum.weight;
         let distance = if distance.abs() < 1e-12 * size { 0.0 } else { distance };
-        let position = pad(position);
-        let own = gap(position);
+        let own = gap(pair.position[q]);
         if !own.is_finite() {
-            return Err(Fault::Gap(position));
+            return Err(Fault::Gap(pair.position[q]));
         }
-        pair.position.push(position);
         pair.weight.push(sum.weight);
         pair.normal.push(pad(normal));
         pair.gap.push(distance + own);

@@ -38,7 +38,7 @@ impl<'a> Line<'a> {
                 let s = self.closing[q];
                 if s != 0.0 {
                     let c = self.compression[q] + t * s;
-                    sum += self.model.weight[q] * pair.law.response(q - self.model.offset[i], c).pressure * s;
+                    sum += self.model.weight[q] * pair.law.pressure(q - self.model.offset[i], c) * s;
                 }
             }
         }

@@ -48,8 +48,8 @@ fn pair_on<const D: usize>(
     bodies: [usize; 2],
 ) -> Result<ContactPair> {
     let shared = cut(&a, &b, &Reach::between(&a, &b));
-    let law = contact::law::make(&spec.layer);
-    contact::assemble(&a, &b, bodies, &shared, &|x| spec.gap.eval(x), law).map_err(|fault| match fault {
+    contact::assemble(&a, &b, bodies, &shared, &|x| spec.gap.eval(x), &spec.layer).map_err(|fault| match fault {
+        Fault::Law(error) => error,
         Fault::NoPartner => {
             let names = [&spec.between[0].value, &spec.between[1].value];
             Error::scene(

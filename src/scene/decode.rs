@@ -2,6 +2,7 @@
 
 mod body;
 mod contact;
+mod layer;
 mod method;
 
 pub use body::reserved;

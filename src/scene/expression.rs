@@ -1,10 +1,13 @@
 //! Numbers that the user may write as expressions in the coordinates: gaps, loads, zones.
 
+mod dual;
 mod grammar;
 mod operators;
 #[cfg(test)]
 mod tests;
 mod token;
+
+pub use dual::Differentiable;
 
 use crate::error::{Error, Place, Result};
 use exmex::{Express, FlatEx, NumberMatcher};
@@ -64,6 +67,11 @@ impl Expression {
     /// Whether the expression uses no variable.
     pub fn is_constant(&self) -> bool {
         self.slots.is_empty()
+    }
+
+    /// Whether it depends on no variable but the first.
+    pub fn uses_only_first(&self) -> bool {
+        self.slots.iter().all(|&slot| slot == 0)
     }
 
     /// The text as the user wrote it.
@@ -131,6 +139,11 @@ impl Field {
             Field::Constant(value) => *value,
             Field::Expression(expression) => expression.eval(&[x[0], x[1], x[2], k as f64]),
         }
+    }
+
+    /// Whether it is the same everywhere.
+    pub fn is_constant(&self) -> bool {
+        matches!(self, Field::Constant(_))
     }
 
     /// Value at a point, refused if it is not finite; `what` names the quantity in the message ("gap").

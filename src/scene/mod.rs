@@ -2,6 +2,7 @@
 
 mod decode;
 pub mod expression;
+mod layer;
 mod overrides;
 mod read;
 mod settings;
@@ -10,6 +11,7 @@ mod spec;
 mod tests;
 
 pub use decode::reserved;
+pub use layer::{Bounds, FORMS, LawForm, LawKind, LayerSpec, Parameter};
 pub use spec::*;
 
 use crate::error::{Error, Kind, Result, Source};

@@ -95,9 +95,19 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
 }
 
 fn contact(contact: &ContactSpec) -> Value {
-    let layer = match contact.layer {
-        LayerSpec::Power { b, a } => json!({ "power": { "B": b, "a": a } }),
-        LayerSpec::Linear { stiffness } => json!({ "linear": { "stiffness": stiffness } }),
+    let layer = match &contact.layer {
+        LayerSpec::Form { form, values } => {
+            let values: Map<_, _> =
+                form.parameters.iter().zip(values).map(|(known, value)| (known.key.into(), field(value))).collect();
+            json!({ form.name: values })
+        }
+        LayerSpec::Table(points) => json!({ "table": points }),
+        LayerSpec::Pressure { law, up_to } => {
+            let mut map = Map::new();
+            map.insert("pressure".into(), json!(law.plain().text()));
+            insert(&mut map, "up_to", up_to.map(|c| json!(c)));
+            map.into()
+        }
     };
     let mut map = Map::new();
     map.insert("between".into(), contact.between.iter().map(|name| json!(name.value)).collect());

@@ -4,6 +4,7 @@
 //! read (missing group, surface of the wrong body) still points into the scene file.
 
 use super::expression::Field;
+use super::layer::LayerSpec;
 use crate::error::{Located, Place};
 use std::path::PathBuf;
 
@@ -126,23 +127,6 @@ pub struct ContactSpec {
     pub layer: LayerSpec,
     /// A known contact pressure to draw and compare with, if any.
     pub reference: Option<Field>,
-}
-
-/// Law of a Winkler layer, parameters checked.
-#[derive(Debug, Clone, PartialEq)]
-pub enum LayerSpec {
-    /// p(c) = (c/B)^(1/a), B > 0, 0 < a <= 1.
-    Power {
-        /// B, a compression per pressure^a.
-        b: f64,
-        /// a, the exponent; 1 is linear.
-        a: f64,
-    },
-    /// p(c) = stiffness * c, stiffness > 0.
-    Linear {
-        /// Pressure per compression.
-        stiffness: f64,
-    },
 }
 
 /// The outer iteration.

@@ -1,15 +1,26 @@
 //! Laws of Winkler layers: pressure against compression.
 //!
 //! The paper writes sigma_n = g(w) with w = -c; here p(c) = -g(-c). A law is monotone with p(0) = 0 and a
-//! bounded tangent on bounded ranges, conditions (6)-(7). A new law is a new file and a line in [`make`].
+//! bounded tangent on bounded ranges, conditions (6)-(7). A new law is a new file, a form of the scene and a line in [`make`].
 
+mod cubic;
+mod exponential;
 mod linear;
+mod make;
 mod power;
+mod quadrature;
+mod table;
+#[cfg(test)]
+mod tests;
+mod typed;
 
+pub use cubic::Cubic;
+pub use exponential::Exponential;
 pub use linear::Linear;
+pub use make::make;
 pub use power::Power;
-
-use crate::scene::LayerSpec;
+pub use table::Table;
+pub use typed::Typed;
 
 /// Answer of a layer at one point.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -22,6 +33,17 @@ pub struct Response {
     pub energy: f64,
 }
 
+impl Response {
+    /// The response `beyond` this one along the tangent.
+    fn straight(self, beyond: f64) -> Self {
+        Response {
+            pressure: self.pressure + self.tangent * beyond,
+            tangent: self.tangent,
+            energy: self.energy + beyond * (self.pressure + 0.5 * self.tangent * beyond),
+        }
+    }
+}
+
 /// A layer's law at the points of one pair.
 pub trait LayerLaw: std::fmt::Debug {
     /// Response at contact point `point` to a compression `c > 0`.
@@ -32,6 +54,11 @@ pub trait LayerLaw: std::fmt::Debug {
         if c <= 0.0 { Response::default() } else { self.compressed(point, c) }
     }
 
+    /// The pressure alone, for searches that need nothing else.
+    fn pressure(&self, point: usize, c: f64) -> f64 {
+        self.response(point, c).pressure
+    }
+
     /// g'(-c) of (38): the tangent of the paper's law g, which also runs through tension as an odd function. For `c > 0` it is
     /// p'(c). Robin terms of open points use it; pressure never does.
     fn robin_tangent(&self, point: usize, c: f64) -> f64 {
@@ -39,46 +66,16 @@ pub trait LayerLaw: std::fmt::Debug {
     }
 }
 
-/// The law that a scene asks for.
-pub fn make(spec: &LayerSpec) -> Box<dyn LayerLaw> {
-    match *spec {
-        LayerSpec::Power { b, a } => Box::new(Power::new(b, a)),
-        LayerSpec::Linear { stiffness } => Box::new(Linear { stiffness }),
-    }
-}
+/// A law with a parameter that varies over the surface: one law a point.
+#[derive(Debug)]
+pub struct PerPoint<L>(pub Vec<L>);
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Every law must be its own energy's derivative, and its tangent its pressure's.
-    fn check(law: &dyn LayerLaw, scale: f64) {
-        assert_eq!(law.response(0, 0.0), Response::default());
-        assert_eq!(law.response(0, -scale), Response::default());
-        assert!(law.response(0, f64::NAN).pressure.is_nan());
-        let mut last = 0.0;
-        for step in 1..40 {
-            let c = scale * 0.1 * step as f64;
-            let h = 1e-5 * c;
-            let (minus, here, plus) = (law.response(0, c - h), law.response(0, c), law.response(0, c + h));
-            let slope = (plus.pressure - minus.pressure) / (2.0 * h);
-            let work = (plus.energy - minus.energy) / (2.0 * h);
-            assert!((slope / here.tangent - 1.0).abs() < 1e-7, "{law:?} at {c}: p' {slope} {here:?}");
-            assert!((work / here.pressure - 1.0).abs() < 1e-7, "{law:?} at {c}: P' {work} {here:?}");
-            assert!(here.pressure > last, "{law:?} is not increasing at {c}");
-            last = here.pressure;
-        }
+impl<L: LayerLaw> LayerLaw for PerPoint<L> {
+    fn compressed(&self, point: usize, c: f64) -> Response {
+        self.0[point].compressed(0, c)
     }
 
-    #[test]
-    fn laws_are_consistent() {
-        for a in [0.1, 0.3, 0.5, 1.0] {
-            check(&Power::new(2.5e-5, a), 5e-5);
-        }
-        check(&Linear { stiffness: 1e5 }, 1e-4);
-        // V1: a closing of B q^a carries q
-        let (b, a, q) = (2.5e-5, 0.5, 10.0f64);
-        let p = Power::new(b, a).response(0, b * q.powf(a)).pressure;
-        assert!((p - q).abs() < 1e-13);
+    fn pressure(&self, point: usize, c: f64) -> f64 {
+        self.0[point].pressure(0, c)
     }
 }

@@ -2,9 +2,9 @@
 
 use super::Decoder;
 use crate::error::{Error, Result};
+use crate::scene::ContactSpec;
 use crate::scene::expression::Field;
 use crate::scene::read::{Keys, Node};
-use crate::scene::{ContactSpec, LayerSpec};
 
 impl Decoder<'_> {
     /// The pairs of contact surfaces; there may be none.
@@ -47,35 +47,8 @@ impl Decoder<'_> {
         Ok(ContactSpec {
             between: [first, second],
             gap: keys.get("gap").map_or(Ok(Field::Constant(0.0)), |gap| self.field(gap))?,
-            layer: layer(keys.require("layer")?)?,
+            layer: self.layer(keys.require("layer")?)?,
             reference: keys.get("reference").map(|reference| self.field(reference)).transpose()?,
         })
     }
-}
-
-fn layer(node: &Node) -> Result<LayerSpec> {
-    const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
-    let keys = Keys::open(node, "the layer", &["power", "linear"]).map_err(|error| match error.advice() {
-        Some(advice) if advice.starts_with("did") => error,
-        _ => error.help(EXAMPLE),
-    })?;
-    keys.exclude("power", "linear")?;
-    if let Some(linear) = keys.get("linear") {
-        let keys = Keys::open(linear, "the linear layer", &["stiffness"])?;
-        return Ok(LayerSpec::Linear { stiffness: keys.require("stiffness")?.positive("the stiffness")? });
-    }
-    let Some(power) = keys.get("power") else {
-        return Err(keys.node().refuse("the layer has no law").help(EXAMPLE));
-    };
-    let keys = Keys::open(power, "the power layer", &["B", "a"])?;
-    let b = keys.require("B")?.positive("B")?;
-    let exponent = keys.require("a")?;
-    let a = exponent.positive("a")?;
-    if a > 1.0 {
-        return Err(exponent
-            .refuse(format!("a is {a}"))
-            .label("must not exceed 1")
-            .help("p(c) = (c/B)^(1/a) with a > 1 is infinitely stiff at first touch, p'(0) = infinity"));
-    }
-    Ok(LayerSpec::Power { b, a })
 }

@@ -80,35 +80,35 @@ fn number(truth: bool) -> f64 {
     if truth { 1.0 } else { 0.0 }
 }
 
-fn compare(a: f64, b: f64, truth: bool) -> f64 {
+pub(super) fn compare(a: f64, b: f64, truth: bool) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { number(truth) }
 }
 
 /// False if one side is, whatever the other: `x > 0 && log(x) > 1` is defined for all x.
-fn and(a: f64, b: f64) -> f64 {
+pub(super) fn and(a: f64, b: f64) -> f64 {
     if a <= 0.0 || b <= 0.0 { 0.0 } else { compare(a, b, true) }
 }
 
 /// True if one side is, whatever the other.
-fn or(a: f64, b: f64) -> f64 {
+pub(super) fn or(a: f64, b: f64) -> f64 {
     if a > 0.0 || b > 0.0 { 1.0 } else { compare(a, b, false) }
 }
 
-fn not(a: f64) -> f64 {
+pub(super) fn not(a: f64) -> f64 {
     compare(a, a, a <= 0.0)
 }
 
 /// Sign of a number, 0 for 0.
-fn sign(a: f64) -> f64 {
+pub(super) fn sign(a: f64) -> f64 {
     if a == 0.0 { 0.0 } else { a.signum() }
 }
 
 /// Larger of two numbers; unlike `f64::max` it keeps a NaN.
-fn max(a: f64, b: f64) -> f64 {
+pub(super) fn max(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
 /// Smaller of two numbers; unlike `f64::min` it keeps a NaN.
-fn min(a: f64, b: f64) -> f64 {
+pub(super) fn min(a: f64, b: f64) -> f64 {
     if a.is_nan() || a < b { a } else { b }
 }

@@ -1,0 +1,72 @@
+//! The law that a scene asks for, at the points of a pair.
+
+use super::{Cubic, Exponential, LayerLaw, Linear, PerPoint, Power, Table, Typed};
+use crate::error::{Error, Kind, Result};
+use crate::scene::expression::Field;
+use crate::scene::{LawForm, LawKind, LayerSpec};
+
+/// Makes the law of a layer; `position` are the contact points.
+///
+/// A law whose parameters are numbers is one object for all points.
+///
+/// # Errors
+/// Parameters out of their range at a point, expressions that are no law of a layer.
+pub fn make(spec: &LayerSpec, position: &[[f64; 3]]) -> Result<Box<dyn LayerLaw>> {
+    match spec {
+        LayerSpec::Form { form, values } => match form.kind {
+            LawKind::Linear => formed(form, values, position, |v| Linear { stiffness: v[0] }),
+            LawKind::Power => formed(form, values, position, |v| Power::new(v[0], v[1])),
+            LawKind::Exponential => formed(form, values, position, |v| Exponential::new(v[0], v[1])),
+            LawKind::Cubic => formed(form, values, position, |v| Cubic { k1: v[0], k3: v[1] }),
+        },
+        LayerSpec::Table(points) => Ok(Box::new(Table::new(points))),
+        LayerSpec::Pressure { law, up_to } => {
+            let size = extent(position);
+            let at = |&x: &[f64; 3]| Typed::new(law, x, *up_to, size);
+            match law.plain().uses_only_first() {
+                true => Ok(Box::new(at(&position[0])?)),
+                false => Ok(Box::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
+            }
+        }
+    }
+}
+
+/// A law of a known form: one for all points, or one a point where a parameter varies.
+fn formed<L: LayerLaw + 'static>(
+    form: &LawForm,
+    values: &[Field],
+    position: &[[f64; 3]],
+    new: fn(&[f64]) -> L,
+) -> Result<Box<dyn LayerLaw>> {
+    let at = |&x: &[f64; 3]| -> Result<L> {
+        let parameters = form.parameters.iter().zip(values).map(|(known, field)| {
+            let value = field.eval_finite(known.what, x)?;
+            match known.bounds.breach(value) {
+                None => Ok(value),
+                Some(breach) => {
+                    let message = format!("{} is {value} at ({}, {}, {})", known.what, x[0], x[1], x[2]);
+                    let error = Error::new(Kind::Scene, message);
+                    Err(match field.place() {
+                        Some(place) => error.at(place).label(breach),
+                        None => error.help(breach),
+                    })
+                }
+            }
+        });
+        Ok(new(&parameters.collect::<Result<Vec<f64>>>()?))
+    };
+    match values.iter().all(Field::is_constant) {
+        true => Ok(Box::new(at(&[0.0; 3])?)),
+        false => Ok(Box::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
+    }
+}
+
+/// Diagonal of the box around all points; no layer is compressed by more.
+fn extent(position: &[[f64; 3]]) -> f64 {
+    let spread = |c: usize| {
+        let values = position.iter().map(|x| x[c]);
+        values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
+    };
+    let size = (0..3).map(|c| spread(c).powi(2)).sum::<f64>().sqrt();
+    if size > 0.0 { size } else { 1.0 }
+}

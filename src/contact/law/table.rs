@@ -1,0 +1,75 @@
+//! Measured layer: a smooth increasing curve through given points.
+
+use super::{LayerLaw, Response};
+
+/// Monotone piecewise cubic curve through (0, 0) and points (c, p), continued as a straight line beyond the last one.
+///
+/// Slopes at the points are means of the secants on both sides, cut down as in Fritsch and Carlson (SIAM J. Numer. Anal. 17,
+/// 1980) so that p' > 0 everywhere: p is continuously differentiable and keeps the order of the points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// Points with their slopes and the energy up to them, from (0, 0) on.
+    knots: Vec<Knot>,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Knot {
+    c: f64,
+    pressure: f64,
+    slope: f64,
+    energy: f64,
+}
+
+impl Table {
+    /// A curve through points (c, p), both increasing from (0, 0), which is not among them; at least one point.
+    pub fn new(points: &[[f64; 2]]) -> Self {
+        let mut knots = vec![Knot::default()];
+        knots.extend(points.iter().map(|&[c, pressure]| Knot { c, pressure, ..Knot::default() }));
+        let secants: Vec<f64> =
+            knots.windows(2).map(|two| (two[1].pressure - two[0].pressure) / (two[1].c - two[0].c)).collect();
+        let last = secants.len() - 1;
+        for (i, knot) in knots.iter_mut().enumerate() {
+            knot.slope = 0.5 * (secants[i.saturating_sub(1)] + secants[i.min(last)]);
+        }
+        for (i, secant) in secants.iter().enumerate() {
+            let size = (knots[i].slope / secant).hypot(knots[i + 1].slope / secant);
+            if size > 3.0 {
+                knots[i].slope *= 3.0 / size;
+                knots[i + 1].slope *= 3.0 / size;
+            }
+        }
+        for i in 0..secants.len() {
+            knots[i + 1].energy = piece(&knots[i], &knots[i + 1], knots[i + 1].c).energy;
+        }
+        Self { knots }
+    }
+}
+
+/// The curve between two knots, at c.
+fn piece(a: &Knot, b: &Knot, c: f64) -> Response {
+    let h = b.c - a.c;
+    let s = (c - a.c) / h;
+    // p = p_a + h s (m_a + s (f + s g)) in the local coordinate s
+    let secant = (b.pressure - a.pressure) / h;
+    let f = 3.0 * secant - 2.0 * a.slope - b.slope;
+    let g = a.slope + b.slope - 2.0 * secant;
+    Response {
+        pressure: a.pressure + h * s * (a.slope + s * (f + s * g)),
+        tangent: a.slope + s * (2.0 * f + 3.0 * s * g),
+        energy: a.energy + h * s * (a.pressure + h * s * (a.slope / 2.0 + s * (f / 3.0 + s * g / 4.0))),
+    }
+}
+
+impl LayerLaw for Table {
+    fn compressed(&self, _point: usize, c: f64) -> Response {
+        // NaN stays in the first piece
+        let above = self.knots.partition_point(|knot| knot.c < c).max(1);
+        match self.knots.get(above) {
+            Some(b) => piece(&self.knots[above - 1], b, c),
+            None => {
+                let end = self.knots[above - 1];
+                Response { pressure: end.pressure, tangent: end.slope, energy: end.energy }.straight(c - end.c)
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Every law of a layer, through the whole program, against closed forms.
+
+mod common;
+
+use common::{Run, Scene, case, solve};
+
+/// Solves the patch under q = 10 with a layer and further settings.
+fn patch(layer: &str, more: &[&str]) -> Run {
+    let layer = format!("contact.0.layer={layer}");
+    let sets = [&["method={stop={residual=1e-12}}", &layer], more].concat();
+    solve(case("patch"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+}
+
+/// V1 with every law: the pressure is q, the layer's closing is where p(c) = q.
+#[test]
+fn patches() {
+    for (layer, closing) in [
+        ("{exponential={p0=3,c0=4e-5}}", 4e-5 * (1.0 + 10.0 / 3.0f64).ln()),
+        ("{cubic={k1=5e4,k3=5e12}}", 1e-4),
+        ("{table=[[5e-5,2],[1e-4,10],[2e-4,50]]}", 1e-4),
+        ("{table=[[5e-5,2],[6e-5,4]]}", f64::NAN),
+        ("{pressure=\"5e4*c + 5e8*c^2\"}", 1e-4),
+        ("{pressure=\"5e4*c*(1 + c/1e-4)\",up_to=5e-5}", 5e-5 + (10.0 - 3.75) / 1e5),
+    ] {
+        let table = patch(layer, &["mesh.set={nl=2,nu=3}"]).contact();
+        for q in 0..table.rows() {
+            assert!((table["pressure"][q] / 10.0 - 1.0).abs() < 1e-10, "{layer} point {q}: {}", table["pressure"][q]);
+            // beyond a table the last slope goes on: that of its last secant, 2e5
+            let closing = if closing.is_nan() { 6e-5 + 6.0 / 2e5 } else { closing };
+            assert!(
+                (table["compression"][q] / closing - 1.0).abs() < 1e-9,
+                "{layer} point {q}: {}",
+                table["compression"][q]
+            );
+        }
+    }
+}
+
+/// A layer of varying thickness under a gap that follows it: the pressure is uniform, the compression B(x) q^a.
+#[test]
+fn a_varying_layer() {
+    for layer in ["{power={B=\"2.5e-5*(1 + x/2)\",a=0.5}}", "{pressure=\"(c/(2.5e-5*(1 + x/2)))^2\"}"] {
+        let table = patch(layer, &["contact.0.gap=-2.5e-5*(1 + x/2)*sqrt(10)"]).contact();
+        for q in 0..table.rows() {
+            let compression = 2.5e-5 * (1.0 + table["x"][q] / 2.0) * 10f64.sqrt();
+            assert!((table["pressure"][q] / 10.0 - 1.0).abs() < 1e-9, "{layer}: {}", table["pressure"][q]);
+            assert!((table["compression"][q] / compression - 1.0).abs() < 1e-9);
+        }
+    }
+    // a constant written as an expression is a constant
+    let groove = Scene::edited("groove", "B = 2.5e-5", "B = \"2.5e-5 + 0*x\"");
+    let [ours, theirs] = [groove.path.clone(), case("groove")].map(|scene| solve(scene, &[]).converged());
+    assert_eq!(ours.count("iterations"), theirs.count("iterations"));
+    assert_eq!(ours.contact()["pressure"], theirs.contact()["pressure"]);
+}
+
+/// Starts that press a layer far beyond the range of numbers come back.
+#[test]
+fn starts_beyond_the_range_of_numbers() {
+    // c/c0 is 1e5 in the start
+    for layer in ["{exponential={p0=3,c0=2e-5}}", "{pressure=\"3*(exp(c/2e-5) - 1)\"}"] {
+        for method in ["auto", "ncg", "newton", "anderson"] {
+            let start = "method.start={normal=1}";
+            let name = format!("method.name={method}");
+            let run = patch(layer, &[&name, start]);
+            let closing = 2e-5 * (1.0 + 10.0 / 3.0f64).ln();
+            let table = run.contact();
+            for q in 0..table.rows() {
+                assert!((table["compression"][q] / closing - 1.0).abs() < 1e-9, "{layer} {method} point {q}");
+            }
+            assert!(run.count("iterations") < 500, "{layer} {method}: {}", run.count("iterations"));
+        }
+    }
+}
