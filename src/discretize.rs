@@ -1,9 +1,12 @@
 //! Scene and mesh -> [`Model`]: the one place where geometry ends. Nothing below it knows the dimension.
 
+mod balance;
 mod find;
 mod gauge;
 mod pairs;
 mod part;
+mod springs;
+mod supports;
 
 use crate::contact::{self, ContactPair};
 use crate::ddm::{self, Body, BodySlot, Exchange, Model, Motion, RobinZone, Segment};
@@ -17,8 +20,11 @@ use crate::linalg::Csr;
 use crate::mesh::Mesh;
 use crate::output::vtu::{BodyField, CellKind};
 use crate::scene::{Order, Scene, Start, Zone};
+use balance::Forces;
+pub use balance::{Balance, Resultant};
 use find::{placed, point};
 use part::Part;
+use std::rc::Rc;
 
 /// What every rank knows of a body before its owner assembles it.
 pub struct Outline<'a> {
@@ -88,16 +94,31 @@ pub struct BodyInfo {
     pub load: [f64; 3],
     /// Rank that owns the body.
     pub rank: usize,
+    /// Names of its rigid surfaces.
+    pub rigid: Vec<String>,
     field: FieldMaker,
+    nodal: NodalMaker,
+    balance: BalanceMaker,
 }
+
+/// State of all dofs -> displacements of all nodes.
+type NodalMaker = Box<dyn Fn(&[f64]) -> Vec<f64>>;
+
+/// Displacements of all nodes, forces omega p at the contact rows -> forces on the body.
+type BalanceMaker = Box<dyn Fn(&[f64], &[f64]) -> Balance>;
 
 /// Displacements of all dofs -> fields for output.
 type FieldMaker = Box<dyn Fn(&[f64]) -> BodyField>;
 
 impl BodyInfo {
-    /// Displacements and recovered stresses for output, from displacements of all dofs.
-    pub fn field(&self, u: &[f64]) -> BodyField {
-        (self.field)(u)
+    /// Displacements and recovered stresses for output, from a state of all dofs.
+    pub fn field(&self, v: &[f64]) -> BodyField {
+        (self.field)(&(self.nodal)(v))
+    }
+
+    /// Forces on the body in a state of all dofs, under the forces omega p of its contact rows.
+    pub fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
+        (self.balance)(&(self.nodal)(v), force)
     }
 }
 
@@ -145,11 +166,15 @@ pub fn discretize<const D: usize>(
     let (mut slots, mut infos, mut kept, mut assemblies) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for (index, mut part) in parts.into_iter().enumerate() {
         let (segments, rows) = rows_of(index, &pairs, part.space.dofs());
-        let free = rigid::modes(&part.space.nodes);
-        let load = part.load(mesh)?;
+        let free: Vec<RigidMotion> = rigid::modes(&part.space.nodes)
+            .into_iter()
+            .map(|motion| RigidMotion { displacement: part.held.frame.dofs(&motion.displacement), ..motion })
+            .collect();
+        let nodal_load = part.load(mesh)?;
+        let load = part.load_on_dofs(nodal_load.clone());
         let gauged = gauge::fix(&mut part, &free, &rows, &load);
         let prescribed: Vec<(usize, f64)> = part.prescribed_sorted();
-        let left = rigid::left_by_supports(&free, &prescribed);
+        let left = part.left(&free);
         let motions: Vec<Motion> = left.iter().map(|motion| trace_of(motion, &rows, &load)).collect();
         let mut slot = BodySlot {
             name: part.spec.name.value.clone(),
@@ -159,7 +184,9 @@ pub fn discretize<const D: usize>(
             row_stiffness: Vec::new(),
             motions,
         };
-        let resultant = std::array::from_fn(|c| if c < D { load.iter().skip(c).step_by(D).sum() } else { 0.0 });
+        let mut resultant =
+            std::array::from_fn(|c| if c < D { nodal_load.iter().skip(c).step_by(D).sum() } else { 0.0 });
+        part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
         let surface: f64 = slot.segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
         let modulus = part.spec.young.value / (1.0 - part.spec.poisson.value.powi(2));
         let held = slot.motions.len() == gauge::felt_by_none(&slot.motions).len();
@@ -184,19 +211,31 @@ pub fn discretize<const D: usize>(
             slot.local =
                 Some(maker.make(Assembled { name: slot.name.clone(), dimension: D, body, rows, motions: free })?);
         }
+        let (space, held) = (Rc::new(part.space), Rc::new(part.held));
         infos.push(BodyInfo {
             name: slot.name.clone(),
-            nodes: part.space.nodes.len(),
-            cells: part.space.cell_count(),
-            dofs: part.space.dofs(),
-            supported: part.prescribed.len(),
+            nodes: space.nodes.len(),
+            cells: space.cell_count(),
+            dofs: space.dofs(),
+            supported: held.supported(),
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: gauge::felt_by_none(&slot.motions).into_iter().map(|(name, _)| name).collect(),
             gauged,
             stiffness,
             load: resultant,
             rank: owner[index],
-            field: field_maker(slot.name.clone(), part.space, material),
+            rigid: held.rigid.iter().map(|(load, _)| part.spec.load[*load].on.value.clone()).collect(),
+            nodal: {
+                let held = held.clone();
+                Box::new(move |v| held.frame.displacements(v))
+            },
+            balance: {
+                let rows = nodal_rows(&slot.segments, &pairs, space.dofs());
+                let (springs, supports) = (part.springs, part.spec.fix.len());
+                let forces = Forces { space: space.clone(), material, held, springs, supports, load: nodal_load, rows };
+                Box::new(move |u, force| forces.balance(u, force))
+            },
+            field: field_maker(slot.name.clone(), space, material),
         });
         slots.push(slot);
     }
@@ -278,6 +317,15 @@ fn rows_of(body: usize, pairs: &[ContactPair], dofs: usize) -> (Vec<Segment>, Cs
     (segments, rows)
 }
 
+/// The rows of these segments for displacements of the nodes.
+fn nodal_rows(segments: &[Segment], pairs: &[ContactPair], dofs: usize) -> Csr {
+    let mut rows = Csr::new(dofs);
+    for &Segment { pair, side } in segments {
+        (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].nodal[side].row(q)));
+    }
+    rows
+}
+
 fn trace_of(motion: &RigidMotion, rows: &Csr, load: &[f64]) -> Motion {
     let mut trace = vec![0.0; rows.rows()];
     rows.multiply(&motion.displacement, &mut trace);
@@ -285,7 +333,7 @@ fn trace_of(motion: &RigidMotion, rows: &Csr, load: &[f64]) -> Motion {
     Motion { name: motion.name.clone(), trace, work }
 }
 
-fn field_maker<const D: usize>(name: String, space: Space<D>, material: Material) -> FieldMaker {
+fn field_maker<const D: usize>(name: String, space: Rc<Space<D>>, material: Material) -> FieldMaker {
     Box::new(move |u| {
         let stress = stress::nodal(&space, &material, u);
         BodyField {

@@ -1,5 +1,6 @@
 //! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`]. What they share is in [`run`].
 
+mod balance;
 pub mod check;
 pub mod inner;
 pub mod method;

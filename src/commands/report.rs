@@ -1,5 +1,6 @@
 //! Outcome -> report, contact tables and plots.
 
+use super::balance;
 use super::preflight;
 use super::run::{Clock, Prepared};
 use crate::contact::ContactPair;
@@ -78,7 +79,7 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
     let coupled = |part: fn(&BodyCounts) -> f64| outcome.coupled.iter().map(part).sum::<f64>();
     let last = outcome.rows.last();
     let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
-    Report {
+    let mut report = Report {
         status: status_name(&outcome.status).to_owned(),
         message: message(outcome, model),
         iterations: outcome.iterations,
@@ -105,7 +106,10 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
         f1: finite(last.map(|row| row.energy)),
         pairs: (0..model.pairs.len()).map(|i| pair_report(scene, prepared, outcome, i)).collect(),
         ..headline(session, scene, prepared, &shared.solvers, clock)
-    }
+    };
+    let balances = balance::gather(scene, prepared, outcome);
+    report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
+    report
 }
 
 /// The part of the report that is known before the first sweep; `solvers` are the inner solvers in words.
@@ -128,6 +132,7 @@ pub fn headline(session: &Session, scene: &Scene, prepared: &Prepared, solvers: 
                 dofs: info.dofs,
                 solver: solver.clone(),
                 rank: info.rank,
+                ..BodyReport::default()
             })
             .collect(),
         times: clock.times.clone(),
@@ -218,8 +223,8 @@ fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) 
     let (pair, layer, range) = (&model.pairs[i], &outcome.layer, model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
     let length = |is: fn(f64) -> bool| (0..pair.len()).filter(|&q| is(c[q])).fold(0.0, |sum, q| sum + pair.weight[q]);
-    let on_side = |side: usize| -> [f64; 3] {
-        std::array::from_fn(|k| (0..pair.len()).fold(0.0, |sum, q| sum - force[q] * pair.resultant[side][q][k]))
+    let sum = |rows: &[[f64; 3]]| -> [f64; 3] {
+        std::array::from_fn(|k| (0..pair.len()).fold(0.0, |sum, q| sum - force[q] * rows[q][k]))
     };
     let sides = sides(prepared, i);
     let coupling = preflight::coupling(scene, prepared, i);
@@ -232,7 +237,8 @@ fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) 
         theta: sides.map(|side| coupling.theta[side]),
         facets_uncovered: pair.uncovered.0,
         layer_energy: layer.energy[i],
-        force: sides.map(on_side),
+        force: sides.map(|side| sum(&pair.resultant[side])),
+        moment: sides.map(|side| sum(&pair.moment[side])),
         peak_pressure: p[peak],
         peak_at: pair.position[peak],
         contact_length: length(|c| c > 0.0),

@@ -10,5 +10,5 @@ pub mod pieces;
 mod side;
 
 pub use law::{LayerLaw, Response};
-pub use pair::{ContactPair, Fault, assemble, pad};
+pub use pair::{ContactPair, Fault, add, assemble, cross, pad};
 pub use side::Side;

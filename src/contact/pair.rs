@@ -8,7 +8,7 @@ use crate::fem::element;
 use crate::linalg::Csr;
 use crate::scene::{LayerSpec, Order};
 use nalgebra::DMatrix;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// A pair of surfaces, discretised: n points with one pressure each.
 ///
@@ -33,9 +33,14 @@ pub struct ContactPair {
     pub prescribed: [Vec<f64>; 2],
     /// B_a and B_b, n rows each, columns the dofs of the body: `B_a u_a = <n.u_a>`, `B_b u_b = -<n.u_b>`.
     pub rows: [Csr; 2],
+    /// The same rows for displacements of the nodes, supported ones included: columns `D * node + component`. Nodal forces of
+    /// the contact are `-sum_q omega_q p_q nodal[side][q]`.
+    pub nodal: [Csr; 2],
     /// Sum of each row's entries by component, prescribed dofs included: force vectors on a side are
     /// `-sum_q omega_q p_q resultant[side][q]`.
     pub resultant: [Vec<[f64; 3]>; 2],
+    /// Moments of these entries about the origin, for the moments on a side in the same way.
+    pub moment: [Vec<[f64; 3]>; 2],
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
     /// Law of the layer.
@@ -117,7 +122,9 @@ pub fn assemble<const D: usize>(
         gap: Vec::new(),
         prescribed: [Vec::new(), Vec::new()],
         rows: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
+        nodal: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
         resultant: [Vec::new(), Vec::new()],
+        moment: [Vec::new(), Vec::new()],
         along_curve: D == 2,
         law,
         uncovered: (covered.iter().filter(|&&c| !c).count(), covered.len()),
@@ -125,24 +132,29 @@ pub fn assemble<const D: usize>(
     for (q, node) in order.into_iter().enumerate() {
         let sum = &points[&node];
         let normal = a.normals[&node];
-        for (side, sign, space, prescribed) in [(0, 1.0, a.space, a.prescribed), (1, -1.0, b.space, b.prescribed)] {
-            let mut entries = Vec::new();
-            let mut resultant = [0.0; D];
-            let mut known = 0.0;
+        for (side, sign, of) in [(0, 1.0, a), (1, -1.0, b)] {
+            let (mut nodal, mut entries) = (Vec::new(), BTreeMap::new());
+            let (mut resultant, mut moment) = ([0.0; 3], [0.0; 3]);
             for (n, share) in shares(&sum.sides[side], sum.weight) {
-                let x = space.nodes[n as usize];
-                for c in 0..D {
-                    let entry = sign * share * normal[c];
-                    resultant[c] += entry;
-                    let dof = D * n as usize + c;
-                    match prescribed.get(&dof) {
-                        Some(u) => known += entry * u,
-                        None => entries.push((dof, entry)),
-                    }
+                let entry = normal.map(|normal| sign * share * normal);
+                nodal.extend((0..D).map(|c| (D * n as usize + c, entry[c])));
+                add(&mut resultant, pad(entry));
+                add(&mut moment, cross(pad(of.space.nodes[n as usize]), pad(entry)));
+                let (node, dofs) = of.frame.force(n, entry);
+                for (c, value) in dofs.into_iter().enumerate() {
+                    *entries.entry(D * node as usize + c).or_insert(0.0) += value;
                 }
             }
+            let mut known = 0.0;
+            entries.retain(|dof, entry| {
+                let prescribed = of.prescribed.get(dof);
+                known += prescribed.map_or(0.0, |u| *entry * u);
+                prescribed.is_none()
+            });
             pair.rows[side].push_row(entries);
-            pair.resultant[side].push(pad(resultant));
+            pair.nodal[side].push_row(nodal);
+            pair.resultant[side].push(resultant);
+            pair.moment[side].push(moment);
             pair.prescribed[side].push(known);
         }
         let distance = sum.gap / sum.weight;
@@ -163,9 +175,19 @@ pub fn pad<const D: usize>(v: [f64; D]) -> [f64; 3] {
     std::array::from_fn(|c| if c < D { v[c] } else { 0.0 })
 }
 
+/// Vector product.
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3])
+}
+
+/// sum += v.
+pub fn add(sum: &mut [f64; 3], v: [f64; 3]) {
+    sum.iter_mut().zip(v).for_each(|(sum, v)| *sum += v);
+}
+
 /// A side's nodal shares of a point, which sum to one. Shares that are only noise of the mesher's coordinates go to the
 /// largest one: surfaces that match to nine digits have nodal rows on both sides.
-fn shares(values: &std::collections::BTreeMap<u32, f64>, weight: f64) -> Vec<(u32, f64)> {
+fn shares(values: &BTreeMap<u32, f64>, weight: f64) -> Vec<(u32, f64)> {
     let (mut kept, noise): (Vec<_>, Vec<_>) =
         values.iter().map(|(&node, value)| (node, value / weight)).partition(|(_, share)| share.abs() > NOISE);
     let lost: f64 = noise.iter().map(|(_, share)| share).sum();
@@ -182,7 +204,7 @@ const NOISE: f64 = 1e-9;
 struct Accumulator {
     weight: f64,
     gap: f64,
-    sides: [std::collections::BTreeMap<u32, f64>; 2],
+    sides: [BTreeMap<u32, f64>; 2],
 }
 
 /// The functions mu_i on the covered part of one facet of side a.

@@ -1,7 +1,7 @@
 //! One surface of a pair: facets of a body with averaged nodal normals.
 
 use crate::fem::space::area_vector;
-use crate::fem::{Facets, Space, element};
+use crate::fem::{Facets, Frame, Space, element};
 use std::collections::HashMap;
 
 /// One contact surface of a body.
@@ -15,13 +15,21 @@ pub struct Side<'a, const D: usize> {
     pub facets: Facets<D>,
     /// Prescribed dofs of the body and their values.
     pub prescribed: &'a HashMap<usize, f64>,
+    /// What its dofs are at turned and tied nodes.
+    pub frame: &'a Frame<D>,
     /// Outer unit normal at each node of the surface: mean of the facets around it.
     pub normals: HashMap<u32, [f64; D]>,
 }
 
 impl<'a, const D: usize> Side<'a, D> {
     /// The side with its nodal normals.
-    pub fn new(name: &'a str, space: &'a Space<D>, facets: Facets<D>, prescribed: &'a HashMap<usize, f64>) -> Self {
+    pub fn new(
+        name: &'a str,
+        space: &'a Space<D>,
+        facets: Facets<D>,
+        prescribed: &'a HashMap<usize, f64>,
+        frame: &'a Frame<D>,
+    ) -> Self {
         let mut normals: HashMap<u32, [f64; D]> = HashMap::new();
         let places = element::nodes::<D>(facets.order);
         for i in 0..facets.count() {
@@ -35,7 +43,7 @@ impl<'a, const D: usize> Side<'a, D> {
         for normal in normals.values_mut() {
             *normal = unit(*normal);
         }
-        Self { name, space, facets, prescribed, normals }
+        Self { name, space, facets, prescribed, frame, normals }
     }
 
     /// Mean measure (length, area) of a facet.

@@ -41,6 +41,12 @@ pub fn not_on_body(on: &Located<String>, body: &str) -> Error {
         .help("a support or load acts on a physical group of its own body")
 }
 
+/// Where an earlier support or load stands that a refused one meets.
+pub fn earlier(on: &Located<String>) -> String {
+    let text = &on.place.source.text[..on.place.span.start];
+    format!("the earlier one is on `{}`, line {} of {}", on.value, 1 + text.matches('\n').count(), on.place.source.name)
+}
+
 /// A refusal that points at an expression of the scene.
 pub fn placed(field: &Field, message: String) -> Error {
     let error =

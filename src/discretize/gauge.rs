@@ -18,7 +18,7 @@ pub fn fix<const D: usize>(part: &mut Part<D>, free: &[RigidMotion], rows: &Csr,
     rows.col.iter().for_each(|&dof| in_rows[dof as usize] = true);
     let mut fixed = Vec::new();
     loop {
-        let left = rigid::left_by_supports(free, &part.prescribed_sorted());
+        let left = part.left(free);
         let motions: Vec<Motion> = left.iter().map(|motion| super::trace_of(motion, rows, load)).collect();
         let idle = felt_by_none(&motions).into_iter().find_map(|(_, weights)| {
             let motion = rigid::combine(&left, &weights);
@@ -26,12 +26,12 @@ pub fn fix<const D: usize>(part: &mut Part<D>, free: &[RigidMotion], rows: &Csr,
         });
         let Some(motion) = idle else { return fixed };
         // a dof outside the contact rows, so that these stay as they are
-        let candidates = (0..in_rows.len()).filter(|dof| !in_rows[*dof] && !part.prescribed.contains_key(dof));
+        let candidates = (0..in_rows.len()).filter(|dof| !in_rows[*dof] && !part.held.prescribed.contains_key(dof));
         let size = |dof: &usize| motion.displacement[*dof].abs();
         let Some(dof) = candidates.max_by(|a, b| size(a).total_cmp(&size(b))).filter(|dof| size(dof) > 1e-3) else {
             return fixed;
         };
-        part.prescribed.insert(dof, 0.0);
+        part.held.prescribed.insert(dof, 0.0);
         fixed.push(motion.name);
     }
 }

@@ -21,7 +21,7 @@ pub fn make_pair<const D: usize>(
         let group = find_group(mesh, name, &[D - 1], "contact surface")?;
         let (body, facets) = owner_of(name, group, parts)?;
         let part = &parts[body];
-        sides.push((body, Side::new(&name.value, &part.space, facets, &part.prescribed)));
+        sides.push((body, Side::new(&name.value, &part.space, facets, &part.held.prescribed, &part.held.frame)));
     }
     let (body_b, b) = sides.remove(1);
     let (body_a, a) = sides.remove(0);

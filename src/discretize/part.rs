@@ -1,22 +1,27 @@
 //! One body of the scene on its mesh: space, supports, loads, stiffness.
 
 use super::find::{find_group, not_on_body, point};
+use super::springs;
+use super::supports::Held;
 use crate::contact;
 use crate::error::{Error, Result};
-use crate::fem::{ElasticBody, Material, NodeGraph, Space, assemble};
+use crate::fem::assemble::{self, NodalBlock};
+use crate::fem::rigid::{self, RigidMotion};
+use crate::fem::{ElasticBody, Material, NodeGraph, Space, surface};
 use crate::linalg::Csr;
 use crate::mesh::Mesh;
 use crate::scene::{BodySpec, LoadKind};
-use std::collections::HashMap;
 
-/// A body of the scene with its space, supports and the lookups that they need.
+/// A body of the scene with its space, supports and springs.
 pub struct Part<'a, const D: usize> {
     /// What the scene says.
     pub spec: &'a BodySpec,
     /// Its finite element space.
     pub space: Space<D>,
-    /// Prescribed dofs and their values.
-    pub prescribed: HashMap<usize, f64>,
+    /// What supports and rigid surfaces hold.
+    pub held: Held<D>,
+    /// Springs to the ground: for each of the scene, its stiffnesses between nodes.
+    pub springs: Vec<Vec<NodalBlock<D>>>,
 }
 
 impl<'a, const D: usize> Part<'a, D> {
@@ -24,49 +29,40 @@ impl<'a, const D: usize> Part<'a, D> {
     pub fn new(spec: &'a BodySpec, mesh: &Mesh<D>) -> Result<Self> {
         let group = find_group(mesh, &spec.name, &[D], "body")?;
         let space = Space::new(mesh, group, spec.order);
-        let mut part = Self { spec, space, prescribed: HashMap::new() };
-        part.support(mesh)?;
-        Ok(part)
-    }
-
-    fn support(&mut self, mesh: &Mesh<D>) -> Result<()> {
-        for support in &self.spec.fix {
-            let dimensions: Vec<usize> = (0..=D).rev().collect();
-            let group = find_group(mesh, &support.on, &dimensions, "support")?;
-            let nodes = self.space.nodes_on(group);
-            if nodes.is_empty() {
-                return Err(not_on_body(&support.on, &self.spec.name.value));
-            }
-            for node in nodes {
-                for (c, value) in support.value[..D].iter().enumerate() {
-                    let Some(value) = value else { continue };
-                    let before = self.prescribed.insert(D * node as usize + c, *value);
-                    if before.is_some_and(|before| before != *value) {
-                        let x = contact::pad(self.space.nodes[node as usize]);
-                        let message = format!(
-                            "body `{}`: supports prescribe two values of the {} displacement at {}",
-                            self.spec.name.value,
-                            ["x", "y", "z"][c],
-                            point(x)
-                        );
-                        return Err(Error::scene(&support.on.place, message)
-                            .label("this one and an earlier one")
-                            .help("make both values equal, or let the surfaces not meet"));
-                    }
-                }
-            }
-        }
-        Ok(())
+        let held = Held::new(spec, &space, mesh)?;
+        let springs =
+            spec.spring.iter().map(|spring| springs::blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
+        Ok(Self { spec, space, held, springs })
     }
 
     /// Prescribed (dof, value), sorted by dof.
     pub fn prescribed_sorted(&self) -> Vec<(usize, f64)> {
-        let mut all: Vec<_> = self.prescribed.iter().map(|(&dof, &value)| (dof, value)).collect();
+        let mut all: Vec<_> = self.held.prescribed.iter().map(|(&dof, &value)| (dof, value)).collect();
         all.sort_unstable_by_key(|entry| entry.0);
         all
     }
 
-    /// The load vector f, supports not regarded.
+    /// The rigid motions, given and returned in the body's dofs, that neither supports nor springs hold.
+    pub fn left(&self, free: &[RigidMotion]) -> Vec<RigidMotion> {
+        let left = rigid::left_by_supports(free, &self.prescribed_sorted());
+        let turned = |motion: &RigidMotion| RigidMotion {
+            name: motion.name.clone(),
+            displacement: self.held.frame.displacements(&motion.displacement),
+        };
+        let springs = self.springs.concat();
+        if springs.is_empty() {
+            return left;
+        }
+        let (nodal, all) = (left.iter().map(turned).collect(), free.iter().map(turned).collect::<Vec<_>>());
+        let left = rigid::left_by_springs(nodal, &all, &springs);
+        let back = |motion: RigidMotion| RigidMotion {
+            displacement: self.held.frame.dofs(&motion.displacement),
+            name: motion.name,
+        };
+        left.into_iter().map(back).collect()
+    }
+
+    /// Nodal forces of the loads, but for those on rigid surfaces. Supports are not regarded.
     pub fn load(&self, mesh: &Mesh<D>) -> Result<Vec<f64>> {
         let name = &self.spec.name;
         let mut load = vec![0.0; self.space.dofs()];
@@ -76,7 +72,8 @@ impl<'a, const D: usize> Part<'a, D> {
             if facets.count() == 0 {
                 return Err(not_on_body(&spec.on, &name.value));
             }
-            assemble::surface_load(
+            let area = surface::measure(&self.space, &facets);
+            surface::surface_load(
                 &self.space,
                 &facets,
                 &|x, n| match &spec.kind {
@@ -85,6 +82,8 @@ impl<'a, const D: usize> Part<'a, D> {
                         n.map(|n| -pressure * n)
                     }
                     LoadKind::Traction(fields) => std::array::from_fn(|c| fields[c].eval(contact::pad(x))),
+                    LoadKind::Force { rigid: true, .. } => [0.0; D],
+                    LoadKind::Force { total, .. } => std::array::from_fn(|c| total[c] / area),
                 },
                 &mut load,
             );
@@ -110,6 +109,23 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(load)
     }
 
+    /// Forces on rigid surfaces: a node of each, and the force (x, y, z).
+    pub fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; 3])> + '_ {
+        self.held.rigid.iter().filter_map(|(index, nodes)| match self.spec.load[*index].kind {
+            LoadKind::Force { total, .. } => Some((*nodes.first()?, total)),
+            _ => None,
+        })
+    }
+
+    /// The load vector f at the body's dofs, from the nodal forces of [`Part::load`] and the forces on rigid surfaces.
+    pub fn load_on_dofs(&self, mut load: Vec<f64>) -> Vec<f64> {
+        for (node, total) in self.rigid_forces() {
+            (0..D).for_each(|c| load[D * node as usize + c] += total[c]);
+        }
+        self.held.frame.forces(&mut load);
+        load
+    }
+
     /// K, f and supports.
     pub fn assemble(
         &self,
@@ -127,14 +143,16 @@ impl<'a, const D: usize> Part<'a, D> {
             })
             .filter(|nodes| nodes.len() > 1)
             .collect();
-        let graph = NodeGraph::new(&self.space, &coupled);
+        let graph = NodeGraph::new(&self.space, &coupled, &self.held.frame);
         let name = &self.spec.name;
-        let stiffness = assemble::stiffness(&self.space, &graph, material).map_err(|defect| {
+        let mut stiffness = assemble::stiffness(&self.space, &graph, material).map_err(|defect| {
             let assemble::Defect::Inverted(cell) = defect;
             let corner = contact::pad(self.space.cell_nodes(cell)[0]);
             let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
             Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
         })?;
+        self.springs.iter().for_each(|springs| assemble::add_blocks(&graph, springs, &mut stiffness));
+        self.held.frame.turn_matrix(&mut stiffness);
         Ok(assemble::support(stiffness, load, prescribed))
     }
 }

@@ -4,9 +4,10 @@
 //! follow from the graph by arithmetic, so that assembly writes each value straight to its place.
 
 use super::element;
+use super::frame::Frame;
 use super::material::Material;
 use super::quadrature;
-use super::space::{Facets, Space, area_vector};
+use super::space::Space;
 use crate::linalg::Csr;
 use crate::scene::Order;
 
@@ -17,14 +18,24 @@ pub struct NodeGraph {
     pub ptr: Vec<u32>,
     /// Neighbours of each node, the node itself included, sorted.
     pub col: Vec<u32>,
+    /// Node that stands for each node; empty if each stands for itself.
+    master: Vec<u32>,
 }
 
 impl NodeGraph {
     /// The graph of a space's cells plus `extra` sets of nodes that are coupled among themselves (the nodes of
-    /// each contact row: pattern of B'B).
-    pub fn new<const D: usize>(space: &Space<D>, extra: &[Vec<u32>]) -> Self {
+    /// each contact row: pattern of B'B). The nodes that `frame` ties are one node in it, their master; alone they only
+    /// meet themselves.
+    pub fn new<const D: usize>(space: &Space<D>, extra: &[Vec<u32>], frame: &Frame<D>) -> Self {
         let n = space.nodes.len();
-        let sets = || space.cells.chunks_exact(space.stride).chain(extra.iter().map(Vec::as_slice));
+        let merged: Vec<u32> = match frame.master.is_empty() {
+            true => Vec::new(),
+            false => space.cells.iter().map(|&node| frame.node(node)).collect(),
+        };
+        let cells = if merged.is_empty() { &space.cells } else { &merged };
+        let tied: Vec<[u32; 1]> = frame.master.keys().map(|&node| [node]).collect();
+        let alone = tied.iter().map(|node| &node[..]);
+        let sets = || cells.chunks_exact(space.stride).chain(extra.iter().map(Vec::as_slice)).chain(alone.clone());
         // node -> sets that contain it
         let mut start = vec![0u32; n + 1];
         sets().flatten().for_each(|&node| start[node as usize + 1] += 1);
@@ -43,13 +54,14 @@ impl NodeGraph {
         let set = |index: u32| -> &[u32] {
             let index = index as usize;
             if index < cell_count {
-                &space.cells[index * space.stride..(index + 1) * space.stride]
+                &cells[index * space.stride..(index + 1) * space.stride]
             } else {
-                &extra[index - cell_count]
+                extra.get(index - cell_count).map_or_else(|| &tied[index - cell_count - extra.len()][..], Vec::as_slice)
             }
         };
         let mut seen = vec![u32::MAX; n];
-        let mut graph = NodeGraph { ptr: vec![0], col: Vec::with_capacity(8 * n) };
+        let master = if merged.is_empty() { Vec::new() } else { (0..n as u32).map(|node| frame.node(node)).collect() };
+        let mut graph = NodeGraph { ptr: vec![0], col: Vec::with_capacity(8 * n), master };
         for i in 0..n {
             let first = graph.col.len();
             for &index in &member[start[i] as usize..start[i + 1] as usize] {
@@ -84,12 +96,34 @@ impl NodeGraph {
 
     /// Where block (i, j) starts in the values of [`NodeGraph::matrix`], and the distance between its rows.
     fn block<const D: usize>(&self, i: u32, j: u32) -> (usize, usize) {
+        let [i, j] = [i, j].map(|node| self.master.get(node as usize).copied().unwrap_or(node));
         let (from, to) = (self.ptr[i as usize] as usize, self.ptr[i as usize + 1] as usize);
         let slot = match self.col[from..to].binary_search(&j) {
             Ok(slot) => slot,
             Err(_) => unreachable!("the graph holds every pair of nodes of a cell"),
         };
         (D * D * from + D * slot, D * (to - from))
+    }
+}
+
+/// A stiffness between two nodes of one cell or facet, as springs to the ground give it.
+#[derive(Debug, Clone)]
+pub struct NodalBlock<const D: usize> {
+    /// The two nodes.
+    pub nodes: [u32; 2],
+    /// Force at the first one for a displacement of the second.
+    pub block: [[f64; D]; D],
+}
+
+/// Adds springs to a stiffness matrix on a graph.
+pub fn add_blocks<const D: usize>(graph: &NodeGraph, blocks: &[NodalBlock<D>], matrix: &mut Csr) {
+    for NodalBlock { nodes: [a, b], block } in blocks {
+        let (start, step) = graph.block::<D>(*a, *b);
+        for (i, row) in block.iter().enumerate() {
+            for (j, value) in row.iter().enumerate() {
+                matrix.values[start + i * step + j] += value;
+            }
+        }
     }
 }
 
@@ -217,31 +251,6 @@ fn body_force_on<const D: usize, const N: usize>(
             let at = interpolate(&x, &phi);
             let force = density(at);
             for (a, &node) in cell.iter().enumerate() {
-                for c in 0..D {
-                    load[D * node as usize + c] += weight * measure * phi[a] * force[c];
-                }
-            }
-        }
-    }
-}
-
-/// Adds a surface load to `load`; `traction(x, n)` is force per area at a point with outer unit normal n.
-pub fn surface_load<const D: usize>(
-    space: &Space<D>,
-    facets: &Facets<D>,
-    traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
-    load: &mut [f64],
-) {
-    let rule = quadrature::simplex::<D>(if space.order == Order::P1 { 3 } else { 5 });
-    for index in 0..facets.count() {
-        let x = facets.coordinates(index, space);
-        for (l, weight) in rule.points.iter().zip(&rule.weights) {
-            let area = area_vector(space.order, &x, l);
-            let measure = area.iter().map(|a| a * a).sum::<f64>().sqrt();
-            let normal = area.map(|a| a / measure);
-            let phi = element::values(space.order, l);
-            let force = traction(interpolate(&x, &phi), normal);
-            for (a, &node) in facets.facet(index).iter().enumerate() {
                 for c in 0..D {
                     load[D * node as usize + c] += weight * measure * phi[a] * force[c];
                 }

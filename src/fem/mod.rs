@@ -6,12 +6,15 @@
 
 pub mod assemble;
 pub mod element;
+pub mod frame;
 pub mod material;
 pub mod quadrature;
 pub mod rigid;
 pub mod space;
 pub mod stress;
+pub mod surface;
 
 pub use assemble::{ElasticBody, NodeGraph};
+pub use frame::Frame;
 pub use material::Material;
 pub use space::{Facets, Space};

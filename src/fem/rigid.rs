@@ -1,5 +1,6 @@
 //! Rigid motions of a body and what its supports leave of them.
 
+use super::assemble::NodalBlock;
 use crate::linalg::kernel;
 use nalgebra::{DMatrix, DVector};
 
@@ -48,6 +49,29 @@ pub fn left_by_supports(motions: &[RigidMotion], prescribed: &[(usize, f64)]) ->
         .into_iter()
         .map(|weights| combine(motions, &weights))
         .collect()
+}
+
+/// Of the motions in `left`, those that springs do not feel; `all` are the motions of the free body, which set the scale.
+pub fn left_by_springs<const D: usize>(
+    left: Vec<RigidMotion>,
+    all: &[RigidMotion],
+    springs: &[NodalBlock<D>],
+) -> Vec<RigidMotion> {
+    let energy = |a: &RigidMotion, b: &RigidMotion| -> f64 {
+        let at = |motion: &RigidMotion, node: u32, c: usize| motion.displacement[D * node as usize + c];
+        let of = |spring: &NodalBlock<D>| -> f64 {
+            let [i, j] = spring.nodes;
+            let terms = (0..D).flat_map(|c| (0..D).map(move |d| (c, d)));
+            terms.map(|(c, d)| at(a, i, c) * spring.block[c][d] * at(b, j, d)).sum()
+        };
+        springs.iter().map(of).sum()
+    };
+    let scale = all.iter().map(|motion| energy(motion, motion)).fold(0.0, f64::max);
+    if scale == 0.0 {
+        return left;
+    }
+    let gram = DMatrix::from_fn(left.len(), left.len(), |i, j| energy(&left[i], &left[j]));
+    kernel(&gram, scale, 1e-12).into_iter().map(|weights| combine(&left, &weights)).collect()
 }
 
 /// Combination of motions, named after the parts that matter.

@@ -58,6 +58,13 @@ impl<const D: usize> Space<D> {
         space
     }
 
+    /// The same nodes with the cells alone that touch one of those `marked`.
+    pub fn around(&self, marked: &[bool]) -> Self {
+        let touching = |cell: &&[u32]| cell.iter().any(|&node| marked[node as usize]);
+        let cells = self.cells.chunks_exact(self.stride).filter(touching).flatten().copied().collect();
+        Space { order: self.order, nodes: self.nodes.clone(), stride: self.stride, cells, from_mesh: Vec::new() }
+    }
+
     /// Number of degrees of freedom.
     pub fn dofs(&self) -> usize {
         D * self.nodes.len()
@@ -180,6 +187,20 @@ impl<const D: usize> Facets<D> {
     /// Body node numbers of facet `i`.
     pub fn facet(&self, i: usize) -> &[u32] {
         &self.nodes[i * self.stride..(i + 1) * self.stride]
+    }
+
+    /// Outer unit normals at the corners of all facets.
+    pub fn normals(&self, space: &Space<D>) -> Vec<[f64; D]> {
+        let corner = |at: usize| std::array::from_fn(|c| if c == at { 1.0 } else { 0.0 });
+        let normals = |i: usize| {
+            let x = self.coordinates(i, space);
+            (0..D).map(move |at| {
+                let area = area_vector(self.order, &x, &corner(at));
+                let size = area.iter().map(|a| a * a).sum::<f64>().sqrt();
+                area.map(|a| a / size)
+            })
+        };
+        (0..self.count()).flat_map(normals).collect()
     }
 
     /// Coordinates of the nodes of facet `i`.

@@ -102,6 +102,38 @@ pub struct BodyReport {
     pub solver: String,
     /// Rank that owned it.
     pub rank: usize,
+    /// Forces on it.
+    pub balance: BalanceReport,
+}
+
+/// A force and its moment about the origin (x, y, z), and where it acts.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ForceReport {
+    /// What it comes from: a physical group of a support, spring or rigid surface; `loads`, `contacts`.
+    pub on: String,
+    /// The force.
+    pub force: [f64; 3],
+    /// The moment.
+    pub moment: [f64; 3],
+}
+
+/// Forces on a body; all together are zero in equilibrium.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct BalanceReport {
+    /// Loads, but for those on rigid surfaces.
+    pub loads: ForceReport,
+    /// All contacts.
+    pub contacts: ForceReport,
+    /// Reaction of each support, in the order of the scene.
+    pub supports: Vec<ForceReport>,
+    /// Force of each spring.
+    pub springs: Vec<ForceReport>,
+    /// Force of each rigid surface, that of supports of its nodes included; its moment keeps the surface from turning.
+    pub rigid: Vec<ForceReport>,
+    /// Size of the sum of all forces over the sum of the sizes of all nodal forces.
+    pub force_imbalance: f64,
+    /// The same for moments about the origin.
+    pub moment_imbalance: f64,
 }
 
 /// One pair of surfaces, sides in the order of the scene.
@@ -123,6 +155,8 @@ pub struct PairReport {
     pub layer_energy: f64,
     /// Contact force on each side (x, y, z).
     pub force: [[f64; 3]; 2],
+    /// Moment of that about the origin (x, y, z).
+    pub moment: [[f64; 3]; 2],
     /// Largest pressure.
     pub peak_pressure: f64,
     /// Where it is (x, y, z).
@@ -156,7 +190,8 @@ impl Report {
             lines.push(if pair.peak_pressure > 0.0 {
                 let [x, y, z] = pair.peak_at.map(|x| readable(x, 4));
                 format!(
-                    "{names}: peak pressure {} at ({x}, {y}, {z}), contact {}, open {}",
+                    "{names}: force {}, peak pressure {} at ({x}, {y}, {z}), contact {}, open {}",
+                    vector(pair.force[0]),
                     readable(pair.peak_pressure, 6),
                     readable(pair.contact_length, 6),
                     readable(pair.open_length, 6)
@@ -165,9 +200,26 @@ impl Report {
                 format!("{names}: no contact")
             });
         }
+        for body in self.bodies.iter().filter(|_| self.residual.is_some()) {
+            let BalanceReport { supports, springs, rigid, force_imbalance, moment_imbalance, .. } = &body.balance;
+            let all = supports.iter().chain(springs).chain(rigid);
+            let held: Vec<_> = all.map(|part| format!("{} {}", part.on, vector(part.force))).collect();
+            let held = if held.is_empty() { String::new() } else { format!("held by {}; ", held.join(", ")) };
+            lines.push(format!(
+                "  {}: {held}imbalance {} of forces, {} of moments",
+                body.name,
+                sci(*force_imbalance, 1),
+                sci(*moment_imbalance, 1)
+            ));
+        }
         lines.extend(self.warnings.iter().map(|warning| format!("  warning: {warning}")));
         lines.join("\n")
     }
+}
+
+/// A vector as text.
+fn vector(v: [f64; 3]) -> String {
+    format!("({})", v.map(|v| readable(v, 6)).join(", "))
 }
 
 /// A number with `digits` after the point, or with an exponent where that would not show it.

@@ -3,7 +3,7 @@
 use super::expression::Field;
 use super::{
     BodySpec, ContactSpec, Gamma, LayerSpec, LoadKind, MeshSource, MethodName, MethodSpec, Order, Plane, RobinSpec,
-    Scene, SolverSpec, Start, StopSpec, Zone,
+    Scene, SolverSpec, SpringKind, Start, StopSpec, Zone,
 };
 use serde_json::{Map, Value, json};
 
@@ -68,9 +68,10 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
     let fix = body.fix.iter().map(|support| {
         let mut map = Map::new();
         map.insert("on".into(), json!(support.on.value));
-        for (axis, value) in ["x", "y", "z"].iter().zip(support.value) {
-            insert(&mut map, axis, value.map(|value| json!(value)));
+        for (axis, value) in ["x", "y", "z"].iter().zip(&support.value) {
+            insert(&mut map, axis, value.as_ref().map(field));
         }
+        insert(&mut map, "normal", support.normal.as_ref().map(field));
         Value::Object(map)
     });
     let load = body.load.iter().map(|load| match &load.kind {
@@ -78,6 +79,13 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
         LoadKind::Traction(traction) => {
             json!({ "on": load.on.value, "traction": vector(traction, dimension) })
         }
+        LoadKind::Force { total, rigid } => {
+            json!({ "on": load.on.value, "force": total[..dimension], "rigid": rigid })
+        }
+    });
+    let spring = body.spring.iter().map(|spring| match &spring.kind {
+        SpringKind::Vector(fields) => json!({ "on": spring.on.value, "stiffness": vector(fields, dimension) }),
+        SpringKind::Normal(k) => json!({ "on": spring.on.value, "normal": field(k) }),
     });
     let order = match body.order {
         Order::P1 => 1,
@@ -90,6 +98,7 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
     map.insert("order".into(), json!(order));
     map.insert("fix".into(), fix.collect());
     map.insert("load".into(), load.collect());
+    map.insert("spring".into(), spring.collect());
     insert(&mut map, "force", body.force.as_ref().map(|force| vector(force, dimension)));
     map.into()
 }

@@ -85,6 +85,8 @@ pub struct BodySpec {
     pub fix: Vec<Support>,
     /// Loads on named groups.
     pub load: Vec<Load>,
+    /// Springs to the ground on named groups.
+    pub spring: Vec<SpringSpec>,
     /// Body force density (x, y, z), if any.
     pub force: Option<[Field; 3]>,
 }
@@ -95,7 +97,27 @@ pub struct Support {
     /// The physical group.
     pub on: Located<String>,
     /// Prescribed value of each component; `None` leaves it free.
-    pub value: [Option<f64>; 3],
+    pub value: [Option<Field>; 3],
+    /// Prescribed displacement along the outer normal of a plane surface.
+    pub normal: Option<Field>,
+}
+
+/// Springs to the ground on a named boundary (per area) or at points.
+#[derive(Debug, Clone)]
+pub struct SpringSpec {
+    /// The physical group.
+    pub on: Located<String>,
+    /// How stiff they are.
+    pub kind: SpringKind,
+}
+
+/// Kinds of springs; stiffnesses are >= 0.
+#[derive(Debug, Clone)]
+pub enum SpringKind {
+    /// Stiffness along x, y, z.
+    Vector([Field; 3]),
+    /// Stiffness along the normal of the surface.
+    Normal(Field),
 }
 
 /// A load on a named boundary.
@@ -114,6 +136,13 @@ pub enum LoadKind {
     Pressure(Field),
     /// Traction vector (x, y, z).
     Traction([Field; 3]),
+    /// Force on the whole boundary.
+    Force {
+        /// The force (x, y, z).
+        total: [f64; 3],
+        /// Whether the boundary moves as one, by a translation; else the force is spread evenly.
+        rigid: bool,
+    },
 }
 
 /// A pair of contact surfaces and the layer between them.

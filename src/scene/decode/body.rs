@@ -2,8 +2,9 @@
 
 use super::Decoder;
 use crate::error::{Error, Located, Result};
-use crate::scene::read::{Keys, Node};
-use crate::scene::{BodySpec, Load, LoadKind, Order, Support};
+use crate::scene::expression::Field;
+use crate::scene::read::{Keys, Node, Value};
+use crate::scene::{BodySpec, Load, LoadKind, Order, SpringKind, SpringSpec, Support};
 
 /// Names of components, for supports.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -40,7 +41,8 @@ impl Decoder<'_> {
     }
 
     fn body(&self, node: &Node) -> Result<BodySpec> {
-        let keys = Keys::open(node, "[[body]]", &["name", "young", "poisson", "order", "fix", "load", "force"])?;
+        let keys =
+            Keys::open(node, "[[body]]", &["name", "young", "poisson", "order", "fix", "load", "spring", "force"])?;
         let items = |key: &str| keys.get(key).map_or(Ok(&[][..]), Node::list);
         let young = keys.require("young")?;
         let poisson = keys.require("poisson")?;
@@ -51,46 +53,120 @@ impl Decoder<'_> {
             order: keys.get("order").map_or(Ok(Order::P1), order)?,
             fix: items("fix")?.iter().map(|item| self.support(item)).collect::<Result<_>>()?,
             load: items("load")?.iter().map(|item| self.load(item)).collect::<Result<_>>()?,
+            spring: items("spring")?.iter().map(|item| self.spring(item)).collect::<Result<_>>()?,
             force: keys.get("force").map(|force| self.vector(force)).transpose()?,
         })
     }
 
     fn support(&self, node: &Node) -> Result<Support> {
-        let keys = Keys::open(node, "a support", &["on", "x", "y", "z"])?;
+        let keys = Keys::open(node, "a support", &["on", "x", "y", "z", "normal", "symmetry"])?;
+        for axis in AXES {
+            keys.exclude(axis, "normal")?;
+            keys.exclude(axis, "symmetry")?;
+        }
+        keys.exclude("normal", "symmetry")?;
         let on = keys.require("on")?.name()?;
         if let (2, Some(entry)) = (self.dimension, keys.entry("z")) {
             return Err(Error::scene(&entry.key_place, "a support in `z` in a plane problem")
                 .label("there is no z")
                 .help("remove it, or set dimension = 3"));
         }
-        let mut value = [None; 3];
+        let mut value = [const { None }; 3];
         for (value, axis) in value.iter_mut().zip(AXES) {
-            *value = keys.get(axis).map(Node::number).transpose()?;
+            *value = keys.get(axis).map(|node| self.field(node)).transpose()?;
         }
-        if value.iter().all(Option::is_none) {
+        let normal = match keys.get("symmetry") {
+            Some(node) if node.boolean()? => Some(Field::Constant(0.0)),
+            Some(node) => return Err(node.refuse("`symmetry = false` holds nothing").help("remove this support")),
+            None => keys.get("normal").map(|node| self.field(node)).transpose()?,
+        };
+        if value.iter().all(Option::is_none) && normal.is_none() {
             let axes = &AXES[..self.dimension];
             return Err(node
                 .refuse(format!("the support on `{}` holds no component", on.value))
-                .help(format!("give the displacement in some of {}: x = 0", axes.join(", "))));
+                .help(format!("give the displacement in some of {}: x = 0; or symmetry = true", axes.join(", "))));
         }
-        Ok(Support { on, value })
+        Ok(Support { on, value, normal })
+    }
+
+    fn spring(&self, node: &Node) -> Result<SpringSpec> {
+        let keys = Keys::open(node, "a spring", &["on", "stiffness", "normal"])?;
+        let on = keys.require("on")?.name()?;
+        keys.exclude("stiffness", "normal")?;
+        let kind = match (keys.get("stiffness"), keys.get("normal")) {
+            (Some(node), _) if matches!(node.value, Value::List(_)) => {
+                let fields = self.vector(node)?;
+                if fields.iter().all(Field::is_zero) {
+                    return Err(node
+                        .refuse("the spring has no stiffness")
+                        .label("some component must be greater than 0"));
+                }
+                SpringKind::Vector(fields)
+            }
+            (Some(node), _) => {
+                let field = self.stiffness(node)?;
+                SpringKind::Vector([field.clone(), field.clone(), field])
+            }
+            (None, Some(node)) => SpringKind::Normal(self.stiffness(node)?),
+            (None, None) => {
+                return Err(node
+                    .refuse(format!("the spring on `{}` has no stiffness", on.value))
+                    .help("give stiffness = k, one for each component, or normal = k along the normal alone"));
+            }
+        };
+        Ok(SpringSpec { on, kind })
+    }
+
+    /// A number > 0, or an expression.
+    fn stiffness(&self, node: &Node) -> Result<Field> {
+        match self.field(node)? {
+            Field::Constant(value) if value <= 0.0 => {
+                Err(node.refuse(format!("the stiffness is {value}")).label("must be greater than 0"))
+            }
+            field => Ok(field),
+        }
     }
 
     fn load(&self, node: &Node) -> Result<Load> {
-        let keys = Keys::open(node, "a load", &["on", "pressure", "traction"])?;
+        let keys = Keys::open(node, "a load", &["on", "pressure", "traction", "force", "rigid"])?;
         let on = keys.require("on")?.name()?;
-        keys.exclude("pressure", "traction")?;
-        let kind = match (keys.get("pressure"), keys.get("traction")) {
-            (Some(pressure), _) => LoadKind::Pressure(self.field(pressure)?),
-            (_, Some(traction)) => LoadKind::Traction(self.vector(traction)?),
-            (None, None) => {
+        for (one, other) in [("pressure", "traction"), ("pressure", "force"), ("traction", "force")] {
+            keys.exclude(one, other)?;
+        }
+        let rigid = keys.get("rigid").map_or(Ok(false), Node::boolean)?;
+        if let (Some(entry), None) = (keys.entry("rigid"), keys.get("force")) {
+            return Err(Error::scene(&entry.key_place, "`rigid` without a force")
+                .help("a rigid surface moves as one under a total force: force = [0, -10], rigid = true"));
+        }
+        let kind = match (keys.get("pressure"), keys.get("traction"), keys.get("force")) {
+            (Some(pressure), ..) => LoadKind::Pressure(self.field(pressure)?),
+            (_, Some(traction), _) => LoadKind::Traction(self.vector(traction)?),
+            (.., Some(force)) => LoadKind::Force { total: self.numbers(force)?, rigid },
+            (None, None, None) => {
                 let components = &["tx", "ty", "tz"][..self.dimension];
-                return Err(node
-                    .refuse(format!("the load on `{}` has no component", on.value))
-                    .help(format!("give pressure = p or traction = [{}]", components.join(", "))));
+                let advice =
+                    format!("give pressure = p, traction = [{}], or a total force = [...]", components.join(", "));
+                return Err(node.refuse(format!("the load on `{}` has no component", on.value)).help(advice));
             }
         };
         Ok(Load { on, kind })
+    }
+}
+
+impl Decoder<'_> {
+    /// A vector of numbers.
+    fn numbers(&self, node: &Node) -> Result<[f64; 3]> {
+        let mut numbers = [0.0; 3];
+        for (number, field) in numbers.iter_mut().zip(self.vector(node)?) {
+            match field {
+                Field::Constant(value) => *number = value,
+                Field::Expression(expression) => {
+                    return Err(Error::scene(expression.place(), "a total force does not depend on the place")
+                        .help("give numbers, or a traction with expressions"));
+                }
+            }
+        }
+        Ok(numbers)
     }
 }
 

@@ -1,0 +1,51 @@
+//! Forces on every body, from the ranks that own them to the report.
+
+use super::run::Prepared;
+use crate::ddm::Outcome;
+use crate::discretize::Balance;
+use crate::output::{BalanceReport, ForceReport};
+use crate::scene::Scene;
+
+/// Numbers of a resultant.
+const WIDTH: usize = 6;
+
+/// The forces on every body in the result; collective.
+pub fn gather(scene: &Scene, prepared: &Prepared, outcome: &Outcome) -> Vec<BalanceReport> {
+    let model = &prepared.problem.model;
+    let mut reports = Vec::new();
+    for (index, info) in prepared.problem.bodies.iter().enumerate() {
+        let spec = &scene.bodies[index];
+        let mut names = vec!["loads".to_owned(), "contacts".to_owned()];
+        names.extend(spec.fix.iter().map(|support| support.on.value.clone()));
+        names.extend(spec.spring.iter().map(|spring| spring.on.value.clone()));
+        names.extend(info.rigid.iter().cloned());
+        let mut message = vec![0.0; WIDTH * names.len() + 2];
+        if let Some(body) = &model.bodies[index].local {
+            let state = body.recover(&outcome.iterate.states[index]);
+            let Balance { parts, size } = info.balance(&state, &model.at_rows(index, &outcome.layer.force));
+            let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
+            message.iter_mut().zip(numbers).for_each(|(place, number)| *place = number);
+        }
+        model.exchange.sum(&mut message);
+        let (numbers, size) = message.split_at(WIDTH * names.len());
+        let mut parts: Vec<ForceReport> = names
+            .into_iter()
+            .zip(numbers.chunks_exact(WIDTH))
+            .map(|(on, n)| ForceReport { on, force: [n[0], n[1], n[2]], moment: [n[3], n[4], n[5]] })
+            .collect();
+        let share = |pick: fn(&ForceReport) -> [f64; 3], size: f64| {
+            let sum = |c: usize| parts.iter().map(|part| pick(part)[c]).sum::<f64>();
+            let lacking = (0..3).map(|c| sum(c).powi(2)).sum::<f64>().sqrt();
+            if size > 0.0 { lacking / size } else { 0.0 }
+        };
+        let (force_imbalance, moment_imbalance) =
+            (share(|part| part.force, size[0]), share(|part| part.moment, size[1]));
+        let rigid = parts.split_off(2 + spec.fix.len() + spec.spring.len());
+        let springs = parts.split_off(2 + spec.fix.len());
+        let supports = parts.split_off(2);
+        let contacts = parts.pop().unwrap_or_default();
+        let loads = parts.pop().unwrap_or_default();
+        reports.push(BalanceReport { loads, contacts, supports, springs, rigid, force_imbalance, moment_imbalance });
+    }
+    reports
+}

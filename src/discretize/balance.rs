@@ -1,0 +1,129 @@
+//! Forces and moments on a body at the end: loads, contacts, supports, springs, rigid surfaces, and what their sum lacks.
+
+use super::supports::Held;
+use crate::contact::{add, cross, pad};
+use crate::fem::assemble::{self, NodalBlock, NodeGraph};
+use crate::fem::{Frame, Material, Space};
+use crate::linalg::Csr;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+/// A force and its moment about the origin (x, y, z).
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Resultant {
+    /// The force.
+    pub force: [f64; 3],
+    /// The moment.
+    pub moment: [f64; 3],
+}
+
+impl Resultant {
+    fn add(&mut self, x: [f64; 3], force: [f64; 3]) {
+        add(&mut self.force, force);
+        add(&mut self.moment, cross(x, force));
+    }
+}
+
+/// All that acts on a body from outside. In equilibrium everything together is zero.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Balance {
+    /// Loads, but for those on rigid surfaces; contacts; then each support, each spring, each rigid surface.
+    pub parts: Vec<Resultant>,
+    /// Sum of the sizes of all nodal forces, and of these times their distances from the origin: what the sum of all parts is
+    /// small against.
+    pub size: [f64; 2],
+}
+
+/// What it takes to find the forces on a body.
+pub struct Forces<const D: usize> {
+    /// Its space.
+    pub space: Rc<Space<D>>,
+    /// Its material.
+    pub material: Material,
+    /// Its supports and rigid surfaces.
+    pub held: Rc<Held<D>>,
+    /// Its springs.
+    pub springs: Vec<Vec<NodalBlock<D>>>,
+    /// Number of supports in the scene.
+    pub supports: usize,
+    /// Nodal forces of its loads.
+    pub load: Vec<f64>,
+    /// Its contact rows for nodal displacements.
+    pub rows: Csr,
+}
+
+impl<const D: usize> Forces<D> {
+    /// The balance at displacements of all nodes, under the forces omega p of the contact rows.
+    ///
+    /// Reactions are the internal forces of the cells around the held nodes less all that is known to act there.
+    pub fn balance(&self, u: &[f64], force: &[f64]) -> Balance {
+        let mut contact = vec![0.0; u.len()];
+        self.rows.add_transpose(-1.0, force, &mut contact);
+        let mut sum = Sum { size: [0.0; 2], space: &self.space };
+        let parts = vec![sum.of(&self.load), sum.of(&contact)];
+        let mut known: Vec<f64> = self.load.iter().zip(&contact).map(|(load, contact)| load + contact).collect();
+        let mut springs = Vec::new();
+        for blocks in &self.springs {
+            let mut pull = vec![0.0; u.len()];
+            for NodalBlock { nodes: [a, b], block } in blocks {
+                for (i, row) in block.iter().enumerate() {
+                    let at = D * *b as usize;
+                    pull[D * *a as usize + i] -= (0..D).map(|j| row[j] * u[at + j]).sum::<f64>();
+                }
+            }
+            springs.push(sum.of(&pull));
+            crate::linalg::axpy(1.0, &pull, &mut known);
+        }
+        let mut supports = vec![Resultant::default(); self.supports];
+        let mut rigid = vec![Resultant::default(); self.held.rigid.len()];
+        for (node, reaction) in self.reactions(u, &known) {
+            let x = pad(self.space.nodes[node as usize]);
+            sum.grow(x, pad(reaction));
+            match self.held.rigid.iter().position(|(_, nodes)| nodes.binary_search(&node).is_ok()) {
+                Some(surface) => rigid[surface].add(x, pad(reaction)),
+                None => {
+                    for (support, part) in self.held.split(node, reaction) {
+                        supports[support].add(x, pad(part));
+                    }
+                }
+            }
+        }
+        Balance { parts: [parts, supports, springs, rigid].concat(), size: sum.size }
+    }
+
+    /// What holds the nodes of supports and rigid surfaces.
+    fn reactions(&self, u: &[f64], known: &[f64]) -> BTreeMap<u32, [f64; D]> {
+        let mut held = vec![false; self.space.nodes.len()];
+        self.held.nodes().for_each(|node| held[node as usize] = true);
+        let around = self.space.around(&held);
+        let graph = NodeGraph::new(&around, &[], &Frame::default());
+        let Ok(stiffness) = assemble::stiffness(&around, &graph, &self.material) else { return BTreeMap::new() };
+        let force = |row: usize| stiffness.row(row).map(|(j, k)| k * u[j]).sum::<f64>() - known[row];
+        let at = |node: u32| (node, std::array::from_fn(|c| force(D * node as usize + c)));
+        self.held.nodes().map(at).collect()
+    }
+}
+
+/// Sums nodal forces.
+struct Sum<'a, const D: usize> {
+    size: [f64; 2],
+    space: &'a Space<D>,
+}
+
+impl<const D: usize> Sum<'_, D> {
+    fn of(&mut self, forces: &[f64]) -> Resultant {
+        let mut resultant = Resultant::default();
+        for (x, force) in self.space.nodes.iter().zip(forces.chunks_exact(D)) {
+            let force: [f64; 3] = std::array::from_fn(|c| force.get(c).copied().unwrap_or(0.0));
+            resultant.add(pad(*x), force);
+            self.grow(pad(*x), force);
+        }
+        resultant
+    }
+
+    fn grow(&mut self, x: [f64; 3], force: [f64; 3]) {
+        let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        self.size[0] += length(force);
+        self.size[1] += length(force) * length(x);
+    }
+}

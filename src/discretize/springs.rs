@@ -1,0 +1,69 @@
+//! Springs of a body to the ground: per area on surfaces, each at the points of point groups.
+
+use super::find::{find_group, not_on_body};
+use crate::contact::pad;
+use crate::error::{Error, Result};
+use crate::fem::assemble::NodalBlock;
+use crate::fem::{Space, surface};
+use crate::mesh::Mesh;
+use crate::scene::expression::Field;
+use crate::scene::{BodySpec, SpringKind, SpringSpec};
+use std::cell::RefCell;
+
+/// The stiffnesses between nodes that a spring of the scene adds to K.
+///
+/// # Errors
+/// Groups that are missing or not on the body, stiffnesses that are negative or not finite somewhere.
+pub fn blocks<const D: usize>(
+    spring: &SpringSpec,
+    spec: &BodySpec,
+    space: &Space<D>,
+    mesh: &Mesh<D>,
+) -> Result<Vec<NodalBlock<D>>> {
+    let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
+    let fault = RefCell::new(None);
+    let value = |field: &Field, x: [f64; D]| match stiffness(field, spring, pad(x)) {
+        Ok(value) => value,
+        Err(error) => {
+            fault.borrow_mut().get_or_insert(error);
+            0.0
+        }
+    };
+    let at = |x: [f64; D], n: [f64; D]| -> [[f64; D]; D] {
+        match &spring.kind {
+            SpringKind::Vector(fields) => {
+                std::array::from_fn(|i| std::array::from_fn(|j| if i == j { value(&fields[i], x) } else { 0.0 }))
+            }
+            SpringKind::Normal(field) => {
+                let k = value(field, x);
+                n.map(|a| n.map(|b| k * a * b))
+            }
+        }
+    };
+    let blocks = if group.dimension == 0 {
+        if matches!(spring.kind, SpringKind::Normal(_)) {
+            return Err(Error::scene(&spring.on.place, format!("points such as `{}` have no normal", spring.on.value))
+                .help("give stiffness = [kx, ky]"));
+        }
+        let node = |node: u32| NodalBlock { nodes: [node; 2], block: at(space.nodes[node as usize], [0.0; D]) };
+        space.nodes_on(group).into_iter().map(node).collect()
+    } else {
+        surface::foundation(space, &space.facets(group), &at)
+    };
+    match fault.into_inner() {
+        Some(error) => Err(error),
+        None if blocks.is_empty() => Err(not_on_body(&spring.on, &spec.name.value)),
+        None => Ok(blocks),
+    }
+}
+
+/// A stiffness at a point, which must be finite and not negative.
+fn stiffness(field: &Field, spring: &SpringSpec, x: [f64; 3]) -> Result<f64> {
+    match field.eval_finite("the stiffness of this spring", x)? {
+        k if k >= 0.0 => Ok(k),
+        k => {
+            let message = format!("the stiffness of the spring on `{}` is {k} at {}", spring.on.value, super::point(x));
+            Err(Error::scene(field.place().unwrap_or(&spring.on.place), message).label("must not be negative"))
+        }
+    }
+}

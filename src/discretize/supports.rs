@@ -1,0 +1,245 @@
+//! Supports of a body: conditions on its nodes, the axes in which they are prescribed dofs, and rigid surfaces.
+
+use super::find::{earlier, find_group, not_on_body, point};
+use crate::contact::pad;
+use crate::error::{Error, Place, Result};
+use crate::fem::{Facets, Frame, Space};
+use crate::mesh::{Group, Mesh};
+use crate::scene::{BodySpec, LoadKind};
+use nalgebra::{DMatrix, DVector};
+use std::collections::{BTreeMap, HashMap};
+
+/// One condition n.u = value at a node.
+#[derive(Debug, Clone, Copy)]
+struct Condition<const D: usize> {
+    direction: [f64; D],
+    value: f64,
+    /// Number of the support in the scene.
+    support: usize,
+}
+
+/// What the supports and rigid surfaces of a body come to.
+#[derive(Debug, Clone, Default)]
+pub struct Held<const D: usize> {
+    /// Coordinates in which conditions are prescribed dofs.
+    pub frame: Frame<D>,
+    /// Prescribed dofs and their values.
+    pub prescribed: HashMap<usize, f64>,
+    /// Independent directions held at each node (at the master of tied ones), with the number of their support.
+    directions: BTreeMap<u32, Vec<([f64; D], usize)>>,
+    /// Tied nodes of each rigid load, with its number.
+    pub rigid: Vec<(usize, Vec<u32>)>,
+}
+
+/// Directions whose sine is below this are the same.
+const PARALLEL: f64 = 1e-8;
+
+impl<const D: usize> Held<D> {
+    /// Collects the conditions of a body's supports on its nodes.
+    ///
+    /// # Errors
+    /// Groups that are missing or not on the body, values that are not finite, surfaces that are no planes, and supports or
+    /// rigid loads that contradict each other.
+    pub fn new(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<Self> {
+        let mut held = Held::default();
+        held.tie(spec, space, mesh)?;
+        let mut conditions: BTreeMap<u32, Vec<Condition<D>>> = BTreeMap::new();
+        for (support, fix) in spec.fix.iter().enumerate() {
+            let dimensions: Vec<usize> = if fix.normal.is_some() { vec![D - 1] } else { (0..=D).rev().collect() };
+            let group = find_group(mesh, &fix.on, &dimensions, "support")?;
+            let nodes = space.nodes_on(group);
+            if nodes.is_empty() {
+                return Err(not_on_body(&fix.on, &spec.name.value));
+            }
+            let components = fix.value[..D].iter().enumerate();
+            let mut held_here: Vec<_> = components.filter_map(|(c, field)| Some((unit(c), field.as_ref()?))).collect();
+            if let Some(field) = &fix.normal {
+                held_here.push((plane(space, group, &fix.on.value, &fix.on.place)?, field));
+            }
+            for node in nodes {
+                for &(direction, field) in &held_here {
+                    let value =
+                        field.eval_finite("the displacement of this support", pad(space.nodes[node as usize]))?;
+                    conditions.entry(held.frame.node(node)).or_default().push(Condition { direction, value, support });
+                }
+            }
+        }
+        for (node, conditions) in conditions {
+            held.hold(node, &conditions, spec, space)?;
+        }
+        held.refuse_pushed_supports(spec)?;
+        Ok(held)
+    }
+
+    /// Ties the nodes of rigid surfaces.
+    fn tie(&mut self, spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<()> {
+        let mut taken: BTreeMap<u32, usize> = BTreeMap::new();
+        for (index, load) in spec.load.iter().enumerate() {
+            if !matches!(load.kind, LoadKind::Force { rigid: true, .. }) {
+                continue;
+            }
+            let group = find_group(mesh, &load.on, &[D - 1], "load")?;
+            let nodes = space.nodes_on(group);
+            let Some(&master) = nodes.first() else {
+                return Err(not_on_body(&load.on, &spec.name.value));
+            };
+            for &node in &nodes {
+                if let Some(other) = taken.insert(node, index) {
+                    let other = &spec.load[other].on;
+                    let message = format!(
+                        "body `{}`: the rigid surfaces `{}` and `{}` meet",
+                        spec.name.value, other.value, load.on.value
+                    );
+                    return Err(Error::scene(&load.on.place, message)
+                        .because(earlier(other))
+                        .help("join the two surfaces in one physical group, with one force"));
+                }
+                if node != master {
+                    self.frame.master.insert(node, master);
+                    self.prescribed.extend((0..D).map(|c| (D * node as usize + c, 0.0)));
+                }
+            }
+            self.rigid.push((index, nodes));
+        }
+        Ok(())
+    }
+
+    /// Turns the conditions at a node into prescribed dofs, in axes of their own where they are inclined.
+    fn hold(&mut self, node: u32, conditions: &[Condition<D>], spec: &BodySpec, space: &Space<D>) -> Result<()> {
+        let mut basis: Vec<([f64; D], f64)> = Vec::new();
+        let kept = self.directions.entry(node).or_default();
+        for (position, condition) in conditions.iter().enumerate() {
+            let (mut rest, mut value) = (condition.direction, condition.value);
+            for (axis, known) in &basis {
+                let share = dot(&condition.direction, axis);
+                rest = std::array::from_fn(|c| rest[c] - share * axis[c]);
+                value -= share * known;
+            }
+            let size = dot(&rest, &rest).sqrt();
+            if size > PARALLEL {
+                let axis = rest.map(|r| r / size);
+                // an axis of space stays one to the last digit
+                let along = (0..D).find(|&c| axis[c].abs() > 1.0 - 1e-14);
+                basis.push(along.map_or((axis, value / size), |c| (unit(c), value / size * axis[c].signum())));
+                kept.push((condition.direction, condition.support));
+                continue;
+            }
+            let largest = conditions[..=position].iter().map(|other| other.value.abs()).fold(0.0, f64::max);
+            if value.abs() > 1e-12 * largest {
+                let earlier_one = conditions[..position].iter().rev().find(|other| other.support != condition.support);
+                return Err(contradiction(spec, condition, earlier_one, space.nodes[node as usize]));
+            }
+        }
+        let turned = basis.iter().any(|(axis, _)| !axis.iter().any(|a| *a == 1.0));
+        if turned {
+            let mut axes: Vec<[f64; D]> = basis.iter().map(|(axis, _)| *axis).collect();
+            for c in 0..D {
+                let rest = axes.iter().fold(unit(c), |rest: [f64; D], axis| {
+                    let share = dot(&rest, axis);
+                    std::array::from_fn(|i| rest[i] - share * axis[i])
+                });
+                let size = dot(&rest, &rest).sqrt();
+                // some axis of space is always this far from a smaller subspace
+                if axes.len() < D && size > 0.5 {
+                    axes.push(rest.map(|r| r / size));
+                }
+            }
+            self.frame.axes.insert(node, std::array::from_fn(|i| axes[i]));
+        }
+        for (i, (axis, value)) in basis.iter().enumerate() {
+            let component = if turned { i } else { (0..D).find(|&c| axis[c] == 1.0).unwrap_or(i) };
+            self.prescribed.insert(D * node as usize + component, *value);
+        }
+        Ok(())
+    }
+
+    /// A rigid force must not push along a direction that a support holds.
+    fn refuse_pushed_supports(&self, spec: &BodySpec) -> Result<()> {
+        for (index, nodes) in &self.rigid {
+            let load = &spec.load[*index];
+            let LoadKind::Force { total, .. } = &load.kind else { continue };
+            let force: [f64; D] = std::array::from_fn(|c| total[c]);
+            for (direction, support) in nodes.first().and_then(|node| self.directions.get(node)).into_iter().flatten() {
+                if dot(&force, direction).abs() > 1e-12 * dot(&force, &force).sqrt() {
+                    let on = &spec.fix[*support].on;
+                    let message = format!(
+                        "body `{}`: the rigid force on `{}` pushes against the support on `{}`",
+                        spec.name.value, load.on.value, on.value
+                    );
+                    return Err(Error::scene(&load.on.place, message).because(earlier(on)).help(
+                        "a rigid surface moves as one: let the support go, or set that component of the force to 0",
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A reaction at a node, split among the supports that hold it there: (support, force).
+    pub fn split(&self, node: u32, reaction: [f64; D]) -> Vec<(usize, [f64; D])> {
+        let Some(directions) = self.directions.get(&node).filter(|directions| !directions.is_empty()) else {
+            return Vec::new();
+        };
+        let n = DMatrix::from_fn(directions.len(), D, |i, c| directions[i].0[c]);
+        let right = &n * DVector::from_fn(D, |c, _| reaction[c]);
+        let Some(shares) = (&n * n.transpose()).lu().solve(&right) else { return Vec::new() };
+        let part =
+            |(i, (direction, support)): (usize, &([f64; D], usize))| (*support, direction.map(|d| d * shares[i]));
+        directions.iter().enumerate().map(part).collect()
+    }
+
+    /// Nodes at which supports act, and tied ones.
+    pub fn nodes(&self) -> impl Iterator<Item = u32> + '_ {
+        let tied = self.rigid.iter().flat_map(|(_, nodes)| nodes.iter().copied());
+        self.directions.keys().copied().chain(tied)
+    }
+
+    /// Number of prescribed dofs that are not those of tied nodes.
+    pub fn supported(&self) -> usize {
+        self.prescribed.len() - D * self.frame.master.len()
+    }
+}
+
+fn unit<const D: usize>(component: usize) -> [f64; D] {
+    std::array::from_fn(|c| if c == component { 1.0 } else { 0.0 })
+}
+
+fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|c| a[c] * b[c]).sum()
+}
+
+/// The outer unit normal of a plane surface.
+fn plane<const D: usize>(space: &Space<D>, group: &Group, name: &str, place: &Place) -> Result<[f64; D]> {
+    let facets: Facets<D> = space.facets(group);
+    let normals = facets.normals(space);
+    let sum = normals.iter().fold([0.0; D], |sum: [f64; D], n| std::array::from_fn(|c| sum[c] + n[c]));
+    let size = dot(&sum, &sum).sqrt();
+    let mean = sum.map(|s| s / size);
+    let bent = |n: &[f64; D]| (0..D).map(|c| (n[c] - mean[c]).powi(2)).sum::<f64>().sqrt() > 1e-6;
+    if !size.is_normal() || normals.iter().any(bent) {
+        return Err(Error::scene(place, format!("`{name}` is no plane, so it has no one normal to hold"))
+            .help("give each plane a physical group and a support of its own, or hold components: x = 0"));
+    }
+    Ok(mean)
+}
+
+fn contradiction<const D: usize>(
+    spec: &BodySpec,
+    condition: &Condition<D>,
+    other: Option<&Condition<D>>,
+    x: [f64; D],
+) -> Error {
+    let on = &spec.fix[condition.support].on;
+    let what = match (0..D).find(|&c| condition.direction[c] == 1.0) {
+        Some(c) => format!("the {} displacement", ["x", "y", "z"][c]),
+        None => format!("the displacement along {}", point(pad(condition.direction))),
+    };
+    let message = format!("body `{}`: supports prescribe two values of {what} at {}", spec.name.value, point(pad(x)));
+    let error = Error::scene(&on.place, message)
+        .label("this one and an earlier one")
+        .help("make both values equal, or let the surfaces not meet");
+    match other {
+        Some(other) => error.because(earlier(&spec.fix[other.support].on)),
+        None => error,
+    }
+}

@@ -1,0 +1,153 @@
+//! The coordinates in which a body is solved: u = T v.
+//!
+//! A support along an inclined direction turns the axes of its nodes, so that it prescribes one component there. A rigid
+//! surface ties its nodes to one of them, the master, which stands for all. In v every support is a prescribed dof, and blocks
+//! of K keep their size.
+
+use crate::linalg::Csr;
+use std::collections::BTreeMap;
+
+/// The map from dofs v to nodal displacements u, and the transposed one for forces. Everything that is not named is the same
+/// in both.
+#[derive(Debug, Clone, Default)]
+pub struct Frame<const D: usize> {
+    /// Orthonormal axes of turned nodes: v_i = axis_i . u.
+    pub axes: BTreeMap<u32, [[f64; D]; D]>,
+    /// Master of each tied node: u = v + v_master, and v = 0 is to be prescribed.
+    pub master: BTreeMap<u32, u32>,
+}
+
+impl<const D: usize> Frame<D> {
+    /// The node whose dofs move a node.
+    pub fn node(&self, node: u32) -> u32 {
+        self.master.get(&node).copied().unwrap_or(node)
+    }
+
+    /// A force at a node as a force at dofs: their node, and its components. The same for a row of B.
+    pub fn force(&self, node: u32, force: [f64; D]) -> (u32, [f64; D]) {
+        let node = self.node(node);
+        (node, self.turned(node, force))
+    }
+
+    /// Components of a vector along the axes of a node.
+    fn turned(&self, node: u32, vector: [f64; D]) -> [f64; D] {
+        match self.axes.get(&node) {
+            None => vector,
+            Some(axes) => axes.map(|axis| (0..D).map(|c| axis[c] * vector[c]).sum()),
+        }
+    }
+
+    /// Nodal forces as forces at dofs, T'f: those of tied nodes go to their master.
+    pub fn forces(&self, f: &mut [f64]) {
+        for (&node, &master) in &self.master {
+            for c in 0..D {
+                f[D * master as usize + c] += std::mem::take(&mut f[D * node as usize + c]);
+            }
+        }
+        self.turn(f);
+    }
+
+    /// Dofs of nodal displacements, v = T^-1 u.
+    pub fn dofs(&self, u: &[f64]) -> Vec<f64> {
+        let mut v = u.to_vec();
+        for (&node, &master) in &self.master {
+            for c in 0..D {
+                v[D * node as usize + c] -= u[D * master as usize + c];
+            }
+        }
+        self.turn(&mut v);
+        v
+    }
+
+    /// Nodal displacements of dofs, u = T v.
+    pub fn displacements(&self, v: &[f64]) -> Vec<f64> {
+        let mut u = v.to_vec();
+        for (&node, axes) in &self.axes {
+            for c in 0..D {
+                u[D * node as usize + c] = (0..D).map(|i| axes[i][c] * v[D * node as usize + i]).sum();
+            }
+        }
+        for (&node, &master) in &self.master {
+            for c in 0..D {
+                u[D * node as usize + c] += u[D * master as usize + c];
+            }
+        }
+        u
+    }
+
+    fn turn(&self, values: &mut [f64]) {
+        for &node in self.axes.keys() {
+            let at = D * node as usize;
+            let turned = self.turned(node, std::array::from_fn(|c| values[at + c]));
+            values[at..at + D].copy_from_slice(&turned);
+        }
+    }
+
+    /// Turns rows and columns of a symmetric matrix of D x D blocks in place. (Ties are a matter of its pattern.)
+    pub fn turn_matrix(&self, k: &mut Csr) {
+        for &node in self.axes.keys() {
+            let first = D * node as usize;
+            let rows: [_; D] = std::array::from_fn(|c| k.range(first + c).start);
+            for entry in 0..k.range(first).len() {
+                let column = self.turned(node, rows.map(|row| k.values[row + entry]));
+                rows.iter().zip(column).for_each(|(row, value)| k.values[row + entry] = value);
+            }
+            let neighbours: Vec<usize> = k.row(first).map(|(j, _)| j).collect();
+            for row in neighbours {
+                let Some(at) = k.position(row, first) else { continue };
+                let turned = self.turned(node, std::array::from_fn(|c| k.values[at + c]));
+                k.values[at..at + D].copy_from_slice(&turned);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::dot;
+
+    #[test]
+    fn forces_do_the_same_work_in_both_coordinates() {
+        let (s, c) = (0.6, 0.8);
+        let frame = Frame::<2> {
+            axes: BTreeMap::from([(1, [[c, s], [-s, c]]), (2, [[s, c], [c, -s]])]),
+            master: BTreeMap::from([(0, 2), (3, 2)]),
+        };
+        let v = [0.0, 0.0, 0.3, -0.7, 1.1, 0.4, 0.0, 0.0, 5.0, 6.0];
+        let u = frame.displacements(&v);
+        assert_eq!(u[0..2], u[4..6]);
+        assert!((u[2] - (c * 0.3 + s * 0.7)).abs() < 1e-15 && u[8..] == v[8..]);
+        let back = frame.dofs(&u);
+        assert!(back.iter().zip(&v).all(|(a, b)| (a - b).abs() < 1e-15), "{back:?}");
+        let mut f = [1.0, 2.0, 3.0, -4.0, 5.0, 6.0, -7.0, 8.0, 9.0, 1.0];
+        let work = dot(&f, &u);
+        frame.forces(&mut f);
+        assert!((dot(&f, &v) - work).abs() < 1e-13);
+        assert_eq!(frame.force(3, [0.0, 5.0]), (2, [4.0, -3.0]));
+    }
+
+    #[test]
+    fn a_turned_matrix_is_the_same_form() {
+        let frame = Frame::<2> { axes: BTreeMap::from([(1, [[0.8, 0.6], [-0.6, 0.8]])]), master: BTreeMap::new() };
+        // nodes 0 - 1 - 2, symmetric blocks
+        let dense = |i: usize, j: usize| {
+            let (i, j) = (i.min(j), i.max(j));
+            if j / 2 - i / 2 > 1 { 0.0 } else { 1.0 + i as f64 + 0.3 * (j * j) as f64 }
+        };
+        let mut k = Csr::new(6);
+        for i in 0..6 {
+            k.push_row((0..6).map(|j| (j, dense(i, j))));
+        }
+        let quadratic = |k: &Csr, u: &[f64]| {
+            let mut ku = [0.0; 6];
+            k.multiply(u, &mut ku);
+            dot(u, &ku)
+        };
+        let v = [0.1, -0.2, 0.3, 0.5, 0.7, -1.1];
+        let before = quadratic(&k, &frame.displacements(&v));
+        frame.turn_matrix(&mut k);
+        assert!((quadratic(&k, &v) - before).abs() < 1e-13 * before.abs());
+        assert!((0..6).all(|i| k.row(i).all(|(j, a)| (a - k.values[k.position(j, i).unwrap()]).abs() < 1e-14)));
+    }
+}

@@ -1,0 +1,69 @@
+//! Integrals over surfaces: loads, foundations, areas.
+
+use super::assemble::{NodalBlock, interpolate};
+use super::space::{Facets, Space, area_vector};
+use super::{element, quadrature};
+use crate::scene::Order;
+
+/// Adds a surface load to `load`; `traction(x, n)` is force per area at a point with outer unit normal n.
+pub fn surface_load<const D: usize>(
+    space: &Space<D>,
+    facets: &Facets<D>,
+    traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
+    load: &mut [f64],
+) {
+    on_facets(space, facets, &mut |nodes, phi, weight, x, normal| {
+        let force = traction(x, normal);
+        for (a, &node) in nodes.iter().enumerate() {
+            for c in 0..D {
+                load[D * node as usize + c] += weight * phi[a] * force[c];
+            }
+        }
+    });
+}
+
+/// Visits the integration points of a surface: nodes of the facet, their shape functions, weight, place, outer unit normal.
+fn on_facets<const D: usize>(
+    space: &Space<D>,
+    facets: &Facets<D>,
+    visit: &mut dyn FnMut(&[u32], &[f64], f64, [f64; D], [f64; D]),
+) {
+    let rule = quadrature::simplex::<D>(if space.order == Order::P1 { 3 } else { 5 });
+    for index in 0..facets.count() {
+        let x = facets.coordinates(index, space);
+        for (l, weight) in rule.points.iter().zip(&rule.weights) {
+            let area = area_vector(space.order, &x, l);
+            let measure = area.iter().map(|a| a * a).sum::<f64>().sqrt();
+            let normal = area.map(|a| a / measure);
+            let phi = element::values(space.order, l);
+            visit(facets.facet(index), &phi, weight * measure, interpolate(&x, &phi), normal);
+        }
+    }
+}
+
+/// Springs per area on a surface, a foundation: `stiffness(x, n)` is traction per displacement at a point with outer unit
+/// normal n.
+pub fn foundation<const D: usize>(
+    space: &Space<D>,
+    facets: &Facets<D>,
+    stiffness: &dyn Fn([f64; D], [f64; D]) -> [[f64; D]; D],
+) -> Vec<NodalBlock<D>> {
+    let mut blocks = Vec::new();
+    on_facets(space, facets, &mut |nodes, phi, weight, x, normal| {
+        let density = stiffness(x, normal);
+        for (a, &first) in nodes.iter().enumerate() {
+            for (b, &second) in nodes.iter().enumerate() {
+                let block = density.map(|row| row.map(|value| weight * phi[a] * phi[b] * value));
+                blocks.push(NodalBlock { nodes: [first, second], block });
+            }
+        }
+    });
+    blocks
+}
+
+/// Length (area) of a surface.
+pub fn measure<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
+    let mut sum = 0.0;
+    on_facets(space, facets, &mut |_, _, weight, _, _| sum += weight);
+    sum
+}

@@ -1,0 +1,195 @@
+//! Supports, springs and forces of every kind, and what the report says of them.
+
+mod common;
+
+use common::{Run, Scene, case, distance, root, solve, text_of};
+use std::f64::consts::PI;
+
+/// Solves the patch to rounding with further settings.
+fn patch(sets: &[&str]) -> Run {
+    let all = [&["method={stop={residual=1e-12}}", "mesh.set={nl=2,nu=3}"], sets].concat();
+    solve(case("patch"), &all.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+}
+
+/// Every value of a column is this one.
+fn uniform(run: &Run, column: &str, value: f64) {
+    for found in &run.contact()[column] {
+        assert!((found / value - 1.0).abs() < 1e-9, "{column}: {found}, not {value}");
+    }
+}
+
+/// The force that a support, spring or rigid surface of a body gives, by list and number.
+fn force(run: &Run, body: usize, list: &str, index: usize) -> [f64; 2] {
+    [0, 1].map(|c| run.number(&format!("bodies/{body}/balance/{list}/{index}/force/{c}")))
+}
+
+fn near(found: [f64; 2], expected: [f64; 2]) {
+    let size = expected[0].hypot(expected[1]);
+    assert!((0..2).all(|c| (found[c] - expected[c]).abs() < 1e-9 * size), "{found:?}, not {expected:?}");
+}
+
+/// Forces and moments on every body cancel, and each pair's are opposite.
+fn balanced(run: &Run, tolerance: f64) {
+    for body in 0..run.report["bodies"].as_array().expect("bodies").len() {
+        for kind in ["force", "moment"] {
+            let imbalance = run.number(&format!("bodies/{body}/balance/{kind}_imbalance"));
+            assert!(imbalance < tolerance, "body {body}, {kind}: {imbalance:e}\n{}", run.said());
+        }
+    }
+    for kind in ["force", "moment"] {
+        for c in 0..3 {
+            let [a, b] = [0, 1].map(|side| run.number(&format!("pairs/0/{kind}/{side}/{c}")));
+            assert!((a + b).abs() <= 1e-12 * (1.0 + a.abs()), "{kind} {c}: {a} {b}");
+        }
+    }
+}
+
+const SHORTENING: f64 = 10.0 * (1.0 - 0.09) / 2.1e5;
+
+#[test]
+fn a_foundation_under_the_patch() {
+    // springs along the normal of the face let it widen: it sinks by q/k as a whole
+    for layer in ["{on=\"lower_face\",normal=1e6}", "{on=\"lower_face\",stiffness=[0,\"1e6 + 0*x\"]}"] {
+        let run = patch(&["body.0.fix=[{on=\"lower_pin\",x=0}]", &format!("body.0.spring=[{layer}]")]);
+        uniform(&run, "pressure", 10.0);
+        uniform(&run, "u_n_lower", -SHORTENING - 10.0 / 1e6);
+        near(force(&run, 0, "springs", 0), [0.0, 10.0]);
+        balanced(&run, 1e-11);
+        assert!(run.warnings().is_empty(), "{}", run.warnings());
+    }
+}
+
+#[test]
+fn a_spring_at_a_point_holds_like_a_support() {
+    let run = patch(&["body.0.fix=[{on=\"lower_face\",y=0}]", "body.0.spring=[{on=\"lower_pin\",stiffness=[1e3,0]}]"]);
+    uniform(&run, "pressure", 10.0);
+    assert!(run.warnings().is_empty(), "nothing slides: {}", run.warnings());
+    // under a sideways load it is what holds: k u = 2
+    let run = patch(&[
+        "body.0.fix=[{on=\"lower_face\",y=0}]",
+        "body.0.spring=[{on=\"lower_pin\",stiffness=1e3}]",
+        "body.0.load=[{on=\"lower_face\",force=[2,0]}]",
+    ]);
+    near(force(&run, 0, "springs", 0), [-2.0, 0.0]);
+    near(force(&run, 0, "supports", 0), [0.0, 10.0]);
+    balanced(&run, 1e-11);
+}
+
+#[test]
+fn a_displacement_that_varies() {
+    // the lower face is turned by 1e-5: everything turns with it, and the pressure stays
+    let run = patch(&["body.0.fix=[{on=\"lower_face\",y=\"1e-5*x\"},{on=\"lower_pin\",x=0}]"]);
+    uniform(&run, "pressure", 10.0);
+    let table = run.contact();
+    for (x, u) in table["x"].iter().zip(&table["u_n_lower"]) {
+        assert!((u - (1e-5 * x - SHORTENING)).abs() < 1e-13, "{u} at {x}");
+    }
+    near(force(&run, 0, "supports", 0), [0.0, 10.0]);
+    balanced(&run, 1e-11);
+}
+
+#[test]
+fn total_forces() {
+    let spread = patch(&["body.1.load=[{on=\"upper_face\",force=[0,-10]}]"]);
+    uniform(&spread, "pressure", 10.0);
+    balanced(&spread, 1e-11);
+    // a gap that is not uniform would turn the block: a rigid face only sinks
+    let gap = "contact.0.gap=2e-5*x^2";
+    for (surface, order) in [("upper_face", 1), ("upper_face", 2), ("upper_bottom", 1)] {
+        let load = format!("body.1.load=[{{on=\"{surface}\",force=[0,-10],rigid=true}}]");
+        let run = patch(&[gap, &load, &format!("body.1.order={order}")]);
+        let total: f64 = run.number("pairs/0/force/1/1");
+        assert!((total - 10.0).abs() < 1e-9, "{surface}: {total}");
+        near(force(&run, 1, "rigid", 0), [0.0, -10.0]);
+        balanced(&run, 1e-11);
+        let table = run.contact();
+        let (low, high) =
+            table["pressure"].iter().fold((f64::MAX, 0.0f64), |(low, high), &p| (low.min(p), high.max(p)));
+        assert!(high - low > 1.0, "the gap makes no difference: {low} to {high}");
+        if surface == "upper_bottom" {
+            let u = &table["u_n_upper"];
+            assert!(u.iter().all(|value| (value - u[0]).abs() < 1e-12 * u[0].abs()), "not flat: {u:?}");
+        }
+    }
+}
+
+/// Reactions of `groove-held`, known from statics: the roller carries the whole load, 10 on a length of 4.
+#[test]
+fn reactions() {
+    for order in [1, 2] {
+        let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
+        let sets = ["mesh.set.n=8", "method={stop={residual=1e-11}}", &orders[0], &orders[1]];
+        let run =
+            solve(case("groove-held"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged();
+        balanced(&run, 1e-9);
+        let roller = force(&run, 0, "supports", 1);
+        assert!((roller[1] - 40.0).abs() < 1e-6 && roller[0] == 0.0, "{roller:?}");
+        // nothing pushes sideways, but the axis holds a moment
+        let axis = force(&run, 0, "supports", 0);
+        assert!(axis[0].abs() < 1e-6 && axis[1] == 0.0, "{axis:?}");
+        assert!(run.number("bodies/0/balance/supports/0/moment/2").abs() > 1e-2);
+    }
+}
+
+/// The groove turned by 30 degrees, its supports as planes of symmetry: the same pressures.
+#[test]
+fn planes_of_symmetry_at_any_angle() {
+    let folder = tempfile::TempDir::new().expect("a temporary folder");
+    let script = std::fs::read_to_string(root().join("meshes/groove/groove.geo")).expect("the script");
+    let turn = "Geometry.AutoCoherence = 0;\nRotate {{0, 0, 1}, {0, 0, 0}, Pi/6} { Surface{1, 2}; }\n";
+    std::fs::write(folder.path().join("groove.geo"), script + "\n" + turn).expect("a script");
+    let text = std::fs::read_to_string(case("groove-held")).expect("the scene");
+    let along = "(x*cos(pi/6) + y*sin(pi/6) - 4)";
+    let text = text.replace("../groove/groove.geo", "groove.geo").replace("(x - 4)", along);
+    let planes = text.replace("x = 0 }", "symmetry = true }").replace("y = 0 }", "normal = 0 }");
+    assert_eq!((planes.matches("symmetry = true").count(), planes.matches("normal = 0").count()), (2, 1));
+    let scene = folder.path().join("scene.toml");
+    std::fs::write(&scene, planes).expect("a scene");
+    for (order, solver) in [(1, "mumps"), (2, "mumps"), (1, "hypre")] {
+        let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
+        let solver = format!("solver={solver}");
+        let sets = ["mesh.set.n=8", "method={stop={residual=1e-12}}", &orders[0], &orders[1], &solver];
+        let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+        let [turned, aligned] = [scene.clone(), case("groove-held")].map(|scene| solve(scene, &args));
+        let apart = distance(&turned.contact()["pressure"], &aligned.contact()["pressure"]);
+        assert!(apart < 1e-10, "P{order} {solver}: {apart:e}\n{}", turned.said());
+        balanced(&turned, 1e-9);
+        let [ours, theirs] = [&turned, &aligned].map(|run| force(run, 0, "supports", 1));
+        let (s, c) = (PI / 6.0).sin_cos();
+        near(ours, [c * theirs[0] - s * theirs[1], s * theirs[0] + c * theirs[1]]);
+    }
+}
+
+/// Wrong supports and loads are refused at their line, with the one that they contradict.
+#[test]
+fn refusals() {
+    let refused = |from: &str, to: &str, at: &str, words: &[&str]| {
+        let scene = Scene::edited("groove-held", from, to);
+        let run = solve(&scene, &[]);
+        assert_eq!(run.code, 3, "{}", run.said());
+        let place = format!("{}:{}:", scene.path.display(), scene.line_of(at));
+        for word in words.iter().copied().chain([&place[..]]) {
+            assert!(run.stderr.contains(word), "no `{word}`\n{}", run.said());
+        }
+    };
+    assert!(text_of("groove-held").contains("groove.geo"));
+    let fix = "fix = [{ on = \"lower_axis\", x = 0 }, { on = \"lower_face\", y = 0 }]";
+    let fixed = |rest: &str| format!("fix = [{{ on = \"lower_axis\", x = 0 }}, {rest}]");
+    let twice = fixed("{ on = \"lower_face\", y = 0 },\n  { on = \"lower_end\", y = 1 }");
+    refused(fix, &twice, "lower_end", &["two values of the y displacement", "is on `lower_face`, line 12"]);
+    let twice = fixed("{ on = \"lower_face\", normal = 0 },\n  { on = \"lower_face\", y = \"1e-3*x\" }");
+    refused(fix, &twice, "1e-3*x", &["two values of the y displacement", "is on `lower_face`, line 12"]);
+    let root = fixed("{ on = \"lower_face\", y = \"sqrt(x - 1)\" }");
+    refused(fix, &root, "sqrt", &["the displacement of this support is not a finite number at x = 0"]);
+    refused(fix, &fixed("{ on = \"lower\", symmetry = true }"), "symmetry", &["no curve `lower`", "is a region"]);
+    let load = "load = [{ on = \"upper_face\", pressure = 10 }]";
+    let pushed = "load = [{ on = \"upper_face\", force = [1, -40], rigid = true }]";
+    refused(load, pushed, "rigid", &["on `upper_face` pushes against the support on `upper_axis`", "line 19"]);
+    let two = "load = [{ on = \"upper_face\", force = [0, -40], rigid = true },\n  { on = \"upper_end\", force = [0, 0], rigid = true }]";
+    refused(load, two, "upper_end\", f", &["the rigid surfaces `upper_face` and `upper_end` meet", "line 20"]);
+    let spring = |text: &str| format!("{load}\nspring = [{text}]");
+    let away = spring("{ on = \"lower_face\", normal = 1 }");
+    refused(load, &away, "normal = 1", &["`lower_face` does not touch body `upper`"]);
+    let negative = spring("{ on = \"upper_end\", stiffness = [1, \"x - 1\"] }");
+    refused(load, &negative, "x - 1\"", &["the spring on `upper_end` is -", "must not be negative"]);
+}
