@@ -21,10 +21,15 @@ pub fn gather(scene: &Scene, prepared: &Prepared, outcome: &Outcome) -> Vec<Bala
         names.extend(info.rigid.iter().cloned());
         let mut message = vec![0.0; WIDTH * names.len() + 2];
         if let Some(body) = &model.bodies[index].local {
-            let state = body.recover(&outcome.iterate.states[index]);
-            let Balance { parts, size } = info.balance(&state, &model.at_rows(index, &outcome.layer.force));
-            let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
-            message.iter_mut().zip(numbers).for_each(|(place, number)| *place = number);
+            // a solver that fails here leaves the forces unknown; the run itself is over
+            match body.recover(&outcome.iterate.states[index]) {
+                Err(_) => message.fill(f64::NAN),
+                Ok(state) => {
+                    let Balance { parts, size } = info.balance(&state, &model.at_rows(index, &outcome.layer.force));
+                    let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
+                    message.iter_mut().zip(numbers).for_each(|(place, number)| *place = number);
+                }
+            }
         }
         model.exchange.sum(&mut message);
         let (numbers, size) = message.split_at(WIDTH * names.len());
