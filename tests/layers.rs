@@ -72,3 +72,25 @@ fn starts_beyond_the_range_of_numbers() {
         }
     }
 }
+
+/// `meshes/coating`: a punch pressed by 50 into a coating that thins out, on a foundation.
+#[test]
+fn coating() {
+    let run = solve(case("coating"), &[]).converged();
+    // statics: the layer and the foundation carry the force on the punch
+    assert!((run.number("pairs/0/force/1/1") - 50.0).abs() < 1e-6, "{}", run.said());
+    assert!((run.number("bodies/0/balance/springs/0/force/1") - 50.0).abs() < 1e-6);
+    for body in 0..2 {
+        for kind in ["force", "moment"] {
+            assert!(run.number(&format!("bodies/{body}/balance/{kind}_imbalance")) < 1e-9, "{}", run.said());
+        }
+    }
+    let table = run.contact();
+    for q in 0..table.rows() {
+        let (x, c) = (table["x"][q], table["compression"][q]);
+        let law = if c > 0.0 { 1e3 * c / (1e-3 * (1.0 - x / 2.0) - c) } else { 0.0 };
+        assert!((table["pressure"][q] - law).abs() <= 1e-10 * law, "at {x}: {}, not {law}", table["pressure"][q]);
+    }
+    // the coating is used up to a third at most, far from the end of its law
+    assert!(table["compression"].iter().all(|&c| c < 2e-4));
+}

@@ -193,3 +193,55 @@ fn refusals() {
     let negative = spring("{ on = \"upper_end\", stiffness = [1, \"x - 1\"] }");
     refused(load, &negative, "x - 1\"", &["the spring on `upper_end` is -", "must not be negative"]);
 }
+
+/// Cubes in space turned about a skew axis, on planes of symmetry that meet in edges and corners, under a rigid force: the
+/// patch is exact.
+#[test]
+fn planes_of_symmetry_in_space() {
+    let folder = tempfile::TempDir::new().expect("a temporary folder");
+    // OpenCASCADE numbers the faces x0 x1 y0 y1 z0 z1 of the turned boxes from 13 and 19 on
+    let names = ["x", "", "y", "", "bottom", "top"];
+    let faces = ["lower", "upper"].iter().zip([13, 19]).flat_map(|(body, first)| {
+        let named = names.iter().zip(first..).filter(|(name, _)| !name.is_empty());
+        named.map(move |(name, face)| format!("Physical Surface(\"{body}_{name}\") = {{{face}}};\n"))
+    });
+    let script = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\nBox(2) = {0, 0, 1, 1, 1, 1};\n\
+                  Rotate {{1, 2, 0.5}, {0, 0, 0}, 0.7} { Volume{1, 2}; }\n\
+                  MeshSize {PointsOf {Volume{1};}} = 0.5;\nMeshSize {PointsOf {Volume{2};}} = 0.35;\n\
+                  Physical Volume(\"lower\") = {1};\nPhysical Volume(\"upper\") = {2};\n";
+    std::fs::write(folder.path().join("patch.geo"), script.to_owned() + &faces.collect::<String>()).expect("a script");
+    let body = |name: &str, rest: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nyoung = 2.1e5\npoisson = 0.3\n{rest}\nfix = [{{ on = \"{name}_x\", symmetry = true }}, \
+             {{ on = \"{name}_y\", symmetry = true }}"
+        )
+    };
+    // the direction of the force is that of the turned z axis, by Rodrigues' formula
+    let axis = [1.0, 2.0, 0.5].map(|a: f64| a / 5.25f64.sqrt());
+    let (s, c) = 0.7f64.sin_cos();
+    let z = [
+        axis[0] * axis[2] * (1.0 - c) + axis[1] * s,
+        axis[1] * axis[2] * (1.0 - c) - axis[0] * s,
+        axis[2] * axis[2] * (1.0 - c) + c,
+    ];
+    let force = z.map(|z| (-10.0 * z).to_string()).join(", ");
+    let lower = body("lower", "") + ", { on = \"lower_bottom\", normal = 0 }]\n";
+    for rigid in [true, false] {
+        let load = format!("load = [{{ on = \"upper_top\", force = [{force}], rigid = {rigid} }}]");
+        let text = format!(
+            "dimension = 3\nmesh = \"patch.geo\"\n{lower}{}]\n[[contact]]\n\
+             between = [\"lower_top\", \"upper_bottom\"]\nlayer = {{ linear = {{ stiffness = 1e5 }} }}\n\
+             [method]\nstop = {{ residual = 1e-11 }}\n",
+            body("upper", &load)
+        );
+        let scene = folder.path().join("scene.toml");
+        std::fs::write(&scene, text).expect("a scene");
+        // a rigid top does not widen: only the force is exact then
+        let run = solve(&scene, if rigid { &["--set", "body.1.poisson=0"] } else { &[] }).converged();
+        uniform(&run, "pressure", 10.0);
+        uniform(&run, "u_n_lower", -10.0 / 2.1e5);
+        balanced(&run, 1e-10);
+        let reaction = [0, 1, 2].map(|c| run.number(&format!("bodies/0/balance/supports/2/force/{c}")));
+        assert!((0..3).all(|c| (reaction[c] - 10.0 * z[c]).abs() < 1e-8), "{reaction:?}, {z:?}");
+    }
+}
