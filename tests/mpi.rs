@@ -40,7 +40,7 @@ fn two_ranks_report_what_one_reports() {
     let serial = solve(case("groove"), &[]).converged();
     let parallel = solve_on(2, case("groove"), &[]).converged();
     assert_eq!((serial.count("ranks"), parallel.count("ranks")), (1, 2));
-    let differ = ["ranks", "messages", "times", "bodies"];
+    let differ = ["ranks", "messages", "times", "inner_times", "bodies"];
     let (ours, theirs) = (serial.report.as_object(), parallel.report.as_object());
     let (ours, theirs) = (ours.expect("a table"), theirs.expect("a table"));
     assert!(ours.keys().eq(theirs.keys()));
@@ -50,6 +50,10 @@ fn two_ranks_report_what_one_reports() {
     let ranks = |run: &common::Run| [run.count("bodies/0/rank"), run.count("bodies/1/rank")];
     assert_eq!(ranks(&serial), [0, 0]);
     assert_eq!(ranks(&parallel), [0, 1]);
+    for body in ["/bodies/0/balance", "/bodies/1/balance"] {
+        assert!(serial.report.pointer(body).is_some());
+        assert_eq!(serial.report.pointer(body), parallel.report.pointer(body));
+    }
     // a body of another rank has a solver, too
     assert_eq!(parallel.solvers(), serial.solvers());
 }
