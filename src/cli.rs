@@ -61,16 +61,20 @@ struct SceneArgs {
     /// Method: auto, robin, ncg, anderson, newton-robin or newton (short for --set method.name=NAME)
     #[arg(long, value_name = "NAME")]
     method: Option<String>,
+    /// Estimate the error of the discretisation (short for --set estimate=true)
+    #[arg(long)]
+    estimate: bool,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
 }
 
 impl SceneArgs {
-    /// All overrides, the method's last.
+    /// All overrides, those with names of their own last.
     fn overrides(&self) -> Vec<String> {
         let method = self.method.iter().map(|name| format!("method.name={name}"));
-        self.overrides.iter().cloned().chain(method).collect()
+        let estimate = self.estimate.then(|| "estimate=true".to_owned());
+        self.overrides.iter().cloned().chain(method).chain(estimate).collect()
     }
 }
 
@@ -79,7 +83,8 @@ pub fn run(words: Vec<String>) -> i32 {
     let mut words = words.into_iter();
     let name = words.next().unwrap_or_else(|| "winkler".to_owned());
     let (program, petsc) = options::split(words);
-    if let Some(flag) = ["-set", "-json", "-method", "-over"].iter().find(|flag| petsc.iter().any(|word| word == *flag))
+    if let Some(flag) =
+        ["-set", "-json", "-method", "-estimate", "-over"].iter().find(|flag| petsc.iter().any(|word| word == *flag))
     {
         let error = Error::new(Kind::Usage, format!("PETSc knows no option {flag}"));
         return complain(&error.help(format!("did you mean -{flag}?")));

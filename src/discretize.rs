@@ -3,6 +3,7 @@
 mod balance;
 mod find;
 mod gauge;
+pub mod meshes;
 mod pairs;
 mod part;
 mod springs;
@@ -23,6 +24,7 @@ use crate::scene::{Order, Scene, Start, Zone};
 use balance::Forces;
 pub use balance::{Balance, Resultant};
 use find::{placed, point};
+use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use std::rc::Rc;
 
@@ -132,14 +134,25 @@ pub struct Problem {
     pub swapped: Vec<bool>,
     /// Stiffness matrix and contact rows of every body, kept only when a method asked for them.
     pub kept: Vec<(Csr, Csr)>,
+    /// The meshes, kept only when an estimate of the error was asked for.
+    pub meshes: Option<Rc<dyn Meshes>>,
     /// Stiffness matrices assembled on this rank.
     pub assemblies: usize,
 }
 
+/// What to keep besides the model.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Keep {
+    /// Matrices and rows, for a method that needs them.
+    pub matrices: bool,
+    /// Meshes, for an estimate of the error.
+    pub meshes: bool,
+}
+
 /// Turns a scene and its mesh into a model.
 ///
-/// `ranks` is (this rank, number of ranks); `keep` keeps matrices and rows for a method that needs them; `cut` finds the common pieces of surfaces in this dimension. `maker` turns each body of this rank into one that
-/// solves.
+/// `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `maker` turns each
+/// body of this rank into one that solves.
 ///
 /// # Errors
 /// Refusals of the scene against its mesh: missing groups, surfaces of the wrong body, supports that contradict each
@@ -149,16 +162,17 @@ pub fn discretize<const D: usize>(
     mesh: &Mesh<D>,
     cut: contact::pieces::Cut<D>,
     ranks: (usize, usize),
-    keep: bool,
+    keep: Keep,
     exchange: Box<dyn Exchange>,
     maker: &mut dyn Maker,
 ) -> Result<Problem> {
     let parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh)).collect::<Result<Vec<_>>>()?;
     let mut pairs = Vec::new();
-    let mut swapped = Vec::new();
+    let (mut swapped, mut fine, mut shapes) = (Vec::new(), Vec::new(), Vec::new());
     for spec in &scene.contacts {
-        let (pair, is_swapped) = pairs::make_pair(spec, mesh, cut, &parts)?;
+        let (pair, points, is_swapped) = pairs::make_pair(spec, mesh, cut, &parts, keep.meshes)?;
         pairs.push(pair);
+        fine.extend(points);
         swapped.push(is_swapped);
     }
     let loads: Vec<usize> = parts.iter().map(|part| part.space.dofs()).collect();
@@ -205,7 +219,7 @@ pub fn discretize<const D: usize>(
             slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
             slot.row_stiffness =
                 (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * body.stiffness.diagonal(i)).sum()).collect();
-            if keep {
+            if keep.matrices {
                 kept.push((body.stiffness.clone(), rows.clone()));
             }
             slot.local =
@@ -232,14 +246,17 @@ pub fn discretize<const D: usize>(
             balance: {
                 let rows = nodal_rows(&slot.segments, &pairs, space.dofs());
                 let (springs, supports) = (part.springs, part.spec.fix.len());
-                let forces = Forces { space: space.clone(), material, held, springs, supports, load: nodal_load, rows };
+                let (space, held) = (space.clone(), held.clone());
+                let forces = Forces { space, material, held, springs, supports, load: nodal_load, rows };
                 Box::new(move |u, force| forces.balance(u, force))
             },
-            field: field_maker(slot.name.clone(), space, material),
+            field: field_maker(slot.name.clone(), space.clone(), material),
         });
+        shapes.push(Shape { space, material, held });
         slots.push(slot);
     }
-    Ok(Problem { model: Model::new(slots, pairs, exchange), bodies: infos, swapped, kept, assemblies })
+    let meshes = keep.meshes.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
+    Ok(Problem { model: Model::new(slots, pairs, exchange), bodies: infos, swapped, kept, meshes, assemblies })
 }
 
 impl Problem {

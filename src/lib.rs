@@ -13,6 +13,7 @@ pub mod contact;
 pub mod ddm;
 pub mod discretize;
 pub mod error;
+pub mod estimate;
 pub mod fem;
 pub mod linalg;
 pub mod mesh;

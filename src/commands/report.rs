@@ -5,8 +5,9 @@ use super::preflight;
 use super::run::{Clock, Prepared};
 use crate::contact::ContactPair;
 use crate::ddm::{BodyCounts, Model, Outcome, Status};
+use crate::estimate::Estimate;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
-use crate::output::{BodyReport, ContactTable, InnerTimes, PairReport, Report, sci};
+use crate::output::{BodyReport, ContactTable, EstimateReport, InnerTimes, PairReport, Report, sci};
 use crate::petsc::Session;
 use crate::scene::Scene;
 
@@ -213,6 +214,19 @@ impl Shared {
     }
 }
 
+/// The estimate of the error for the report.
+pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
+    let all: f64 = estimate.bodies.iter().chain(&estimate.layers).sum();
+    let share = |error: &f64| if all > 0.0 { error / all } else { 0.0 };
+    EstimateReport {
+        energy: estimate.energy,
+        nodal: estimate.nodal,
+        displacement: estimate.displacement,
+        pressure: estimate.pressure.clone(),
+        bodies: estimate.bodies.iter().map(share).collect(),
+    }
+}
+
 /// Sides of pair `i` in the order of the scene.
 fn sides(prepared: &Prepared, i: usize) -> [usize; 2] {
     if prepared.problem.swapped[i] { [1, 0] } else { [0, 1] }
@@ -260,7 +274,7 @@ fn ends(pair: &ContactPair, c: &[f64]) -> Vec<[f64; 3]> {
 }
 
 /// The contact table of pair `i`, sides in the order of the scene.
-pub fn contact_table(prepared: &Prepared, outcome: &Outcome, i: usize) -> ContactTable {
+pub fn contact_table(prepared: &Prepared, outcome: &Outcome, estimate: Option<&Estimate>, i: usize) -> ContactTable {
     let model = &prepared.problem.model;
     let (pair, range, points) = (&model.pairs[i], model.range(i), model.points());
     let sides = sides(prepared, i);
@@ -276,6 +290,7 @@ pub fn contact_table(prepared: &Prepared, outcome: &Outcome, i: usize) -> Contac
         compression: outcome.layer.compression[range.clone()].to_vec(),
         pressure: outcome.layer.pressure[range.clone()].to_vec(),
         displacement: sides.map(displacement),
+        pressure_error: estimate.map_or(Vec::new(), |estimate| estimate.pressure_error[range].to_vec()),
     }
 }
 

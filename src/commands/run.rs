@@ -4,9 +4,10 @@ use super::inner::Inner;
 use super::method;
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::method::Method;
-use crate::ddm::{self, Observer, Outcome, RobinRule, Settings, StopRule};
-use crate::discretize::{self, Problem};
+use crate::ddm::{self, Observer, Outcome, RobinRule, Settings, Status, StopRule};
+use crate::discretize::{self, Keep, Problem};
 use crate::error::{Error, Kind, Result};
+use crate::estimate::{self, Estimate, Nodal};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::scene::{MeshSource, Order, RobinSpec, Scene};
@@ -91,6 +92,7 @@ fn build<const D: usize>(session: &Session, scene: &Scene, cut: Cut<D>, clock: &
     let mut inner = Inner::new(session, scene, keep);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
+    let keep = Keep { matrices: keep, meshes: scene.estimate || scene.method.stop.balanced };
     let problem = discretize::discretize(scene, &mesh, cut, ranks, keep, exchange, &mut inner);
     let mut problem = agree(session, problem)?;
     problem.share();
@@ -246,6 +248,7 @@ pub fn iterate(
         },
         methods: std::mem::take(&mut prepared.methods),
         stop: StopRule { residual: stop.residual, increment: stop.increment, iterations: stop.iterations },
+        balance: prepared.problem.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _),
         start: discretize::start(scene, &prepared.problem.model)?,
     };
     let outcome = ddm::solve(&mut prepared.problem.model, &mut settings, observer)?;
@@ -253,10 +256,24 @@ pub fn iterate(
     Ok(outcome)
 }
 
+/// Estimates the error of what a run found, if the scene asks for it.
+///
+/// # Errors
+/// Failures of PETSc.
+pub fn estimate(prepared: &mut Prepared, outcome: &Outcome, clock: &mut Clock) -> Result<Option<Estimate>> {
+    let good = matches!(outcome.status, Status::Converged | Status::Attainable | Status::IterationLimit);
+    let Some(meshes) = prepared.problem.meshes.clone().filter(|_| good) else { return Ok(None) };
+    let Outcome { iterate, layer, weight, .. } = outcome;
+    let estimate = estimate::estimate(&*meshes, &mut prepared.problem.model, iterate, layer, weight)?;
+    clock.phase("estimate");
+    Ok(Some(estimate))
+}
+
 /// The stopping rules in words.
 pub fn targets(scene: &Scene) -> String {
     let stop = &scene.method.stop;
     let rules = [("residual", stop.residual), ("increment", stop.increment)];
     let rules = rules.iter().filter_map(|(name, value)| value.map(|value| format!("{name} <= {value:e}")));
-    rules.collect::<Vec<_>>().join(" or ")
+    let balanced = stop.balanced.then(|| format!("error <= {} of the discretisation's", ddm::SHARE));
+    rules.chain(balanced).collect::<Vec<_>>().join(" or ")
 }

@@ -4,6 +4,7 @@ use super::run::{self, Clock, Prepared};
 use super::{folder_of, load, report};
 use crate::ddm::{Observer, Outcome, Row};
 use crate::error::{Error, Kind, Result};
+use crate::estimate::Estimate;
 use crate::output::{Folder, HistoryWriter, IterationTable, Plot, Report, Verbosity, say, vtu};
 use crate::parallel::agree;
 use crate::petsc::Session;
@@ -41,12 +42,14 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
         history: if first { Some(history(&folder, &scene)?) } else { None },
     };
     let outcome = run::iterate(&scene, &mut prepared, &mut watchers, &mut clock)?;
+    let estimate = run::estimate(&mut prepared, &outcome, &mut clock)?;
     watchers.table.finish();
     let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
-    let written = failed.and(write(session, &scene, &prepared, &outcome, &folder));
+    let written = failed.and(write(session, &scene, &prepared, &outcome, estimate.as_ref(), &folder));
     clock.phase("output");
     clock.total();
     let mut report = report::report(session, &scene, &prepared, &outcome, &clock);
+    report.discretization_error = estimate.as_ref().map(report::discretization_error);
     if first {
         report.files = names(&folder, &scene, &prepared);
         let json = to_json(&report)?;
@@ -103,7 +106,14 @@ impl Observer for Watchers {
 }
 
 /// Writes fields (each rank its bodies), contact tables and plots (the first rank).
-fn write(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &Outcome, folder: &Folder) -> Result<()> {
+fn write(
+    session: &Session,
+    scene: &Scene,
+    prepared: &Prepared,
+    outcome: &Outcome,
+    estimate: Option<&Estimate>,
+    folder: &Folder,
+) -> Result<()> {
     let model = &prepared.problem.model;
     let first = session.rank() == 0;
     if scene.output.vtu {
@@ -122,7 +132,7 @@ fn write(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &Outcom
         return Ok(());
     }
     for i in 0..model.pairs.len() {
-        report::contact_table(prepared, outcome, i).save(folder)?;
+        report::contact_table(prepared, outcome, estimate, i).save(folder)?;
     }
     if scene.output.plots {
         let convergence = Plot::convergence(&scene.title, &[report::convergence("", outcome)]);

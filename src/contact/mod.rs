@@ -3,12 +3,14 @@
 //! Data flow: two [`Side`]s -> [`pieces`] (integration points that both sides share) -> [`ContactPair`]
 //! (weights, rows B_a and B_b, gaps), which knows no dimension. Layer laws live in [`law`].
 
+pub mod fine;
 pub mod law;
 pub mod order;
 mod pair;
 pub mod pieces;
 mod side;
 
+pub use fine::Fine;
 pub use law::{LayerLaw, Response};
 pub use pair::{ContactPair, Fault, add, assemble, cross, pad};
 pub use side::Side;

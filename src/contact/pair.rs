@@ -21,6 +21,8 @@ pub struct ContactPair {
     pub surfaces: [String; 2],
     /// Numbers of the two bodies.
     pub bodies: [usize; 2],
+    /// Node of side a that each point belongs to, n.
+    pub nodes: Vec<u32>,
     /// Positions of the points on side a, n.
     pub position: Vec<[f64; 3]>,
     /// omega_q > 0, length or area, n.
@@ -116,6 +118,7 @@ pub fn assemble<const D: usize>(
     let mut pair = ContactPair {
         surfaces: [a.name.to_owned(), b.name.to_owned()],
         bodies,
+        nodes: order,
         position,
         weight: Vec::new(),
         normal: Vec::new(),
@@ -129,7 +132,8 @@ pub fn assemble<const D: usize>(
         law,
         uncovered: (covered.iter().filter(|&&c| !c).count(), covered.len()),
     };
-    for (q, node) in order.into_iter().enumerate() {
+    for q in 0..pair.nodes.len() {
+        let node = pair.nodes[q];
         let sum = &points[&node];
         let normal = a.normals[&node];
         for (side, sign, of) in [(0, 1.0, a), (1, -1.0, b)] {

@@ -103,6 +103,12 @@ pub trait Body {
     /// Size of the rounding errors in [`Body::residual`], as |e|_{diag(G)^-1} squared.
     fn rounding(&self, u: &[f64], force: &[f64]) -> f64;
 
+    /// A load on all dofs as the right-hand side r of [`Body::solve`] that has the same effect; supports take their part.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>>;
+
     /// What was done so far.
     fn counts(&self) -> BodyCounts;
 

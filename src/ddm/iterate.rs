@@ -1,5 +1,6 @@
 //! The outer loop (41)-(42).
 
+use super::balance::{Balance, Discretisation};
 use super::body::BodyCounts;
 use super::closing::rigid_closing;
 use super::field::Field;
@@ -27,6 +28,8 @@ pub struct Settings {
     pub methods: Vec<Box<dyn Method>>,
     /// When to stop.
     pub stop: StopRule,
+    /// Who knows the error of the discretisation, if the run is to stop where more would be in vain.
+    pub balance: Option<Box<dyn Discretisation>>,
     /// Start: outer normal displacement of all contact rows (layout of a trace vector).
     pub start: Vec<f64>,
 }
@@ -82,6 +85,8 @@ pub struct Outcome {
     pub iterate: Field,
     /// The layers at that iterate.
     pub layer: Layer,
+    /// The Robin term omega psi kappa that the model carries, for each contact row.
+    pub weight: Vec<f64>,
     /// History, one row an iterate.
     pub rows: Vec<Row>,
     /// Name of the method that made the last step.
@@ -121,8 +126,9 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     let mut sweeper = Sweeper::default();
     let mut last: Option<Last> = None;
     let mut rows: Vec<Row> = Vec::new();
+    let mut balance = settings.balance.take().map(Balance::new);
     let (mut active, mut updates) = (0, 0);
-    let (status, layer) = loop {
+    let (status, layer, weight) = loop {
         let k = updates;
         let layer = Layer::at(model, &iterate.trace);
         let weight = robin.weight(model, &settings.zone, &layer, k);
@@ -130,7 +136,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
             early = held::unheld(model, &weight).map(|free| Status::Unheld { body: free.body, motion: free.name });
         }
         if let Some(status) = early {
-            break (status, layer);
+            break (status, layer, weight);
         }
         model.robin(&weight)?;
         let relaxed = last.as_ref().filter(|last| last.relaxed).map(|last| (&last.sweep, last.length));
@@ -144,22 +150,27 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         row.error = row.residual * method.amplification().sqrt();
         let verdict = watch.judge(&seen, &settings.stop, &row);
         observer.row(&row);
-        let residual = row.residual;
+        let (residual, error) = (row.residual, row.error);
         rows.push(row);
         match verdict {
-            Verdict::End(status) => break (status, layer),
+            Verdict::End(status) => break (status, layer, weight),
             Verdict::Stalled if active + 1 < settings.methods.len() => {
                 active += 1;
                 observer.note(&format!("iteration {k}: no progress, {} takes over", settings.methods[active].name()));
             }
             Verdict::Stalled | Verdict::Go => {}
         }
+        if let Some(balance) = &mut balance
+            && balance.is_met(model, &iterate, &layer, &weight, error)?
+        {
+            break (Status::Converged, layer, weight);
+        }
         let target = settings.stop.residual.unwrap_or(0.0);
         let mut here =
             Here { model, sweeper: &mut sweeper, k, layer: &layer, weight: &weight, sweep: &sweep, residual, target };
         let step = settings.methods[active].step(&mut here)?;
         let (direction, length, relaxed) = match step {
-            Step::Unbounded => break (Status::Unbounded, layer),
+            Step::Unbounded => break (Status::Unbounded, layer, weight),
             Step::Sweep(gamma) => (None, gamma, true),
             Step::Along(direction, length) => (Some(direction), length, false),
         };
@@ -177,6 +188,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         solves_skipped: sweeper.solves_skipped,
         iterate,
         layer,
+        weight,
         rows,
         method: method.name(),
         coupled: settings.methods.iter().map(|method| method.coupled()).collect(),

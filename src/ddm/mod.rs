@@ -3,6 +3,7 @@
 //! Start with [`iterate`]: the loop. It works on point arrays (compression, pressure, tangent, weight) and on
 //! bodies that answer the verbs of [`Body`]; it knows no dimension, no element, no mesh and no PETSc.
 
+mod balance;
 pub mod body;
 mod closing;
 pub mod field;
@@ -12,6 +13,7 @@ pub mod iterate;
 pub mod layer;
 mod lift;
 pub mod line;
+pub mod linear;
 pub mod method;
 pub mod model;
 mod progress;
@@ -21,6 +23,7 @@ pub mod sweep;
 mod watch;
 pub mod zone;
 
+pub use balance::{Discretisation, SHARE};
 pub use body::{Body, BodyCounts, Energy, Solved};
 pub use closing::rigid_closing;
 pub use field::Field;

@@ -2,20 +2,22 @@
 
 use super::find::{find_group, placed, point};
 use super::part::Part;
-use crate::contact::pieces::Reach;
-use crate::contact::{self, ContactPair, Fault, Side};
+use crate::contact::pieces::{Reach, Shared};
+use crate::contact::{self, ContactPair, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::Facets;
 use crate::mesh::{Group, Mesh};
 use crate::scene::ContactSpec;
 
-/// The pair of a contact, and whether its side a is the scene's second surface.
+/// The pair of a contact, its integration points if `fine` asks for them, and whether its side a is the scene's second
+/// surface.
 pub fn make_pair<const D: usize>(
     spec: &ContactSpec,
     mesh: &Mesh<D>,
     cut: contact::pieces::Cut<D>,
     parts: &[Part<D>],
-) -> Result<(ContactPair, bool)> {
+    fine: bool,
+) -> Result<(ContactPair, Option<Fine<D>>, bool)> {
     let mut sides = Vec::new();
     for name in &spec.between {
         let group = find_group(mesh, name, &[D - 1], "contact surface")?;
@@ -36,19 +38,20 @@ pub fn make_pair<const D: usize>(
     let (fine_a, fine_b) = (a.mean_measure(), b.mean_measure());
     let a_carries = if (fine_a - fine_b).abs() > 1e-6 * fine_a { fine_a < fine_b } else { a.name < b.name };
     let (a, b, bodies) = if a_carries { (a, b, [body_a, body_b]) } else { (b, a, [body_b, body_a]) };
-    let pair = pair_on(spec, cut, a, b, bodies)?;
-    Ok((pair, !a_carries))
+    let shared = cut(&a, &b, &Reach::between(&a, &b));
+    let pair = pair_on(spec, &shared, &a, &b, bodies)?;
+    let fine = fine.then(|| Fine::new(&a, &b, &shared, &pair, &|x| spec.gap.eval(x)));
+    Ok((pair, fine, !a_carries))
 }
 
 fn pair_on<const D: usize>(
     spec: &ContactSpec,
-    cut: contact::pieces::Cut<D>,
-    a: Side<D>,
-    b: Side<D>,
+    shared: &[Shared<D>],
+    a: &Side<D>,
+    b: &Side<D>,
     bodies: [usize; 2],
 ) -> Result<ContactPair> {
-    let shared = cut(&a, &b, &Reach::between(&a, &b));
-    contact::assemble(&a, &b, bodies, &shared, &|x| spec.gap.eval(x), &spec.layer).map_err(|fault| match fault {
+    contact::assemble(a, b, bodies, shared, &|x| spec.gap.eval(x), &spec.layer).map_err(|fault| match fault {
         Fault::Law(error) => error,
         Fault::NoPartner => {
             let names = [&spec.between[0].value, &spec.between[1].value];

@@ -9,6 +9,7 @@ pub mod element;
 pub mod frame;
 pub mod material;
 pub mod quadrature;
+pub mod recovery;
 pub mod rigid;
 pub mod space;
 pub mod stress;

@@ -23,6 +23,8 @@ pub struct ContactTable {
     pub pressure: Vec<f64>,
     /// Averaged normal displacement of side a and of side b, each along its own outer normal.
     pub displacement: [Vec<f64>; 2],
+    /// Estimated error of the pressure, exact minus discrete; empty if it was not asked for.
+    pub pressure_error: Vec<f64>,
 }
 
 impl ContactTable {
@@ -46,17 +48,16 @@ impl ContactTable {
     /// Those of `out`, and `InvalidInput` when the vectors differ in length.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let [of_a, of_b] = &self.displacement;
-        let columns = [&self.weight, &self.gap, &self.compression, &self.pressure, of_a, of_b];
+        let mut columns = vec![&self.weight, &self.gap, &self.compression, &self.pressure, of_a, of_b];
+        let estimated = (!self.pressure_error.is_empty()).then_some("pressure_error");
+        columns.extend(estimated.map(|_| &self.pressure_error));
         if columns.iter().any(|column| column.len() != self.points.len()) {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "contact table with columns of different length"));
         }
         let mut csv = csv::Writer::from_writer(out);
         let sides = self.side_names.each_ref().map(|side| format!("u_n_{side}"));
-        csv.write_record(
-            ["x", "y", "z", "weight", "gap", "compression", "pressure"]
-                .into_iter()
-                .chain(sides.iter().map(String::as_str)),
-        )?;
+        let names = ["x", "y", "z", "weight", "gap", "compression", "pressure"].into_iter();
+        csv.write_record(names.chain(sides.iter().map(String::as_str)).chain(estimated))?;
         for (q, point) in self.points.iter().enumerate() {
             let values = point.iter().copied().chain(columns.iter().map(|column| column[q]));
             csv.write_record(values.map(field))?;
@@ -78,6 +79,7 @@ mod tests {
             compression: vec![1e-7, -0.25],
             pressure: vec![2.0f64.sqrt(), 0.0],
             displacement: [vec![1e-300, 2.0], vec![-3.0, 1e22]],
+            pressure_error: vec![0.1, -0.1],
         }
     }
 
@@ -90,15 +92,26 @@ mod tests {
         assert_eq!(path, base.path().join("contact-upper_bottom-lower.csv"));
         let mut csv = csv::Reader::from_path(&path).unwrap();
         let header: Vec<_> = csv.headers().unwrap().iter().map(String::from).collect();
-        assert_eq!(header.join(","), "x,y,z,weight,gap,compression,pressure,u_n_upper bottom,u_n_lower");
+        let names = "x,y,z,weight,gap,compression,pressure,u_n_upper bottom,u_n_lower,pressure_error";
+        assert_eq!(header.join(","), names);
         let rows: Vec<Vec<f64>> =
             csv.records().map(|row| row.unwrap().iter().map(|v| v.parse().unwrap()).collect()).collect();
         assert_eq!(rows.len(), 2);
         for (q, row) in rows.iter().enumerate() {
             let [x, y, z] = table.points[q];
             let [a, b] = &table.displacement;
-            let expected =
-                [x, y, z, table.weight[q], table.gap[q], table.compression[q], table.pressure[q], a[q], b[q]];
+            let expected = [
+                x,
+                y,
+                z,
+                table.weight[q],
+                table.gap[q],
+                table.compression[q],
+                table.pressure[q],
+                a[q],
+                b[q],
+                table.pressure_error[q],
+            ];
             assert_eq!(row[..], expected);
         }
     }

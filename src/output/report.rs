@@ -53,6 +53,8 @@ pub struct Report {
     pub residual: Option<f64>,
     /// Estimate of the relative error of the iteration in the energy norm.
     pub error_estimate: Option<f64>,
+    /// Estimated errors of the discretisation, if they were asked for.
+    pub discretization_error: Option<EstimateReport>,
     /// Estimated bounds of the spectrum of G^-1 F1''.
     pub spectrum: Option<[f64; 2]>,
     /// Relative increment of the last update, the largest of the bodies.
@@ -85,6 +87,21 @@ pub struct InnerTimes {
     pub factor: f64,
     /// Solves.
     pub solve: f64,
+}
+
+/// Estimated errors of the discretisation, relative.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct EstimateReport {
+    /// In the energy norm of bodies and layers.
+    pub energy: f64,
+    /// Of the nodal values, in the same norm.
+    pub nodal: f64,
+    /// Of the normal displacements at the contact points, root of mean squares.
+    pub displacement: f64,
+    /// Of the pressures at the contact points of each pair, root of mean squares.
+    pub pressure: Vec<f64>,
+    /// Share of each body in the squared energy error, in the order of the scene.
+    pub bodies: Vec<f64>,
 }
 
 /// One body.
@@ -185,6 +202,15 @@ impl Report {
             self.dofs,
             seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
         ));
+        if let Some(error) = &self.discretization_error {
+            let pressures: Vec<String> = error.pressure.iter().map(|&error| sci(error, 1)).collect();
+            lines.push(format!(
+                "  estimated discretisation error: pressure {}, displacement {}, energy norm {}",
+                pressures.join(" and "),
+                sci(error.displacement, 1),
+                sci(error.energy, 1)
+            ));
+        }
         for pair in &self.pairs {
             let names = format!("  {} - {}", pair.bodies[0], pair.bodies[1]);
             lines.push(if pair.peak_pressure > 0.0 {

@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 
 /// Checks a whole scene, read from `path`. Looks whether the mesh file is there.
 pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
-    const KEYS: &[&str] = &["title", "dimension", "plane", "mesh", "body", "contact", "method", "solver", "output"];
+    const KEYS: &[&str] =
+        &["title", "dimension", "plane", "mesh", "body", "contact", "method", "solver", "estimate", "output"];
     let keys = Keys::open(tree, "the scene", KEYS)?;
     let dimension = dimension(&keys)?;
     let decoder = Decoder { dimension: dimension.value, folder: path.parent().unwrap_or(Path::new("")) };
@@ -32,6 +33,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         contacts: decoder.contacts(&keys)?,
         method: decoder.method(keys.get("method"))?,
         solver: solver(keys.get("solver"))?,
+        estimate: keys.get("estimate").map_or(Ok(false), Node::boolean)?,
         output: output(keys.get("output"))?,
         dimension,
     })

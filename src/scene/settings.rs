@@ -28,6 +28,7 @@ impl Scene {
         settings.insert("contact".into(), self.contacts.iter().map(contact).collect());
         settings.insert("method".into(), method(&self.method));
         settings.insert("solver".into(), solver(&self.solver));
+        settings.insert("estimate".into(), json!(self.estimate));
         let mut output = Map::new();
         insert(&mut output, "dir", self.output.dir.as_ref().map(|dir| json!(dir.display().to_string())));
         output.insert("vtu".into(), json!(self.output.vtu));
@@ -139,10 +140,13 @@ fn method(method: &MethodSpec) -> Value {
         Start::Zero => json!("zero"),
         Start::Normal(normal) => json!({ "normal": field(normal) }),
     };
-    let StopSpec { residual, increment, iterations } = &method.stop;
+    let StopSpec { residual, increment, balanced, iterations } = &method.stop;
     let mut stop = Map::new();
     insert(&mut stop, "residual", residual.map(|value| json!(value)));
     insert(&mut stop, "increment", increment.map(|value| json!(value)));
+    if *balanced {
+        stop.insert("balanced".into(), json!(true));
+    }
     stop.insert("iterations".into(), json!(iterations));
     let gamma = match &method.gamma {
         Gamma::Stationary(gamma) => json!(gamma),

@@ -29,6 +29,8 @@ pub struct Scene {
     pub method: MethodSpec,
     /// The inner solver.
     pub solver: SolverSpec,
+    /// Whether to estimate the error of the discretisation.
+    pub estimate: bool,
     /// What to write.
     pub output: OutputSpec,
 }
@@ -278,6 +280,8 @@ pub struct StopSpec {
     pub residual: Option<f64>,
     /// The paper's rule on the increment of normal displacements, for every body.
     pub increment: Option<f64>,
+    /// Whether to stop where the error of the iteration is a tenth of that of the discretisation.
+    pub balanced: bool,
     /// Most iterations; default 2000.
     pub iterations: usize,
 }
@@ -338,7 +342,7 @@ impl Default for MethodSpec {
 
 impl Default for StopSpec {
     fn default() -> Self {
-        Self { residual: Some(1e-8), increment: None, iterations: 2000 }
+        Self { residual: Some(1e-8), increment: None, balanced: false, iterations: 2000 }
     }
 }
 

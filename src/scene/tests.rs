@@ -88,7 +88,10 @@ fn the_groove_is_read() {
     assert!(matches!(scene.method.psi, Zone::Active));
     assert_eq!(scene.method.gamma, Gamma::Stationary(0.7));
     assert!(matches!(scene.method.start, Start::Normal(Field::Constant(1e-4))));
-    assert_eq!(scene.method.stop, StopSpec { residual: None, increment: Some(1e-3), iterations: 2000 });
+    assert_eq!(
+        scene.method.stop,
+        StopSpec { residual: None, increment: Some(1e-3), balanced: false, iterations: 2000 }
+    );
     assert_eq!(scene.solver, SolverSpec { preset: None, options: vec![] });
     assert_eq!(scene.output, OutputSpec { dir: None, vtu: true, plots: true });
 }
@@ -107,7 +110,10 @@ fn defaults_and_a_scene_in_space() {
     assert!(matches!(scene.method.start, Start::Auto));
     assert_eq!((scene.method.name, scene.method.robin), (MethodName::Auto, RobinSpec::Auto));
     assert_eq!(scene.method.gamma, Gamma::Stationary(0.6));
-    assert_eq!(scene.method.stop, StopSpec { residual: Some(1e-8), increment: None, iterations: 2000 });
+    assert_eq!(
+        scene.method.stop,
+        StopSpec { residual: Some(1e-8), increment: None, balanced: false, iterations: 2000 }
+    );
     let options = vec!["-ksp_rtol".to_owned(), "1e-10".to_owned()];
     assert_eq!(scene.solver, SolverSpec { preset: Some(Preset::Hypre), options });
     assert_eq!(scene.output, OutputSpec { dir: Some("out".into()), vtu: false, plots: true });

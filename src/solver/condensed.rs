@@ -150,6 +150,13 @@ impl Body for CondensedBody {
         self.condensed.as_ref().map_or(0.0, |condensed| condensed.body.rounding(u, force))
     }
 
+    fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>> {
+        let mut load = load.to_vec();
+        self.whole.prescribed.iter().for_each(|&(dof, _)| load[dof] = 0.0);
+        let turned = self.retained.turn(&load);
+        self.condense()?.schur.get_mut().condense(&turned)
+    }
+
     fn counts(&self) -> BodyCounts {
         match &self.condensed {
             None => BodyCounts::default(),

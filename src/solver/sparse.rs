@@ -202,6 +202,12 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         sum * f64::EPSILON * f64::EPSILON
     }
 
+    fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>> {
+        let mut r = load.to_vec();
+        self.body.prescribed.iter().for_each(|&(dof, _)| r[dof] = 0.0);
+        Ok(r)
+    }
+
     fn counts(&self) -> BodyCounts {
         let (symbolic, factorizations) = self.solver.factorizations();
         BodyCounts { symbolic, factorizations, ..self.counts }

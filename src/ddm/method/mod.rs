@@ -3,7 +3,7 @@
 //! A new method is a new file with the trait [`Method`].
 
 mod anderson;
-mod cg;
+pub(super) mod cg;
 mod conjugate;
 mod newton;
 mod relaxed;

@@ -93,7 +93,7 @@ fn depth(node: &Node) -> Result<usize> {
 
 fn stop(node: &Node) -> Result<StopSpec> {
     let default = StopSpec::default();
-    let keys = Keys::open(node, "the stop rule", &["residual", "increment", "iterations"])?;
+    let keys = Keys::open(node, "the stop rule", &["residual", "increment", "balanced", "iterations"])?;
     let tolerance = |key: &str| keys.get(key).map(|node| node.positive("the tolerance")).transpose();
     let increment = tolerance("increment")?;
     let iterations = match keys.get("iterations") {
@@ -109,5 +109,6 @@ fn stop(node: &Node) -> Result<StopSpec> {
         (None, None) => default.residual,
         (given, _) => given,
     };
-    Ok(StopSpec { residual, increment, iterations })
+    let balanced = keys.get("balanced").map_or(Ok(false), Node::boolean)?;
+    Ok(StopSpec { residual, increment, balanced, iterations })
 }

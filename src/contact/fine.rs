@@ -1,0 +1,103 @@
+//! The integration points of a pair one by one, for an estimate of the error: there the compression of the layer and the gap
+//! are those of the points themselves, not means around the nodes.
+
+use super::pair::ContactPair;
+use super::pieces::Shared;
+use super::side::{Side, length, unit};
+use crate::fem::{Facets, element};
+use crate::linalg::Csr;
+use std::collections::HashMap;
+
+/// The shared integration points of a pair.
+pub struct Fine<const D: usize> {
+    /// Numbers of the two bodies.
+    pub bodies: [usize; 2],
+    /// Length (area) of each point.
+    pub weight: Vec<f64>,
+    /// Gap of each point: distance of the meshes along the normal, and the scene's own gap.
+    pub gap: Vec<f64>,
+    /// Size of the facet of side a under each point: its length, or the root of its area.
+    pub size: Vec<f64>,
+    /// Unit normal from side a to side b at each point.
+    pub normal: Vec<[f64; D]>,
+    /// The contact point nearest to each: for laws that differ from point to point.
+    pub nearest: Vec<usize>,
+    /// Values at the contact points -> values at the integration points, by the shape functions of side a.
+    pub interpolation: Csr,
+    /// Where the points lie on each side.
+    pub sides: [FineSide<D>; 2],
+}
+
+/// Where the points lie on a surface.
+pub struct FineSide<const D: usize> {
+    /// The facets.
+    pub facets: Facets<D>,
+    /// Facet of each point.
+    pub facet: Vec<usize>,
+    /// Barycentric coordinates in it.
+    pub at: Vec<[f64; D]>,
+}
+
+impl<const D: usize> Fine<D> {
+    /// The points of `pair`, made of these sides and shared points; `gap(x)` is the scene's own gap.
+    pub fn new(
+        a: &Side<D>,
+        b: &Side<D>,
+        shared: &[Shared<D>],
+        pair: &ContactPair,
+        gap: &dyn Fn([f64; 3]) -> f64,
+    ) -> Self {
+        let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
+        let side = |side: &Side<D>, facet: fn(&Shared<D>) -> usize, at: fn(&Shared<D>) -> [f64; D]| FineSide {
+            facets: side.facets.clone(),
+            facet: shared.iter().map(facet).collect(),
+            at: shared.iter().map(at).collect(),
+        };
+        let mut fine = Self {
+            bodies: pair.bodies,
+            weight: shared.iter().map(|point| point.weight).collect(),
+            gap: Vec::new(),
+            size: Vec::new(),
+            normal: Vec::new(),
+            nearest: Vec::new(),
+            interpolation: Csr::new(pair.len()),
+            sides: [side(a, |p| p.facet_a, |p| p.at_a), side(b, |p| p.facet_b, |p| p.at_b)],
+        };
+        for point in shared {
+            let nodes = a.facets.facet(point.facet_a);
+            let normal = unit(std::array::from_fn(|c| (0..D).map(|k| point.at_a[k] * a.normals[&nodes[k]][c]).sum()));
+            let place = |side: &Side<D>, facet: usize, l: &[f64; D]| {
+                let x = side.facets.coordinates(facet, side.space);
+                crate::fem::assemble::interpolate(&x, &element::values(side.facets.order, l))
+            };
+            let from = place(a, point.facet_a, &point.at_a);
+            let to = place(b, point.facet_b, &point.at_b);
+            let distance: f64 = (0..D).map(|c| (to[c] - from[c]) * normal[c]).sum();
+            let rounding = 1e-12 * length(a.area(point.facet_a));
+            let distance = if distance.abs() < rounding { 0.0 } else { distance };
+            fine.gap.push(distance + gap(super::pad(from)));
+            fine.size.push(length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
+            fine.normal.push(normal);
+            // where mid-edges carry no point, the vertices do
+            let phi = element::values(a.facets.order, &point.at_a);
+            let all = nodes.iter().all(|node| point_of.contains_key(node));
+            let shape = |k: usize| {
+                if all {
+                    phi[k]
+                } else if k < D {
+                    point.at_a[k]
+                } else {
+                    0.0
+                }
+            };
+            let of_point = |(k, node): (usize, &u32)| point_of.get(node).map(|&q| (q, shape(k)));
+            let mut row: Vec<(usize, f64)> = nodes.iter().enumerate().filter_map(of_point).collect();
+            row.sort_unstable_by_key(|entry| entry.0);
+            let near = (0..D).max_by(|&i, &j| point.at_a[i].total_cmp(&point.at_a[j]));
+            let near = near.and_then(|k| point_of.get(&nodes[k]).copied()).or(row.first().map(|entry| entry.0));
+            fine.nearest.push(near.unwrap_or(0));
+            fine.interpolation.push_row(row);
+        }
+        fine
+    }
+}

@@ -1,0 +1,93 @@
+//! Stopping where the error of the iteration is small beside that of the discretisation: more would be in vain.
+
+use super::field::Field;
+use super::layer::Layer;
+use super::model::Model;
+use crate::error::Result;
+
+/// Knows how far the discrete problem is from the continuous one.
+pub trait Discretisation {
+    /// Relative error of the discrete solution near an iterate, in the norm of [`Row::error`](super::Row): the part of it that
+    /// iterates share a space with, so that it bounds what the nodal values are worth. `weight` = omega psi kappa is the
+    /// Robin term that the model carries.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn error(&mut self, model: &mut Model, iterate: &Field, layer: &Layer, weight: &[f64]) -> Result<f64>;
+}
+
+/// Share of the discretisation's error that the iteration's may have.
+pub const SHARE: f64 = 0.1;
+
+/// Error of the iteration from which on asking is worth its price.
+const FIRST: f64 = 0.03;
+
+/// Asks seldom: an estimate costs about as much as a Newton step.
+pub(super) struct Balance {
+    rule: Box<dyn Discretisation>,
+    last: Option<f64>,
+}
+
+impl Balance {
+    pub fn new(rule: Box<dyn Discretisation>) -> Self {
+        Self { rule, last: None }
+    }
+
+    /// Whether an iterate with this estimated error is good enough. A good last answer is confirmed at this iterate.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn is_met(
+        &mut self,
+        model: &mut Model,
+        iterate: &Field,
+        layer: &Layer,
+        weight: &[f64],
+        error: f64,
+    ) -> Result<bool> {
+        let worth_asking = self.last.map_or(FIRST, |last| SHARE * last);
+        if error.is_nan() || error > worth_asking {
+            return Ok(false);
+        }
+        let now = self.rule.error(model, iterate, layer, weight)?;
+        self.last = Some(now);
+        Ok(error <= SHARE * now)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ddm::Serial;
+    use std::cell::Cell;
+    use std::rc::Rc;
+
+    struct Fixed(Rc<Cell<usize>>, Vec<f64>);
+
+    impl Discretisation for Fixed {
+        fn error(&mut self, _: &mut Model, _: &Field, _: &Layer, _: &[f64]) -> Result<f64> {
+            self.0.set(self.0.get() + 1);
+            Ok(self.1.remove(0))
+        }
+    }
+
+    #[test]
+    fn it_asks_first_when_worth_it_and_again_to_confirm() {
+        let asked = Rc::new(Cell::new(0));
+        let mut balance = Balance::new(Box::new(Fixed(asked.clone(), vec![0.1, 0.02, 0.02])));
+        let mut model = Model::new(Vec::new(), Vec::new(), Box::new(Serial));
+        let layer = Layer::default();
+        let mut ask = |error: f64| {
+            let met = balance.is_met(&mut model, &Field::default(), &layer, &[], error).unwrap();
+            (met, asked.get())
+        };
+        assert_eq!(ask(f64::NAN), (false, 0));
+        assert_eq!(ask(0.2), (false, 0));
+        // 0.02 > 0.1 * 0.1
+        assert_eq!(ask(0.02), (false, 1));
+        assert_eq!(ask(0.015), (false, 1));
+        // worth asking again, and the answer is now 0.02
+        assert_eq!(ask(0.009), (false, 2));
+        assert_eq!(ask(0.0019), (true, 3));
+    }
+}

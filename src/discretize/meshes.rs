@@ -1,0 +1,162 @@
+//! What an estimate of the error asks of meshes, without their dimension.
+
+use super::supports::Held;
+use crate::contact::Fine;
+use crate::fem::recovery::Recovery;
+use crate::fem::{Material, Space, element};
+use crate::linalg::Csr;
+use std::rc::Rc;
+
+/// The meshes of all bodies and pairs, kept for an estimate of the error.
+pub trait Meshes {
+    /// Displacements of all nodes of a body for a state of all its dofs.
+    fn displacements(&self, body: usize, state: &[f64]) -> Vec<f64>;
+
+    /// Turns forces at the nodes of a body into those at its dofs.
+    fn forces(&self, body: usize, load: &mut [f64]);
+
+    /// Recovers from displacements of all nodes of a body.
+    fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn Recovered + 'a>;
+
+    /// The integration points of a pair.
+    fn points(&self, pair: usize) -> FinePoints<'_>;
+
+    /// Order of convergence of the energy error of a body: the degree of its elements.
+    fn degree(&self, body: usize) -> usize;
+}
+
+/// The integration points of a pair; see [`Fine`].
+pub struct FinePoints<'a> {
+    /// Length (area) of each.
+    pub weight: &'a [f64],
+    /// Gap of each.
+    pub gap: &'a [f64],
+    /// What the two bodies give way, per pressure, to one that changes its sign within a facet: between the springs of two
+    /// half-spaces in a row, for a wave as long as the facet.
+    pub compliance: Vec<f64>,
+    /// Contact point nearest to each.
+    pub nearest: &'a [usize],
+    /// Values at the contact points -> values at these.
+    pub interpolation: &'a Csr,
+}
+
+/// A displacement of a body with what was recovered from it.
+pub trait Recovered {
+    /// Squared energy norm of recovered minus discrete stress, for each cell.
+    fn energy_errors(&self) -> Vec<f64>;
+
+    /// Residual of the interpolation error at all nodes, see [`Recovery::interpolation_residual`].
+    fn interpolation_residual(&self) -> Vec<f64>;
+
+    /// Outer normal displacement at the integration points of a side of a pair, the interpolation error added.
+    fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
+
+    /// Adds `sum force_g n.v` over the integration points of a side of a pair to `r`, for every shape function v.
+    fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]);
+}
+
+/// A body's space, material and supports.
+pub struct Shape<const D: usize> {
+    /// Its space.
+    pub space: Rc<Space<D>>,
+    /// Its material.
+    pub material: Material,
+    /// Its supports, which choose the dofs.
+    pub held: Rc<Held<D>>,
+}
+
+/// [`Meshes`] in `D` dimensions.
+pub struct Kept<const D: usize> {
+    /// Bodies in the order of the scene.
+    pub shapes: Vec<Shape<D>>,
+    /// Integration points of each pair.
+    pub fine: Vec<Fine<D>>,
+}
+
+impl<const D: usize> Meshes for Kept<D> {
+    fn displacements(&self, body: usize, state: &[f64]) -> Vec<f64> {
+        self.shapes[body].held.frame.displacements(state)
+    }
+
+    fn forces(&self, body: usize, load: &mut [f64]) {
+        self.shapes[body].held.frame.forces(load);
+    }
+
+    fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn Recovered + 'a> {
+        let shape = &self.shapes[body];
+        Box::new(OnBody { kept: self, shape, u, recovery: Recovery::new(&shape.space, u) })
+    }
+
+    fn points(&self, pair: usize) -> FinePoints<'_> {
+        let Fine { weight, gap, size, bodies, nearest, interpolation, .. } = &self.fine[pair];
+        let soft: f64 = bodies.iter().map(|&body| 1.0 / modulus::<D>(&self.shapes[body].material)).sum();
+        let compliance = size.iter().map(|size| size * soft / std::f64::consts::PI).collect();
+        FinePoints { weight, gap, compliance, nearest, interpolation }
+    }
+
+    fn degree(&self, body: usize) -> usize {
+        self.shapes[body].space.order as usize + 1
+    }
+}
+
+/// E/(1 - nu^2) of a material, from the stresses of a stretch and of a shear along the axes.
+fn modulus<const D: usize>(material: &Material) -> f64 {
+    let unit = |j: usize| {
+        let mut h = [[0.0; D]; D];
+        h[0][j] = 1.0;
+        material.stress(&h)
+    };
+    let (stretch, shear) = (unit(0)[0], unit(1)[3]);
+    4.0 * shear * (stretch - shear) / stretch
+}
+
+struct OnBody<'a, const D: usize> {
+    kept: &'a Kept<D>,
+    shape: &'a Shape<D>,
+    u: &'a [f64],
+    recovery: Recovery<'a, D>,
+}
+
+/// The outer normal of side b is minus that of side a.
+const SIGN: [f64; 2] = [1.0, -1.0];
+
+impl<const D: usize> OnBody<'_, D> {
+    /// Visits the integration points of a side: number, normal, nodes and barycentric coordinates of each.
+    fn visit(&self, pair: usize, side: usize, mut visitor: impl FnMut(usize, [f64; D], &[u32], &[f64; D])) {
+        let fine = &self.kept.fine[pair];
+        let on = &fine.sides[side];
+        for g in 0..fine.weight.len() {
+            visitor(g, fine.normal[g].map(|n| SIGN[side] * n), on.facets.facet(on.facet[g]), &on.at[g]);
+        }
+    }
+}
+
+impl<const D: usize> Recovered for OnBody<'_, D> {
+    fn energy_errors(&self) -> Vec<f64> {
+        self.recovery.energy_errors(&|_, h| self.shape.material.stress(h))
+    }
+
+    fn interpolation_residual(&self) -> Vec<f64> {
+        self.recovery.interpolation_residual(&|_, h| self.shape.material.stress(h))
+    }
+
+    fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
+        let mut values = vec![0.0; self.kept.fine[pair].weight.len()];
+        self.visit(pair, side, |g, normal, nodes, l| {
+            let mut u = self.recovery.bubble(&nodes[..D], l);
+            for (&node, phi) in nodes.iter().zip(element::values(self.shape.space.order, l)) {
+                (0..D).for_each(|c| u[c] += phi * self.u[D * node as usize + c]);
+            }
+            values[g] = (0..D).map(|c| normal[c] * u[c]).sum();
+        });
+        values
+    }
+
+    fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]) {
+        self.visit(pair, side, |g, normal, nodes, l| {
+            for (&node, phi) in nodes.iter().zip(element::values(self.shape.space.order, l)) {
+                (0..D).for_each(|c| r[D * node as usize + c] += force[g] * phi * normal[c]);
+            }
+        });
+    }
+}

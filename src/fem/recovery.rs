@@ -1,0 +1,240 @@
+//! Displacements recovered by patches, and what they tell of the error: polynomial preserving recovery (Zhang and Naga 2005).
+//!
+//! Around each vertex a polynomial of one degree more than the elements is fitted to the nodal displacements. Its gradient
+//! is of higher order than the discrete one on any mesh, at boundaries too; between vertices the polynomials are blended by
+//! the linear hats. Patches end with their body, so nothing is smoothed across a contact. A vertex on the boundary takes two
+//! rings of cells, since one is one-sided.
+
+mod bubble;
+mod patch;
+#[cfg(test)]
+mod tests;
+
+use super::assemble::interpolate;
+use super::element;
+use super::quadrature;
+use super::space::Space;
+use crate::scene::Order;
+use bubble::Bubble;
+use patch::Patch;
+use std::collections::{BTreeSet, HashMap};
+
+/// Stress (xx yy zz xy yz xz) of a displacement gradient at a point.
+pub type Law<'a, const D: usize> = &'a dyn Fn([f64; D], &[[f64; D]; D]) -> [f64; 6];
+
+/// A displacement with the polynomials recovered from it.
+pub struct Recovery<'a, const D: usize> {
+    space: &'a Space<D>,
+    displacement: &'a [f64],
+    /// Polynomial of each vertex; `None` at mid-edge nodes.
+    patches: Vec<Option<Patch<D>>>,
+}
+
+fn add<const D: usize>(sum: &mut [[f64; D]; D], factor: f64, term: &[[f64; D]; D]) {
+    for (sum, term) in sum.iter_mut().flatten().zip(term.iter().flatten()) {
+        *sum += factor * term;
+    }
+}
+
+/// Discrete gradient of a cell at a barycentric point.
+fn gradient_at<const D: usize>(gradient: &[[f64; D]], cell: &[u32], u: &[f64]) -> [[f64; D]; D] {
+    let mut h = [[0.0; D]; D];
+    for (a, &node) in cell.iter().enumerate() {
+        for c in 0..D {
+            for j in 0..D {
+                h[c][j] += u[D * node as usize + c] * gradient[a][j];
+            }
+        }
+    }
+    h
+}
+
+/// sigma(h) : h.
+fn density<const D: usize>(stress: &[f64; 6], h: &[[f64; D]; D]) -> f64 {
+    let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
+    (0..D).flat_map(|i| (0..D).map(move |j| (i, j))).map(|(i, j)| stress[place[i][j]] * h[i][j]).sum()
+}
+
+impl<'a, const D: usize> Recovery<'a, D> {
+    /// Recovers the gradient of the displacement `u`, one entry a dof.
+    pub fn new(space: &'a Space<D>, u: &'a [f64]) -> Self {
+        match D {
+            2 => Self::on::<3>(space, u),
+            _ => Self::on::<4>(space, u),
+        }
+    }
+
+    fn cell(&self, index: usize) -> &'a [u32] {
+        &self.space.cells[index * self.space.stride..(index + 1) * self.space.stride]
+    }
+
+    fn on<const N: usize>(space: &'a Space<D>, u: &'a [f64]) -> Self {
+        let mut recovery = Self { space, displacement: u, patches: Vec::new() };
+        let mut around: Vec<Vec<u32>> = vec![Vec::new(); space.nodes.len()];
+        let mut facets: HashMap<[u32; D], usize> = HashMap::new();
+        for index in 0..space.cell_count() {
+            let cell = recovery.cell(index);
+            for (opposite, &node) in cell[..N].iter().enumerate() {
+                around[node as usize].push(index as u32);
+                let mut key: [u32; D] = std::array::from_fn(|k| cell[if k < opposite { k } else { k + 1 }]);
+                key.sort_unstable();
+                *facets.entry(key).or_default() += 1;
+            }
+        }
+        let mut outer = vec![false; space.nodes.len()];
+        for (key, _) in facets.into_iter().filter(|(_, cells)| *cells == 1) {
+            key.iter().for_each(|&node| outer[node as usize] = true);
+        }
+        let degree = if space.order == Order::P1 { 2 } else { 3 };
+        let patch = |node: usize| {
+            let mut cells: BTreeSet<u32> = around[node].iter().copied().collect();
+            let mut rings = if outer[node] { 2 } else { 1 };
+            loop {
+                while rings > 1 {
+                    let ring: BTreeSet<u32> =
+                        cells.iter().flat_map(|&cell| &recovery.cell(cell as usize)[..N]).copied().collect();
+                    cells.extend(ring.iter().flat_map(|&other| &around[other as usize]));
+                    rings -= 1;
+                }
+                let nodes = cells.iter().flat_map(|&cell| recovery.cell(cell as usize)).copied().collect();
+                let fitted = Patch::fit(space, u, space.nodes[node], &nodes, degree);
+                // a body of few cells: what its nodes determine
+                if fitted.is_some() || cells.len() == space.cell_count() {
+                    let lower = || (0..degree).rev().find_map(|d| Patch::fit(space, u, space.nodes[node], &nodes, d));
+                    return fitted.or_else(lower);
+                }
+                rings = 2;
+            }
+        };
+        let patches = (0..space.nodes.len()).map(|node| if around[node].is_empty() { None } else { patch(node) });
+        recovery.patches = patches.collect();
+        recovery
+    }
+
+    fn patch(&self, node: u32) -> &Patch<D> {
+        match &self.patches[node as usize] {
+            Some(patch) => patch,
+            None => unreachable!("vertices of cells have patches"),
+        }
+    }
+
+    /// Squared energy norm of the difference of recovered and discrete stress on each cell.
+    pub fn energy_errors(&self, law: Law<D>) -> Vec<f64> {
+        match D {
+            2 => self.energy_errors_on::<3>(law),
+            _ => self.energy_errors_on::<4>(law),
+        }
+    }
+
+    fn energy_errors_on<const N: usize>(&self, law: Law<D>) -> Vec<f64> {
+        let rule = quadrature::simplex::<N>(5);
+        let of_cell = |index: usize| {
+            let (cell, x) = (self.cell(index), self.space.cell_nodes(index));
+            let mut sum = 0.0;
+            for (l, weight) in rule.points.iter().zip(&rule.weights) {
+                let Some((gradient, measure)) = element::gradients::<D, N>(self.space.order, &x, l) else { continue };
+                let at = interpolate(&x, &element::values(self.space.order, l));
+                let mut difference = gradient_at(&gradient, cell, self.displacement);
+                difference.iter_mut().flatten().for_each(|h| *h = -*h);
+                for (l, &node) in l.iter().zip(cell) {
+                    add(&mut difference, *l, &self.patch(node).gradient(&at));
+                }
+                sum += weight * measure * density(&law(at, &difference), &difference);
+            }
+            sum
+        };
+        (0..self.space.cell_count()).map(of_cell).collect()
+    }
+
+    /// Residual of the interpolation error: `-int sigma(b) : grad v` for every shape function v, with the b of
+    /// [`Recovery::bubble`].
+    ///
+    /// With b the error of the nodal interpolant, a displacement w with this residual is what the nodal values lack.
+    pub fn interpolation_residual(&self, law: Law<D>) -> Vec<f64> {
+        match D {
+            2 => self.interpolation_residual_on::<3>(law),
+            _ => self.interpolation_residual_on::<4>(law),
+        }
+    }
+
+    fn interpolation_residual_on<const N: usize>(&self, law: Law<D>) -> Vec<f64> {
+        let rule = quadrature::simplex::<N>(5);
+        let mut residual = vec![0.0; self.space.dofs()];
+        let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
+        for index in 0..self.space.cell_count() {
+            let (cell, x) = (self.cell(index), self.space.cell_nodes(index));
+            let bubbles = self.bubbles(&cell[..N]);
+            for (l, weight) in rule.points.iter().zip(&rule.weights) {
+                let Some((gradient, measure)) = element::gradients::<D, N>(self.space.order, &x, l) else { continue };
+                let Some((hats, _)) = element::gradients::<D, N>(Order::P1, &x[..N], l) else { continue };
+                let at = interpolate(&x, &element::values(self.space.order, l));
+                let mut slope = [[0.0; D]; D];
+                for (bubble, coefficient) in &bubbles {
+                    let d = bubble.slopes(l);
+                    for j in 0..D {
+                        let along: f64 = (0..N).map(|k| d[k] * hats[k][j]).sum();
+                        (0..D).for_each(|c| slope[c][j] += coefficient[c] * along);
+                    }
+                }
+                let stress = law(at, &slope);
+                for (a, &node) in cell.iter().enumerate() {
+                    for c in 0..D {
+                        let work: f64 = (0..D).map(|j| stress[place[c][j]] * gradient[a][j]).sum();
+                        residual[D * node as usize + c] -= weight * measure * work;
+                    }
+                }
+            }
+        }
+        residual
+    }
+
+    /// Error of the nodal interpolant at barycentric point `l` of a simplex with these vertices, by the recovered
+    /// derivatives: b with u = I u + b. It has the polynomial degree of the elements and one more, vanishes at all nodes, and is
+    /// continuous.
+    pub fn bubble<const N: usize>(&self, vertices: &[u32], l: &[f64; N]) -> [f64; D] {
+        let mut sum = [0.0; D];
+        for (bubble, coefficient) in self.bubbles(vertices) {
+            let value = bubble.value(l);
+            (0..D).for_each(|c| sum[c] += value * coefficient[c]);
+        }
+        sum
+    }
+
+    /// Functions that vanish at the nodes, with their coefficients, on a simplex with these vertices.
+    fn bubbles(&self, vertices: &[u32]) -> Vec<(Bubble, [f64; D])> {
+        let n = vertices.len();
+        let arm = |from: usize, to: usize| -> [f64; D] {
+            let [x, y] = [from, to].map(|k| self.space.nodes[vertices[k] as usize]);
+            std::array::from_fn(|c| y[c] - x[c])
+        };
+        let mean = |of: &[usize], along: &[[f64; D]]| -> [f64; D] {
+            let mut sum = [0.0; D];
+            for &k in of {
+                let derivative = self.patch(vertices[k]).derivative(along);
+                (0..D).for_each(|c| sum[c] += derivative[c] / of.len() as f64);
+            }
+            sum
+        };
+        let mut all = Vec::new();
+        for i in 0..n {
+            for j in i + 1..n {
+                let e = arm(i, j);
+                if self.space.order == Order::P1 {
+                    // u(s) - linear = -s (1 - s) u''/2 on an edge
+                    all.push((Bubble::Edge(i, j), mean(&[i, j], &[e, e]).map(|d| -0.5 * d)));
+                    continue;
+                }
+                // u(s) - quadratic = s (s - 1/2) (s - 1) u'''/6 on an edge
+                all.push((Bubble::OddEdge(i, j), mean(&[i, j], &[e, e, e]).map(|d| d / 12.0)));
+                for k in j + 1..n {
+                    let (a, b, of) = (arm(k, i), arm(k, j), [i, j, k]);
+                    let third = |x, y, z| mean(&of, &[x, y, z]);
+                    let (aaa, bbb, aab, abb) = (third(a, a, a), third(b, b, b), third(a, a, b), third(a, b, b));
+                    let at_middle = |c: usize| (aaa[c] + bbb[c]) / 6.0 - (aab[c] + abb[c]) / 4.0;
+                    all.push((Bubble::Face(i, j, k), std::array::from_fn(at_middle)));
+                }
+            }
+        }
+        all
+    }
+}
