@@ -65,12 +65,15 @@ fn pressure_of_a_wave() {
         let run = solve_with(case("wavy"), &sets(order, n));
         let table = run.contact();
         let exact = pressure_error(&table, order, |q| 40.0 + 6.350_881_4 * (PI * table["x"][q]).cos());
-        is_effective(run.number("discretization_error/pressure/0"), exact, &format!("P{order}"));
+        let reported = run.number("discretization_error/pressure/0");
+        is_effective(reported, exact, &format!("P{order}"));
+        // the column has the errors that the number sums up, on the safe side by a quarter
+        let summed = pressure_error(&table, order, |q| table["pressure"][q] + table["pressure_error"][q]);
+        assert!((1.25 * summed / reported - 1.0).abs() < 1e-6, "{summed} {reported}");
     }
 }
 
-/// V3b: the pressure of the groove with a kink and an end of contact, against a mesh three times as fine; each point with its
-/// sign where the error is large.
+/// V3b: the pressure of the groove with a kink and an end of contact, against a mesh three times as fine.
 #[test]
 fn pressure_of_a_groove() {
     let with = |order: usize, n: usize, law: &str| {
@@ -89,11 +92,6 @@ fn pressure_of_a_groove() {
             assert!((0..table.rows()).all(|q| (table["x"][q] - fine["x"][step * q]).abs() < 1e-9));
             let error = pressure_error(&table, order, exact);
             is_effective(run.number("discretization_error/pressure/0"), error, &format!("{law} P{order}"));
-            let peak = |x: f64| (3.2..3.3).contains(&x);
-            for q in (0..table.rows()).filter(|&q| order == 1 && peak(table["x"][q])) {
-                let true_error = exact(q) - table["pressure"][q];
-                is_effective(table["pressure_error"][q], true_error, &format!("{law} at {}", table["x"][q]));
-            }
         }
     }
 }
