@@ -1,6 +1,6 @@
 //! The command line: words -> request -> command -> exit code.
 
-use crate::commands::{check, solve, sweep};
+use crate::commands::{bench, check, mesh, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::petsc::Session;
 use crate::solver::options;
@@ -24,6 +24,26 @@ const EXIT_CODES: &str = "Exit codes: 0 converged, 1 not converged (results are 
 
 #[derive(Subcommand)]
 enum Command {
+    #[command(flatten)]
+    Solving(Solving),
+    /// Compare meshes, orders, inner solvers, methods and ranks: time, memory, counts and errors
+    Bench(BenchArgs),
+    /// Make the mesh of a scene, or find it in the cache, and say what is in it
+    Mesh {
+        #[command(flatten)]
+        scene: OverriddenScene,
+        /// File to write: .msh or .vtu
+        #[arg(short, value_name = "FILE")]
+        output: Option<PathBuf>,
+        /// Print it as JSON
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// The commands that need MPI and PETSc.
+#[derive(Subcommand)]
+enum Solving {
     /// Solve a scene and write its results
     Solve {
         #[command(flatten)]
@@ -48,6 +68,80 @@ enum Command {
         #[arg(long, value_name = "KEY=V1,V2,...", required = true)]
         over: Vec<String>,
     },
+}
+
+#[derive(Args)]
+struct OverriddenScene {
+    /// Scene file (TOML)
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+    /// Replace a key of the scene, for example mesh.set.n=64; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+}
+
+#[derive(Args)]
+struct BenchArgs {
+    /// Scene files (TOML)
+    #[arg(value_name = "SCENE", required = true)]
+    scenes: Vec<PathBuf>,
+    /// Folder for the results [default: bench in that of solve]
+    #[arg(short, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Key and its values, for example mesh.set.n=16,32,64; may be repeated
+    #[arg(long, value_name = "KEY=V1,V2,...")]
+    over: Vec<String>,
+    /// Inner solvers: mumps,hypre,... or one string of PETSc options; may be repeated [default: all presets]
+    #[arg(long = "solver", value_name = "LIST|OPTIONS", allow_hyphen_values = true)]
+    solvers: Vec<String>,
+    /// Methods [default: the scene's]
+    #[arg(long = "method", value_name = "LIST", value_delimiter = ',')]
+    methods: Vec<String>,
+    /// Element orders of all bodies [default: the scene's]
+    #[arg(long = "order", value_name = "LIST", value_delimiter = ',')]
+    orders: Vec<usize>,
+    /// Numbers of MPI ranks
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1")]
+    ranks: Vec<usize>,
+    /// Runs of each combination; times are their medians
+    #[arg(long, value_name = "N", default_value = "1")]
+    repeat: usize,
+    /// Contact table, or folder of results, that errors are measured against
+    #[arg(long, value_name = "PATH")]
+    against: Option<PathBuf>,
+    /// Seconds after which a run is ended
+    #[arg(long, value_name = "S", default_value = "3600")]
+    timeout: f64,
+    /// Also measure one linear factor-and-solve of the same bodies
+    #[arg(long)]
+    linear: bool,
+    /// Keep the rows that the folder has already
+    #[arg(long)]
+    resume: bool,
+    /// Replace a key of the scene in all runs; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+}
+
+impl BenchArgs {
+    fn request(self, petsc: Vec<String>) -> bench::Request {
+        bench::Request {
+            scenes: self.scenes,
+            folder: self.output,
+            overrides: self.overrides,
+            over: self.over,
+            solvers: self.solvers,
+            methods: self.methods,
+            orders: self.orders,
+            ranks: self.ranks,
+            repeat: self.repeat,
+            against: self.against,
+            timeout: self.timeout,
+            linear: self.linear,
+            resume: self.resume,
+            petsc,
+        }
+    }
 }
 
 #[derive(Args)]
@@ -78,14 +172,16 @@ impl SceneArgs {
     }
 }
 
+/// Flags of the program that begin with two dashes: with one they look like PETSc's.
+const TWO_DASHES: [&str; 10] =
+    ["-set", "-json", "-method", "-estimate", "-over", "-solver", "-order", "-ranks", "-repeat", "-against"];
+
 /// Runs the program with the words of its command line, the name first; returns the exit code.
 pub fn run(words: Vec<String>) -> i32 {
     let mut words = words.into_iter();
     let name = words.next().unwrap_or_else(|| "winkler".to_owned());
     let (program, petsc) = options::split(words);
-    if let Some(flag) =
-        ["-set", "-json", "-method", "-estimate", "-over"].iter().find(|flag| petsc.iter().any(|word| word == *flag))
-    {
+    if let Some(flag) = TWO_DASHES.iter().find(|flag| petsc.iter().any(|word| word == *flag)) {
         let error = Error::new(Kind::Usage, format!("PETSc knows no option {flag}"));
         return complain(&error.help(format!("did you mean -{flag}?")));
     }
@@ -99,11 +195,24 @@ pub fn run(words: Vec<String>) -> i32 {
             return refusal.exit_code();
         }
     };
-    let session = match Session::start(&petsc) {
+    // these start other programs and need neither MPI nor PETSc
+    let alone = match cli.command {
+        Command::Bench(arguments) => bench::bench(&arguments.request(petsc)),
+        Command::Mesh { scene: OverriddenScene { scene, overrides }, output, json } => {
+            mesh::mesh(&mesh::Request { scene, overrides, output, json })
+        }
+        Command::Solving(command) => return with_session(&petsc, command),
+    };
+    alone.unwrap_or_else(|error| complain(&error))
+}
+
+/// Runs a command that solves.
+fn with_session(petsc: &[String], command: Solving) -> i32 {
+    let session = match Session::start(petsc) {
         Ok(session) => session,
         Err(error) => return complain(&error),
     };
-    match dispatch(&session, cli.command) {
+    match dispatch(&session, command) {
         Ok(code) => code,
         Err(error) if error.is_silent() => error.kind().exit_code(),
         Err(error) => {
@@ -117,17 +226,17 @@ pub fn run(words: Vec<String>) -> i32 {
     }
 }
 
-fn dispatch(session: &Session, command: Command) -> Result<i32> {
+fn dispatch(session: &Session, command: Solving) -> Result<i32> {
     match command {
-        Command::Solve { scene, output } => {
+        Solving::Solve { scene, output } => {
             let overrides = scene.overrides();
             solve::solve(session, solve::Request { scene: scene.scene, folder: output, overrides, json: scene.json })
         }
-        Command::Check { scene } => {
+        Solving::Check { scene } => {
             let overrides = scene.overrides();
             check::check(session, scene.scene, overrides, scene.json)
         }
-        Command::Sweep { scene, output, over } => {
+        Solving::Sweep { scene, output, over } => {
             let overrides = scene.overrides();
             sweep::sweep(
                 session,

@@ -20,7 +20,7 @@ use crate::fem::{
 use crate::linalg::Csr;
 use crate::mesh::Mesh;
 use crate::output::vtu::{BodyField, CellKind};
-use crate::scene::{Order, Scene, Start, Zone};
+use crate::scene::{Scene, Start, Zone};
 use balance::Forces;
 pub use balance::{Balance, Resultant};
 use find::{placed, point};
@@ -356,12 +356,7 @@ fn field_maker<const D: usize>(name: String, space: Rc<Space<D>>, material: Mate
         BodyField {
             name: name.clone(),
             points: space.nodes.iter().map(|&x| contact::pad(x)).collect(),
-            cell: match (D, space.order) {
-                (2, Order::P1) => CellKind::Triangle,
-                (2, Order::P2) => CellKind::QuadraticTriangle,
-                (_, Order::P1) => CellKind::Tetra,
-                (_, Order::P2) => CellKind::QuadraticTetra,
-            },
+            cell: CellKind::simplex(D, space.order.degree()),
             connectivity: space.cells.clone(),
             displacement: u
                 .chunks_exact(D)

@@ -30,7 +30,7 @@ const ROOMS: [&str; 16] = [
 const NARROW: [(&str, &[&str]); 2] = [("ddm", &["error", "linalg", "contact"]), ("output", &["error", "ddm"])];
 
 /// Files that may know the space dimension: those of the first rooms, and the one that picks it.
-const SPATIAL: [&str; 6] = ["scene", "mesh", "fem", "contact", "discretize", "commands/run.rs"];
+const SPATIAL: [&str; 7] = ["scene", "mesh", "fem", "contact", "discretize", "commands/run.rs", "commands/mesh.rs"];
 
 /// Lines that a file may have.
 const LONGEST: usize = 450;

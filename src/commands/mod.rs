@@ -1,8 +1,11 @@
-//! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`]. What they share is in [`run`].
+//! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`], [`bench`], [`mesh`]. What those
+//! that solve share is in [`run`].
 
 mod balance;
+pub mod bench;
 pub mod check;
 pub mod inner;
+pub mod mesh;
 pub mod method;
 pub mod preflight;
 pub mod report;
@@ -13,22 +16,27 @@ pub mod sweep;
 use crate::error::Result;
 use crate::petsc::Session;
 use crate::scene::Scene;
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 
 /// Folder of results: `-o`, else what the scene says, else `results/<case>`.
 pub fn folder_of(scene: &Scene, typed: Option<PathBuf>) -> PathBuf {
-    let stem = scene.path.file_stem().unwrap_or_default();
-    let case = match scene.path.parent().and_then(|parent| parent.file_name()) {
+    typed.or_else(|| scene.output.dir.clone()).unwrap_or_else(|| PathBuf::from("results").join(case_of(&scene.path)))
+}
+
+/// Name of a scene's case: the folder of a file called `scene.toml`, else the file's name.
+fn case_of(path: &Path) -> &OsStr {
+    let stem = path.file_stem().unwrap_or_default();
+    match path.parent().and_then(|parent| parent.file_name()) {
         Some(folder) if stem == "scene" => folder,
         _ => stem,
-    };
-    typed.or_else(|| scene.output.dir.clone()).unwrap_or_else(|| PathBuf::from("results").join(case))
+    }
 }
 
 /// Reads a scene on every rank; a refusal is printed once.
 ///
 /// # Errors
 /// Refusals of the scene.
-pub fn load(session: &Session, path: &std::path::Path, overrides: &[String]) -> Result<Scene> {
+pub fn load(session: &Session, path: &Path, overrides: &[String]) -> Result<Scene> {
     crate::parallel::agree(session, crate::scene::load(path, overrides))
 }

@@ -96,7 +96,7 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
 }
 
 /// One `--over`: key and values. Commas inside brackets, braces, parentheses or quotes do not separate.
-fn axis(text: &str) -> Result<(String, Vec<String>)> {
+pub(super) fn axis(text: &str) -> Result<(String, Vec<String>)> {
     let refuse = || {
         Error::new(Kind::Usage, format!("`--over {text}` is not KEY=V1,V2,..."))
             .help("for example --over method.gamma=0.3,0.6,0.9")
@@ -126,7 +126,7 @@ fn axis(text: &str) -> Result<(String, Vec<String>)> {
     Ok((key.trim().to_owned(), values.into_iter().map(|value| value.trim().to_owned()).collect()))
 }
 
-fn combinations(axes: &[(String, Vec<String>)]) -> Vec<Vec<String>> {
+pub(super) fn combinations(axes: &[(String, Vec<String>)]) -> Vec<Vec<String>> {
     axes.iter().fold(vec![Vec::new()], |runs, (_, values)| {
         runs.iter()
             .flat_map(|run| values.iter().map(move |value| [run.clone(), vec![value.clone()]].concat()))

@@ -12,6 +12,7 @@ mod load;
 mod msh;
 mod nodes;
 mod physical;
+mod quality;
 mod script;
 mod simplex;
 #[cfg(test)]
@@ -19,6 +20,7 @@ mod tests;
 
 pub use load::{Loaded, Origin, load};
 pub use msh::read;
+pub use quality::Quality;
 
 use crate::scene::Order;
 use std::path::PathBuf;

@@ -86,7 +86,10 @@ impl Folder {
 }
 
 /// Writes a whole file or nothing: fills a temporary file beside `path` and renames it.
-pub(super) fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
+///
+/// # Errors
+/// [`Kind::File`](crate::error::Kind::File) with the path and the cause; then nothing was changed.
+pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(path.file_name().unwrap_or_default());
     hidden.push(format!(".{}.part", std::process::id()));

@@ -23,10 +23,10 @@ pub fn say(text: impl std::fmt::Display) {
 }
 
 pub use contact::ContactTable;
-pub use folder::{Folder, safe_name};
+pub use folder::{Folder, safe_name, write_whole};
 pub use format::{sci, seconds};
 pub use history::HistoryWriter;
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, PressureSeries, Series, Style};
 pub use report::{BalanceReport, BodyReport, EstimateReport, ForceReport, InnerTimes, PairReport, Report};
 pub use table::{IterationTable, Verbosity};
-pub use vtu::{BodyField, CellKind};
+pub use vtu::{BodyField, CellKind, Grid};

@@ -21,6 +21,16 @@ pub enum CellKind {
 }
 
 impl CellKind {
+    /// Kind of the simplices of a dimension (2 or 3) and order (1 or 2).
+    pub fn simplex(dimension: usize, order: usize) -> Self {
+        match (dimension, order) {
+            (2, 1) => CellKind::Triangle,
+            (2, _) => CellKind::QuadraticTriangle,
+            (_, 1) => CellKind::Tetra,
+            (_, _) => CellKind::QuadraticTetra,
+        }
+    }
+
     /// Points per cell.
     pub fn stride(self) -> usize {
         match self {
@@ -73,47 +83,19 @@ impl BodyField {
     /// Those of `out`, and `InvalidInput` when the arrays do not fit each other.
     pub fn write(self, out: &mut dyn Write) -> io::Result<()> {
         self.check().map_err(|what| io::Error::new(io::ErrorKind::InvalidInput, what))?;
-        let stride = self.cell.stride();
-        let cells = self.connectivity.len() / stride;
-        let array = |name: &str, components: u32, data: Vec<f64>| {
-            Attribute::DataArray(DataArray {
-                name: name.into(),
-                elem: ElementType::Generic(components),
-                data: data.into(),
-            })
-        };
-        let piece = UnstructuredGridPiece {
-            points: self.points.into_flattened().into(),
-            cells: Cells {
-                cell_verts: VertexNumbers::XML {
-                    connectivity: self.connectivity.into_iter().map(u64::from).collect(),
-                    offsets: (1..=cells).map(|cell| (cell * stride) as u64).collect(),
-                },
-                types: vec![self.cell.vtk(); cells],
-            },
-            data: Attributes {
-                point: vec![
-                    array("displacement", 3, self.displacement.into_flattened()),
-                    array("stress", 6, self.stress.into_flattened()),
-                    array("von_mises", 1, self.von_mises),
-                ],
-                cell: Vec::new(),
-            },
-        };
-        let vtk = Vtk {
-            version: Version::new_xml(1, 0),
+        let grid = Grid {
             title: self.name,
-            byte_order: ByteOrder::native(),
-            data: DataSet::inline(piece),
-            file_path: None,
+            points: self.points,
+            cell: self.cell,
+            connectivity: self.connectivity,
+            at_points: vec![
+                ("displacement".to_owned(), 3, self.displacement.into_flattened()),
+                ("stress".to_owned(), 6, self.stress.into_flattened()),
+                ("von_mises".to_owned(), 1, self.von_mises),
+            ],
+            at_cells: Vec::new(),
         };
-        writeln!(out, r#"<?xml version="1.0"?>"#)?;
-        let mut whole = Whole { out, failure: None };
-        let written = vtk.write_xml(&mut whole);
-        match whole.failure {
-            Some(failure) => Err(failure),
-            None => written.map_err(io::Error::other),
-        }
+        grid.write(out)
     }
 
     /// Says what does not fit: ParaView would crash on it, or show another body's values.
@@ -131,6 +113,64 @@ impl BodyField {
                 Err(format!("body `{}`: a cell has point {last} of {points}", self.name))
             }
             _ => Ok(()),
+        }
+    }
+}
+
+/// A grid of cells of one kind with values at points and cells.
+pub struct Grid {
+    /// Title in the file.
+    pub title: String,
+    /// Points.
+    pub points: Vec<[f64; 3]>,
+    /// Kind of all cells.
+    pub cell: CellKind,
+    /// Point numbers, [`CellKind::stride`] per cell.
+    pub connectivity: Vec<u32>,
+    /// Arrays at the points: name, components, values.
+    pub at_points: Vec<(String, u32, Vec<f64>)>,
+    /// Arrays at the cells: name, components, values.
+    pub at_cells: Vec<(String, u32, Vec<f64>)>,
+}
+
+impl Grid {
+    /// Writes VTK's XML format with binary (base64) data. Arrays must fit the points and cells.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write(self, out: &mut dyn Write) -> io::Result<()> {
+        let stride = self.cell.stride();
+        let cells = self.connectivity.len() / stride;
+        let arrays = |list: Vec<(String, u32, Vec<f64>)>| {
+            let array = |(name, components, data): (String, u32, Vec<f64>)| {
+                Attribute::DataArray(DataArray { name, elem: ElementType::Generic(components), data: data.into() })
+            };
+            list.into_iter().map(array).collect()
+        };
+        let piece = UnstructuredGridPiece {
+            points: self.points.into_flattened().into(),
+            cells: Cells {
+                cell_verts: VertexNumbers::XML {
+                    connectivity: self.connectivity.into_iter().map(u64::from).collect(),
+                    offsets: (1..=cells).map(|cell| (cell * stride) as u64).collect(),
+                },
+                types: vec![self.cell.vtk(); cells],
+            },
+            data: Attributes { point: arrays(self.at_points), cell: arrays(self.at_cells) },
+        };
+        let vtk = Vtk {
+            version: Version::new_xml(1, 0),
+            title: self.title,
+            byte_order: ByteOrder::native(),
+            data: DataSet::inline(piece),
+            file_path: None,
+        };
+        writeln!(out, r#"<?xml version="1.0"?>"#)?;
+        let mut whole = Whole { out, failure: None };
+        let written = vtk.write_xml(&mut whole);
+        match whole.failure {
+            Some(failure) => Err(failure),
+            None => written.map_err(io::Error::other),
         }
     }
 }

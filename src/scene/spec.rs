@@ -72,6 +72,16 @@ pub enum Order {
     P2,
 }
 
+impl Order {
+    /// Polynomial degree: 1 or 2.
+    pub fn degree(self) -> usize {
+        match self {
+            Order::P1 => 1,
+            Order::P2 => 2,
+        }
+    }
+}
+
 /// A body: a named group of cells, its material, supports and loads.
 #[derive(Debug, Clone)]
 pub struct BodySpec {

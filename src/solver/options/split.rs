@@ -36,12 +36,14 @@ pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<Strin
 
 /// A scene file or a command: never meant as the value of an option.
 fn is_ours(word: &str) -> bool {
-    word.ends_with(".toml") || ["solve", "check", "sweep"].contains(&word)
+    word.ends_with(".toml") || ["solve", "check", "sweep", "bench", "mesh"].contains(&word)
 }
 
-/// One dash, then two or more signs of which the first is a letter.
+/// One dash, then two or more signs of which the first is a letter; a whole string of options (for `bench --solver`) is
+/// none.
 fn is_petsc(word: &str) -> bool {
-    word.strip_prefix('-').is_some_and(|bare| bare.starts_with(|c: char| c.is_ascii_alphabetic()) && bare.len() >= 2)
+    let bare = word.strip_prefix('-').filter(|bare| bare.len() >= 2 && !bare.contains(char::is_whitespace));
+    bare.is_some_and(|bare| bare.starts_with(|c: char| c.is_ascii_alphabetic()))
 }
 
 /// A dash and a letter, or two dashes.
@@ -68,5 +70,8 @@ mod tests {
         check("-1e-3 - -o", "-1e-3 - -o", "");
         check("-ksp_type cg -- -ksp_type x", "-- -ksp_type x", "-ksp_type cg");
         check("-ksp_monitor", "", "-ksp_monitor");
+        check("-ksp_monitor bench", "bench", "-ksp_monitor");
+        let string = ["--solver", "-ksp_type cg -pc_type icc"].map(String::from);
+        assert_eq!(split(string.clone()), (string.to_vec(), Vec::new()));
     }
 }

@@ -1,0 +1,158 @@
+//! The plots of a benchmark.
+
+use super::plan::{Plan, part};
+use super::table::{Row, Table};
+use crate::output::{Axis, Color, Plot, Series, Style};
+
+/// All plots that the rows have numbers for, with their file names; those of several scenes have the scene in it.
+pub(super) fn all(table: &Table, plan: &Plan) -> Vec<(String, Plot)> {
+    let mut plots = Vec::new();
+    for (name, scene) in plan.names.iter().zip(&plan.scenes) {
+        let rows: Vec<&Row> =
+            table.rows.iter().filter(|row| row.key[0] == *name && row.is_good() && !row.is_linear()).collect();
+        let stem =
+            |what: &str| if plan.scenes.len() == 1 { format!("{what}.svg") } else { format!("{what}-{name}.svg") };
+        let chart = Chart { rows: &rows, plan, title: &scene.title };
+        let list = [
+            ("time-error", chart.time_error()),
+            ("time-dofs", chart.against_dofs("seconds", "wall time, s")),
+            ("memory-dofs", chart.against_dofs("memory_mb", "peak memory, MB")),
+            ("iterations-theta", chart.iterations_theta()),
+        ];
+        plots.extend(list.into_iter().filter_map(|(what, plot)| Some((stem(what), plot?))));
+    }
+    plots
+}
+
+/// The rows of one scene.
+struct Chart<'a> {
+    rows: &'a [&'a Row],
+    plan: &'a Plan,
+    title: &'a str,
+}
+
+/// Rows of one curve, by a name made of the parts of their keys that differ.
+type Curve<'a> = (String, Vec<&'a Row>);
+
+impl Chart<'_> {
+    /// Rows that differ in the columns that `along` picks only, as curves.
+    fn curves(&self, along: impl Fn(&str) -> bool) -> Vec<Curve<'_>> {
+        let columns = self.plan.columns();
+        let kept: Vec<usize> = (1..columns.len()).filter(|&column| !along(&columns[column])).collect();
+        let differs = |column: usize| self.rows.iter().any(|row| row.key[column] != self.rows[0].key[column]);
+        let named: Vec<usize> = kept.iter().copied().filter(|&column| differs(column)).collect();
+        let mut curves: Vec<(Vec<&str>, Curve)> = Vec::new();
+        for row in self.rows {
+            let key: Vec<&str> = kept.iter().map(|&column| row.key[column].as_str()).collect();
+            if let Some((_, (_, rows))) = curves.iter_mut().find(|(known, _)| *known == key) {
+                rows.push(row);
+                continue;
+            }
+            let parts: Vec<String> = named.iter().map(|&column| part(&columns[column], &row.key[column])).collect();
+            let name = if parts.is_empty() { row.key[columns.len() - 4].clone() } else { parts.join(", ") };
+            curves.push((key, (name, vec![row])));
+        }
+        curves.into_iter().map(|(_, curve)| curve).collect()
+    }
+
+    fn plot(&self, x: &str, y: &str, series: Vec<Series>) -> Option<Plot> {
+        let axis = |label: &str| Axis { label: label.to_owned(), log: true };
+        let has_points = series.iter().any(|series| !series.points.is_empty());
+        has_points.then(|| Plot { title: self.title.to_owned(), x: axis(x), y: axis(y), series })
+    }
+
+    /// Time against error: who reaches an accuracy first. The dashed line joins the runs that no other one beats in both.
+    fn time_error(&self) -> Option<Plot> {
+        let mut series =
+            self.series(is_of_mesh, |row| Some((row.number("error")?, row.number("seconds")?)), |_| String::new());
+        let all: Vec<(f64, f64)> = series.iter().flat_map(|series| series.points.iter().copied()).collect();
+        let front = Series::new("Pareto front", pareto(all), Style::Dashed).color(Color::Grey);
+        series.push(front);
+        let of = self.rows.iter().map(|row| row.error_of.as_str()).find(|of| !of.is_empty())?;
+        self.plot(&format!("relative error ({of})"), "wall time, s", series)
+    }
+
+    /// A number against the dofs, with the exponent of the power that fits it.
+    fn against_dofs(&self, name: &str, label: &str) -> Option<Plot> {
+        let slope =
+            |points: &[(f64, f64)]| exponent(points).map_or(String::new(), |slope| format!(" (dofs^{slope:.2})"));
+        let series = self.series(is_of_mesh, |row| Some((row.number("dofs")?, row.number(name)?)), slope);
+        self.plot("degrees of freedom", label, series)
+    }
+
+    /// Sweeps against the coupling of the bodies, where it was varied.
+    fn iterations_theta(&self) -> Option<Plot> {
+        let is_over = |column: &str| !is_of_mesh(column) && self.plan.keys.iter().any(|key| key == column);
+        let point = |row: &Row| Some((1.0 / (1.0 - row.number("theta")?), row.number("sweeps")?));
+        let series = self.series(is_over, point, |_| String::new());
+        let varied = |series: &Series| series.points.windows(2).any(|pair| pair[1].0 > pair[0].0);
+        if !series.iter().any(varied) {
+            return None;
+        }
+        self.plot("1 / (1 - theta)", "sweeps", series)
+    }
+
+    /// A curve of points for each group of rows, sorted by x; `more` is added to its name.
+    fn series(
+        &self,
+        along: impl Fn(&str) -> bool,
+        point: impl Fn(&Row) -> Option<(f64, f64)>,
+        more: impl Fn(&[(f64, f64)]) -> String,
+    ) -> Vec<Series> {
+        let curve = |(name, rows): Curve| {
+            let mut points: Vec<(f64, f64)> = rows.into_iter().filter_map(&point).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let label = name + &more(&points);
+            Series::new(label, points, Style::LineMarkers)
+        };
+        self.curves(along).into_iter().map(curve).filter(|series| !series.points.is_empty()).collect()
+    }
+}
+
+fn is_of_mesh(column: &str) -> bool {
+    column.starts_with("mesh.")
+}
+
+/// The points that no other one is below in both coordinates, sorted by the first.
+fn pareto(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let mut front: Vec<(f64, f64)> = Vec::new();
+    for point in points {
+        if front.last().is_none_or(|last| point.1 < last.1) {
+            front.push(point);
+        }
+    }
+    front
+}
+
+/// Exponent of the power law through points by least squares of the logarithms; `None` if they share one place.
+fn exponent(points: &[(f64, f64)]) -> Option<f64> {
+    let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+    let count = logs.len() as f64;
+    let mean = logs.iter().fold((0.0, 0.0), |sum, log| (sum.0 + log.0 / count, sum.1 + log.1 / count));
+    let (mut xx, mut xy) = (0.0, 0.0);
+    for (x, y) in logs {
+        xx += (x - mean.0).powi(2);
+        xy += (x - mean.0) * (y - mean.1);
+    }
+    let slope = xy / xx;
+    (xx > 1e-12 && slope.is_finite()).then_some(slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_is_what_nothing_beats() {
+        let points = vec![(1.0, 9.0), (2.0, 5.0), (3.0, 6.0), (2.0, 7.0), (4.0, 1.0)];
+        assert_eq!(pareto(points), [(1.0, 9.0), (2.0, 5.0), (4.0, 1.0)]);
+    }
+
+    #[test]
+    fn a_power_law_has_its_exponent() {
+        let points: Vec<(f64, f64)> = [1.0, 2.0, 5.0, 9.0].iter().map(|&x: &f64| (x, 3.0 * x.powf(1.5))).collect();
+        assert!(exponent(&points).is_some_and(|slope| (slope - 1.5).abs() < 1e-12));
+        assert_eq!(exponent(&[(2.0, 1.0), (2.0, 3.0)]), None);
+    }
+}

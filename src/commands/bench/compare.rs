@@ -1,0 +1,211 @@
+//! Error of a contact pressure: against a table, or against the closed form of the scene.
+
+use super::plan::Plan;
+use super::usage;
+use crate::error::{Error, Kind, Result};
+use crate::scene::Scene;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+use std::path::{Path, PathBuf};
+
+/// Contact points of one pair with their weights and pressures, in the order of the file.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Points {
+    /// File without its folder.
+    name: String,
+    at: Vec<[f64; 3]>,
+    weight: Vec<f64>,
+    pressure: Vec<f64>,
+}
+
+/// What `--against` names.
+#[derive(Default)]
+pub(super) struct References(Vec<Points>);
+
+impl References {
+    /// Reads a contact table, or all tables of a folder of results.
+    ///
+    /// # Errors
+    /// Files that cannot be read, several scenes, one table for several pairs.
+    pub fn read(path: Option<&Path>, plan: &Plan) -> Result<Self> {
+        let Some(path) = path else { return Ok(Self::default()) };
+        let [scene] = &plan.scenes[..] else {
+            return Err(usage("`--against` goes with one scene"));
+        };
+        let found = if path.is_dir() { tables(path)? } else { vec![Points::read(path)?] };
+        if found.len() != scene.contacts.len() {
+            let help = "give the folder of results of the same scene, or the table of its only pair";
+            let message = format!(
+                "{} has {} contact tables, the scene {} pairs",
+                path.display(),
+                found.len(),
+                scene.contacts.len()
+            );
+            return Err(usage(message).help(help));
+        }
+        Ok(Self(found))
+    }
+
+    /// Relative error of the pressures of a run; `None` without `--against`.
+    pub fn error(&self, scene: &Scene, run: &[Points]) -> Option<f64> {
+        (!self.0.is_empty()).then(|| difference(scene.dimension.value, run, &self.0))?
+    }
+}
+
+/// The contact tables in a folder of results, by their names.
+///
+/// # Errors
+/// A folder or table that cannot be read.
+pub(super) fn tables(folder: &Path) -> Result<Vec<Points>> {
+    let entries = std::fs::read_dir(folder).map_err(|cause| Error::file(folder, "read", &cause))?;
+    let is_table = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("contact-") && name.ends_with(".csv")
+    };
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).filter(is_table).collect();
+    paths.sort();
+    paths.iter().map(|path| Points::read(path)).collect()
+}
+
+impl Points {
+    fn read(path: &Path) -> Result<Self> {
+        let refuse = |why: String| {
+            Error::new(Kind::File, format!("{} is no contact table: {why}", path.display()))
+                .help("it needs the columns x, y, z and pressure of a contact-*.csv")
+        };
+        let mut file = csv::Reader::from_path(path).map_err(|cause| refuse(cause.to_string()))?;
+        let header = file.headers().map_err(|cause| refuse(cause.to_string()))?.clone();
+        let place = |name: &str| header.iter().position(|column| column == name);
+        let columns = ["x", "y", "z", "pressure"]
+            .map(|name| place(name).ok_or_else(|| refuse(format!("there is no column `{name}`"))));
+        let [x, y, z, p] = columns;
+        let (places, weight) = ([x?, y?, z?, p?], place("weight"));
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut points = Self { name, ..Self::default() };
+        for record in file.records() {
+            let record = record.map_err(|cause| refuse(cause.to_string()))?;
+            let number = |column: usize| {
+                record[column].parse::<f64>().map_err(|_| refuse(format!("`{}` is no number", &record[column])))
+            };
+            points.at.push([number(places[0])?, number(places[1])?, number(places[2])?]);
+            points.pressure.push(number(places[3])?);
+            points.weight.push(weight.map_or(Ok(1.0), number)?);
+        }
+        Ok(points)
+    }
+}
+
+/// Relative error in L2 of the pressures of a run against those of another one, over all pairs; `None` where they cannot be
+/// compared.
+pub(super) fn difference(dimension: usize, run: &[Points], reference: &[Points]) -> Option<f64> {
+    if run.len() != reference.len() {
+        return None;
+    }
+    let mut sums = (0.0, 0.0);
+    for own in run {
+        // tables of the same pair, or the only two
+        let other = reference.iter().find(|other| other.name == own.name || reference.len() == 1)?;
+        let known: Vec<f64> = match dimension {
+            2 => own.at.iter().map(|x| along(other, x)).collect(),
+            _ => over(other, &own.at),
+        };
+        add(&mut sums, own, &known);
+    }
+    relative(sums)
+}
+
+/// Relative error in L2 of the pressures of a run against the `reference` of its contacts; `None` where one has none.
+pub(super) fn closed_form(scene: &Scene, run: &[Points]) -> Option<f64> {
+    let mut sums = (0.0, 0.0);
+    // a scene with several pairs would need to know which table is whose
+    let ([contact], [own]) = (&scene.contacts[..], run) else { return None };
+    let field = contact.reference.as_ref()?;
+    let known: Vec<f64> = own.at.iter().map(|&x| field.eval(x)).collect();
+    add(&mut sums, own, &known);
+    relative(sums)
+}
+
+fn add(sums: &mut (f64, f64), own: &Points, known: &[f64]) {
+    for q in 0..known.len() {
+        sums.0 += own.weight[q] * (own.pressure[q] - known[q]).powi(2);
+        sums.1 += own.weight[q] * known[q].powi(2);
+    }
+}
+
+fn relative((error, whole): (f64, f64)) -> Option<f64> {
+    let relative = (error / whole).sqrt();
+    relative.is_finite().then_some(relative)
+}
+
+/// Pressure of a curve of points at the foot of `x` on it, linear between neighbours.
+fn along(curve: &Points, x: &[f64; 3]) -> f64 {
+    let mut best = (f64::INFINITY, curve.pressure.first().copied().unwrap_or(f64::NAN));
+    for q in 1..curve.at.len() {
+        let (a, b) = (curve.at[q - 1], curve.at[q]);
+        let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+        let to = |to: &[f64; 3]| -> [f64; 3] { std::array::from_fn(|c| to[c] - a[c]) };
+        let edge = to(&b);
+        let s = (dot(to(x), edge) / dot(edge, edge)).clamp(0.0, 1.0);
+        let foot: [f64; 3] = std::array::from_fn(|c| a[c] + s * edge[c] - x[c]);
+        let distance = dot(foot, foot);
+        if distance < best.0 {
+            best = (distance, (1.0 - s) * curve.pressure[q - 1] + s * curve.pressure[q]);
+        }
+    }
+    best.1
+}
+
+/// Points that a plane is fitted through.
+const NEIGHBOURS: usize = 8;
+
+/// Pressures of scattered points of a surface at places on it: the plane of least squares through the nearest points, near
+/// ones with more weight.
+fn over(surface: &Points, places: &[[f64; 3]]) -> Vec<f64> {
+    let points = surface.at.iter().zip(&surface.pressure);
+    let tree = RTree::bulk_load(points.map(|(&x, &p)| GeomWithData::new(x, p)).collect());
+    let at = |x: &[f64; 3]| {
+        let near: Vec<_> = tree.nearest_neighbor_iter_with_distance_2(*x).take(NEIGHBOURS).collect();
+        let Some(&(_, far)) = near.last() else { return f64::NAN };
+        let weight = |distance: f64| 1.0 / (distance + 1e-20 * far).max(f64::MIN_POSITIVE).sqrt();
+        let row = |k: usize| -> [f64; 4] {
+            let y = near[k].0.geom();
+            [1.0, y[0] - x[0], y[1] - x[1], y[2] - x[2]].map(|value| weight(near[k].1) * value)
+        };
+        let matrix = nalgebra::DMatrix::from_fn(near.len(), 4, |k, c| row(k)[c]);
+        let right = nalgebra::DVector::from_fn(near.len(), |k, _| weight(near[k].1) * near[k].0.data);
+        let svd = matrix.svd(true, true);
+        let small = 1e-9 * svd.singular_values.max();
+        svd.solve(&right, small).map_or(f64::NAN, |plane| plane[0])
+    };
+    places.iter().map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(at: Vec<[f64; 3]>, p: impl Fn(&[f64; 3]) -> f64) -> Points {
+        Points { name: String::new(), weight: vec![1.0; at.len()], pressure: at.iter().map(p).collect(), at }
+    }
+
+    #[test]
+    fn a_linear_pressure_is_met_between_the_points() {
+        let p = |x: &[f64; 3]| 3.0 + 2.0 * x[0];
+        let curve = points((0..5).map(|k| [f64::from(k), 0.0, 0.0]).collect(), p);
+        let between = points(vec![[0.5, 0.1, 0.0], [3.25, 0.0, 0.0]], p);
+        let error = difference(2, &[between.clone()], &[curve.clone()]);
+        assert!(error.is_some_and(|error| error < 1e-15), "{error:?}");
+        let off = points(between.at.clone(), |x| 1.01 * p(x));
+        let error = difference(2, &[off], &[curve]).expect("an error");
+        assert!((error - 0.01).abs() < 1e-12, "{error}");
+    }
+
+    #[test]
+    fn a_linear_pressure_is_met_on_a_surface() {
+        let p = |x: &[f64; 3]| 1.0 + x[0] - 0.5 * x[1];
+        let grid = (0..36).map(|k| [f64::from(k % 6), f64::from(k / 6), 2.0]).collect();
+        let own = points(vec![[2.3, 1.7, 2.0], [3.0, 3.0, 2.0], [0.1, 4.9, 2.0]], p);
+        let error = difference(3, &[own], &[points(grid, p)]).expect("an error");
+        assert!(error < 1e-9, "{error}");
+    }
+}

@@ -1,0 +1,157 @@
+//! `winkler bench`: a scene by every mesh, order, inner solver, method and number of ranks that was asked for, each in a
+//! process of its own; times, memory, counts and errors as a table and plots.
+
+mod charts;
+mod compare;
+mod errors;
+mod plan;
+mod process;
+mod table;
+
+use super::folder_of;
+use crate::error::{Error, Kind, Result};
+use crate::output::{Folder, say};
+use crate::scene::Scene;
+use indicatif::{ProgressBar, ProgressStyle};
+use plan::{Case, Plan};
+use process::Runner;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use table::{Row, Table};
+
+/// What the user typed.
+pub struct Request {
+    /// Scene files.
+    pub scenes: Vec<PathBuf>,
+    /// Folder of results, if typed.
+    pub folder: Option<PathBuf>,
+    /// Overrides of scene keys for every run.
+    pub overrides: Vec<String>,
+    /// `KEY=V1,V2,...`; several make all combinations.
+    pub over: Vec<String>,
+    /// Inner solvers: names of presets with commas between, or one string of PETSc options each.
+    pub solvers: Vec<String>,
+    /// Methods; none for the scene's own.
+    pub methods: Vec<String>,
+    /// Element orders; none for the scene's own.
+    pub orders: Vec<usize>,
+    /// Numbers of ranks.
+    pub ranks: Vec<usize>,
+    /// Runs of each combination.
+    pub repeat: usize,
+    /// Contact table, or folder of them, that errors are measured against.
+    pub against: Option<PathBuf>,
+    /// Seconds after which a run is ended.
+    pub timeout: f64,
+    /// Whether to measure one linear factor-and-solve of the bodies, too.
+    pub linear: bool,
+    /// Whether rows that the folder has already are kept.
+    pub resume: bool,
+    /// PETSc options for every run.
+    pub petsc: Vec<String>,
+}
+
+/// Runs all combinations, writes `bench.csv` row by row and the plots at the end; returns the exit code: 1 if a run did
+/// not converge, was refused or did not end in time.
+///
+/// # Errors
+/// Command lines that make no sense, scenes that cannot be read, a folder that cannot be written. What goes wrong in a
+/// run is a row.
+pub fn bench(request: &Request) -> Result<i32> {
+    let is_one_of_many = |name| std::env::var(name).is_ok_and(|size| size.parse::<usize>().is_ok_and(|size| size > 1));
+    if ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].into_iter().any(is_one_of_many) {
+        return Err(usage("`bench` starts the ranks of its runs itself").help("`--ranks 1,2` instead of mpiexec"));
+    }
+    let plan = Plan::new(request)?;
+    let folder = Folder::create(folder(request, &plan))?;
+    let reference = compare::References::read(request.against.as_deref(), &plan)?;
+    let mut table = Table::open(&folder, &plan, request)?;
+    let runner = Runner::new(request, folder.path())?;
+    let bar = progress(plan.cases.len());
+    let mut meshed = BTreeSet::new();
+    for case in &plan.cases {
+        bar.set_message(case.label());
+        let kept = table.kept(case);
+        let is_new = kept.is_none();
+        let row = match kept {
+            Some(row) => row,
+            None => measure(case, &runner, &reference, &mut meshed)?,
+        };
+        bar.suspend(|| say(row.line(&case.label(), is_new)));
+        table.add(row)?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    errors::against_finest(&mut table, &plan);
+    table.compare_with_linear();
+    table.rewrite()?;
+    for (name, plot) in charts::all(&table, &plan) {
+        folder.write(&name, |out| plot.write(out))?;
+    }
+    say(format_args!("results in {}", folder.path().display()));
+    Ok(i32::from(!table.rows.iter().all(Row::is_good)))
+}
+
+fn folder(request: &Request, plan: &Plan) -> PathBuf {
+    match (&request.folder, &plan.scenes[..]) {
+        (Some(folder), _) => folder.clone(),
+        (None, [scene]) => folder_of(scene, None).join("bench"),
+        (None, _) => PathBuf::from("results/bench"),
+    }
+}
+
+fn progress(runs: usize) -> ProgressBar {
+    let bar = ProgressBar::new(runs as u64);
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len}, {elapsed} gone, {eta} left: {wide_msg}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// One row: as many runs as asked for, and what they say.
+fn measure(
+    case: &Case,
+    runner: &Runner,
+    reference: &compare::References,
+    meshed: &mut BTreeSet<Vec<String>>,
+) -> Result<Row> {
+    let scene = match crate::scene::load(&case.scene, &case.overrides) {
+        Ok(scene) => scene,
+        Err(error) => return Ok(Row::refused(case, &error)),
+    };
+    // Gmsh works before the clock starts
+    if meshed.insert(case.mesh_overrides.clone()) {
+        runner.mesh(case)?;
+    }
+    let runs = runner.repeat(case)?;
+    let mut row = Row::new(case, &runs);
+    if row.is_good() && !case.is_linear() {
+        if let Some((error, what)) = known_error(&scene, &row, reference, runner, case) {
+            row.set_error(error, what);
+        }
+    }
+    Ok(row)
+}
+
+/// Error of a run against what is known beforehand: `--against`, or the closed form of the scene.
+fn known_error(
+    scene: &Scene,
+    row: &Row,
+    reference: &compare::References,
+    runner: &Runner,
+    case: &Case,
+) -> Option<(f64, &'static str)> {
+    let tables = compare::tables(&runner.folder(case)).ok()?;
+    if let Some(error) = reference.error(scene, &tables) {
+        return Some((error, "pressure, --against"));
+    }
+    if let Some(error) = row.displacement_error() {
+        return Some((error, "displacement, exact"));
+    }
+    Some((compare::closed_form(scene, &tables)?, "pressure, reference"))
+}
+
+/// A refusal of the command line.
+fn usage(message: impl Into<String>) -> Error {
+    Error::new(Kind::Usage, message)
+}

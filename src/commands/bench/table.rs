@@ -1,0 +1,373 @@
+//! The rows of a benchmark, in memory and in `bench.csv`.
+
+use super::Request;
+use super::plan::{Case, LINEAR, Plan};
+use super::process::{RUNS, Run};
+use crate::error::{Error, Result};
+use crate::output::{Folder, sci, seconds};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::PathBuf;
+
+/// Columns with a number, after the key, `runs`, `status` and `message`.
+pub(super) const NUMBERS: [&str; 25] = [
+    "dofs",
+    "points",
+    "theta",
+    "seconds",
+    "spread",
+    "mesh_seconds",
+    "discretize_seconds",
+    "set_up_seconds",
+    "iterate_seconds",
+    "factor_seconds",
+    "solve_seconds",
+    "cpu_seconds",
+    "memory_mb",
+    "iterations",
+    "sweeps",
+    "inner_iterations",
+    "factorizations",
+    "dense_factorizations",
+    "residual",
+    "peak_pressure",
+    "linear_seconds",
+    "linear_solves",
+    "error",
+    "error_h1",
+    "error_energy",
+];
+
+/// One combination and what was measured.
+#[derive(Debug, Clone)]
+pub(super) struct Row {
+    /// Columns of the plan.
+    pub key: Vec<String>,
+    runs: usize,
+    /// How it ended.
+    pub status: String,
+    message: String,
+    numbers: BTreeMap<&'static str, f64>,
+    /// What the error is measured in and against; empty without an error.
+    pub error_of: String,
+    /// Error of the displacements that the run itself told.
+    displacement_error: Option<f64>,
+}
+
+/// All rows and their file.
+pub(super) struct Table<'a> {
+    folder: &'a Folder,
+    columns: Vec<String>,
+    /// Rows so far.
+    pub rows: Vec<Row>,
+    /// Rows of an earlier benchmark that are kept.
+    old: Vec<Row>,
+    file: csv::Writer<File>,
+}
+
+/// The file of the rows.
+const FILE: &str = "bench.csv";
+/// What the rows of the folder were made with.
+const SETTINGS: &str = "bench.txt";
+
+impl Row {
+    /// The row of some runs of a case: times are medians, counts those of the first run, which all share.
+    pub fn new(case: &Case, runs: &[Run]) -> Self {
+        let worst = runs.iter().find(|run| !is_good(&run.status));
+        let Some(first) = worst.or(runs.first()) else {
+            return Self::empty(case, "failed", "nothing was run");
+        };
+        // such a run stops at its one update, as it should
+        let linear = case.is_linear() && first.status == "iteration-limit";
+        let (status, message) = if linear {
+            (LINEAR, "one factorisation and one solve")
+        } else {
+            (first.status.as_str(), first.message.as_str())
+        };
+        let mut row = Self::empty(case, status, message);
+        row.runs = runs.len();
+        let mut put = |name: &'static str, of: &dyn Fn(&Run) -> Option<f64>| {
+            let values: Vec<f64> = runs.iter().filter_map(of).filter(|value| value.is_finite()).collect();
+            if let Some(middle) = median(values) {
+                row.numbers.insert(name, middle);
+            }
+        };
+        put("seconds", &|run| Some(run.seconds));
+        put("cpu_seconds", &|run| Some(run.cpu));
+        put("memory_mb", &|run| Some(run.memory as f64 / 1e6));
+        let at = |run: &Run, path: &str| run.report.pointer(path).and_then(Value::as_f64);
+        for (name, path) in [
+            ("mesh_seconds", "/times/mesh"),
+            ("discretize_seconds", "/times/discretize"),
+            ("set_up_seconds", "/times/set-up"),
+            ("iterate_seconds", "/times/iterate"),
+            ("factor_seconds", "/inner_times/factor"),
+            ("solve_seconds", "/inner_times/solve"),
+        ] {
+            put(name, &|run| at(run, path));
+        }
+        for (name, path) in [
+            ("dofs", "/dofs"),
+            ("iterations", "/iterations"),
+            ("sweeps", "/sweeps"),
+            ("inner_iterations", "/inner_iterations"),
+            ("factorizations", "/factorizations"),
+            ("dense_factorizations", "/dense_factorizations"),
+            ("residual", "/residual"),
+        ] {
+            row.numbers.extend(at(first, path).map(|value| (name, value)));
+        }
+        let pairs = first.report["pairs"].as_array().map_or(&[][..], Vec::as_slice);
+        if !pairs.is_empty() {
+            let of = |pair: &Value, key: &str| pair[key].as_f64().unwrap_or(f64::NAN);
+            let theta = |pair: &Value| {
+                let both = pair["theta"].as_array().map_or(&[][..], Vec::as_slice);
+                both.iter().filter_map(Value::as_f64).product::<f64>().sqrt()
+            };
+            row.numbers.insert("points", pairs.iter().map(|pair| of(pair, "points")).sum());
+            row.numbers.insert("theta", pairs.iter().map(theta).fold(0.0, f64::max));
+            row.numbers.insert("peak_pressure", pairs.iter().map(|pair| of(pair, "peak_pressure")).fold(0.0, f64::max));
+        }
+        let times: Vec<f64> = runs.iter().map(|run| run.seconds).collect();
+        if let (true, Some(middle)) = (runs.len() > 1, median(times.clone())) {
+            let (low, high) = times.iter().fold((f64::MAX, 0.0f64), |(low, high), &t| (low.min(t), high.max(t)));
+            row.numbers.insert("spread", (high - low) / middle);
+        }
+        if case.is_linear() {
+            let body_solves = at(first, "/body_solves").unwrap_or(0.0);
+            let bodies = first.report["bodies"].as_array().map_or(0, Vec::len) as f64;
+            let each = |time: &str, count: f64| row.number(time).map_or(f64::NAN, |time| time / count * bodies);
+            let linear = each("factor_seconds", row.number("factorizations").unwrap_or(0.0))
+                + each("solve_seconds", body_solves);
+            row.numbers.extend(linear.is_finite().then_some(("linear_seconds", linear)));
+        }
+        // of the bodies that have a closed form, the worst
+        let bodies = first.report["bodies"].as_array().map_or(&[][..], Vec::as_slice);
+        let worst = |key: &str| bodies.iter().filter_map(|body| body[key].as_f64()).reduce(f64::max);
+        row.displacement_error = worst("error_l2");
+        for name in ["error_h1", "error_energy"] {
+            row.numbers.extend(worst(name).map(|error| (name, error)));
+        }
+        row
+    }
+
+    /// The row of a case whose scene is refused.
+    pub fn refused(case: &Case, error: &Error) -> Self {
+        let message = match error.advice() {
+            Some(help) => format!("error: {}; help: {help}", error.message()),
+            None => format!("error: {}", error.message()),
+        };
+        Self::empty(case, "refused", &message)
+    }
+
+    fn empty(case: &Case, status: &str, message: &str) -> Self {
+        Self {
+            key: case.key.clone(),
+            runs: 0,
+            status: status.to_owned(),
+            message: message.to_owned(),
+            numbers: BTreeMap::new(),
+            error_of: String::new(),
+            displacement_error: None,
+        }
+    }
+
+    /// Whether the run came to its end as it should.
+    pub fn is_good(&self) -> bool {
+        is_good(&self.status)
+    }
+
+    /// Whether it is one linear factor-and-solve.
+    pub fn is_linear(&self) -> bool {
+        self.status == LINEAR
+    }
+
+    /// A measured number.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.numbers.get(name).copied()
+    }
+
+    /// Sets the error and what it is measured in and against.
+    pub fn set_error(&mut self, error: f64, what: &str) {
+        self.numbers.insert("error", error);
+        self.error_of = what.to_owned();
+    }
+
+    /// Relative error of the displacements, where the scene has their closed form.
+    pub fn displacement_error(&self) -> Option<f64> {
+        self.displacement_error
+    }
+
+    /// The row as a line for the terminal.
+    pub fn line(&self, label: &str, is_new: bool) -> String {
+        let number = |name: &str| self.number(name);
+        let mut line = format!("{label}: {}", self.status);
+        if !self.is_good() && !self.message.is_empty() {
+            line += &format!(" ({})", self.message);
+        }
+        if let Some(time) = number("seconds") {
+            line += &format!(", {} s", seconds(time));
+        }
+        if let (Some(dofs), Some(sweeps)) = (number("dofs"), number("sweeps")) {
+            line += &format!(", {dofs} dofs, {sweeps} sweeps");
+        }
+        if let Some(error) = number("error") {
+            line += &format!(", error {}", sci(error, 2));
+        }
+        if is_new { line } else { line + " (kept)" }
+    }
+
+    fn fields(&self) -> Vec<String> {
+        let mut fields = self.key.clone();
+        fields.extend([self.runs.to_string(), self.status.clone(), self.message.clone()]);
+        fields.extend(NUMBERS.iter().map(|name| self.number(name).map_or(String::new(), |value| format!("{value}"))));
+        fields.push(self.error_of.clone());
+        fields
+    }
+}
+
+fn is_good(status: &str) -> bool {
+    matches!(status, "converged" | "attainable" | LINEAR)
+}
+
+/// The middle of some numbers, the mean of the two middle ones if their count is even.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => None,
+        count if count.is_multiple_of(2) => Some(0.5 * (values[middle - 1] + values[middle])),
+        _ => Some(values[middle]),
+    }
+}
+
+impl<'a> Table<'a> {
+    /// Opens the file of a plan. With `--resume` the rows that it has already are read first, if they were made with the
+    /// same settings.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn open(folder: &'a Folder, plan: &Plan, request: &Request) -> Result<Self> {
+        let mut columns = plan.columns();
+        columns.extend(["runs", "status", "message"].map(str::to_owned));
+        columns.extend(NUMBERS.map(str::to_owned));
+        columns.push("error_of".to_owned());
+        let settings = format!(
+            "winkler {}\n--set {:?}\nPETSc {:?}\n--repeat {}\n--timeout {}\n--against {:?}\n",
+            env!("CARGO_PKG_VERSION"),
+            request.overrides,
+            request.petsc,
+            request.repeat,
+            request.timeout,
+            request.against
+        );
+        let known = std::fs::read_to_string(folder.path().join(SETTINGS)).is_ok_and(|old| old == settings);
+        let old = if request.resume && known { read(folder, &columns) } else { Vec::new() };
+        folder.write(SETTINGS, |out| out.write_all(settings.as_bytes()))?;
+        let mut table =
+            Self { folder, columns, rows: Vec::new(), old, file: csv::Writer::from_writer(folder.open(FILE)?.1) };
+        let header = table.columns.clone();
+        table.put(&header)?;
+        Ok(table)
+    }
+
+    /// The row of a case that an earlier benchmark made.
+    pub fn kept(&self, case: &Case) -> Option<Row> {
+        self.old.iter().find(|row| row.key == case.key && !matches!(row.status.as_str(), "killed" | "failed")).cloned()
+    }
+
+    /// Adds a row and writes it at once: what was measured is kept whatever comes next.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn add(&mut self, row: Row) -> Result<()> {
+        self.put(&row.fields())?;
+        self.rows.push(row);
+        Ok(())
+    }
+
+    fn put(&mut self, fields: &[String]) -> Result<()> {
+        let written = self.file.write_record(fields).map_err(std::io::Error::from).and_then(|()| self.file.flush());
+        written.map_err(|cause| Error::file(&self.folder.path().join(FILE), "write", &cause))
+    }
+
+    /// Writes all rows anew, with what only the whole table could tell.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn rewrite(&self) -> Result<()> {
+        let fill = |out: &mut dyn std::io::Write| {
+            let mut file = csv::Writer::from_writer(out);
+            file.write_record(&self.columns)?;
+            for row in &self.rows {
+                file.write_record(row.fields())?;
+            }
+            file.flush()
+        };
+        self.folder.write(FILE, fill).map(|_| ())
+    }
+
+    /// Folder of the results of all runs.
+    pub fn runs(&self) -> PathBuf {
+        self.folder.path().join(RUNS)
+    }
+
+    /// Place of a column of the key.
+    fn column(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|column| column == name)
+    }
+
+    /// Says of every row how many linear factor-and-solves of the same bodies its set-up and iteration would pay for: by the
+    /// fastest solver with a row of the method `linear`.
+    pub fn compare_with_linear(&mut self) {
+        let Some(solver) = self.column("solver") else { return };
+        let same = |a: &Row, b: &Row| (0..a.key.len()).all(|k| k == solver || k == solver + 1 || a.key[k] == b.key[k]);
+        let linear: Vec<Row> = self.rows.iter().filter(|row| row.is_linear()).cloned().collect();
+        for row in self.rows.iter_mut().filter(|row| row.is_good() && !row.is_linear()) {
+            let yard =
+                linear.iter().filter(|other| same(row, other)).filter_map(|other| other.number("linear_seconds"));
+            let (yard, own) = (yard.fold(f64::INFINITY, f64::min), ["set_up_seconds", "iterate_seconds"]);
+            let own: f64 = own.iter().filter_map(|name| row.number(name)).sum();
+            if yard.is_finite() && yard > 0.0 {
+                row.numbers.insert("linear_solves", own / yard);
+            }
+        }
+    }
+}
+
+/// The rows of the file in a folder that has these columns; none if it has others.
+fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
+    let Ok(mut file) = csv::Reader::from_path(folder.path().join(FILE)) else { return Vec::new() };
+    if !file.headers().is_ok_and(|header| header.iter().eq(columns)) {
+        return Vec::new();
+    }
+    let keys = columns.len() - NUMBERS.len() - 4;
+    let row = |record: csv::StringRecord| {
+        let numbers = NUMBERS.iter().enumerate();
+        let numbers = numbers.filter_map(|(k, &name)| Some((name, record[keys + 3 + k].parse().ok()?)));
+        Row {
+            key: record.iter().take(keys).map(str::to_owned).collect(),
+            runs: record[keys].parse().unwrap_or(0),
+            status: record[keys + 1].to_owned(),
+            message: record[keys + 2].to_owned(),
+            numbers: numbers.collect(),
+            error_of: record[columns.len() - 1].to_owned(),
+            displacement_error: None,
+        }
+    };
+    // the last row of a benchmark that was killed may not be whole
+    file.records().map_while(|record| record.ok()).map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::median;
+
+    #[test]
+    fn the_median_is_the_middle() {
+        assert_eq!(median(vec![5.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 100.0]), Some(3.0));
+        assert_eq!(median(Vec::new()), None);
+    }
+}

@@ -1,0 +1,158 @@
+//! `winkler mesh`: makes the mesh of a scene, or finds it, and says what is in it.
+
+use crate::error::{Error, Kind, Result};
+use crate::fem::Space;
+use crate::mesh::{Loaded, Origin};
+use crate::output::{CellKind, Grid, say, write_whole};
+use crate::scene::{Order, Scene};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What the user typed.
+pub struct Request {
+    /// Scene file.
+    pub scene: PathBuf,
+    /// Overrides of scene keys.
+    pub overrides: Vec<String>,
+    /// File to write, `.msh` or `.vtu`.
+    pub output: Option<PathBuf>,
+    /// Whether to print JSON.
+    pub json: bool,
+}
+
+/// Makes the mesh of a scene or finds it in the cache, prints its bodies and groups with the shape of their cells, and
+/// writes it where asked; returns the exit code.
+///
+/// # Errors
+/// Refusals of scene and mesh, a body without cells, a file that cannot be written.
+pub fn mesh(request: &Request) -> Result<i32> {
+    let scene = crate::scene::load(&request.scene, &request.overrides)?;
+    match scene.dimension.value {
+        2 => show::<2>(&scene, request),
+        _ => show::<3>(&scene, request),
+    }
+}
+
+fn show<const D: usize>(scene: &Scene, request: &Request) -> Result<i32> {
+    let began = Instant::now();
+    let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
+    let loaded = crate::mesh::load::<D>(&scene.mesh, order)?;
+    let seconds = began.elapsed().as_secs_f64();
+    if let Some(path) = &request.output {
+        write(path, &loaded)?;
+    }
+    let facts = facts(scene, &loaded, seconds)?;
+    if request.json {
+        say(format_args!("{facts:#}"));
+    } else {
+        print(&facts);
+    }
+    Ok(0)
+}
+
+/// All that is said about a mesh.
+fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Result<Value> {
+    let mesh = &loaded.mesh;
+    let mut bodies = Vec::new();
+    for body in &scene.bodies {
+        let name = &body.name.value;
+        let Some(group) = mesh.group(name).filter(|group| group.dimension == D) else {
+            let known: Vec<&str> = mesh.group_names(D).collect();
+            return Err(Error::scene(&body.name.place, format!("the mesh has no cells named `{name}`"))
+                .help(format!("its groups of cells: {}", known.join(", "))));
+        };
+        let space = Space::new(mesh, group, body.order);
+        let quality = mesh.quality(group);
+        bodies.push(json!({
+            "name": name, "cells": group.len(), "nodes": space.nodes.len(), "dofs": space.dofs(),
+            "quality": { "least": quality.least, "mean": quality.mean },
+        }));
+    }
+    let groups: Vec<Value> = mesh
+        .groups
+        .iter()
+        .map(|group| json!({ "name": group.name, "dimension": group.dimension, "simplices": group.len() }))
+        .collect();
+    Ok(json!({
+        "title": scene.title,
+        "file": loaded.file,
+        "origin": match loaded.origin {
+            Origin::File => "the scene's own file",
+            Origin::Cache => "from the cache",
+            Origin::Gmsh => "made by Gmsh",
+        },
+        "seconds": seconds,
+        "dimension": D,
+        "order": mesh.order.degree(),
+        "nodes": mesh.points.len(),
+        "bodies": bodies,
+        "groups": groups,
+    }))
+}
+
+fn print(facts: &Value) {
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
+    let list = |key: &str| facts[key].as_array().cloned().unwrap_or_default();
+    say(text(&facts["title"]));
+    say(format_args!(
+        "  {} ({}, {:.2} s): {} nodes, order {}",
+        text(&facts["file"]),
+        text(&facts["origin"]),
+        number(&facts["seconds"]),
+        facts["nodes"],
+        facts["order"]
+    ));
+    for body in list("bodies") {
+        say(format_args!(
+            "  body {}: {} cells, {} nodes, {} dofs, quality at least {:.3}, mean {:.3}",
+            text(&body["name"]),
+            body["cells"],
+            body["nodes"],
+            body["dofs"],
+            number(&body["quality"]["least"]),
+            number(&body["quality"]["mean"])
+        ));
+    }
+    let cells = facts["dimension"].clone();
+    for group in list("groups").iter().filter(|group| group["dimension"] != cells) {
+        let kind = ["points", "lines", "triangles"][number(&group["dimension"]) as usize];
+        say(format_args!("  group {}: {} {kind}", text(&group["name"]), group["simplices"]));
+    }
+}
+
+/// Writes the mesh: `.msh` as the file that was read, `.vtu` as cells with the number of their body.
+fn write<const D: usize>(path: &Path, loaded: &Loaded<D>) -> Result<()> {
+    match path.extension().and_then(|end| end.to_str()) {
+        Some("msh") => {
+            let bytes = std::fs::read(&loaded.file).map_err(|cause| Error::file(&loaded.file, "read", &cause))?;
+            write_whole(path, |out| out.write_all(&bytes))
+        }
+        Some("vtu") => {
+            let grid = grid(loaded);
+            write_whole(path, |out| grid.write(out))
+        }
+        _ => Err(Error::new(Kind::Usage, format!("`{}` names no kind of mesh file", path.display()))
+            .help("end it with .msh or .vtu")),
+    }
+}
+
+fn grid<const D: usize>(loaded: &Loaded<D>) -> Grid {
+    let mesh = &loaded.mesh;
+    let mut grid = Grid {
+        title: mesh.path.display().to_string(),
+        points: mesh.points.iter().map(|&x| crate::contact::pad(x)).collect(),
+        cell: CellKind::simplex(D, mesh.order.degree()),
+        connectivity: Vec::new(),
+        at_points: Vec::new(),
+        at_cells: Vec::new(),
+    };
+    let mut number = Vec::new();
+    for (index, group) in mesh.groups.iter().filter(|group| group.dimension == D).enumerate() {
+        grid.connectivity.extend(&group.connectivity);
+        number.extend(vec![index as f64; group.len()]);
+    }
+    grid.at_cells.push(("group".to_owned(), 1, number));
+    grid
+}
