@@ -1,6 +1,7 @@
 //! Scene and mesh -> [`Model`]: the one place where geometry ends. Nothing below it knows the dimension.
 
 mod balance;
+mod elastic;
 mod find;
 mod gauge;
 pub mod meshes;
@@ -13,7 +14,7 @@ use crate::contact::{self, ContactPair};
 use crate::ddm::{self, Body, BodySlot, Exchange, Model, Motion, RobinZone, Segment};
 use crate::error::Result;
 use crate::fem::{
-    ElasticBody, Material, Space,
+    ElasticBody, Elasticity, Space,
     rigid::{self, RigidMotion},
     stress,
 };
@@ -89,6 +90,8 @@ pub struct BodyInfo {
     pub left_by_all: Vec<String>,
     /// Names of the rigid motions without work that a gauge fixes at one node each.
     pub gauged: Vec<String>,
+    /// What the user should know of its elasticity.
+    pub warning: Option<String>,
     /// Stiffness of the body against a uniform contact pressure, per area: modulus over depth (area or volume over the length
     /// or area of its contact surfaces); zero if supports leave it a motion that contact feels.
     pub stiffness: f64,
@@ -202,10 +205,10 @@ pub fn discretize<const D: usize>(
             std::array::from_fn(|c| if c < D { nodal_load.iter().skip(c).step_by(D).sum() } else { 0.0 });
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
         let surface: f64 = slot.segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
-        let modulus = part.spec.young.value / (1.0 - part.spec.poisson.value.powi(2));
+        let elasticity = elastic::of(part.spec, &part.space, mesh, scene.plane)?;
+        let modulus = elastic::modulus(&part.space, &elasticity, share(&slot.segments, &pairs));
         let held = slot.motions.len() == gauge::felt_by_none(&slot.motions).len();
         let stiffness = if held && surface > 0.0 { modulus * surface / part.space.measure() } else { 0.0 };
-        let material = Material::isotropic(part.spec.young.value, part.spec.poisson.value, D, scene.plane);
         maker.plan(&Outline {
             name: &slot.name,
             dimension: D,
@@ -214,7 +217,7 @@ pub fn discretize<const D: usize>(
             motions: &free,
         })?;
         if owner[index] == ranks.0 {
-            let body = part.assemble(mesh, &rows, &material, load, prescribed)?;
+            let body = part.assemble(mesh, &rows, &elasticity, load, prescribed)?;
             assemblies += 1;
             slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
             slot.row_stiffness =
@@ -225,7 +228,7 @@ pub fn discretize<const D: usize>(
             slot.local =
                 Some(maker.make(Assembled { name: slot.name.clone(), dimension: D, body, rows, motions: free })?);
         }
-        let (space, held) = (Rc::new(part.space), Rc::new(part.held));
+        let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
         infos.push(BodyInfo {
             name: slot.name.clone(),
             nodes: space.nodes.len(),
@@ -235,6 +238,7 @@ pub fn discretize<const D: usize>(
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: gauge::felt_by_none(&slot.motions).into_iter().map(|(name, _)| name).collect(),
             gauged,
+            warning: elastic::warning(part.spec, &space, scene.plane),
             stiffness,
             load: resultant,
             rank: owner[index],
@@ -246,13 +250,13 @@ pub fn discretize<const D: usize>(
             balance: {
                 let rows = nodal_rows(&slot.segments, &pairs, space.dofs());
                 let (springs, supports) = (part.springs, part.spec.fix.len());
-                let (space, held) = (space.clone(), held.clone());
-                let forces = Forces { space, material, held, springs, supports, load: nodal_load, rows };
+                let (space, held, elasticity) = (space.clone(), held.clone(), elasticity.clone());
+                let forces = Forces { space, elasticity, held, springs, supports, load: nodal_load, rows };
                 Box::new(move |u, force| forces.balance(u, force))
             },
-            field: field_maker(slot.name.clone(), space.clone(), material),
+            field: field_maker(slot.name.clone(), space.clone(), elasticity.clone()),
         });
-        shapes.push(Shape { space, material, held });
+        shapes.push(Shape { space, elasticity, modulus, held });
         slots.push(slot);
     }
     let meshes = keep.meshes.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
@@ -343,6 +347,18 @@ fn nodal_rows(segments: &[Segment], pairs: &[ContactPair], dofs: usize) -> Csr {
     rows
 }
 
+/// Mean squared components of the normals on the contact surfaces of a body.
+fn share(segments: &[Segment], pairs: &[ContactPair]) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for pair in segments.iter().map(|segment| &pairs[segment.pair]) {
+        for (weight, normal) in pair.weight.iter().zip(&pair.normal) {
+            (0..3).for_each(|c| sum[c] += weight * normal[c] * normal[c]);
+        }
+    }
+    let total: f64 = sum.iter().sum();
+    if total > 0.0 { sum.map(|sum| sum / total) } else { sum }
+}
+
 fn trace_of(motion: &RigidMotion, rows: &Csr, load: &[f64]) -> Motion {
     let mut trace = vec![0.0; rows.rows()];
     rows.multiply(&motion.displacement, &mut trace);
@@ -350,9 +366,9 @@ fn trace_of(motion: &RigidMotion, rows: &Csr, load: &[f64]) -> Motion {
     Motion { name: motion.name.clone(), trace, work }
 }
 
-fn field_maker<const D: usize>(name: String, space: Rc<Space<D>>, material: Material) -> FieldMaker {
+fn field_maker<const D: usize>(name: String, space: Rc<Space<D>>, elasticity: Rc<Elasticity>) -> FieldMaker {
     Box::new(move |u| {
-        let stress = stress::nodal(&space, &material, u);
+        let stress = stress::nodal(&space, &elasticity, u);
         BodyField {
             name: name.clone(),
             points: space.nodes.iter().map(|&x| contact::pad(x)).collect(),

@@ -161,6 +161,7 @@ fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> 
         warnings
             .push(format!("body {}: nothing holds its {motions}, no load works on it: fixed at one node", body.name));
     }
+    warnings.extend(problem.bodies.iter().filter_map(|body| body.warning.clone()));
     for (pair, spec) in problem.model.pairs.iter().zip(&scene.contacts) {
         let (without, all) = pair.uncovered;
         if without > 0 {

@@ -10,7 +10,8 @@ mod pair;
 pub mod pieces;
 mod side;
 
+pub use crate::fem::pad;
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
-pub use pair::{ContactPair, Fault, add, assemble, cross, pad};
+pub use pair::{ContactPair, Fault, add, assemble, cross};
 pub use side::Side;

@@ -4,7 +4,7 @@ use super::law::{self, LayerLaw};
 use super::pieces::Shared;
 use super::side::Side;
 use crate::error::Error;
-use crate::fem::element;
+use crate::fem::{element, pad};
 use crate::linalg::Csr;
 use crate::scene::{LayerSpec, Order};
 use nalgebra::DMatrix;
@@ -172,11 +172,6 @@ pub fn assemble<const D: usize>(
         pair.gap.push(distance + own);
     }
     Ok(pair)
-}
-
-/// A vector of 2 or 3 components as 3.
-pub fn pad<const D: usize>(v: [f64; D]) -> [f64; 3] {
-    std::array::from_fn(|c| if c < D { v[c] } else { 0.0 })
 }
 
 /// Vector product.

@@ -3,7 +3,7 @@
 use super::supports::Held;
 use crate::contact::{add, cross, pad};
 use crate::fem::assemble::{self, NodalBlock, NodeGraph};
-use crate::fem::{Frame, Material, Space};
+use crate::fem::{Elasticity, Frame, Space};
 use crate::linalg::Csr;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -38,8 +38,8 @@ pub struct Balance {
 pub struct Forces<const D: usize> {
     /// Its space.
     pub space: Rc<Space<D>>,
-    /// Its material.
-    pub material: Material,
+    /// Its elasticity.
+    pub elasticity: Rc<Elasticity>,
     /// Its supports and rigid surfaces.
     pub held: Rc<Held<D>>,
     /// Its springs.
@@ -95,9 +95,10 @@ impl<const D: usize> Forces<D> {
     fn reactions(&self, u: &[f64], known: &[f64]) -> BTreeMap<u32, [f64; D]> {
         let mut held = vec![false; self.space.nodes.len()];
         self.held.nodes().for_each(|node| held[node as usize] = true);
-        let around = self.space.around(&held);
+        let (around, cells) = self.space.around(&held);
+        let elasticity = self.elasticity.of_cells(&cells);
         let graph = NodeGraph::new(&around, &[], &Frame::default());
-        let Ok(stiffness) = assemble::stiffness(&around, &graph, &self.material) else { return BTreeMap::new() };
+        let Ok(stiffness) = assemble::stiffness(&around, &graph, &elasticity) else { return BTreeMap::new() };
         let force = |row: usize| stiffness.row(row).map(|(j, k)| k * u[j]).sum::<f64>() - known[row];
         let at = |node: u32| (node, std::array::from_fn(|c| force(D * node as usize + c)));
         self.held.nodes().map(at).collect()

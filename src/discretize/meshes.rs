@@ -3,7 +3,7 @@
 use super::supports::Held;
 use crate::contact::Fine;
 use crate::fem::recovery::Recovery;
-use crate::fem::{Material, Space, element};
+use crate::fem::{Elasticity, Space, element, pad};
 use crate::linalg::Csr;
 use std::rc::Rc;
 
@@ -55,12 +55,14 @@ pub trait Recovered {
     fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]);
 }
 
-/// A body's space, material and supports.
+/// A body's space, elasticity and supports.
 pub struct Shape<const D: usize> {
     /// Its space.
     pub space: Rc<Space<D>>,
-    /// Its material.
-    pub material: Material,
+    /// Its elasticity.
+    pub elasticity: Rc<Elasticity>,
+    /// Its modulus against pressure on its contact surfaces, E/(1 - nu^2) if isotropic.
+    pub modulus: f64,
     /// Its supports, which choose the dofs.
     pub held: Rc<Held<D>>,
 }
@@ -89,7 +91,7 @@ impl<const D: usize> Meshes for Kept<D> {
 
     fn points(&self, pair: usize) -> FinePoints<'_> {
         let Fine { weight, gap, size, bodies, nearest, interpolation, .. } = &self.fine[pair];
-        let soft: f64 = bodies.iter().map(|&body| 1.0 / modulus::<D>(&self.shapes[body].material)).sum();
+        let soft: f64 = bodies.iter().map(|&body| 1.0 / self.shapes[body].modulus).sum();
         let compliance = size.iter().map(|size| size * soft / std::f64::consts::PI).collect();
         FinePoints { weight, gap, compliance, nearest, interpolation }
     }
@@ -99,22 +101,18 @@ impl<const D: usize> Meshes for Kept<D> {
     }
 }
 
-/// E/(1 - nu^2) of a material, from the stresses of a stretch and of a shear along the axes.
-fn modulus<const D: usize>(material: &Material) -> f64 {
-    let unit = |j: usize| {
-        let mut h = [[0.0; D]; D];
-        h[0][j] = 1.0;
-        material.stress(&h)
-    };
-    let (stretch, shear) = (unit(0)[0], unit(1)[3]);
-    4.0 * shear * (stretch - shear) / stretch
-}
-
 struct OnBody<'a, const D: usize> {
     kept: &'a Kept<D>,
     shape: &'a Shape<D>,
     u: &'a [f64],
     recovery: Recovery<'a, D>,
+}
+
+impl<const D: usize> OnBody<'_, D> {
+    /// Stress of a displacement gradient at an integration point of a cell; assembly was there, so the law has a value.
+    fn stress(&self, cell: usize, x: [f64; D], h: &[[f64; D]; D]) -> [f64; 6] {
+        self.shape.elasticity.at(cell, pad(x)).map_or([0.0; 6], |material| material.stress(h))
+    }
 }
 
 /// The outer normal of side b is minus that of side a.
@@ -133,11 +131,11 @@ impl<const D: usize> OnBody<'_, D> {
 
 impl<const D: usize> Recovered for OnBody<'_, D> {
     fn energy_errors(&self) -> Vec<f64> {
-        self.recovery.energy_errors(&|_, h| self.shape.material.stress(h))
+        self.recovery.energy_errors(&|cell, x, h| self.stress(cell, x, h))
     }
 
     fn interpolation_residual(&self) -> Vec<f64> {
-        self.recovery.interpolation_residual(&|_, h| self.shape.material.stress(h))
+        self.recovery.interpolation_residual(&|cell, x, h| self.stress(cell, x, h))
     }
 
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {

@@ -1,5 +1,6 @@
 //! One body of the scene on its mesh: space, supports, loads, stiffness.
 
+use super::elastic;
 use super::find::{find_group, not_on_body, point};
 use super::springs;
 use super::supports::Held;
@@ -7,7 +8,7 @@ use crate::contact;
 use crate::error::{Error, Result};
 use crate::fem::assemble::{self, NodalBlock};
 use crate::fem::rigid::{self, RigidMotion};
-use crate::fem::{ElasticBody, Material, NodeGraph, Space, surface};
+use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
 use crate::linalg::Csr;
 use crate::mesh::Mesh;
 use crate::scene::{BodySpec, LoadKind};
@@ -131,7 +132,7 @@ impl<'a, const D: usize> Part<'a, D> {
         &self,
         mesh: &Mesh<D>,
         rows: &Csr,
-        material: &Material,
+        elasticity: &Elasticity,
         load: Vec<f64>,
         prescribed: Vec<(usize, f64)>,
     ) -> Result<ElasticBody> {
@@ -145,11 +146,13 @@ impl<'a, const D: usize> Part<'a, D> {
             .collect();
         let graph = NodeGraph::new(&self.space, &coupled, &self.held.frame);
         let name = &self.spec.name;
-        let mut stiffness = assemble::stiffness(&self.space, &graph, material).map_err(|defect| {
-            let assemble::Defect::Inverted(cell) = defect;
-            let corner = contact::pad(self.space.cell_nodes(cell)[0]);
-            let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
-            Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
+        let mut stiffness = assemble::stiffness(&self.space, &graph, elasticity).map_err(|defect| match defect {
+            assemble::Defect::Inverted(cell) => {
+                let corner = contact::pad(self.space.cell_nodes(cell)[0]);
+                let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
+                Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
+            }
+            assemble::Defect::Elasticity(number, x, flaw) => elastic::refusal(self.spec, number, Some(x), &flaw),
         })?;
         self.springs.iter().for_each(|springs| assemble::add_blocks(&graph, springs, &mut stiffness));
         self.held.frame.turn_matrix(&mut stiffness);

@@ -3,9 +3,10 @@
 //! The pattern is built once from the node graph (cells, and couplings through contact rows); entry positions
 //! follow from the graph by arithmetic, so that assembly writes each value straight to its place.
 
+use super::elasticity::{Elasticity, Flaw};
 use super::element;
 use super::frame::Frame;
-use super::material::Material;
+use super::pad;
 use super::quadrature;
 use super::space::Space;
 use crate::linalg::Csr;
@@ -152,27 +153,31 @@ pub struct ElasticBody {
 pub enum Defect {
     /// Cell (number within the body) with a singular or inverted map.
     Inverted(usize),
+    /// No elasticity: number of the cell's spec, place, and why.
+    Elasticity(usize, [f64; 3], Flaw),
 }
 
-/// Stiffness matrix of a space on a graph.
+/// Stiffness matrix of a space on a graph. Where the elasticity varies within a cell it is taken at the points of a rule of
+/// degree 2 (P1) or 5 (P2).
 ///
 /// # Errors
-/// [`Defect::Inverted`] names a cell whose map is not invertible at an integration point.
-pub fn stiffness<const D: usize>(space: &Space<D>, graph: &NodeGraph, material: &Material) -> Result<Csr, Defect> {
+/// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity.
+pub fn stiffness<const D: usize>(space: &Space<D>, graph: &NodeGraph, elasticity: &Elasticity) -> Result<Csr, Defect> {
     match D {
-        2 => stiffness_on::<D, 3>(space, graph, material),
-        _ => stiffness_on::<D, 4>(space, graph, material),
+        2 => stiffness_on::<D, 3>(space, graph, elasticity),
+        _ => stiffness_on::<D, 4>(space, graph, elasticity),
     }
 }
 
 fn stiffness_on<const D: usize, const N: usize>(
     space: &Space<D>,
     graph: &NodeGraph,
-    material: &Material,
+    elasticity: &Elasticity,
 ) -> Result<Csr, Defect> {
     let mut matrix = graph.matrix::<D>();
     let affine = quadrature::simplex::<N>(if space.order == Order::P1 { 1 } else { 2 });
     let curved = quadrature::simplex::<N>(5);
+    let varying = quadrature::simplex::<N>(if space.order == Order::P1 { 2 } else { 5 });
     let stride = space.stride;
     let mut local = vec![[[0.0; D]; D]; stride * stride];
     let mut x = vec![[0.0; D]; stride];
@@ -180,19 +185,24 @@ fn stiffness_on<const D: usize, const N: usize>(
         for (x, &node) in x.iter_mut().zip(cell) {
             *x = space.nodes[node as usize];
         }
-        let rule = if is_straight(&x, N) { &affine } else { &curved };
+        let constant = elasticity.constant_in(index);
+        let rule = match (constant, is_straight(&x, N)) {
+            (None, _) => &varying,
+            (_, true) => &affine,
+            _ => &curved,
+        };
         local.fill([[0.0; D]; D]);
         for (l, weight) in rule.points.iter().zip(&rule.weights) {
             let (gradient, measure) = element::gradients::<D, N>(space.order, &x, l).ok_or(Defect::Inverted(index))?;
-            let weight = weight * measure;
-            for a in 0..stride {
-                for b in a..stride {
-                    let block = material.block(&gradient[a], &gradient[b]);
-                    for i in 0..D {
-                        for j in 0..D {
-                            local[a * stride + b][i][j] += weight * block[i][j];
-                        }
-                    }
+            let gradient = &gradient[..stride];
+            match constant {
+                Some(material) => material.accumulate(gradient, weight * measure, &mut local),
+                None => {
+                    let at = pad(interpolate(&x, &element::values(space.order, l)));
+                    let material = elasticity
+                        .at(index, at)
+                        .map_err(|flaw| Defect::Elasticity(elasticity.region(index), at, flaw))?;
+                    material.accumulate(gradient, weight * measure, &mut local);
                 }
             }
         }

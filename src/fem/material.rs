@@ -1,73 +1,237 @@
-//! Linear elastic material.
+//! Linear elastic material at a point: Hooke's law sigma = C eps (2) and the bounds on C (4).
 
 use crate::scene::Plane;
+use nalgebra::{Matrix3, Matrix6};
 
-/// Isotropic linear elasticity: sigma = lambda tr(eps) I + 2 mu eps, with the lambda of the plane state.
+/// Index pairs of the components of stress and strain: xx yy zz xy yz xz, the order of VTK.
+pub const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+
+/// Component behind each Voigt number 11 22 33 23 13 12.
+const VOIGT: [usize; 6] = [0, 1, 2, 4, 5, 3];
+
+/// Share of a diagonal entry that elimination must leave of it: less is zero in double precision.
+const SINGULAR: f64 = 1e-13;
+
+/// Elasticity tensor C of space as a matrix: stress (xx yy zz xy yz xz) = C times strain in the same order, shear strains
+/// counted twice (2 eps_xy). Symmetric; unit of stress.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tensor(pub [[f64; 6]; 6]);
+
+impl Tensor {
+    /// Isotropic, from Young's modulus > 0 and Poisson's ratio in (-1, 1/2).
+    pub fn isotropic(young: f64, poisson: f64) -> Self {
+        let (lambda, mu) = lame(young, poisson);
+        let mut c = [[0.0; 6]; 6];
+        for i in 0..3 {
+            c[i][..3].fill(lambda);
+            c[i][i] += 2.0 * mu;
+            c[i + 3][i + 3] = mu;
+        }
+        Self(c)
+    }
+
+    /// Orthotropic with axes 1, 2, 3 along x, y, z, from E1 E2 E3, nu12 nu13 nu23 and G12 G13 G23; nu12 is the
+    /// contraction along 2 under tension along 1. `None` if these moduli have no finite stiffness.
+    pub fn orthotropic(constants: &[f64; 9]) -> Option<Self> {
+        let [e1, e2, e3, nu12, nu13, nu23, g12, g13, g23] = *constants;
+        let (s12, s13, s23) = (-nu12 / e1, -nu13 / e1, -nu23 / e2);
+        let compliance = Matrix3::new(1.0 / e1, s12, s13, s12, 1.0 / e2, s23, s13, s23, 1.0 / e3);
+        let normal = compliance.try_inverse()?;
+        let mut c = [[0.0; 6]; 6];
+        for i in 0..3 {
+            for j in 0..3 {
+                c[i][j] = 0.5 * (normal[(i, j)] + normal[(j, i)]);
+            }
+        }
+        (c[3][3], c[4][4], c[5][5]) = (g12, g23, g13);
+        Some(Self(c))
+    }
+
+    /// From the 21 constants C11 C12 ... C16 C22 ... C66: upper triangle by rows, in Voigt's order 11 22 33 23 13 12.
+    pub fn anisotropic(constants: &[f64; 21]) -> Self {
+        let mut c = [[0.0; 6]; 6];
+        let mut rest = constants.iter();
+        for (k, &i) in VOIGT.iter().enumerate() {
+            for (&j, &value) in VOIGT[k..].iter().zip(&mut rest) {
+                (c[i][j], c[j][i]) = (value, value);
+            }
+        }
+        Self(c)
+    }
+
+    /// The tensor in x, y, z of a material whose axes 1, 2, 3 have the directions `axes[0..3]` (orthonormal rows).
+    pub fn rotated(&self, axes: &[[f64; 3]; 3]) -> Self {
+        // stress in x, y, z = bond times stress in the material's axes; work makes strains turn with its transpose
+        let bond = Matrix6::from_fn(|row, column| {
+            let ((i, j), (a, b)) = (PAIRS[row], PAIRS[column]);
+            let once = axes[a][i] * axes[b][j];
+            if a == b { once } else { once + axes[b][i] * axes[a][j] }
+        });
+        let turned = bond * self.matrix() * bond.transpose();
+        Self(std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (turned[(i, j)] + turned[(j, i)]))))
+    }
+
+    fn matrix(&self) -> Matrix6<f64> {
+        Matrix6::from_fn(|i, j| self.0[i][j])
+    }
+
+    /// Whether C eps : eps > 0 for every strain (4), beyond rounding.
+    pub fn is_coercive(&self) -> bool {
+        let mut c = self.0;
+        for k in 0..6 {
+            // also false for NaN
+            if !(c[k][k] > SINGULAR * self.0[k][k] && c[k][k] < f64::INFINITY) {
+                return false;
+            }
+            for i in k + 1..6 {
+                let factor = c[i][k] / c[k][k];
+                for j in k + 1..6 {
+                    c[i][j] -= factor * c[k][j];
+                }
+            }
+        }
+        true
+    }
+
+    /// The least C eps : eps over strains with eps : eps = 1, in any axes the same; NaN if C is not finite.
+    pub fn least_eigenvalue(&self) -> f64 {
+        if self.0.as_flattened().iter().any(|c| !c.is_finite()) {
+            return f64::NAN;
+        }
+        let unit = |i: usize| if i < 3 { 1.0 } else { f64::sqrt(2.0) };
+        Matrix6::from_fn(|i, j| unit(i) * unit(j) * self.0[i][j]).symmetric_eigenvalues().min()
+    }
+
+    /// Stiffness against uniaxial stress along x, y and z of a body that is held in one direction across it, mean of both:
+    /// E/(1 - nu^2) if isotropic. In plane problems z is held (plane strain) or free (plane stress) and the z entry is zero.
+    pub fn moduli(&self, dimension: usize, plane: Plane) -> [f64; 3] {
+        let Some(s) = self.matrix().try_inverse() else { return [0.0; 3] };
+        let held = |i: usize, j: usize| 1.0 / (s[(i, i)] - s[(i, j)].powi(2) / s[(j, j)]);
+        std::array::from_fn(|i| match (dimension, plane) {
+            (2, _) if i == 2 => 0.0,
+            (2, Plane::Strain) => held(i, 2),
+            (2, Plane::Stress) => 1.0 / s[(i, i)],
+            _ => 0.5 * (held(i, (i + 1) % 3) + held(i, (i + 2) % 3)),
+        })
+    }
+
+    /// What is left for the strains xx, yy, xy when the stresses zz, yz, xz vanish; zero rows and columns for these.
+    fn plane_stress(&self) -> Self {
+        const IN: [usize; 3] = [0, 1, 3];
+        const OUT: [usize; 3] = [2, 4, 5];
+        let block = |rows: [usize; 3], columns: [usize; 3]| Matrix3::from_fn(|i, j| self.0[rows[i]][columns[j]]);
+        let mut c = [[0.0; 6]; 6];
+        // (4) holds, so that the block can be inverted
+        if let Some(inverse) = block(OUT, OUT).try_inverse() {
+            let reduced = block(IN, IN) - block(IN, OUT) * inverse * block(OUT, IN);
+            for (i, &row) in IN.iter().enumerate() {
+                for (j, &column) in IN.iter().enumerate() {
+                    c[row][column] = 0.5 * (reduced[(i, j)] + reduced[(j, i)]);
+                }
+            }
+        }
+        Self(c)
+    }
+}
+
+fn lame(young: f64, poisson: f64) -> (f64, f64) {
+    (young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)), young / (2.0 * (1.0 + poisson)))
+}
+
+/// Hooke's law of a body in its dimension: C of space, of plane strain (the same, of strains in the plane), or of plane stress.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
-    /// First Lamé constant; in plane stress the reduced 2 lambda mu / (lambda + 2 mu).
-    pub lambda: f64,
-    /// Shear modulus.
-    pub mu: f64,
-    /// sigma_zz = this times (sigma_xx + sigma_yy) in plane problems.
-    pub out_of_plane: f64,
+    /// Stress (xx yy zz xy yz xz) per strain.
+    stiffness: Tensor,
+    /// Lamé's lambda (that of the plane state) and mu if the material is isotropic.
+    lame: Option<(f64, f64)>,
 }
 
 impl Material {
     /// From Young's modulus and Poisson's ratio, in `dimension` 2 or 3 (`plane` matters in 2 only).
     pub fn isotropic(young: f64, poisson: f64, dimension: usize, plane: Plane) -> Self {
-        let mu = young / (2.0 * (1.0 + poisson));
-        let lambda = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
-        if dimension == 2 && plane == Plane::Stress {
-            let reduced = 2.0 * lambda * mu / (lambda + 2.0 * mu);
-            Self { lambda: reduced, mu, out_of_plane: 0.0 }
-        } else {
-            Self { lambda, mu, out_of_plane: poisson }
+        let (lambda, mu) = lame(young, poisson);
+        let reduced = match (dimension, plane) {
+            (2, Plane::Stress) => 2.0 * lambda * mu / (lambda + 2.0 * mu),
+            _ => lambda,
+        };
+        Self { lame: Some((reduced, mu)), ..Self::new(Tensor::isotropic(young, poisson), dimension, plane) }
+    }
+
+    /// From a coercive tensor of space.
+    pub fn new(tensor: Tensor, dimension: usize, plane: Plane) -> Self {
+        let stiffness = if dimension == 2 && plane == Plane::Stress { tensor.plane_stress() } else { tensor };
+        Self { stiffness, lame: None }
+    }
+
+    /// Adds `weight` times the D x D blocks B_a' C B_b of the stiffness density for all nodes a <= b to `local[a n + b]`,
+    /// where n is the number of gradients: `gradient[a]` is that of the shape function of node a.
+    pub fn accumulate<const D: usize>(&self, gradient: &[[f64; D]], weight: f64, local: &mut [[[f64; D]; D]]) {
+        match self.lame {
+            Some((lambda, mu)) => isotropic_blocks(weight * lambda, weight * mu, gradient, local),
+            None => self.blocks(gradient, weight, local),
         }
     }
 
-    /// The D x D block of the stiffness density for gradients `a` (row) and `b` (column):
-    /// lambda a_i b_j + mu a_j b_i + mu (a.b) delta_ij.
-    pub fn block<const D: usize>(&self, a: &[f64; D], b: &[f64; D]) -> [[f64; D]; D] {
-        let product: f64 = (0..D).map(|i| a[i] * b[i]).sum();
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                let shear = if i == j { self.mu * product } else { 0.0 };
-                self.lambda * a[i] * b[j] + self.mu * a[j] * b[i] + shear
-            })
-        })
+    fn blocks<const D: usize>(&self, gradient: &[[f64; D]], weight: f64, local: &mut [[[f64; D]; D]]) {
+        let n = gradient.len();
+        for b in 0..n {
+            for j in 0..D {
+                let mut h = [[0.0; D]; D];
+                h[j] = gradient[b].map(|g| weight * g);
+                let stress = self.stress(&h);
+                for a in 0..=b {
+                    for i in 0..D {
+                        let force: f64 = (0..D).map(|k| stress[component(i, k)] * gradient[a][k]).sum();
+                        local[a * n + b][i][j] += force;
+                    }
+                }
+            }
+        }
     }
 
-    /// Stress (xx yy zz xy yz xz) of a displacement gradient `h[i][j]` = du_i/dx_j.
+    /// Stress (xx yy zz xy yz xz) of a displacement gradient `h[i][j]` = du_i/dx_j (1), (2).
     pub fn stress<const D: usize>(&self, h: &[[f64; D]; D]) -> [f64; 6] {
-        let trace: f64 = (0..D).map(|i| h[i][i]).sum();
-        let s = |i: usize, j: usize| {
-            let diagonal = if i == j { self.lambda * trace } else { 0.0 };
-            diagonal + self.mu * (h[i][j] + h[j][i])
-        };
-        if D == 2 {
-            let (xx, yy) = (s(0, 0), s(1, 1));
-            [xx, yy, self.out_of_plane * (xx + yy), s(0, 1), 0.0, 0.0]
-        } else {
-            [s(0, 0), s(1, 1), s(2, 2), s(0, 1), s(1, 2), s(0, 2)]
+        let strain = strain(h);
+        std::array::from_fn(|i| (0..6).map(|j| self.stiffness.0[i][j] * strain[j]).sum())
+    }
+}
+
+/// Strain (xx yy zz, and 2 eps of xy yz xz) of a displacement gradient (3).
+pub fn strain<const D: usize>(h: &[[f64; D]; D]) -> [f64; 6] {
+    PAIRS.map(|(i, j)| match (i < D && j < D, i == j) {
+        (false, _) => 0.0,
+        (_, true) => h[i][i],
+        _ => h[i][j] + h[j][i],
+    })
+}
+
+/// Place of the component (i, j) of a symmetric tensor among [`PAIRS`].
+fn component(i: usize, j: usize) -> usize {
+    match (i.min(j), i.max(j)) {
+        (i, j) if i == j => i,
+        (0, 1) => 3,
+        (1, _) => 4,
+        _ => 5,
+    }
+}
+
+/// lambda a_i b_j + mu a_j b_i + mu (a.b) delta_ij.
+fn isotropic_blocks<const D: usize>(lambda: f64, mu: f64, gradient: &[[f64; D]], local: &mut [[[f64; D]; D]]) {
+    let n = gradient.len();
+    for (i_a, a) in gradient.iter().enumerate() {
+        for (i_b, b) in gradient.iter().enumerate().skip(i_a) {
+            let product: f64 = (0..D).map(|i| a[i] * b[i]).sum();
+            let block = &mut local[i_a * n + i_b];
+            for i in 0..D {
+                for j in 0..D {
+                    block[i][j] += lambda * a[i] * b[j] + mu * a[j] * b[i];
+                }
+                block[i][i] += mu * product;
+            }
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn uniaxial_plane_states_have_their_moduli() {
-        let (e, nu) = (2.1e5, 0.3);
-        // plane strain, sigma_yy = 0: eps_xx = sigma (1 - nu^2) / E, eps_yy = -sigma nu (1 + nu) / E
-        let h = [[(1.0 - nu * nu) / e, 0.0], [0.0, -nu * (1.0 + nu) / e]];
-        let s = Material::isotropic(e, nu, 2, Plane::Strain).stress(&h);
-        assert!((s[0] - 1.0).abs() < 1e-14 && s[1].abs() < 1e-14 && (s[2] - nu).abs() < 1e-14);
-        // plane stress, sigma_yy = 0: eps_xx = sigma / E, eps_yy = -nu sigma / E
-        let h = [[1.0 / e, 0.0], [0.0, -nu / e]];
-        let s = Material::isotropic(e, nu, 2, Plane::Stress).stress(&h);
-        assert!((s[0] - 1.0).abs() < 1e-14 && s[1].abs() < 1e-14 && s[2] == 0.0);
-    }
-}
+mod tests;

@@ -5,6 +5,7 @@
 //! Degree of freedom `D * node + component` everywhere.
 
 pub mod assemble;
+pub mod elasticity;
 pub mod element;
 pub mod frame;
 pub mod material;
@@ -16,6 +17,12 @@ pub mod stress;
 pub mod surface;
 
 pub use assemble::{ElasticBody, NodeGraph};
+pub use elasticity::Elasticity;
 pub use frame::Frame;
 pub use material::Material;
 pub use space::{Facets, Space};
+
+/// A vector of 2 or 3 components as 3.
+pub fn pad<const D: usize>(v: [f64; D]) -> [f64; 3] {
+    std::array::from_fn(|c| if c < D { v[c] } else { 0.0 })
+}

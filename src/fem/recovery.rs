@@ -19,8 +19,8 @@ use bubble::Bubble;
 use patch::Patch;
 use std::collections::{BTreeSet, HashMap};
 
-/// Stress (xx yy zz xy yz xz) of a displacement gradient at a point.
-pub type Law<'a, const D: usize> = &'a dyn Fn([f64; D], &[[f64; D]; D]) -> [f64; 6];
+/// Stress (xx yy zz xy yz xz) in a cell at a point of a displacement gradient.
+pub type Law<'a, const D: usize> = &'a dyn Fn(usize, [f64; D], &[[f64; D]; D]) -> [f64; 6];
 
 /// A displacement with the polynomials recovered from it.
 pub struct Recovery<'a, const D: usize> {
@@ -139,7 +139,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
                 for (l, &node) in l.iter().zip(cell) {
                     add(&mut difference, *l, &self.patch(node).gradient(&at));
                 }
-                sum += weight * measure * density(&law(at, &difference), &difference);
+                sum += weight * measure * density(&law(index, at, &difference), &difference);
             }
             sum
         };
@@ -176,7 +176,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
                         (0..D).for_each(|c| slope[c][j] += coefficient[c] * along);
                     }
                 }
-                let stress = law(at, &slope);
+                let stress = law(index, at, &slope);
                 for (a, &node) in cell.iter().enumerate() {
                     for c in 0..D {
                         let work: f64 = (0..D).map(|j| stress[place[c][j]] * gradient[a][j]).sum();

@@ -3,7 +3,7 @@
 use super::element;
 use crate::mesh::{Group, Mesh};
 use crate::scene::Order;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 const ABSENT: u32 = u32::MAX;
 
@@ -58,11 +58,14 @@ impl<const D: usize> Space<D> {
         space
     }
 
-    /// The same nodes with the cells alone that touch one of those `marked`.
-    pub fn around(&self, marked: &[bool]) -> Self {
-        let touching = |cell: &&[u32]| cell.iter().any(|&node| marked[node as usize]);
-        let cells = self.cells.chunks_exact(self.stride).filter(touching).flatten().copied().collect();
-        Space { order: self.order, nodes: self.nodes.clone(), stride: self.stride, cells, from_mesh: Vec::new() }
+    /// The same nodes with the cells alone that touch one of those `marked`, and the numbers that these cells have here.
+    pub fn around(&self, marked: &[bool]) -> (Self, Vec<usize>) {
+        let cell = |index: usize| &self.cells[index * self.stride..(index + 1) * self.stride];
+        let touching = |index: &usize| cell(*index).iter().any(|&node| marked[node as usize]);
+        let kept: Vec<usize> = (0..self.cell_count()).filter(touching).collect();
+        let cells = kept.iter().flat_map(|&index| cell(index)).copied().collect();
+        let nodes = self.nodes.clone();
+        (Space { order: self.order, nodes, stride: self.stride, cells, from_mesh: Vec::new() }, kept)
     }
 
     /// Number of degrees of freedom.
@@ -77,18 +80,43 @@ impl<const D: usize> Space<D> {
 
     /// Area (volume) of all cells, by their corners.
     pub fn measure(&self) -> f64 {
-        let simplex = |i: usize| {
-            let x = self.cell_nodes(i);
-            let edge = |j: usize| -> [f64; D] { std::array::from_fn(|c| x[j][c] - x[0][c]) };
-            let (a, b) = (edge(1), edge(2));
-            if D == 2 {
-                return 0.5 * (a[0] * b[1] - a[1] * b[0]).abs();
-            }
-            let c = edge(3);
-            let normal = [0, 1, 2].map(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
-            (0..3).map(|i| normal[i] * c[i]).sum::<f64>().abs() / 6.0
+        (0..self.cell_count()).map(|i| self.cell_measure(i)).sum()
+    }
+
+    /// Area (volume) of cell `i`, by its corners.
+    pub fn cell_measure(&self, i: usize) -> f64 {
+        let x = self.cell_nodes(i);
+        let edge = |j: usize| -> [f64; D] { std::array::from_fn(|c| x[j][c] - x[0][c]) };
+        let (a, b) = (edge(1), edge(2));
+        if D == 2 {
+            return 0.5 * (a[0] * b[1] - a[1] * b[0]).abs();
+        }
+        let c = edge(3);
+        let normal = [0, 1, 2].map(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
+        (0..3).map(|i| normal[i] * c[i]).sum::<f64>().abs() / 6.0
+    }
+
+    /// Mean of the corners of cell `i`.
+    pub fn centroid(&self, i: usize) -> [f64; D] {
+        let corners = &self.cells[i * self.stride..][..=D];
+        std::array::from_fn(|c| corners.iter().map(|&node| self.nodes[node as usize][c]).sum::<f64>() / (D + 1) as f64)
+    }
+
+    /// Numbers of the body's cells that are in a mesh group of dimension `D`.
+    pub fn cells_in(&self, group: &Group) -> Vec<usize> {
+        let sorted = |nodes: &[u32]| {
+            let mut key = nodes[..=D].to_vec();
+            key.sort_unstable();
+            key
         };
-        (0..self.cell_count()).map(simplex).sum()
+        let wanted: HashSet<Vec<u32>> = group
+            .connectivity
+            .chunks_exact(group.stride)
+            .filter_map(|points| self.simplex(points, D))
+            .map(|nodes| sorted(&nodes))
+            .collect();
+        let cells = self.cells.chunks_exact(self.stride).enumerate();
+        cells.filter(|(_, cell)| wanted.contains(&sorted(cell))).map(|(index, _)| index).collect()
     }
 
     /// Coordinates of the nodes of cell `i`.

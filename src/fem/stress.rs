@@ -1,20 +1,24 @@
 //! Nodal stresses recovered from displacements.
 
-use super::element;
-use super::material::Material;
+use super::elasticity::Elasticity;
 use super::space::Space;
+use super::{assemble, element, pad, quadrature};
+use crate::scene::Order;
+use nalgebra::Matrix3;
 
 /// Stress at every node: the volume-weighted mean over its cells of the cell's stress at the node.
 ///
-/// `u` has one entry a dof; the result one (xx yy zz xy yz xz) a node.
-pub fn nodal<const D: usize>(space: &Space<D>, material: &Material, u: &[f64]) -> Vec<[f64; 6]> {
+/// `u` has one entry a dof; the result one (xx yy zz xy yz xz) a node. Where the elasticity has no value at a node (the axis
+/// of cylindrical axes, say), that of an integration point of the cell serves.
+pub fn nodal<const D: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64]) -> Vec<[f64; 6]> {
     match D {
-        2 => nodal_on::<D, 3>(space, material, u),
-        _ => nodal_on::<D, 4>(space, material, u),
+        2 => nodal_on::<D, 3>(space, elasticity, u),
+        _ => nodal_on::<D, 4>(space, elasticity, u),
     }
 }
 
-fn nodal_on<const D: usize, const N: usize>(space: &Space<D>, material: &Material, u: &[f64]) -> Vec<[f64; 6]> {
+fn nodal_on<const D: usize, const N: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64]) -> Vec<[f64; 6]> {
+    let inside = quadrature::simplex::<N>(if space.order == Order::P1 { 2 } else { 5 }).points[0];
     let mut sum = vec![[0.0; 6]; space.nodes.len()];
     let mut volume = vec![0.0; space.nodes.len()];
     let places = element::nodes::<N>(space.order);
@@ -31,6 +35,11 @@ fn nodal_on<const D: usize, const N: usize>(space: &Space<D>, material: &Materia
                     }
                 }
             }
+            let material = elasticity.at(index, pad(space.nodes[node as usize])).or_else(|_| {
+                elasticity.at(index, pad(assemble::interpolate(&x, &element::values(space.order, &inside))))
+            });
+            // assembly was there: it has a value
+            let Ok(material) = material else { continue };
             let stress = material.stress(&h);
             volume[node as usize] += measure;
             for (sum, stress) in sum[node as usize].iter_mut().zip(stress) {
@@ -42,6 +51,15 @@ fn nodal_on<const D: usize, const N: usize>(space: &Space<D>, material: &Materia
         sum.iter_mut().for_each(|s| *s /= volume);
     }
     sum
+}
+
+/// Principal stresses of (xx yy zz xy yz xz), the largest (tension is positive) first.
+pub fn principal(s: &[f64; 6]) -> [f64; 3] {
+    let [xx, yy, zz, xy, yz, xz] = *s;
+    let values = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).symmetric_eigenvalues();
+    let mut sorted = [values[0], values[1], values[2]];
+    sorted.sort_by(|a, b| b.total_cmp(a));
+    sorted
 }
 
 /// Von Mises stress of (xx yy zz xy yz xz).

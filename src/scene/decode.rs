@@ -2,6 +2,7 @@
 
 mod body;
 mod contact;
+mod elasticity;
 mod layer;
 mod method;
 

@@ -1,6 +1,7 @@
 //! What the user wrote: TOML -> checked [`Scene`]. Every refusal names file, line, and the way out.
 
 mod decode;
+mod elasticity;
 pub mod expression;
 mod layer;
 mod overrides;
@@ -11,6 +12,7 @@ mod spec;
 mod tests;
 
 pub use decode::reserved;
+pub use elasticity::*;
 pub use layer::{Bounds, FORMS, LawForm, LawKind, LayerSpec, Parameter};
 pub use spec::*;
 

@@ -2,8 +2,8 @@
 
 use super::expression::Field;
 use super::{
-    BodySpec, ContactSpec, Gamma, LayerSpec, LoadKind, MeshSource, MethodName, MethodSpec, Order, Plane, RobinSpec,
-    Scene, SolverSpec, SpringKind, Start, StopSpec, Zone,
+    AxesSpec, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, LayerSpec, LoadKind, MeshSource, MethodName,
+    MethodSpec, Order, Plane, RobinSpec, Scene, SolverSpec, SpringKind, Start, StopSpec, Zone,
 };
 use serde_json::{Map, Value, json};
 
@@ -94,14 +94,46 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
     };
     let mut map = Map::new();
     map.insert("name".into(), json!(body.name.value));
-    map.insert("young".into(), json!(body.young.value));
-    map.insert("poisson".into(), json!(body.poisson.value));
+    map.extend(elasticity(&body.elasticity));
+    let regions = body.regions.iter().map(|region| {
+        let mut map = elasticity(&region.elasticity);
+        map.insert("on".into(), json!(region.on.value));
+        Value::Object(map)
+    });
+    insert(&mut map, "region", (!body.regions.is_empty()).then(|| regions.collect()));
     map.insert("order".into(), json!(order));
     map.insert("fix".into(), fix.collect());
     map.insert("load".into(), load.collect());
     map.insert("spring".into(), spring.collect());
     insert(&mut map, "force", body.force.as_ref().map(|force| vector(force, dimension)));
     map.into()
+}
+
+fn elasticity(elasticity: &ElasticitySpec) -> Map<String, Value> {
+    let mut map = Map::new();
+    match &elasticity.constants {
+        Constants::Isotropic { young, poisson } => {
+            map.insert("young".into(), field(young));
+            map.insert("poisson".into(), field(poisson));
+        }
+        Constants::Orthotropic(fields) => {
+            let named = Constants::ORTHOTROPIC.iter().zip(fields.iter());
+            let named: Map<_, _> = named.map(|(name, value)| (name.to_string(), field(value))).collect();
+            map.insert("orthotropic".into(), named.into());
+        }
+        Constants::Anisotropic(fields) => {
+            map.insert("anisotropic".into(), fields.iter().map(field).collect());
+        }
+    }
+    let axes = elasticity.axes.as_ref().map(|axes| match axes {
+        AxesSpec::Directions { first, second: Some(second) } => {
+            json!({ "first": vector(first, 3), "second": vector(second, 3) })
+        }
+        AxesSpec::Directions { first, second: None } => json!({ "first": vector(first, 3) }),
+        AxesSpec::Angle { angle, axis } => json!({ "angle": field(angle), "axis": vector(axis, 3) }),
+    });
+    insert(&mut map, "axes", axes);
+    map
 }
 
 fn contact(contact: &ContactSpec) -> Value {

@@ -5,6 +5,7 @@
 
 use super::expression::Field;
 use super::layer::LayerSpec;
+use super::{ElasticitySpec, RegionSpec};
 use crate::error::{Located, Place};
 use std::path::PathBuf;
 
@@ -82,15 +83,15 @@ impl Order {
     }
 }
 
-/// A body: a named group of cells, its material, supports and loads.
+/// A body: a named group of cells, its elasticity, supports and loads.
 #[derive(Debug, Clone)]
 pub struct BodySpec {
     /// Name of the physical group of cells; `[a-z][a-z0-9]*`, no PETSc family word (it is an option prefix).
     pub name: Located<String>,
-    /// Young's modulus, > 0.
-    pub young: Located<f64>,
-    /// Poisson's ratio, in (-1, 0.5).
-    pub poisson: Located<f64>,
+    /// What it is made of.
+    pub elasticity: ElasticitySpec,
+    /// Parts of it that are made of something else.
+    pub regions: Vec<RegionSpec>,
     /// Polynomial order.
     pub order: Order,
     /// Supports: prescribed displacement components on named groups.

@@ -1,6 +1,6 @@
-//! `[[body]]`: material, supports, loads.
+//! `[[body]]`: supports, loads.
 
-use super::Decoder;
+use super::{Decoder, elasticity};
 use crate::error::{Error, Located, Result};
 use crate::scene::expression::Field;
 use crate::scene::read::{Keys, Node, Value};
@@ -41,15 +41,13 @@ impl Decoder<'_> {
     }
 
     fn body(&self, node: &Node) -> Result<BodySpec> {
-        let keys =
-            Keys::open(node, "[[body]]", &["name", "young", "poisson", "order", "fix", "load", "spring", "force"])?;
+        let own = ["name", "order", "fix", "load", "spring", "force", "region"];
+        let keys = Keys::open(node, "[[body]]", &[&own[..1], &elasticity::KEYS, &own[1..]].concat())?;
         let items = |key: &str| keys.get(key).map_or(Ok(&[][..]), Node::list);
-        let young = keys.require("young")?;
-        let poisson = keys.require("poisson")?;
         Ok(BodySpec {
             name: name(keys.require("name")?)?,
-            young: Located::new(young.positive("Young's modulus")?, young.place.clone()),
-            poisson: Located::new(poisson_ratio(poisson)?, poisson.place.clone()),
+            elasticity: self.elasticity(&keys)?,
+            regions: self.regions(&keys)?,
             order: keys.get("order").map_or(Ok(Order::P1), order)?,
             fix: items("fix")?.iter().map(|item| self.support(item)).collect::<Result<_>>()?,
             load: items("load")?.iter().map(|item| self.load(item)).collect::<Result<_>>()?,
@@ -185,19 +183,6 @@ fn name(node: &Node) -> Result<Located<String>> {
             .help("choose another name, also for the physical group in the mesh"));
     }
     Ok(name)
-}
-
-fn poisson_ratio(node: &Node) -> Result<f64> {
-    match node.number()? {
-        value if value > -1.0 && value < 0.5 => Ok(value),
-        value => {
-            let error = node.refuse(format!("Poisson's ratio is {value}")).label("must lie between -1 and 0.5");
-            Err(match value == 0.5 {
-                true => error.help("incompressible bodies are not possible; take 0.49, say"),
-                false => error,
-            })
-        }
-    }
 }
 
 fn order(node: &Node) -> Result<Order> {

@@ -1,0 +1,94 @@
+//! Elasticity of the bodies of a scene: constants, regions, and refusals that name body and place.
+
+use super::find::{find_group, not_on_body, point};
+use crate::contact::pad;
+use crate::error::{Error, Result};
+use crate::fem::Space;
+use crate::fem::elasticity::{Elasticity, Flaw};
+use crate::mesh::Mesh;
+use crate::scene::{BodySpec, Constants, ElasticitySpec, Order, Plane};
+
+/// The elasticity of a body.
+///
+/// # Errors
+/// Regions that are not there, lie elsewhere or overlap, and constants that make no material.
+pub fn of<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, plane: Plane) -> Result<Elasticity> {
+    let mut of_cell = vec![0; if spec.regions.is_empty() { 0 } else { space.cell_count() }];
+    for (number, region) in spec.regions.iter().enumerate() {
+        let cells = space.cells_in(find_group(mesh, &region.on, &[D], "region")?);
+        if cells.is_empty() {
+            return Err(not_on_body(&region.on, &spec.name.value));
+        }
+        for cell in cells {
+            if of_cell[cell] != 0 {
+                let (first, second) = (&spec.regions[of_cell[cell] - 1].on.value, &region.on.value);
+                let at = point(pad(space.centroid(cell)));
+                let message = format!("the regions `{first}` and `{second}` share the cell at {at}");
+                return Err(Error::scene(&region.on.place, message).help("let each cell be in one region at most"));
+            }
+            of_cell[cell] = number + 1;
+        }
+    }
+    let specs: Vec<&ElasticitySpec> = specs(spec).collect();
+    Elasticity::new(&specs, of_cell, D, plane).map_err(|(number, flaw)| refusal(spec, number, None, &flaw))
+}
+
+fn specs(spec: &BodySpec) -> impl Iterator<Item = &ElasticitySpec> {
+    std::iter::once(&spec.elasticity).chain(spec.regions.iter().map(|region| &region.elasticity))
+}
+
+/// The refusal of the constants of a body (`number` 0) or its regions, at a point if they depend on it.
+pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> Error {
+    let place = &specs(spec).nth(number).unwrap_or(&spec.elasticity).place;
+    let at = x.map(|x| format!(" at {}", point(x))).unwrap_or_default();
+    let name = &spec.name.value;
+    match flaw {
+        Flaw::Constant(constant, value, rule) => {
+            Error::scene(place, format!("body `{name}`: {constant} is {value}{at}")).label(*rule)
+        }
+        Flaw::Axes(what) => Error::scene(place, format!("body `{name}`: axes{at}: {what}")),
+        Flaw::NotCoercive(eigenvalue) => {
+            let value = if eigenvalue.is_finite() {
+                format!("the least eigenvalue of C is {eigenvalue:.6e}")
+            } else {
+                "C is not finite".to_owned()
+            };
+            Error::scene(place, format!("body `{name}`: the elasticity tensor is not positive definite{at}"))
+                .label(value)
+                .help("a strain must cost energy, whatever its direction: look for a slip among the constants")
+        }
+    }
+}
+
+/// Mean modulus of a body against pressure on surfaces with the mean squared normal components `share` (which sum to one).
+/// Cells whose constants make no material at their middle count as nothing: assembly refuses them.
+pub fn modulus<const D: usize>(space: &Space<D>, elasticity: &Elasticity, share: [f64; 3]) -> f64 {
+    let in_cell = |cell: usize| {
+        let moduli = elasticity.moduli(cell, pad(space.centroid(cell))).unwrap_or_default();
+        (0..3).map(|c| share[c] * moduli[c]).sum::<f64>()
+    };
+    if elasticity.is_constant() {
+        return in_cell(0);
+    }
+    let sum: f64 = (0..space.cell_count()).map(|cell| space.cell_measure(cell) * in_cell(cell)).sum();
+    sum / space.measure()
+}
+
+/// What the user should know: linear elements are too stiff where the volume can hardly change.
+pub fn warning<const D: usize>(spec: &BodySpec, space: &Space<D>, plane: Plane) -> Option<String> {
+    if spec.order == Order::P2 || (D == 2 && plane == Plane::Stress) {
+        return None;
+    }
+    let largest = |spec: &ElasticitySpec| match &spec.constants {
+        Constants::Isotropic { poisson, .. } => space.nodes.iter().map(|&x| poisson.eval(pad(x))).fold(0.0, f64::max),
+        _ => 0.0,
+    };
+    let poisson = specs(spec).map(largest).fold(0.0, f64::max);
+    (poisson > LOCKING).then(|| {
+        let name = &spec.name.value;
+        format!("body {name}: Poisson's ratio is {poisson}: linear elements are far too stiff there; set order = 2")
+    })
+}
+
+/// Poisson's ratio above which linear elements lock.
+const LOCKING: f64 = 0.49;
