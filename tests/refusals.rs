@@ -71,7 +71,8 @@ fn names_that_the_mesh_does_not_have() {
 #[test]
 fn names_of_bodies_that_are_words_of_petsc() {
     for word in ["mat", "log", "draw"] {
-        groove_refused("name = \"lower\"", &format!("name = \"{word}\""), word, &[&format!("`{word}`"), "PETSc"]);
+        let name = format!("name = \"{word}\"");
+        groove_refused("name = \"lower\"", &name, &name, &[&format!("`{word}`"), "PETSc"]);
     }
     groove_refused("name = \"lower\"", "name = \"Lower\"", "Lower", &["`Lower`", "small letter"]);
 }
