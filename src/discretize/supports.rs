@@ -130,7 +130,7 @@ impl<const D: usize> Held<D> {
                 return Err(contradiction(spec, condition, earlier_one, space.nodes[node as usize]));
             }
         }
-        let turned = basis.iter().any(|(axis, _)| !axis.iter().any(|a| *a == 1.0));
+        let turned = basis.iter().any(|(axis, _)| !axis.contains(&1.0));
         if turned {
             let mut axes: Vec<[f64; D]> = basis.iter().map(|(axis, _)| *axis).collect();
             for c in 0..D {

@@ -22,12 +22,12 @@ pub fn surface_load<const D: usize>(
     });
 }
 
-/// Visits the integration points of a surface: nodes of the facet, their shape functions, weight, place, outer unit normal.
-fn on_facets<const D: usize>(
-    space: &Space<D>,
-    facets: &Facets<D>,
-    visit: &mut dyn FnMut(&[u32], &[f64], f64, [f64; D], [f64; D]),
-) {
+/// What is done at an integration point of a surface: nodes of the facet, their shape functions, weight, place, outer unit
+/// normal.
+type Visit<'a, const D: usize> = dyn FnMut(&[u32], &[f64], f64, [f64; D], [f64; D]) + 'a;
+
+/// Visits the integration points of a surface.
+fn on_facets<const D: usize>(space: &Space<D>, facets: &Facets<D>, visit: &mut Visit<D>) {
     let rule = quadrature::simplex::<D>(if space.order == Order::P1 { 3 } else { 5 });
     for index in 0..facets.count() {
         let x = facets.coordinates(index, space);

@@ -68,7 +68,7 @@ impl Schur {
     ) -> Result<Schur> {
         let one = |i: usize| i as Int + 1;
         let inside = lower.iter().all(|&(i, j, _)| i < rows && j <= i) && retained.iter().all(|&i| i < rows);
-        if !inside || retained.is_empty() || retained.len() >= rows || rows % block_size != 0 {
+        if !inside || retained.is_empty() || retained.len() >= rows || !rows.is_multiple_of(block_size) {
             return Err(Error::new(Kind::Solver, "not a lower triangle with retained and interior rows"));
         }
         let mut schur = Schur {

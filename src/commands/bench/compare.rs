@@ -193,7 +193,7 @@ mod tests {
         let p = |x: &[f64; 3]| 3.0 + 2.0 * x[0];
         let curve = points((0..5).map(|k| [f64::from(k), 0.0, 0.0]).collect(), p);
         let between = points(vec![[0.5, 0.1, 0.0], [3.25, 0.0, 0.0]], p);
-        let error = difference(2, &[between.clone()], &[curve.clone()]);
+        let error = difference(2, std::slice::from_ref(&between), std::slice::from_ref(&curve));
         assert!(error.is_some_and(|error| error < 1e-15), "{error:?}");
         let off = points(between.at.clone(), |x| 1.01 * p(x));
         let error = difference(2, &[off], &[curve]).expect("an error");

@@ -125,10 +125,11 @@ fn measure(
     }
     let runs = runner.repeat(case)?;
     let mut row = Row::new(case, &runs);
-    if row.is_good() && !case.is_linear() {
-        if let Some((error, what)) = known_error(&scene, &row, reference, runner, case) {
-            row.set_error(error, what);
-        }
+    if row.is_good()
+        && !case.is_linear()
+        && let Some((error, what)) = known_error(&scene, &row, reference, runner, case)
+    {
+        row.set_error(error, what);
     }
     Ok(row)
 }

@@ -35,8 +35,9 @@ impl Typed {
         let (first, first_slope) = typed.value(0.0);
         let least = typed.value(top * 10f64.powi(-DECADES)).0;
         let largest = typed.value(top * 1e-3).0.abs();
-        // a formula may miss zero by rounding
-        if first != 0.0 && !(first.abs() <= 1e-12 * largest) {
+        // a formula may miss zero by rounding; one that is not a number misses it, too
+        let is_zero = first == 0.0 || first.abs() <= 1e-12 * largest;
+        if !is_zero {
             return Err(typed.refuse(format!("p(0) is {first}, not 0"), "without compression there is no pressure"));
         }
         if first_slope.is_infinite() {

@@ -1,9 +1,9 @@
 //! Common pieces of two triangulated surfaces: convex polygons in the parameters of the facets of side a.
 //!
-//! The corners of a facet of side b are brought to the parameters of a facet of side a along the normals of a: x = x_a(u, v)
-//! + t n(u, v). There the image is clipped by the facet. Straight edges of the image stand for what may be slightly curved;
-//! each facet of a is still covered once, since neighbours in b share their edges. A curved facet of b is
-//! split into four at its mid-edges.
+//! The corners of a facet of side b are brought to the parameters of a facet of side a along the normals of a, which is to
+//! solve x = x_a(u, v) + t n(u, v). There the image is clipped by the facet. Straight edges of the image stand for what may
+//! be slightly curved; each facet of a is still covered once, since neighbours in b share their edges. A curved facet of b
+//! is split into four at its mid-edges.
 
 use super::polygon::{self, Polygon};
 use super::search::{Reach, Search};
