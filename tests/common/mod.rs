@@ -72,8 +72,19 @@ impl Run {
 
     /// The contact table of the first pair.
     pub fn contact(&self) -> Table {
-        let name = |side: usize| self.text(&format!("pairs/0/bodies/{side}"));
+        self.contact_of(0)
+    }
+
+    /// The contact table of a pair, which must be the only one of its two bodies.
+    pub fn contact_of(&self, pair: usize) -> Table {
+        let name = |side: usize| self.text(&format!("pairs/{pair}/bodies/{side}"));
         self.table(&format!("contact-{}-{}.csv", name(0), name(1)))
+    }
+
+    /// Force vectors of a pair on its two bodies, in the order of the scene.
+    pub fn forces(&self, pair: usize) -> [[f64; 3]; 2] {
+        let component = |side, c| self.number(&format!("pairs/{pair}/force/{side}/{c}"));
+        std::array::from_fn(|side| std::array::from_fn(|c| component(side, c)))
     }
 
     /// `history.csv`.
