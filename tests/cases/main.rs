@@ -3,8 +3,11 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bearing;
+mod flange;
 mod hertz;
 mod ring;
+mod spheres;
 mod westergaard;
 
 use common::{Run, case, solve};

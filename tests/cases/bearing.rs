@@ -1,0 +1,87 @@
+//! A roller bearing: twelve and more bodies that only contact and soft springs hold.
+
+use super::{case, close, solve};
+use crate::common::{Run, Scene, root};
+use std::fs;
+use std::process::Command;
+
+/// Total load, on the inner ring.
+const LOAD: f64 = 300.0;
+
+/// The scene that `scripts/bearing` prints.
+fn made(rollers: usize) -> String {
+    let output =
+        Command::new(root().join("scripts/bearing")).arg(rollers.to_string()).output().expect("the script runs");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// The same as a scene of its own, with one kind of value replaced and coarser meshes.
+fn varied(rollers: usize, from: &str, to: &str) -> Scene {
+    let folder = root().join("meshes/bearing");
+    Scene::new(made(rollers).replace("geo = \"", &format!("geo = \"{}/", folder.display())).replace(from, to))
+}
+
+/// What the inner ring presses on each roller, whose forces on the ring must add up to the load.
+fn carried(run: &Run, rollers: usize) -> Vec<f64> {
+    let pairs = run.report["pairs"].as_array().expect("pairs");
+    assert_eq!(pairs.len(), 2 * rollers);
+    let forces: Vec<[f64; 3]> = (0..rollers).map(|k| run.forces(2 * k)[0]).collect();
+    let sum: [f64; 2] = std::array::from_fn(|c| forces.iter().map(|force| force[c]).sum());
+    assert!(sum[0].abs() < 1e-6 * LOAD && (sum[1] + LOAD).abs() < 1e-6 * LOAD, "{sum:?}");
+    forces.iter().map(|force| force[0].hypot(force[1])).collect()
+}
+
+/// Forces of rollers between rings that do not deform, for a linear layer: Q = 4/3 k sqrt(2 R) delta^(3/2) at each of its two
+/// contacts, which share the approach D cos(psi) - clearance/2 of the rings. D is where the forces add up to the load.
+fn rigid(rollers: usize, clearance: f64, stiffness: f64) -> Vec<f64> {
+    let compliance = |radius: f64| (3.0 / (4.0 * stiffness * (2.0 * radius).sqrt())).powf(2.0 / 3.0);
+    let both = compliance(1.0 / (1.0 / 5.0 + 1.0 / 30.0)) + compliance(1.0 / (1.0 / 5.0 - 1.0 / 40.0));
+    let angle = |k: usize| std::f64::consts::TAU * k as f64 / rollers as f64;
+    let force = |k: usize, d: f64| ((d * angle(k).cos() - clearance / 2.0).max(0.0) / both).powf(1.5);
+    let total = |d: f64| (0..rollers).map(|k| force(k, d) * angle(k).cos()).sum::<f64>();
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if total(middle) < LOAD { low = middle } else { high = middle }
+    }
+    (0..rollers).map(|k| force(k, low)).collect()
+}
+
+/// The scene is what the script prints; by default settings it converges in few steps, exactly balanced, with the upper rollers
+/// open, and near Stribeck's share for the most loaded one.
+#[test]
+fn by_default() {
+    assert_eq!(fs::read_to_string(case("bearing")).expect("the scene"), made(12), "run scripts/bearing 12 again");
+    let run = solve(case("bearing"), &["--set", "mesh.set.n=4"]).converged();
+    let forces = carried(&run, 12);
+    assert!(forces[4..9].iter().all(|&force| force == 0.0), "{forces:?}");
+    assert!(forces[..3].iter().all(|&force| force > 20.0), "{forces:?}");
+    let share = forces[0] * 12.0 / LOAD;
+    assert!(share > 4.0 && share < 5.0, "{share}");
+    for k in 1..6 {
+        assert!((forces[k] - forces[12 - k]).abs() < 1e-3 * forces[0], "roller {k}: {forces:?}");
+    }
+    assert!(run.warnings().is_empty(), "{}", run.warnings());
+}
+
+/// Rings and rollers that are stiff against the layer share the load as in closed form.
+#[test]
+fn stiff_rings() {
+    let scene = varied(12, "young = 2.1e5", "young = 2.1e8");
+    let run = solve(&scene, &["--set", "mesh.set.n=8"]).converged();
+    let forces = carried(&run, 12);
+    for (k, exact) in rigid(12, 0.01, 2.5e4).into_iter().enumerate() {
+        assert!((forces[k] - exact).abs() < 0.005 * forces[0], "roller {k}: {}, closed form {exact}", forces[k]);
+    }
+}
+
+/// Another number of rollers, none of them at the bottom.
+#[test]
+fn turned() {
+    let scene = varied(16, "turn = 0", "turn = 0.5");
+    let run = solve(&scene, &["--set", "mesh.set.n=4"]).converged();
+    let forces = carried(&run, 16);
+    close("the two lowest", forces[0], forces[15], 1e-3);
+    assert!(forces[0] > forces[1] && forces[1] > forces[2], "{forces:?}");
+    assert_eq!(forces.iter().filter(|&&force| force == 0.0).count(), 8, "{forces:?}");
+}

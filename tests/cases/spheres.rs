@@ -1,0 +1,19 @@
+//! Spheres in space: Hertz's contact, and a soft layer between stiff bodies.
+
+use super::solved;
+
+/// A soft layer between stiff spheres: p = k (delta - r^2 / (2 R)) with F = pi k R delta^2; the layer carries exactly the load.
+#[test]
+fn soft_layer() {
+    let run = solved("sphere-layer", &["mesh.set.n=4"]);
+    let (stiffness, approach, peak) = (18_655.5, 0.02, 373.11);
+    let table = run.contact();
+    for q in 0..table.rows() {
+        let r = table["x"][q].hypot(table["y"][q]);
+        let exact = stiffness * (approach - r * r / 50.0f64).max(0.0);
+        let ours = table["pressure"][q];
+        assert!((ours - exact).abs() < 0.015 * peak, "p({r}) = {ours}, closed form {exact}");
+    }
+    let force = run.forces(0)[1][2];
+    assert!((force / (586.081 / 4.0) - 1.0).abs() < 1e-8, "{force}");
+}
