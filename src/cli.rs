@@ -51,6 +51,9 @@ enum Solving {
         /// Folder for the results [default: output.dir of the scene, else results/CASE]
         #[arg(short, value_name = "DIR")]
         output: Option<PathBuf>,
+        /// Write displacements and stresses of the bodies for ParaView (short for --set output.vtu=true)
+        #[arg(long)]
+        vtu: bool,
     },
     /// Build a scene's problem, solve nothing, and say what is there
     Check {
@@ -173,8 +176,8 @@ impl SceneArgs {
 }
 
 /// Flags of the program that begin with two dashes: with one they look like PETSc's.
-const TWO_DASHES: [&str; 10] =
-    ["-set", "-json", "-method", "-estimate", "-over", "-solver", "-order", "-ranks", "-repeat", "-against"];
+const TWO_DASHES: [&str; 11] =
+    ["-set", "-json", "-method", "-estimate", "-vtu", "-over", "-solver", "-order", "-ranks", "-repeat", "-against"];
 
 /// Runs the program with the words of its command line, the name first; returns the exit code.
 pub fn run(words: Vec<String>) -> i32 {
@@ -228,8 +231,9 @@ fn with_session(petsc: &[String], command: Solving) -> i32 {
 
 fn dispatch(session: &Session, command: Solving) -> Result<i32> {
     match command {
-        Solving::Solve { scene, output } => {
-            let overrides = scene.overrides();
+        Solving::Solve { scene, output, vtu } => {
+            let mut overrides = scene.overrides();
+            overrides.extend(vtu.then(|| "output.vtu=true".to_owned()));
             solve::solve(session, solve::Request { scene: scene.scene, folder: output, overrides, json: scene.json })
         }
         Solving::Check { scene } => {

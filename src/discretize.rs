@@ -56,6 +56,9 @@ pub trait Maker {
     /// # Errors
     /// PETSc's refusal of a matrix or an option value.
     fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>>;
+
+    /// A body of this name with the same K, f and contact rows, left by an earlier scene on the rank that owns it.
+    fn kept(&mut self, name: &str) -> Option<BodySlot>;
 }
 
 /// A body ready for its inner solver.
@@ -141,6 +144,8 @@ pub struct Problem {
     pub meshes: Option<Rc<dyn Meshes>>,
     /// Stiffness matrices assembled on this rank.
     pub assemblies: usize,
+    /// Those that an earlier scene has left.
+    pub assemblies_avoided: usize,
 }
 
 /// What to keep besides the model.
@@ -180,7 +185,8 @@ pub fn discretize<const D: usize>(
     }
     let loads: Vec<usize> = parts.iter().map(|part| part.space.dofs()).collect();
     let owner = crate::parallel::owners(&loads, ranks.1);
-    let (mut slots, mut infos, mut kept, mut assemblies) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    let (mut slots, mut infos, mut kept) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut assemblies, mut assemblies_avoided) = (0, 0);
     for (index, mut part) in parts.into_iter().enumerate() {
         let (segments, rows) = rows_of(index, &pairs, part.space.dofs());
         let free: Vec<RigidMotion> = rigid::modes(&part.space.nodes)
@@ -216,7 +222,10 @@ pub fn discretize<const D: usize>(
             prescribed: &prescribed,
             motions: &free,
         })?;
-        if owner[index] == ranks.0 {
+        if let Some(before) = maker.kept(&slot.name) {
+            slot = BodySlot { segments: slot.segments, motions: slot.motions, ..before };
+            assemblies_avoided += 1;
+        } else if owner[index] == ranks.0 {
             let body = part.assemble(mesh, &rows, &elasticity, load, prescribed)?;
             assemblies += 1;
             slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
@@ -260,7 +269,15 @@ pub fn discretize<const D: usize>(
         slots.push(slot);
     }
     let meshes = keep.meshes.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
-    Ok(Problem { model: Model::new(slots, pairs, exchange), bodies: infos, swapped, kept, meshes, assemblies })
+    Ok(Problem {
+        model: Model::new(slots, pairs, exchange),
+        bodies: infos,
+        swapped,
+        kept,
+        meshes,
+        assemblies,
+        assemblies_avoided,
+    })
 }
 
 impl Problem {

@@ -187,3 +187,45 @@ fn a_condensed_body_is_factored_once() {
     let full = solve(case("wavy"), &["--set", "mesh.set.n=8", "--set", "method.start.normal=3e-4"]).converged();
     assert_eq!(counts(&full, ["factorizations", "dense_factorizations", "robin_updates"]), [2, 4, 4]);
 }
+
+/// K and f depend neither on the method nor on layers and gaps: a sweep over these factors each body once, and every run is the
+/// one that `solve` makes.
+#[test]
+fn a_sweep_keeps_condensed_bodies() {
+    let sweep = |over: &[&str], more: &[&str]| -> Vec<serde_json::Value> {
+        let path = case("groove").display().to_string();
+        let over: Vec<&str> = over.iter().flat_map(|over| ["--over", over]).collect();
+        let run =
+            winkler(&[&["sweep", &path, "-o", "out", "--json", "--set", "mesh.set.n=8"][..], &over, more].concat());
+        assert_eq!(run.code, 0, "{}", run.said());
+        serde_json::from_str(&run.stdout).expect("a list of reports")
+    };
+    let done =
+        ["assemblies", "factorizations", "symbolic_factorizations", "assemblies_avoided", "factorizations_avoided"];
+    let counts = |report: &serde_json::Value| done.map(|name| report[name].as_u64().expect("a count"));
+    let (once, never) = ([2, 2, 2, 0, 0], [0, 0, 0, 2, 2]);
+    let overs: [&[&str]; 3] = [
+        &["method.gamma=0.5,0.6"],
+        &["contact.0.layer.power.a=0.5,1", "contact.0.gap=0,\"1e-4*abs(x-4)\""],
+        &["method.name=newton-robin,ncg", "contact.0.layer.power.B=2.5e-5,1e-5"],
+    ];
+    for over in overs {
+        let reports = sweep(over, &[]);
+        assert_eq!(counts(&reports[0]), once, "{over:?}");
+        assert!(reports.len() > 1 && reports[1..].iter().all(|report| counts(report) == never), "{over:?}");
+    }
+    let reports = sweep(&["contact.0.gap=0,\"1e-4*abs(x-4)\"", "method.gamma=0.5,0.6"], &[]);
+    for (report, (gap, gamma)) in reports.iter().zip([("0", "0.5"), ("0", "0.6"), ("W", "0.5"), ("W", "0.6")]) {
+        let gap = format!("contact.0.gap={}", gap.replace('W', "\"1e-4*abs(x-4)\""));
+        let gamma = format!("method.gamma={gamma}");
+        let alone = solve(case("groove"), &["--set", "mesh.set.n=8", "--set", &gap, "--set", &gamma]);
+        for name in ["iterations", "residual", "F1", "body_solves", "dense_factorizations"] {
+            assert_eq!(report[name], alone.report[name], "{name} of {gap}, {gamma}");
+        }
+    }
+    // another mesh, another body, another solver: nothing is left
+    for over in ["mesh.set.n=4,8", "body.0.young=1e5,2e5", "solver=mumps,condensed"] {
+        assert!(sweep(&[over], &[]).iter().all(|report| counts(report)[3..] == [0, 0]), "{over}");
+    }
+    assert_eq!(counts(&sweep(&["method.gamma=0.5,0.6"], &["--set", "solver=mumps"])[1])[0], 2);
+}

@@ -7,8 +7,8 @@ use std::fs;
 
 #[test]
 fn two_ranks_give_the_serial_history_and_files() {
-    let serial = solve(case("groove"), &[]).converged();
-    let parallel = solve_on(2, case("groove"), &[]).converged();
+    let serial = solve(case("groove"), &["--vtu"]).converged();
+    let parallel = solve_on(2, case("groove"), &["--vtu"]).converged();
     let lines = |run: &common::Run, name: &str| -> Vec<String> {
         let text = fs::read_to_string(run.folder.join(name)).expect("a result");
         text.lines().map(str::to_owned).collect()

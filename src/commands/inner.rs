@@ -1,6 +1,6 @@
 //! The inner solver of each body: what was asked for, or the program's choice and its reason.
 
-use crate::ddm::Body;
+use crate::ddm::{Body, BodySlot};
 use crate::discretize::{Assembled, Maker, Outline};
 use crate::error::Result;
 use crate::petsc::Session;
@@ -20,6 +20,8 @@ pub struct Inner<'a> {
     /// Bytes that the solvers so far leave, on the rank that has least.
     memory: usize,
     plans: Vec<Plan>,
+    /// Condensed bodies that an earlier scene has left; `local` is there on the rank that owns it.
+    kept: Vec<BodySlot>,
 }
 
 /// The choice for a body.
@@ -34,14 +36,14 @@ struct Plan {
 
 impl<'a> Inner<'a> {
     /// Starts from the memory that is free now; collective. `joined` tells that the method takes the bodies' own matrices
-    /// together, which a condensed body does not have.
-    pub fn new(session: &'a Session, scene: &Scene, joined: bool) -> Self {
+    /// together, which a condensed body does not have. `kept` are bodies of an earlier scene that serve this one, too.
+    pub fn new(session: &'a Session, scene: &Scene, joined: bool, kept: Vec<BodySlot>) -> Self {
         let mine = memory::available() as u64;
         let mut least = mine;
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
-        Self { session, asked: scene.solver.preset, joined, memory: least as usize, plans: Vec::new() }
+        Self { session, asked: scene.solver.preset, joined, memory: least as usize, plans: Vec::new(), kept }
     }
 
     /// Why the solvers are what they are, in words: once if all bodies have the same.
@@ -52,6 +54,12 @@ impl<'a> Inner<'a> {
         }
         let all = self.plans.iter().map(|plan| format!("{}: {}", plan.name, plan.reason));
         all.collect::<Vec<_>>().join("; ")
+    }
+
+    /// Names of the condensed bodies.
+    pub fn condensed(&self) -> Vec<String> {
+        let condensed = self.plans.iter().filter(|plan| plan.preset == Preset::Condensed);
+        condensed.map(|plan| plan.name.clone()).collect()
     }
 
     fn choose(&self, name: &str, size: &Size) -> Result<(Preset, String)> {
@@ -81,9 +89,11 @@ impl Maker for Inner<'_> {
     fn plan(&mut self, outline: &Outline) -> Result<()> {
         let &Outline { name, dimension, rows, prescribed, motions } = outline;
         let retained = Retained::new(dimension, rows, prescribed, motions);
-        let size = Size { dimension, dofs: rows.columns, retained: retained.dofs.len(), memory: self.memory };
+        // a body that is kept has its memory already
+        let memory = if self.kept.iter().any(|slot| slot.name == name) { usize::MAX } else { self.memory };
+        let size = Size { dimension, dofs: rows.columns, retained: retained.dofs.len(), memory };
         let (preset, reason) = self.choose(name, &size)?;
-        if matches!(preset, Preset::Mumps | Preset::Condensed) {
+        if matches!(preset, Preset::Mumps | Preset::Condensed) && memory == self.memory {
             self.memory = self.memory.saturating_sub(size.bytes(preset));
         }
         preset::apply(self.session, name, preset)?;
@@ -101,5 +111,10 @@ impl Maker for Inner<'_> {
         let modes: Vec<Vec<f64>> = motions.into_iter().map(|motion| motion.displacement).collect();
         let krylov = Krylov::new(self.session, &name, dimension, &body.stiffness, &modes)?;
         Ok(Box::new(SparseBody::new(body, rows, krylov)))
+    }
+
+    fn kept(&mut self, name: &str) -> Option<BodySlot> {
+        let at = self.kept.iter().position(|slot| slot.name == name && slot.local.is_some())?;
+        Some(self.kept.swap_remove(at))
     }
 }

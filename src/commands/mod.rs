@@ -9,6 +9,7 @@ pub mod mesh;
 pub mod method;
 pub mod preflight;
 pub mod report;
+mod reuse;
 pub mod run;
 pub mod solve;
 pub mod sweep;

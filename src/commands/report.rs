@@ -100,6 +100,8 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
         robin_updates_skipped: counts.robin_skipped,
         dense_factorizations: counts.dense_factorizations,
         assemblies: shared.assemblies,
+        assemblies_avoided: shared.assemblies_avoided,
+        factorizations_avoided: counts.factorizations_avoided,
         body_solves_skipped: outcome.solves_skipped,
         messages: model.exchange.messages(),
         residual: finite(last.map(|row| row.residual)),
@@ -147,6 +149,7 @@ pub fn headline(session: &Session, scene: &Scene, prepared: &Prepared, solvers: 
 pub struct Shared {
     counts: BodyCounts,
     assemblies: usize,
+    assemblies_avoided: usize,
     /// Inner solver of each body.
     pub solvers: Vec<String>,
 }
@@ -160,7 +163,7 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
 }
 
 /// Numbers before the words about the solvers.
-const HEAD: usize = 10;
+const HEAD: usize = 12;
 
 /// Most bytes of the words about a solver.
 const WORDS: usize = 64;
@@ -171,6 +174,7 @@ impl Shared {
         let model = &prepared.problem.model;
         let mut message = vec![0.0; HEAD + WORDS * model.bodies.len()];
         message[6] = prepared.problem.assemblies as f64;
+        message[10] = prepared.problem.assemblies_avoided as f64;
         for (index, slot) in model.bodies.iter().enumerate() {
             let Some(body) = &slot.local else { continue };
             let counts = body.counts();
@@ -186,6 +190,7 @@ impl Shared {
             message[7] += counts.factor_seconds;
             message[8] += counts.solve_seconds;
             message[9] += counts.dense_factorizations as f64;
+            message[11] += counts.factorizations_avoided as f64;
             let place = &mut message[HEAD + WORDS * index..];
             place
                 .iter_mut()
@@ -207,8 +212,10 @@ impl Shared {
                 factor_seconds: message[7],
                 solve_seconds: message[8],
                 dense_factorizations: count(9),
+                factorizations_avoided: count(11),
             },
             assemblies: count(6),
+            assemblies_avoided: count(10),
             solvers: message[HEAD..].chunks_exact(WORDS).map(words).collect(),
         }
     }

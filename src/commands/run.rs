@@ -4,7 +4,7 @@ use super::inner::Inner;
 use super::method;
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::method::Method;
-use crate::ddm::{self, Observer, Outcome, RobinRule, Settings, Status, StopRule};
+use crate::ddm::{self, BodySlot, Observer, Outcome, RobinRule, Settings, Status, StopRule};
 use crate::discretize::{self, Keep, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
@@ -62,25 +62,44 @@ pub struct Prepared {
     pub choice: String,
     /// Warnings.
     pub warnings: Vec<String>,
+    /// Names of the condensed bodies, with which another run can go on.
+    pub condensed: Vec<String>,
 }
 
-/// Builds the discrete problem of a scene; bodies get their inner solvers but nothing is factored.
+impl Prepared {
+    /// Takes the condensed bodies out, their counts begun anew, for another scene with the same bodies.
+    pub fn take_condensed(&mut self) -> Vec<BodySlot> {
+        let mut slots = std::mem::take(&mut self.problem.model.bodies);
+        slots.retain(|slot| self.condensed.contains(&slot.name));
+        slots.iter_mut().filter_map(|slot| slot.local.as_mut()).for_each(|body| body.begin_anew());
+        slots
+    }
+}
+
+/// Builds the discrete problem of a scene, with the bodies `kept` from an earlier one; bodies get their inner solvers but
+/// nothing is factored.
 ///
 /// # Errors
 /// Refusals of scene and mesh, printed on one rank; failures of PETSc.
-pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Prepared> {
+pub fn prepare(session: &Session, scene: &Scene, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared> {
     agree(session, refuse(scene))?;
     agree(session, scene_options(session, scene))?;
     let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
     options::distribute(session, &names)?;
     match scene.dimension.value {
-        2 => build::<2>(session, scene, pieces::plane, clock),
-        _ => build::<3>(session, scene, pieces::space, clock),
+        2 => build::<2>(session, scene, pieces::plane, kept, clock),
+        _ => build::<3>(session, scene, pieces::space, kept, clock),
     }
 }
 
 /// What [`prepare`] does where the dimension matters.
-fn build<const D: usize>(session: &Session, scene: &Scene, cut: Cut<D>, clock: &mut Clock) -> Result<Prepared> {
+fn build<const D: usize>(
+    session: &Session,
+    scene: &Scene,
+    cut: Cut<D>,
+    kept: Vec<BodySlot>,
+    clock: &mut Clock,
+) -> Result<Prepared> {
     let mesh = mesh::<D>(session, scene)?;
     clock.phase("mesh");
     let largest = mesh.points.len() * D;
@@ -89,7 +108,7 @@ fn build<const D: usize>(session: &Session, scene: &Scene, cut: Cut<D>, clock: &
     let threads = if D == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
     session.set_blas_threads(threads);
     let keep = method::keeps_matrices(scene);
-    let mut inner = Inner::new(session, scene, keep);
+    let mut inner = Inner::new(session, scene, keep, kept);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
     let keep = Keep { matrices: keep, meshes: scene.estimate || scene.method.stop.balanced };
@@ -98,7 +117,7 @@ fn build<const D: usize>(session: &Session, scene: &Scene, cut: Cut<D>, clock: &
     problem.share();
     clock.phase("discretize");
     let warnings = warnings(session, scene, &problem);
-    Ok(Prepared { problem, methods: Vec::new(), choice: inner.reason(), warnings })
+    Ok(Prepared { problem, methods: Vec::new(), choice: inner.reason(), warnings, condensed: inner.condensed() })
 }
 
 /// What the decoder of the scene cannot know.

@@ -1,14 +1,13 @@
 //! `winkler sweep`: a scene over values of its keys, one row a run.
 
 use super::run::{self, Clock};
-use super::{folder_of, report};
+use super::{folder_of, report, reuse};
 use crate::ddm::Silent;
 use crate::error::{Error, Kind, Result};
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::{Folder, Plot, Report, say, sci};
 use crate::parallel::agree;
 use crate::petsc::Session;
-use crate::solver::options;
 use std::path::PathBuf;
 
 /// What the user typed.
@@ -44,16 +43,17 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
     let mut table = csv::Writer::from_writer(folder.open("sweep.csv")?.1);
     let mut exit = 0;
     let (mut reports, mut histories, mut pressures, mut reference) = (Vec::new(), Vec::new(), Vec::new(), None);
+    let mut before = None;
     for (scene, values) in scenes.iter().zip(&runs) {
         let mut clock = Clock::default();
-        let mut prepared = run::prepare(session, scene, &mut clock)?;
+        let mut prepared = reuse::prepare(session, scene, before.take(), &mut clock)?;
         run::set_up(session, scene, &mut prepared, &mut clock)?;
         let outcome = run::iterate(scene, &mut prepared, &mut Silent, &mut clock)?;
         clock.total();
         let report = report::report(session, scene, &prepared, &outcome, &clock);
-        options::withdraw(session)?;
         exit = exit.max(report::exit_code(&outcome.status));
         if !first {
+            before = Some((scene, prepared));
             continue;
         }
         let label = label(&axes, values);
@@ -78,6 +78,7 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
             }
         }
         reports.push(report);
+        before = Some((scene, prepared));
     }
     if first {
         if scenes[0].output.plots {

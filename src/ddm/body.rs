@@ -29,6 +29,8 @@ pub struct BodyCounts {
     pub dense_factorizations: usize,
     /// Symbolic factorisations (patterns analysed).
     pub symbolic: usize,
+    /// Numeric factorisations of K that an earlier run has left.
+    pub factorizations_avoided: usize,
     /// Solves G z = r.
     pub solves: usize,
     /// Krylov iterations in them.
@@ -111,6 +113,9 @@ pub trait Body {
 
     /// What was done so far.
     fn counts(&self) -> BodyCounts;
+
+    /// Starts the counts anew for another run with the same K and f; what need not be done again counts as avoided.
+    fn begin_anew(&mut self);
 
     /// Displacements of all nodes for a state.
     ///

@@ -37,6 +37,10 @@ pub struct Report {
     pub symbolic_factorizations: usize,
     /// Stiffness matrices assembled.
     pub assemblies: usize,
+    /// Stiffness matrices that an earlier run of a sweep has left.
+    pub assemblies_avoided: usize,
+    /// Numeric factorisations of stiffness matrices that an earlier run of a sweep has left.
+    pub factorizations_avoided: usize,
     /// Solves of one body, those of the start included.
     pub body_solves: usize,
     /// Solves of one body that were not needed because its data did not change.

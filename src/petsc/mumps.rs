@@ -53,7 +53,7 @@ pub struct Schur {
 }
 
 impl Schur {
-    /// Plans to eliminate all but the `retained` dofs. `lower` holds (row, column, value) of the lower triangle, each place once;
+    /// Plans to eliminate all but the `retained` dofs. `lower` holds (row, column, value) of the lower triangle, row by row, each place once;
     /// `block_size` dofs belong to one node. Options `-<body>_mat_mumps_icntl_<i>` and `_cntl_<i>` are honoured.
     ///
     /// # Errors
@@ -246,22 +246,26 @@ impl Drop for Schur {
 /// their order.
 fn positions(block_size: usize, rows: usize, lower: &[(usize, usize, f64)], retained: &[usize]) -> Result<Vec<Int>> {
     let nodes = rows / block_size;
-    let mut edges: Vec<(i32, i32)> = lower
-        .iter()
-        .map(|&(i, j, _)| ((i / block_size) as i32, (j / block_size) as i32))
-        .filter(|(i, j)| i != j)
-        .flat_map(|(i, j)| [(i, j), (j, i)])
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
-    let mut ptr = vec![0; nodes + 1];
-    for &(i, _) in &edges {
-        ptr[i as usize + 1] += 1;
+    // each edge once: rows of a node follow each other
+    let mut seen = vec![usize::MAX; nodes];
+    let mut edges: Vec<(usize, usize)> = Vec::new();
+    for (node, other) in lower.iter().map(|&(i, j, _)| (i / block_size, j / block_size)) {
+        if node != other && seen[other] != node {
+            seen[other] = node;
+            edges.push((node, other));
+        }
     }
+    let mut ptr = vec![0; nodes + 1];
+    edges.iter().flat_map(|&(i, j)| [i, j]).for_each(|node| ptr[node + 1] += 1);
     for i in 0..nodes {
         ptr[i + 1] += ptr[i];
     }
-    let mut col: Vec<i32> = edges.into_iter().map(|edge| edge.1).collect();
+    let mut next = ptr.clone();
+    let mut col = vec![0; 2 * edges.len()];
+    for (i, j) in edges.into_iter().flat_map(|(i, j)| [(i, j), (j, i)]) {
+        col[next[i] as usize] = j as i32;
+        next[i] += 1;
+    }
     let order = metis::nested_dissection(&mut ptr, &mut col)?;
     let mut node_at = vec![0; nodes];
     order.iter().enumerate().for_each(|(node, &at)| node_at[at as usize] = node);

@@ -362,7 +362,7 @@ impl Default for StopSpec {
 pub struct OutputSpec {
     /// Folder for the results, if the scene names one (`-o` wins).
     pub dir: Option<PathBuf>,
-    /// Whether to write `<body>.vtu` and the `.pvd`; default true.
+    /// Whether to write `<body>.vtu` and the `.pvd`; default false.
     pub vtu: bool,
     /// Whether to draw the SVG plots; default true.
     pub plots: bool,
@@ -370,6 +370,6 @@ pub struct OutputSpec {
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { dir: None, vtu: true, plots: true }
+        Self { dir: None, vtu: false, plots: true }
     }
 }

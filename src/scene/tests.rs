@@ -101,13 +101,13 @@ fn the_groove_is_read() {
         StopSpec { residual: None, increment: Some(1e-3), balanced: false, iterations: 2000 }
     );
     assert_eq!(scene.solver, SolverSpec { preset: None, options: vec![] });
-    assert_eq!(scene.output, OutputSpec { dir: None, vtu: true, plots: true });
+    assert_eq!(scene.output, OutputSpec { dir: None, vtu: false, plots: true });
 }
 
 #[test]
 fn defaults_and_a_scene_in_space() {
     let text = "dimension = 3\nmesh = 'groove.msh'\n[[body]]\nname='a1'\nyoung=1\npoisson=0\norder=2\nforce=['z',0,1]\n\
-                fix=[{on='s',z=0.5}]\n[solver]\npreset='hypre'\noptions='-ksp_rtol 1e-10'\n[output]\ndir='out'\nvtu=false\n";
+                fix=[{on='s',z=0.5}]\n[solver]\npreset='hypre'\noptions='-ksp_rtol 1e-10'\n[output]\ndir='out'\nvtu=true\n";
     let scene = load_text(text, &[]).unwrap();
     assert_eq!(scene.title, "scene");
     assert!(matches!(&scene.mesh, MeshSource::Msh { .. }));
@@ -124,7 +124,7 @@ fn defaults_and_a_scene_in_space() {
     );
     let options = vec!["-ksp_rtol".to_owned(), "1e-10".to_owned()];
     assert_eq!(scene.solver, SolverSpec { preset: Some(Preset::Hypre), options });
-    assert_eq!(scene.output, OutputSpec { dir: Some("out".into()), vtu: false, plots: true });
+    assert_eq!(scene.output, OutputSpec { dir: Some("out".into()), vtu: true, plots: true });
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn overrides_replace_and_add() {
             "solver=mumps",
             "solver.preset=hypre",
             "solver.options=-ksp_rtol 1e-10",
-            "output.vtu=false",
+            "output.vtu=true",
             "title=Ein anderer Titel",
             "plane=stress",
             "method.gamma=0.1",
@@ -169,7 +169,7 @@ fn overrides_replace_and_add() {
     assert_eq!(scene.solver.preset, Some(Preset::Hypre));
     assert_eq!(scene.solver.options, ["-ksp_rtol", "1e-10"]);
     assert_eq!((scene.title.as_str(), scene.plane), ("Ein anderer Titel", Plane::Stress));
-    assert!(!scene.output.vtu && scene.output.plots);
+    assert!(scene.output.vtu && scene.output.plots);
     assert_eq!(scene.method.gamma, Gamma::Stationary(0.2));
 }
 

@@ -28,6 +28,8 @@ pub struct CondensedBody {
 }
 
 struct Condensed {
+    /// Whether an earlier run made it.
+    kept: bool,
     /// Wall seconds of the elimination.
     seconds: f64,
     schur: RefCell<Schur>,
@@ -86,7 +88,7 @@ impl CondensedBody {
         };
         let solver = Dense::new(retained, schur.take_complement());
         let body = SparseBody::new(body, self.retained.rows.clone(), solver);
-        Ok(Condensed { seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
+        Ok(Condensed { kept: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
     }
 }
 
@@ -164,12 +166,20 @@ impl Body for CondensedBody {
                 let counts = condensed.body.counts();
                 BodyCounts {
                     dense_factorizations: counts.factorizations,
-                    factorizations: 1,
-                    symbolic: 1,
-                    factor_seconds: counts.factor_seconds + condensed.seconds,
+                    factorizations: usize::from(!condensed.kept),
+                    factorizations_avoided: usize::from(condensed.kept),
+                    symbolic: usize::from(!condensed.kept),
+                    factor_seconds: counts.factor_seconds + if condensed.kept { 0.0 } else { condensed.seconds },
                     ..counts
                 }
             }
+        }
+    }
+
+    fn begin_anew(&mut self) {
+        if let Some(condensed) = &mut self.condensed {
+            condensed.kept = true;
+            condensed.body.begin_anew();
         }
     }
 

@@ -20,6 +20,8 @@ pub struct SparseBody<S> {
     row_stiffness: Vec<f64>,
     coupling: Coupling,
     counts: BodyCounts,
+    /// Symbolic and numeric factorisations before the counts began.
+    before: (usize, usize),
     product: Vec<f64>,
 }
 
@@ -34,7 +36,18 @@ impl<S: InnerSolver> SparseBody<S> {
             (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * body.stiffness.diagonal(i)).sum());
         let row_stiffness = row_stiffness.collect();
         let product = vec![0.0; body.load.len()];
-        Self { body, rows, solver, weight, prepared, row_stiffness, coupling, counts: BodyCounts::default(), product }
+        Self {
+            body,
+            rows,
+            solver,
+            weight,
+            prepared,
+            row_stiffness,
+            coupling,
+            counts: BodyCounts::default(),
+            before: (0, 0),
+            product,
+        }
     }
 
     /// The inner solver.
@@ -210,7 +223,13 @@ impl<S: InnerSolver> Body for SparseBody<S> {
 
     fn counts(&self) -> BodyCounts {
         let (symbolic, factorizations) = self.solver.factorizations();
+        let (symbolic, factorizations) = (symbolic - self.before.0, factorizations - self.before.1);
         BodyCounts { symbolic, factorizations, ..self.counts }
+    }
+
+    fn begin_anew(&mut self) {
+        self.before = self.solver.factorizations();
+        self.counts = BodyCounts::default();
     }
 
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
