@@ -17,7 +17,7 @@ use std::path::PathBuf;
 pub fn check(session: &Session, path: PathBuf, overrides: Vec<String>, as_json: bool) -> Result<i32> {
     let mut clock = Clock::default();
     let scene = load(session, &path, &overrides)?;
-    let prepared = run::prepare(session, &scene, Vec::new(), &mut clock)?;
+    let prepared = run::prepare(session, &scene, &mut clock)?;
     clock.total();
     let shared = report::Shared::gather(&prepared);
     if session.rank() != 0 {

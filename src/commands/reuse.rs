@@ -20,11 +20,13 @@ pub fn prepare(
     before: Option<(&Scene, Prepared)>,
     clock: &mut Clock,
 ) -> Result<Prepared> {
-    let Some((last, mut prepared)) = before else { return run::prepare(session, scene, Vec::new(), clock) };
+    let Some((last, mut prepared)) = before else { return run::prepare(session, scene, clock) };
     let joined = method::keeps_matrices(last) || method::keeps_matrices(scene);
     let same = |without: &[&str]| settings(last, without) == settings(scene, without);
     let condensed = prepared.condensed.len() == prepared.problem.bodies.len();
-    if !joined && condensed && same(&[]) {
+    // an estimate of the error needs the meshes, which are kept only for it
+    let meshes = |scene: &Scene| scene.estimate || scene.method.stop.balanced;
+    if !joined && condensed && meshes(last) == meshes(scene) && same(&[]) {
         let model = &mut prepared.problem.model;
         model.exchange = Box::new(Ranks::new(session));
         let bodies = model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
@@ -35,7 +37,7 @@ pub fn prepare(
     let kept = if !joined && same(&["gap", "layer", "reference"]) { prepared.take_condensed() } else { Vec::new() };
     drop(prepared);
     options::withdraw(session)?;
-    run::prepare(session, scene, kept, clock)
+    run::prepare_with(session, scene, kept, clock)
 }
 
 /// A scene without what no body depends on, and without some keys of its contacts.

@@ -76,12 +76,19 @@ impl Prepared {
     }
 }
 
-/// Builds the discrete problem of a scene, with the bodies `kept` from an earlier one; bodies get their inner solvers but
-/// nothing is factored.
+/// Builds the discrete problem of a scene; bodies get their inner solvers but nothing is factored.
 ///
 /// # Errors
 /// Refusals of scene and mesh, printed on one rank; failures of PETSc.
-pub fn prepare(session: &Session, scene: &Scene, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared> {
+pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Prepared> {
+    prepare_with(session, scene, Vec::new(), clock)
+}
+
+/// The same, with the bodies `kept` from an earlier scene.
+///
+/// # Errors
+/// Those of [`prepare`].
+pub fn prepare_with(session: &Session, scene: &Scene, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared> {
     agree(session, refuse(scene))?;
     agree(session, scene_options(session, scene))?;
     let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();

@@ -32,7 +32,7 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
     let mut clock = Clock::default();
     let scene = load(session, &request.scene, &request.overrides)?;
     let folder = agree(session, Folder::create(folder_of(&scene, request.folder)))?;
-    let mut prepared = run::prepare(session, &scene, Vec::new(), &mut clock)?;
+    let mut prepared = run::prepare(session, &scene, &mut clock)?;
     run::set_up(session, &scene, &mut prepared, &mut clock)?;
     let first = session.rank() == 0;
     let monitored = session.options().all()?.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));

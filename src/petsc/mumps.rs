@@ -106,7 +106,7 @@ impl Schur {
     /// Eliminates; what follows needs it.
     ///
     /// # Errors
-    /// When the interior is not positive definite, or memory does not suffice.
+    /// When the interior is singular, or memory does not suffice.
     pub fn factor(&mut self) -> Result<()> {
         let asked = self.mumps.icntl[13];
         for room in ROOM {
@@ -158,8 +158,15 @@ impl Schur {
     /// # Errors
     /// Failures of MUMPS.
     pub fn expand(&mut self, b: &[f64], x_retained: &[f64]) -> Result<Vec<f64>> {
-        // the expansion goes on from what the condensation of the same right-hand side has left in MUMPS
         self.condense(b)?;
+        self.expand_condensed(b, x_retained)
+    }
+
+    /// The same for the right-hand side that was condensed last: goes on from what that has left in MUMPS.
+    ///
+    /// # Errors
+    /// Failures of MUMPS.
+    pub fn expand_condensed(&mut self, b: &[f64], x_retained: &[f64]) -> Result<Vec<f64>> {
         let mut x = b.to_vec();
         self.solve(2, &mut x, &mut x_retained.to_vec())?;
         for (&dof, value) in self.retained.iter().zip(x_retained) {
@@ -302,8 +309,27 @@ fn failure(job: Int, first: Int, second: Int) -> Error {
             .because(format!("its work space is too small by {size} numbers"))
             .help("raise -mat_mumps_icntl_14 (per cent), or take multigrid: --set solver=hypre"),
         -6 | -10 => error
-            .because("the interior of the body is singular to rounding, or not positive definite")
+            .because("the interior of the body is singular to rounding")
             .help("look for cells without stiffness, or for parts of the body that nothing joins to it"),
         _ => error.because("see INFOG in the users' guide of MUMPS"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::failure;
+
+    #[test]
+    fn numbers_of_mumps_become_words() {
+        for (first, second, words) in [
+            (-9, -3, "too small by 3 million numbers"),
+            (-13, 70, "could not get memory for 70 numbers"),
+            (-10, 4, "singular to rounding"),
+            (-53, 0, "users' guide"),
+        ] {
+            let error = failure(2, first, second);
+            assert!(error.message().contains(&format!("INFOG(1)={first}")), "{error}");
+            assert!(error.render(false).contains(words), "{}", error.render(false));
+        }
     }
 }

@@ -76,7 +76,7 @@ impl CondensedBody {
         }
         let load = schur.condense(&self.load)?;
         // the interior under the loads alone, with the retained dofs at rest
-        let rest = schur.expand(&self.load, &vec![0.0; retained])?;
+        let rest = schur.expand_condensed(&self.load, &vec![0.0; retained])?;
         let work = dot(&self.load, &rest);
         let body = ElasticBody {
             stiffness: full(retained, schur.complement()),

@@ -66,8 +66,8 @@ impl Size {
 /// ```
 pub fn choose(size: &Size) -> (Preset, String) {
     let &Size { dimension, dofs, retained, memory } = size;
-    let place = if dimension == 2 { "plane" } else { "space" };
-    let what = format!("{dofs} dofs in the {place}, {retained} of them on the contact");
+    let place = if dimension == 2 { "in the plane" } else { "in space" };
+    let what = format!("{dofs} dofs {place}, {retained} of them on the contact");
     let megabytes = |preset: Preset| size.bytes(preset) / 1_000_000;
     let fits = |preset: Preset| size.bytes(preset) < memory;
     let dense = (retained as f64).powi(3) / 3.0;
