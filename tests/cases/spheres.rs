@@ -1,6 +1,6 @@
 //! Spheres in space: Hertz's contact, and a soft layer between stiff bodies.
 
-use super::solved;
+use super::{close, solved};
 
 /// A soft layer between stiff spheres: p = k (delta - r^2 / (2 R)) with F = pi k R delta^2; the layer carries exactly the load.
 #[test]
@@ -14,6 +14,13 @@ fn soft_layer() {
         let ours = table["pressure"][q];
         assert!((ours - exact).abs() < 0.015 * peak, "p({r}) = {ours}, closed form {exact}");
     }
-    let force = run.forces(0)[1][2];
-    assert!((force / (586.081 / 4.0) - 1.0).abs() < 1e-8, "{force}");
+    close("force", run.forces(0)[1][2], 586.081 / 4.0, 1e-7);
+}
+
+/// V5: the peak between elastic spheres, coarse as the mesh is; the layer carries exactly the load.
+#[test]
+fn hertz() {
+    let run = solved("hertz-sphere", &["mesh.set.n=4"]);
+    close("peak", run.number("pairs/0/peak_pressure"), 279.83, 0.02);
+    close("force", run.forces(0)[1][2], 586.081 / 4.0, 1e-7);
 }
