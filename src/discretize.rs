@@ -1,6 +1,7 @@
 //! Scene and mesh -> [`Model`]: the one place where geometry ends. Nothing below it knows the dimension.
 
 mod balance;
+mod carried;
 mod elastic;
 mod find;
 mod gauge;
@@ -15,10 +16,10 @@ use crate::ddm::{self, Body, BodySlot, Exchange, Model, Motion, RobinZone, Segme
 use crate::error::Result;
 use crate::fem::{
     ElasticBody, Elasticity, Space,
-    rigid::{self, RigidMotion},
+    rigid::{self, FreeMotion, RigidMotion},
     stress,
 };
-use crate::linalg::Csr;
+use crate::linalg::{Csr, axpy};
 use crate::mesh::Mesh;
 use crate::output::vtu::{BodyField, CellKind};
 use crate::scene::{Scene, Start, Zone};
@@ -73,6 +74,18 @@ pub struct Assembled {
     pub rows: Csr,
     /// Rigid motions of the free body, for multigrid's near-null space.
     pub motions: Vec<RigidMotion>,
+    /// Those that its supports leave.
+    pub left: Vec<FreeMotion>,
+}
+
+/// Matrices of a body for a method that needs them besides the body.
+pub struct Matrices {
+    /// K, f and supports.
+    pub body: ElasticBody,
+    /// All contact rows of the body, pair by pair.
+    pub rows: Csr,
+    /// Rigid motions that its supports leave.
+    pub left: Vec<FreeMotion>,
 }
 
 /// What is known of a body besides its matrices.
@@ -138,8 +151,10 @@ pub struct Problem {
     pub bodies: Vec<BodyInfo>,
     /// For each pair, whether side a (which carries the points) is the second surface in the scene.
     pub swapped: Vec<bool>,
-    /// Stiffness matrix and contact rows of every body, kept only when a method asked for them.
-    pub kept: Vec<(Csr, Csr)>,
+    /// The matrices of every body, kept only when a method asked for them.
+    pub kept: Vec<Matrices>,
+    /// Trace of the rigid motions that supports give bodies: states, and so the traces of iterates, are relative to them.
+    pub carried: Vec<f64>,
     /// The meshes, kept only when an estimate of the error was asked for.
     pub meshes: Option<Rc<dyn Meshes>>,
     /// Stiffness matrices assembled on this rank.
@@ -185,7 +200,7 @@ pub fn discretize<const D: usize>(
     }
     let loads: Vec<usize> = parts.iter().map(|part| part.space.dofs()).collect();
     let owner = crate::parallel::owners(&loads, ranks.1);
-    let (mut slots, mut infos, mut kept) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut slots, mut infos, mut kept, mut offsets) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let (mut assemblies, mut assemblies_avoided) = (0, 0);
     for (index, mut part) in parts.into_iter().enumerate() {
         let (segments, rows) = rows_of(index, &pairs, part.space.dofs());
@@ -197,6 +212,14 @@ pub fn discretize<const D: usize>(
         let load = part.load_on_dofs(nodal_load.clone());
         let gauged = gauge::fix(&mut part, &free, &rows, &load);
         let prescribed: Vec<(usize, f64)> = part.prescribed_sorted();
+        let (carried, prescribed) = carried::carried(&free, &prescribed)
+            .filter(|_| part.springs.is_empty())
+            .unwrap_or((Vec::new(), prescribed));
+        let mut offset = vec![0.0; rows.rows()];
+        if !carried.is_empty() {
+            rows.multiply(&carried, &mut offset);
+        }
+        offsets.push(offset);
         let left = part.left(&free);
         let motions: Vec<Motion> = left.iter().map(|motion| trace_of(motion, &rows, &load)).collect();
         let mut slot = BodySlot {
@@ -226,16 +249,23 @@ pub fn discretize<const D: usize>(
             slot = BodySlot { segments: slot.segments, motions: slot.motions, ..before };
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 {
-            let body = part.assemble(mesh, &rows, &elasticity, load, prescribed)?;
+            let left = rigid::free(&left, &prescribed, &load);
+            let body = part.assemble(mesh, &rows, &elasticity, load, prescribed, carried)?;
             assemblies += 1;
             slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
             slot.row_stiffness =
                 (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * body.stiffness.diagonal(i)).sum()).collect();
             if keep.matrices {
-                kept.push((body.stiffness.clone(), rows.clone()));
+                kept.push(Matrices { body: body.clone(), rows: rows.clone(), left: left.clone() });
             }
-            slot.local =
-                Some(maker.make(Assembled { name: slot.name.clone(), dimension: D, body, rows, motions: free })?);
+            slot.local = Some(maker.make(Assembled {
+                name: slot.name.clone(),
+                dimension: D,
+                body,
+                rows,
+                motions: free,
+                left,
+            })?);
         }
         let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
         infos.push(BodyInfo {
@@ -269,15 +299,11 @@ pub fn discretize<const D: usize>(
         slots.push(slot);
     }
     let meshes = keep.meshes.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
-    Ok(Problem {
-        model: Model::new(slots, pairs, exchange),
-        bodies: infos,
-        swapped,
-        kept,
-        meshes,
-        assemblies,
-        assemblies_avoided,
-    })
+    let mut model = Model::new(slots, pairs, exchange);
+    let mut carried = vec![0.0; 2 * model.points()];
+    offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
+    model.carry(&carried);
+    Ok(Problem { model, bodies: infos, swapped, kept, meshes, carried, assemblies, assemblies_avoided })
 }
 
 impl Problem {
@@ -317,12 +343,12 @@ pub fn robin_zone(scene: &Scene) -> RobinZone {
 ///
 /// # Errors
 /// A start that is not finite at a contact point.
-pub fn start(scene: &Scene, model: &Model) -> Result<Vec<f64>> {
+pub fn start(scene: &Scene, problem: &Problem) -> Result<Vec<f64>> {
+    let model = &problem.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
     if let Start::Auto = &scene.method.start {
-        // without a minimum any start does: the run ends before its first sweep
-        return Ok(ddm::rigid_closing(model).unwrap_or(trace));
+        return Ok(ddm::automatic_start(model));
     }
     if let Start::Normal(field) = &scene.method.start {
         let positions = model.pairs.iter().flat_map(|pair| &pair.position);
@@ -335,6 +361,7 @@ pub fn start(scene: &Scene, model: &Model) -> Result<Vec<f64>> {
             trace[points + q] = value;
         }
     }
+    axpy(-1.0, &problem.carried, &mut trace);
     Ok(trace)
 }
 

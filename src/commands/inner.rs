@@ -103,14 +103,14 @@ impl Maker for Inner<'_> {
     }
 
     fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>> {
-        let Assembled { name, dimension, body, rows, motions } = assembled;
+        let Assembled { name, dimension, body, rows, motions, left } = assembled;
         let plan = self.plans.iter_mut().find(|plan| plan.name == name);
         if let Some(retained) = plan.and_then(|plan| plan.retained.take()) {
-            return Ok(Box::new(CondensedBody::new(self.session, &name, dimension, body, retained)));
+            return Ok(Box::new(CondensedBody::new(self.session, &name, dimension, body, left, retained)));
         }
         let modes: Vec<Vec<f64>> = motions.into_iter().map(|motion| motion.displacement).collect();
         let krylov = Krylov::new(self.session, &name, dimension, &body.stiffness, &modes)?;
-        Ok(Box::new(SparseBody::new(body, rows, krylov)))
+        Ok(Box::new(SparseBody::new(body, rows, &left, krylov)))
     }
 
     fn kept(&mut self, name: &str) -> Option<BodySlot> {

@@ -2,11 +2,11 @@
 
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
 use crate::ddm::method::{Anderson, Conjugate, Inner, Method, Newton, Relaxed};
-use crate::discretize::Problem;
+use crate::discretize::{Matrices, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::petsc::Session;
 use crate::scene::{Gamma, MethodName, Preset, Scene};
-use crate::solver::{Krylov, Monolithic, Union, preset};
+use crate::solver::{Krylov, Monolithic, Part, Union, preset};
 
 /// Prefix of the PETSc options of the Newton matrix of all bodies.
 pub const WHOLE: &str = "newton";
@@ -56,7 +56,8 @@ fn whole(session: &Session, problem: &mut Problem) -> Result<Monolithic> {
             points[place % model.points()][place / model.points()] = (body, row);
         }
     }
-    let union = Union::new(std::mem::take(&mut problem.kept), &points);
+    let kept = std::mem::take(&mut problem.kept).into_iter();
+    let union = Union::new(kept.map(|Matrices { body, rows, left }| Part::new(body, rows, &left)).collect(), &points);
     preset::apply(session, WHOLE, Preset::Mumps)?;
     Monolithic::new(union, |stiffness| Krylov::new(session, WHOLE, 1, stiffness, &[]))
 }

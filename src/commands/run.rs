@@ -276,7 +276,7 @@ pub fn iterate(
         methods: std::mem::take(&mut prepared.methods),
         stop: StopRule { residual: stop.residual, increment: stop.increment, iterations: stop.iterations },
         balance: prepared.problem.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _),
-        start: discretize::start(scene, &prepared.problem.model)?,
+        start: discretize::start(scene, &prepared.problem)?,
     };
     let outcome = ddm::solve(&mut prepared.problem.model, &mut settings, observer)?;
     clock.phase("iterate");

@@ -1,5 +1,7 @@
-//! The automatic start: bodies that contact alone holds are pushed, rigidly, until the layers carry their loads.
+//! The automatic start: bodies that contact alone holds are pushed, rigidly, until the layers carry their loads; then surfaces
+//! that overlap far too much give way.
 
+use super::held;
 use super::layer::Layer;
 use super::line::Unbounded;
 use super::model::Model;
@@ -69,6 +71,53 @@ pub fn rigid_closing(model: &Model) -> Result<Vec<f64>, Unbounded> {
         }
     }
     Ok(trace)
+}
+
+/// Layers that push this many times harder than loads and surfaces could make them start too deep.
+const DEEP: f64 = 10.0;
+
+/// The automatic start: the trace of [`rigid_closing`], or zero without a minimum (the run then ends before its first sweep).
+///
+/// An overlap of the scene, or supports that drive bodies together, can make the pressure of a stiff law there any number. The
+/// surfaces then give way, each point by itself, until law and surface are in balance.
+pub fn automatic_start(model: &Model) -> Vec<f64> {
+    let points = model.points();
+    let mut trace = rigid_closing(model).unwrap_or(vec![0.0; 2 * points]);
+    let layer = Layer::at(model, &trace);
+    let mut springs = vec![0.0; 2 * points];
+    for body in 0..model.bodies.len() {
+        model.put(body, &held::natural_springs(model, body), &mut springs);
+    }
+    // a row without stiffness has prescribed dofs only and cannot move
+    let compliance = |i: usize| if springs[i] > 0.0 { springs[i].recip() } else { 0.0 };
+    let too_deep = |q: usize| {
+        let (c, soft) = (layer.compression[q].max(0.0), compliance(q).max(compliance(points + q)));
+        if soft > 0.0 { layer.force[q] - DEEP * c / soft } else { 0.0 }
+    };
+    let excess: f64 = (0..points).map(|q| too_deep(q).max(0.0)).sum();
+    let load: f64 = model.bodies.iter().flat_map(|slot| &slot.motions).map(|motion| motion.work.abs()).sum();
+    if excess <= DEEP * load {
+        return trace;
+    }
+    for (i, pair) in model.pairs.iter().enumerate() {
+        for q in model.range(i) {
+            if too_deep(q) <= 0.0 {
+                continue;
+            }
+            // side a carries the points: it can move at each by itself
+            let side = if compliance(q) > 0.0 { q } else { points + q };
+            let (soft, c) = (compliance(side), layer.compression[q]);
+            // way of the surface from 0 to c; a pressure that is no number pushes back
+            let (mut low, mut high) = (0.0, c);
+            for _ in 0..60 {
+                let way = 0.5 * (low + high);
+                let force = model.weight[q] * pair.law.response(q - model.offset[i], c - way).pressure;
+                if force * soft <= way { high = way } else { low = way }
+            }
+            trace[side] -= high;
+        }
+    }
+    trace
 }
 
 /// Zero of an increasing function that is negative at 0, roughly; `None` if there is none below 1e12.

@@ -142,8 +142,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         let relaxed = last.as_ref().filter(|last| last.relaxed).map(|last| (&last.sweep, last.length));
         let sweep = sweeper.sweep(model, &iterate, &layer, &weight, relaxed)?;
         let method = &settings.methods[active];
-        let seen =
-            Seen { model, iterate: &iterate, layer: &layer, weight: &weight, sweep: &sweep, last: last.as_ref() };
+        let seen = Seen { model, iterate: &iterate, layer: &layer, sweep: &sweep, last: last.as_ref() };
         let mut row = watch.measure(&seen);
         (row.iteration, row.sweeps, row.seconds) = (k, sweeper.sweeps, clock.elapsed().as_secs_f64());
         row.factorizations += method.coupled().factorizations;

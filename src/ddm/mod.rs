@@ -18,6 +18,7 @@ pub mod method;
 pub mod model;
 mod progress;
 pub mod robin;
+mod scale;
 pub mod stop;
 pub mod sweep;
 mod watch;
@@ -25,7 +26,7 @@ pub mod zone;
 
 pub use balance::{Discretisation, SHARE};
 pub use body::{Body, BodyCounts, Energy, Solved};
-pub use closing::rigid_closing;
+pub use closing::{automatic_start, rigid_closing};
 pub use field::Field;
 pub use iterate::{Outcome, Settings, Status, solve};
 pub use layer::Layer;

@@ -93,6 +93,22 @@ impl Model {
         Self { bodies, pairs, offset, weight, gap, exchange }
     }
 
+    /// Makes a trace known: states are from now on relative to a displacement with that trace, as if supports prescribed it.
+    pub fn carry(&mut self, trace: &[f64]) {
+        let points = self.points();
+        for pair in 0..self.pairs.len() {
+            for q in self.range(pair) {
+                let known = &mut self.pairs[pair].prescribed;
+                let local = q - self.offset[pair];
+                known[0][local] += trace[q];
+                known[1][local] += trace[points + q];
+                self.gap[q] = self.pairs[pair].gap[local]
+                    - self.pairs[pair].prescribed[0][local]
+                    - self.pairs[pair].prescribed[1][local];
+            }
+        }
+    }
+
     /// Number of contact points of all pairs.
     pub fn points(&self) -> usize {
         self.weight.len()

@@ -30,27 +30,6 @@ pub fn relative_increment(step: &[f64], now: &[f64]) -> f64 {
     if norm(step) == 0.0 { 0.0 } else { norm(step) / norm(now) }
 }
 
-/// Numerator over reference, where a zero reference asks for an absolute zero.
-///
-/// The reference is at least 1e-8 of the strain energy norm of the start, so that a solution that is zero is reached. The
-/// start's strain is bounded whatever the laws do; energies of later iterates are not.
-#[derive(Debug, Default)]
-pub struct Reference {
-    least: Option<f64>,
-}
-
-impl Reference {
-    /// sqrt(numerator / reference), both squared norms; `strain` is the part of the reference in the bodies.
-    pub fn relative(&mut self, numerator: f64, reference: f64, strain: f64) -> f64 {
-        let least = *self.least.get_or_insert(1e-16 * strain.abs());
-        if numerator.is_nan() || reference.is_nan() {
-            return f64::NAN;
-        }
-        // rounding can make a tiny numerator negative
-        if numerator <= 0.0 { 0.0 } else { (numerator / reference.max(least)).sqrt() }
-    }
-}
-
 /// Watches for progress: at the rounding floor the residual stays where it is.
 #[derive(Debug)]
 pub struct Floor {
@@ -169,17 +148,6 @@ mod tests {
         );
         let mut still = Cycle::default();
         assert!((0..20).all(|_| still.period(&[1.0], [true].into_iter(), 1.0, 0.0).is_none()));
-    }
-
-    #[test]
-    fn a_vanishing_solution_is_reached_and_a_blown_up_iterate_does_not_excuse_a_residual() {
-        let mut reference = Reference::default();
-        assert_eq!(reference.relative(0.0, 0.0, 0.0), 0.0);
-        let mut reference = Reference::default();
-        assert_eq!(reference.relative(4.0, 1.0, 1.0), 2.0);
-        assert!(reference.relative(1e-40, 1e-40, 1e-40) < 1e-11);
-        assert_eq!(reference.relative(1e60, 1e60, 1e60), 1.0);
-        assert_eq!(reference.relative(1.0, 1.0, 0.5), 1.0);
     }
 
     #[test]

@@ -5,7 +5,8 @@ use super::iterate::Status;
 use super::layer::Layer;
 use super::model::Model;
 use super::progress::Row;
-use super::stop::{Cycle, Floor, Reference, StopRule, relative_increment};
+use super::scale::Scale;
+use super::stop::{Cycle, Floor, StopRule, relative_increment};
 use super::sweep::Sweep;
 
 /// The step that led to an iterate.
@@ -27,8 +28,6 @@ pub(super) struct Seen<'a> {
     pub model: &'a Model,
     pub iterate: &'a Field,
     pub layer: &'a Layer,
-    /// omega psi kappa of the contact rows.
-    pub weight: &'a [f64],
     pub sweep: &'a Sweep,
     /// The step that led here.
     pub last: Option<&'a Last>,
@@ -47,7 +46,7 @@ pub(super) enum Verdict {
 /// Measures each iterate and decides whether to go on.
 #[derive(Default)]
 pub(super) struct Watch {
-    reference: Reference,
+    scale: Scale,
     floor: Floor,
     cycle: Cycle,
 }
@@ -59,6 +58,7 @@ impl Watch {
         let strain: f64 = sweep.energy.iter().map(|e| e.strain).sum();
         let potential: f64 = sweep.energy.iter().map(|e| e.potential).sum();
         let decrement: f64 = sweep.decrement.iter().sum();
+        self.scale.learn(model, layer, strain);
         let increments: Vec<f64> = (0..model.bodies.len())
             .map(|body| match last {
                 None => f64::NAN,
@@ -68,7 +68,7 @@ impl Watch {
             })
             .collect();
         Row {
-            residual: self.reference.relative(decrement, strain + layer.work, strain),
+            residual: self.scale.relative(decrement, strain + layer.work),
             increment: increments.iter().copied().fold(f64::NAN, f64::max),
             increments,
             gamma: last.map_or(f64::NAN, |last| last.length),
@@ -96,8 +96,8 @@ impl Watch {
             return Verdict::End(Status::InnerSolver { body: *body, reason: reason.clone() });
         }
         let met = stop.is_met(row.residual, row.increment);
-        let steady = last.is_none_or(|last| is_steady(&last.pressure, &layer.pressure, stop));
-        let imbalance = imbalance(seen);
+        let steady = last.is_none_or(|last| self.scale.is_steady(&last.pressure, &layer.pressure, stop));
+        let imbalance = self.scale.imbalance(model, layer);
         let balanced = stop.residual.is_none_or(|tolerance| imbalance <= 10.0 * tolerance);
         if met && steady && balanced {
             return Verdict::End(Status::Converged);
@@ -120,41 +120,8 @@ impl Watch {
     }
 }
 
-/// Whether the last step changed no pressure by more than ten times the residual that is asked for, relative to the largest.
-/// The residual is one of energies: where a layer is stiff, or hardly holds a body, it sees too little of the pressure.
-fn is_steady(before: &[f64], now: &[f64], stop: &StopRule) -> bool {
-    let Some(tolerance) = stop.residual else { return true };
-    let peak = now.iter().copied().fold(0.0, f64::max);
-    before.iter().zip(now).all(|(before, now)| (now - before).abs() <= 10.0 * tolerance * peak)
-}
-
 /// Largest share of its contact forces that a body may lack in balance where rounding allows no less.
 const UNBALANCED: f64 = 1e-3;
-
-/// What the forces on a body lack in balance, as a share of those of its contacts, the most over all rigid motions that
-/// supports leave free.
-///
-/// For such a motion m, K m = 0, so that m'r = m'G z = sum weight m z on the contact rows. The residual sees too little of
-/// this where a Robin term much stiffer than the layer holds the body.
-fn imbalance(seen: &Seen) -> f64 {
-    let Seen { model, iterate, layer, weight, sweep, .. } = *seen;
-    let mut most = 0.0f64;
-    for (index, slot) in model.bodies.iter().enumerate() {
-        let (weight, z) = (model.of_body(index, weight), model.of_body(index, &sweep.correction.trace));
-        let (force, u) = (model.at_rows(index, &layer.force), model.of_body(index, &iterate.trace));
-        let size = u.iter().fold(0.0f64, |max, u| max.max(u.abs()));
-        // K u is rounded entry by entry, and a motion sums over all of them
-        let rounding = 10.0 * f64::EPSILON * slot.scale * size;
-        for motion in &slot.motions {
-            let lacking: f64 = (0..z.len()).map(|q| weight[q] * motion.trace[q] * z[q]).sum();
-            let acting: f64 = (0..z.len()).map(|q| force[q] * motion.trace[q].abs()).sum();
-            if lacking.abs() > rounding {
-                most = most.max(lacking.abs() / acting);
-            }
-        }
-    }
-    most
-}
 
 /// Largest residual that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
 const BELIEVABLE: f64 = 1e-4;

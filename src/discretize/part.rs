@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::fem::assemble::{self, NodalBlock};
 use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
-use crate::linalg::Csr;
+use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
 use crate::scene::{BodySpec, LoadKind};
 
@@ -127,7 +127,7 @@ impl<'a, const D: usize> Part<'a, D> {
         load
     }
 
-    /// K, f and supports.
+    /// K, f and supports; `carried` is the rigid motion that was taken out of `prescribed`, if any.
     pub fn assemble(
         &self,
         mesh: &Mesh<D>,
@@ -135,6 +135,7 @@ impl<'a, const D: usize> Part<'a, D> {
         elasticity: &Elasticity,
         load: Vec<f64>,
         prescribed: Vec<(usize, f64)>,
+        carried: Vec<f64>,
     ) -> Result<ElasticBody> {
         let coupled: Vec<Vec<u32>> = (0..rows.rows())
             .map(|q| {
@@ -156,6 +157,10 @@ impl<'a, const D: usize> Part<'a, D> {
         })?;
         self.springs.iter().for_each(|springs| assemble::add_blocks(&graph, springs, &mut stiffness));
         self.held.frame.turn_matrix(&mut stiffness);
-        Ok(assemble::support(stiffness, load, prescribed))
+        let work = dot(&load, &carried);
+        let mut body = assemble::support(stiffness, load, prescribed);
+        body.energy_constant -= work;
+        body.carried = carried;
+        Ok(body)
     }
 }

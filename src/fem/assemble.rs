@@ -146,6 +146,9 @@ pub struct ElasticBody {
     pub energy_constant: f64,
     /// u_c'K_cc u_c minus the u_c'K_cc u_c that the scaled diagonal gives: correction of u'Ku.
     pub strain_constant: f64,
+    /// Rigid displacement of all dofs that supports give the body, to be added to u; empty if there is none. All else here
+    /// is relative to it.
+    pub carried: Vec<f64>,
 }
 
 /// Why a body could not be assembled.
@@ -318,7 +321,8 @@ pub fn support(mut stiffness: Csr, mut load: Vec<f64>, prescribed: Vec<(usize, f
     }
     energy_constant += 0.5 * strain_constant;
     strain_constant -= prescribed.iter().map(|(_, u)| scale * u * u).sum::<f64>();
-    ElasticBody { stiffness, load, prescribed, lifting, energy_constant, strain_constant }
+    let carried = Vec::new();
+    ElasticBody { stiffness, load, prescribed, lifting, energy_constant, strain_constant, carried }
 }
 
 #[cfg(test)]

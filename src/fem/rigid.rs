@@ -13,6 +13,31 @@ pub struct RigidMotion {
     pub displacement: Vec<f64>,
 }
 
+/// A rigid motion that supports leave free.
+#[derive(Debug, Clone)]
+pub struct FreeMotion {
+    /// Displacement, one entry a dof, zero at supports.
+    pub displacement: Vec<f64>,
+    /// Work of the loads on it.
+    pub work: f64,
+}
+
+/// A motion moves supported dofs by no more than this, or it is not free.
+const HELD: f64 = 1e-12;
+
+/// The motions of [`left_by_supports`] with the work that `load` does on them; without those that supports hold a little.
+pub fn free(left: &[RigidMotion], prescribed: &[(usize, f64)], load: &[f64]) -> Vec<FreeMotion> {
+    let is_free = |motion: &&RigidMotion| prescribed.iter().all(|entry| motion.displacement[entry.0].abs() <= HELD);
+    left.iter()
+        .filter(is_free)
+        .map(|motion| {
+            let mut displacement = motion.displacement.clone();
+            prescribed.iter().for_each(|entry| displacement[entry.0] = 0.0);
+            FreeMotion { work: crate::linalg::dot(&displacement, load), displacement }
+        })
+        .collect()
+}
+
 /// The 3 (2D) or 6 (3D) rigid motions about the centre of `nodes`: translations, then rotations, scaled to
 /// displacements of about one. Gmsh and PETSc call them rigid body modes.
 pub fn modes<const D: usize>(nodes: &[[f64; D]]) -> Vec<RigidMotion> {

@@ -8,8 +8,8 @@
 use super::{Dense, Retained, SparseBody, memory};
 use crate::ddm::{Body, BodyCounts, Energy, Solved};
 use crate::error::{Error, Kind, Result};
-use crate::fem::ElasticBody;
-use crate::linalg::{Csr, dot};
+use crate::fem::{ElasticBody, rigid::FreeMotion};
+use crate::linalg::{Csr, axpy, dot};
 use crate::petsc::{Schur, Session};
 use std::cell::RefCell;
 use std::time::Instant;
@@ -23,6 +23,8 @@ pub struct CondensedBody {
     /// K, f and B of all dofs till they are condensed; f stays.
     whole: ElasticBody,
     load: Vec<f64>,
+    /// Rigid motions that supports leave, on the retained dofs.
+    free: Vec<FreeMotion>,
     /// Made by the first Robin term or set-up.
     condensed: Option<Condensed>,
 }
@@ -39,9 +41,30 @@ struct Condensed {
 impl CondensedBody {
     /// A body that will be condensed when it is set up. `name` is the prefix of its PETSc options, of which those of MUMPS are
     /// read.
-    pub fn new(session: &Session, name: &str, dimension: usize, whole: ElasticBody, retained: Retained) -> Self {
+    pub fn new(
+        session: &Session,
+        name: &str,
+        dimension: usize,
+        whole: ElasticBody,
+        free: Vec<FreeMotion>,
+        retained: Retained,
+    ) -> Self {
+        let on_retained = |motion: FreeMotion| {
+            let turned = retained.turn(&motion.displacement);
+            FreeMotion { displacement: retained.dofs.iter().map(|&dof| turned[dof]).collect(), work: motion.work }
+        };
+        let free = free.into_iter().map(on_retained).collect();
         let load = retained.turn(&whole.load);
-        Self { session: session.clone(), name: name.to_owned(), retained, dimension, whole, load, condensed: None }
+        Self {
+            session: session.clone(),
+            name: name.to_owned(),
+            retained,
+            dimension,
+            whole,
+            load,
+            free,
+            condensed: None,
+        }
     }
 
     /// Eliminates the interior, once.
@@ -85,9 +108,10 @@ impl CondensedBody {
             energy_constant: self.whole.energy_constant - 0.5 * work,
             strain_constant: self.whole.strain_constant + work + 2.0 * dot(&whole_lifting, &rest),
             lifting,
+            carried: Vec::new(),
         };
         let solver = Dense::new(retained, schur.take_complement());
-        let body = SparseBody::new(body, self.retained.rows.clone(), solver);
+        let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, solver);
         Ok(Condensed { kept: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
     }
 }
@@ -104,7 +128,7 @@ fn full(rows: usize, values: &[f64]) -> Csr {
 
 impl Body for CondensedBody {
     fn len(&self) -> usize {
-        self.retained.dofs.len()
+        self.retained.dofs.len() + self.free.len()
     }
 
     fn rest(&self) -> Vec<f64> {
@@ -112,11 +136,17 @@ impl Body for CondensedBody {
     }
 
     fn trace(&self, u: &[f64], t: &mut [f64]) {
-        self.retained.rows.multiply(u, t);
+        match &self.condensed {
+            Some(condensed) => condensed.body.trace(u, t),
+            None => t.fill(f64::NAN),
+        }
     }
 
     fn add_rows(&self, rows: &[f64], y: &mut [f64]) {
-        self.retained.rows.add_transpose(1.0, rows, y);
+        match &self.condensed {
+            Some(condensed) => condensed.body.add_rows(rows, y),
+            None => y.fill(f64::NAN),
+        }
     }
 
     fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
@@ -156,7 +186,9 @@ impl Body for CondensedBody {
         let mut load = load.to_vec();
         self.whole.prescribed.iter().for_each(|&(dof, _)| load[dof] = 0.0);
         let turned = self.retained.turn(&load);
-        self.condense()?.schur.get_mut().condense(&turned)
+        let condensed = self.condense()?;
+        let load = condensed.schur.get_mut().condense(&turned)?;
+        condensed.body.reduce(&load)
     }
 
     fn counts(&self) -> BodyCounts {
@@ -184,13 +216,16 @@ impl Body for CondensedBody {
     }
 
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
-        match &self.condensed {
-            Some(condensed) => Ok(self.retained.turn_back(&condensed.schur.borrow_mut().expand(&self.load, u)?)),
-            None => Ok(self.retained.turn_back(&vec![0.0; self.load.len()])),
-        }
+        let mut all = match &self.condensed {
+            Some(Condensed { schur, body, .. }) => schur.borrow_mut().expand(&self.load, &body.join(u))?,
+            None => vec![0.0; self.load.len()],
+        };
+        all = self.retained.turn_back(&all);
+        axpy(1.0, &self.whole.carried, &mut all);
+        Ok(all)
     }
 
     fn describe(&self) -> String {
-        format!("condensed to {} dofs by mumps", self.len())
+        format!("condensed to {} dofs by mumps", self.retained.dofs.len())
     }
 }

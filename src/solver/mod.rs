@@ -12,13 +12,15 @@ pub mod options;
 pub mod preset;
 mod retained;
 mod sparse;
+mod split;
 
 pub use condensed::CondensedBody;
 pub use dense::Dense;
 pub use krylov::Krylov;
-pub use monolithic::{Monolithic, Union};
+pub use monolithic::{Monolithic, Part, Union};
 pub use retained::Retained;
 pub use sparse::SparseBody;
+pub use split::Split;
 
 use crate::ddm::Solved;
 use crate::error::Result;

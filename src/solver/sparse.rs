@@ -1,16 +1,19 @@
-//! A body whose state is all its dofs and whose G is a sparse matrix.
+//! A body whose state is all its dofs and its rigid motion, and whose G is a sparse matrix.
 
-use super::InnerSolver;
+use super::{InnerSolver, Split};
 use crate::ddm::{Body, BodyCounts, Energy, Solved};
 use crate::error::Result;
-use crate::fem::ElasticBody;
+use crate::fem::{ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, dot};
 use std::time::Instant;
 
 /// A body with assembled K and f, its contact rows B, and a solver for G = K + B' diag(d) B.
+///
+/// A state is (v, a) for the displacement v + R a ([`Split`]).
 pub struct SparseBody<S> {
     body: ElasticBody,
     rows: Csr,
+    split: Split,
     solver: S,
     /// Robin weight of each row that G has now.
     weight: Vec<f64>,
@@ -27,32 +30,32 @@ pub struct SparseBody<S> {
 
 impl<S: InnerSolver> SparseBody<S> {
     /// Joins a body, its contact rows (columns: its dofs, none of them prescribed) and a solver whose matrix is K on a
-    /// pattern that holds B'B.
-    pub fn new(body: ElasticBody, rows: Csr, solver: S) -> Self {
+    /// pattern that holds B'B. `free` are the rigid motions that its supports leave.
+    pub fn new(body: ElasticBody, rows: Csr, free: &[FreeMotion], solver: S) -> Self {
         let coupling = Coupling::new(&body.stiffness, &rows);
+        let split = Split::new(free, &rows);
         let weight = vec![0.0; rows.rows()];
         let prepared = weight.clone();
         let row_stiffness =
             (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * body.stiffness.diagonal(i)).sum());
         let row_stiffness = row_stiffness.collect();
         let product = vec![0.0; body.load.len()];
-        Self {
-            body,
-            rows,
-            solver,
-            weight,
-            prepared,
-            row_stiffness,
-            coupling,
-            counts: BodyCounts::default(),
-            before: (0, 0),
-            product,
-        }
+        let (counts, before) = (BodyCounts::default(), (0, 0));
+        Self { body, rows, split, solver, weight, prepared, row_stiffness, coupling, counts, before, product }
     }
 
     /// The inner solver.
     pub fn solver(&self) -> &S {
         &self.solver
+    }
+
+    /// Displacements of all dofs for a state.
+    pub fn join(&self, u: &[f64]) -> Vec<f64> {
+        self.split.join(u)
+    }
+
+    fn dofs(&self) -> usize {
+        self.body.load.len()
     }
 }
 
@@ -119,20 +122,22 @@ fn is_far(rows: &Csr, row_stiffness: &[f64], old: &[f64], new: &[f64]) -> bool {
 
 impl<S: InnerSolver> SparseBody<S> {
     /// One solve, or one application of the preconditioner, counted and timed apart from the set-up it may need.
-    fn apply(&mut self, solve: impl FnOnce(&mut S) -> Result<Solved>) -> Result<Solved> {
+    fn apply(&mut self, z: &mut [f64], solve: impl FnOnce(&mut S, &mut [f64]) -> Result<Solved>) -> Result<Solved> {
         self.set_up()?;
         self.counts.solves += 1;
         let began = Instant::now();
-        let solved = solve(&mut self.solver)?;
+        let solved = solve(&mut self.solver, &mut z[..self.body.load.len()])?;
         self.counts.solve_seconds += began.elapsed().as_secs_f64();
         self.counts.inner_iterations += solved.iterations;
+        z[self.body.load.len()..].fill(0.0);
+        self.split.separate(z);
         Ok(solved)
     }
 }
 
 impl<S: InnerSolver> Body for SparseBody<S> {
     fn len(&self) -> usize {
-        self.body.load.len()
+        self.dofs() + self.split.count()
     }
 
     fn rest(&self) -> Vec<f64> {
@@ -144,29 +149,40 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn trace(&self, u: &[f64], t: &mut [f64]) {
-        self.rows.multiply(u, t);
+        let (v, rigid) = u.split_at(self.dofs());
+        self.rows.multiply(v, t);
+        self.split.add_trace(rigid, t);
     }
 
     fn add_rows(&self, rows: &[f64], y: &mut [f64]) {
+        let (y, rigid) = y.split_at_mut(self.dofs());
         self.rows.add_transpose(1.0, rows, y);
+        self.split.add_rows(1.0, rows, rigid);
     }
 
     fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
-        self.body.stiffness.multiply(u, &mut self.product);
-        for i in 0..r.len() {
+        let n = self.dofs();
+        let (v, rigid) = u.split_at(n);
+        self.body.stiffness.multiply(v, &mut self.product);
+        for i in 0..n {
             r[i] = self.body.load[i] - self.product[i];
         }
-        let work = dot(&self.body.load, u);
-        let quadratic = dot(u, &self.product);
-        self.rows.add_transpose(-1.0, force, r);
+        let work = dot(&self.body.load, v) + dot(self.split.work(), rigid);
+        let quadratic = dot(v, &self.product);
+        self.rows.add_transpose(-1.0, force, &mut r[..n]);
+        r[n..].copy_from_slice(self.split.work());
+        self.split.add_rows(-1.0, force, &mut r[n..]);
+        self.split.balance(r);
         Energy {
-            strain: quadratic + 2.0 * dot(&self.body.lifting, u) + self.body.strain_constant,
+            strain: quadratic + 2.0 * dot(&self.body.lifting, v) + self.body.strain_constant,
             potential: 0.5 * quadratic - work + self.body.energy_constant,
         }
     }
 
     fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
-        self.body.stiffness.multiply(u, y);
+        let n = self.dofs();
+        self.body.stiffness.multiply(&u[..n], &mut y[..n]);
+        y[n..].fill(0.0);
     }
 
     fn robin(&mut self, weight: &[f64]) -> Result<()> {
@@ -192,11 +208,13 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
-        self.apply(|solver| solver.solve(r, z))
+        let n = self.dofs();
+        self.apply(z, |solver, z| solver.solve(&r[..n], z))
     }
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
-        self.apply(|solver| solver.precondition(r, z))
+        let n = self.dofs();
+        self.apply(z, |solver, z| solver.precondition(&r[..n], z))
     }
 
     fn rounding(&self, u: &[f64], force: &[f64]) -> f64 {
@@ -218,6 +236,7 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>> {
         let mut r = load.to_vec();
         self.body.prescribed.iter().for_each(|&(dof, _)| r[dof] = 0.0);
+        r.extend(self.split.rigid_part(&r));
         Ok(r)
     }
 
@@ -233,7 +252,9 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
-        Ok(u.to_vec())
+        let mut all = self.join(u);
+        crate::linalg::axpy(1.0, &self.body.carried, &mut all);
+        Ok(all)
     }
 
     fn describe(&self) -> String {

@@ -1,0 +1,95 @@
+//! What counts as nothing: energies, pressures and forces of the start, by which a solution that vanishes is measured.
+//!
+//! Bodies that nothing presses together but an initial overlap, and that nothing holds, move apart until no pressure is left: all
+//! that a relative tolerance could refer to vanishes with the error. What remains then is the start. Its layers may answer
+//! an overlap with any pressure, so each point counts for no more than the surfaces under it could answer elastically.
+
+use super::layer::Layer;
+use super::model::Model;
+use super::stop::StopRule;
+use crate::linalg::dot;
+
+/// A solution this much smaller than the start is measured by the start.
+const NOTHING: f64 = 1e-6;
+
+/// Least scales of a run, from its start.
+#[derive(Debug, Default)]
+pub struct Scale {
+    known: bool,
+    /// Energy: u'Ku + sum omega p c.
+    energy: f64,
+    /// Pressure.
+    pressure: f64,
+    /// Sum of contact forces.
+    force: f64,
+}
+
+impl Scale {
+    /// Takes the scales of the start, if they are not known; `strain` is u'Ku over all bodies.
+    pub fn learn(&mut self, model: &Model, layer: &Layer, strain: f64) {
+        if std::mem::replace(&mut self.known, true) {
+            return;
+        }
+        let force = elastic(model, layer);
+        let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
+        let work = force.iter().zip(&layer.compression).map(|(f, c)| f * c.max(0.0)).sum::<f64>();
+        self.energy = NOTHING * NOTHING * finite(strain.abs() + work);
+        let pressure = force.iter().zip(&model.weight).map(|(f, w)| f / w).fold(0.0, f64::max);
+        self.pressure = NOTHING * finite(pressure);
+        self.force = NOTHING * finite(force.iter().sum());
+    }
+
+    /// The relative residual: root of `numerator` = r'G^-1 r over `reference` = u'Ku + sum omega p c. A zero reference asks for
+    /// an absolute zero.
+    pub fn relative(&self, numerator: f64, reference: f64) -> f64 {
+        if numerator.is_nan() || reference.is_nan() {
+            return f64::NAN;
+        }
+        // rounding can make a tiny numerator negative
+        if numerator <= 0.0 { 0.0 } else { (numerator / reference.max(self.energy)).sqrt() }
+    }
+
+    /// Whether the last step changed no pressure by more than ten times the residual that is asked for, relative to the
+    /// largest. The residual is one of energies: where a layer is stiff, or hardly holds a body, it sees too little of the
+    /// pressure.
+    pub fn is_steady(&self, before: &[f64], now: &[f64], stop: &StopRule) -> bool {
+        let Some(tolerance) = stop.residual else { return true };
+        let peak = now.iter().copied().fold(self.pressure, f64::max);
+        before.iter().zip(now).all(|(before, now)| (now - before).abs() <= 10.0 * tolerance * peak)
+    }
+
+    /// What the forces on a body lack in balance, as a share of those of its contacts, the most over all rigid motions that
+    /// supports leave free. For such a motion m, K m = 0: only loads and contact forces work on it.
+    ///
+    /// The residual sees too little of this where a Robin term much stiffer than the layer holds the body.
+    pub fn imbalance(&self, model: &Model, layer: &Layer) -> f64 {
+        let mut most = 0.0f64;
+        for (body, slot) in model.bodies.iter().enumerate() {
+            let force = model.at_rows(body, &layer.force);
+            for motion in &slot.motions {
+                let arm = motion.trace.iter().fold(0.0f64, |max, m| max.max(m.abs()));
+                let acting: f64 = force.iter().zip(&motion.trace).map(|(force, m)| (force * m).abs()).sum();
+                let lacking = (motion.work - dot(&force, &motion.trace)).abs();
+                if lacking > 0.0 {
+                    most = most.max(lacking / acting.max(arm * self.force));
+                }
+            }
+        }
+        most
+    }
+}
+
+/// Force at every point, no more than the surfaces of the two bodies answer to its compression.
+fn elastic(model: &Model, layer: &Layer) -> Vec<f64> {
+    let points = model.points();
+    let mut stiffness = vec![0.0; 2 * points];
+    for body in 0..model.bodies.len() {
+        model.put(body, &super::held::natural_springs(model, body), &mut stiffness);
+    }
+    (0..points)
+        .map(|q| {
+            let softer = stiffness[q].min(stiffness[points + q]);
+            (softer * layer.compression[q]).min(layer.force[q]).max(0.0)
+        })
+        .collect()
+}
