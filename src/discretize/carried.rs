@@ -7,9 +7,12 @@ use nalgebra::{DMatrix, DVector};
 /// Supports agree with a rigid motion to this share of the largest prescribed displacement.
 const AGREES: f64 = 1e-9;
 
+/// Prescribed (dof, value).
+type Prescribed = Vec<(usize, f64)>;
+
 /// The rigid motion that the prescribed (dof, value) give the body, one entry a dof, and what they prescribe besides it; `None`
 /// if they prescribe zero or deform the body.
-pub fn carried(motions: &[RigidMotion], prescribed: &[(usize, f64)]) -> Option<(Vec<f64>, Vec<(usize, f64)>)> {
+pub fn carried(motions: &[RigidMotion], prescribed: &[(usize, f64)]) -> Option<(Vec<f64>, Prescribed)> {
     let largest = prescribed.iter().fold(0.0f64, |max, (_, u)| max.max(u.abs()));
     if largest == 0.0 {
         return None;
@@ -26,7 +29,7 @@ pub fn carried(motions: &[RigidMotion], prescribed: &[(usize, f64)]) -> Option<(
     for (motion, &weight) in motions.iter().zip(weights.iter()) {
         axpy(weight, &motion.displacement, &mut displacement);
     }
-    let rest: Vec<(usize, f64)> = prescribed.iter().map(|&(dof, u)| (dof, u - displacement[dof])).collect();
+    let rest: Prescribed = prescribed.iter().map(|&(dof, u)| (dof, u - displacement[dof])).collect();
     rest.iter().all(|(_, u)| u.abs() <= AGREES * largest).then_some((displacement, rest))
 }
 
