@@ -1,5 +1,6 @@
 //! Scene and mesh -> [`Model`]: the one place where geometry ends. Nothing below it knows the dimension.
 
+mod auto;
 mod balance;
 mod carried;
 mod elastic;
@@ -10,6 +11,7 @@ mod pairs;
 mod part;
 mod springs;
 mod supports;
+mod surface;
 
 use crate::contact::{self, ContactPair};
 use crate::ddm::{self, Body, BodySlot, Exchange, Model, Motion, RobinZone, Segment};
@@ -22,13 +24,14 @@ use crate::fem::{
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Mesh;
 use crate::output::vtu::{BodyField, CellKind};
-use crate::scene::{Scene, Start, Zone};
+use crate::scene::{ContactSpec, Scene, Start, Zone};
 use balance::Forces;
 pub use balance::{Balance, Resultant};
 use find::{placed, point};
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use std::rc::Rc;
+pub use surface::ContactSurface;
 
 /// What every rank knows of a body before its owner assembles it.
 pub struct Outline<'a> {
@@ -143,14 +146,24 @@ impl BodyInfo {
     }
 }
 
+/// What is known of a pair besides its arrays.
+pub struct ContactInfo {
+    /// What the scene says; `between` names the bodies if the pair was found.
+    pub spec: ContactSpec,
+    /// Whether side a (which carries the points) is the second of `spec.between`.
+    pub swapped: bool,
+    /// Mesh of side a, for output.
+    pub surface: ContactSurface,
+}
+
 /// The discrete problem and what reports need to know of its origin.
 pub struct Problem {
     /// What the method works on.
     pub model: Model,
     /// Bodies in the order of the scene.
     pub bodies: Vec<BodyInfo>,
-    /// For each pair, whether side a (which carries the points) is the second surface in the scene.
-    pub swapped: Vec<bool>,
+    /// Origin of each pair.
+    pub contacts: Vec<ContactInfo>,
     /// The matrices of every body, kept only when a method asked for them.
     pub kept: Vec<Matrices>,
     /// Trace of the rigid motions that supports give bodies: states, and so the traces of iterates, are relative to them.
@@ -190,13 +203,13 @@ pub fn discretize<const D: usize>(
     maker: &mut dyn Maker,
 ) -> Result<Problem> {
     let parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh)).collect::<Result<Vec<_>>>()?;
-    let mut pairs = Vec::new();
-    let (mut swapped, mut fine, mut shapes) = (Vec::new(), Vec::new(), Vec::new());
-    for spec in &scene.contacts {
-        let (pair, points, is_swapped) = pairs::make_pair(spec, mesh, cut, &parts, keep.meshes)?;
+    let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
+    let (mut fine, mut shapes) = (Vec::new(), Vec::new());
+    for found in pairs::all(scene, mesh, cut, &parts, keep.meshes)? {
+        let pairs::Contact { spec, pair, fine: points, swapped, surface } = found;
         pairs.push(pair);
         fine.extend(points);
-        swapped.push(is_swapped);
+        contacts.push(ContactInfo { spec, swapped, surface });
     }
     let loads: Vec<usize> = parts.iter().map(|part| part.space.dofs()).collect();
     let owner = crate::parallel::owners(&loads, ranks.1);
@@ -303,7 +316,7 @@ pub fn discretize<const D: usize>(
     let mut carried = vec![0.0; 2 * model.points()];
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);
-    Ok(Problem { model, bodies: infos, swapped, kept, meshes, carried, assemblies, assemblies_avoided })
+    Ok(Problem { model, bodies: infos, contacts, kept, meshes, carried, assemblies, assemblies_avoided })
 }
 
 impl Problem {

@@ -5,8 +5,10 @@ use super::preflight;
 use super::run::{Clock, Prepared};
 use crate::contact::ContactPair;
 use crate::ddm::{BodyCounts, Model, Outcome, Status};
+use crate::discretize::Problem;
 use crate::estimate::Estimate;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
+use crate::output::vtu::Grid;
 use crate::output::{BodyReport, ContactTable, EstimateReport, InnerTimes, PairReport, Report, sci};
 use crate::petsc::Session;
 use crate::scene::Scene;
@@ -236,7 +238,7 @@ pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
 
 /// Sides of pair `i` in the order of the scene.
 fn sides(prepared: &Prepared, i: usize) -> [usize; 2] {
-    if prepared.problem.swapped[i] { [1, 0] } else { [0, 1] }
+    if prepared.problem.contacts[i].swapped { [1, 0] } else { [0, 1] }
 }
 
 fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) -> PairReport {
@@ -251,7 +253,7 @@ fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) 
     let coupling = preflight::coupling(scene, prepared, i);
     let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
     PairReport {
-        surfaces: scene.contacts[i].between.each_ref().map(|name| name.value.clone()),
+        surfaces: prepared.problem.contacts[i].spec.between.each_ref().map(|name| name.value.clone()),
         bodies: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
         points: pair.len(),
         carrier: pair.surfaces[0].clone(),
@@ -301,6 +303,22 @@ pub fn contact_table(prepared: &Prepared, outcome: &Outcome, estimate: Option<&E
     }
 }
 
+/// Pair `i` on its surface: gap, compression, pressure, normal (from side a to side b) and area (length) of the points.
+pub fn contact_surface(name: &str, prepared: &Prepared, outcome: &Outcome, i: usize) -> Grid {
+    let model = &prepared.problem.model;
+    let (pair, range) = (&model.pairs[i], model.range(i));
+    prepared.problem.contacts[i].surface.grid(
+        name.to_owned(),
+        &[
+            ("gap", 1, pair.gap.clone()),
+            ("compression", 1, outcome.layer.compression[range.clone()].to_vec()),
+            ("pressure", 1, outcome.layer.pressure[range].to_vec()),
+            ("normal", 3, pair.normal.as_flattened().to_vec()),
+            (if pair.along_curve { "length" } else { "area" }, 1, pair.weight.clone()),
+        ],
+    )
+}
+
 /// Residual and increment of a run against the iteration.
 pub fn convergence(label: &str, outcome: &Outcome) -> ConvergenceSeries {
     let rows = outcome.rows.iter().map(|row| (row.iteration, row.residual, row.increment)).collect();
@@ -320,10 +338,10 @@ pub fn pressure(label: &str, prepared: &Prepared, outcome: &Outcome, i: usize) -
 }
 
 /// The scene's reference pressure of pair `i`, drawn dashed.
-pub fn reference(scene: &Scene, model: &Model, i: usize) -> Option<PressureSeries> {
-    let field = scene.contacts[i].reference.as_ref()?;
-    let (axis, _) = main_axis(&model.pairs[i]);
-    let position = &model.pairs[i].position;
+pub fn reference(problem: &Problem, i: usize) -> Option<PressureSeries> {
+    let field = problem.contacts[i].spec.reference.as_ref()?;
+    let (axis, _) = main_axis(&problem.model.pairs[i]);
+    let position = &problem.model.pairs[i].position;
     Some(PressureSeries {
         label: "reference".to_owned(),
         s: position.iter().map(|x| x[axis]).collect(),

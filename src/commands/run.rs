@@ -123,7 +123,7 @@ fn build<const D: usize>(
     let mut problem = agree(session, problem)?;
     problem.share();
     clock.phase("discretize");
-    let warnings = warnings(session, scene, &problem);
+    let warnings = warnings(session, &problem);
     Ok(Prepared { problem, methods: Vec::new(), choice: inner.reason(), warnings, condensed: inner.condensed() })
 }
 
@@ -167,7 +167,7 @@ fn mesh<const D: usize>(session: &Session, scene: &Scene) -> Result<crate::mesh:
     agree(session, load())
 }
 
-fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> {
+fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
     let mut warnings = Vec::new();
     if session.blas_name() == "reference BLAS" {
         warnings.push(
@@ -188,10 +188,10 @@ fn warnings(session: &Session, scene: &Scene, problem: &Problem) -> Vec<String> 
             .push(format!("body {}: nothing holds its {motions}, no load works on it: fixed at one node", body.name));
     }
     warnings.extend(problem.bodies.iter().filter_map(|body| body.warning.clone()));
-    for (pair, spec) in problem.model.pairs.iter().zip(&scene.contacts) {
+    for (pair, contact) in problem.model.pairs.iter().zip(&problem.contacts) {
         let (without, all) = pair.uncovered;
         if without > 0 {
-            let names = [&spec.between[0].value, &spec.between[1].value];
+            let names = contact.spec.between.each_ref().map(|name| &name.value);
             warnings.push(format!("{} - {}: {without} of {all} facets have no partner", names[0], names[1]));
         }
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);

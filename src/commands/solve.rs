@@ -124,7 +124,13 @@ fn write(
             }
         }
         if first {
-            let names: Vec<&str> = prepared.problem.bodies.iter().map(|body| body.name.as_str()).collect();
+            let mut names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();
+            for i in 0..model.pairs.len() {
+                let file = folder.unused(&report::contact_table(prepared, outcome, None, i).stem(), "vtu");
+                let name = file.trim_end_matches(".vtu").to_owned();
+                folder.write(&file, |out| report::contact_surface(&name, prepared, outcome, i).write(out))?;
+                names.push(name);
+            }
             folder.write(&vtu::pvd_name("bodies"), |out| vtu::write_pvd(&names, out))?;
         }
     }
@@ -140,7 +146,7 @@ fn write(
         // only along curves: points of a surface over one coordinate would be a cloud
         for i in (0..model.pairs.len()).filter(|&i| model.pairs[i].along_curve) {
             let mut curves = vec![report::pressure("pressure", prepared, outcome, i)];
-            curves.extend(report::reference(scene, model, i));
+            curves.extend(report::reference(&prepared.problem, i));
             let (_, axis) = report::main_axis(&model.pairs[i]);
             let plot = Plot::pressure(&scene.title, axis, &curves);
             folder.write(&folder.unused("pressure", "svg"), |out| plot.write(out))?;

@@ -73,7 +73,7 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
         let pairs = &prepared.problem.model.pairs;
         for i in (0..pairs.len()).filter(|&i| pairs[i].along_curve) {
             pressures.push((i, report::main_axis(&pairs[i]).1, report::pressure(&label, &prepared, &outcome, i)));
-            if let Some(curve) = report::reference(scene, &prepared.problem.model, i) {
+            if let Some(curve) = report::reference(&prepared.problem, i) {
                 reference.get_or_insert((i, curve));
             }
         }

@@ -66,15 +66,10 @@ impl<const D: usize> Fine<D> {
         for point in shared {
             let nodes = a.facets.facet(point.facet_a);
             let normal = unit(std::array::from_fn(|c| (0..D).map(|k| point.at_a[k] * a.normals[&nodes[k]][c]).sum()));
-            let place = |side: &Side<D>, facet: usize, l: &[f64; D]| {
-                let x = side.facets.coordinates(facet, side.space);
-                crate::fem::assemble::interpolate(&x, &element::values(side.facets.order, l))
-            };
-            let from = place(a, point.facet_a, &point.at_a);
-            let to = place(b, point.facet_b, &point.at_b);
-            let distance: f64 = (0..D).map(|c| (to[c] - from[c]) * normal[c]).sum();
+            let x = a.facets.coordinates(point.facet_a, a.space);
+            let from = crate::fem::assemble::interpolate(&x, &element::values(a.facets.order, &point.at_a));
             let rounding = 1e-12 * length(a.area(point.facet_a));
-            let distance = if distance.abs() < rounding { 0.0 } else { distance };
+            let distance = if point.gap.abs() < rounding { 0.0 } else { point.gap };
             fine.gap.push(distance + gap(super::pad(from)));
             fine.size.push(length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
             fine.normal.push(normal);

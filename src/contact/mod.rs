@@ -8,7 +8,7 @@ pub mod law;
 pub mod order;
 mod pair;
 pub mod pieces;
-mod side;
+pub mod side;
 
 pub use crate::fem::pad;
 pub use fine::Fine;

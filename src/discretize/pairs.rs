@@ -1,57 +1,122 @@
 //! Contacts of the scene on the mesh: which body each surface bounds, which side carries the points.
 
+use super::auto;
 use super::find::{find_group, placed, point};
 use super::part::Part;
-use crate::contact::pieces::{Reach, Shared};
+use super::surface::ContactSurface;
+use crate::contact::pieces::{Cut, Reach};
 use crate::contact::{self, ContactPair, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::Facets;
 use crate::mesh::{Group, Mesh};
-use crate::scene::ContactSpec;
+use crate::scene::{ContactSpec, Overlap, Scene};
 
-/// The pair of a contact, its integration points if `fine` asks for them, and whether its side a is the scene's second
-/// surface.
-pub fn make_pair<const D: usize>(
-    spec: &ContactSpec,
-    mesh: &Mesh<D>,
-    cut: contact::pieces::Cut<D>,
-    parts: &[Part<D>],
-    fine: bool,
-) -> Result<(ContactPair, Option<Fine<D>>, bool)> {
-    let mut sides = Vec::new();
-    for name in &spec.between {
-        let group = find_group(mesh, name, &[D - 1], "contact surface")?;
-        let (body, facets) = owner_of(name, group, parts)?;
-        let part = &parts[body];
-        sides.push((body, Side::new(&name.value, &part.space, facets, &part.held.prescribed, &part.held.frame)));
-    }
-    let (body_b, b) = sides.remove(1);
-    let (body_a, a) = sides.remove(0);
-    if body_a == body_b {
-        return Err(Error::scene(
-            &spec.between[1].place,
-            format!("both surfaces belong to body `{}`", parts[body_a].spec.name.value),
-        )
-        .help("contact of a body with itself is out of scope; make two bodies of it"));
-    }
-    // the finer side carries the points, whatever the order in the scene
-    let (fine_a, fine_b) = (a.mean_measure(), b.mean_measure());
-    let a_carries = if (fine_a - fine_b).abs() > 1e-6 * fine_a { fine_a < fine_b } else { a.name < b.name };
-    let (a, b, bodies) = if a_carries { (a, b, [body_a, body_b]) } else { (b, a, [body_b, body_a]) };
-    let shared = cut(&a, &b, &Reach::between(&a, &b));
-    let pair = pair_on(spec, &shared, &a, &b, bodies)?;
-    let fine = fine.then(|| Fine::new(&a, &b, &shared, &pair, &|x| spec.gap.eval(x)));
-    Ok((pair, fine, !a_carries))
+/// One surface of a pair: facets of a body.
+pub struct Surface<'a, const D: usize> {
+    /// Number of the body.
+    pub body: usize,
+    /// Name of the physical group, or of the body if the pair was found.
+    pub name: &'a str,
+    /// The facets, oriented outwards.
+    pub facets: Facets<D>,
 }
 
-fn pair_on<const D: usize>(
-    spec: &ContactSpec,
-    shared: &[Shared<D>],
-    a: &Side<D>,
-    b: &Side<D>,
-    bodies: [usize; 2],
-) -> Result<ContactPair> {
-    contact::assemble(a, b, bodies, shared, &|x| spec.gap.eval(x), &spec.layer).map_err(|fault| match fault {
+/// A pair with its origin.
+pub struct Contact<const D: usize> {
+    /// What the scene says; `between` names the bodies if the pair was found.
+    pub spec: ContactSpec,
+    /// The arrays of the method.
+    pub pair: ContactPair,
+    /// Its integration points, if they were asked for.
+    pub fine: Option<Fine<D>>,
+    /// Whether side a (which carries the points) is the second of `spec.between`.
+    pub swapped: bool,
+    /// Its mesh, for output.
+    pub surface: ContactSurface,
+}
+
+/// All pairs of the scene: those with names in the order of the file, then those that are found. `fine` asks for integration
+/// points.
+pub fn all<const D: usize>(
+    scene: &Scene,
+    mesh: &Mesh<D>,
+    cut: Cut<D>,
+    parts: &[Part<D>],
+    fine: bool,
+) -> Result<Vec<Contact<D>>> {
+    let mut contacts = Vec::new();
+    let mut named = Vec::new();
+    for spec in &scene.contacts {
+        let surface = |k: usize| {
+            let name = &spec.between[k];
+            let group = find_group(mesh, name, &[D - 1], "contact surface")?;
+            let (body, facets) = owner_of(name, group, parts)?;
+            Ok(Surface { body, name: &name.value, facets })
+        };
+        let surfaces = [surface(0)?, surface(1)?];
+        let [a, b] = surfaces.each_ref().map(|surface| surface.body);
+        if a == b {
+            return Err(Error::scene(
+                &spec.between[1].place,
+                format!("both surfaces belong to body `{}`", parts[a].spec.name.value),
+            )
+            .help("contact of a body with itself is out of scope; make two bodies of it"));
+        }
+        named.push([a, b]);
+        contacts.push(make_pair(spec.clone(), None, cut, parts, surfaces, fine)?);
+    }
+    if let Some(auto) = &scene.auto {
+        for surfaces in auto::find(auto, cut, parts, &named)? {
+            let mut spec = auto.contact.clone();
+            for (name, surface) in spec.between.iter_mut().zip(&surfaces) {
+                surface.name.clone_into(&mut name.value);
+            }
+            contacts.push(make_pair(spec, Some(auto.distance), cut, parts, surfaces, fine)?);
+        }
+    }
+    Ok(contacts)
+}
+
+/// The pair of two surfaces; with a `distance` they may be no farther apart.
+fn make_pair<const D: usize>(
+    spec: ContactSpec,
+    distance: Option<f64>,
+    cut: Cut<D>,
+    parts: &[Part<D>],
+    surfaces: [Surface<D>; 2],
+    fine: bool,
+) -> Result<Contact<D>> {
+    let [first, second] = surfaces.map(|Surface { body, name, facets }| {
+        let held = &parts[body].held;
+        (body, Side::new(name, &parts[body].space, facets, &held.prescribed, &held.frame))
+    });
+    // the finer side carries the points, whatever the order in the scene
+    let (fine_a, fine_b) = (first.1.mean_measure(), second.1.mean_measure());
+    let equal = (fine_a - fine_b).abs() <= 1e-6 * fine_a;
+    let swapped = if equal { first.1.name >= second.1.name } else { fine_a >= fine_b };
+    let ((body_a, a), (body_b, b)) = if swapped { (second, first) } else { (first, second) };
+    let reach = distance.map_or_else(|| Reach::between(&a, &b), |distance| auto::within(&a, &b, distance));
+    let mut shared = cut(&a, &b, &reach);
+    if spec.touching {
+        shared.iter_mut().for_each(|point| point.gap = 0.0);
+    }
+    let gap = |x| spec.gap.eval(x);
+    let pair = contact::assemble(&a, &b, [body_a, body_b], &shared, &gap, &spec.layer)
+        .map_err(|fault| refuse(&spec, fault))?;
+    let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
+    if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
+        let (depth, at) = (-pair.gap[deepest], point(pair.position[deepest]));
+        let message = format!("`{}` and `{}` overlap by {depth:.3e} at {at}", a.name, b.name);
+        return Err(Error::scene(&spec.between[0].place, message)
+            .help("move a body, give a larger gap, or let the layer take it: overlap = \"compress\""));
+    }
+    let surface = ContactSurface::new(&a, &shared, &pair);
+    let fine = fine.then(|| Fine::new(&a, &b, &shared, &pair, &gap));
+    Ok(Contact { spec, pair, fine, swapped, surface })
+}
+
+fn refuse(spec: &ContactSpec, fault: Fault) -> Error {
+    match fault {
         Fault::Law(error) => error,
         Fault::NoPartner => {
             let names = [&spec.between[0].value, &spec.between[1].value];
@@ -62,7 +127,7 @@ fn pair_on<const D: usize>(
             .help("a pair needs surfaces whose outer normals point at each other; look at the mesh with `gmsh`")
         }
         Fault::Gap(x) => placed(&spec.gap, format!("the gap is not finite at {}", point(x))),
-    })
+    }
 }
 
 /// The body that a contact surface bounds, with the facets.

@@ -154,40 +154,66 @@ impl<const D: usize> Space<D> {
 
     /// The facets of a mesh group (of dimension `D - 1`) that bound a cell of this body, oriented outwards.
     pub fn facets(&self, group: &Group) -> Facets<D> {
-        let stride = element::node_count(D, self.order);
         let mut on_group = vec![false; self.nodes.len()];
-        let mut wanted: HashMap<Vec<u32>, Vec<u32>> = HashMap::new();
-        let mut order_of_file = Vec::new();
+        let mut wanted: HashMap<[u32; D], usize> = HashMap::new();
         for points in group.connectivity.chunks_exact(group.stride) {
             if let Some(nodes) = self.simplex(points, D - 1) {
                 nodes[..D].iter().for_each(|&node| on_group[node as usize] = true);
-                let mut key = nodes[..D].to_vec();
-                key.sort_unstable();
-                if wanted.insert(key.clone(), nodes).is_none() {
-                    order_of_file.push(key);
-                }
+                let next = wanted.len();
+                wanted.entry(key(&nodes)).or_insert(next);
             }
         }
         // the cell next to each facet decides which way is out
-        let mut oriented: HashMap<Vec<u32>, Vec<u32>> = HashMap::new();
-        for cell in self.cells.chunks_exact(self.stride) {
+        let mut found = vec![None; wanted.len()];
+        for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
             let touching = cell[..=D].iter().filter(|&&node| on_group[node as usize]).count();
             if touching < D {
                 continue;
             }
             for opposite in 0..=D {
-                let mut key: Vec<u32> = (0..=D).filter(|&i| i != opposite).map(|i| cell[i]).collect();
-                key.sort_unstable();
-                if let Some(mut nodes) = wanted.remove(&key) {
-                    if self.points_inwards(&nodes, cell[opposite]) {
-                        flip::<D>(&mut nodes);
-                    }
-                    oriented.insert(key, nodes);
+                if let Some(place) = wanted.remove(&key(&face::<D>(cell, opposite))) {
+                    found[place] = Some((index, opposite));
                 }
             }
         }
-        let nodes = order_of_file.iter().filter_map(|key| oriented.get(key)).flatten().copied();
-        Facets { order: self.order, stride, nodes: nodes.collect() }
+        self.facets_of(found.into_iter().flatten())
+    }
+
+    /// All facets that bound one cell only, oriented outwards.
+    pub fn boundary(&self) -> Facets<D> {
+        let mut faces: Vec<([u32; D], u32)> = Vec::with_capacity(self.cell_count() * (D + 1));
+        for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
+            faces
+                .extend((0..=D).map(|opposite| (key(&face::<D>(cell, opposite)), (index * (D + 1) + opposite) as u32)));
+        }
+        faces.sort_unstable();
+        let lone = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1);
+        let mut places: Vec<u32> = lone.map(|group| group[0].1).collect();
+        places.sort_unstable();
+        self.facets_of(places.into_iter().map(|place| (place as usize / (D + 1), place as usize % (D + 1))))
+    }
+
+    /// The facets opposite a vertex of a cell each, oriented out of the cell.
+    fn facets_of(&self, places: impl Iterator<Item = (usize, usize)>) -> Facets<D> {
+        let mut nodes = Vec::new();
+        for (index, opposite) in places {
+            let cell = &self.cells[index * self.stride..(index + 1) * self.stride];
+            let mut facet = face::<D>(cell, opposite).to_vec();
+            if self.points_inwards(&facet, cell[opposite]) {
+                facet.swap(0, 1);
+            }
+            if self.order == Order::P2 {
+                let local = |node: u32| cell.iter().position(|&other| other == node).unwrap_or(0);
+                let ends: Vec<usize> = facet.iter().map(|&node| local(node)).collect();
+                for &(i, j) in &element::EDGES[..D * (D - 1) / 2] {
+                    let (from, to) = (ends[i].min(ends[j]), ends[i].max(ends[j]));
+                    let edge = element::EDGES.iter().position(|&edge| edge == (from, to)).unwrap_or(0);
+                    facet.push(cell[D + 1 + edge]);
+                }
+            }
+            nodes.extend(facet);
+        }
+        Facets { order: self.order, stride: element::node_count(D, self.order), nodes }
     }
 
     fn points_inwards(&self, facet: &[u32], opposite: u32) -> bool {
@@ -198,12 +224,16 @@ impl<const D: usize> Space<D> {
     }
 }
 
-fn flip<const D: usize>(nodes: &mut [u32]) {
-    nodes.swap(0, 1);
-    if D == 3 && nodes.len() == 6 {
-        // mid-edges 01 12 02 become 01 02 12
-        nodes.swap(4, 5);
-    }
+/// The vertices of a cell without one of them.
+fn face<const D: usize>(cell: &[u32], opposite: usize) -> [u32; D] {
+    std::array::from_fn(|i| cell[if i < opposite { i } else { i + 1 }])
+}
+
+/// The first `D` nodes, sorted.
+fn key<const D: usize>(nodes: &[u32]) -> [u32; D] {
+    let mut key = std::array::from_fn(|i| nodes[i]);
+    key.sort_unstable();
+    key
 }
 
 impl<const D: usize> Facets<D> {
@@ -229,6 +259,12 @@ impl<const D: usize> Facets<D> {
             })
         };
         (0..self.count()).flat_map(normals).collect()
+    }
+
+    /// The facets for which `keep` holds, in their order.
+    pub fn only(&self, keep: &[bool]) -> Self {
+        let kept = (0..self.count()).filter(|&i| keep[i]).flat_map(|i| self.facet(i)).copied();
+        Self { nodes: kept.collect(), ..*self }
     }
 
     /// Coordinates of the nodes of facet `i`.

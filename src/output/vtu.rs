@@ -10,6 +10,10 @@ use vtkio::model::{
 /// Kind of the cells of a body; local numbering of the points is VTK's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellKind {
+    /// Two ends.
+    Line,
+    /// Two ends, then the middle.
+    QuadraticLine,
     /// Three vertices.
     Triangle,
     /// Three vertices, then mid-edges 01 12 02.
@@ -34,6 +38,8 @@ impl CellKind {
     /// Points per cell.
     pub fn stride(self) -> usize {
         match self {
+            CellKind::Line => 2,
+            CellKind::QuadraticLine => 3,
             CellKind::Triangle => 3,
             CellKind::QuadraticTriangle => 6,
             CellKind::Tetra => 4,
@@ -43,6 +49,8 @@ impl CellKind {
 
     fn vtk(self) -> CellType {
         match self {
+            CellKind::Line => CellType::Line,
+            CellKind::QuadraticLine => CellType::QuadraticEdge,
             CellKind::Triangle => CellType::Triangle,
             CellKind::QuadraticTriangle => CellType::QuadraticTriangle,
             CellKind::Tetra => CellType::Tetra,
@@ -204,7 +212,7 @@ pub fn pvd_name(title: &str) -> String {
     format!("{}.pvd", if title.is_empty() { "bodies".into() } else { safe_name(title) })
 }
 
-/// Writes the collection that opens the `.vtu` files of all bodies at once: one part per body, at time 0.
+/// Writes the collection that opens the `.vtu` files of all bodies and contact surfaces at once: one part each, at time 0.
 ///
 /// # Errors
 /// Those of `out`.
@@ -252,6 +260,8 @@ mod tests {
     #[test]
     fn every_value_reads_back() {
         for (cell, code) in [
+            (CellKind::Line, CellType::Line),
+            (CellKind::QuadraticLine, CellType::QuadraticEdge),
             (CellKind::Triangle, CellType::Triangle),
             (CellKind::QuadraticTriangle, CellType::QuadraticTriangle),
             (CellKind::Tetra, CellType::Tetra),

@@ -25,13 +25,15 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         Some(node) => node.string()?.to_owned(),
         None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
     };
+    let (contacts, auto) = decoder.contacts(&keys)?;
     Ok(Scene {
         path: path.to_owned(),
         title,
         plane: decoder.plane(&keys)?,
         mesh: decoder.mesh(keys.require("mesh")?)?,
         bodies: decoder.bodies(&keys)?,
-        contacts: decoder.contacts(&keys)?,
+        contacts,
+        auto,
         method: decoder.method(keys.get("method"))?,
         solver: solver(keys.get("solver"))?,
         estimate: keys.get("estimate").map_or(Ok(false), Node::boolean)?,

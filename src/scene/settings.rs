@@ -3,7 +3,7 @@
 use super::expression::Field;
 use super::{
     AxesSpec, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, LayerSpec, LoadKind, MeshSource, MethodName,
-    MethodSpec, Order, Plane, RobinSpec, Scene, SolverSpec, SpringKind, Start, StopSpec, Zone,
+    MethodSpec, Order, Overlap, Plane, RobinSpec, Scene, SolverSpec, SpringKind, Start, StopSpec, Zone,
 };
 use serde_json::{Map, Value, json};
 
@@ -25,7 +25,13 @@ impl Scene {
         settings.insert("mesh".into(), mesh(&self.mesh));
         let dimension = self.dimension.value;
         settings.insert("body".into(), self.bodies.iter().map(|item| body(item, dimension)).collect());
-        settings.insert("contact".into(), self.contacts.iter().map(contact).collect());
+        let auto = self.auto.iter().map(|auto| {
+            let mut map = contact(&auto.contact);
+            map["between"] = json!("auto");
+            map["distance"] = json!(auto.distance);
+            map
+        });
+        settings.insert("contact".into(), self.contacts.iter().map(contact).chain(auto).collect());
         settings.insert("method".into(), method(&self.method));
         settings.insert("solver".into(), solver(&self.solver));
         settings.insert("estimate".into(), json!(self.estimate));
@@ -154,6 +160,9 @@ fn contact(contact: &ContactSpec) -> Value {
     let mut map = Map::new();
     map.insert("between".into(), contact.between.iter().map(|name| json!(name.value)).collect());
     map.insert("gap".into(), field(&contact.gap));
+    map.insert("touching".into(), json!(contact.touching));
+    let overlap = Overlap::ALL.iter().find(|(_, named)| *named == contact.overlap).map(|(name, _)| name);
+    map.insert("overlap".into(), json!(overlap));
     map.insert("layer".into(), layer);
     insert(&mut map, "reference", contact.reference.as_ref().map(field));
     map.into()

@@ -11,7 +11,7 @@ mod search;
 mod space;
 
 pub use plane::plane;
-pub use search::Reach;
+pub use search::{Reach, Search};
 pub use space::space;
 
 use super::side::Side;

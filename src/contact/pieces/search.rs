@@ -2,7 +2,7 @@
 
 use crate::contact::side::{Side, length};
 use rstar::primitives::{GeomWithData, Rectangle};
-use rstar::{AABB, Point, RTree};
+use rstar::{AABB, RTree};
 
 /// How far apart two surfaces may be and still face each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,17 +31,11 @@ impl Reach {
 }
 
 /// The facets of side b, found by their boxes.
-pub struct Search<const D: usize>
-where
-    [f64; D]: Point<Scalar = f64>,
-{
+pub struct Search<const D: usize> {
     tree: RTree<GeomWithData<Rectangle<[f64; D]>, usize>>,
 }
 
-impl<const D: usize> Search<D>
-where
-    [f64; D]: Point<Scalar = f64>,
-{
+impl<const D: usize> Search<D> {
     /// Sorts the facets of a side.
     pub fn new(b: &Side<D>) -> Self {
         let boxed = |i: usize| {
@@ -49,6 +43,16 @@ where
             GeomWithData::new(Rectangle::from_corners(low, high), i)
         };
         Self { tree: RTree::bulk_load((0..b.facets.count()).map(boxed).collect()) }
+    }
+
+    /// Facets whose boxes come within `distance` of facet `i` of side a.
+    pub fn near(&self, a: &Side<D>, i: usize, distance: f64) -> impl Iterator<Item = usize> + '_ {
+        let (low, high) = a.bounds(i);
+        self.meeting(low.map(|x| x - distance), high.map(|x| x + distance))
+    }
+
+    fn meeting(&self, low: [f64; D], high: [f64; D]) -> impl Iterator<Item = usize> + '_ {
+        self.tree.locate_in_envelope_intersecting(AABB::from_corners(low, high)).map(|candidate| candidate.data)
     }
 
     /// Facets near the prism of facet `i` of side a along its normals. The prism is somewhat more than twice as high as the
@@ -79,7 +83,6 @@ where
             }
         }
         let slack = 1e-9 * length(std::array::from_fn::<f64, D, _>(|c| high[c] - low[c]));
-        let window = AABB::from_corners(low.map(|x| x - slack), high.map(|x| x + slack));
-        self.tree.locate_in_envelope_intersecting(window).map(|candidate| candidate.data).collect()
+        self.meeting(low.map(|x| x - slack), high.map(|x| x + slack)).collect()
     }
 }

@@ -1,0 +1,103 @@
+//! Pairs that the scene leaves to be found: boundary facets of different bodies that face each other within a distance.
+
+use super::pairs::Surface;
+use super::part::Part;
+use crate::contact::Side;
+use crate::contact::pieces::{Cut, Reach, Search};
+use crate::contact::side::unit;
+use crate::error::{Error, Result};
+use crate::fem::Facets;
+use crate::scene::AutoContact;
+
+/// Facets face each other if the cosine between the normal of one and minus that of the other is larger.
+const FACING: f64 = 0.5;
+
+/// The two surfaces of each pair of bodies that come near each other, named after the bodies, but for pairs in `named`.
+///
+/// First all facets that could have a partner are gathered, so that the nodal normals are those of smooth surfaces;
+/// of these the ones stay that share a piece.
+///
+/// # Errors
+/// A scene in which nothing is near anything.
+pub fn find<'a, const D: usize>(
+    auto: &AutoContact,
+    cut: Cut<D>,
+    parts: &'a [Part<D>],
+    named: &[[usize; 2]],
+) -> Result<Vec<[Surface<'a, D>; 2]>> {
+    let whole: Vec<Side<D>> = parts
+        .iter()
+        .map(|part| {
+            Side::new(
+                &part.spec.name.value,
+                &part.space,
+                part.space.boundary(),
+                &part.held.prescribed,
+                &part.held.frame,
+            )
+        })
+        .collect();
+    let searches: Vec<Search<D>> = whole.iter().map(Search::new).collect();
+    let mut found = Vec::new();
+    for a in 0..parts.len() {
+        for b in a + 1..parts.len() {
+            if named.contains(&[a, b]) || named.contains(&[b, a]) {
+                continue;
+            }
+            let near = candidates(&whole[a], &whole[b], &searches[b], auto.distance);
+            if near.iter().any(|facets| facets.count() == 0) {
+                continue;
+            }
+            let side = |body: usize, facets: &Facets<D>| {
+                Side::new(
+                    whole[body].name,
+                    whole[body].space,
+                    facets.clone(),
+                    whole[body].prescribed,
+                    whole[body].frame,
+                )
+            };
+            let (side_a, side_b) = (side(a, &near[0]), side(b, &near[1]));
+            let mut used = [vec![false; near[0].count()], vec![false; near[1].count()]];
+            for point in cut(&side_a, &side_b, &within(&side_a, &side_b, auto.distance)) {
+                used[0][point.facet_a] = true;
+                used[1][point.facet_b] = true;
+            }
+            if used[0].contains(&true) {
+                let surface = |side: usize, body: usize| Surface {
+                    body,
+                    name: parts[body].spec.name.value.as_str(),
+                    facets: near[side].only(&used[side]),
+                };
+                found.push([surface(0, a), surface(1, b)]);
+            }
+        }
+    }
+    if found.is_empty() {
+        let place = &auto.contact.between[0].place;
+        let message = format!("no facets of different bodies face each other within {}", auto.distance);
+        return Err(Error::scene(place, message).help("a larger distance may find some"));
+    }
+    Ok(found)
+}
+
+/// How far the surfaces of a found pair may be apart.
+pub fn within<const D: usize>(a: &Side<D>, b: &Side<D>, distance: f64) -> Reach {
+    Reach { gap: distance, overlap: distance.min(Reach::between(a, b).overlap) }
+}
+
+/// Facets of two bodies with opposed normals and boxes within the distance.
+fn candidates<const D: usize>(a: &Side<D>, b: &Side<D>, search: &Search<D>, distance: f64) -> [Facets<D>; 2] {
+    let mut keep = [vec![false; a.facets.count()], vec![false; b.facets.count()]];
+    for i in 0..a.facets.count() {
+        let normal = unit(a.area(i));
+        for j in search.near(a, i, distance) {
+            let other = unit(b.area(j));
+            if (0..D).map(|c| normal[c] * other[c]).sum::<f64>() < -FACING {
+                keep[0][i] = true;
+                keep[1][j] = true;
+            }
+        }
+    }
+    [a.facets.only(&keep[0]), b.facets.only(&keep[1])]
+}
