@@ -161,6 +161,9 @@ struct SceneArgs {
     /// Estimate the error of the discretisation (short for --set estimate=true)
     #[arg(long)]
     estimate: bool,
+    /// Adapt the mesh until the estimated error of pressures and displacements is at most this (short for --set adapt.error=E)
+    #[arg(long, value_name = "E")]
+    tolerance: Option<String>,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
@@ -171,13 +174,26 @@ impl SceneArgs {
     fn overrides(&self) -> Vec<String> {
         let method = self.method.iter().map(|name| format!("method.name={name}"));
         let estimate = self.estimate.then(|| "estimate=true".to_owned());
-        self.overrides.iter().cloned().chain(method).chain(estimate).collect()
+        let tolerance = self.tolerance.iter().map(|error| format!("adapt.error={error}"));
+        self.overrides.iter().cloned().chain(method).chain(estimate).chain(tolerance).collect()
     }
 }
 
 /// Flags of the program that begin with two dashes: with one they look like PETSc's.
-const TWO_DASHES: [&str; 11] =
-    ["-set", "-json", "-method", "-estimate", "-vtu", "-over", "-solver", "-order", "-ranks", "-repeat", "-against"];
+const TWO_DASHES: [&str; 12] = [
+    "-set",
+    "-json",
+    "-method",
+    "-estimate",
+    "-tolerance",
+    "-vtu",
+    "-over",
+    "-solver",
+    "-order",
+    "-ranks",
+    "-repeat",
+    "-against",
+];
 
 /// Runs the program with the words of its command line, the name first; returns the exit code.
 pub fn run(words: Vec<String>) -> i32 {

@@ -4,6 +4,8 @@
 //! the energy norm, and the part of the displacement that the elements cannot represent. The second one acts like a load
 //! on the discrete problem; its response is what nodal displacements and nodal pressures lack.
 
+pub mod sizes;
+
 use crate::ddm::{Discretisation, Field, Layer, Model, linear};
 use crate::discretize::meshes::Meshes;
 use crate::error::Result;

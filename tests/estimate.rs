@@ -135,3 +135,77 @@ fn nothing_to_estimate_and_two_ranks() {
         assert!((one / two - 1.0).abs() < 1e-9, "{name}: {one} {two}");
     }
 }
+
+/// Pressure of a table at a place, by the quadratic elements of its surface.
+fn quadratic(table: &Table, place: f64) -> f64 {
+    let (x, p) = (&table["x"], &table["pressure"]);
+    let last = (table.rows() - 1) / 2;
+    let element = (1..=last).find(|&e| x[2 * e] >= place - 1e-12).unwrap_or(last) - 1;
+    let [a, m, b] = [0, 1, 2].map(|k| p[2 * element + k]);
+    let s = (place - x[2 * element]) / (x[2 * element + 2] - x[2 * element]);
+    a * (1.0 - s) * (1.0 - 2.0 * s) + m * 4.0 * s * (1.0 - s) + b * s * (2.0 * s - 1.0)
+}
+
+/// Relative error of the pressures against those of a much better table.
+fn distance_from(table: &Table, better: &Table) -> f64 {
+    let sum = |value: &dyn Fn(usize) -> f64| -> f64 {
+        (0..table.rows()).map(|q| table["weight"][q] * value(q).powi(2)).sum()
+    };
+    let error = sum(&|q| table["pressure"][q] - quadratic(better, table["x"][q]));
+    (error / sum(&|q| table["pressure"][q])).sqrt()
+}
+
+/// Adapted meshes have the error that was asked for, with far fewer cells than a uniform one; a second run starts from the mesh
+/// that the first one ended with.
+#[test]
+fn adapted_meshes() {
+    let better = solve(root().join("meshes/groove-held/graded.toml"), &["--set", "mesh.set.n=4"]).converged().contact();
+    // known to all digits
+    for (x, p) in [(0.5, 9.35518), (2.0, 10.77811), (2.5, 13.96683), (3.0, 26.80042)] {
+        assert!((quadratic(&better, x) / p - 1.0).abs() < 5e-5, "p({x}) = {}", quadratic(&better, x));
+    }
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
+    let mut sets = sets(2, 8);
+    // the title is part of what an adaptation is remembered by: this one is new
+    sets.extend(["method={}".to_owned(), "adapt.error=1e-3".to_owned(), format!("title={now} adapted")]);
+    let run = solve_with(case("groove-held"), &sets);
+    let rounds = run.report["rounds"].as_array().expect("rounds");
+    assert!(rounds.len() >= 2, "{}", run.said());
+    let number = |round: usize, name: &str| rounds[round][name].as_f64().expect("a number");
+    assert!(number(0, "pressure") > 1e-3 && number(rounds.len() - 1, "pressure") <= 1e-3);
+    let error = distance_from(&run.contact(), &better);
+    assert!(error < 1e-3 && error > 5e-5, "{error:e}\n{}", run.said());
+    // a uniform mesh has this error with more than 4096 cells
+    assert!(number(rounds.len() - 1, "cells") < 2500.0, "{}", run.said());
+    let again = solve_with(case("groove-held"), &sets);
+    assert_eq!(again.report["rounds"].as_array().map(Vec::len), Some(1), "{}", again.said());
+    assert_eq!(again.count("dofs"), run.count("dofs"));
+}
+
+/// Meshes that may not grow end the run with a status of its own; a finished mesh cannot be adapted.
+#[test]
+fn limits_of_adaptation() {
+    let args = ["--tolerance", "1e-6", "--set", "adapt.cells=500", "--set", "method={}"];
+    let run = solve(case("groove-held"), &args);
+    assert_eq!((run.code, run.text("status")), (1, "mesh-limit"), "{}", run.said());
+    assert!(run.stdout.contains("adapt.cells"), "{}", run.said());
+    let scene = Scene::new(common::text_of("groove-held").replace("mesh = {", "mesh = \"a.msh\" # {"));
+    std::fs::write(scene.path.with_file_name("a.msh"), "").expect("a file");
+    let run = solve(&scene, &["--tolerance", "1e-3"]);
+    assert_eq!(run.code, 3, "{}", run.said());
+    assert!(run.stderr.contains("cannot be made anew") && run.stderr.contains(".geo"), "{}", run.said());
+}
+
+/// A start from a coarser mesh saves iterations and changes nothing else.
+#[test]
+fn nested_start() {
+    let with = |start: &str| {
+        let mut all = sets(1, 16);
+        all.extend(["method={name=\"robin\"}".to_owned(), format!("method.start={start}")]);
+        solve_with(case("groove-held"), &all)
+    };
+    let (auto, nested) = (with("auto"), with("nested"));
+    assert!(nested.count("iterations") + 20 < auto.count("iterations"), "{}", nested.count("iterations"));
+    let distance = common::distance(&nested.contact()["pressure"], &auto.contact()["pressure"]);
+    assert!(distance < 1e-6, "{distance:e}");
+}

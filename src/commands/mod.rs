@@ -1,8 +1,10 @@
 //! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`], [`bench`], [`mesh`]. What those
 //! that solve share is in [`run`].
 
+pub mod adapt;
 mod balance;
 pub mod bench;
+pub mod carry;
 pub mod check;
 pub mod inner;
 pub mod mesh;

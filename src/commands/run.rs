@@ -56,6 +56,8 @@ impl Clock {
 pub struct Prepared {
     /// The discrete problem.
     pub problem: Problem,
+    /// Start of the iteration, if it does not come from the scene.
+    pub start: Option<Vec<f64>>,
     /// The methods, made by [`set_up`].
     pub methods: Vec<Box<dyn Method>>,
     /// Why the inner solver is what it is where no PETSc option was typed.
@@ -118,13 +120,14 @@ fn build<const D: usize>(
     let mut inner = Inner::new(session, scene, keep, kept);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
-    let keep = Keep { matrices: keep, meshes: scene.estimate || scene.method.stop.balanced };
+    let keep = Keep { matrices: keep, meshes: scene.estimate || scene.method.stop.balanced || scene.adapt.is_some() };
     let problem = discretize::discretize(scene, &mesh, cut, ranks, keep, exchange, &mut inner);
     let mut problem = agree(session, problem)?;
     problem.share();
     clock.phase("discretize");
     let warnings = warnings(session, &problem);
-    Ok(Prepared { problem, methods: Vec::new(), choice: inner.reason(), warnings, condensed: inner.condensed() })
+    let condensed = inner.condensed();
+    Ok(Prepared { problem, start: None, methods: Vec::new(), choice: inner.reason(), warnings, condensed })
 }
 
 /// What the decoder of the scene cannot know.
@@ -276,7 +279,10 @@ pub fn iterate(
         methods: std::mem::take(&mut prepared.methods),
         stop: StopRule { residual: stop.residual, increment: stop.increment, iterations: stop.iterations },
         balance: prepared.problem.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _),
-        start: discretize::start(scene, &prepared.problem)?,
+        start: match prepared.start.take() {
+            Some(start) => start,
+            None => discretize::start(scene, &prepared.problem)?,
+        },
     };
     let outcome = ddm::solve(&mut prepared.problem.model, &mut settings, observer)?;
     clock.phase("iterate");

@@ -1,5 +1,6 @@
 //! `winkler solve`: one scene, one run, all its results.
 
+use super::adapt::Plan;
 use super::run::{self, Clock, Prepared};
 use super::{folder_of, load, report};
 use crate::ddm::{Observer, Outcome, Row};
@@ -32,26 +33,41 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
     let mut clock = Clock::default();
     let scene = load(session, &request.scene, &request.overrides)?;
     let folder = agree(session, Folder::create(folder_of(&scene, request.folder)))?;
-    let mut prepared = run::prepare(session, &scene, &mut clock)?;
-    run::set_up(session, &scene, &mut prepared, &mut clock)?;
     let first = session.rank() == 0;
-    let monitored = session.options().all()?.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
-    let verbosity = if request.json || monitored || !first { Verbosity::Quiet } else { Verbosity::Table };
-    let mut watchers = Watchers {
-        table: IterationTable::new(verbosity, &run::targets(&scene)),
-        history: if first { Some(history(&folder, &scene)?) } else { None },
+    let mut plan = Plan::new(session, scene, &mut clock)?;
+    let (prepared, outcome, estimate, failed) = loop {
+        let mut prepared = run::prepare(session, &plan.scene, &mut clock)?;
+        prepared.start = plan.start(&prepared);
+        run::set_up(session, &plan.scene, &mut prepared, &mut clock)?;
+        let all = session.options().all()?;
+        let monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
+        let verbosity = if request.json || monitored || !first { Verbosity::Quiet } else { Verbosity::Table };
+        let mut watchers = Watchers {
+            table: IterationTable::new(verbosity, &run::targets(&plan.scene)),
+            history: if first { Some(history(&folder, &plan.scene)?) } else { None },
+        };
+        let outcome = run::iterate(&plan.scene, &mut prepared, &mut watchers, &mut clock)?;
+        let estimate = run::estimate(&mut prepared, &outcome, &mut clock)?;
+        watchers.table.finish();
+        let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
+        let more = plan.goes_on(session, &prepared, &outcome, estimate.as_ref(), &mut clock)?;
+        if !more {
+            break (prepared, outcome, estimate, failed);
+        }
     };
-    let outcome = run::iterate(&scene, &mut prepared, &mut watchers, &mut clock)?;
-    let estimate = run::estimate(&mut prepared, &outcome, &mut clock)?;
-    watchers.table.finish();
-    let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
-    let written = failed.and(write(session, &scene, &prepared, &outcome, estimate.as_ref(), &folder));
+    let scene = &plan.scene;
+    let written = failed.and(write(session, scene, &prepared, &outcome, estimate.as_ref(), &folder));
     clock.phase("output");
     clock.total();
-    let mut report = report::report(session, &scene, &prepared, &outcome, &clock);
+    let mut report = report::report(session, scene, &prepared, &outcome, &clock);
     report.discretization_error = estimate.as_ref().map(report::discretization_error);
+    report.rounds = plan.rounds;
+    if let Some(limit) = &plan.limit {
+        report.status = "mesh-limit".to_owned();
+        report.message = format!("the error asked for is not reached: {limit}");
+    }
     if first {
-        report.files = names(&folder, &scene, &prepared);
+        report.files = names(&folder, scene, &prepared);
         let json = to_json(&report)?;
         folder.write("report.json", |out| out.write_all(json.as_bytes()))?;
         if request.json {
@@ -68,7 +84,7 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
         }
     }
     written?;
-    Ok(report::exit_code(&outcome.status))
+    Ok(if plan.limit.is_some() { 1 } else { report::exit_code(&outcome.status) })
 }
 
 /// A report as JSON text, ended by a newline.

@@ -21,8 +21,23 @@ pub trait Meshes {
     /// The integration points of a pair.
     fn points(&self, pair: usize) -> FinePoints<'_>;
 
+    /// The cells of a body.
+    fn cells(&self, body: usize) -> Cells;
+
     /// Order of convergence of the energy error of a body: the degree of its elements.
     fn degree(&self, body: usize) -> usize;
+}
+
+/// The cells of a body by their corners.
+pub struct Cells {
+    /// Coordinates of the nodes.
+    pub nodes: Vec<[f64; 3]>,
+    /// Corners of a cell.
+    pub stride: usize,
+    /// Node numbers of the corners, `stride` per cell.
+    pub corners: Vec<u32>,
+    /// Size of each cell: edge of the regular simplex of its measure.
+    pub sizes: Vec<f64>,
 }
 
 /// The integration points of a pair; see [`Fine`].
@@ -94,6 +109,19 @@ impl<const D: usize> Meshes for Kept<D> {
         let soft: f64 = bodies.iter().map(|&body| 1.0 / self.shapes[body].modulus).sum();
         let compliance = size.iter().map(|size| size * soft / std::f64::consts::PI).collect();
         FinePoints { weight, gap, compliance, nearest, interpolation }
+    }
+
+    fn cells(&self, body: usize) -> Cells {
+        let space = &self.shapes[body].space;
+        // measure of the regular simplex with edges of length one
+        let regular = if D == 2 { 3f64.sqrt() / 4.0 } else { 2f64.sqrt() / 12.0 };
+        let size = |index| (space.cell_measure(index) / regular).powf(1.0 / D as f64);
+        Cells {
+            nodes: space.nodes.iter().map(|&x| pad(x)).collect(),
+            stride: D + 1,
+            corners: space.cells.chunks_exact(space.stride).flat_map(|cell| &cell[..=D]).copied().collect(),
+            sizes: (0..space.cell_count()).map(size).collect(),
+        }
     }
 
     fn degree(&self, body: usize) -> usize {

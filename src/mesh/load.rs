@@ -40,12 +40,12 @@ pub enum Origin {
 /// of named simplices in `D` dimensions (see [`read`](super::read)), or of too low an order.
 pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<D>> {
     match source {
-        MeshSource::Geo { file, set, places } => {
+        MeshSource::Geo { file, set, places, sizes } => {
             let script = Script::read(&file.value).map_err(|error| error.at(&file.place))?;
             for ((name, _), place) in set.iter().zip(places) {
                 script.check(name, &Located::new(file.value.clone(), place.clone()))?;
             }
-            from_script(file, set, order, &folders())
+            from_script(file, set, sizes.as_deref(), order, &folders())
         }
         MeshSource::Msh { file } => from_file(file, order),
     }
@@ -74,6 +74,7 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order) -> Result<Lo
 pub(super) fn from_script<const D: usize>(
     file: &Located<PathBuf>,
     set: &[(String, f64)],
+    sizes: Option<&str>,
     order: Order,
     folders: &[PathBuf],
 ) -> Result<Loaded<D>> {
@@ -83,7 +84,7 @@ pub(super) fn from_script<const D: usize>(
         script.check(name, file)?;
     }
     let gmsh = Gmsh::find()?;
-    let name = file_name::<D>(path, &script, set, order, &gmsh);
+    let name = file_name::<D>(path, &script, set, sizes, order, &gmsh);
 
     // A file of the cache that cannot be read or is damaged is as good as none.
     for folder in folders {
@@ -95,14 +96,46 @@ pub(super) fn from_script<const D: usize>(
     }
     let workshop = Workshop::open(folders)?;
     let made = workshop.path().join(&name);
-    gmsh.run(path, set, D, order, &made, workshop.path())?;
+    let sized = sizes.map(|sizes| super::sizes::script(file, &script, sizes, workshop.path())).transpose()?;
+    gmsh.run(sized.as_deref().unwrap_or(path), set, D, order, &made, workshop.path())?;
     let bytes = std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause))?;
     let mesh = checked(path, &bytes, order)?;
     Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })
 }
 
+/// Keeps the sizes of a mesh that an adaptation ended with: `purpose` is all that it was for, scene and error.
+///
+/// # Errors
+/// The cache cannot be written.
+pub fn keep_final(purpose: &str, sizes: &str) -> Result<()> {
+    let workshop = Workshop::open(&folders())?;
+    let name = final_name(purpose);
+    let made = workshop.path().join(&name);
+    std::fs::write(&made, sizes).map_err(|cause| Error::file(&made, "write", &cause))?;
+    workshop.publish(&made, &name).map(|_| ())
+}
+
+/// The sizes that an earlier adaptation for the same `purpose` ended with.
+pub fn recall_final(purpose: &str) -> Option<String> {
+    let name = final_name(purpose);
+    folders().iter().find_map(|folder| std::fs::read_to_string(folder.join(&name)).ok())
+}
+
+fn final_name(purpose: &str) -> String {
+    let mut key = Key::new();
+    key.add(purpose.as_bytes());
+    key.file_name("sizes") + ".pos"
+}
+
 /// Name of the mesh in the cache: it changes with everything that changes the mesh.
-fn file_name<const D: usize>(path: &Path, script: &Script, set: &[(String, f64)], order: Order, gmsh: &Gmsh) -> String {
+fn file_name<const D: usize>(
+    path: &Path,
+    script: &Script,
+    set: &[(String, f64)],
+    sizes: Option<&str>,
+    order: Order,
+    gmsh: &Gmsh,
+) -> String {
     let mut key = Key::new();
     key.add(gmsh.identity().as_bytes());
     key.add(&[D as u8, order as u8]);
@@ -112,6 +145,9 @@ fn file_name<const D: usize>(path: &Path, script: &Script, set: &[(String, f64)]
     }
     for text in &script.files {
         key.add(text);
+    }
+    if let Some(sizes) = sizes {
+        key.add(sizes.as_bytes());
     }
     key.file_name(&path.file_stem().unwrap_or_default().to_string_lossy())
 }

@@ -15,12 +15,14 @@ mod physical;
 mod quality;
 mod script;
 mod simplex;
+mod sizes;
 #[cfg(test)]
 mod tests;
 
-pub use load::{Loaded, Origin, load};
+pub use load::{Loaded, Origin, keep_final, load, recall_final};
 pub use msh::read;
 pub use quality::Quality;
+pub use sizes::view;
 
 use crate::scene::Order;
 use std::path::PathBuf;

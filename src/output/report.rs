@@ -59,6 +59,8 @@ pub struct Report {
     pub error_estimate: Option<f64>,
     /// Estimated errors of the discretisation, if they were asked for.
     pub discretization_error: Option<EstimateReport>,
+    /// Meshes that were adapted to an error, one after another.
+    pub rounds: Vec<RoundReport>,
     /// Estimated bounds of the spectrum of G^-1 F1''.
     pub spectrum: Option<[f64; 2]>,
     /// Relative increment of the last update, the largest of the bodies.
@@ -106,6 +108,25 @@ pub struct EstimateReport {
     pub pressure: Vec<f64>,
     /// Share of each body in the squared energy error, in the order of the scene.
     pub bodies: Vec<f64>,
+}
+
+/// One mesh of an adaptation; errors are relative estimates.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct RoundReport {
+    /// Cells of all bodies.
+    pub cells: usize,
+    /// Degrees of freedom.
+    pub dofs: usize,
+    /// Error of the pressures, the largest of the pairs.
+    pub pressure: f64,
+    /// Error of the normal displacements at the contact points.
+    pub displacement: f64,
+    /// Error in the energy norm.
+    pub energy: f64,
+    /// Iterations.
+    pub iterations: usize,
+    /// Wall seconds, the making of the mesh included.
+    pub seconds: f64,
 }
 
 /// One body.
@@ -206,6 +227,22 @@ impl Report {
             self.dofs,
             seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
         ));
+        if !self.rounds.is_empty() {
+            lines.push(
+                "  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds".to_owned(),
+            );
+        }
+        for (index, round) in self.rounds.iter().enumerate() {
+            let [pressure, displacement, energy] =
+                [round.pressure, round.displacement, round.energy].map(|e| sci(e, 2));
+            lines.push(format!(
+                "  {index:>4} {:>10} {:>10} {pressure:>10} {displacement:>13} {energy:>10} {:>11} {:>9}",
+                round.cells,
+                round.dofs,
+                round.iterations,
+                seconds(round.seconds)
+            ));
+        }
         if let Some(error) = &self.discretization_error {
             let pressures: Vec<String> = error.pressure.iter().map(|&error| sci(error, 1)).collect();
             lines.push(format!(

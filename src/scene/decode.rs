@@ -10,14 +10,14 @@ pub use body::reserved;
 
 use super::expression::Field;
 use super::read::{Keys, Node, Value};
-use super::{MeshSource, OutputSpec, Plane, Preset, Scene, SolverSpec};
+use super::{AdaptSpec, MeshSource, OutputSpec, Plane, Preset, Scene, SolverSpec};
 use crate::error::{Error, Located, Place, Result, nearest};
 use std::path::{Path, PathBuf};
 
 /// Checks a whole scene, read from `path`. Looks whether the mesh file is there.
 pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     const KEYS: &[&str] =
-        &["title", "dimension", "plane", "mesh", "body", "contact", "method", "solver", "estimate", "output"];
+        &["title", "dimension", "plane", "mesh", "body", "contact", "method", "solver", "estimate", "adapt", "output"];
     let keys = Keys::open(tree, "the scene", KEYS)?;
     let dimension = dimension(&keys)?;
     let decoder = Decoder { dimension: dimension.value, folder: path.parent().unwrap_or(Path::new("")) };
@@ -37,6 +37,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         method: decoder.method(keys.get("method"))?,
         solver: solver(keys.get("solver"))?,
         estimate: keys.get("estimate").map_or(Ok(false), Node::boolean)?,
+        adapt: keys.get("adapt").map(adapt).transpose()?,
         output: output(keys.get("output"))?,
         dimension,
     })
@@ -91,7 +92,7 @@ impl Decoder<'_> {
         if let Value::String(name) = &node.value {
             let file = self.file(node)?;
             return Ok(match name.ends_with(".geo") {
-                true => MeshSource::Geo { file, set: Vec::new(), places: Vec::new() },
+                true => MeshSource::Geo { file, set: Vec::new(), places: Vec::new(), sizes: None },
                 false => MeshSource::Msh { file },
             });
         }
@@ -110,7 +111,7 @@ impl Decoder<'_> {
         let file = self.file(keys.require("geo")?)?;
         let set = keys.get("set").map_or(Ok(Vec::new()), numbers)?;
         let (places, set) = set.into_iter().map(|(place, name, value)| (place, (name, value))).unzip();
-        Ok(MeshSource::Geo { file, set, places })
+        Ok(MeshSource::Geo { file, set, places, sizes: None })
     }
 
     /// The path of a file that must exist, joined with the folder of the scene.
@@ -199,6 +200,24 @@ fn solver(node: Option<&Node>) -> Result<SolverSpec> {
         }
     }
     Ok(SolverSpec { preset: keys.get("preset").map(preset).transpose()?, options })
+}
+
+fn adapt(node: &Node) -> Result<AdaptSpec> {
+    let keys = Keys::open(node, "`adapt`", &["error", "cells", "rounds"])?;
+    let error = keys.require("error")?;
+    let count = |key: &str, usual: usize| match keys.get(key) {
+        None => Ok(usual),
+        Some(node) => match usize::try_from(node.whole()?) {
+            Ok(count) if count > 0 => Ok(count),
+            _ => Err(node.refuse(format!("`{key}` must be 1 or more"))),
+        },
+    };
+    Ok(AdaptSpec {
+        error: error.positive("the error")?,
+        cells: count("cells", 1_000_000)?,
+        rounds: count("rounds", 10)?,
+        place: error.place.clone(),
+    })
 }
 
 fn output(node: Option<&Node>) -> Result<OutputSpec> {

@@ -35,6 +35,9 @@ impl Scene {
         settings.insert("method".into(), method(&self.method));
         settings.insert("solver".into(), solver(&self.solver));
         settings.insert("estimate".into(), json!(self.estimate));
+        let adapt = self.adapt.as_ref();
+        let adapt = adapt.map(|adapt| json!({ "error": adapt.error, "cells": adapt.cells, "rounds": adapt.rounds }));
+        insert(&mut settings, "adapt", adapt);
         let mut output = Map::new();
         insert(&mut output, "dir", self.output.dir.as_ref().map(|dir| json!(dir.display().to_string())));
         output.insert("vtu".into(), json!(self.output.vtu));
@@ -179,6 +182,7 @@ fn method(method: &MethodSpec) -> Value {
     let start = match &method.start {
         Start::Auto => json!("auto"),
         Start::Zero => json!("zero"),
+        Start::Nested => json!("nested"),
         Start::Normal(normal) => json!({ "normal": field(normal) }),
     };
     let StopSpec { residual, increment, balanced, iterations } = &method.stop;

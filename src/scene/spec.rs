@@ -8,6 +8,7 @@ use super::layer::LayerSpec;
 use super::{ElasticitySpec, RegionSpec};
 use crate::error::{Located, Place};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// A checked scene.
 #[derive(Debug, Clone)]
@@ -34,6 +35,8 @@ pub struct Scene {
     pub solver: SolverSpec,
     /// Whether to estimate the error of the discretisation.
     pub estimate: bool,
+    /// Meshes adapted to an error, if asked for.
+    pub adapt: Option<AdaptSpec>,
     /// What to write.
     pub output: OutputSpec,
 }
@@ -58,6 +61,8 @@ pub enum MeshSource {
         set: Vec<(String, f64)>,
         /// Where each name stands.
         places: Vec<Place>,
+        /// A field of sizes for Gmsh to follow instead of the script's own; no scene file has one.
+        sizes: Option<Arc<str>>,
     },
     /// A mesh file, format 4.1, text or binary.
     Msh {
@@ -310,6 +315,8 @@ pub enum Start {
     Auto,
     /// Zero normal displacement.
     Zero,
+    /// The solution on a mesh of elements twice as large.
+    Nested,
     /// Outer normal displacement on every contact surface.
     Normal(Field),
 }
@@ -385,6 +392,19 @@ impl Default for StopSpec {
     fn default() -> Self {
         Self { residual: Some(1e-8), increment: None, balanced: false, iterations: 2000 }
     }
+}
+
+/// Meshes adapted until an estimated error is small enough.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdaptSpec {
+    /// Relative error of pressures and displacements asked for.
+    pub error: f64,
+    /// Most cells of a mesh.
+    pub cells: usize,
+    /// Most meshes.
+    pub rounds: usize,
+    /// Where the error was asked for.
+    pub place: Place,
 }
 
 /// What to write.

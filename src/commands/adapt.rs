@@ -1,0 +1,173 @@
+//! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
+
+use super::run::{self, Clock, Prepared};
+use super::{carry, report};
+use crate::ddm::{Outcome, Status};
+use crate::error::{Error, Result};
+use crate::estimate::Estimate;
+use crate::estimate::sizes::{self, Sizes};
+use crate::mesh;
+use crate::output::{ContactTable, RoundReport};
+use crate::petsc::Session;
+use crate::scene::{AdaptSpec, MeshSource, Scene, Start};
+use crate::solver::options;
+
+/// Cells of a body's first mesh.
+const FIRST: usize = 150;
+
+/// Part of the error asked for that the next mesh aims at, so that an estimate a little too good costs no further mesh.
+const AIM: f64 = 0.7;
+
+/// Part of an error that the next mesh may leave at least: what a coarse mesh tells of a kink does not hold for a very fine one.
+const LEAST: f64 = 0.1;
+
+/// What remains to be done of a run of several meshes.
+pub struct Plan {
+    /// The scene of this round.
+    pub scene: Scene,
+    /// Meshes so far.
+    pub rounds: Vec<RoundReport>,
+    /// Why the meshes end before the error is reached, in words.
+    pub limit: Option<String>,
+    goal: Option<AdaptSpec>,
+    /// The scene that follows a coarse one.
+    finer: Option<Scene>,
+    purpose: String,
+    carried: Vec<ContactTable>,
+    seconds: f64,
+}
+
+impl Plan {
+    /// The first round of a scene: its own mesh, a coarse one, or the one that an earlier run ended with.
+    ///
+    /// # Errors
+    /// A scene whose mesh cannot follow sizes; what [`run::prepare`] refuses.
+    pub fn new(session: &Session, scene: Scene, clock: &mut Clock) -> Result<Self> {
+        let goal = scene.adapt.clone();
+        let nested = matches!(scene.method.start, Start::Nested);
+        let mut settings = scene.settings();
+        ["output", "solver", "method"].iter().for_each(|key| settings[*key] = serde_json::Value::Null);
+        let mut plan = Self {
+            purpose: settings.to_string(),
+            scene,
+            rounds: Vec::new(),
+            limit: None,
+            goal,
+            finer: None,
+            carried: Vec::new(),
+            seconds: 0.0,
+        };
+        if plan.goal.is_none() && !nested {
+            return Ok(plan);
+        }
+        if let MeshSource::Msh { file } = &plan.scene.mesh {
+            let place = plan.goal.as_ref().map_or(&file.place, |goal| &goal.place);
+            return Err(Error::scene(place, "a finished mesh cannot be made anew with other sizes")
+                .help("let the scene name a Gmsh script: mesh = \"file.geo\""));
+        }
+        let bodies = plan.scene.bodies.len();
+        if plan.goal.is_none() {
+            let mut coarse = plan.scene.clone();
+            coarse.estimate = true;
+            let prepared = run::prepare(session, &coarse, clock)?;
+            let sizes = prepared.problem.meshes.as_ref().map(|meshes| sizes::scaled(&**meshes, bodies, 2.0));
+            options::withdraw(session)?;
+            coarse.method.stop.balanced = true;
+            follow(&mut coarse, sizes.map(view));
+            plan.finer = Some(std::mem::replace(&mut plan.scene, coarse));
+            return Ok(plan);
+        }
+        plan.scene.estimate = true;
+        plan.scene.method.stop.balanced = true;
+        let mut view_of_first = mesh::recall_final(&plan.purpose);
+        if view_of_first.is_none() {
+            let prepared = run::prepare(session, &plan.scene, clock)?;
+            let sizes = prepared.problem.meshes.as_ref().map(|m| sizes::uniform(&**m, bodies, FIRST * bodies));
+            options::withdraw(session)?;
+            view_of_first = sizes.map(view);
+        }
+        follow(&mut plan.scene, view_of_first);
+        Ok(plan)
+    }
+
+    /// The start of this round, if an earlier one gives it.
+    pub fn start(&self, prepared: &Prepared) -> Option<Vec<f64>> {
+        (!self.carried.is_empty()).then(|| carry::trace(&self.carried, prepared))
+    }
+
+    /// Whether another round follows this one. Collective.
+    ///
+    /// # Errors
+    /// The cache of meshes cannot be written.
+    pub fn goes_on(
+        &mut self,
+        session: &Session,
+        prepared: &Prepared,
+        outcome: &Outcome,
+        estimate: Option<&Estimate>,
+        clock: &mut Clock,
+    ) -> Result<bool> {
+        let good = matches!(outcome.status, Status::Converged | Status::Attainable);
+        let pairs = prepared.problem.model.pairs.len();
+        if let Some(finer) = self.finer.take() {
+            if good {
+                self.carried = (0..pairs).map(|i| report::contact_table(prepared, outcome, None, i)).collect();
+            }
+            self.scene = finer;
+            options::withdraw(session)?;
+            return Ok(true);
+        }
+        let (Some(goal), Some(estimate), Some(meshes)) = (&self.goal, estimate, &prepared.problem.meshes) else {
+            return Ok(false);
+        };
+        let total = clock.total();
+        let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
+        self.rounds.push(RoundReport {
+            cells: prepared.problem.bodies.iter().map(|body| body.cells).sum(),
+            dofs: prepared.problem.bodies.iter().map(|body| body.dofs).sum(),
+            pressure: estimate.pressure.iter().copied().fold(0.0, f64::max),
+            displacement: estimate.displacement,
+            energy: estimate.energy,
+            iterations: outcome.iterations,
+            seconds: total - self.seconds,
+        });
+        self.seconds = total;
+        if !good {
+            return Ok(false);
+        }
+        if error <= goal.error {
+            if let (MeshSource::Geo { sizes: Some(view), .. }, 0) = (&self.scene.mesh, session.rank()) {
+                mesh::keep_final(&self.purpose, view)?;
+            }
+            return Ok(false);
+        }
+        if self.rounds.len() >= goal.rounds {
+            self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
+            return Ok(false);
+        }
+        let model = &prepared.problem.model;
+        let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
+        let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
+        let wanted = sizes::wanted(&**meshes, model, estimate, share, goal.cells);
+        let now = self.rounds[self.rounds.len() - 1].cells as f64;
+        if wanted.cells >= 0.9 * goal.cells as f64 && now >= 0.7 * goal.cells as f64 {
+            self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
+            return Ok(false);
+        }
+        self.carried = (0..pairs).map(|i| report::contact_table(prepared, outcome, None, i)).collect();
+        follow(&mut self.scene, Some(view(wanted)));
+        options::withdraw(session)?;
+        Ok(true)
+    }
+}
+
+fn view(sizes: Sizes) -> String {
+    mesh::view(sizes.stride, &sizes.corners, &sizes.sizes)
+}
+
+/// Lets the mesh of a scene follow sizes.
+fn follow(scene: &mut Scene, view: Option<String>) {
+    if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
+        *sizes = view.map(Into::into);
+    }
+}

@@ -1,0 +1,99 @@
+//! Meshes of wanted sizes: a script of the user's and a field of sizes, which Gmsh follows instead of the script's own.
+
+use super::script::Script;
+use crate::error::{Error, Located, Result};
+use std::path::{Path, PathBuf};
+
+/// Writes the script that meshes another one to a field of sizes into the folder `work`; gives its path. `field` is a view of
+/// Gmsh (`.pos`). Structured meshes cannot follow sizes: their commands are left out of a copy.
+///
+/// # Errors
+/// A structured script that reads other files, which a copy would not find; a folder that cannot be written.
+pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: &Path) -> Result<PathBuf> {
+    let write = |name: &str, text: &str| {
+        let path = work.join(name);
+        std::fs::write(&path, text).map_err(|cause| Error::file(&path, "write", &cause)).map(|()| path)
+    };
+    let own = read.files.first().map_or(String::new(), |bytes| String::from_utf8_lossy(bytes).into_owned());
+    let free = unstructured(&own);
+    let mut script = std::path::absolute(&file.value).map_err(|cause| Error::file(&file.value, "find", &cause))?;
+    if free != own {
+        if read.files.len() > 1 {
+            let message = format!("{} makes a structured mesh and reads other files", file.value.display());
+            return Err(Error::scene(&file.place, message)
+                .help("take `Transfinite` and `Recombine` out of it: such a mesh cannot follow sizes"));
+        }
+        script = write("free.geo", &free)?;
+    }
+    let sizes = write("sizes.pos", field)?;
+    let text = format!(
+        "Merge \"{}\";\nMesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\n\
+         Mesh.MeshSizeFromCurvature = 0;\nMerge \"{}\";\nBackground Mesh View[PostProcessing.NbViews - 1];\n",
+        script.display(),
+        sizes.display()
+    );
+    write("sized.geo", &text)
+}
+
+/// The script without the commands that ask for structured meshes, from the word to the semicolon.
+fn unstructured(text: &str) -> String {
+    let mut kept = String::with_capacity(text.len());
+    let mut rest = text;
+    while !rest.is_empty() {
+        let word = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len());
+        let until = |sign: &str| rest.find(sign).map_or(rest.len(), |at| at + sign.len());
+        let quoted = |sign: char| rest[1..].find(sign).map_or(rest.len(), |at| at + 2);
+        let length = match rest.chars().next() {
+            _ if rest.starts_with("//") => until("\n"),
+            _ if rest.starts_with("/*") => until("*/"),
+            Some(quote @ ('"' | '\'')) => quoted(quote),
+            _ if word > 0 && matches!(&rest[..word], "Transfinite" | "TransfQuadTri" | "Recombine") => {
+                rest = &rest[until(";")..];
+                continue;
+            }
+            _ if word > 0 => word,
+            first => first.map_or(1, char::len_utf8),
+        };
+        kept.push_str(&rest[..length]);
+        rest = &rest[length..];
+    }
+    kept
+}
+
+/// A field of sizes on simplices as a view of Gmsh: corners of all simplices, `stride` of them each, and the size at each
+/// corner.
+pub fn view(stride: usize, corners: &[[f64; 3]], sizes: &[f64]) -> String {
+    use std::fmt::Write;
+    let mut text = String::from("View \"sizes\" {\n");
+    let list = |values: &mut dyn Iterator<Item = f64>| values.map(|v| format!("{v:e}")).collect::<Vec<_>>().join(",");
+    for (x, size) in corners.chunks_exact(stride).zip(sizes.chunks_exact(stride)) {
+        let at = list(&mut x.iter().flatten().copied());
+        let size = list(&mut size.iter().copied());
+        // writing to a String cannot fail
+        let _ = writeln!(text, "S{}({at}){{{size}}};", if stride == 3 { "T" } else { "S" });
+    }
+    text + "};\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn structured_commands_go_and_nothing_else() {
+        let text = "n = 3; // Transfinite;\nTransfinite Curve {1, 2} = n + 1 Using Progression 1.1;\n\
+                    Recombine Surface{1};\nPhysical Surface(\"Transfinite;\") = {1};\nmyTransfinite = 2;\n";
+        let expected = "n = 3; // Transfinite;\n\n\nPhysical Surface(\"Transfinite;\") = {1};\nmyTransfinite = 2;\n";
+        assert_eq!(unstructured(text), expected);
+        assert_eq!(unstructured("a = 'x"), "a = 'x");
+    }
+
+    #[test]
+    fn a_view_has_a_line_for_each_simplex() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        assert_eq!(
+            view(3, &corners, &[0.5, 0.25, 1.0]),
+            "View \"sizes\" {\nST(0e0,0e0,0e0,1e0,0e0,0e0,0e0,1e0,0e0){5e-1,2.5e-1,1e0};\n};\n"
+        );
+    }
+}
