@@ -22,7 +22,7 @@ pub fn trace(tables: &[ContactTable], prepared: &Prepared) -> Vec<f64> {
             }
             let all: f64 = shares.iter().map(|(_, share)| share).sum();
             for (of_scene, column) in table.displacement.iter().enumerate() {
-                let side = if prepared.problem.swapped[i] { 1 - of_scene } else { of_scene };
+                let side = if prepared.problem.contacts[i].swapped { 1 - of_scene } else { of_scene };
                 let sum: f64 = shares.iter().map(|(near, share)| share * column[*near]).sum();
                 trace[side * points + model.offset[i] + q] = sum / all - pair.prescribed[side][q];
             }
