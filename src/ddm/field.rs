@@ -12,6 +12,9 @@ pub struct Field {
     pub trace: Vec<f64>,
 }
 
+/// Ratio of a step to the traces after it beyond which digits of the traces were lost.
+const CANCELLED: f64 = 1e3;
+
 impl Field {
     /// All bodies at rest, with the traces of that.
     pub fn rest(model: &Model) -> Field {
@@ -36,6 +39,25 @@ impl Field {
             update(u, z);
         }
         update(&mut self.trace, &other.trace);
+    }
+
+    /// Makes the traces anew from the states, if a step that moved them by `moved` ended so much nearer to zero that rounding of
+    /// its size shows: states and traces are added to on their own and would part. Collective.
+    pub fn retrace(&mut self, model: &Model, moved: &[f64]) {
+        let size = |v: &[f64]| v.iter().fold(0.0f64, |max, t| max.max(t.abs()));
+        if size(moved) <= CANCELLED * size(&self.trace) {
+            return;
+        }
+        let mut trace = vec![0.0; self.trace.len()];
+        for (index, slot) in model.bodies.iter().enumerate() {
+            if let Some(body) = &slot.local {
+                let mut rows = vec![0.0; slot.row_stiffness.len()];
+                body.trace(&self.states[index], &mut rows);
+                model.put(index, &rows, &mut trace);
+            }
+        }
+        model.exchange.sum(&mut trace);
+        self.trace = trace;
     }
 
     /// The zero of the same shape.

@@ -176,7 +176,8 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         let direction = direction.as_ref().unwrap_or(&sweep.correction);
         iterate.add(length, direction);
         updates += 1;
-        let moved = direction.trace.iter().map(|t| length * t).collect();
+        let moved: Vec<f64> = direction.trace.iter().map(|t| length * t).collect();
+        iterate.retrace(model, &moved);
         last = Some(Last { sweep, relaxed, length, moved, pressure: layer.pressure });
     };
     let method = &settings.methods[active];

@@ -46,7 +46,7 @@ const CASES: &[Case] = &[
     ("young = 2.1e5\npoisson = 0.3\norder", "order", "[[body]]", "[[body]] has no `young`", "orthotropic = { E1 = ... }"),
     ("order = 1", "axes = { angle = 1 }\norder = 1", "axes", "axes of an isotropic material", "remove them"),
     ("order = 1", "orthotropic = { E1 = 1 }\norder = 1", "orthotropic", "[[body]] has both `young` and `orthotropic`", ""),
-    ("young = 2.1e5\n", "anisotropic = [1]\n", "anisotropic", "[[body]] has both `poisson` and `anisotropic`", ""),
+    ("young = 2.1e5\n", "anisotropic = [1]\n", "poisson", "[[body]] has both `poisson` and `anisotropic`", ""),
     ("young = 2.1e5\npoisson = 0.3\norder", "anisotropic = [1, 2]\norder", "[1, 2]", "an anisotropic material has 21 constants, not 2", "upper triangle"),
     ("young = 2.1e5\npoisson = 0.3\norder", "orthotropic = { E1 = 1 }\norder", "{ E1 = 1 }", "the orthotropic material has no `E2`", ""),
     ("young = 2.1e5\npoisson = 0.3\norder", "orthotropic = { e1 = 1 }\norder", "e1", "unknown key `e1` in the orthotropic material", "`E1`"),
