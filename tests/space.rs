@@ -267,7 +267,7 @@ fn pairs_are_found_on_the_mesh() {
 #[test]
 fn surfaces_are_written() {
     for (name, set) in [("patch-2d", "body.1.order=2"), ("shells", "body.0.order=1"), ("shells", "body.0.order=2")] {
-        let run = run(name, &[set]);
+        let run = run(name, &[set, "output.vtu=true"]);
         let side = |k: usize| run.text(&format!("pairs/0/bodies/{k}"));
         let stem = format!("contact-{}-{}", side(0), side(1));
         let collection = std::fs::read_to_string(run.folder.join("bodies.pvd")).expect("a collection");

@@ -41,13 +41,15 @@ impl Field {
         update(&mut self.trace, &other.trace);
     }
 
-    /// Makes the traces anew from the states, if a step that moved them by `moved` ended so much nearer to zero that rounding of
-    /// its size shows: states and traces are added to on their own and would part. Collective.
-    pub fn retrace(&mut self, model: &Model, moved: &[f64]) {
+    /// Whether a step that moved the traces by `moved` ended so much nearer to zero that rounding of its size shows.
+    pub fn is_cancelled(&self, moved: &[f64]) -> bool {
         let size = |v: &[f64]| v.iter().fold(0.0f64, |max, t| max.max(t.abs()));
-        if size(moved) <= CANCELLED * size(&self.trace) {
-            return;
-        }
+        size(moved) > CANCELLED * size(&self.trace)
+    }
+
+    /// Makes the traces anew from the states: both are added to on their own, and part by the rounding of large steps.
+    /// Collective.
+    pub fn retrace(&mut self, model: &Model) {
         let mut trace = vec![0.0; self.trace.len()];
         for (index, slot) in model.bodies.iter().enumerate() {
             if let Some(body) = &slot.local {

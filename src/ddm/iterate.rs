@@ -177,7 +177,9 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         iterate.add(length, direction);
         updates += 1;
         let moved: Vec<f64> = direction.trace.iter().map(|t| length * t).collect();
-        iterate.retrace(model, &moved);
+        if settings.methods[active].moves_far() || iterate.is_cancelled(&moved) {
+            iterate.retrace(model);
+        }
         last = Some(Last { sweep, relaxed, length, moved, pressure: layer.pressure });
     };
     let method = &settings.methods[active];

@@ -76,6 +76,11 @@ pub trait Method {
     /// Name, as in the scene and the table.
     fn name(&self) -> &'static str;
 
+    /// Whether its steps may move bodies far in ways that contact does not feel, which no trace shows.
+    fn moves_far(&self) -> bool {
+        false
+    }
+
     /// The step that leads on.
     ///
     /// # Errors

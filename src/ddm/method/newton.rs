@@ -206,6 +206,10 @@ impl Method for Newton {
         }
     }
 
+    fn moves_far(&self) -> bool {
+        matches!(self.inner, Inner::Direct(_))
+    }
+
     fn amplification(&self) -> f64 {
         self.amplification
     }
