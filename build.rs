@@ -49,6 +49,7 @@ const FUNCTIONS: &[&str] = &[
     "PCGetOperators",
     "PCGetType",
     "PCReset",
+    "PCSetUp",
     "PetscContainerCreate",
     "PetscContainerDestroy",
     "PetscContainerSetPointer",

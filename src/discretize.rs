@@ -266,8 +266,7 @@ pub fn discretize<const D: usize>(
             let body = part.assemble(mesh, &rows, &elasticity, load, prescribed, carried)?;
             assemblies += 1;
             slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-            slot.row_stiffness =
-                (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * body.stiffness.diagonal(i)).sum()).collect();
+            slot.row_stiffness = body.row_stiffness(&rows);
             if keep.matrices {
                 kept.push(Matrices { body: body.clone(), rows: rows.clone(), left: left.clone() });
             }

@@ -12,9 +12,6 @@ pub struct Field {
     pub trace: Vec<f64>,
 }
 
-/// Ratio of a step to the traces after it beyond which digits of the traces were lost.
-const CANCELLED: f64 = 1e3;
-
 impl Field {
     /// All bodies at rest, with the traces of that.
     pub fn rest(model: &Model) -> Field {
@@ -39,12 +36,6 @@ impl Field {
             update(u, z);
         }
         update(&mut self.trace, &other.trace);
-    }
-
-    /// Whether a step that moved the traces by `moved` ended so much nearer to zero that rounding of its size shows.
-    pub fn is_cancelled(&self, moved: &[f64]) -> bool {
-        let size = |v: &[f64]| v.iter().fold(0.0f64, |max, t| max.max(t.abs()));
-        size(moved) > CANCELLED * size(&self.trace)
     }
 
     /// Makes the traces anew from the states: both are added to on their own, and part by the rounding of large steps.

@@ -176,8 +176,8 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         let direction = direction.as_ref().unwrap_or(&sweep.correction);
         iterate.add(length, direction);
         updates += 1;
-        let moved: Vec<f64> = direction.trace.iter().map(|t| length * t).collect();
-        if settings.methods[active].moves_far() || iterate.is_cancelled(&moved) {
+        let moved = direction.trace.iter().map(|t| length * t).collect();
+        if settings.methods[active].moves_far() {
             iterate.retrace(model);
         }
         last = Some(Last { sweep, relaxed, length, moved, pressure: layer.pressure });

@@ -151,6 +151,13 @@ pub struct ElasticBody {
     pub carried: Vec<f64>,
 }
 
+impl ElasticBody {
+    /// b diag(K) b' of each row b: stiffness of the nodes under a contact point.
+    pub fn row_stiffness(&self, rows: &Csr) -> Vec<f64> {
+        (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * self.stiffness.diagonal(i)).sum()).collect()
+    }
+}
+
 /// Why a body could not be assembled.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Defect {

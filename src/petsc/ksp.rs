@@ -175,6 +175,9 @@ impl Ksp {
             |error: Error| error.help(format!("choose other {0}ksp_type, {0}pc_type, ...", self.own_options()));
         self.recover()?;
         petsc!(KSPSetUp(self.ksp)).map_err(advise)?;
+        // KSPSetUp leaves new values of a matrix it has seen before to the first application
+        let pc = self.pc()?;
+        petsc!(PCSetUp(pc)).map_err(advise)?;
         petsc!(KSPSetUpOnBlocks(self.ksp)).map_err(advise)?;
         self.note_failure()
     }

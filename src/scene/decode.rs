@@ -52,6 +52,16 @@ struct Decoder<'a> {
 }
 
 impl Decoder<'_> {
+    /// A number > 0, or an expression.
+    fn positive_field(&self, node: &Node, what: &str) -> Result<Field> {
+        match self.field(node)? {
+            Field::Constant(value) if value <= 0.0 => {
+                Err(node.refuse(format!("{what} is {value}")).label("must be greater than 0"))
+            }
+            field => Ok(field),
+        }
+    }
+
     /// A number, or an expression in the coordinates.
     fn field(&self, node: &Node) -> Result<Field> {
         match &node.value {

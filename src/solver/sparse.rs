@@ -36,9 +36,7 @@ impl<S: InnerSolver> SparseBody<S> {
         let split = Split::new(free, &rows);
         let weight = vec![0.0; rows.rows()];
         let prepared = weight.clone();
-        let row_stiffness =
-            (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * body.stiffness.diagonal(i)).sum());
-        let row_stiffness = row_stiffness.collect();
+        let row_stiffness = body.row_stiffness(&rows);
         let product = vec![0.0; body.load.len()];
         let (counts, before) = (BodyCounts::default(), (0, 0));
         Self { body, rows, split, solver, weight, prepared, row_stiffness, coupling, counts, before, product }

@@ -102,10 +102,10 @@ impl Decoder<'_> {
                 SpringKind::Vector(fields)
             }
             (Some(node), _) => {
-                let field = self.stiffness(node)?;
+                let field = self.positive_field(node, "the stiffness")?;
                 SpringKind::Vector([field.clone(), field.clone(), field])
             }
-            (None, Some(node)) => SpringKind::Normal(self.stiffness(node)?),
+            (None, Some(node)) => SpringKind::Normal(self.positive_field(node, "the stiffness")?),
             (None, None) => {
                 return Err(node
                     .refuse(format!("the spring on `{}` has no stiffness", on.value))
@@ -113,16 +113,6 @@ impl Decoder<'_> {
             }
         };
         Ok(SpringSpec { on, kind })
-    }
-
-    /// A number > 0, or an expression.
-    fn stiffness(&self, node: &Node) -> Result<Field> {
-        match self.field(node)? {
-            Field::Constant(value) if value <= 0.0 => {
-                Err(node.refuse(format!("the stiffness is {value}")).label("must be greater than 0"))
-            }
-            field => Ok(field),
-        }
     }
 
     fn load(&self, node: &Node) -> Result<Load> {

@@ -26,7 +26,10 @@ impl Decoder<'_> {
                 "a material is young and poisson, orthotropic = { E1 = ... } or anisotropic = [C11, ...]";
             let young = keys.require("young").map_err(|error| error.help(OTHERS))?;
             let poisson = keys.require("poisson")?;
-            let constants = Constants::Isotropic { young: self.positive(young)?, poisson: self.poisson(poisson)? };
+            let constants = Constants::Isotropic {
+                young: self.positive_field(young, "Young's modulus")?,
+                poisson: self.poisson(poisson)?,
+            };
             (constants, &young.place)
         };
         let axes = match (keys.entry("axes"), &constants) {
@@ -49,16 +52,6 @@ impl Decoder<'_> {
             Ok(RegionSpec { on: keys.require("on")?.name()?, elasticity: self.elasticity(&keys)? })
         };
         items.iter().map(region).collect()
-    }
-
-    /// Young's modulus: a number > 0, or an expression.
-    fn positive(&self, node: &Node) -> Result<Field> {
-        match self.field(node)? {
-            Field::Constant(value) if value <= 0.0 => {
-                Err(node.refuse(format!("Young's modulus is {value}")).label("must be greater than 0"))
-            }
-            field => Ok(field),
-        }
     }
 
     fn poisson(&self, node: &Node) -> Result<Field> {
