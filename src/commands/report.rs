@@ -4,12 +4,13 @@ use super::balance;
 use super::preflight;
 use super::run::{Clock, Prepared};
 use crate::contact::ContactPair;
+use crate::ddm::forecast::{best_factor, best_gamma};
 use crate::ddm::{BodyCounts, Model, Outcome, Status};
 use crate::discretize::Problem;
 use crate::estimate::Estimate;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::vtu::Grid;
-use crate::output::{BodyReport, ContactTable, EstimateReport, InnerTimes, PairReport, Report, sci};
+use crate::output::{BodyReport, ContactTable, EstimateReport, ForecastReport, InnerTimes, PairReport, Report, sci};
 use crate::petsc::Session;
 use crate::scene::Scene;
 
@@ -48,8 +49,10 @@ fn message(outcome: &Outcome, model: &Model) -> String {
             format!("residual {} after {k} iterations: rounding allows no less", sci(residual, 1))
         }
         Status::IterationLimit => format!(
-            "not converged in {k} iterations, residual {}: allow more (method.stop.iterations) or try {other}",
-            sci(residual, 1)
+            "not converged in {k} iterations, residual {}: allow more (method.stop.iterations{}) or try {}",
+            sci(residual, 1),
+            outlook(outcome),
+            advice(outcome).unwrap_or_else(|| other.to_owned())
         ),
         Status::NotFinite { body } => format!(
             "body `{}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}",
@@ -74,6 +77,37 @@ fn message(outcome: &Outcome, model: &Model) -> String {
     }
 }
 
+/// What more iterations would bring, for the report.
+fn forecast(outcome: &Outcome) -> Option<ForecastReport> {
+    let goes_on = matches!(
+        outcome.status,
+        Status::Converged | Status::Attainable | Status::IterationLimit | Status::Cycle { .. }
+    );
+    let forecast = outcome.forecast.as_ref().filter(|_| goes_on)?;
+    Some(ForecastReport {
+        factor: forecast.factor,
+        iterations: Some(forecast.iterations).filter(|iterations| iterations.is_finite()),
+        best_gamma: outcome.spectrum.map(best_gamma),
+        best_factor: outcome.spectrum.map(best_factor),
+    })
+}
+
+/// The iterations left in words, to follow the advice to allow more.
+fn outlook(outcome: &Outcome) -> String {
+    match forecast(outcome).map(|forecast| forecast.iterations) {
+        None => String::new(),
+        Some(None) => "; at this rate no number is enough".to_owned(),
+        Some(Some(more)) => format!("; about {more} more at this rate"),
+    }
+}
+
+/// What helps the paper's iteration where the spectrum is known.
+fn advice(outcome: &Outcome) -> Option<String> {
+    let spectrum = outcome.spectrum.filter(|_| outcome.method == "robin")?;
+    let (gamma, factor) = (best_gamma(spectrum), best_factor(spectrum));
+    Some(format!("--method auto; the best number for method.gamma is {gamma:.2}, a factor of {factor:.3} an iteration"))
+}
+
 /// Fills the report of a run.
 pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &Outcome, clock: &Clock) -> Report {
     let model = &prepared.problem.model;
@@ -89,6 +123,7 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
         sweeps: outcome.sweeps,
         method: outcome.method.to_owned(),
         spectrum: outcome.spectrum.map(|(low, high)| [low, high]),
+        forecast: forecast(outcome),
         error_estimate: finite(last.map(|row| row.error)),
         factorizations: counts.factorizations + coupled(|counts| counts.factorizations as f64) as usize,
         inner_times: InnerTimes {

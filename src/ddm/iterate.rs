@@ -4,6 +4,7 @@ use super::balance::{Balance, Discretisation};
 use super::body::BodyCounts;
 use super::closing::rigid_closing;
 use super::field::Field;
+use super::forecast::Forecast;
 use super::held;
 use super::layer::Layer;
 use super::lift::lift;
@@ -95,6 +96,8 @@ pub struct Outcome {
     pub coupled: Vec<BodyCounts>,
     /// Estimated bounds of the spectrum of G^-1 F1'', if the method saw enough.
     pub spectrum: Option<(f64, f64)>,
+    /// What it would still need to the residual that is asked for, where that can be told.
+    pub forecast: Option<Forecast>,
 }
 
 /// Why no method can find a solution: a motion that nothing can hold, or loads that push a body off for ever.
@@ -182,7 +185,9 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         }
         last = Some(Last { sweep, relaxed, length, moved, pressure: layer.pressure });
     };
+    settings.methods[active].conclude(model, &layer, &weight);
     let method = &settings.methods[active];
+    let forecast = settings.stop.residual.and_then(|target| Forecast::new(&rows, target, method.factor()));
     Ok(Outcome {
         status,
         iterations: updates,
@@ -195,5 +200,6 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         method: method.name(),
         coupled: settings.methods.iter().map(|method| method.coupled()).collect(),
         spectrum: method.spectrum(),
+        forecast,
     })
 }

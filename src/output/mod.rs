@@ -27,6 +27,8 @@ pub use folder::{Folder, safe_name, write_whole};
 pub use format::{sci, seconds};
 pub use history::HistoryWriter;
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, PressureSeries, Series, Style};
-pub use report::{BalanceReport, BodyReport, EstimateReport, ForceReport, InnerTimes, PairReport, Report, RoundReport};
+pub use report::{
+    BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, PairReport, Report, RoundReport,
+};
 pub use table::{IterationTable, Verbosity};
 pub use vtu::{BodyField, CellKind, Grid};

@@ -63,6 +63,8 @@ pub struct Report {
     pub rounds: Vec<RoundReport>,
     /// Estimated bounds of the spectrum of G^-1 F1''.
     pub spectrum: Option<[f64; 2]>,
+    /// What more iterations would bring.
+    pub forecast: Option<ForecastReport>,
     /// Relative increment of the last update, the largest of the bodies.
     pub increment: Option<f64>,
     /// Functional F1 (25).
@@ -84,6 +86,19 @@ pub struct Report {
     pub settings: Value,
     /// Files written, relative to the folder of results.
     pub files: Vec<String>,
+}
+
+/// What more iterations would bring, from the spectrum and the method's own rate.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ForecastReport {
+    /// Factor by which an iteration reduces the residual in the long run.
+    pub factor: f64,
+    /// Iterations from the result to the residual that was asked for; null if it is never reached.
+    pub iterations: Option<f64>,
+    /// The best stationary gamma, 2/(lowest + highest of the spectrum), if there are bounds.
+    pub best_gamma: Option<f64>,
+    /// The factor of `robin` with that gamma.
+    pub best_factor: Option<f64>,
 }
 
 /// Wall seconds of the inner solvers.

@@ -1,6 +1,6 @@
 //! Aitken's rule.
 
-use super::{GammaRule, Here, LineSearch, Unbounded};
+use super::{GammaRule, Here, LineSearch, Ritz, Unbounded};
 use crate::linalg::dot;
 
 /// gamma^k = -gamma^{k-1} z^{k-1}.(z^k - z^{k-1}) / |z^k - z^{k-1}|^2 on the traces: the secant of the fixed point map.
@@ -12,7 +12,7 @@ pub struct Aitken {
 }
 
 impl GammaRule for Aitken {
-    fn gamma(&mut self, here: &mut Here) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded> {
         let z = &here.sweep.correction.trace;
         let secant = self.last.as_ref().map(|(gamma, before)| {
             let change: Vec<f64> = z.iter().zip(before).map(|(z, before)| z - before).collect();
@@ -21,9 +21,13 @@ impl GammaRule for Aitken {
         let trace = z.clone();
         let gamma = match secant {
             Some(gamma) if gamma > 0.0 && gamma < 10.0 => gamma,
-            _ => LineSearch.gamma(here)?,
+            _ => LineSearch.gamma(here, ritz)?,
         };
         self.last = Some((gamma, trace));
         Ok(gamma)
+    }
+
+    fn restart(&mut self) {
+        *self = Self::default();
     }
 }

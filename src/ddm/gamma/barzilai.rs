@@ -1,6 +1,6 @@
 //! The rule of Barzilai and Borwein.
 
-use super::{GammaRule, Here, LineSearch, Unbounded};
+use super::{GammaRule, Here, LineSearch, Ritz, Unbounded};
 use crate::ddm::field::local_dot;
 
 /// gamma^k = s'G s / s'y with s the last step and y the change of the residual: the inverse of a Rayleigh quotient of
@@ -21,7 +21,7 @@ struct Last {
 }
 
 impl GammaRule for BarzilaiBorwein {
-    fn gamma(&mut self, here: &mut Here) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded> {
         let quotient = self.last.as_ref().map(|last| {
             // s = gamma z0, G s = gamma r0, y = r0 - r: s'Gs / s'y = gamma r0'z0 / (r0'z0 - r'z0)
             let mut product = [local_dot(&here.sweep.residual, &last.z)];
@@ -30,10 +30,14 @@ impl GammaRule for BarzilaiBorwein {
         });
         let gamma = match quotient {
             Some(gamma) if gamma > 0.0 && gamma.is_finite() && !here.k.is_multiple_of(10) => gamma,
-            _ => LineSearch.gamma(here)?,
+            _ => LineSearch.gamma(here, ritz)?,
         };
         let z = here.sweep.correction.states.clone();
         self.last = Some(Last { gamma, decrement: here.decrement(), z });
         Ok(gamma)
+    }
+
+    fn restart(&mut self) {
+        *self = Self::default();
     }
 }

@@ -8,23 +8,29 @@ mod spectral;
 pub use aitken::Aitken;
 pub use barzilai::BarzilaiBorwein;
 pub use search::LineSearch;
-pub use spectral::{Lanczos, Spectral};
+pub use spectral::Spectral;
 
+use super::forecast::{best_factor, relaxed_factor};
 use super::line::Unbounded;
 use super::method::Here;
+use super::ritz::Ritz;
 
 /// Chooses gamma^k after the sweep of iteration k.
 pub trait GammaRule {
-    /// The relaxation for the update along the sweep's correction.
+    /// The relaxation for the update along the sweep's correction; `ritz` has seen all corrections, this one included.
     ///
     /// # Errors
     /// [`Unbounded`] if F1 falls for ever along it.
-    fn gamma(&mut self, here: &mut Here) -> Result<f64, Unbounded>;
+    fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded>;
 
-    /// Estimated bounds of the spectrum of G^-1 F1'', if the rule makes them.
-    fn spectrum(&self) -> Option<(f64, f64)> {
+    /// Factor by which an iteration reduces the slowest mode, if the spectrum of G^-1 F1'' lies in (low, high) and the rule
+    /// has one.
+    fn factor(&self, _spectrum: (f64, f64)) -> Option<f64> {
         None
     }
+
+    /// Forgets what earlier iterations told: the problem changes.
+    fn restart(&mut self) {}
 }
 
 /// gamma^k = gamma, as in the paper.
@@ -32,8 +38,12 @@ pub trait GammaRule {
 pub struct Stationary(pub f64);
 
 impl GammaRule for Stationary {
-    fn gamma(&mut self, _here: &mut Here) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, _here: &mut Here, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
         Ok(self.0)
+    }
+
+    fn factor(&self, spectrum: (f64, f64)) -> Option<f64> {
+        Some(relaxed_factor(self.0, spectrum))
     }
 }
 
@@ -42,7 +52,11 @@ impl GammaRule for Stationary {
 pub struct Schedule(pub Vec<f64>);
 
 impl GammaRule for Schedule {
-    fn gamma(&mut self, here: &mut Here) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Here, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
         Ok(self.0[here.k.min(self.0.len() - 1)])
+    }
+
+    fn factor(&self, spectrum: (f64, f64)) -> Option<f64> {
+        Some(relaxed_factor(self.0[self.0.len() - 1], spectrum))
     }
 }

@@ -1,6 +1,6 @@
 //! Exact line search.
 
-use super::{GammaRule, Here, Unbounded};
+use super::{GammaRule, Here, Ritz, Unbounded, best_factor};
 use crate::ddm::line::Line;
 
 /// gamma^k minimises F1 along the correction. F1 is convex, so every step descends.
@@ -8,7 +8,11 @@ use crate::ddm::line::Line;
 pub struct LineSearch;
 
 impl GammaRule for LineSearch {
-    fn gamma(&mut self, here: &mut Here) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Here, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
         Line::new(here.model, here.layer, &here.sweep.residual, &here.sweep.correction).minimize(1e-6)
+    }
+
+    fn factor(&self, spectrum: (f64, f64)) -> Option<f64> {
+        Some(best_factor(spectrum))
     }
 }

@@ -1,8 +1,9 @@
 //! Anderson acceleration of the sweep, safeguarded by F1.
 
-use super::{Here, Method, Step};
+use super::{Here, Layer, Method, Model, Step};
 use crate::ddm::field::Field;
 use crate::ddm::line::Line;
+use crate::ddm::ritz::Ritz;
 use crate::error::Result;
 use nalgebra::{DMatrix, DVector};
 use std::collections::VecDeque;
@@ -16,12 +17,13 @@ pub struct Anderson {
     /// Correction at the last iterate and the step from it.
     last: Option<(Field, Field)>,
     closed: Vec<bool>,
+    ritz: Ritz,
 }
 
 impl Anderson {
     /// Mixes up to `depth` earlier steps.
     pub fn new(depth: usize) -> Self {
-        Self { depth, history: VecDeque::new(), last: None, closed: Vec::new() }
+        Self { depth, history: VecDeque::new(), last: None, closed: Vec::new(), ritz: Ritz::default() }
     }
 
     /// z - sum gamma_j (s_j + dz_j) with the least-squares gamma on traces: Anderson's step with mixing one.
@@ -76,9 +78,29 @@ impl Method for Anderson {
             line = Line::new(here.model, here.layer, &here.sweep.residual, &direction);
         }
         let Ok(length) = line.minimize(1e-4) else { return Ok(Step::Unbounded) };
+        // the step is the best guess of the error: the slow modes are in it
+        self.ritz.observe(here.model, &direction);
+        self.ritz.bounds(here.model, here.layer, here.weight);
         let mut step = direction.clone();
         step.add(length - 1.0, &direction);
         self.last = Some((z.clone(), step));
         Ok(Step::Along(direction, length))
+    }
+
+    fn amplification(&self) -> f64 {
+        self.ritz.known().map_or(f64::NAN, |(low, _)| low.recip().max(1.0))
+    }
+
+    fn spectrum(&self) -> Option<(f64, f64)> {
+        self.ritz.known()
+    }
+
+    fn conclude(&mut self, model: &Model, layer: &Layer, weight: &[f64]) {
+        self.ritz.bounds(model, layer, weight);
+    }
+
+    fn restart(&mut self) {
+        self.history.clear();
+        self.last = None;
     }
 }

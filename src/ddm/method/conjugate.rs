@@ -1,14 +1,17 @@
 //! Nonlinear conjugate gradients, preconditioned by the Robin sweep.
 
-use super::{Here, Method, Step};
+use super::{Here, Layer, Method, Model, Step};
 use crate::ddm::field::{Field, local_dot};
+use crate::ddm::forecast::gradients_factor;
 use crate::ddm::line::Line;
+use crate::ddm::ritz::Ritz;
 use crate::error::Result;
 
 /// Polak and Ribière's rule with exact line search on F1, restarted when the contact set changes.
 #[derive(Default)]
 pub struct Conjugate {
     last: Option<Last>,
+    ritz: Ritz,
 }
 
 struct Last {
@@ -40,8 +43,30 @@ impl Method for Conjugate {
         }
         let line = Line::new(here.model, here.layer, &here.sweep.residual, &direction);
         let Ok(length) = line.minimize(1e-8) else { return Ok(Step::Unbounded) };
+        self.ritz.observe(here.model, &direction);
+        self.ritz.bounds(here.model, here.layer, here.weight);
         let residual = here.sweep.residual.clone();
         self.last = Some(Last { direction: direction.clone(), residual, decrement: here.decrement(), closed });
         Ok(Step::Along(direction, length))
+    }
+
+    fn amplification(&self) -> f64 {
+        self.spectrum().map_or(f64::NAN, |(low, _)| low.recip().max(1.0))
+    }
+
+    fn spectrum(&self) -> Option<(f64, f64)> {
+        self.ritz.known()
+    }
+
+    fn factor(&self) -> Option<f64> {
+        self.spectrum().map(gradients_factor)
+    }
+
+    fn conclude(&mut self, model: &Model, layer: &Layer, weight: &[f64]) {
+        self.ritz.bounds(model, layer, weight);
+    }
+
+    fn restart(&mut self) {
+        self.last = None;
     }
 }

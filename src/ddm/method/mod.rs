@@ -102,4 +102,15 @@ pub trait Method {
     fn spectrum(&self) -> Option<(f64, f64)> {
         None
     }
+
+    /// Factor by which an iteration reduces the residual in the long run, if the method has one of its own.
+    fn factor(&self) -> Option<f64> {
+        None
+    }
+
+    /// Last look at the iterate with which a run ends, with the Robin term `weight` that the model carries. Collective.
+    fn conclude(&mut self, _model: &Model, _layer: &Layer, _weight: &[f64]) {}
+
+    /// Forgets what earlier iterations told: the problem changes.
+    fn restart(&mut self) {}
 }

@@ -1,7 +1,8 @@
 //! The paper's iteration: u <- u + gamma z.
 
-use super::{Here, Method, Step};
+use super::{Here, Layer, Method, Model, Step};
 use crate::ddm::gamma::GammaRule;
+use crate::ddm::ritz::Ritz;
 use crate::error::Result;
 
 /// The relaxed Robin-Robin iteration (41)-(42) with any rule for gamma.
@@ -10,12 +11,13 @@ pub struct Relaxed {
     /// Norm of the last correction and the gamma that followed it.
     last: Option<(f64, f64)>,
     amplification: f64,
+    ritz: Ritz,
 }
 
 impl Relaxed {
     /// With this rule.
     pub fn new(rule: Box<dyn GammaRule>) -> Self {
-        Self { rule, last: None, amplification: f64::NAN }
+        Self { rule, last: None, amplification: f64::NAN, ritz: Ritz::default() }
     }
 }
 
@@ -31,7 +33,8 @@ impl Method for Relaxed {
             let factor = size / before;
             self.amplification = if factor < 1.0 { (gamma / (1.0 - factor)).max(1.0) } else { f64::NAN };
         }
-        Ok(match self.rule.gamma(here) {
+        self.ritz.observe(here.model, &here.sweep.correction);
+        Ok(match self.rule.gamma(here, &mut self.ritz) {
             Ok(gamma) => {
                 self.last = Some((size, gamma));
                 Step::Sweep(gamma)
@@ -41,10 +44,23 @@ impl Method for Relaxed {
     }
 
     fn amplification(&self) -> f64 {
-        self.rule.spectrum().map_or(self.amplification, |(low, _)| low.recip().max(1.0))
+        self.ritz.known().map_or(self.amplification, |(low, _)| low.recip().max(1.0))
     }
 
     fn spectrum(&self) -> Option<(f64, f64)> {
-        self.rule.spectrum()
+        self.ritz.known()
+    }
+
+    fn factor(&self) -> Option<f64> {
+        self.rule.factor(self.ritz.known()?)
+    }
+
+    fn conclude(&mut self, model: &Model, layer: &Layer, weight: &[f64]) {
+        self.ritz.bounds(model, layer, weight);
+    }
+
+    fn restart(&mut self) {
+        self.rule.restart();
+        (self.last, self.amplification) = (None, f64::NAN);
     }
 }
