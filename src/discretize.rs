@@ -81,16 +81,6 @@ pub struct Assembled {
     pub left: Vec<FreeMotion>,
 }
 
-/// Matrices of a body for a method that needs them besides the body.
-pub struct Matrices {
-    /// K, f and supports.
-    pub body: ElasticBody,
-    /// All contact rows of the body, pair by pair.
-    pub rows: Csr,
-    /// Rigid motions that its supports leave.
-    pub left: Vec<FreeMotion>,
-}
-
 /// What is known of a body besides its matrices.
 pub struct BodyInfo {
     /// Name in the scene.
@@ -164,8 +154,6 @@ pub struct Problem {
     pub bodies: Vec<BodyInfo>,
     /// Origin of each pair.
     pub contacts: Vec<ContactInfo>,
-    /// The matrices of every body, kept only when a method asked for them.
-    pub kept: Vec<Matrices>,
     /// Trace of the rigid motions that supports give bodies: states, and so the traces of iterates, are relative to them.
     pub carried: Vec<f64>,
     /// The meshes, kept only when an estimate of the error was asked for.
@@ -176,19 +164,10 @@ pub struct Problem {
     pub assemblies_avoided: usize,
 }
 
-/// What to keep besides the model.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Keep {
-    /// Matrices and rows, for a method that needs them.
-    pub matrices: bool,
-    /// Meshes, for an estimate of the error.
-    pub meshes: bool,
-}
-
 /// Turns a scene and its mesh into a model.
 ///
 /// `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `maker` turns each
-/// body of this rank into one that solves.
+/// body of this rank into one that solves. `keep` tells to keep the meshes, for an estimate of the error.
 ///
 /// # Errors
 /// Refusals of the scene against its mesh: missing groups, surfaces of the wrong body, supports that contradict each
@@ -198,14 +177,14 @@ pub fn discretize<const D: usize>(
     mesh: &Mesh<D>,
     cut: contact::pieces::Cut<D>,
     ranks: (usize, usize),
-    keep: Keep,
+    keep: bool,
     exchange: Box<dyn Exchange>,
     maker: &mut dyn Maker,
 ) -> Result<Problem> {
     let parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh)).collect::<Result<Vec<_>>>()?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
-    for found in pairs::all(scene, mesh, cut, &parts, keep.meshes)? {
+    for found in pairs::all(scene, mesh, cut, &parts, keep)? {
         let pairs::Contact { spec, pair, fine: points, swapped, surface } = found;
         pairs.push(pair);
         fine.extend(points);
@@ -213,7 +192,7 @@ pub fn discretize<const D: usize>(
     }
     let loads: Vec<usize> = parts.iter().map(|part| part.space.dofs()).collect();
     let owner = crate::parallel::owners(&loads, ranks.1);
-    let (mut slots, mut infos, mut kept, mut offsets) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut slots, mut infos, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
     let (mut assemblies, mut assemblies_avoided) = (0, 0);
     for (index, mut part) in parts.into_iter().enumerate() {
         let (segments, rows) = rows_of(index, &pairs, part.space.dofs());
@@ -267,9 +246,6 @@ pub fn discretize<const D: usize>(
             assemblies += 1;
             slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
             slot.row_stiffness = body.row_stiffness(&rows);
-            if keep.matrices {
-                kept.push(Matrices { body: body.clone(), rows: rows.clone(), left: left.clone() });
-            }
             slot.local = Some(maker.make(Assembled {
                 name: slot.name.clone(),
                 dimension: D,
@@ -310,12 +286,12 @@ pub fn discretize<const D: usize>(
         shapes.push(Shape { space, elasticity, modulus, held });
         slots.push(slot);
     }
-    let meshes = keep.meshes.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
+    let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
     let mut carried = vec![0.0; 2 * model.points()];
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);
-    Ok(Problem { model, bodies: infos, contacts, kept, meshes, carried, assemblies, assemblies_avoided })
+    Ok(Problem { model, bodies: infos, contacts, meshes, carried, assemblies, assemblies_avoided })
 }
 
 impl Problem {

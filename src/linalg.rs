@@ -24,6 +24,12 @@ impl Csr {
         Self { columns, ptr: vec![0], col: Vec::new(), values: Vec::new() }
     }
 
+    /// A square matrix with all entries stored, from its values row by row.
+    pub fn full(rows: usize, values: Vec<f64>) -> Self {
+        let ptr = (0..=rows).map(|i| (i * rows) as i32).collect();
+        Self { columns: rows, ptr, col: (0..rows).flat_map(|_| 0..rows as i32).collect(), values }
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.ptr.len() - 1

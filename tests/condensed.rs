@@ -124,7 +124,7 @@ fn it_is_chosen_where_nothing_else_is_asked_for() {
     let typed = run(&["--set", "solver=condensed", "-lower_pc_type", "icc"]).converged();
     assert_eq!(typed.solvers(), ["cg + icc by petsc", "condensed to 32 dofs by mumps"]);
     let joined = run(&["--method", "newton", "--set", "solver=condensed"]).converged();
-    assert_eq!(joined.solvers(), ["preonly + cholesky by mumps"; 2]);
+    assert_eq!((joined.solvers(), joined.count("factorizations")), (chosen.solvers(), 2));
     let controlled = run(&["-mat_mumps_icntl_14", "80", "-lower_mat_mumps_cntl_1", "1e-3"]).converged();
     assert_eq!((controlled.solvers(), controlled.warnings()), (chosen.solvers(), String::new()));
     for (options, words) in [

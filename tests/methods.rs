@@ -73,13 +73,41 @@ fn zones_give_one_pressure() {
 fn the_default_is_fast() {
     let plain = |scene: &str| text_of(scene).split("[method]").next().unwrap_or_default().to_owned();
     let groove = solve(Scene::new(plain("groove")), &[]).converged();
-    assert!(groove.number("residual") <= 1e-8 && groove.count("sweeps") <= 30, "{}", groove.count("sweeps"));
+    assert!(groove.number("residual") <= 1e-8 && groove.count("sweeps") <= 8, "{}", groove.count("sweeps"));
     let held = Scene::new(plain("groove-held"));
     let easy = solve(&held, &[]).converged();
-    assert!(easy.count("sweeps") <= 60, "{}", easy.count("sweeps"));
-    let stiff = solve(&held, &["--set", "contact.0.layer.power={B=1e-6, a=0.1}"]).converged();
-    assert!(stiff.number("residual") <= 1e-8 && stiff.count("sweeps") <= 400, "{}", stiff.count("sweeps"));
-    assert_eq!(stiff.text("method"), "newton-robin");
+    assert!(easy.count("sweeps") <= 7, "{}", easy.count("sweeps"));
+    let hard = ["--set", "contact.0.layer.power={B=1e-6, a=0.1}"];
+    let stiff = solve(&held, &hard).converged();
+    assert!(stiff.number("residual") <= 1e-8 && stiff.count("sweeps") <= 16, "{}", stiff.count("sweeps"));
+    assert_eq!((stiff.text("method"), stiff.count("factorizations")), ("newton", 2));
+    // without a condensed body on one rank to join
+    let sweeps = solve(&held, &[&hard[..], &["--method", "newton-robin"]].concat()).converged();
+    assert!(sweeps.number("residual") <= 1e-8 && sweeps.count("sweeps") <= 400, "{}", sweeps.count("sweeps"));
+    let large = solve(&held, &[&hard[..], &["--set", "solver=mumps"]].concat()).converged();
+    assert_eq!(large.text("method"), "newton-robin");
+}
+
+/// Newton's method with condensed bodies joins their Schur complements: the sparse matrix of whole bodies has the same steps.
+#[test]
+fn newton_on_condensed_bodies() {
+    for (scene, sets) in [("groove-held", "mesh.set.n=16"), ("stack", "mesh.set.n1=6"), ("patch-3d", "mesh.set.nl=4")] {
+        let run = |solver: &str| {
+            let solver = format!("solver={solver}");
+            let plain = Scene::new(text_of(scene).split("[method]").next().unwrap_or_default());
+            solve(plain, &["--method", "newton", "--set", &solver, "--set", sets]).converged()
+        };
+        let (small, whole) = (run("condensed"), run("mumps"));
+        assert_eq!(small.count("iterations"), whole.count("iterations"), "{scene}");
+        assert_eq!((small.text("method"), whole.text("method")), ("newton", "newton"));
+        let bodies = small.solvers().len();
+        assert_eq!(small.count("factorizations"), bodies, "{scene}: one elimination a body, no other sparse factor");
+        assert!(whole.count("factorizations") > 2 * bodies);
+        for pair in 0..bodies - 1 {
+            let (ours, theirs) = (small.contact_of(pair), whole.contact_of(pair));
+            assert!(distance(&ours["pressure"], &theirs["pressure"]) < 1e-9, "{scene}");
+        }
+    }
 }
 
 /// The estimated spectrum of G^-1 F1'' lies around one: 1 - theta and 1 + theta.

@@ -15,8 +15,6 @@ pub struct Inner<'a> {
     session: &'a Session,
     /// What the scene names.
     asked: Option<Preset>,
-    /// Whether the method needs the matrices of the bodies themselves.
-    joined: bool,
     /// Bytes that the solvers so far leave, on the rank that has least.
     memory: usize,
     plans: Vec<Plan>,
@@ -35,15 +33,14 @@ struct Plan {
 }
 
 impl<'a> Inner<'a> {
-    /// Starts from the memory that is free now; collective. `joined` tells that the method takes the bodies' own matrices
-    /// together, which a condensed body does not have. `kept` are bodies of an earlier scene that serve this one, too.
-    pub fn new(session: &'a Session, scene: &Scene, joined: bool, kept: Vec<BodySlot>) -> Self {
+    /// Starts from the memory that is free now; collective. `kept` are bodies of an earlier scene that serve this one, too.
+    pub fn new(session: &'a Session, scene: &Scene, kept: Vec<BodySlot>) -> Self {
         let mine = memory::available() as u64;
         let mut least = mine;
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
-        Self { session, asked: scene.solver.preset, joined, memory: least as usize, plans: Vec::new(), kept }
+        Self { session, asked: scene.solver.preset, memory: least as usize, plans: Vec::new(), kept }
     }
 
     /// Why the solvers are what they are, in words: once if all bodies have the same.
@@ -64,16 +61,10 @@ impl<'a> Inner<'a> {
 
     fn choose(&self, name: &str, size: &Size) -> Result<(Preset, String)> {
         let typed = options::asks_for_ksp(self.session, name)?;
-        let condensable = size.can_condense() && !self.joined && !typed;
+        let condensable = size.can_condense() && !typed;
         Ok(match self.asked {
             Some(Preset::Condensed) if !condensable => {
-                let why = if typed {
-                    "PETSc options were typed"
-                } else if self.joined {
-                    "the method factors all bodies together"
-                } else {
-                    "there is nothing to condense"
-                };
+                let why = if typed { "PETSc options were typed" } else { "there is nothing to condense" };
                 (Preset::Mumps, why.to_owned())
             }
             Some(preset) => (preset, "the scene asks for it".to_owned()),

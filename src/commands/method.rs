@@ -1,35 +1,54 @@
 //! The scene's method -> the method that runs.
 
+use crate::ddm::Model;
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
-use crate::ddm::method::{Anderson, Conjugate, Inner, Method, Newton, Relaxed};
-use crate::discretize::{Matrices, Problem};
+use crate::ddm::method::{Anderson, Conjugate, Coupled, Inner, Method, Newton, Relaxed};
 use crate::error::{Error, Kind, Result};
 use crate::petsc::Session;
 use crate::scene::{Gamma, MethodName, Preset, Scene};
-use crate::solver::{Krylov, Monolithic, Part, Union, preset};
+use crate::solver::{Dense, Krylov, Monolithic, Union, options, preset};
 
 /// Prefix of the PETSc options of the Newton matrix of all bodies.
-pub const WHOLE: &str = "newton";
+const WHOLE: &str = "newton";
 
-/// Whether the scene's method needs the matrices of the bodies besides the bodies.
-pub fn keeps_matrices(scene: &Scene) -> bool {
-    scene.method.name == MethodName::Newton
+/// Dofs of all condensed bodies up to which their dense Newton matrix is factored: 0.2 s and 250 MB.
+const DENSE: usize = 3000;
+
+/// The methods of a scene.
+pub struct Made {
+    /// The first one, and those that take over when progress stops.
+    pub methods: Vec<Box<dyn Method>>,
+    /// Prefix of the PETSc options of a solver that they have of their own.
+    pub prefix: Option<&'static str>,
 }
 
-/// The method of a scene, and those that take over when progress stops.
+/// Makes the method of a scene; the bodies of `model` are set up, and `condensed` tells that each is condensed.
 ///
 /// # Errors
 /// `newton` on several ranks; failures of PETSc.
-pub fn make(session: &Session, scene: &Scene, problem: &mut Problem) -> Result<Vec<Box<dyn Method>>> {
-    let newton = || Box::new(Newton::new(Inner::Sweep)) as Box<dyn Method>;
-    Ok(match scene.method.name {
-        MethodName::Auto => vec![newton(), Box::new(Conjugate::default())],
-        MethodName::NewtonRobin => vec![newton()],
-        MethodName::Robin => vec![Box::new(Relaxed::new(rule(&scene.method.gamma)))],
-        MethodName::Ncg => vec![Box::new(Conjugate::default())],
-        MethodName::Anderson => vec![Box::new(Anderson::new(scene.method.depth))],
-        MethodName::Newton => vec![Box::new(Newton::new(Inner::Direct(Box::new(whole(session, problem)?))))],
-    })
+pub fn make(session: &Session, scene: &Scene, model: &Model, condensed: bool) -> Result<Made> {
+    let over_sweeps = || Box::new(Newton::new(Inner::Sweep)) as Box<dyn Method>;
+    let joined = |coupled: Box<dyn Coupled>| Box::new(Newton::new(Inner::Direct(coupled))) as Box<dyn Method>;
+    let small = || (condensed && session.size() == 1).then(|| dense(model)).flatten();
+    let mut prefix = None;
+    let methods = match scene.method.name {
+        MethodName::Auto => {
+            let last = [over_sweeps(), Box::new(Conjugate::default())];
+            small().map(joined).into_iter().chain(last).collect()
+        }
+        MethodName::NewtonRobin => vec![over_sweeps()],
+        MethodName::Robin => vec![Box::new(Relaxed::new(rule(&scene.method.gamma))) as _],
+        MethodName::Ncg => vec![Box::new(Conjugate::default()) as _],
+        MethodName::Anderson => vec![Box::new(Anderson::new(scene.method.depth)) as _],
+        MethodName::Newton => match small().filter(|_| !matches!(options::asks_for_ksp(session, WHOLE), Ok(true))) {
+            Some(coupled) => vec![joined(coupled)],
+            None => {
+                prefix = Some(WHOLE);
+                vec![joined(sparse(session, model)?)]
+            }
+        },
+    };
+    Ok(Made { methods, prefix })
 }
 
 fn rule(gamma: &Gamma) -> Box<dyn GammaRule> {
@@ -43,21 +62,21 @@ fn rule(gamma: &Gamma) -> Box<dyn GammaRule> {
     }
 }
 
-/// All bodies as one matrix.
-fn whole(session: &Session, problem: &mut Problem) -> Result<Monolithic> {
-    if session.size() > 1 {
+/// All bodies as one dense matrix, if they are condensed to few dofs.
+fn dense(model: &Model) -> Option<Box<dyn Coupled>> {
+    let dofs = model.bodies.iter().map(|slot| Some(slot.local.as_ref()?.matrices()?.len())).sum::<Option<usize>>()?;
+    let union = Union::of(model).filter(|_| dofs <= DENSE)?.without_zeros();
+    let solver = Dense::new(dofs, union.stiffness.values.clone());
+    Some(Box::new(Monolithic::new(union, solver)))
+}
+
+/// All bodies as one sparse matrix.
+fn sparse(session: &Session, model: &Model) -> Result<Box<dyn Coupled>> {
+    let Some(union) = Union::of(model).filter(|_| session.size() == 1) else {
         return Err(Error::new(Kind::Usage, "method `newton` factors all bodies together and runs on one rank")
             .help("choose newton-robin, or start without mpiexec"));
-    }
-    let model = &problem.model;
-    let mut points = vec![[(0, 0); 2]; model.points()];
-    for body in 0..model.bodies.len() {
-        for (row, place) in model.trace_ranges(body).flatten().enumerate() {
-            points[place % model.points()][place / model.points()] = (body, row);
-        }
-    }
-    let kept = std::mem::take(&mut problem.kept).into_iter();
-    let union = Union::new(kept.map(|Matrices { body, rows, left }| Part::new(body, rows, &left)).collect(), &points);
+    };
     preset::apply(session, WHOLE, Preset::Mumps)?;
-    Monolithic::new(union, |stiffness| Krylov::new(session, WHOLE, 1, stiffness, &[]))
+    let solver = Krylov::new(session, WHOLE, 1, &union.stiffness, &[])?;
+    Ok(Box::new(Monolithic::new(union, solver)))
 }

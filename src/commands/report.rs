@@ -135,7 +135,8 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
         inner_iterations: counts.inner_iterations,
         robin_updates: counts.robin_updates,
         robin_updates_skipped: counts.robin_skipped,
-        dense_factorizations: counts.dense_factorizations,
+        dense_factorizations: counts.dense_factorizations
+            + coupled(|counts| counts.dense_factorizations as f64) as usize,
         assemblies: shared.assemblies,
         assemblies_avoided: shared.assemblies_avoided,
         factorizations_avoided: counts.factorizations_avoided,

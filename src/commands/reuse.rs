@@ -1,7 +1,6 @@
 //! What a run of a sweep takes over from the run before it: K and f of a body do not depend on method, layers and gaps, so a
 //! condensed body is kept as it is, and where only the method changes the whole problem.
 
-use super::method;
 use super::run::{self, Clock, Prepared};
 use crate::error::Result;
 use crate::parallel::Ranks;
@@ -21,12 +20,11 @@ pub fn prepare(
     clock: &mut Clock,
 ) -> Result<Prepared> {
     let Some((last, mut prepared)) = before else { return run::prepare(session, scene, clock) };
-    let joined = method::keeps_matrices(last) || method::keeps_matrices(scene);
     let same = |without: &[&str]| settings(last, without) == settings(scene, without);
     let condensed = prepared.condensed.len() == prepared.problem.bodies.len();
     // an estimate of the error needs the meshes, which are kept only for it
     let meshes = |scene: &Scene| scene.estimate || scene.method.stop.balanced;
-    if !joined && condensed && meshes(last) == meshes(scene) && same(&[]) {
+    if condensed && meshes(last) == meshes(scene) && same(&[]) {
         let model = &mut prepared.problem.model;
         model.exchange = Box::new(Ranks::new(session));
         let bodies = model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
@@ -34,7 +32,7 @@ pub fn prepare(
         prepared.problem.assemblies = 0;
         return Ok(prepared);
     }
-    let kept = if !joined && same(&["gap", "layer", "reference"]) { prepared.take_condensed() } else { Vec::new() };
+    let kept = if same(&["gap", "layer", "reference"]) { prepared.take_condensed() } else { Vec::new() };
     drop(prepared);
     options::withdraw(session)?;
     run::prepare_with(session, scene, kept, clock)

@@ -5,7 +5,7 @@ use super::method;
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::method::Method;
 use crate::ddm::{self, BodySlot, Observer, Outcome, RobinRule, Settings, Status, StopRule};
-use crate::discretize::{self, Keep, Problem};
+use crate::discretize::{self, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
 use crate::parallel::{Ranks, agree};
@@ -116,11 +116,10 @@ fn build<const D: usize>(
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
     let threads = if D == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
     session.set_blas_threads(threads);
-    let keep = method::keeps_matrices(scene);
-    let mut inner = Inner::new(session, scene, keep, kept);
+    let mut inner = Inner::new(session, scene, kept);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
-    let keep = Keep { matrices: keep, meshes: scene.estimate || scene.method.stop.balanced || scene.adapt.is_some() };
+    let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
     let problem = discretize::discretize(scene, &mesh, cut, ranks, keep, exchange, &mut inner);
     let mut problem = agree(session, problem)?;
     problem.share();
@@ -215,12 +214,12 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
 pub fn set_up(session: &Session, scene: &Scene, prepared: &mut Prepared, clock: &mut Clock) -> Result<()> {
     let failed = ddm::prepare(&mut prepared.problem.model);
     agree(session, failed)?;
-    prepared.methods = agree(session, method::make(session, scene, &mut prepared.problem))?;
+    let condensed = prepared.condensed.len() == prepared.problem.bodies.len();
+    let made = agree(session, method::make(session, scene, &prepared.problem.model, condensed))?;
+    prepared.methods = made.methods;
     let names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();
     let mut names: Vec<&str> = names.iter().map(String::as_str).collect();
-    if method::keeps_matrices(scene) {
-        names.push(method::WHOLE);
-    }
+    names.extend(made.prefix);
     let any = |flags: &mut [u8]| {
         if session.size() > 1 && !flags.is_empty() {
             let mine = flags.to_vec();

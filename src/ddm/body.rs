@@ -1,6 +1,7 @@
 //! What the method asks of a body.
 
 use crate::error::Result;
+use crate::linalg::Csr;
 
 /// Quadratic terms of F1 (25) of one body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -43,6 +44,31 @@ pub struct BodyCounts {
     pub factor_seconds: f64,
     /// Wall seconds in solves, set-ups apart.
     pub solve_seconds: f64,
+}
+
+/// Matrices of a body whose states are (v, a): the displacement v + R a, with rigid motions R that its supports leave.
+#[derive(Debug, Clone, Copy)]
+pub struct Matrices<'a> {
+    /// K, of the dofs v.
+    pub stiffness: &'a Csr,
+    /// B, of the dofs v.
+    pub rows: &'a Csr,
+    /// R: one vector over the dofs v for each number in a.
+    pub motions: &'a [Vec<f64>],
+    /// B R: one vector over the contact rows each.
+    pub traces: &'a [Vec<f64>],
+}
+
+impl Matrices<'_> {
+    /// Length of a state.
+    pub fn len(&self) -> usize {
+        self.stiffness.rows() + self.motions.len()
+    }
+
+    /// Whether states are empty; they never are.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
 }
 
 /// An elastic body with stiffness K, load f and contact rows B (one row a contact point of each of its surfaces).
@@ -116,6 +142,19 @@ pub trait Body {
 
     /// Starts the counts anew for another run with the same K and f; what need not be done again counts as avoided.
     fn begin_anew(&mut self);
+
+    /// Its matrices, if they are in this process's memory: for methods that join the bodies.
+    fn matrices(&self) -> Option<Matrices<'_>> {
+        None
+    }
+
+    /// How many numbers at the end of a state are rigid motion.
+    fn rigid(&self) -> usize {
+        0
+    }
+
+    /// Gives a state that was made from [`Body::matrices`] the body's own shares of deformation and rigid motion.
+    fn separate(&self, _state: &mut [f64]) {}
 
     /// Displacements of all nodes for a state.
     ///

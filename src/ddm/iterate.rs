@@ -10,6 +10,7 @@ use super::layer::Layer;
 use super::lift::lift;
 use super::method::{Here, Method, Step};
 use super::model::Model;
+use super::origin::Origin;
 use super::progress::{Observer, Row};
 use super::robin::{Robin, RobinRule};
 use super::stop::StopRule;
@@ -124,8 +125,10 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         iterate = lifted;
         early = failed.map(|(body, reason)| Status::InnerSolver { body, reason });
     }
+    // an estimate of the discretisation's error needs the iterates whole
+    let origin = settings.balance.is_none().then(|| Origin::take(model, &mut iterate));
     let mut robin = Robin::new(settings.robin.clone());
-    let mut watch = Watch::default();
+    let mut watch = Watch::from(origin.as_ref());
     let mut sweeper = Sweeper::default();
     let mut last: Option<Last> = None;
     let mut rows: Vec<Row> = Vec::new();
@@ -149,6 +152,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         let mut row = watch.measure(&seen);
         (row.iteration, row.sweeps, row.seconds) = (k, sweeper.sweeps, clock.elapsed().as_secs_f64());
         row.factorizations += method.coupled().factorizations;
+        row.energy += origin.as_ref().map_or(0.0, |origin| origin.energy);
         row.error = row.residual * method.amplification().sqrt();
         let verdict = watch.judge(&seen, &settings.stop, &row);
         observer.row(&row);
@@ -186,6 +190,9 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         last = Some(Last { sweep, relaxed, length, moved, pressure: layer.pressure });
     };
     settings.methods[active].conclude(model, &layer, &weight);
+    if let Some(origin) = origin {
+        origin.give(model, &mut iterate);
+    }
     let method = &settings.methods[active];
     let forecast = settings.stop.residual.and_then(|target| Forecast::new(&rows, target, method.factor()));
     Ok(Outcome {

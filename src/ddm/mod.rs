@@ -17,6 +17,7 @@ pub mod line;
 pub mod linear;
 pub mod method;
 pub mod model;
+mod origin;
 mod progress;
 pub mod ritz;
 pub mod robin;
@@ -27,7 +28,7 @@ mod watch;
 pub mod zone;
 
 pub use balance::{Discretisation, SHARE};
-pub use body::{Body, BodyCounts, Energy, Solved};
+pub use body::{Body, BodyCounts, Energy, Matrices, Solved};
 pub use closing::{automatic_start, rigid_closing};
 pub use field::Field;
 pub use forecast::Forecast;

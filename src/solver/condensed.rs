@@ -6,7 +6,7 @@
 //! energies and all that is printed are the same numbers.
 
 use super::{Dense, Retained, SparseBody, memory};
-use crate::ddm::{Body, BodyCounts, Energy, Solved};
+use crate::ddm::{Body, BodyCounts, Energy, Matrices, Solved};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, axpy, dot};
@@ -102,7 +102,7 @@ impl CondensedBody {
         let rest = schur.expand_condensed(&self.load, &vec![0.0; retained])?;
         let work = dot(&self.load, &rest);
         let body = ElasticBody {
-            stiffness: full(retained, schur.complement()),
+            stiffness: Csr::full(retained, schur.complement().to_vec()),
             load,
             prescribed: Vec::new(),
             energy_constant: self.whole.energy_constant - 0.5 * work,
@@ -113,16 +113,6 @@ impl CondensedBody {
         let solver = Dense::new(retained, schur.take_complement());
         let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, solver);
         Ok(Condensed { kept: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
-    }
-}
-
-/// A matrix without zeros as compressed rows.
-fn full(rows: usize, values: &[f64]) -> Csr {
-    Csr {
-        columns: rows,
-        ptr: (0..=rows).map(|i| (i * rows) as i32).collect(),
-        col: (0..rows).flat_map(|_| 0..rows as i32).collect(),
-        values: values.to_vec(),
     }
 }
 
@@ -197,7 +187,6 @@ impl Body for CondensedBody {
             Some(condensed) => {
                 let counts = condensed.body.counts();
                 BodyCounts {
-                    dense_factorizations: counts.factorizations,
                     factorizations: usize::from(!condensed.kept),
                     factorizations_avoided: usize::from(condensed.kept),
                     symbolic: usize::from(!condensed.kept),
@@ -212,6 +201,20 @@ impl Body for CondensedBody {
         if let Some(condensed) = &mut self.condensed {
             condensed.kept = true;
             condensed.body.begin_anew();
+        }
+    }
+
+    fn matrices(&self) -> Option<Matrices<'_>> {
+        self.condensed.as_ref().and_then(|condensed| condensed.body.matrices())
+    }
+
+    fn rigid(&self) -> usize {
+        self.free.len()
+    }
+
+    fn separate(&self, state: &mut [f64]) {
+        if let Some(condensed) = &self.condensed {
+            condensed.body.separate(state);
         }
     }
 

@@ -55,6 +55,10 @@ impl InnerSolver for Dense {
         (usize::from(self.factorizations > 0), self.factorizations)
     }
 
+    fn is_dense(&self) -> bool {
+        true
+    }
+
     fn describe(&self) -> String {
         "dense Cholesky".to_owned()
     }

@@ -17,7 +17,7 @@ mod split;
 pub use condensed::CondensedBody;
 pub use dense::Dense;
 pub use krylov::Krylov;
-pub use monolithic::{Monolithic, Part, Union};
+pub use monolithic::{Monolithic, Union};
 pub use retained::Retained;
 pub use sparse::SparseBody;
 pub use split::Split;
@@ -58,6 +58,11 @@ pub trait InnerSolver {
 
     /// (symbolic, numeric) factorisations or preconditioner set-ups so far.
     fn factorizations(&self) -> (usize, usize);
+
+    /// Whether the factorisations are dense ones, which are counted apart.
+    fn is_dense(&self) -> bool {
+        false
+    }
 
     /// One line for the report.
     fn describe(&self) -> String;

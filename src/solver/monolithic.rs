@@ -1,59 +1,110 @@
 //! The Newton matrix (35) of all bodies together: K + B' diag(omega kappa) B with B = [B_a B_b], factored as one.
 //!
-//! The reference for methods that decompose: same functional, one big direct solve, one rank.
+//! With whole bodies it is the reference for methods that decompose: same functional, one big sparse factorisation. With
+//! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. One rank.
 
-use super::{Krylov, SparseBody, Split};
+use super::{InnerSolver, SparseBody};
 use crate::ddm::method::Coupled;
-use crate::ddm::{Body, BodyCounts, Field};
+use crate::ddm::{Body, BodyCounts, Field, Model};
 use crate::error::Result;
-use crate::fem::{ElasticBody, rigid::FreeMotion};
-use crate::linalg::Csr;
+use crate::fem::ElasticBody;
+use crate::linalg::{Csr, axpy};
 
-/// Stiffness matrices side by side and the rows that couple them.
+/// Stiffness matrices side by side and the rows that couple them, on the states of the bodies.
+///
+/// A state is (v, a) for v + R a, K meets v alone, and B v + B R a is what contact feels. So a rigid motion, however large,
+/// leaves no rounding in the strains. v + R a is not unique: as many springs as R has columns, each under one dof of v, make
+/// it so. They carry no force, since the rows for a say that all forces are balanced without them.
 pub struct Union {
-    /// Stiffness matrix of all bodies, with the pattern of B'B.
+    /// Stiffness matrix of all bodies with these springs, with the pattern of B'B.
     pub stiffness: Csr,
-    /// One row a contact point: [B_a B_b].
+    /// One row a contact point: [B_a B_a R_a B_b B_b R_b].
     pub rows: Csr,
-    /// First dof of each body, and the number of all.
+    /// First entry of each body's state, and the number of all.
     pub offset: Vec<usize>,
-    /// The bodies.
-    pub parts: Vec<Part>,
-    /// For each body, where its rows stand in a trace vector.
-    pub places: Vec<Vec<usize>>,
 }
 
-/// A body of the union.
-pub struct Part {
-    stiffness: Csr,
-    rows: Csr,
-    split: Split,
-}
+impl Union {
+    /// Of the bodies of a model; `None` if one of them has no matrices in this process.
+    pub fn of(model: &Model) -> Option<Self> {
+        let parts = model.bodies.iter().map(|slot| slot.local.as_ref()?.matrices()).collect::<Option<Vec<_>>>()?;
+        let mut offset = vec![0];
+        for part in &parts {
+            offset.push(offset[offset.len() - 1] + part.len());
+        }
+        let n = offset[parts.len()];
+        // the two rows of each contact point as (body, row of the body)
+        let mut points = vec![[(0, 0); 2]; model.points()];
+        for body in 0..parts.len() {
+            for (row, place) in model.trace_ranges(body).flatten().enumerate() {
+                points[place % model.points()][place / model.points()] = (body, row);
+            }
+        }
+        let mut rows = Csr::new(n);
+        // entries of K that are to be there, with what is added to K
+        let mut extra: Vec<Vec<(i32, f64)>> = (0..n).map(|i| vec![(i as i32, 0.0)]).collect();
+        for sides in &points {
+            let mut entries = Vec::new();
+            for &(body, row) in sides {
+                let part = &parts[body];
+                let rigid = part.traces.iter().enumerate().map(|(k, trace)| (part.stiffness.rows() + k, trace[row]));
+                entries.extend(part.rows.row(row).chain(rigid).map(|(i, value)| (offset[body] + i, value)));
+            }
+            for &(i, _) in &entries {
+                extra[i].extend(entries.iter().map(|&(j, _)| (j as i32, 0.0)));
+            }
+            rows.push_row(entries);
+        }
+        let mut stiffness = Csr::new(n);
+        for (&first, part) in offset.iter().zip(&parts) {
+            let own = part.stiffness;
+            for dof in pins(part.motions) {
+                extra[first + dof].push(((first + dof) as i32, own.diagonal(dof)));
+            }
+            for i in 0..part.len() {
+                let known = (0..own.rows()).contains(&i).then(|| own.row(i)).into_iter().flatten();
+                let mut entries: Vec<(i32, f64)> = known.map(|(j, value)| ((first + j) as i32, value)).collect();
+                entries.append(&mut extra[first + i]);
+                entries.sort_unstable_by_key(|entry| entry.0);
+                entries.dedup_by(|next, kept| {
+                    let same = next.0 == kept.0;
+                    kept.1 += if same { next.1 } else { 0.0 };
+                    same
+                });
+                for (j, value) in entries {
+                    stiffness.col.push(j);
+                    stiffness.values.push(value);
+                }
+                stiffness.ptr.push(stiffness.col.len() as i32);
+            }
+        }
+        Some(Self { stiffness, rows, offset })
+    }
 
-impl Part {
-    /// From a body, its contact rows, and the rigid motions that its supports leave free.
-    pub fn new(body: ElasticBody, rows: Csr, free: &[FreeMotion]) -> Self {
-        let split = Split::new(free, &rows);
-        Self { stiffness: body.stiffness, rows, split }
+    /// The same with all entries of K stored, row by row.
+    pub fn without_zeros(mut self) -> Self {
+        let n = self.stiffness.rows();
+        let mut values = vec![0.0; n * n];
+        for i in 0..n {
+            self.stiffness.row(i).for_each(|(j, value)| values[i * n + j] = value);
+        }
+        self.stiffness = Csr::full(n, values);
+        self
     }
 }
 
 /// All bodies as one.
-pub struct Monolithic {
-    whole: SparseBody<Krylov>,
-    union: Union,
+pub struct Monolithic<S> {
+    whole: SparseBody<S>,
+    offset: Vec<usize>,
 }
 
-impl Monolithic {
-    /// Joins the bodies; `make` makes the solver of a matrix.
-    ///
-    /// # Errors
-    /// PETSc's refusal of the matrix or of an option.
-    pub fn new(union: Union, make: impl FnOnce(&Csr) -> Result<Krylov>) -> Result<Self> {
+impl<S: InnerSolver> Monolithic<S> {
+    /// The joined bodies, and a solver whose matrix is their K.
+    pub fn new(union: Union, solver: S) -> Self {
         let n = union.stiffness.rows();
-        let krylov = make(&union.stiffness)?;
         let body = ElasticBody {
-            stiffness: union.stiffness.clone(),
+            stiffness: union.stiffness,
             load: vec![0.0; n],
             prescribed: Vec::new(),
             lifting: Vec::new(),
@@ -61,33 +112,24 @@ impl Monolithic {
             strain_constant: 0.0,
             carried: Vec::new(),
         };
-        Ok(Self { whole: SparseBody::new(body, union.rows.clone(), &[], krylov), union })
+        Self { whole: SparseBody::new(body, union.rows, &[], solver), offset: union.offset }
     }
 }
 
-impl Coupled for Monolithic {
-    fn solve(&mut self, weight: &[f64], r: &[Vec<f64>]) -> Result<Option<Field>> {
+impl<S: InnerSolver> Coupled for Monolithic<S> {
+    fn solve(&mut self, model: &Model, weight: &[f64], r: &[Vec<f64>]) -> Result<Option<Field>> {
         self.whole.robin(weight)?;
-        let dofs = |(part, r): (&Part, &Vec<f64>)| r[..part.stiffness.rows()].to_vec();
-        let whole = self.union.parts.iter().zip(r).flat_map(dofs).collect::<Vec<f64>>();
+        let whole = r.concat();
         let mut x = vec![0.0; whole.len()];
         if self.whole.solve(&whole, &mut x)?.failure.is_some() || x.iter().any(|x| !x.is_finite()) {
             return Ok(None);
         }
-        let mut field = Field { states: Vec::new(), trace: vec![0.0; 2 * self.union.rows.rows()] };
-        for (body, part) in self.union.parts.iter().enumerate() {
-            let n = part.stiffness.rows();
-            let mut state = x[self.union.offset[body]..self.union.offset[body + 1]].to_vec();
-            state.resize(n + part.split.count(), 0.0);
-            part.split.separate(&mut state);
-            let mut rows = vec![0.0; part.rows.rows()];
-            part.rows.multiply(&state[..n], &mut rows);
-            part.split.add_trace(&state[n..], &mut rows);
-            for (&place, value) in self.union.places[body].iter().zip(rows) {
-                field.trace[place] = value;
-            }
-            field.states.push(state);
+        let mut states: Vec<Vec<f64>> = self.offset.windows(2).map(|part| x[part[0]..part[1]].to_vec()).collect();
+        for (slot, state) in model.bodies.iter().zip(&mut states) {
+            slot.local.iter().for_each(|body| body.separate(state));
         }
+        let mut field = Field { states, trace: vec![0.0; 2 * model.points()] };
+        field.retrace(model);
         Ok(Some(field))
     }
 
@@ -96,51 +138,18 @@ impl Coupled for Monolithic {
     }
 }
 
-impl Union {
-    /// The union of bodies, with `points` giving for each contact point its two rows as (body, row of the body).
-    pub fn new(parts: Vec<Part>, points: &[[(usize, usize); 2]]) -> Self {
-        let mut offset = vec![0];
-        for part in &parts {
-            offset.push(offset[offset.len() - 1] + part.stiffness.rows());
-        }
-        let n = offset[parts.len()];
-        let mut rows = Csr::new(n);
-        let mut places: Vec<Vec<usize>> = parts.iter().map(|part| vec![0; part.rows.rows()]).collect();
-        // dofs of other nodes that a dof meets through a contact row
-        let mut extra: Vec<Vec<i32>> = vec![Vec::new(); n];
-        for (q, sides) in points.iter().enumerate() {
-            let mut entries = Vec::new();
-            for (side, &(body, row)) in sides.iter().enumerate() {
-                places[body][row] = side * points.len() + q;
-                entries.extend(parts[body].rows.row(row).map(|(dof, value)| (offset[body] + dof, value)));
-            }
-            for &(i, _) in &entries {
-                extra[i].extend(entries.iter().map(|&(j, _)| j as i32));
-            }
-            rows.push_row(entries);
-        }
-        let mut stiffness = Csr::new(n);
-        for (body, own) in parts.iter().map(|part| &part.stiffness).enumerate() {
-            for i in 0..own.rows() {
-                let more = &mut extra[offset[body] + i];
-                more.sort_unstable();
-                more.dedup();
-                let mut entries: Vec<(i32, f64)> =
-                    own.row(i).map(|(j, value)| ((offset[body] + j) as i32, value)).collect();
-                let known = entries.len();
-                for &j in more.iter() {
-                    if entries[..known].binary_search_by_key(&j, |entry| entry.0).is_err() {
-                        entries.push((j, 0.0));
-                    }
-                }
-                entries.sort_unstable_by_key(|entry| entry.0);
-                for (j, value) in entries {
-                    stiffness.col.push(j);
-                    stiffness.values.push(value);
-                }
-                stiffness.ptr.push(stiffness.col.len() as i32);
-            }
-        }
-        Self { stiffness, rows, offset, parts, places }
+/// As many dofs as there are motions such that no combination of these leaves them all at rest: the pivots of an elimination.
+fn pins(motions: &[Vec<f64>]) -> Vec<usize> {
+    let mut left = motions.to_vec();
+    let mut pins = Vec::new();
+    while let Some(mut motion) = left.pop() {
+        let largest =
+            |motion: &Vec<f64>| (0..motion.len()).max_by(|&i, &j| motion[i].abs().total_cmp(&motion[j].abs()));
+        let Some(pin) = largest(&motion) else { break };
+        let pivot = motion[pin];
+        motion.iter_mut().for_each(|u| *u /= pivot);
+        left.iter_mut().for_each(|other| axpy(-other[pin], &motion, other));
+        pins.push(pin);
     }
+    pins
 }

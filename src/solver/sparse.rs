@@ -1,7 +1,7 @@
 //! A body whose state is all its dofs and its rigid motion, and whose G is a sparse matrix.
 
 use super::{InnerSolver, Split};
-use crate::ddm::{Body, BodyCounts, Energy, Solved};
+use crate::ddm::{Body, BodyCounts, Energy, Matrices, Solved};
 use crate::error::Result;
 use crate::fem::{ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, dot};
@@ -241,12 +241,28 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     fn counts(&self) -> BodyCounts {
         let (symbolic, factorizations) = self.solver.factorizations();
         let (symbolic, factorizations) = (symbolic - self.before.0, factorizations - self.before.1);
+        if self.solver.is_dense() {
+            return BodyCounts { dense_factorizations: factorizations, ..self.counts };
+        }
         BodyCounts { symbolic, factorizations, ..self.counts }
     }
 
     fn begin_anew(&mut self) {
         self.before = self.solver.factorizations();
         self.counts = BodyCounts::default();
+    }
+
+    fn matrices(&self) -> Option<Matrices<'_>> {
+        let (motions, traces) = (self.split.motions(), self.split.traces());
+        Some(Matrices { stiffness: &self.body.stiffness, rows: &self.rows, motions, traces })
+    }
+
+    fn rigid(&self) -> usize {
+        self.split.count()
+    }
+
+    fn separate(&self, state: &mut [f64]) {
+        self.split.separate(state);
     }
 
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {

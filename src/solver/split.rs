@@ -49,6 +49,16 @@ impl Split {
         self.motions.len()
     }
 
+    /// R, one vector over the dofs each.
+    pub fn motions(&self) -> &[Vec<f64>] {
+        &self.motions
+    }
+
+    /// B R, one vector over the contact rows each.
+    pub fn traces(&self) -> &[Vec<f64>] {
+        &self.traces
+    }
+
     /// Moves the rigid part of the dofs of a state to its end.
     pub fn separate(&self, state: &mut [f64]) {
         let (dofs, rigid) = state.split_at_mut(state.len() - self.count());

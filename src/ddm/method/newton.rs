@@ -5,6 +5,7 @@ use crate::ddm::BodyCounts;
 use crate::ddm::field::{Field, local_dot};
 use crate::ddm::held;
 use crate::ddm::line::Line;
+use crate::ddm::model::Model;
 use crate::error::Result;
 
 /// How the Newton system is solved.
@@ -18,10 +19,11 @@ pub enum Inner {
 /// The Newton matrix of all bodies together, factored.
 pub trait Coupled {
     /// Solves (K + B' diag(weight) B) x = r with `weight` = omega kappa at the points; `None` if the matrix is singular.
+    /// `model` has the bodies that were joined.
     ///
     /// # Errors
     /// Failures of the solver library.
-    fn solve(&mut self, weight: &[f64], r: &[Vec<f64>]) -> Result<Option<Field>>;
+    fn solve(&mut self, model: &Model, weight: &[f64], r: &[Vec<f64>]) -> Result<Option<Field>>;
 
     /// What was done so far.
     fn counts(&self) -> BodyCounts;
@@ -60,7 +62,7 @@ impl Newton {
         let weight: Vec<f64> = here.model.weight.iter().zip(slope).map(|(w, k)| w * k).collect();
         let direct = match &mut self.inner {
             Inner::Direct(_) if held::joint_is_weak(here.model, &weight) => None,
-            Inner::Direct(coupled) => coupled.solve(&weight, &here.sweep.residual)?,
+            Inner::Direct(coupled) => coupled.solve(here.model, &weight, &here.sweep.residual)?,
             Inner::Sweep => None,
         };
         Ok(match direct {

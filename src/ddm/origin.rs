@@ -1,0 +1,52 @@
+//! The rigid motions of the start as the origin of displacements.
+//!
+//! A body that falls far onto its neighbour comes with traces that are huge beside the compression of the layer: each sum
+//! of two of them, less the gap, is rounded anew, and the pressures of a stiff layer tremble with it. So the gap takes the
+//! motions of the start, once, and the iteration works on what is left.
+
+use super::field::Field;
+use super::model::Model;
+
+/// Rigid motions that were taken out of an iterate, and the gap as it was with them.
+pub struct Origin {
+    motion: Field,
+    gap: Vec<f64>,
+    /// What the loads have gained on these motions: to be added to F1.
+    pub energy: f64,
+}
+
+impl Origin {
+    /// Takes the rigid motions out of `iterate` and into the gap of `model`. Collective.
+    pub fn take(model: &mut Model, iterate: &mut Field) -> Self {
+        let mut motion = iterate.zero_like();
+        let mut energy = [0.0];
+        for (index, slot) in model.bodies.iter_mut().enumerate() {
+            let Some(body) = &mut slot.local else { continue };
+            let (state, origin) = (&mut iterate.states[index], &mut motion.states[index]);
+            let deformation = state.len() - body.rigid();
+            origin[deformation..].copy_from_slice(&state[deformation..]);
+            state[deformation..].fill(0.0);
+            // the residual at rest without contact is the load
+            let mut load = vec![0.0; origin.len()];
+            body.residual(&body.rest(), &vec![0.0; slot.row_stiffness.len()], &mut load);
+            energy[0] -= crate::linalg::dot(&load[deformation..], &origin[deformation..]);
+        }
+        model.exchange.sum(&mut energy);
+        motion.retrace(model);
+        iterate.retrace(model);
+        let gap = model.gap.clone();
+        model.gap.iter_mut().zip(motion.closing()).for_each(|(gap, closing)| *gap -= closing);
+        Self { motion, gap, energy: energy[0] }
+    }
+
+    /// Traces of the motions.
+    pub fn trace(&self) -> &[f64] {
+        &self.motion.trace
+    }
+
+    /// Gives the motions back.
+    pub fn give(self, model: &mut Model, iterate: &mut Field) {
+        iterate.add(1.0, &self.motion);
+        model.gap = self.gap;
+    }
+}
