@@ -58,13 +58,14 @@ fn two_ranks_report_what_one_reports() {
     assert_eq!(parallel.solvers(), serial.solvers());
 }
 
-/// One collective call a sweep. Besides: largest stiffness of each body, trace of the start, spectrum, counts of the report.
+/// One collective call a sweep. Besides: largest stiffness of each body, trace of the start, its rigid part, spectrum, counts
+/// of the report.
 #[test]
-fn messages_are_one_a_sweep_and_four() {
+fn messages_are_one_a_sweep_and_five() {
     for (ranks, gamma) in [(2, "0.6"), (2, "0.3")] {
         let gamma = format!("method.gamma={gamma}");
         let run = solve_on(ranks, case("groove"), &["--set", "mesh.set.n=8", "--set", &gamma]).converged();
-        assert_eq!(run.count("messages"), run.count("sweeps") + 4, "{gamma}");
+        assert_eq!(run.count("messages"), run.count("sweeps") + 5, "{gamma}");
     }
     assert_eq!(solve(case("groove"), &["--set", "mesh.set.n=8"]).converged().count("messages"), 0);
 }

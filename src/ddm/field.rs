@@ -41,6 +41,12 @@ impl Field {
     /// Makes the traces anew from the states: both are added to on their own, and part by the rounding of large steps.
     /// Collective.
     pub fn retrace(&mut self, model: &Model) {
+        self.trace_here(model);
+        model.exchange.sum(&mut self.trace);
+    }
+
+    /// The traces of the bodies that live here, zero for others.
+    pub fn trace_here(&mut self, model: &Model) {
         let mut trace = vec![0.0; self.trace.len()];
         for (index, slot) in model.bodies.iter().enumerate() {
             if let Some(body) = &slot.local {
@@ -49,7 +55,6 @@ impl Field {
                 model.put(index, &rows, &mut trace);
             }
         }
-        model.exchange.sum(&mut trace);
         self.trace = trace;
     }
 

@@ -126,9 +126,9 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         early = failed.map(|(body, reason)| Status::InnerSolver { body, reason });
     }
     // an estimate of the discretisation's error needs the iterates whole
-    let origin = settings.balance.is_none().then(|| Origin::take(model, &mut iterate));
+    let mut origin = settings.balance.is_none().then(|| Origin::take(model, &mut iterate));
     let mut robin = Robin::new(settings.robin.clone());
-    let mut watch = Watch::from(origin.as_ref());
+    let mut watch = Watch::default();
     let mut sweeper = Sweeper::default();
     let mut last: Option<Last> = None;
     let mut rows: Vec<Row> = Vec::new();
@@ -148,7 +148,8 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         let relaxed = last.as_ref().filter(|last| last.relaxed).map(|last| (&last.sweep, last.length));
         let sweep = sweeper.sweep(model, &iterate, &layer, &weight, relaxed)?;
         let method = &settings.methods[active];
-        let seen = Seen { model, iterate: &iterate, layer: &layer, sweep: &sweep, last: last.as_ref() };
+        let from = origin.as_ref().map_or(&[][..], |origin| origin.trace());
+        let seen = Seen { model, iterate: &iterate, origin: from, layer: &layer, sweep: &sweep, last: last.as_ref() };
         let mut row = watch.measure(&seen);
         (row.iteration, row.sweeps, row.seconds) = (k, sweeper.sweeps, clock.elapsed().as_secs_f64());
         row.factorizations += method.coupled().factorizations;
@@ -186,6 +187,12 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         let moved = direction.trace.iter().map(|t| length * t).collect();
         if settings.methods[active].moves_far() {
             iterate.retrace(model);
+        }
+        if origin.as_ref().is_some_and(|origin| origin.is_far_from(&iterate)) {
+            origin = origin.map(|origin| {
+                origin.give(model, &mut iterate);
+                Origin::take(model, &mut iterate)
+            });
         }
         last = Some(Last { sweep, relaxed, length, moved, pressure: layer.pressure });
     };

@@ -7,6 +7,9 @@
 use super::field::Field;
 use super::model::Model;
 
+/// How many times an iterate's displacement its origin may be.
+const FAR: f64 = 10.0;
+
 /// Rigid motions that were taken out of an iterate, and the gap as it was with them.
 pub struct Origin {
     motion: Field,
@@ -31,17 +34,28 @@ impl Origin {
             body.residual(&body.rest(), &vec![0.0; slot.row_stiffness.len()], &mut load);
             energy[0] -= crate::linalg::dot(&load[deformation..], &origin[deformation..]);
         }
-        model.exchange.sum(&mut energy);
-        motion.retrace(model);
-        iterate.retrace(model);
+        // one message: the energy, then the traces of motions and of what is left
+        motion.trace_here(model);
+        iterate.trace_here(model);
+        let mut message = [&energy[..], &motion.trace, &iterate.trace].concat();
+        model.exchange.sum(&mut message);
+        iterate.trace = message.split_off(1 + motion.trace.len());
+        motion.trace = message.split_off(1);
         let gap = model.gap.clone();
         model.gap.iter_mut().zip(motion.closing()).for_each(|(gap, closing)| *gap -= closing);
-        Self { motion, gap, energy: energy[0] }
+        Self { motion, gap, energy: message[0] }
     }
 
     /// Traces of the motions.
     pub fn trace(&self) -> &[f64] {
         &self.motion.trace
+    }
+
+    /// Whether the motions are so much larger than where the iterate is that they do more harm than good: the start was no good.
+    pub fn is_far_from(&self, iterate: &Field) -> bool {
+        let size = |sum: &mut dyn Iterator<Item = f64>| sum.fold(0.0f64, |max, t| max.max(t.abs()));
+        let whole = size(&mut self.motion.trace.iter().zip(&iterate.trace).map(|(a, b)| a + b));
+        size(&mut self.motion.trace.iter().copied()) > FAR * whole
     }
 
     /// Gives the motions back.

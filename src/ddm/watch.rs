@@ -4,7 +4,6 @@ use super::field::Field;
 use super::iterate::Status;
 use super::layer::Layer;
 use super::model::Model;
-use super::origin::Origin;
 use super::progress::Row;
 use super::scale::Scale;
 use super::stop::{Cycle, Floor, StopRule, relative_increment};
@@ -28,6 +27,8 @@ pub(super) struct Last {
 pub(super) struct Seen<'a> {
     pub model: &'a Model,
     pub iterate: &'a Field,
+    /// Traces that the iterate's are relative to; empty for none.
+    pub origin: &'a [f64],
     pub layer: &'a Layer,
     pub sweep: &'a Sweep,
     /// The step that led here.
@@ -47,28 +48,21 @@ pub(super) enum Verdict {
 /// Measures each iterate and decides whether to go on.
 #[derive(Default)]
 pub(super) struct Watch {
-    /// Traces that iterates are relative to; empty for none.
-    origin: Vec<f64>,
     scale: Scale,
     floor: Floor,
     cycle: Cycle,
 }
 
 impl Watch {
-    /// For iterates relative to these traces, if any.
-    pub fn from(origin: Option<&Origin>) -> Self {
-        Self { origin: origin.map_or(Vec::new(), |origin| origin.trace().to_vec()), ..Self::default() }
-    }
-
     /// The row of an iterate: residual and F1 from the sweep at it, increments from the `step` that led to it.
     pub fn measure(&mut self, seen: &Seen) -> Row {
-        let Seen { model, iterate, layer, sweep, last, .. } = *seen;
+        let Seen { model, iterate, origin, layer, sweep, last } = *seen;
         let strain: f64 = sweep.energy.iter().map(|e| e.strain).sum();
         let potential: f64 = sweep.energy.iter().map(|e| e.potential).sum();
         let decrement: f64 = sweep.decrement.iter().sum();
         self.scale.learn(model, layer, strain);
         let mut trace = iterate.trace.clone();
-        trace.iter_mut().zip(&self.origin).for_each(|(trace, origin)| *trace += origin);
+        trace.iter_mut().zip(origin).for_each(|(trace, origin)| *trace += origin);
         let increments: Vec<f64> = (0..model.bodies.len())
             .map(|body| match last {
                 None => f64::NAN,

@@ -192,14 +192,15 @@ pub fn judge(case: &Case, reference: &Answer, answer: &Answer) -> Verdict {
     Verdict::Right
 }
 
-/// Largest difference of pressures relative to the largest of the reference.
+/// Largest difference of pressures relative to the largest of the reference; if that has none, to what the loads could make.
 pub fn difference(case: &Case, reference: &Answer, answer: &Answer) -> f64 {
     if reference.pressure.len() != answer.pressure.len() {
         return f64::NAN;
     }
     let pairs = reference.pressure.iter().zip(&answer.pressure);
     let apart = pairs.map(|(p, q)| (p - q).abs()).fold(0.0, |max, d| if d > max || d.is_nan() { d } else { max });
-    apart / peak(reference).max(1e-6 * case.pressure)
+    let peak = peak(reference);
+    apart / if peak > 0.0 { peak.max(1e-6 * case.pressure) } else { case.pressure }
 }
 
 /// Whether a body that contact alone holds touches nothing in the solution.
