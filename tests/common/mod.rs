@@ -151,7 +151,8 @@ pub fn environment(command: &mut Command) {
 }
 
 fn finish(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
-    command.current_dir(scratch.path());
+    // launchers that start at the same moment get into each other's way in a common folder
+    command.current_dir(scratch.path()).env("OMPI_MCA_orte_tmpdir_base", scratch.path());
     let (status, stdout, stderr) = output(command, patience());
     let report = match fs::read(folder.join("report.json")) {
         Ok(bytes) => serde_json::from_slice(&bytes).expect("report.json is JSON"),
