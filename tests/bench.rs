@@ -60,6 +60,10 @@ fn errors_fall_with_the_mesh_and_rows_are_whole() {
             {
                 assert!(number(row, column) > 0.0, "{column}");
             }
+            // no two runs take the same time; no process takes more than all cores
+            let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get()) as f64;
+            assert!(number(row, "spread") > 0.0);
+            assert!(number(row, "cpu_seconds") < cores * number(row, "seconds"), "{row:?}");
             // a process with PETSc in it, and not the machine
             assert!((10.0..2000.0).contains(&number(row, "memory_mb")), "{row:?}");
         }
@@ -98,6 +102,45 @@ fn the_finest_mesh_or_a_table_is_the_reference() {
         assert!((number(row, "error") / error - 1.0).abs() < 1e-6, "{row:?}");
     }
     assert!(number(&rows[2], "error") < 1e-7, "the reference itself");
+}
+
+/// Columns are what the report of the run says, and what it says together with that of the linear solve.
+#[test]
+fn rows_are_their_reports() {
+    let (run, rows) = bench(&[&scene("wavy"), "--set", "mesh.set.n=4", "--solver", "mumps", "--linear"]);
+    assert_eq!((run.code, rows.len()), (0, 2), "{}", run.said());
+    let report = |method: &str| -> serde_json::Value {
+        let path = run.folder.join(format!("out/runs/wavy_mumps_{method}_1_1/report.json"));
+        serde_json::from_slice(&fs::read(&path).expect("a report")).expect("JSON")
+    };
+    let of = |report: &serde_json::Value, path: &str| report.pointer(path).and_then(|v| v.as_f64()).expect("a number");
+    for row in &rows {
+        let report = report(&row["method"]);
+        for (column, path) in [
+            ("mesh_seconds", "/times/mesh"),
+            ("discretize_seconds", "/times/discretize"),
+            ("set_up_seconds", "/times/set-up"),
+            ("iterate_seconds", "/times/iterate"),
+            ("factor_seconds", "/inner_times/factor"),
+            ("solve_seconds", "/inner_times/solve"),
+            ("sweeps", "/sweeps"),
+            ("factorizations", "/factorizations"),
+            ("residual", "/residual"),
+            ("peak_pressure", "/pairs/0/peak_pressure"),
+        ] {
+            assert_eq!(number(row, column), of(&report, path), "{column}");
+        }
+        let theta = (of(&report, "/pairs/0/theta/0") * of(&report, "/pairs/0/theta/1")).sqrt();
+        assert!((number(row, "theta") / theta - 1.0).abs() < 1e-12);
+    }
+    // two bodies: what one factorisation and one solve of each take
+    let [linear, solved] = &rows[..] else { panic!("two rows") };
+    let yard = report("linear");
+    let each = |time: &str, count: &str| of(&yard, time) / of(&yard, count) * 2.0;
+    let seconds = each("/inner_times/factor", "/factorizations") + each("/inner_times/solve", "/body_solves");
+    assert!((number(linear, "linear_seconds") / seconds - 1.0).abs() < 1e-9);
+    let own = number(solved, "set_up_seconds") + number(solved, "iterate_seconds");
+    assert!((number(solved, "linear_solves") / (own / seconds) - 1.0).abs() < 1e-9);
 }
 
 /// What goes wrong is a row with its words, and the other rows are there.

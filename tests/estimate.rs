@@ -70,7 +70,48 @@ fn pressure_of_a_wave() {
         // the column has the errors that the number sums up, on the safe side by a quarter
         let summed = pressure_error(&table, order, |q| table["pressure"][q] + table["pressure_error"][q]);
         assert!((1.25 * summed / reported - 1.0).abs() < 1e-6, "{summed} {reported}");
+        wave_displacements(&run, order);
+        if order == 1 {
+            wave_layer(&run);
+        }
     }
+}
+
+/// Amplitude of the pressure, and stiffness of the layer.
+const WAVE: (f64, f64) = (6.350_881_4, 1e5);
+
+/// Uniform strain under 40 between smooth walls, a wave on it; the upper surface follows by compression and gap.
+fn wave_displacements(run: &Run, order: usize) {
+    let table = run.contact();
+    let shape = PI.sinh().powi(2) / (PI.sinh() * PI.cosh() + PI);
+    let lower = |x: f64| {
+        let uniform = 40.0 * 1.3 * 0.4 / (0.7 * 2.1e5);
+        -uniform - 2.0 * 0.91 / (2.1e5 * PI) * shape * WAVE.0 * (PI * x).cos()
+    };
+    let upper = |x: f64| {
+        let pressure = 40.0 + WAVE.0 * (PI * x).cos();
+        pressure / WAVE.1 + 1e-4 * (1.0 - (PI * x).cos()) - lower(x)
+    };
+    let mut sums = (0.0, 0.0);
+    for q in 0..table.rows() {
+        let (w, x) = (table["weight"][q], table["x"][q]);
+        for (found, exact) in [(table["u_n_lower"][q], lower(x)), (table["u_n_upper"][q], upper(x))] {
+            sums.0 += w * (found - exact).powi(2);
+            sums.1 += w * exact.powi(2);
+        }
+    }
+    let exact = f64::sqrt(sums.0 / sums.1);
+    is_effective(run.number("discretization_error/displacement"), exact, &format!("displacements, P{order}"));
+}
+
+/// What the layer's squared error is: that of interpolation on sixteen elements, (h k)^4 / 120 of a wave of the pressure.
+fn wave_layer(run: &Run) {
+    let of = |name: &str| run.number(&format!("discretization_error/{name}"));
+    // u'Ku and the work of the layer
+    let size = 1600.0 * (1.3 * 0.4 / (0.7 * 2.1e5) * 2.0 + 1.0 / WAVE.1);
+    let estimated = (1.0 - of("bodies/0") - of("bodies/1")) * of("energy").powi(2) * size;
+    let exact = WAVE.0.powi(2) / WAVE.1 * (PI / 16.0).powi(4) / 240.0;
+    is_effective(estimated.sqrt(), exact.sqrt(), "layer");
 }
 
 /// V3b: the pressure of the groove with a kink and an end of contact, against a mesh three times as fine.

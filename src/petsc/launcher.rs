@@ -21,12 +21,22 @@ const LAUNCHERS: [&str; 9] = [
 /// What Open MPI is told when it runs alone.
 ///
 /// Lone processes all take the same name for their session folder in /tmp; without one they cannot collide when several
-/// start at once.
-const ALONE: [(&str, &str); 4] = [
+/// start at once. The other names keep it from loading components that it would not choose. It also asks hwloc for the cores
+/// and caches that ranks are bound to; hwloc looks for graphics cards then, on X servers, too. A lone process is not bound.
+const ALONE: [(&str, &str); 13] = [
     ("OMPI_MCA_ess_singleton_isolated", "1"),
+    ("OMPI_MCA_ess", "singleton"),
+    ("OMPI_MCA_pmix", "isolated"),
     ("OMPI_MCA_pml", "ob1"),
     ("OMPI_MCA_btl", "self"),
+    ("OMPI_MCA_coll", "self,basic,libnbc"),
     ("OMPI_MCA_orte_create_session_dirs", "0"),
+    ("OMPI_MCA_shmem", "posix"),
+    ("OMPI_MCA_reachable", "weighted"),
+    ("OMPI_MCA_state", "app"),
+    ("OMPI_MCA_errmgr", "default_app"),
+    ("HWLOC_PLUGINS_PATH", "/nonexistent"),
+    ("HWLOC_COMPONENTS", "no_os,stop"),
 ];
 
 /// Whether a launcher such as `mpiexec` started this process.
