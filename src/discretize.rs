@@ -4,6 +4,7 @@ mod auto;
 mod balance;
 mod carried;
 mod elastic;
+mod fields;
 mod find;
 mod gauge;
 pub mod meshes;
@@ -17,16 +18,16 @@ use crate::contact::{self, ContactPair};
 use crate::ddm::{self, Body, BodySlot, Exchange, Model, Motion, RobinZone, Segment};
 use crate::error::Result;
 use crate::fem::{
-    ElasticBody, Elasticity, Space,
+    ElasticBody,
     rigid::{self, FreeMotion, RigidMotion},
-    stress,
 };
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Mesh;
-use crate::output::vtu::{BodyField, CellKind};
+use crate::output::vtu::BodyField;
 use crate::scene::{ContactSpec, Scene, Start, Zone};
 use balance::Forces;
 pub use balance::{Balance, Resultant};
+use fields::{ErrorMaker, FieldMaker};
 use find::{placed, point};
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
@@ -113,6 +114,7 @@ pub struct BodyInfo {
     field: FieldMaker,
     nodal: NodalMaker,
     balance: BalanceMaker,
+    errors: Option<ErrorMaker>,
 }
 
 /// State of all dofs -> displacements of all nodes.
@@ -120,9 +122,6 @@ type NodalMaker = Box<dyn Fn(&[f64]) -> Vec<f64>>;
 
 /// Displacements of all nodes, forces omega p at the contact rows -> forces on the body.
 type BalanceMaker = Box<dyn Fn(&[f64], &[f64]) -> Balance>;
-
-/// Displacements of all dofs -> fields for output.
-type FieldMaker = Box<dyn Fn(&[f64]) -> BodyField>;
 
 impl BodyInfo {
     /// Displacements and recovered stresses for output, from a state of all dofs.
@@ -133,6 +132,12 @@ impl BodyInfo {
     /// Forces on the body in a state of all dofs, under the forces omega p of its contact rows.
     pub fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
         (self.balance)(&(self.nodal)(v), force)
+    }
+
+    /// Errors against the scene's known displacements over the norms of these, if the scene has them: L2 norm, H1 seminorm,
+    /// energy norm ([`norms::error`](crate::fem::norms::error)); from a state of all dofs.
+    pub fn errors(&self, v: &[f64]) -> Option<[f64; 3]> {
+        self.errors.as_ref().map(|errors| errors(&(self.nodal)(v)))
     }
 }
 
@@ -281,7 +286,8 @@ pub fn discretize<const D: usize>(
                 let forces = Forces { space, elasticity, held, springs, supports, load: nodal_load, rows };
                 Box::new(move |u, force| forces.balance(u, force))
             },
-            field: field_maker(slot.name.clone(), space.clone(), elasticity.clone()),
+            errors: fields::error_maker(part.spec, &space, &elasticity)?,
+            field: fields::field_maker(slot.name.clone(), space.clone(), elasticity.clone()),
         });
         shapes.push(Shape { space, elasticity, modulus, held });
         slots.push(slot);
@@ -396,22 +402,4 @@ fn trace_of(motion: &RigidMotion, rows: &Csr, load: &[f64]) -> Motion {
     rows.multiply(&motion.displacement, &mut trace);
     let work = gauge::work(&motion.displacement, load);
     Motion { name: motion.name.clone(), trace, work }
-}
-
-fn field_maker<const D: usize>(name: String, space: Rc<Space<D>>, elasticity: Rc<Elasticity>) -> FieldMaker {
-    Box::new(move |u| {
-        let stress = stress::nodal(&space, &elasticity, u);
-        BodyField {
-            name: name.clone(),
-            points: space.nodes.iter().map(|&x| contact::pad(x)).collect(),
-            cell: CellKind::simplex(D, space.order.degree()),
-            connectivity: space.cells.clone(),
-            displacement: u
-                .chunks_exact(D)
-                .map(|u| std::array::from_fn(|c| u.get(c).copied().unwrap_or(0.0)))
-                .collect(),
-            von_mises: stress.iter().map(stress::von_mises).collect(),
-            stress,
-        }
-    })
 }

@@ -51,6 +51,39 @@ fn oblique_fibres() {
     }
 }
 
+/// Cubes of oblique fibres: the compliance along z by the formula of an orthotropic body in any direction.
+#[test]
+fn oblique_fibres_in_space() {
+    let (e, nu12, nu13, nu23) = ([1.4e5, 1e4, 8e3], 0.3, 0.25, 0.45);
+    let (g12, g13, g23) = (5e3, 4e3, 3.4e3);
+    let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|c| a[c] * b[c]).sum::<f64>();
+    let unit = |v: [f64; 3]| v.map(|c| c / dot(v, v).sqrt());
+    let compliance = |first: [f64; 3], second: [f64; 3]| {
+        let first = unit(first);
+        let along = dot(first, second);
+        let second = unit(std::array::from_fn(|c| second[c] - along * first[c]));
+        // squared cosines between z and the axes
+        let (l, m) = (first[2].powi(2), second[2].powi(2));
+        let n = 1.0 - l - m;
+        l * l / e[0]
+            + m * m / e[1]
+            + n * n / e[2]
+            + l * m * (1.0 / g12 - 2.0 * nu12 / e[0])
+            + l * n * (1.0 / g13 - 2.0 * nu13 / e[0])
+            + m * n * (1.0 / g23 - 2.0 * nu23 / e[1])
+    };
+    let lower = 10.0 * compliance([2.0, 1.0, 2.0], [0.0, 1.0, 0.0]);
+    let upper = 10.0 * compliance([1.0, -2.0, 3.0], [1.0, 0.0, 0.0]);
+    let run = solve(case("anisotropic-3d"), &[]).converged();
+    let table = run.contact();
+    for q in 0..table.rows() {
+        assert!(near(table["pressure"][q], 10.0, 1e-9), "{}", table["pressure"][q]);
+        assert!(near(table["u_n_lower"][q], -lower, 1e-9), "{} {lower}", table["u_n_lower"][q]);
+    }
+    let energy = -0.5 * 10.0 * (lower + upper + 10.0 / 1e5);
+    assert!(near(run.number("F1"), energy, 1e-9), "{} {energy}", run.number("F1"));
+}
+
 /// The same blocks by their 21 constants, and in axes given in another way: the same run.
 #[test]
 fn one_material_in_several_words() {

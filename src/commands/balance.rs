@@ -1,5 +1,6 @@
 //! Forces on every body, from the ranks that own them to the report.
 
+use super::results::{self, Recovered};
 use super::run::Prepared;
 use crate::ddm::Outcome;
 use crate::discretize::Balance;
@@ -10,7 +11,7 @@ use crate::scene::Scene;
 const WIDTH: usize = 6;
 
 /// The forces on every body in the result; collective.
-pub fn gather(scene: &Scene, prepared: &Prepared, outcome: &Outcome) -> Vec<BalanceReport> {
+pub fn gather(scene: &Scene, prepared: &Prepared, outcome: &Outcome, recovered: &results::All) -> Vec<BalanceReport> {
     let model = &prepared.problem.model;
     let mut reports = Vec::new();
     for (index, info) in prepared.problem.bodies.iter().enumerate() {
@@ -20,15 +21,14 @@ pub fn gather(scene: &Scene, prepared: &Prepared, outcome: &Outcome) -> Vec<Bala
         names.extend(spec.spring.iter().map(|spring| spring.on.value.clone()));
         names.extend(info.rigid.iter().cloned());
         let mut message = vec![0.0; WIDTH * names.len() + 2];
-        if let Some(body) = &model.bodies[index].local {
+        match &recovered[index] {
+            None => {}
             // a solver that fails here leaves the forces unknown; the run itself is over
-            match body.recover(&outcome.iterate.states[index]) {
-                Err(_) => message.fill(f64::NAN),
-                Ok(state) => {
-                    let Balance { parts, size } = info.balance(&state, &model.at_rows(index, &outcome.layer.force));
-                    let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
-                    message.iter_mut().zip(numbers).for_each(|(place, number)| *place = number);
-                }
+            Some(Err(_)) => message.fill(f64::NAN),
+            Some(Ok(Recovered { state, .. })) => {
+                let Balance { parts, size } = info.balance(state, &model.at_rows(index, &outcome.layer.force));
+                let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
+                message.iter_mut().zip(numbers).for_each(|(place, number)| *place = number);
             }
         }
         model.exchange.sum(&mut message);

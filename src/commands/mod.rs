@@ -11,6 +11,7 @@ pub mod mesh;
 pub mod method;
 pub mod preflight;
 pub mod report;
+pub mod results;
 mod reuse;
 pub mod run;
 pub mod solve;

@@ -2,6 +2,7 @@
 
 use super::balance;
 use super::preflight;
+use super::results;
 use super::run::{Clock, Prepared};
 use crate::contact::ContactPair;
 use crate::ddm::forecast::{best_factor, best_gamma};
@@ -109,7 +110,14 @@ fn advice(outcome: &Outcome) -> Option<String> {
 }
 
 /// Fills the report of a run.
-pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &Outcome, clock: &Clock) -> Report {
+pub fn report(
+    session: &Session,
+    scene: &Scene,
+    prepared: &Prepared,
+    outcome: &Outcome,
+    recovered: &results::All,
+    clock: &Clock,
+) -> Report {
     let model = &prepared.problem.model;
     let shared = Shared::gather(prepared);
     let counts = &shared.counts;
@@ -148,7 +156,8 @@ pub fn report(session: &Session, scene: &Scene, prepared: &Prepared, outcome: &O
         pairs: (0..model.pairs.len()).map(|i| pair_report(scene, prepared, outcome, i)).collect(),
         ..headline(session, scene, prepared, &shared.solvers, clock)
     };
-    let balances = balance::gather(scene, prepared, outcome);
+    results::fill(prepared, recovered, &mut report.bodies);
+    let balances = balance::gather(scene, prepared, outcome, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
     report
 }

@@ -1,8 +1,9 @@
 //! `winkler solve`: one scene, one run, all its results.
 
 use super::adapt::Plan;
+use super::results::Recovered;
 use super::run::{self, Clock, Prepared};
-use super::{folder_of, load, report};
+use super::{folder_of, load, report, results};
 use crate::ddm::{Observer, Outcome, Row};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
@@ -56,10 +57,11 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
         }
     };
     let scene = &plan.scene;
-    let written = failed.and(write(session, scene, &prepared, &outcome, estimate.as_ref(), &folder));
+    let recovered = results::recover(&prepared, &outcome);
+    let written = failed.and(write(session, scene, &prepared, &outcome, &recovered, estimate.as_ref(), &folder));
     clock.phase("output");
     clock.total();
-    let mut report = report::report(session, scene, &prepared, &outcome, &clock);
+    let mut report = report::report(session, scene, &prepared, &outcome, &recovered, &clock);
     report.discretization_error = estimate.as_ref().map(report::discretization_error);
     report.rounds = plan.rounds;
     if let Some(limit) = &plan.limit {
@@ -84,6 +86,7 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
         }
     }
     written?;
+    recovered.into_iter().flatten().collect::<Result<Vec<_>>>()?;
     Ok(if plan.limit.is_some() { 1 } else { report::exit_code(&outcome.status) })
 }
 
@@ -127,17 +130,15 @@ fn write(
     scene: &Scene,
     prepared: &Prepared,
     outcome: &Outcome,
+    recovered: &results::All,
     estimate: Option<&Estimate>,
     folder: &Folder,
 ) -> Result<()> {
     let model = &prepared.problem.model;
     let first = session.rank() == 0;
     if scene.output.vtu {
-        for (index, info) in prepared.problem.bodies.iter().enumerate() {
-            if let Some(body) = &model.bodies[index].local {
-                let field = info.field(&body.recover(&outcome.iterate.states[index])?);
-                folder.write(&field.file_name(), |out| field.write(out))?;
-            }
+        for Recovered { field, .. } in recovered.iter().flatten().flatten() {
+            folder.write(&field.file_name(), |out| field.clone().write(out))?;
         }
         if first {
             let mut names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();

@@ -1,7 +1,7 @@
 //! `winkler sweep`: a scene over values of its keys, one row a run.
 
 use super::run::{self, Clock};
-use super::{folder_of, report, reuse};
+use super::{folder_of, report, results, reuse};
 use crate::ddm::Silent;
 use crate::error::{Error, Kind, Result};
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
@@ -50,7 +50,8 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
         run::set_up(session, scene, &mut prepared, &mut clock)?;
         let outcome = run::iterate(scene, &mut prepared, &mut Silent, &mut clock)?;
         clock.total();
-        let report = report::report(session, scene, &prepared, &outcome, &clock);
+        let recovered = results::recover(&prepared, &outcome);
+        let report = report::report(session, scene, &prepared, &outcome, &recovered, &clock);
         exit = exit.max(report::exit_code(&outcome.status));
         if !first {
             before = Some((scene, prepared));

@@ -9,6 +9,7 @@ pub mod elasticity;
 pub mod element;
 pub mod frame;
 pub mod material;
+pub mod norms;
 pub mod quadrature;
 pub mod recovery;
 pub mod rigid;

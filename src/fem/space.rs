@@ -96,6 +96,19 @@ impl<const D: usize> Space<D> {
         (0..3).map(|i| normal[i] * c[i]).sum::<f64>().abs() / 6.0
     }
 
+    /// du_i/dx_j in a cell (its node numbers) from the gradients of its shape functions; `u` has one entry a dof.
+    pub fn displacement_gradient(&self, cell: &[u32], gradient: &[[f64; D]], u: &[f64]) -> [[f64; D]; D] {
+        let mut h = [[0.0; D]; D];
+        for (&node, gradient) in cell.iter().zip(gradient) {
+            for i in 0..D {
+                for j in 0..D {
+                    h[i][j] += u[D * node as usize + i] * gradient[j];
+                }
+            }
+        }
+        h
+    }
+
     /// Mean of the corners of cell `i`.
     pub fn centroid(&self, i: usize) -> [f64; D] {
         let corners = &self.cells[i * self.stride..][..=D];

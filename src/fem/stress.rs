@@ -27,14 +27,7 @@ fn nodal_on<const D: usize, const N: usize>(space: &Space<D>, elasticity: &Elast
         let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
         for (l, &node) in places.iter().zip(cell) {
             let Some((gradient, measure)) = element::gradients::<D, N>(space.order, &x, l) else { continue };
-            let mut h = [[0.0; D]; D];
-            for (a, &other) in cell.iter().enumerate() {
-                for i in 0..D {
-                    for j in 0..D {
-                        h[i][j] += u[D * other as usize + i] * gradient[a][j];
-                    }
-                }
-            }
+            let h = space.displacement_gradient(cell, &gradient, u);
             let material = elasticity.at(index, pad(space.nodes[node as usize])).or_else(|_| {
                 elasticity.at(index, pad(assemble::interpolate(&x, &element::values(space.order, &inside))))
             });
@@ -53,8 +46,11 @@ fn nodal_on<const D: usize, const N: usize>(space: &Space<D>, elasticity: &Elast
     sum
 }
 
-/// Principal stresses of (xx yy zz xy yz xz), the largest (tension is positive) first.
+/// Principal stresses of (xx yy zz xy yz xz), the largest (tension is positive) first; NaN if the stress is not finite.
 pub fn principal(s: &[f64; 6]) -> [f64; 3] {
+    if s.iter().any(|s| !s.is_finite()) {
+        return [f64::NAN; 3];
+    }
     let [xx, yy, zz, xy, yz, xz] = *s;
     let values = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).symmetric_eigenvalues();
     let mut sorted = [values[0], values[1], values[2]];
@@ -67,4 +63,23 @@ pub fn von_mises(s: &[f64; 6]) -> f64 {
     let [xx, yy, zz, xy, yz, xz] = *s;
     let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
     (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn invariants_of_a_stress() {
+        // 7, 2, -3 along axes turned by the thirds of the cube's diagonal: Q = I - 2 v v'/(v'v), v = (1, 1, 1)
+        let q = |i: usize, j: usize| f64::from(i == j) - 2.0 / 3.0;
+        let values = [7.0, 2.0, -3.0];
+        let s = |i: usize, j: usize| (0..3).map(|k| q(i, k) * values[k] * q(j, k)).sum::<f64>();
+        let stress = [s(0, 0), s(1, 1), s(2, 2), s(0, 1), s(1, 2), s(0, 2)];
+        let found = principal(&stress);
+        assert!((0..3).all(|k| (found[k] - values[k]).abs() < 1e-14), "{found:?}");
+        // sqrt(((7-2)^2 + (2+3)^2 + (7+3)^2) / 2)
+        assert!((von_mises(&stress) - 75f64.sqrt()).abs() < 1e-13);
+        assert!(principal(&[f64::NAN; 6])[0].is_nan());
+    }
 }

@@ -159,6 +159,18 @@ pub struct BodyReport {
     pub solver: String,
     /// Rank that owned it.
     pub rank: usize,
+    /// Largest von Mises stress at the nodes.
+    pub max_von_mises: Option<f64>,
+    /// Where it is (x, y, z).
+    pub max_von_mises_at: Option<[f64; 3]>,
+    /// Largest and least principal stress at the nodes.
+    pub principal_range: Option<[f64; 2]>,
+    /// Error against the scene's `exact` over its own norm: of displacements in L2.
+    pub error_l2: Option<f64>,
+    /// The same of displacement gradients in L2: the H1 seminorm.
+    pub error_h1: Option<f64>,
+    /// The same in the energy norm.
+    pub error_energy: Option<f64>,
     /// Forces on it.
     pub balance: BalanceReport,
 }

@@ -76,6 +76,8 @@ pub struct BodyField {
     pub stress: Vec<[f64; 6]>,
     /// Von Mises stress at each point.
     pub von_mises: Vec<f64>,
+    /// Principal stresses at each point, the largest first.
+    pub principal: Vec<[f64; 3]>,
 }
 
 impl BodyField {
@@ -84,8 +86,8 @@ impl BodyField {
         vtu_name(&self.name)
     }
 
-    /// Writes VTK's XML format with binary (base64) data: point arrays `displacement` (3 components), `stress` (6) and
-    /// `von_mises` (1).
+    /// Writes VTK's XML format with binary (base64) data: point arrays `displacement` (3 components), `stress` (6),
+    /// `von_mises` (1) and `principal` (3).
     ///
     /// # Errors
     /// Those of `out`, and `InvalidInput` when the arrays do not fit each other.
@@ -100,6 +102,7 @@ impl BodyField {
                 ("displacement".to_owned(), 3, self.displacement.into_flattened()),
                 ("stress".to_owned(), 6, self.stress.into_flattened()),
                 ("von_mises".to_owned(), 1, self.von_mises),
+                ("principal".to_owned(), 3, self.principal.into_flattened()),
             ],
             at_cells: Vec::new(),
         };
@@ -109,8 +112,8 @@ impl BodyField {
     /// Says what does not fit: ParaView would crash on it, or show another body's values.
     fn check(&self) -> Result<(), String> {
         let points = self.points.len();
-        let lengths = [self.displacement.len(), self.stress.len(), self.von_mises.len()];
-        if lengths != [points; 3] {
+        let lengths = [self.displacement.len(), self.stress.len(), self.von_mises.len(), self.principal.len()];
+        if lengths != [points; 4] {
             return Err(format!("body `{}`: {points} points, {lengths:?} values", self.name));
         }
         if !self.connectivity.len().is_multiple_of(self.cell.stride()) {
@@ -254,6 +257,7 @@ mod tests {
             displacement: (0..n).map(|i| std::array::from_fn(|c| number(-100.0, i, c))).collect(),
             stress: (0..n).map(|i| std::array::from_fn(|c| number(1e9, i, c))).collect(),
             von_mises: (0..n).map(|i| number(1e-9, i, 0)).collect(),
+            principal: (0..n).map(|i| std::array::from_fn(|c| number(-1e9, i, c))).collect(),
         }
     }
 
@@ -298,6 +302,7 @@ mod tests {
                     ("displacement", 3, Some(body.displacement.into_flattened())),
                     ("stress", 6, Some(body.stress.into_flattened())),
                     ("von_mises", 1, Some(body.von_mises)),
+                    ("principal", 3, Some(body.principal.into_flattened())),
                 ]
             );
         }
@@ -311,7 +316,9 @@ mod tests {
         cut.connectivity.pop();
         let mut wild = body(CellKind::Tetra);
         wild.connectivity[2] = 4;
-        for bad in [short, cut, wild] {
+        let mut few = body(CellKind::Tetra);
+        few.principal.pop();
+        for bad in [short, cut, wild, few] {
             let error = bad.write(&mut Vec::new()).unwrap_err();
             assert_eq!(error.kind(), io::ErrorKind::InvalidInput);
         }

@@ -8,7 +8,7 @@ mod method;
 
 pub use body::reserved;
 
-use super::expression::Field;
+use super::expression::{Differentiable, Field};
 use super::read::{Keys, Node, Value};
 use super::{AdaptSpec, MeshSource, OutputSpec, Plane, Preset, Scene, SolverSpec};
 use crate::error::{Error, Located, Place, Result, nearest};
@@ -73,17 +73,35 @@ impl Decoder<'_> {
 
     /// A vector with as many components as space has; the missing third one is zero.
     fn vector(&self, node: &Node) -> Result<[Field; 3]> {
+        let mut vector = [const { Field::Constant(0.0) }; 3];
+        for (component, item) in vector.iter_mut().zip(self.components(node)?) {
+            *component = self.field(item)?;
+        }
+        Ok(vector)
+    }
+
+    /// A vector that can be differentiated.
+    fn smooth_vector(&self, node: &Node) -> Result<Vec<Differentiable>> {
+        let variables = &["x", "y", "z"][..self.dimension];
+        let component = |item: &Node| match &item.value {
+            Value::Integer(_) | Value::Float(_) => {
+                Differentiable::parse(&item.number()?.to_string(), &item.place, variables)
+            }
+            Value::String(text) => Differentiable::parse(text, &item.place, variables),
+            _ => Err(item.expected("a number or an expression")),
+        };
+        self.components(node)?.iter().map(component).collect()
+    }
+
+    /// The components of a vector: as many as space has.
+    fn components<'n>(&self, node: &'n Node) -> Result<&'n [Node]> {
         let items = node.list()?;
         if items.len() != self.dimension {
             let place = items.get(self.dimension).map_or(&node.place, |extra| &extra.place);
             let count = format!("a vector has {} components here, not {}", self.dimension, items.len());
             return Err(Error::scene(place, count).help(format!("the dimension of the scene is {}", self.dimension)));
         }
-        let mut vector = [const { Field::Constant(0.0) }; 3];
-        for (component, item) in vector.iter_mut().zip(items) {
-            *component = self.field(item)?;
-        }
-        Ok(vector)
+        Ok(items)
     }
 
     fn plane(&self, keys: &Keys) -> Result<Plane> {

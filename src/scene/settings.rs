@@ -115,6 +115,7 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
     map.insert("load".into(), load.collect());
     map.insert("spring".into(), spring.collect());
     insert(&mut map, "force", body.force.as_ref().map(|force| vector(force, dimension)));
+    insert(&mut map, "exact", body.exact.as_ref().map(|exact| exact.iter().map(|u| json!(u.plain().text())).collect()));
     map.into()
 }
 

@@ -3,7 +3,7 @@
 //! Everything that names a mesh group keeps its [`Located`] place, so that a refusal after the mesh was
 //! read (missing group, surface of the wrong body) still points into the scene file.
 
-use super::expression::Field;
+use super::expression::{Differentiable, Field};
 use super::layer::LayerSpec;
 use super::{ElasticitySpec, RegionSpec};
 use crate::error::{Located, Place};
@@ -109,6 +109,8 @@ pub struct BodySpec {
     pub spring: Vec<SpringSpec>,
     /// Body force density (x, y, z), if any.
     pub force: Option<[Field; 3]>,
+    /// A known displacement to compare with, if any: as many components as the scene has dimensions, of x, y (z).
+    pub exact: Option<Vec<Differentiable>>,
 }
 
 /// Prescribed displacement components on a named group (a boundary, or points).

@@ -4,8 +4,8 @@
 
 use crate::scenes::{Case, Expect};
 use std::path::Path;
-use winkler::commands::report;
 use winkler::commands::run::{self, Clock};
+use winkler::commands::{report, results};
 use winkler::ddm::{Silent, Status};
 use winkler::error::Result;
 use winkler::petsc::Session;
@@ -119,7 +119,8 @@ fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Re
     run::set_up(session, &scene, &mut prepared, &mut clock)?;
     let outcome = run::iterate(&scene, &mut prepared, &mut Silent, &mut clock)?;
     let seconds = clock.total();
-    let report = report::report(session, &scene, &prepared, &outcome, &clock);
+    let recovered = results::recover(&prepared, &outcome);
+    let report = report::report(session, &scene, &prepared, &outcome, &recovered, &clock);
     let model = &prepared.problem.model;
     Ok(Answer {
         status: report.status,

@@ -41,7 +41,7 @@ impl Decoder<'_> {
     }
 
     fn body(&self, node: &Node) -> Result<BodySpec> {
-        let own = ["name", "order", "fix", "load", "spring", "force", "region"];
+        let own = ["name", "order", "fix", "load", "spring", "force", "exact", "region"];
         let keys = Keys::open(node, "[[body]]", &[&own[..1], &elasticity::KEYS, &own[1..]].concat())?;
         let items = |key: &str| keys.get(key).map_or(Ok(&[][..]), Node::list);
         Ok(BodySpec {
@@ -53,6 +53,7 @@ impl Decoder<'_> {
             load: items("load")?.iter().map(|item| self.load(item)).collect::<Result<_>>()?,
             spring: items("spring")?.iter().map(|item| self.spring(item)).collect::<Result<_>>()?,
             force: keys.get("force").map(|force| self.vector(force)).transpose()?,
+            exact: keys.get("exact").map(|exact| self.smooth_vector(exact)).transpose()?,
         })
     }
 

@@ -144,10 +144,15 @@ impl Differentiable {
     /// Value, and derivative by the first variable, for the values of the variables in the order of
     /// [`Differentiable::parse`].
     pub fn eval(&self, values: &[f64]) -> (f64, f64) {
+        self.eval_by(0, values)
+    }
+
+    /// The same with the derivative by the variable of this number.
+    pub fn eval_by(&self, variable: usize, values: &[f64]) -> (f64, f64) {
         let mut used = [Dual::default(); MOST_VARIABLES];
         for (used, &slot) in used.iter_mut().zip(self.plain.slots.iter()) {
             let value = values.get(slot).copied().unwrap_or(f64::NAN);
-            *used = Dual { value, slope: if slot == 0 { 1.0 } else { 0.0 } };
+            *used = Dual { value, slope: if slot == variable { 1.0 } else { 0.0 } };
         }
         match self.dual.eval(&used[..self.plain.slots.len()]) {
             Ok(Dual { value, slope }) => (value, slope),
@@ -206,6 +211,7 @@ mod tests {
     fn slopes_at_zero_are_those_of_the_formula() {
         assert_eq!(parse("c^2").eval(&[0.0, 0.0]), (0.0, 0.0));
         assert_eq!(parse("(x - 2)^2*c").eval(&[0.0, 1.0]).1, 1.0);
+        assert_eq!(parse("(x - 2)^2*c").eval_by(1, &[3.0, 1.0]).1, -6.0);
         assert_eq!(parse("1e5*c + c^1.5").eval(&[0.0, 0.0]), (0.0, 1e5));
         assert_eq!(parse("sqrt(c)").eval(&[0.0, 0.0]).1, f64::INFINITY);
         assert!(parse("log(c)").eval(&[-1.0, 0.0]).0.is_nan());

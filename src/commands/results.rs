@@ -1,0 +1,66 @@
+//! What the displacements of a body say: fields for output, largest stresses with their places, errors against a known answer.
+
+use super::run::Prepared;
+use crate::ddm::Outcome;
+use crate::error::Result;
+use crate::output::BodyReport;
+use crate::output::vtu::BodyField;
+
+/// The end of a run in one body of this rank.
+pub struct Recovered {
+    /// All dofs.
+    pub state: Vec<f64>,
+    /// Displacements and stresses at the nodes.
+    pub field: BodyField,
+}
+
+/// The end of a run in every body: none for those of other ranks, and the failure of a solver that should have found the
+/// interior of a body.
+pub type All = Vec<Option<Result<Recovered>>>;
+
+/// Recovers the bodies of this rank.
+pub fn recover(prepared: &Prepared, outcome: &Outcome) -> All {
+    let bodies = prepared.problem.bodies.iter().zip(&prepared.problem.model.bodies);
+    bodies
+        .zip(&outcome.iterate.states)
+        .map(|((info, slot), state)| {
+            let body = slot.local.as_ref()?;
+            Some(body.recover(state).map(|state| Recovered { field: info.field(&state), state }))
+        })
+        .collect()
+}
+
+/// Numbers of a body in the message.
+const NUMBERS: usize = 9;
+
+/// Puts largest stresses and errors of all bodies into their reports; null where there is none. Collective.
+pub fn fill(prepared: &Prepared, recovered: &All, reports: &mut [BodyReport]) {
+    let mut message = vec![0.0; NUMBERS * reports.len()];
+    let bodies = prepared.problem.bodies.iter().zip(recovered);
+    for (mine, (info, recovered)) in message.chunks_exact_mut(NUMBERS).zip(bodies) {
+        match recovered {
+            None => {}
+            Some(Err(_)) => mine.fill(f64::NAN),
+            Some(Ok(Recovered { state, field })) => {
+                let von_mises = &field.von_mises;
+                let largest = (0..von_mises.len()).max_by(|&i, &j| von_mises[i].total_cmp(&von_mises[j])).unwrap_or(0);
+                mine[0] = von_mises[largest];
+                mine[1..4].copy_from_slice(&field.points[largest]);
+                mine[4] = field.principal.iter().map(|s| s[0]).fold(f64::NEG_INFINITY, f64::max);
+                mine[5] = field.principal.iter().map(|s| s[2]).fold(f64::INFINITY, f64::min);
+                mine[6..].copy_from_slice(&info.errors(state).unwrap_or([f64::NAN; 3]));
+            }
+        }
+    }
+    prepared.problem.model.exchange.sum(&mut message);
+    let finite = |value: f64| value.is_finite().then_some(value);
+    for (report, numbers) in reports.iter_mut().zip(message.chunks_exact(NUMBERS)) {
+        let stressed = numbers[0].is_finite();
+        report.max_von_mises = finite(numbers[0]);
+        report.max_von_mises_at = stressed.then_some([numbers[1], numbers[2], numbers[3]]);
+        report.principal_range = stressed.then_some([numbers[4], numbers[5]]);
+        report.error_l2 = finite(numbers[6]);
+        report.error_h1 = finite(numbers[7]);
+        report.error_energy = finite(numbers[8]);
+    }
+}

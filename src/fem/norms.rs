@@ -1,0 +1,78 @@
+//! Norms of errors: a finite element displacement against a known one.
+
+use super::elasticity::Elasticity;
+use super::material::strain;
+use super::space::Space;
+use super::{assemble, element, pad, quadrature};
+
+/// Norms of a displacement of one body.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Norms {
+    /// L2 norm: root of the integral of u.u.
+    pub l2: f64,
+    /// H1 seminorm: root of the integral of grad u : grad u.
+    pub h1: f64,
+    /// Energy norm: root of the integral of eps(u) : C eps(u), twice the strain energy.
+    pub energy: f64,
+}
+
+/// A known displacement at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known<const D: usize> {
+    /// u_i.
+    pub value: [f64; D],
+    /// du_i/dx_j.
+    pub gradient: [[f64; D]; D],
+}
+
+/// Norms of u_h - u and of u, in this order, over the cells of a space, by a rule exact to degree five.
+///
+/// `u` has one entry a dof. Points where there is no elasticity count without energy; assembly refuses them. The values are
+/// NaN where `exact` is not finite.
+pub fn error<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    u: &[f64],
+    exact: &dyn Fn([f64; D]) -> Known<D>,
+) -> [Norms; 2] {
+    match D {
+        2 => error_on::<D, 3>(space, elasticity, u, exact),
+        _ => error_on::<D, 4>(space, elasticity, u, exact),
+    }
+}
+
+fn error_on<const D: usize, const N: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    u: &[f64],
+    exact: &dyn Fn([f64; D]) -> Known<D>,
+) -> [Norms; 2] {
+    let rule = quadrature::simplex::<N>(5);
+    let mut squares = [Norms::default(); 2];
+    for index in 0..space.cell_count() {
+        let x = space.cell_nodes(index);
+        let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
+        let nodal: Vec<[f64; D]> = cell.iter().map(|&node| std::array::from_fn(|c| u[D * node as usize + c])).collect();
+        for (l, weight) in rule.points.iter().zip(&rule.weights) {
+            let Some((gradient, measure)) = element::gradients::<D, N>(space.order, &x, l) else { continue };
+            let phi = element::values(space.order, l);
+            let at = assemble::interpolate(&x, &phi);
+            let known = exact(at);
+            let (value, slope) = (assemble::interpolate(&nodal, &phi), space.displacement_gradient(cell, &gradient, u));
+            let difference = Known {
+                value: std::array::from_fn(|i| value[i] - known.value[i]),
+                gradient: std::array::from_fn(|i| std::array::from_fn(|j| slope[i][j] - known.gradient[i][j])),
+            };
+            let material = elasticity.at(index, pad(at)).ok();
+            for (sum, field) in squares.iter_mut().zip([difference, known]) {
+                let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+                let stress = material.map_or([0.0; 6], |material| material.stress(&field.gradient));
+                let energy: f64 = stress.iter().zip(strain(&field.gradient)).map(|(s, e)| s * e).sum();
+                sum.l2 += weight * measure * square(&field.value);
+                sum.h1 += weight * measure * square(field.gradient.as_flattened());
+                sum.energy += weight * measure * energy;
+            }
+        }
+    }
+    squares.map(|sum| Norms { l2: sum.l2.sqrt(), h1: sum.h1.sqrt(), energy: sum.energy.sqrt() })
+}
