@@ -84,6 +84,26 @@ fn oblique_fibres_in_space() {
     assert!(near(run.number("F1"), energy, 1e-9), "{} {energy}", run.number("F1"));
 }
 
+/// A uniaxial state told one per cent too large is wrong by 0.01/1.01 in every norm, and its stresses are known.
+#[test]
+fn known_displacements_and_stresses() {
+    let told: Vec<String> = ["0.3*x", "0.3*y", "-z"].iter().map(|u| format!("\"1.01*10/2.1e5*({u})\"")).collect();
+    let sets = [format!("body.0.exact=[{}]", told.join(", "))];
+    let run = solve_set(case("patch-3d"), &sets).converged();
+    for norm in ["error_l2", "error_h1", "error_energy"] {
+        let error = run.number(&format!("bodies/0/{norm}"));
+        assert!(near(error, 0.01 / 1.01, 1e-8), "{norm} {error}");
+        assert!(run.report["bodies"][1][norm].is_null());
+    }
+    for body in 0..2 {
+        let stress = |key: &str| run.number(&format!("bodies/{body}/{key}"));
+        assert!(near(stress("max_von_mises"), 10.0, 1e-9));
+        assert!(stress("principal_range/0").abs() < 1e-8 && near(stress("principal_range/1"), -10.0, 1e-9));
+        let height = stress("max_von_mises_at/2");
+        assert!((body as f64..=body as f64 + 1.0).contains(&height), "{height}");
+    }
+}
+
 /// The same blocks by their 21 constants, and in axes given in another way: the same run.
 #[test]
 fn one_material_in_several_words() {

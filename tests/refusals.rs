@@ -54,6 +54,17 @@ fn keys_and_types() {
 }
 
 #[test]
+fn known_displacements() {
+    let exact = |value: &str, words: &[&str]| {
+        groove_refused("name = \"lower\"\n", &format!("name = \"lower\"\nexact = {value}\n"), "exact =", words);
+    };
+    exact("[0, \"sqrt(x - 5)\"]", &["the known displacement is NaN at (", "help"]);
+    exact("[0, 0, 0]", &["2 components here, not 3"]);
+    exact("[0, \"2*z\"]", &["`z`"]);
+    exact("[0, true]", &["a number or an expression"]);
+}
+
+#[test]
 fn plane_bodies_in_space() {
     let scene = Scene::edited("groove", "dimension = 2 ", "dimension = 3 ");
     refused(&solve(&scene, &[]), MESH, &["groove.geo", "no physical group holds volumes", "dimension = 3", "help"]);
