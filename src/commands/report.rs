@@ -11,7 +11,9 @@ use crate::discretize::Problem;
 use crate::estimate::Estimate;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::vtu::Grid;
-use crate::output::{BodyReport, ContactTable, EstimateReport, ForecastReport, InnerTimes, PairReport, Report, sci};
+use crate::output::{
+    BodyReport, ContactTable, EstimateReport, ForecastReport, InnerTimes, IntervalReport, PairReport, Report, sci,
+};
 use crate::petsc::Session;
 use crate::scene::Scene;
 
@@ -132,6 +134,12 @@ pub fn report(
         method: outcome.method.to_owned(),
         spectrum: outcome.spectrum.map(|(low, high)| [low, high]),
         forecast: forecast(outcome),
+        gamma_interval: outcome.interval.map(|interval| IntervalReport {
+            theorem: Some(interval.theorem()).filter(|&end| end > 0.0),
+            descent: interval.descent(),
+            lower: interval.lower,
+            upper: interval.upper,
+        }),
         error_estimate: finite(last.map(|row| row.error)),
         factorizations: counts.factorizations + coupled(|counts| counts.factorizations as f64) as usize,
         inner_times: InnerTimes {

@@ -277,6 +277,7 @@ pub fn iterate(
         },
         methods: std::mem::take(&mut prepared.methods),
         stop: StopRule { residual: stop.residual, increment: stop.increment, iterations: stop.iterations },
+        interval: scene.method.interval,
         balance: prepared.problem.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _),
         start: match prepared.start.take() {
             Some(start) => start,

@@ -6,6 +6,7 @@ use super::closing::rigid_closing;
 use super::field::Field;
 use super::forecast::Forecast;
 use super::held;
+use super::interval::{Interval, interval};
 use super::layer::Layer;
 use super::lift::lift;
 use super::method::{Here, Method, Step};
@@ -30,6 +31,8 @@ pub struct Settings {
     pub methods: Vec<Box<dyn Method>>,
     /// When to stop.
     pub stop: StopRule,
+    /// Whether to find the interval (33) of gamma at the end, which takes some sweeps.
+    pub interval: bool,
     /// Who knows the error of the discretisation, if the run is to stop where more would be in vain.
     pub balance: Option<Box<dyn Discretisation>>,
     /// Start: outer normal displacement of all contact rows (layout of a trace vector).
@@ -99,6 +102,8 @@ pub struct Outcome {
     pub spectrum: Option<(f64, f64)>,
     /// What it would still need to the residual that is asked for, where that can be told.
     pub forecast: Option<Forecast>,
+    /// The interval (33) of gamma, if it was asked for and can be told.
+    pub interval: Option<Interval>,
 }
 
 /// Why no method can find a solution: a motion that nothing can hold, or loads that push a body off for ever.
@@ -197,6 +202,11 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         last = Some(Last { sweep, relaxed, length, moved, pressure: layer.pressure });
     };
     settings.methods[active].conclude(model, &layer, &weight);
+    let solved = matches!(status, Status::Converged | Status::Attainable);
+    let interval = match (&rows[..], settings.interval && solved) {
+        ([first, .., last], true) => interval(model, &layer, &weight, first.energy - last.energy)?,
+        _ => None,
+    };
     if let Some(origin) = origin {
         origin.give(model, &mut iterate);
     }
@@ -215,5 +225,6 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         coupled: settings.methods.iter().map(|method| method.coupled()).collect(),
         spectrum: method.spectrum(),
         forecast,
+        interval,
     })
 }

@@ -30,11 +30,56 @@ pub fn respond(
             None => Vec::new(),
         });
     }
-    let spring: Vec<f64> = model.weight.iter().zip(&layer.tangent).map(|(w, k)| w * k).collect();
+    let spring = springs(model, &layer.tangent);
+    let solution = solve(model, layer, weight, residual, &spring, (reduction, MOST))?;
+    Ok((solution.x, solution.energy))
+}
+
+/// Extreme eigenvalues of G^-1 (K + B' diag(omega slope) B) among the displacements that forces at the contact rows cause, by at
+/// most `most` Lanczos steps from the forces `rows` (layout of a trace vector); `weight` as in [`respond`].
+///
+/// # Errors
+/// Failures of the solver library.
+pub fn spectrum(
+    model: &mut Model,
+    layer: &Layer,
+    weight: &[f64],
+    slope: &[f64],
+    rows: &[f64],
+    most: usize,
+) -> Result<Option<(f64, f64)>> {
+    let mut residual = Vec::new();
+    for index in 0..model.bodies.len() {
+        let force = model.of_body(index, rows);
+        residual.push(model.bodies[index].local.as_ref().map_or(Vec::new(), |body| {
+            let mut load = vec![0.0; body.len()];
+            body.add_rows(&force, &mut load);
+            load
+        }));
+    }
+    let spring = springs(model, slope);
+    Ok(solve(model, layer, weight, residual, &spring, (SETTLED, most))?.spectrum)
+}
+
+/// Fall of the residual after which extreme eigenvalues have settled.
+const SETTLED: f64 = 1e-9;
+
+/// omega slope at the points.
+fn springs(model: &Model, slope: &[f64]) -> Vec<f64> {
+    model.weight.iter().zip(slope).map(|(w, k)| w * k).collect()
+}
+
+fn solve(
+    model: &mut Model,
+    layer: &Layer,
+    weight: &[f64],
+    residual: Vec<Vec<f64>>,
+    spring: &[f64],
+    (reduction, most): (f64, usize),
+) -> Result<cg::Solution> {
     let mut sweeper = Sweeper::default();
     let sweep = sweeper.precondition(model, residual.clone(), &residual)?;
     let mut here =
         Here { model, sweeper: &mut sweeper, k: 0, layer, weight, sweep: &sweep, residual: 1.0, target: reduction };
-    let solution = cg::solve(&mut here, &spring, reduction, MOST)?;
-    Ok((solution.x, solution.energy))
+    cg::solve(&mut here, spring, reduction, most)
 }

@@ -65,6 +65,8 @@ pub struct Report {
     pub spectrum: Option<[f64; 2]>,
     /// What more iterations would bring.
     pub forecast: Option<ForecastReport>,
+    /// Interval (33) of gamma, if it was asked for.
+    pub gamma_interval: Option<IntervalReport>,
     /// Relative increment of the last update, the largest of the bodies.
     pub increment: Option<f64>,
     /// Functional F1 (25).
@@ -99,6 +101,19 @@ pub struct ForecastReport {
     pub best_gamma: Option<f64>,
     /// The factor of `robin` with that gamma.
     pub best_factor: Option<f64>,
+}
+
+/// Theorem 3 on the level set of the start; intervals of gamma begin at zero, which is not in them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct IntervalReport {
+    /// End of the interval (33), 2 lower/upper^2; null where `lower` is zero.
+    pub theorem: Option<f64>,
+    /// End of the interval in which F1 falls in every step, 2/upper.
+    pub descent: f64,
+    /// B_Phi: F1'' is at least this times G.
+    pub lower: f64,
+    /// D_Phi: and at most this times G.
+    pub upper: f64,
 }
 
 /// Wall seconds of the inner solvers.

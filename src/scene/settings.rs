@@ -209,6 +209,9 @@ fn method(method: &MethodSpec) -> Value {
     let mut map = json!({ "name": name, "psi": psi, "robin": robin, "start": start, "stop": stop });
     if method.name == MethodName::Robin {
         map["gamma"] = gamma;
+        if method.interval {
+            map["interval"] = json!(true);
+        }
     }
     if method.name == MethodName::Anderson {
         map["depth"] = json!(method.depth);

@@ -220,6 +220,8 @@ pub struct MethodSpec {
     pub robin: RobinSpec,
     /// Relaxation of the method `robin`.
     pub gamma: Gamma,
+    /// Whether `robin` finds the interval (33) of gamma at the end.
+    pub interval: bool,
     /// Earlier steps that the method `anderson` mixes.
     pub depth: usize,
     /// Start of the iteration.
@@ -383,6 +385,7 @@ impl Default for MethodSpec {
             psi: Zone::Active,
             robin: RobinSpec::Auto,
             gamma: Gamma::Stationary(0.6),
+            interval: false,
             depth: 5,
             start: Start::Auto,
             stop: StopSpec::default(),

@@ -11,7 +11,8 @@ impl Decoder<'_> {
     pub(super) fn method(&self, node: Option<&Node>) -> Result<MethodSpec> {
         let default = MethodSpec::default();
         let Some(node) = node else { return Ok(default) };
-        let keys = Keys::open(node, "[method]", &["name", "psi", "gamma", "robin", "depth", "start", "stop"])?;
+        let keys =
+            Keys::open(node, "[method]", &["name", "psi", "gamma", "robin", "interval", "depth", "start", "stop"])?;
         let name = match keys.get("name") {
             Some(name) => choose(name, "method", &MethodName::ALL)?,
             None => {
@@ -26,10 +27,21 @@ impl Decoder<'_> {
             psi: keys.get("psi").map_or(Ok(default.psi), |psi| self.zone(psi))?,
             robin: keys.get("robin").map_or(Ok(usual), robin)?,
             gamma: keys.get("gamma").map_or(Ok(default.gamma), gamma)?,
+            interval: self.interval(&keys, name)?,
             depth: keys.get("depth").map_or(Ok(default.depth), depth)?,
             start: keys.get("start").map_or(Ok(default.start), |start| self.start(start))?,
             stop: keys.get("stop").map_or(Ok(default.stop), stop)?,
         })
+    }
+
+    fn interval(&self, keys: &Keys, name: MethodName) -> Result<bool> {
+        let Some(node) = keys.get("interval") else { return Ok(false) };
+        if node.boolean()? && name != MethodName::Robin {
+            return Err(node
+                .refuse("only the method `robin` has an interval of gamma")
+                .help("name = \"robin\", or leave `interval` away"));
+        }
+        node.boolean()
     }
 
     fn zone(&self, node: &Node) -> Result<Zone> {

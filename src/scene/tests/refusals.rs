@@ -118,6 +118,8 @@ const CASES: &[Case] = &[
     ("power = { B = 2.5e-5, a = 0.5 }", "pressure = \"c\", up_to = 0", "0", "the end of the law is 0", ""),
     ("power = { B = 2.5e-5, a = 0.5 }", "linear = { stiffness = 1 }, up_to = 1", "up_to", "`up_to` without an expression", ""),
     ("[method]", "[[contact]]\nbetween = [\"upper_bottom\", \"lower_top\"]\nlayer.linear.stiffness = 1\n[method]", "\"upper_bottom\"", "a second contact of `upper_bottom` and `lower_top`", ""),
+    // The method.
+    ("[method]", "[method]\nname = \"ncg\"\ninterval = true", "true", "only the method `robin` has an interval of gamma", "name = \"robin\""),
     // The mesh.
     ("geo = \"groove.geo\"", "geo = \"groove.geo\", msh = \"groove.msh\"", "msh", "the mesh has both `geo` and `msh`", ""),
     ("geo = \"groove.geo\"", "msh = \"groove.msh\"", "set", "`set` for a finished mesh", ""),

@@ -1,0 +1,140 @@
+//! The interval (33) of gamma, in which Theorem 3 promises convergence, for the forms that a run ended with.
+//!
+//! The theorem asks for constants of F1' over all displacements. A layer has them on bounded ranges only, so they are taken over
+//! the level set {F1 <= F1(u0)} of the start, which an iteration that descends never leaves.
+
+use super::held;
+use super::layer::Layer;
+use super::linear;
+use super::model::Model;
+use crate::contact::law::LayerLaw;
+use crate::error::Result;
+
+/// Bounds of F1'' in the norm of the Robin form G over a level set: `lower` G <= F1'' <= `upper` G.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// B_Phi of Theorem 3; zero if nothing but contact, which may open, holds a body.
+    pub lower: f64,
+    /// D_Phi.
+    pub upper: f64,
+}
+
+impl Interval {
+    /// 2 gamma* = 2 B_Phi B_G / D_Phi^2 of (33), the end of the interval that begins at zero. In the norm of G, B_G is one.
+    pub fn theorem(&self) -> f64 {
+        2.0 * self.lower / (self.upper * self.upper)
+    }
+
+    /// 2 / D_Phi: below it F1 falls in every step, as F1' is a gradient, which the theorem does not ask for.
+    pub fn descent(&self) -> f64 {
+        2.0 / self.upper
+    }
+}
+
+/// Steps of the Lanczos iterations at most.
+const MOST: usize = 300;
+
+/// Places between the ends of a range where a tangent is looked at, for laws that neither stiffen nor soften all the way.
+const BETWEEN: usize = 32;
+
+/// The interval at a solution with this `layer` and Robin term `weight` = omega psi kappa; `excess` is F1(u0) - F1 of the
+/// solution. None if the eigenvalues cannot be found. Collective: solves with G.
+///
+/// # Errors
+/// Failures of the solver library.
+pub fn interval(model: &mut Model, layer: &Layer, weight: &[f64], excess: f64) -> Result<Option<Interval>> {
+    let (mut least, mut most) = (vec![0.0; model.points()], vec![0.0; model.points()]);
+    for (i, pair) in model.pairs.iter().enumerate() {
+        for q in model.range(i) {
+            let point = q - model.offset[i];
+            let range = range(&*pair.law, point, layer.compression[q], excess.max(0.0) / model.weight[q]);
+            (least[q], most[q]) = tangents(&*pair.law, point, range);
+        }
+    }
+    let start = rows(model);
+    let Some((_, upper)) = linear::spectrum(model, layer, weight, &most, &start, MOST)? else { return Ok(None) };
+    let springs: Vec<f64> = model.weight.iter().zip(&least).map(|(w, k)| w * k).collect();
+    let lower = match held::joint_is_weak(model, &springs) {
+        true => 0.0,
+        false => linear::spectrum(model, layer, weight, &least, &start, MOST)?.map_or(0.0, |(low, _)| low),
+    };
+    // modes without a trace have the eigenvalue one
+    Ok(Some(Interval { lower: lower.min(1.0), upper: upper.max(1.0) }))
+}
+
+/// Forces on the contact rows in which every mode has a part.
+fn rows(model: &Model) -> Vec<f64> {
+    let points = model.points();
+    let share = |i: usize| 0.1 + (0.618_033_988_749_895 * (i + 1) as f64).fract();
+    (0..2 * points).map(|i| model.weight[i % points] * share(i)).collect()
+}
+
+/// Compressions that a point can have in the level set. F1 is convex, and what it exceeds its minimum by is at least what any
+/// one point does by itself: P(c) - P(c0) - p(c0) (c - c0) <= `excess`, the same per area.
+fn range(law: &dyn LayerLaw, point: usize, c: f64, excess: f64) -> (f64, f64) {
+    let here = law.response(point, c);
+    let rise = |other: f64| law.response(point, other).energy - here.energy - here.pressure * (other - c);
+    let within = |other: f64| rise(other) <= excess;
+    // nothing changes below zero: an open point is open
+    let low = if c <= 0.0 { c } else { edge(|way| within(c - way), c) };
+    let first = c.max(0.0);
+    let mut way = f64::MIN_POSITIVE.sqrt().max(f64::EPSILON * first);
+    while within(first + way) && way.is_finite() {
+        way *= 4.0;
+    }
+    let high = edge(|way| within(first + way), way);
+    ((c - low).max(0.0), first + high)
+}
+
+/// The largest way up to `most` that is still inside, by bisection.
+fn edge(inside: impl Fn(f64) -> bool, most: f64) -> f64 {
+    if inside(most) {
+        return most;
+    }
+    let (mut low, mut high) = (0.0, most);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if inside(middle) { low = middle } else { high = middle }
+    }
+    // one that is just outside: a bound must not be too small
+    high
+}
+
+/// Least and largest p' over a range of compressions.
+fn tangents(law: &dyn LayerLaw, point: usize, (low, high): (f64, f64)) -> (f64, f64) {
+    let places = (0..=BETWEEN).map(|i| low + (high - low) * i as f64 / BETWEEN as f64);
+    let all = places.map(|c| law.response(point, c).tangent);
+    all.fold((f64::INFINITY, 0.0), |(least, most), k| (least.min(k), f64::max(most, k)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::law::{Linear, Power};
+
+    /// The energy of a linear layer exceeds by k (c - c0)^2/2.
+    #[test]
+    fn ranges_of_a_linear_layer() {
+        let law = Linear { stiffness: 4.0 };
+        let (low, high) = range(&law, 0, 3.0, 8.0);
+        assert!((low - 1.0).abs() < 1e-12 && (high - 5.0).abs() < 1e-12, "{low} {high}");
+        assert_eq!(tangents(&law, 0, (low, high)), (4.0, 4.0));
+        // with 18 it may open: k 3^2/2
+        let (low, high) = range(&law, 0, 3.0, 18.1);
+        assert!(low == 0.0 && high > 6.0);
+        assert_eq!(tangents(&law, 0, (low, high)), (0.0, 4.0));
+        // an open point closes by k c^2/2
+        let (low, high) = range(&law, 0, -7.0, 8.0);
+        assert!(low == 0.0 && (high - 2.0).abs() < 1e-12);
+    }
+
+    /// (c/B)^2 from c0 = 0: the energy is c^3/(3 B^2), the largest tangent 2 c/B^2.
+    #[test]
+    fn a_layer_that_stiffens() {
+        let law = Power::new(0.5, 0.5);
+        let range = range(&law, 0, 0.0, 36.0);
+        assert!((range.1 - 3.0).abs() < 1e-12);
+        let (least, most) = tangents(&law, 0, range);
+        assert!(least == 0.0 && (most - 24.0).abs() < 1e-10);
+    }
+}
