@@ -337,7 +337,7 @@ pub fn robin_zone(scene: &Scene) -> RobinZone {
 ///
 /// # Errors
 /// A start that is not finite at a contact point.
-pub fn start(scene: &Scene, problem: &Problem) -> Result<Vec<f64>> {
+pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Vec<f64>> {
     let model = &problem.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
@@ -347,7 +347,7 @@ pub fn start(scene: &Scene, problem: &Problem) -> Result<Vec<f64>> {
     if let Start::Normal(field) = &scene.method.start {
         let positions = model.pairs.iter().flat_map(|pair| &pair.position);
         for (q, &x) in positions.enumerate() {
-            let value = field.eval(x);
+            let value = field.eval(x) / factor;
             if !value.is_finite() {
                 return Err(placed(field, format!("the start is {value} at {}", point(x))));
             }

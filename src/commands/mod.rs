@@ -15,6 +15,7 @@ pub mod results;
 mod reuse;
 pub mod run;
 pub mod solve;
+pub mod steps;
 pub mod sweep;
 
 use crate::error::Result;

@@ -4,6 +4,7 @@ use super::balance;
 use super::preflight;
 use super::results;
 use super::run::{Clock, Prepared};
+use super::steps;
 use crate::contact::ContactPair;
 use crate::ddm::forecast::{best_factor, best_gamma};
 use crate::ddm::{BodyCounts, Model, Outcome, Status};
@@ -31,16 +32,16 @@ pub fn status_name(status: &Status) -> &'static str {
     }
 }
 
-/// Exit code of a run that ended with this status.
-pub fn exit_code(status: &Status) -> i32 {
-    match status {
-        Status::Converged | Status::Attainable => 0,
+/// Exit code of a run that ended like this.
+pub fn exit_code(prepared: &Prepared, outcome: &Outcome) -> i32 {
+    match outcome.status {
+        Status::Converged | Status::Attainable if steps::warnings(&prepared.steps).is_empty() => 0,
         _ => 1,
     }
 }
 
 /// The status in words: what happened, to which body, in which iteration, and what to try.
-fn message(outcome: &Outcome, model: &Model) -> String {
+pub fn message(outcome: &Outcome, model: &Model) -> String {
     let k = outcome.iterations;
     let name = |body: &usize| &model.bodies[*body].name;
     let residual = outcome.rows.last().map_or(f64::NAN, |row| row.residual);
@@ -158,12 +159,14 @@ pub fn report(
         factorizations_avoided: counts.factorizations_avoided,
         body_solves_skipped: outcome.solves_skipped,
         messages: model.exchange.messages(),
+        steps: prepared.steps.clone(),
         residual: finite(last.map(|row| row.residual)),
         increment: finite(last.map(|row| row.increment)),
         f1: finite(last.map(|row| row.energy)),
         pairs: (0..model.pairs.len()).map(|i| pair_report(scene, prepared, outcome, i)).collect(),
         ..headline(session, scene, prepared, &shared.solvers, clock)
     };
+    report.warnings.extend(steps::warnings(&prepared.steps));
     results::fill(prepared, recovered, &mut report.bodies);
     let balances = balance::gather(scene, prepared, outcome, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
@@ -290,7 +293,7 @@ pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
 }
 
 /// Sides of pair `i` in the order of the scene.
-fn sides(prepared: &Prepared, i: usize) -> [usize; 2] {
+pub fn sides(prepared: &Prepared, i: usize) -> [usize; 2] {
     if prepared.problem.contacts[i].swapped { [1, 0] } else { [0, 1] }
 }
 

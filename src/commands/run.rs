@@ -2,12 +2,14 @@
 
 use super::inner::Inner;
 use super::method;
+use super::steps;
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::method::Method;
 use crate::ddm::{self, BodySlot, Observer, Outcome, RobinRule, Settings, Status, StopRule};
 use crate::discretize::{self, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
+use crate::output::StepReport;
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::scene::{MeshSource, Order, RobinSpec, Scene};
@@ -62,6 +64,8 @@ pub struct Prepared {
     pub methods: Vec<Box<dyn Method>>,
     /// Why the inner solver is what it is where no PETSc option was typed.
     pub choice: String,
+    /// Load steps so far.
+    pub steps: Vec<StepReport>,
     /// Warnings.
     pub warnings: Vec<String>,
     /// Names of the condensed bodies, with which another run can go on.
@@ -126,7 +130,15 @@ fn build<const D: usize>(
     clock.phase("discretize");
     let warnings = warnings(session, &problem);
     let condensed = inner.condensed();
-    Ok(Prepared { problem, start: None, methods: Vec::new(), choice: inner.reason(), warnings, condensed })
+    Ok(Prepared {
+        problem,
+        start: None,
+        methods: Vec::new(),
+        steps: Vec::new(),
+        choice: inner.reason(),
+        warnings,
+        condensed,
+    })
 }
 
 /// What the decoder of the scene cannot know.
@@ -267,6 +279,7 @@ pub fn iterate(
     clock: &mut Clock,
 ) -> Result<Outcome> {
     let stop = &scene.method.stop;
+    prepared.steps.clear();
     let mut settings = Settings {
         zone: discretize::robin_zone(scene),
         robin: match scene.method.robin {
@@ -281,10 +294,16 @@ pub fn iterate(
         balance: prepared.problem.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _),
         start: match prepared.start.take() {
             Some(start) => start,
-            None => discretize::start(scene, &prepared.problem)?,
+            None if scene.method.steps.is_empty() => discretize::start(scene, &prepared.problem, 1.0)?,
+            // each step has its own
+            None => Vec::new(),
         },
+        resume: None,
     };
-    let outcome = ddm::solve(&mut prepared.problem.model, &mut settings, observer)?;
+    let outcome = match scene.method.steps.is_empty() {
+        true => ddm::solve(&mut prepared.problem.model, &mut settings, observer)?,
+        false => steps::iterate(scene, prepared, &mut settings, observer)?,
+    };
     clock.phase("iterate");
     Ok(outcome)
 }

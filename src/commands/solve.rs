@@ -87,7 +87,7 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
     }
     written?;
     recovered.into_iter().flatten().collect::<Result<Vec<_>>>()?;
-    Ok(if plan.limit.is_some() { 1 } else { report::exit_code(&outcome.status) })
+    Ok(if plan.limit.is_some() { 1 } else { report::exit_code(&prepared, &outcome) })
 }
 
 /// A report as JSON text, ended by a newline.
@@ -102,7 +102,7 @@ pub fn to_json(report: &Report) -> Result<String> {
 
 fn history(folder: &Folder, scene: &Scene) -> Result<HistoryWriter> {
     let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
-    HistoryWriter::create(folder, &names)
+    HistoryWriter::create(folder, &names, !scene.method.steps.is_empty())
 }
 
 /// Table and file of the iterations.

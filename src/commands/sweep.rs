@@ -52,7 +52,7 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
         clock.total();
         let recovered = results::recover(&prepared, &outcome);
         let report = report::report(session, scene, &prepared, &outcome, &recovered, &clock);
-        exit = exit.max(report::exit_code(&outcome.status));
+        exit = exit.max(report::exit_code(&prepared, &outcome));
         if !first {
             before = Some((scene, prepared));
             continue;

@@ -9,6 +9,7 @@ use crate::linalg::Csr;
 use crate::scene::{LayerSpec, Order};
 use nalgebra::DMatrix;
 use std::collections::{BTreeMap, HashMap};
+use std::rc::Rc;
 
 /// A pair of surfaces, discretised: n points with one pressure each.
 ///
@@ -46,7 +47,7 @@ pub struct ContactPair {
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
     /// Law of the layer.
-    pub law: Box<dyn LayerLaw>,
+    pub law: Rc<dyn LayerLaw>,
     /// Facets of side a without a partner, and all of them.
     pub uncovered: (usize, usize),
 }
@@ -129,7 +130,7 @@ pub fn assemble<const D: usize>(
         resultant: [Vec::new(), Vec::new()],
         moment: [Vec::new(), Vec::new()],
         along_curve: D == 2,
-        law,
+        law: law.into(),
         uncovered: (covered.iter().filter(|&&c| !c).count(), covered.len()),
     };
     for q in 0..pair.nodes.len() {

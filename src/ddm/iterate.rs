@@ -35,6 +35,8 @@ pub struct Settings {
     pub interval: bool,
     /// Who knows the error of the discretisation, if the run is to stop where more would be in vain.
     pub balance: Option<Box<dyn Discretisation>>,
+    /// A displacement to start from as it is, once, in place of a start.
+    pub resume: Option<Field>,
     /// Start: outer normal displacement of all contact rows (layout of a trace vector).
     pub start: Vec<f64>,
 }
@@ -125,7 +127,9 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     let clock = Instant::now();
     let mut early = hopeless(model);
     let mut iterate = Field::rest(model);
-    if early.is_none() {
+    if let Some(field) = settings.resume.take() {
+        iterate = field;
+    } else if early.is_none() {
         let (lifted, failed) = lift(model, &settings.start)?;
         iterate = lifted;
         early = failed.map(|(body, reason)| Status::InnerSolver { body, reason });

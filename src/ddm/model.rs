@@ -88,9 +88,16 @@ impl Model {
             offset.push(offset[offset.len() - 1] + pair.len());
         }
         let weight = pairs.iter().flat_map(|pair| pair.weight.iter().copied()).collect();
-        let free_gap = |pair: &ContactPair, q: usize| pair.gap[q] - pair.prescribed[0][q] - pair.prescribed[1][q];
-        let gap = pairs.iter().flat_map(|pair| (0..pair.len()).map(|q| free_gap(pair, q))).collect();
-        Self { bodies, pairs, offset, weight, gap, exchange }
+        let mut model = Self { bodies, pairs, offset, weight, gap: Vec::new(), exchange };
+        model.scale_gaps(1.0);
+        model
+    }
+
+    /// Makes all gaps 1/`factor` of what they are between the meshes: displacements are in shares `factor` of themselves.
+    pub fn scale_gaps(&mut self, factor: f64) {
+        let free_gap =
+            |pair: &ContactPair, q: usize| pair.gap[q] / factor - pair.prescribed[0][q] - pair.prescribed[1][q];
+        self.gap = self.pairs.iter().flat_map(|pair| (0..pair.len()).map(|q| free_gap(pair, q))).collect();
     }
 
     /// Makes a trace known: states are from now on relative to a displacement with that trace, as if supports prescribed it.

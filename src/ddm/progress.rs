@@ -3,6 +3,8 @@
 /// One row of the iteration history: iterate u^k and the step that leads on from it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Row {
+    /// Load step, from 1 on; 0 where there are none.
+    pub step: usize,
     /// k: updates made so far.
     pub iteration: usize,
     /// Relative residual of the iterate (docs/theory.md).

@@ -13,24 +13,28 @@ pub struct HistoryWriter {
     path: PathBuf,
     csv: csv::Writer<File>,
     bodies: usize,
+    /// Whether rows have the column of load steps.
+    steps: bool,
     failure: Option<Error>,
 }
 
 impl HistoryWriter {
-    /// Opens `history.csv` and writes its header; `bodies` are the names in the order of [`Row::increments`].
+    /// Opens `history.csv` and writes its header; `bodies` are the names in the order of [`Row::increments`]. With `steps` each row
+    /// begins with its load step.
     ///
     /// # Errors
     /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
-    pub fn create<S: AsRef<str>>(folder: &Folder, bodies: &[S]) -> Result<Self> {
+    pub fn create<S: AsRef<str>>(folder: &Folder, bodies: &[S], steps: bool) -> Result<Self> {
         let (path, file) = folder.open("history.csv")?;
         let csv = csv::Writer::from_writer(file);
-        let mut header: Vec<String> = ["iteration", "residual", "error", "increment"].map(String::from).into();
+        let mut header: Vec<String> = if steps { vec!["step".into()] } else { Vec::new() };
+        header.extend(["iteration", "residual", "error", "increment"].map(String::from));
         header.extend(bodies.iter().map(|body| format!("increment_{}", body.as_ref())));
         header.extend(
             ["gamma", "energy", "closed", "points", "sweeps", "factorizations", "inner_iterations", "seconds"]
                 .map(String::from),
         );
-        let mut history = Self { path, csv, bodies: bodies.len(), failure: None };
+        let mut history = Self { path, csv, bodies: bodies.len(), steps, failure: None };
         history.line(&header);
         history.failure.take().map_or(Ok(history), Err)
     }
@@ -55,7 +59,9 @@ impl HistoryWriter {
 
 impl Observer for HistoryWriter {
     fn row(&mut self, row: &Row) {
-        let mut fields = vec![row.iteration.to_string(), field(row.residual), field(row.error), field(row.increment)];
+        let mut fields = if self.steps { vec![row.step.to_string()] } else { Vec::new() };
+        fields.push(row.iteration.to_string());
+        fields.extend([row.residual, row.error, row.increment].map(field));
         // Row 0 may come without increments.
         fields.extend((0..self.bodies).map(|body| row.increments.get(body).map_or(String::new(), |&v| field(v))));
         fields.extend([field(row.gamma), field(row.energy)]);
@@ -76,7 +82,7 @@ mod tests {
     fn rows_are_in_the_file_before_the_end() {
         let base = tempfile::tempdir().unwrap();
         let folder = Folder::create(base.path()).unwrap();
-        let mut history = HistoryWriter::create(&folder, &["upper", "lower"]).unwrap();
+        let mut history = HistoryWriter::create(&folder, &["upper", "lower"], true).unwrap();
         history.row(&Row {
             residual: 1.0,
             error: f64::NAN,
@@ -88,6 +94,7 @@ mod tests {
             ..Row::default()
         });
         history.row(&Row {
+            step: 2,
             iteration: 1,
             residual: 1e-9,
             error: 2e-9,
@@ -107,10 +114,10 @@ mod tests {
         assert_eq!(
             lines,
             [
-                "iteration,residual,error,increment,increment_upper,increment_lower,gamma,energy,closed,points,\
+                "step,iteration,residual,error,increment,increment_upper,increment_lower,gamma,energy,closed,points,\
                  sweeps,factorizations,inner_iterations,seconds",
-                "0,1.0,,,,,,-0.1,0,9,1,0,0,0.0",
-                "1,1e-9,2e-9,0.5,0.5,0.3333333333333333,0.25,-0.2,4,9,2,3,7,1.5",
+                "0,0,1.0,,,,,,-0.1,0,9,1,0,0,0.0",
+                "2,1,1e-9,2e-9,0.5,0.5,0.3333333333333333,0.25,-0.2,4,9,2,3,7,1.5",
             ]
         );
         assert_eq!(history.finish().unwrap(), base.path().join("history.csv"));
@@ -121,8 +128,13 @@ mod tests {
     #[test]
     fn a_full_disk_is_told_once_at_the_end() {
         let file = File::options().write(true).open("/dev/full").unwrap();
-        let mut history =
-            HistoryWriter { path: "history.csv".into(), csv: csv::Writer::from_writer(file), bodies: 0, failure: None };
+        let mut history = HistoryWriter {
+            path: "history.csv".into(),
+            csv: csv::Writer::from_writer(file),
+            bodies: 0,
+            steps: false,
+            failure: None,
+        };
         history.row(&Row::default());
         history.row(&Row::default());
         let error = history.finish().unwrap_err();

@@ -29,7 +29,7 @@ pub use history::HistoryWriter;
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, PressureSeries, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, PairReport,
-    Report, RoundReport,
+    Report, RoundReport, StepPairReport, StepReport,
 };
 pub use table::{IterationTable, Verbosity};
 pub use vtu::{BodyField, CellKind, Grid};

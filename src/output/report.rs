@@ -53,6 +53,8 @@ pub struct Report {
     pub inner_iterations: usize,
     /// Collective messages between ranks.
     pub messages: usize,
+    /// Load steps, if they were asked for, the full load included.
+    pub steps: Vec<StepReport>,
     /// Relative residual of the result.
     pub residual: Option<f64>,
     /// Estimate of the relative error of the iteration in the energy norm.
@@ -114,6 +116,34 @@ pub struct IntervalReport {
     pub lower: f64,
     /// D_Phi: and at most this times G.
     pub upper: f64,
+}
+
+/// A load step.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct StepReport {
+    /// Share of all loads and prescribed displacements.
+    pub factor: f64,
+    /// How it ended, as [`Report::status`].
+    pub status: String,
+    /// The status in words.
+    pub message: String,
+    /// Updates of the iterate in it.
+    pub iterations: usize,
+    /// Relative residual at its end.
+    pub residual: Option<f64>,
+    /// Its pairs in the order of the scene.
+    pub pairs: Vec<StepPairReport>,
+}
+
+/// A pair of surfaces at the end of a load step.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct StepPairReport {
+    /// Contact force on the side that stands first in the scene (x, y, z).
+    pub force: [f64; 3],
+    /// Largest pressure.
+    pub peak_pressure: f64,
+    /// Points with c > 0.
+    pub closed: usize,
 }
 
 /// Wall seconds of the inner solvers.
@@ -253,6 +283,9 @@ pub struct PairReport {
     pub contact_ends: Vec<[f64; 3]>,
 }
 
+/// Load steps that the closing lines list; more stand in the report only.
+const LISTED: usize = 20;
+
 impl Report {
     /// The closing lines for a terminal.
     pub fn summary(&self) -> String {
@@ -293,6 +326,15 @@ impl Report {
                 sci(error.displacement, 1),
                 sci(error.energy, 1)
             ));
+        }
+        for (index, step) in self.steps.iter().enumerate().filter(|_| self.steps.len() <= LISTED) {
+            let pairs = step.pairs.iter().map(|pair| {
+                let (peak, force) = (readable(pair.peak_pressure, 6), vector(pair.force));
+                format!("force {force}, peak pressure {peak}, {} points closed", pair.closed)
+            });
+            let (pairs, factor) = (pairs.collect::<Vec<_>>().join("; "), readable(step.factor, 4));
+            let (number, k) = (index + 1, step.iterations);
+            lines.push(format!("  step {number}, factor {factor}: {k} iterations, {}: {pairs}", step.status));
         }
         for pair in &self.pairs {
             let names = format!("  {} - {}", pair.bodies[0], pair.bodies[1]);

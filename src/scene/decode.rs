@@ -26,6 +26,12 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
     };
     let (contacts, auto) = decoder.contacts(&keys)?;
+    let method = decoder.method(keys.get("method"))?;
+    if let (Some(adapt), false) = (keys.get("adapt"), method.steps.is_empty()) {
+        return Err(adapt
+            .refuse("an adapted mesh and load steps in one scene")
+            .help("leave `adapt` or `method.steps` away"));
+    }
     Ok(Scene {
         path: path.to_owned(),
         title,
@@ -34,7 +40,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         bodies: decoder.bodies(&keys)?,
         contacts,
         auto,
-        method: decoder.method(keys.get("method"))?,
+        method,
         solver: solver(keys.get("solver"))?,
         estimate: keys.get("estimate").map_or(Ok(false), Node::boolean)?,
         adapt: keys.get("adapt").map(adapt).transpose()?,

@@ -213,6 +213,9 @@ fn method(method: &MethodSpec) -> Value {
             map["interval"] = json!(true);
         }
     }
+    if !method.steps.is_empty() {
+        map["steps"] = json!(method.steps);
+    }
     if method.name == MethodName::Anderson {
         map["depth"] = json!(method.depth);
     }

@@ -226,6 +226,8 @@ pub struct MethodSpec {
     pub depth: usize,
     /// Start of the iteration.
     pub start: Start,
+    /// Shares of the loads, one after another and 1 at last; none are no steps.
+    pub steps: Vec<f64>,
     /// When to stop.
     pub stop: StopSpec,
 }
@@ -388,6 +390,7 @@ impl Default for MethodSpec {
             interval: false,
             depth: 5,
             start: Start::Auto,
+            steps: Vec::new(),
             stop: StopSpec::default(),
         }
     }

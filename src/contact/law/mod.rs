@@ -9,6 +9,7 @@ mod linear;
 mod make;
 mod power;
 mod quadrature;
+mod scaled;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,7 @@ pub use exponential::Exponential;
 pub use linear::Linear;
 pub use make::make;
 pub use power::Power;
+pub use scaled::Scaled;
 pub use table::Table;
 pub use typed::Typed;
 

@@ -11,8 +11,11 @@ impl Decoder<'_> {
     pub(super) fn method(&self, node: Option<&Node>) -> Result<MethodSpec> {
         let default = MethodSpec::default();
         let Some(node) = node else { return Ok(default) };
-        let keys =
-            Keys::open(node, "[method]", &["name", "psi", "gamma", "robin", "interval", "depth", "start", "stop"])?;
+        let keys = Keys::open(
+            node,
+            "[method]",
+            &["name", "psi", "gamma", "robin", "interval", "depth", "start", "steps", "stop"],
+        )?;
         let name = match keys.get("name") {
             Some(name) => choose(name, "method", &MethodName::ALL)?,
             None => {
@@ -22,6 +25,13 @@ impl Decoder<'_> {
             }
         };
         let usual = if name == MethodName::Robin { RobinSpec::Tangent } else { default.robin };
+        let start = keys.get("start").map_or(Ok(default.start), |start| self.start(start))?;
+        let steps = keys.get("steps");
+        if let (Some(steps), Start::Nested) = (steps, &start) {
+            return Err(steps
+                .refuse("load steps after a start from a coarser mesh")
+                .help("each step starts from the one before: leave `start = \"nested\"` away"));
+        }
         Ok(MethodSpec {
             name,
             psi: keys.get("psi").map_or(Ok(default.psi), |psi| self.zone(psi))?,
@@ -29,7 +39,8 @@ impl Decoder<'_> {
             gamma: keys.get("gamma").map_or(Ok(default.gamma), gamma)?,
             interval: self.interval(&keys, name)?,
             depth: keys.get("depth").map_or(Ok(default.depth), depth)?,
-            start: keys.get("start").map_or(Ok(default.start), |start| self.start(start))?,
+            start,
+            steps: steps.map_or(Ok(default.steps), load_steps)?,
             stop: keys.get("stop").map_or(Ok(default.stop), stop)?,
         })
     }
@@ -100,6 +111,25 @@ fn depth(node: &Node) -> Result<usize> {
     match usize::try_from(node.whole()?) {
         Ok(depth) if (1..=50).contains(&depth) => Ok(depth),
         _ => Err(node.refuse("the depth must lie between 1 and 50")),
+    }
+}
+
+/// Most steps that a number may stand for.
+const MOST_STEPS: usize = 1000;
+
+fn load_steps(node: &Node) -> Result<Vec<f64>> {
+    if let Value::List(items) = &node.value {
+        let factors: Vec<f64> = items.iter().map(|item| item.positive("the factor")).collect::<Result<_>>()?;
+        return match factors.last() {
+            Some(1.0) => Ok(factors),
+            _ => Err(node.refuse("the last load step is not the full load").help("end the list with 1")),
+        };
+    }
+    match usize::try_from(node.whole()?) {
+        Ok(count) if (1..=MOST_STEPS).contains(&count) => {
+            Ok((1..=count).map(|step| step as f64 / count as f64).collect())
+        }
+        _ => Err(node.refuse(format!("the number of load steps must lie between 1 and {MOST_STEPS}"))),
     }
 }
 

@@ -120,6 +120,11 @@ const CASES: &[Case] = &[
     ("[method]", "[[contact]]\nbetween = [\"upper_bottom\", \"lower_top\"]\nlayer.linear.stiffness = 1\n[method]", "\"upper_bottom\"", "a second contact of `upper_bottom` and `lower_top`", ""),
     // The method.
     ("[method]", "[method]\nname = \"ncg\"\ninterval = true", "true", "only the method `robin` has an interval of gamma", "name = \"robin\""),
+    ("[method]", "[method]\nsteps = [0.5, 0.9]", "[0.5, 0.9]", "the last load step is not the full load", "with 1"),
+    ("[method]", "[method]\nsteps = [0, 1]", "0", "the factor is 0", ""),
+    ("[method]", "[method]\nsteps = 0", "0", "the number of load steps must lie between 1 and 1000", ""),
+    ("start = { normal = 1e-4 }", "start = \"nested\"\nsteps = 3", "3", "load steps after a start from a coarser mesh", "nested"),
+    ("[[contact]]", "adapt = { error = 1e-3 }\n[[contact]]", "", "", ""),
     // The mesh.
     ("geo = \"groove.geo\"", "geo = \"groove.geo\", msh = \"groove.msh\"", "msh", "the mesh has both `geo` and `msh`", ""),
     ("geo = \"groove.geo\"", "msh = \"groove.msh\"", "set", "`set` for a finished mesh", ""),
