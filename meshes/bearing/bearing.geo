@@ -1,6 +1,6 @@
 // A roller bearing in the plane, its axis the origin: an inner ring, `rollers` rollers, an outer ring. Roller 1 is at the
-// bottom, the others follow counterclockwise. Only the arcs that may touch are surfaces for contact; rollers have two more
-// arcs, forwards and backwards, where the cage holds them. Elements of size 1/n where they touch, growing into the bodies.
+// bottom, the others follow counterclockwise. Elements have the size 1/n on the arcs that may touch and
+// grow into the bodies. Rollers have two more arcs, forwards and backwards, where the cage holds them.
 SetFactory("OpenCASCADE");
 DefineConstant[ rollers = {12, Name "rollers"} ];
 DefineConstant[ clearance = {0.01, Name "clearance"} ]; // diametral; a quarter of it lies on either side of each roller
@@ -70,11 +70,7 @@ For k In {0 : rollers - 1}
   Curve Loop(p) = {p + 1 : p + 8};
   Plane Surface(p) = {p};
   Physical Surface(Sprintf("roller%g", k + 1)) = {p};
-  Physical Curve(Sprintf("roller%g_outer", k + 1)) = {p + 1};
-  Physical Curve(Sprintf("roller%g_inner", k + 1)) = {p + 5};
   Physical Curve(Sprintf("roller%g_cage", k + 1)) = {p + 3, p + 7};
-  Physical Curve(Sprintf("inner_%g", k + 1)) = {10000 + 2*k};
-  Physical Curve(Sprintf("outer_%g", k + 1)) = {20000 + 2*k};
 EndFor
 
 Physical Surface("inner") = {1};

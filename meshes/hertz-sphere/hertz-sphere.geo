@@ -1,7 +1,8 @@
 // Two spheres of radius R that touch at the origin, each cut to a block of side `size` around the contact; x = 0 and y = 0 are
-// planes of symmetry, so a quarter is left. Elements of size a/n around the contact, growing outwards.
+// planes of symmetry, so a quarter is left. Elements of size a/n around the contact, smaller at its edge, growing outwards.
 SetFactory("OpenCASCADE");
 DefineConstant[ n = {4, Name "n"} ];  // elements along the radius a = 1 that the contact has under the load of the scene
+DefineConstant[ edge = {1, Name "edge"} ]; // how many times smaller they are where that contact ends
 DefineConstant[ R = {50, Name "R"} ];
 
 a = 1;
@@ -42,6 +43,16 @@ Field[2].SizeMin = a/n;
 Field[2].DistMin = 1.2*a;
 Field[2].SizeMax = size/4;
 Field[2].DistMax = size;
-Background Field = 2;
+Field[3] = MathEval; // distance from the circle of radius a
+Field[3].F = Sprintf("Sqrt((Sqrt(x^2 + y^2) - %g)^2 + z^2)", a);
+Field[4] = Threshold;
+Field[4].InField = 3;
+Field[4].SizeMin = a/n/edge;
+Field[4].DistMin = 0.1*a;
+Field[4].SizeMax = size/4;
+Field[4].DistMax = size;
+Field[5] = Min;
+Field[5].FieldsList = {2, 4};
+Background Field = 5;
 Mesh.MeshSizeExtendFromBoundary = 0;
 Mesh.MeshSizeFromPoints = 0;

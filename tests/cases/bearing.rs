@@ -25,7 +25,12 @@ fn varied(rollers: usize, from: &str, to: &str) -> Scene {
 fn carried(run: &Run, rollers: usize) -> Vec<f64> {
     let pairs = run.report["pairs"].as_array().expect("pairs");
     assert_eq!(pairs.len(), 2 * rollers);
-    let forces: Vec<[f64; 3]> = (0..rollers).map(|k| run.forces(2 * k)[0]).collect();
+    // the inner ring is the first body, and pairs are found body by body
+    let forces: Vec<[f64; 3]> = (0..rollers).map(|k| run.forces(k)[1]).collect();
+    for k in 0..rollers {
+        let bodies: Vec<_> = (0..2).map(|side| run.text(&format!("pairs/{k}/bodies/{side}"))).collect();
+        assert_eq!(bodies, ["inner", &format!("roller{}", k + 1)]);
+    }
     let sum: [f64; 2] = std::array::from_fn(|c| forces.iter().map(|force| force[c]).sum());
     assert!(sum[0].abs() < 1e-6 * LOAD && (sum[1] + LOAD).abs() < 1e-6 * LOAD, "{sum:?}");
     forces.iter().map(|force| force[0].hypot(force[1])).collect()
