@@ -171,6 +171,20 @@ fn damaged_meshes() {
             refused(&solve(&whole, &[]), MESH, &[name]);
         }
     }
+    // a facet of no length in a loaded surface, named with its line
+    gmsh(&["-format", "msh41"], &file("text.msh"));
+    let text = std::fs::read_to_string(file("text.msh")).expect("a mesh");
+    let mut lines: Vec<&str> = text.lines().collect();
+    let elements = lines.iter().position(|line| *line == "$Elements").expect("elements");
+    let mut blocks =
+        (elements + 2..lines.len()).filter(|&i| lines[i].starts_with("1 ") && lines[i].matches(' ').count() == 3);
+    let facet = blocks.next().expect("a block of facets") + 1;
+    let words: Vec<&str> = lines[facet].split_whitespace().collect();
+    let flat = format!("{} {} {}", words[0], words[1], words[1]);
+    lines[facet] = &flat;
+    std::fs::write(file("flat.msh"), lines.join("\n") + "\n").expect("a mesh");
+    let place = format!("flat.msh:{}:", facet + 1);
+    refused(&solve(patch_with(&file("flat.msh")), &[]), MESH, &[&place, "has zero length"]);
     std::fs::write(file("empty.msh"), "").expect("a file");
     refused(&solve(patch_with(&file("empty.msh")), &[]), MESH, &["empty.msh", "$MeshFormat"]);
 }

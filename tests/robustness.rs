@@ -2,20 +2,25 @@
 
 mod common;
 
-use common::{Run, Scene, solve};
+use common::{Run, Scene, solve, solve_on};
 
 /// Two unit blocks of modulus `young` on each other, the lower one on a roller; Poisson's ratio is zero, so that each is a
 /// spring. `upper` is what holds and loads the upper one.
 fn column(young: f64, upper: &str, gap: &str, layer: &str) -> Run {
+    solve(blocks([young; 2], [3, 2], upper, gap, layer), &[]).converged()
+}
+
+/// The same blocks, each with a modulus and a number of elements along the contact.
+fn blocks([lower, young]: [f64; 2], [n1, n2]: [usize; 2], upper: &str, gap: &str, layer: &str) -> Scene {
     let geo = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/stack/stack.geo");
     let text = format!(
         r#"
 dimension = 2
-mesh = {{ geo = "{geo}", set = {{ n1 = 3, n2 = 2 }} }}
+mesh = {{ geo = "{geo}", set = {{ rows = 2, n1 = {n1}, n2 = {n2} }} }}
 
 [[body]]
 name = "b1"
-young = {young:e}
+young = {lower:e}
 poisson = 0
 fix = [{{ on = "b1_bottom", y = 0 }}, {{ on = "b1_left", x = 0 }}]
 
@@ -31,7 +36,7 @@ gap = "{gap}"
 layer = {{ {layer} }}
 "#
     );
-    solve(Scene::new(text), &[]).converged()
+    Scene::new(text)
 }
 
 /// All pressures are `expected` to a share of `accuracy`.
@@ -84,4 +89,76 @@ fn an_overlap_that_comes_to_nothing() {
         let run = column(1e3, r#"fix = [{ on = "b2_left", x = 0 }]"#, "-1e-5", layer);
         assert!(run.contact()["pressure"].iter().all(|&p| p <= 1e-12 * 1e3 * 1e-5), "{layer}");
     }
+}
+
+/// The upper block pressed down by a support of its top.
+fn pressed(depth: f64) -> String {
+    format!(r#"fix = [{{ on = "b2_left", x = 0 }}, {{ on = "b2_top", y = -{depth:e} }}]"#)
+}
+
+/// The pressure where two blocks and a layer (c/B)^(1/a) share a shortening: p / E1 + p / E2 + B p^a.
+fn shared([lower, upper]: [f64; 2], b: f64, a: f64, depth: f64) -> f64 {
+    let (mut low, mut high) = (0.0, depth * lower.min(upper));
+    for _ in 0..200 {
+        let p: f64 = 0.5 * (low + high);
+        if p / lower + p / upper + b * p.powf(a) < depth { low = p } else { high = p }
+    }
+    low
+}
+
+/// The corners of the box V9 in kappa h/E and E1/E2: layers a million times softer and stiffer than the softer block, and one
+/// block a million times stiffer than the other.
+#[test]
+fn corners_of_stiffness() {
+    for young in [[1.0, 1.0], [1.0, 1e6], [1e6, 1.0]] {
+        for kappa in [1e-6, 1.0, 1e6] {
+            let expected = shared(young, 1.0 / kappa, 1.0, 1e-3);
+            for method in ["auto", "newton", "newton-robin", "ncg", "anderson"] {
+                let scene =
+                    blocks(young, [3, 2], &pressed(1e-3), "0", &format!("linear = {{ stiffness = {kappa:e} }}"));
+                let run = solve(scene, &["--method", method]).converged();
+                assert_pressure(&run, expected, 1e-6);
+            }
+        }
+    }
+}
+
+/// Its corners in the layer of the paper, B and a, on the paper's blocks.
+#[test]
+fn corners_of_the_law() {
+    for (b, a) in [(1e-6, 0.1), (1e-6, 1.0), (2e-4, 0.1), (2e-4, 1.0)] {
+        for method in ["auto", "newton", "ncg"] {
+            let scene = blocks([2.1e5; 2], [3, 2], &pressed(2e-4), "0", &format!("power = {{ B = {b:e}, a = {a} }}"));
+            let run = solve(scene, &["--method", method]).converged();
+            assert_pressure(&run, shared([2.1e5; 2], b, a, 2e-4), 1e-6);
+        }
+    }
+}
+
+/// Its ends of gamma: right under a soft layer, and under a stiff one, where theta is 0.999, not said to be.
+#[test]
+fn ends_of_gamma() {
+    for gamma in ["0.01", "1.2"] {
+        let run = |kappa: f64| {
+            let layer = format!("linear = {{ stiffness = {kappa:e} }}");
+            let method = format!("method={{gamma={gamma}, stop={{residual=1e-7, iterations=1700}}}}");
+            solve(blocks([1.0; 2], [3, 2], &pressed(1e-3), "0", &layer), &["--set", &method])
+        };
+        assert_pressure(&run(1e-3).converged(), shared([1.0; 2], 1e3, 1.0, 1e-3), 1e-5);
+        let stiff = run(1e3);
+        assert!(stiff.code == 1 && stiff.number("residual") > 1e-7, "gamma = {gamma}: {}", stiff.text("status"));
+    }
+}
+
+/// Blocks of two triangles each, on more ranks than there are triangles.
+#[test]
+fn more_ranks_than_elements() {
+    let upper = r#"fix = [{ on = "b2_left", x = 0 }]
+load = [{ on = "b2_top", pressure = 0.5 }]"#;
+    let scene = || blocks([100.0; 2], [1, 1], upper, "0", "linear = { stiffness = 300 }");
+    let (serial, parallel) = (solve(scene(), &[]).converged(), solve_on(5, scene(), &[]).converged());
+    assert_eq!(parallel.count("bodies/0/cells") + parallel.count("bodies/1/cells"), 4);
+    assert_pressure(&parallel, 0.5, 1e-12);
+    assert_eq!(parallel.contact()["pressure"], serial.contact()["pressure"]);
+    assert!(parallel.warnings().contains("3 of 5 ranks have no body"), "{}", parallel.warnings());
 }

@@ -84,7 +84,7 @@ fn pencil(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<(f64, f64)> {
     let scaled = |m: &DMatrix<f64>| {
         DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
             let (i, j) = (kept[i], kept[j]);
-            m[(i, j)] / (b[(i, i)] * b[(j, j)]).sqrt()
+            m[(i, j)] / b[(i, i)].sqrt() / b[(j, j)].sqrt()
         })
     };
     let (a, b) = (scaled(a), scaled(b));
@@ -94,6 +94,9 @@ fn pencil(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<(f64, f64)> {
     let eigen = SymmetricEigen::new(b);
     let largest = eigen.eigenvalues.max();
     let new: Vec<usize> = (0..kept.len()).filter(|&i| eigen.eigenvalues[i] > NEW * largest).collect();
+    if new.is_empty() {
+        return None;
+    }
     let basis = DMatrix::from_fn(kept.len(), new.len(), |i, j| {
         eigen.eigenvectors[(i, new[j])] / eigen.eigenvalues[new[j]].sqrt()
     });
