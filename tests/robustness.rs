@@ -155,10 +155,9 @@ fn ends_of_gamma() {
 fn more_ranks_than_elements() {
     let upper = r#"fix = [{ on = "b2_left", x = 0 }]
 load = [{ on = "b2_top", pressure = 0.5 }]"#;
-    let scene = || blocks([100.0; 2], [1, 1], upper, "0", "linear = { stiffness = 300 }");
-    let (serial, parallel) = (solve(scene(), &[]).converged(), solve_on(5, scene(), &[]).converged());
+    let scene = blocks([100.0; 2], [1, 1], upper, "0", "linear = { stiffness = 300 }");
+    let parallel = solve_on(5, scene, &[]).converged();
     assert_eq!(parallel.count("bodies/0/cells") + parallel.count("bodies/1/cells"), 4);
     assert_pressure(&parallel, 0.5, 1e-12);
-    assert_eq!(parallel.contact()["pressure"], serial.contact()["pressure"]);
     assert!(parallel.warnings().contains("3 of 5 ranks have no body"), "{}", parallel.warnings());
 }
