@@ -109,7 +109,9 @@ fn outlook(outcome: &Outcome) -> String {
 fn advice(outcome: &Outcome) -> Option<String> {
     let spectrum = outcome.spectrum.filter(|_| outcome.method == "robin")?;
     let (gamma, factor) = (best_gamma(spectrum), best_factor(spectrum));
-    Some(format!("--method auto; the best number for method.gamma is {gamma:.2}, a factor of {factor:.3} an iteration"))
+    // near one the digits that matter are those of the difference
+    let factor = if factor > 0.99 { format!("1 - {}", sci(1.0 - factor, 1)) } else { format!("{factor:.3}") };
+    Some(format!("--method auto; the best number for method.gamma is {gamma:.2}, a factor of {factor} an iteration"))
 }
 
 /// Fills the report of a run.

@@ -153,6 +153,7 @@ fn header(axes: &[(String, Vec<String>)], report: &Report) -> Vec<String> {
         "iterations",
         "sweeps",
         "factorizations",
+        "dense_factorizations",
         "inner_iterations",
         "residual",
         "increment",
@@ -172,7 +173,8 @@ fn line(values: &[String], report: &Report) -> Vec<String> {
     let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
     let mut line = values.to_vec();
     line.push(report.status.clone());
-    let counts = [report.iterations, report.sweeps, report.factorizations, report.inner_iterations];
+    let factored = [report.factorizations, report.dense_factorizations];
+    let counts = [report.iterations, report.sweeps, factored[0], factored[1], report.inner_iterations];
     line.extend(counts.map(|count| count.to_string()));
     line.extend([report.residual, report.increment, report.f1].map(number));
     line.push(report.dofs.to_string());
