@@ -290,8 +290,8 @@ fn curved_surfaces() {
 /// Quadratic tetrahedra meet through linear hats: docs/cases.md.
 #[test]
 fn in_space() {
-    cubes(steel(), graded(fibres(0.5))).converges("cubes", 1, [4, 6, 8], [1.9, 0.95], 0.15);
-    cubes(steel(), graded(fibres(0.5))).converges("cubes", 2, [2, 4, 6], [1.5, 1.5], 0.01);
+    cubes(graded(steel()), fibres(0.5)).converges("cubes", 1, [4, 6, 8], [1.9, 0.95], 0.15);
+    cubes(graded(steel()), fibres(0.5)).converges("cubes", 2, [2, 4, 6], [1.9, 1.8], 0.01);
 }
 
 /// The stored problems, which a user can run. Where the contact reaches free edges of bodies, orders in space are lower.
