@@ -65,18 +65,18 @@ fn rule(gamma: &Gamma) -> Box<dyn GammaRule> {
 /// All bodies as one dense matrix, if they are condensed to few dofs.
 fn dense(model: &Model) -> Option<Box<dyn Coupled>> {
     let dofs = model.bodies.iter().map(|slot| Some(slot.local.as_ref()?.matrices()?.len())).sum::<Option<usize>>()?;
-    let union = Union::of(model).filter(|_| dofs <= DENSE)?.without_zeros();
+    let union = Union::of(model, true).filter(|_| dofs <= DENSE)?.without_zeros();
     let solver = Dense::new(dofs, union.stiffness.values.clone());
     Some(Box::new(Monolithic::new(union, solver)))
 }
 
 /// All bodies as one sparse matrix.
 fn sparse(session: &Session, model: &Model) -> Result<Box<dyn Coupled>> {
-    let Some(union) = Union::of(model).filter(|_| session.size() == 1) else {
+    let Some(union) = Union::of(model, false).filter(|_| session.size() == 1) else {
         return Err(Error::new(Kind::Usage, "method `newton` factors all bodies together and runs on one rank")
             .help("choose newton-robin, or start without mpiexec"));
     };
     preset::apply(session, WHOLE, Preset::Mumps)?;
-    let solver = Krylov::new(session, WHOLE, 1, &union.stiffness, &[])?;
+    let solver = Krylov::new(session, WHOLE, 3, &union.stiffness, &[])?;
     Ok(Box::new(Monolithic::new(union, solver)))
 }

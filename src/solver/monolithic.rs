@@ -25,9 +25,14 @@ pub struct Union {
 }
 
 impl Union {
-    /// Of the bodies of a model; `None` if one of them has no matrices in this process.
-    pub fn of(model: &Model) -> Option<Self> {
-        let parts = model.bodies.iter().map(|slot| slot.local.as_ref()?.matrices()).collect::<Option<Vec<_>>>()?;
+    /// Of the bodies of a model; `None` if one of them has no matrices in this process. Without `rigid` the rigid motions stay
+    /// part of v: multigrid wants to see nodes only.
+    pub fn of(model: &Model, rigid: bool) -> Option<Self> {
+        let parts = model.bodies.iter().map(|slot| slot.local.as_ref()?.matrices());
+        let mut parts = parts.collect::<Option<Vec<_>>>()?;
+        if !rigid {
+            parts.iter_mut().for_each(|part| (part.motions, part.traces) = (&[], &[]));
+        }
         let mut offset = vec![0];
         for part in &parts {
             offset.push(offset[offset.len() - 1] + part.len());
@@ -119,14 +124,18 @@ impl<S: InnerSolver> Monolithic<S> {
 impl<S: InnerSolver> Coupled for Monolithic<S> {
     fn solve(&mut self, model: &Model, weight: &[f64], r: &[Vec<f64>]) -> Result<Option<Field>> {
         self.whole.robin(weight)?;
-        let whole = r.concat();
+        let parts = || self.offset.windows(2).map(|part| part[0]..part[1]);
+        let whole: Vec<f64> = parts().zip(r).flat_map(|(part, r)| &r[..part.len()]).copied().collect();
         let mut x = vec![0.0; whole.len()];
         if self.whole.solve(&whole, &mut x)?.failure.is_some() || x.iter().any(|x| !x.is_finite()) {
             return Ok(None);
         }
-        let mut states: Vec<Vec<f64>> = self.offset.windows(2).map(|part| x[part[0]..part[1]].to_vec()).collect();
+        let mut states: Vec<Vec<f64>> = parts().map(|part| x[part].to_vec()).collect();
         for (slot, state) in model.bodies.iter().zip(&mut states) {
-            slot.local.iter().for_each(|body| body.separate(state));
+            for body in &slot.local {
+                state.resize(body.len(), 0.0);
+                body.separate(state);
+            }
         }
         let mut field = Field { states, trace: vec![0.0; 2 * model.points()] };
         field.retrace(model);
