@@ -33,8 +33,15 @@ pub fn make(session: &Session, scene: &Scene, model: &Model, condensed: bool) ->
     let mut prefix = None;
     let methods = match scene.method.name {
         MethodName::Auto => {
+            let first = match small() {
+                None if multigrid(session, model) => {
+                    prefix = Some(WHOLE);
+                    Some(sparse(session, scene, model)?)
+                }
+                dense => dense,
+            };
             let last = [over_sweeps(), Box::new(Conjugate::default())];
-            small().map(joined).into_iter().chain(last).collect()
+            first.map(joined).into_iter().chain(last).collect()
         }
         MethodName::NewtonRobin => vec![over_sweeps()],
         MethodName::Robin => vec![Box::new(Relaxed::new(rule(&scene.method.gamma))) as _],
@@ -44,7 +51,7 @@ pub fn make(session: &Session, scene: &Scene, model: &Model, condensed: bool) ->
             Some(coupled) => vec![joined(coupled)],
             None => {
                 prefix = Some(WHOLE);
-                vec![joined(sparse(session, model)?)]
+                vec![joined(sparse(session, scene, model)?)]
             }
         },
     };
@@ -70,13 +77,27 @@ fn dense(model: &Model) -> Option<Box<dyn Coupled>> {
     Some(Box::new(Monolithic::new(union, solver)))
 }
 
-/// All bodies as one sparse matrix.
-fn sparse(session: &Session, model: &Model) -> Result<Box<dyn Coupled>> {
-    let Some(union) = Union::of(model, false).filter(|_| session.size() == 1) else {
+/// Whether multigrid solves every body of this process, the only one.
+fn multigrid(session: &Session, model: &Model) -> bool {
+    let hypre = |name: &str| session.options().get(&format!("-{name}_pc_type")).is_some_and(|pc| pc == "hypre");
+    session.size() == 1 && model.bodies.iter().all(|slot| hypre(&slot.name))
+}
+
+/// All bodies as one sparse matrix: with multigrid if that is what they have, else factored.
+fn sparse(session: &Session, scene: &Scene, model: &Model) -> Result<Box<dyn Coupled>> {
+    let multigrid = multigrid(session, model);
+    // multigrid wants nodes, without numbers for rigid motions among them
+    let Some(union) = Union::of(model, !multigrid).filter(|_| session.size() == 1) else {
         return Err(Error::new(Kind::Usage, "method `newton` factors all bodies together and runs on one rank")
             .help("choose newton-robin, or start without mpiexec"));
     };
-    preset::apply(session, WHOLE, Preset::Mumps)?;
-    let solver = Krylov::new(session, WHOLE, 3, &union.stiffness, &[])?;
+    let (preset, block) = if multigrid {
+        preset::made_often(session, WHOLE)?;
+        (Preset::Hypre, scene.dimension.value)
+    } else {
+        (Preset::Mumps, 1)
+    };
+    preset::apply(session, WHOLE, preset)?;
+    let solver = Krylov::new(session, WHOLE, block, &union.stiffness, &[])?;
     Ok(Box::new(Monolithic::new(union, solver)))
 }

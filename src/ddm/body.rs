@@ -119,6 +119,14 @@ pub trait Body {
     /// Failures of the solver library; not converging is told in [`Solved`].
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
 
+    /// How far solves have to reduce r, unless the user says: a hint to iterative inner solvers.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn precision(&mut self, _rtol: f64) -> Result<()> {
+        Ok(())
+    }
+
     /// z = M^-1 r with a fixed symmetric M near G: what preconditions conjugate gradients over all bodies. Costs no more than
     /// a solve, and for an iterative inner solver only one application of its preconditioner.
     ///

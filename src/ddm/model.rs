@@ -155,6 +155,14 @@ impl Model {
         }
     }
 
+    /// Tells every body how far its solves have to reduce r.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn precision(&mut self, rtol: f64) -> Result<()> {
+        self.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.precision(rtol))
+    }
+
     /// Gives every body its Robin term `weight` = omega psi kappa of each contact row (37)-(38).
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! Any PETSc KSP and PC as inner solver.
 
-use super::InnerSolver;
+use super::{InnerSolver, options};
 use crate::ddm::Solved;
 use crate::error::Result;
 use crate::linalg::Csr;
@@ -17,6 +17,8 @@ pub struct Krylov {
     multigrid: bool,
     /// Whether it is kept while G stays near; the user may decide by `-ksp_reuse_preconditioner`.
     keeps: bool,
+    /// Whether the user leaves the tolerance to the method.
+    free: bool,
     /// Whether G is far from the matrix of the preconditioner.
     stale: bool,
     /// Iterations per digit of the first solve with this preconditioner.
@@ -56,7 +58,8 @@ impl Krylov {
         }
         let multigrid = matches!(ksp.pc_type().as_str(), "hypre" | "gamg" | "ml" | "mg") && ksp.ksp_type() != "preonly";
         let keeps = multigrid && session.options().get(&format!("-{body}_ksp_reuse_preconditioner")).is_none();
-        Ok(Self { matrix, ksp, changed: true, set_ups: 0, multigrid, keeps, stale: true, fresh: None })
+        let free = ksp.ksp_type() != "preonly" && options::typed(session, body, "ksp_rtol").is_none();
+        Ok(Self { matrix, ksp, free, changed: true, set_ups: 0, multigrid, keeps, stale: true, fresh: None })
     }
 }
 
@@ -96,6 +99,10 @@ impl InnerSolver for Krylov {
             iterations: if direct { 0 } else { solved.iterations },
             failure: (!solved.reason.converged()).then(|| solved.reason.to_string()),
         })
+    }
+
+    fn precision(&mut self, rtol: f64) -> Result<()> {
+        if self.free { self.ksp.set_tolerance(rtol) } else { Ok(()) }
     }
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {

@@ -132,7 +132,7 @@ impl<S: InnerSolver> Coupled for Monolithic<S> {
         }
         let mut states: Vec<Vec<f64>> = parts().map(|part| x[part].to_vec()).collect();
         for (slot, state) in model.bodies.iter().zip(&mut states) {
-            for body in &slot.local {
+            if let Some(body) = &slot.local {
                 state.resize(body.len(), 0.0);
                 body.separate(state);
             }

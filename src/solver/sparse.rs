@@ -205,6 +205,10 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         done
     }
 
+    fn precision(&mut self, rtol: f64) -> Result<()> {
+        self.solver.precision(rtol)
+    }
+
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         let n = self.dofs();
         self.apply(z, |solver, z| solver.solve(&r[..n], z))

@@ -71,14 +71,26 @@ pub enum Step {
     Unbounded,
 }
 
+/// Precision of solves whose result is a step.
+pub(super) const FINE: f64 = 1e-6;
+
+/// Precision of solves that measure: of the residual, two digits more than this are right.
+const ROUGH: f64 = 1e-2;
+
 /// A way to make the next iterate.
 pub trait Method {
     /// Name, as in the scene and the table.
     fn name(&self) -> &'static str;
 
-    /// Whether its steps may move bodies far in ways that contact does not feel, which no trace shows.
-    fn moves_far(&self) -> bool {
+    /// Whether its steps come from all bodies together. Then sweeps only measure, and need not follow the tangents; and steps
+    /// may move bodies far in ways that contact does not feel, which no trace shows.
+    fn is_joint(&self) -> bool {
         false
+    }
+
+    /// How far it wants inexact solves of the bodies to reduce their residuals.
+    fn precision(&self) -> f64 {
+        FINE
     }
 
     /// The step that leads on.

@@ -208,8 +208,12 @@ impl Method for Newton {
         }
     }
 
-    fn moves_far(&self) -> bool {
+    fn is_joint(&self) -> bool {
         matches!(self.inner, Inner::Direct(_))
+    }
+
+    fn precision(&self) -> f64 {
+        super::ROUGH
     }
 
     fn amplification(&self) -> f64 {
