@@ -8,7 +8,7 @@ use super::forecast::Forecast;
 use super::held;
 use super::interval::{Interval, interval};
 use super::layer::Layer;
-use super::lift::lift;
+use super::lift::{lift, move_rigidly};
 use super::method::{FINE, Here, Method, Step};
 use super::model::Model;
 use super::origin::Origin;
@@ -130,7 +130,8 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     if let Some(field) = settings.resume.take() {
         iterate = field;
     } else if early.is_none() {
-        let (lifted, failed) = lift(model, &settings.start)?;
+        let start = if settings.methods[0].is_joint() { move_rigidly } else { lift };
+        let (lifted, failed) = start(model, &settings.start)?;
         iterate = lifted;
         early = failed.map(|(body, reason)| Status::InnerSolver { body, reason });
     }

@@ -6,11 +6,18 @@
 
 use super::body::Solved;
 use super::field::Field;
+use super::method::ROUGH;
 use super::model::{BodySlot, Model};
 use crate::error::Result;
+use crate::linalg::{axpy, dot};
+use nalgebra::{DMatrix, DVector};
 
 /// Springs of the constraint B u = t over the stiffness of the nodes under them.
 const STIFF: f64 = 1e4;
+/// The same for a rough lift: multigrid bears these springs well.
+const SOFT: f64 = 10.0;
+/// Share of the start's trace that a rough lift may miss.
+const MISSED: f64 = 1e-3;
 /// Steps; each gains a factor of about `STIFF` over the surface's compliance.
 const STEPS: usize = 4;
 
@@ -32,6 +39,62 @@ pub fn prepare(model: &mut Model) -> Result<()> {
 
 fn springs(slot: &BodySlot) -> Vec<f64> {
     slot.row_stiffness.iter().map(|k| STIFF * k).collect()
+}
+
+/// The iterate with about the given trace, for a method that needs no equilibrium inside: bodies are moved rigidly, and only
+/// one that is then far from its trace is deformed, roughly. The second value is as in [`lift`].
+///
+/// # Errors
+/// Failures of the solver library.
+pub fn move_rigidly(model: &mut Model, trace: &[f64]) -> Result<(Field, Option<(usize, String)>)> {
+    model.precision(ROUGH)?;
+    let mut iterate = Field::rest(model);
+    let mut failed = None;
+    for index in 0..model.bodies.len() {
+        let target = model.of_body(index, trace);
+        let slot = &mut model.bodies[index];
+        let Some(body) = &mut slot.local else { continue };
+        let u = &mut iterate.states[index];
+        let mut rows = vec![0.0; target.len()];
+        body.trace(u, &mut rows);
+        let mut apart: Vec<f64> = target.iter().zip(&rows).map(|(target, row)| target - row).collect();
+        if let Some(traces) = body.matrices().map(|matrices| matrices.traces) {
+            let rigid = fit(traces, &apart);
+            let first = u.len() - rigid.len();
+            u[first..].copy_from_slice(&rigid);
+            rigid.iter().zip(traces).for_each(|(&a, trace)| axpy(-a, trace, &mut apart));
+        }
+        let size = |v: &[f64]| v.iter().fold(0.0f64, |max, t| max.max(t.abs()));
+        if size(&apart) <= MISSED * size(&target) {
+            continue;
+        }
+        let springs: Vec<f64> = slot.row_stiffness.iter().map(|k| SOFT * k).collect();
+        body.robin(&springs)?;
+        let force: Vec<f64> = springs.iter().zip(&apart).map(|(k, apart)| -k * apart).collect();
+        let (mut r, mut z) = (vec![0.0; u.len()], vec![0.0; u.len()]);
+        body.residual(u, &force, &mut r);
+        let Solved { failure, .. } = body.solve(&r, &mut z)?;
+        failed = failed.or(failure.map(|reason| (index, reason)));
+        axpy(1.0, &z, u);
+    }
+    iterate.retrace(model);
+    Ok((iterate, failed))
+}
+
+/// Least squares: amounts of some vectors that together come nearest to another.
+fn fit(vectors: &[Vec<f64>], to: &[f64]) -> Vec<f64> {
+    let count = vectors.len();
+    let normal = DMatrix::from_fn(count, count, |i, j| dot(&vectors[i], &vectors[j]));
+    let right = DVector::from_fn(count, |i, _| dot(&vectors[i], to));
+    let largest = (0..count).map(|i| normal[(i, i)]).fold(0.0, f64::max);
+    if largest == 0.0 {
+        return vec![0.0; count];
+    }
+    // motions that contact does not feel stay out
+    match normal.svd(true, true).solve(&right, 1e-10 * largest) {
+        Ok(amounts) => amounts.as_slice().to_vec(),
+        Err(_) => vec![0.0; count],
+    }
 }
 
 /// The iterate with the given trace (values where a support prescribes the row are not taken: the support wins).
@@ -79,7 +142,7 @@ pub fn lift(model: &mut Model, trace: &[f64]) -> Result<(Field, Option<(usize, S
                 failed[index] = 1.0;
                 reasons[index] = reason;
             }
-            crate::linalg::axpy(1.0, &z, &mut u);
+            axpy(1.0, &z, &mut u);
         }
         body.trace(&u, &mut rows);
         model.put(index, &rows, &mut iterate.trace);

@@ -75,7 +75,7 @@ pub enum Step {
 pub(super) const FINE: f64 = 1e-6;
 
 /// Precision of solves that measure: of the residual, two digits more than this are right.
-const ROUGH: f64 = 1e-2;
+pub(super) const ROUGH: f64 = 1e-2;
 
 /// A way to make the next iterate.
 pub trait Method {
