@@ -98,7 +98,9 @@ fn newton_on_condensed_bodies() {
             solve(plain, &["--method", "newton", "--set", &solver, "--set", sets]).converged()
         };
         let (small, whole) = (run("condensed"), run("mumps"));
-        assert_eq!(small.count("iterations"), whole.count("iterations"), "{scene}");
+        // the interior of whole bodies is not in equilibrium at the start, which can cost a step
+        let more = whole.count("iterations").checked_sub(small.count("iterations"));
+        assert!(more.is_some_and(|more| more <= 1), "{scene}");
         assert_eq!((small.text("method"), whole.text("method")), ("newton", "newton"));
         let bodies = small.solvers().len();
         assert_eq!(small.count("factorizations"), bodies, "{scene}: one elimination a body, no other sparse factor");

@@ -13,7 +13,7 @@ use super::method::{FINE, Here, Method, Step};
 use super::model::Model;
 use super::origin::Origin;
 use super::progress::{Observer, Row};
-use super::robin::{Robin, RobinRule};
+use super::robin::{self, Robin, RobinRule};
 use super::stop::StopRule;
 use super::sweep::Sweeper;
 use super::watch::{Last, Seen, Verdict, Watch};
@@ -148,10 +148,12 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     let (status, layer, weight) = loop {
         let k = updates;
         let layer = Layer::at(model, &iterate.trace);
-        let mut weight = match before.take() {
-            Some(weight) if settings.methods[active].is_joint() => weight,
-            _ => robin.weight(model, &settings.zone, &layer, k),
-        };
+        let mut weight = robin.weight(model, &settings.zone, &layer, k);
+        if let Some(old) = before.take().filter(|_| settings.methods[active].is_joint())
+            && robin::is_of_the_size(model, &old, &weight)
+        {
+            weight = old;
+        }
         if early.is_none() {
             early = held::unheld(model, &weight).map(|free| Status::Unheld { body: free.body, motion: free.name });
         }

@@ -66,6 +66,17 @@ fn held_safely(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
     weight
 }
 
+/// Growth of a body's whole Robin term, either way, beyond which an old one does not even serve to measure.
+const FAR: f64 = 100.0;
+
+/// Whether the Robin terms of two iterates are alike, body by body.
+pub(super) fn is_of_the_size(model: &Model, old: &[f64], new: &[f64]) -> bool {
+    (0..model.bodies.len()).all(|body| {
+        let [old, new] = [old, new].map(|weight| model.of_body(body, weight).iter().sum::<f64>());
+        old <= FAR * new && new <= FAR * old
+    })
+}
+
 /// A motion held by less than this share of what [`hold`] gives is not held safely.
 const WEAK: f64 = 1e-3;
 
