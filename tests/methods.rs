@@ -112,6 +112,26 @@ fn newton_on_condensed_bodies() {
     }
 }
 
+/// Bodies with multigrid: the Newton matrix has one multigrid for all, and the bodies' own only measure.
+#[test]
+fn multigrid_over_all_bodies() {
+    let run = |solver: &str| {
+        let solver = format!("solver={solver}");
+        let sets = ["mesh.set.n=3", "body.0.order=1", "body.1.order=1", "method={}", &solver];
+        solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+    };
+    let (multigrid, condensed) = (run("hypre"), run("condensed"));
+    assert_eq!((multigrid.text("method"), condensed.text("method")), ("newton", "newton"));
+    assert!(distance(&multigrid.contact()["pressure"], &condensed.contact()["pressure"]) < 1e-7);
+    // one set-up a step at most; of each body's own for options, for the start and for the end
+    let (steps, set_ups) = (multigrid.count("iterations"), multigrid.count("factorizations"));
+    assert!(steps <= condensed.count("iterations") + 4 && set_ups <= steps + 8, "{steps} steps, {set_ups} set-ups");
+    // a start that is a rigid motion takes no solve: sweeps are all that bodies solve for
+    assert_eq!(multigrid.count("body_solves"), 2 * multigrid.count("sweeps"));
+    let sweeps = run("{preset=\"hypre\",options=\"-lower_ksp_rtol 1e-8\"}");
+    assert!(sweeps.count("inner_iterations") > multigrid.count("inner_iterations"));
+}
+
 /// The estimated spectrum of G^-1 F1'' lies around one: 1 - theta and 1 + theta.
 #[test]
 fn the_spectrum_is_symmetric_about_one() {
