@@ -29,6 +29,12 @@ pub trait GammaRule {
         None
     }
 
+    /// Whether gamma does not depend on the iterates. Then the decrease of the corrections tells the slowest mode; else it tells
+    /// little, and the Ritz values of `ritz` are made anew before each gamma.
+    fn is_fixed(&self) -> bool {
+        false
+    }
+
     /// Forgets what earlier iterations told: the problem changes.
     fn restart(&mut self) {}
 }
@@ -45,6 +51,10 @@ impl GammaRule for Stationary {
     fn factor(&self, spectrum: (f64, f64)) -> Option<f64> {
         Some(relaxed_factor(self.0, spectrum))
     }
+
+    fn is_fixed(&self) -> bool {
+        true
+    }
 }
 
 /// gamma^k from a list; the last value stays.
@@ -58,5 +68,9 @@ impl GammaRule for Schedule {
 
     fn factor(&self, spectrum: (f64, f64)) -> Option<f64> {
         Some(relaxed_factor(self.0[self.0.len() - 1], spectrum))
+    }
+
+    fn is_fixed(&self) -> bool {
+        true
     }
 }

@@ -11,12 +11,11 @@ pub struct Spectral {
 
 impl GammaRule for Spectral {
     fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded> {
-        let spectrum = ritz.bounds(here.model, here.layer, here.weight);
         // a residual that grows, or contact that moves, makes the estimate one of the past
         let steady =
             self.last.is_some_and(|(residual, closed)| here.residual < residual && here.layer.closed == closed);
         self.last = Some((here.residual, here.layer.closed));
-        match spectrum {
+        match ritz.known() {
             Some(spectrum) if steady && here.k > 5 => Ok(best_gamma(spectrum)),
             _ => LineSearch.gamma(here, ritz),
         }

@@ -28,12 +28,15 @@ impl Method for Relaxed {
 
     fn step(&mut self, here: &mut Here) -> Result<Step> {
         let size = here.decrement().sqrt();
-        // the slowest mode survives: its factor 1 - gamma lambda_min shows in the decrease of the corrections
+        // the slowest mode survives a fixed gamma: its factor 1 - gamma lambda_min shows in the decrease of the corrections
         if let Some((before, gamma)) = self.last {
             let factor = size / before;
             self.amplification = if factor < 1.0 { (gamma / (1.0 - factor)).max(1.0) } else { f64::NAN };
         }
         self.ritz.observe(here.model, &here.sweep.correction);
+        if !self.rule.is_fixed() {
+            self.ritz.bounds(here.model, here.layer, here.weight);
+        }
         Ok(match self.rule.gamma(here, &mut self.ritz) {
             Ok(gamma) => {
                 self.last = Some((size, gamma));
