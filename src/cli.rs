@@ -115,6 +115,9 @@ struct BenchArgs {
     /// Seconds after which a run is ended
     #[arg(long, value_name = "S", default_value = "3600")]
     timeout: f64,
+    /// Seconds after which no further run begins
+    #[arg(long, value_name = "S", default_value = "inf")]
+    budget: f64,
     /// Also measure one linear factor-and-solve of the same bodies
     #[arg(long)]
     linear: bool,
@@ -140,6 +143,7 @@ impl BenchArgs {
             repeat: self.repeat,
             against: self.against,
             timeout: self.timeout,
+            budget: self.budget,
             linear: self.linear,
             resume: self.resume,
             petsc,

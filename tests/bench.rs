@@ -167,9 +167,10 @@ fn failures_are_rows() {
     let (status, words) = of("wrong", "ncg", "mumps");
     assert!(status == "refused" && words.contains("number"), "{status}: {words}");
     // a run that takes too long
-    let late = ["--solver", "mumps", "--over", "mesh.set.n=64", "--timeout", "0.2"];
+    let late = ["--solver", "mumps", "--over", "mesh.set.n=64,128", "--order", "1,2", "--timeout", "0.05"];
     let (run, rows) = bench(&[&[scene("groove-held").as_str()], &late[..]].concat());
-    assert_eq!((run.code, rows[0]["status"].as_str()), (1, "timeout"), "{}", run.said());
+    let status: Vec<&str> = rows.iter().map(|row| row["status"].as_str()).collect();
+    assert_eq!((run.code, &status[..]), (1, &["timeout", "timeout", "skipped", "skipped"][..]), "{}", run.said());
 }
 
 /// Rows of a table that is there already are kept with `--resume`, and only with it, and only under the same settings.
@@ -193,6 +194,18 @@ fn a_benchmark_is_taken_up_again() {
     let both = rows(&folder.path().join("out/bench.csv"));
     assert_eq!((both.len(), &both[0]["seconds"]), (2, &first[0]["seconds"]));
     assert_eq!(run("mesh.set.n=4,8", &["--set", "method.gamma=0.5"]), 0);
+    // a budget that is spent skips what is not there yet, and another run makes it
+    let spent = [
+        &words("mesh.set.n=4,8,16").map(String::from)[..],
+        std::slice::from_ref(&out),
+        &["--budget".into(), "0".into()],
+    ];
+    let ended = winkler(&spent.concat().iter().map(String::as_str).collect::<Vec<_>>());
+    let status = |rows: &[BTreeMap<String, String>]| rows.iter().map(|row| row["status"].clone()).collect::<Vec<_>>();
+    let left = rows(&folder.path().join("out/bench.csv"));
+    assert_eq!((ended.code, status(&left)), (1, vec!["skipped".to_owned(); 3]), "{}", ended.said());
+    assert_eq!(run("mesh.set.n=4,8,16", &[]), 0);
+    assert_eq!(status(&rows(&folder.path().join("out/bench.csv"))), vec!["converged"; 3]);
 }
 
 /// Ranks are started by mpiexec, and theta is varied by the stiffness of the layer.

@@ -114,6 +114,49 @@ fn wave_layer(run: &Run) {
     is_effective(estimated.sqrt(), exact.sqrt(), "layer");
 }
 
+/// V2 on meshes of another family: triangles of any shape, and nodes of the two surfaces that do not face each other.
+#[test]
+fn pressure_of_a_wave_on_free_meshes() {
+    let script = std::fs::read_to_string(root().join("meshes/wavy/wavy.geo")).expect("the script");
+    let free: String =
+        script.lines().filter(|line| !line.starts_with("Transfinite S")).map(|l| l.to_owned() + "\n").collect();
+    let free = free
+        .replace("Curve {1, 3, 11, 13} = n + 1", "Curve {1, 3} = n + 1;\nTransfinite Curve {11, 13} = Ceil(1.3*n) + 1");
+    assert!(free.contains("Ceil(1.3*n)") && !free.contains("Transfinite S"));
+    let scene = Scene::new(common::text_of("wavy"));
+    std::fs::write(scene.path.with_file_name("wavy.geo"), free).expect("a script");
+    for (order, n) in [(1, 16), (2, 12)] {
+        let run = solve_with(&scene, &sets(order, n));
+        let table = run.contact();
+        let exact = weighted_error(&table, 0..table.rows(), |q| 40.0 + WAVE.0 * (PI * table["x"][q]).cos());
+        is_effective(run.number("discretization_error/pressure/0"), exact, &format!("P{order}"));
+        wave_displacements(&run, order);
+    }
+}
+
+/// Relative root of mean squares of differences of the pressures from `exact` at some points, by their weights.
+fn weighted_error(table: &Table, points: impl Iterator<Item = usize> + Clone, exact: impl Fn(usize) -> f64) -> f64 {
+    let sum = |value: &dyn Fn(usize) -> f64| points.clone().map(|q| table["weight"][q] * value(q).powi(2)).sum::<f64>();
+    (sum(&|q| table["pressure"][q] - exact(q)) / sum(&|q| table["pressure"][q])).sqrt()
+}
+
+/// V6: a wavy surface on a flat one, the wave in the mesh. With a layer a hundred times as stiff estimates are up to five
+/// times the error: docs/theory.md.
+#[test]
+fn pressure_between_wavy_surfaces() {
+    for (order, n) in [(1, 16), (2, 16)] {
+        let with = |order: usize, n: usize| {
+            let mut all = sets(order, n);
+            all.extend(["method={}", "contact.0.layer={linear={stiffness=1e6}}"].map(str::to_owned));
+            solve_with(case("westergaard"), &all)
+        };
+        let (run, better) = (with(order, n), with(2, 64).contact());
+        let table = run.contact();
+        let exact = weighted_error(&table, 0..table.rows(), |q| quadratic(&better, table["x"][q]));
+        is_effective(run.number("discretization_error/pressure/0"), exact, &format!("P{order}"));
+    }
+}
+
 /// V3b: the pressure of the groove with a kink and an end of contact, against a mesh three times as fine.
 #[test]
 fn pressure_of_a_groove() {
@@ -223,6 +266,22 @@ fn adapted_meshes() {
     assert_eq!(again.count("dofs"), run.count("dofs"));
 }
 
+/// A slice of space whose solution is that of the plane: a mesh that follows sizes in space has the error that was asked for.
+#[test]
+fn adapted_meshes_in_space() {
+    let better = solve_with(case("groove"), &[&sets(2, 64)[..], &["method={}".to_owned()]].concat()).contact();
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
+    let mut sets = sets(1, 4);
+    sets.extend(["method={}".to_owned(), "adapt.error=1e-2".to_owned(), format!("title={now} in space")]);
+    let run = solve_with(case("groove3d"), &sets);
+    let rounds = run.report["rounds"].as_array().expect("rounds");
+    let number = |round: usize, name: &str| rounds[round][name].as_f64().expect("a number");
+    assert!(rounds.len() >= 2 && number(0, "pressure") > 1e-2, "{}", run.said());
+    assert!(number(rounds.len() - 1, "pressure") <= 1e-2, "{}", run.said());
+    let error = distance_from(&run.contact(), &better);
+    assert!(error < 1e-2 && error > 1e-3, "{error:e}\n{}", run.said());
+}
+
 /// Meshes that may not grow end the run with a status of its own; a finished mesh cannot be adapted.
 #[test]
 fn limits_of_adaptation() {
@@ -235,6 +294,9 @@ fn limits_of_adaptation() {
     let run = solve(&scene, &["--tolerance", "1e-3"]);
     assert_eq!(run.code, 3, "{}", run.said());
     assert!(run.stderr.contains("cannot be made anew") && run.stderr.contains(".geo"), "{}", run.said());
+    // two ranks agree: they say it once
+    let two = solve_on(2, &scene, &["--tolerance", "1e-3"]);
+    assert_eq!((two.code, two.stderr.matches("cannot be made anew").count()), (3, 1), "{}", two.said());
 }
 
 /// A start from a coarser mesh saves iterations and changes nothing else.

@@ -1,8 +1,8 @@
 // The blocks of the groove, 4 x 1, as a slice of space: one on the other with nothing shared, the groove's axis is x = 4.
 SetFactory("OpenCASCADE");
 DefineConstant[ n = {8, Name "n"} ];                   // elements through the height of a block; 4 n along it
-DefineConstant[ layers = {1, Name "layers"} ];         // elements through the thickness
 DefineConstant[ thickness = {0.125, Name "thickness"} ];
+DefineConstant[ layers = {Ceil(n*thickness - 0.001), Name "layers"} ]; // elements through the thickness; cubes unless given
 
 // A box has 12 lines (along z y z y, z y z y, x x x x) and the faces x0 x1 y0 y1 z0 z1.
 Box(1) = {0, 0, 0, 4, 1, thickness};

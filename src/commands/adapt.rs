@@ -8,6 +8,7 @@ use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Sizes};
 use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
+use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::scene::{AdaptSpec, MeshSource, Scene, Start};
 use crate::solver::options;
@@ -60,11 +61,7 @@ impl Plan {
         if plan.goal.is_none() && !nested {
             return Ok(plan);
         }
-        if let MeshSource::Msh { file } = &plan.scene.mesh {
-            let place = plan.goal.as_ref().map_or(&file.place, |goal| &goal.place);
-            return Err(Error::scene(place, "a finished mesh cannot be made anew with other sizes")
-                .help("let the scene name a Gmsh script: mesh = \"file.geo\""));
-        }
+        agree(session, plan.refuse_finished_mesh())?;
         let bodies = plan.scene.bodies.len();
         if plan.goal.is_none() {
             let mut coarse = plan.scene.clone();
@@ -88,6 +85,14 @@ impl Plan {
         }
         follow(&mut plan.scene, view_of_first);
         Ok(plan)
+    }
+
+    /// A mesh that is a file cannot follow sizes.
+    fn refuse_finished_mesh(&self) -> Result<()> {
+        let MeshSource::Msh { file } = &self.scene.mesh else { return Ok(()) };
+        let place = self.goal.as_ref().map_or(&file.place, |goal| &goal.place);
+        Err(Error::scene(place, "a finished mesh cannot be made anew with other sizes")
+            .help("let the scene name a Gmsh script: mesh = \"file.geo\""))
     }
 
     /// The start of this round, if an earlier one gives it.
@@ -136,8 +141,9 @@ impl Plan {
             return Ok(false);
         }
         if error <= goal.error {
-            if let (MeshSource::Geo { sizes: Some(view), .. }, 0) = (&self.scene.mesh, session.rank()) {
-                mesh::keep_final(&self.purpose, view)?;
+            if let MeshSource::Geo { sizes: Some(view), .. } = &self.scene.mesh {
+                let kept = if session.rank() == 0 { mesh::keep_final(&self.purpose, view) } else { Ok(()) };
+                agree(session, kept)?;
             }
             return Ok(false);
         }

@@ -163,7 +163,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
         let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
         for index in 0..self.space.cell_count() {
             let (cell, x) = (self.cell(index), self.space.cell_nodes(index));
-            let bubbles = self.bubbles(&cell[..N]);
+            let bubbles = self.bubbles(&cell[..N], |_| true);
             for (l, weight) in rule.points.iter().zip(&rule.weights) {
                 let Some((gradient, measure)) = element::gradients::<D, N>(self.space.order, &x, l) else { continue };
                 let Some((hats, _)) = element::gradients::<D, N>(Order::P1, &x[..N], l) else { continue };
@@ -193,15 +193,17 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// continuous.
     pub fn bubble<const N: usize>(&self, vertices: &[u32], l: &[f64; N]) -> [f64; D] {
         let mut sum = [0.0; D];
-        for (bubble, coefficient) in self.bubbles(vertices) {
+        // most vanish on a facet
+        for (bubble, coefficient) in self.bubbles(vertices, |bubble| bubble.value(l) != 0.0) {
             let value = bubble.value(l);
             (0..D).for_each(|c| sum[c] += value * coefficient[c]);
         }
         sum
     }
 
-    /// Functions that vanish at the nodes, with their coefficients, on a simplex with these vertices.
-    fn bubbles(&self, vertices: &[u32]) -> Vec<(Bubble, [f64; D])> {
+    /// Those of the functions that vanish at the nodes that are `wanted`, with their coefficients, on a simplex with these
+    /// vertices.
+    fn bubbles(&self, vertices: &[u32], wanted: impl Fn(&Bubble) -> bool) -> Vec<(Bubble, [f64; D])> {
         let n = vertices.len();
         let arm = |from: usize, to: usize| -> [f64; D] {
             let [x, y] = [from, to].map(|k| self.space.nodes[vertices[k] as usize]);
@@ -218,23 +220,32 @@ impl<'a, const D: usize> Recovery<'a, D> {
         let mut all = Vec::new();
         for i in 0..n {
             for j in i + 1..n {
-                let e = arm(i, j);
                 if self.space.order == Order::P1 {
-                    // u(s) - linear = -s (1 - s) u''/2 on an edge
-                    all.push((Bubble::Edge(i, j), mean(&[i, j], &[e, e]).map(|d| -0.5 * d)));
+                    all.push(Bubble::Edge(i, j));
                     continue;
                 }
-                // u(s) - quadratic = s (s - 1/2) (s - 1) u'''/6 on an edge
-                all.push((Bubble::OddEdge(i, j), mean(&[i, j], &[e, e, e]).map(|d| d / 12.0)));
-                for k in j + 1..n {
-                    let (a, b, of) = (arm(k, i), arm(k, j), [i, j, k]);
-                    let third = |x, y, z| mean(&of, &[x, y, z]);
-                    let (aaa, bbb, aab, abb) = (third(a, a, a), third(b, b, b), third(a, a, b), third(a, b, b));
-                    let at_middle = |c: usize| (aaa[c] + bbb[c]) / 6.0 - (aab[c] + abb[c]) / 4.0;
-                    all.push((Bubble::Face(i, j, k), std::array::from_fn(at_middle)));
-                }
+                all.push(Bubble::OddEdge(i, j));
+                all.extend((j + 1..n).map(|k| Bubble::Face(i, j, k)));
             }
         }
-        all
+        let coefficient = |bubble: &Bubble| match *bubble {
+            // u(s) - linear = -s (1 - s) u''/2 on an edge
+            Bubble::Edge(i, j) => mean(&[i, j], &[arm(i, j); 2]).map(|d| -0.5 * d),
+            // u(s) - quadratic = s (s - 1/2) (s - 1) u'''/6 on an edge
+            Bubble::OddEdge(i, j) => mean(&[i, j], &[arm(i, j); 3]).map(|d| d / 12.0),
+            Bubble::Face(i, j, k) => {
+                let (a, b, of) = (arm(k, i), arm(k, j), [i, j, k]);
+                let third = |x, y, z| mean(&of, &[x, y, z]);
+                let (aaa, bbb, aab, abb) = (third(a, a, a), third(b, b, b), third(a, a, b), third(a, b, b));
+                std::array::from_fn(|c: usize| (aaa[c] + bbb[c]) / 6.0 - (aab[c] + abb[c]) / 4.0)
+            }
+        };
+        all.retain(wanted);
+        all.into_iter()
+            .map(|bubble| {
+                let c = coefficient(&bubble);
+                (bubble, c)
+            })
+            .collect()
     }
 }

@@ -17,6 +17,7 @@ use plan::{Case, Plan};
 use process::Runner;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::time::Instant;
 use table::{Row, Table};
 
 /// What the user typed.
@@ -43,6 +44,8 @@ pub struct Request {
     pub against: Option<PathBuf>,
     /// Seconds after which a run is ended.
     pub timeout: f64,
+    /// Seconds after which no further run begins.
+    pub budget: f64,
     /// Whether to measure one linear factor-and-solve of the bodies, too.
     pub linear: bool,
     /// Whether rows that the folder has already are kept.
@@ -69,12 +72,15 @@ pub fn bench(request: &Request) -> Result<i32> {
     let runner = Runner::new(request, folder.path())?;
     let bar = progress(plan.cases.len());
     let mut meshed = BTreeSet::new();
+    let began = Instant::now();
     for case in &plan.cases {
         bar.set_message(case.label());
         let kept = table.kept(case);
         let is_new = kept.is_none();
         let row = match kept {
             Some(row) => row,
+            None if plan.is_beyond(case, &table.rows) => Row::skipped(case, "an earlier mesh took too long"),
+            None if began.elapsed().as_secs_f64() >= request.budget => Row::skipped(case, "the budget is spent"),
             None => measure(case, &runner, &reference, &mut meshed)?,
         };
         bar.suspend(|| say(row.line(&case.label(), is_new)));

@@ -68,6 +68,8 @@ pub(super) struct Table<'a> {
 
 /// The file of the rows.
 const FILE: &str = "bench.csv";
+/// Status of a case that was not run.
+const SKIPPED: &str = "skipped";
 /// What the rows of the folder were made with.
 const SETTINGS: &str = "bench.txt";
 
@@ -159,6 +161,16 @@ impl Row {
             None => format!("error: {}", error.message()),
         };
         Self::empty(case, "refused", &message)
+    }
+
+    /// The row of a case that is not run.
+    pub fn skipped(case: &Case, why: &str) -> Self {
+        Self::empty(case, SKIPPED, why)
+    }
+
+    /// Whether the run did not end in time.
+    pub fn is_late(&self) -> bool {
+        self.status == "timeout"
     }
 
     fn empty(case: &Case, status: &str, message: &str) -> Self {
@@ -274,7 +286,8 @@ impl<'a> Table<'a> {
 
     /// The row of a case that an earlier benchmark made.
     pub fn kept(&self, case: &Case) -> Option<Row> {
-        self.old.iter().find(|row| row.key == case.key && !matches!(row.status.as_str(), "killed" | "failed")).cloned()
+        let is_to_do = |row: &Row| matches!(row.status.as_str(), "killed" | "failed" | SKIPPED);
+        self.old.iter().find(|row| row.key == case.key && !is_to_do(row)).cloned()
     }
 
     /// Adds a row and writes it at once: what was measured is kept whatever comes next.

@@ -81,16 +81,17 @@ impl<const D: usize> Patch<D> {
     pub fn derivative(&self, along: &[[f64; D]]) -> [f64; D] {
         let mut sum = [0.0; D];
         for (monomial, coefficient) in self.terms.iter().filter(|(monomial, _)| monomial.len() == along.len()) {
-            let factor = permanent(monomial, along) / self.size.powi(along.len() as i32);
+            let factor = permanent(monomial, along, 0) / self.size.powi(along.len() as i32);
             (0..D).for_each(|c| sum[c] += factor * coefficient[c]);
         }
         sum
     }
 }
 
-/// Sum over all orders of the vectors of the products of their components: the derivative of a monomial along them.
-fn permanent<const D: usize>(monomial: &[usize], along: &[[f64; D]]) -> f64 {
+/// Sum over all orders of the vectors of the products of their components: the derivative of a monomial along them. Bits of
+/// `taken` tell vectors that other coordinates have.
+fn permanent<const D: usize>(monomial: &[usize], along: &[[f64; D]], taken: u32) -> f64 {
     let Some((&i, rest)) = monomial.split_first() else { return 1.0 };
-    let without = |k: usize| [&along[..k], &along[k + 1..]].concat();
-    (0..along.len()).map(|k| along[k][i] * permanent(rest, &without(k))).sum()
+    let free = (0..along.len()).filter(|k| taken >> k & 1 == 0);
+    free.map(|k| along[k][i] * permanent(rest, along, taken | 1 << k)).sum()
 }
