@@ -122,7 +122,8 @@ impl<S: InnerSolver> Monolithic<S> {
 }
 
 impl<S: InnerSolver> Coupled for Monolithic<S> {
-    fn solve(&mut self, model: &Model, weight: &[f64], r: &[Vec<f64>]) -> Result<Option<Field>> {
+    fn solve(&mut self, model: &Model, weight: &[f64], r: &[Vec<f64>], reduction: f64) -> Result<Option<Field>> {
+        self.whole.precision(reduction)?;
         self.whole.robin(weight)?;
         let parts = || self.offset.windows(2).map(|part| part[0]..part[1]);
         let whole: Vec<f64> = parts().zip(r).flat_map(|(part, r)| &r[..part.len()]).copied().collect();

@@ -19,11 +19,11 @@ pub enum Inner {
 /// The Newton matrix of all bodies together, factored.
 pub trait Coupled {
     /// Solves (K + B' diag(weight) B) x = r with `weight` = omega kappa at the points; `None` if the matrix is singular.
-    /// `model` has the bodies that were joined.
+    /// `model` has the bodies that were joined; an iterative solver reduces r by `reduction`.
     ///
     /// # Errors
     /// Failures of the solver library.
-    fn solve(&mut self, model: &Model, weight: &[f64], r: &[Vec<f64>]) -> Result<Option<Field>>;
+    fn solve(&mut self, model: &Model, weight: &[f64], r: &[Vec<f64>], reduction: f64) -> Result<Option<Field>>;
 
     /// What was done so far.
     fn counts(&self) -> BodyCounts;
@@ -50,9 +50,15 @@ impl Newton {
     /// the quadratic convergence gives, and never more than the run asks for.
     fn forcing(&mut self, here: &Here) -> f64 {
         let ratio = here.residual / self.last;
+        // with a solver of its own a step costs little beside what it takes to measure the next iterate
+        let (low, high, margin) = match self.inner {
+            Inner::Direct(_) if self.last.is_infinite() => (1e-2, 1e-2, 0.1),
+            Inner::Direct(_) => (1e-6, 1e-2, 0.1),
+            Inner::Sweep => (1e-3, 0.3, 0.5),
+        };
         self.last = here.residual;
-        let wish = (0.9 * ratio * ratio).clamp(1e-3, 0.3);
-        wish.max(0.5 * here.target / here.residual).min(0.3)
+        let wish = (0.9 * ratio * ratio).clamp(low, high);
+        wish.max(margin * here.target / here.residual).min(high)
     }
 }
 
@@ -62,7 +68,7 @@ impl Newton {
         let weight: Vec<f64> = here.model.weight.iter().zip(slope).map(|(w, k)| w * k).collect();
         let direct = match &mut self.inner {
             Inner::Direct(_) if held::joint_is_weak(here.model, &weight) => None,
-            Inner::Direct(coupled) => coupled.solve(here.model, &weight, &here.sweep.residual)?,
+            Inner::Direct(coupled) => coupled.solve(here.model, &weight, &here.sweep.residual, forcing)?,
             Inner::Sweep => None,
         };
         Ok(match direct {
