@@ -39,16 +39,20 @@ pub enum Origin {
 /// A file that cannot be read, a number that the script does not take, Gmsh missing or failing, a mesh that is not one
 /// of named simplices in `D` dimensions (see [`read`](super::read)), or of too low an order.
 pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<D>> {
-    match source {
+    let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes } => {
             let script = Script::read(&file.value).map_err(|error| error.at(&file.place))?;
             for ((name, _), place) in set.iter().zip(places) {
                 script.check(name, &Located::new(file.value.clone(), place.clone()))?;
             }
-            from_script(file, set, sizes.as_deref(), order, &folders())
+            from_script(file, set, sizes.as_deref(), order, &folders())?
         }
-        MeshSource::Msh { file } => from_file(file, order),
+        MeshSource::Msh { file } => from_file(file, order)?,
+    };
+    if D == 3 {
+        loaded.mesh.sort_cells();
     }
+    Ok(loaded)
 }
 
 fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order) -> Result<Loaded<D>> {

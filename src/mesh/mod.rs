@@ -9,6 +9,7 @@ mod elements;
 mod gmsh;
 mod groups;
 mod load;
+mod locality;
 mod msh;
 mod nodes;
 mod physical;
