@@ -190,8 +190,8 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         rows.push(row);
         match verdict {
             Verdict::End(status) => break (status, layer, weight),
-            Verdict::Stalled if active + 1 < settings.methods.len() => {
-                active += 1;
+            Verdict::Stalled if settings.methods.len() > 1 => {
+                active = (active + 1) % settings.methods.len();
                 observer.note(&format!("iteration {k}: no progress, {} takes over", settings.methods[active].name()));
             }
             Verdict::Stalled | Verdict::Go => {}

@@ -30,6 +30,9 @@ const TOLERANCE: &str = "1e-6";
 /// Dofs of a body in space above which multigrid beats a factorisation.
 const LARGE: usize = 150_000;
 
+/// Retained dofs of a body in space beyond which dense algebra on all contacts together is dearer than multigrid.
+const WIDE: usize = 2000;
+
 /// Retained dofs up to which a dense factorisation costs nothing worth comparing.
 const SMALL: usize = 300;
 
@@ -68,6 +71,8 @@ impl Size {
 /// // too little memory for a factor, or too many dofs: multigrid
 /// assert_eq!(choose(&Size { memory: 500_000_000, ..size }).0, Preset::Hypre);
 /// assert_eq!(choose(&Size { dofs: 1_000_000, ..size }).0, Preset::Hypre);
+/// // nor is a dense matrix of a wide contact small
+/// assert_eq!(choose(&Size { retained: 5000, ..size }).0, Preset::Hypre);
 /// // a sheet that is nothing but contact has nothing to gain
 /// assert_eq!(choose(&Size { dimension: 2, dofs: 40_000, retained: 20_000, ..size }).0, Preset::Mumps);
 /// ```
@@ -81,6 +86,8 @@ pub fn choose(size: &Size) -> (Preset, String) {
     let pays = retained <= SMALL || dense <= memory::work_of_factor(dimension, dofs);
     if dimension != 2 && dofs > LARGE {
         (Preset::Hypre, format!("{what}: too many to factor"))
+    } else if dimension != 2 && retained > WIDE && 2 * retained < dofs {
+        (Preset::Hypre, format!("{what}: too many there for dense algebra"))
     } else if size.can_condense() && pays && fits(Preset::Condensed) {
         (Preset::Condensed, format!("{what}, about {} MB", megabytes(Preset::Condensed)))
     } else if fits(Preset::Mumps) {
