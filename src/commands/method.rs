@@ -29,6 +29,7 @@ pub struct Made {
 pub fn make(session: &Session, scene: &Scene, model: &Model, condensed: bool) -> Result<Made> {
     let over_sweeps = || Box::new(Newton::new(Inner::Sweep)) as Box<dyn Method>;
     let joined = |coupled: Box<dyn Coupled>| Box::new(Newton::new(Inner::Direct(coupled))) as Box<dyn Method>;
+    let typed = options::asks_for_ksp(session, WHOLE)?;
     let small = || (condensed && session.size() == 1).then(|| dense(model)).flatten();
     let mut prefix = None;
     let methods = match scene.method.name {
@@ -47,7 +48,7 @@ pub fn make(session: &Session, scene: &Scene, model: &Model, condensed: bool) ->
         MethodName::Robin => vec![Box::new(Relaxed::new(rule(&scene.method.gamma))) as _],
         MethodName::Ncg => vec![Box::new(Conjugate::default()) as _],
         MethodName::Anderson => vec![Box::new(Anderson::new(scene.method.depth)) as _],
-        MethodName::Newton => match small().filter(|_| !matches!(options::asks_for_ksp(session, WHOLE), Ok(true))) {
+        MethodName::Newton => match (!typed).then(small).flatten() {
             Some(coupled) => vec![joined(coupled)],
             None => {
                 prefix = Some(WHOLE);
@@ -72,7 +73,10 @@ fn rule(gamma: &Gamma) -> Box<dyn GammaRule> {
 /// All bodies as one dense matrix, if they are condensed to few dofs.
 fn dense(model: &Model) -> Option<Box<dyn Coupled>> {
     let dofs = model.bodies.iter().map(|slot| Some(slot.local.as_ref()?.matrices()?.len())).sum::<Option<usize>>()?;
-    let union = Union::of(model, true).filter(|_| dofs <= DENSE)?.without_zeros();
+    if dofs > DENSE {
+        return None;
+    }
+    let union = Union::of(model, true)?.without_zeros();
     let solver = Dense::new(dofs, union.stiffness.values.clone());
     Some(Box::new(Monolithic::new(union, solver)))
 }

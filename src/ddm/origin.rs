@@ -24,7 +24,7 @@ impl Origin {
         let mut motion = iterate.zero_like();
         let mut energy = [0.0];
         for (index, slot) in model.bodies.iter_mut().enumerate() {
-            let Some(body) = &mut slot.local else { continue };
+            let Some(body) = slot.local.as_mut().filter(|body| body.rigid() > 0) else { continue };
             let (state, origin) = (&mut iterate.states[index], &mut motion.states[index]);
             let deformation = state.len() - body.rigid();
             origin[deformation..].copy_from_slice(&state[deformation..]);
