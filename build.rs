@@ -78,7 +78,6 @@ const FUNCTIONS: &[&str] = &[
     "VecResetArray",
     "VecRestoreArray",
     "VecSetBlockSize",
-    "dmumps_c",
 ];
 
 /// Ends the build with a sentence; cargo shows what a failed build script wrote.
@@ -111,12 +110,27 @@ fn main() {
             refuse(&format!("{}: {sentence}", path.display()));
         }
     }
-    // A PETSc outside the system's folders is found again when the program runs.
-    for folder in petsc.link_paths.iter().filter(|folder| !folder.starts_with("/usr")) {
-        println!("cargo:rustc-link-arg=-Wl,-rpath,{}", folder.display());
-    }
+    println!("cargo:rustc-env=WINKLER_PETSC_LIBRARY={}", library(&petsc).display());
     let mumps = mumps(&petsc.include_paths);
     declare(&[&petsc.include_paths[..], &mumps].concat());
+}
+
+/// File of the shared library of PETSc under the name that its programs ask for (`libpetsc.so.3.18`). It is opened when a run
+/// first needs PETSc, not linked: it brings a hundred libraries, whose loading takes longer than a small scene.
+fn library(petsc: &pkg_config::Library) -> PathBuf {
+    let name = petsc.libs.iter().find(|name| name.starts_with("petsc"));
+    let plain = format!("lib{}{}", name.map_or("petsc", String::as_str), env::consts::DLL_SUFFIX);
+    let folder = petsc.link_paths.iter().find(|folder| folder.join(&plain).exists());
+    let Some(file) = folder.map(|folder| folder.join(&plain)) else {
+        refuse(&format!("{plain} is not in {:?}: winkler needs PETSc as a shared library", petsc.link_paths));
+    };
+    let (target, start) = (file.canonicalize().ok(), format!("{plain}."));
+    let versions = folder.and_then(|folder| folder.read_dir().ok()).into_iter().flatten().flatten();
+    let versions = versions.map(|entry| entry.path()).filter(|path| {
+        let named = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(&start));
+        named && path.canonicalize().ok() == target
+    });
+    versions.min_by_key(|path| path.as_os_str().len()).unwrap_or(file)
 }
 
 /// Links MUMPS itself, whose Schur complement PETSc does not hand on in full, and returns the folder of its header.
@@ -158,34 +172,46 @@ fn find() -> pkg_config::Library {
         [_, Ok(_)] => "petsc",
         [Err(cause), _] => refuse(&format!("{cause}\n\nPETSc was not found: {}", requirements::ADVICE)),
     };
-    pkg_config::probe_library(name).unwrap_or_else(|cause| refuse(&format!("PETSc was not found: {cause}")))
+    let probed = pkg_config::Config::new().cargo_metadata(false).print_system_libs(true).probe(name);
+    probed.unwrap_or_else(|cause| refuse(&format!("PETSc was not found: {cause}")))
 }
 
-/// Writes the declarations to `petsc.rs` in the build folder.
+/// Writes the declarations to the build folder: `petsc.rs` has the functions of PETSc as fields of `Library`, found when its
+/// file is opened, `mumps.rs` the function of MUMPS, which is linked.
 fn declare(petsc: &[PathBuf]) {
     let mpi = ["mpi-c", "ompi-c", "mpi", "ompi", "mpich"]
         .iter()
         .find_map(|name| pkg_config::Config::new().cargo_metadata(false).probe(name).ok())
         .map(|library| library.include_paths)
         .unwrap_or_default();
-    let mut builder = bindgen::Builder::default()
+    let common = || {
+        bindgen::Builder::default()
+            .clang_args(petsc.iter().chain(&mpi).map(|folder| format!("-I{}", folder.display())))
+            .rust_edition(bindgen::RustEdition::Edition2024)
+            .generate_comments(false)
+            .layout_tests(false)
+    };
+    let mut library = common()
         .header("src/petsc/wrapper.h")
-        .clang_args(petsc.iter().chain(&mpi).map(|folder| format!("-I{}", folder.display())))
-        .rust_edition(bindgen::RustEdition::Edition2024)
         // One type for communicators in the whole crate: that of the `mpi` crate.
         .blocklist_type("(MPI_Comm|ompi_communicator_t)")
         .raw_line("use mpi::ffi::MPI_Comm;")
-        .allowlist_type("(KSPConvergedReason|MatOption|PCFailedReason|PetscErrorType|PetscBool|DMUMPS_STRUC_C)")
-        .allowlist_var("PetscTrFree")
-        .generate_comments(false)
-        .layout_tests(false);
+        .allowlist_type("(KSPConvergedReason|MatOption|PCFailedReason|PetscErrorType|PetscBool)")
+        .dynamic_library_name("Library")
+        .dynamic_link_require_all(true);
     for function in FUNCTIONS {
-        builder = builder.allowlist_function(function);
+        library = library.allowlist_function(function);
     }
-    let bindings = builder.generate().unwrap_or_else(|cause| {
-        refuse(&format!("bindgen could not read PETSc's headers: {cause}; it needs `apt-get install libclang-dev`"))
-    });
-    let folder = env::var_os("OUT_DIR").unwrap_or_default();
-    let file = Path::new(&folder).join("petsc.rs");
-    bindings.write_to_file(&file).unwrap_or_else(|cause| refuse(&format!("cannot write {}: {cause}", file.display())));
+    let mumps = common().header_contents("mumps.h", "#include <dmumps_c.h>").allowlist_function("dmumps_c");
+    for (builder, file) in [(library, "petsc.rs"), (mumps, "mumps.rs")] {
+        let bindings = builder.generate().unwrap_or_else(|cause| {
+            refuse(&format!(
+                "bindgen could not read the headers of PETSc or MUMPS: {cause}; it needs `apt-get install libclang-dev`"
+            ))
+        });
+        let file = Path::new(&env::var_os("OUT_DIR").unwrap_or_default()).join(file);
+        bindings
+            .write_to_file(&file)
+            .unwrap_or_else(|cause| refuse(&format!("cannot write {}: {cause}", file.display())));
+    }
 }

@@ -229,3 +229,11 @@ fn a_sweep_keeps_condensed_bodies() {
     }
     assert_eq!(counts(&sweep(&["method.gamma=0.5,0.6"], &["--set", "solver=mumps"])[1])[0], 2);
 }
+
+#[test]
+fn petsc_is_loaded_only_by_runs_that_make_its_objects() {
+    assert!(coarse("groove", &["--set", "solver=condensed"]).report["petsc"].is_null());
+    for words in [["--set", "solver=mumps"], ["--set", "solver=hypre"], ["-ksp_type", "cg"]] {
+        assert!(coarse("groove", &words).text("petsc").starts_with("3."), "{words:?}");
+    }
+}

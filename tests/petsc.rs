@@ -280,3 +280,67 @@ fn a_panic_on_one_rank_ends_the_others() {
         assert!(String::from_utf8_lossy(&output.stderr).contains("the planted panic"));
     }
 }
+
+/// Options that were set while PETSc waited are those of its objects, and what was read stays read.
+#[test]
+fn petsc_waits_till_it_is_needed_and_takes_over_the_options() {
+    let inside = || {
+        let session = Session::start(&[])?;
+        let options = session.options();
+        options.set("-a_ksp_rtol", Some("1e-3"))?;
+        options.set("-a_KSP_max_it", Some("7"))?;
+        options.set("a_ksp_max_it", Some("9"))?;
+        options.set("-flag", None)?;
+        options.set("-slip", Some("1"))?;
+        options.set("-gone", None)?;
+        options.clear("-GONE")?;
+        options.mark_used("-flag")?;
+        assert!(options.set("-1", None).is_err() && options.mark_used("-1").is_err());
+        let state = || -> Result<_> {
+            let names =
+                |entries: Vec<(String, Option<String>)>| entries.into_iter().map(|(name, _)| name.to_lowercase());
+            let all: Vec<String> = names(options.all()?).collect();
+            let left: Vec<String> = names(options.left()?).collect();
+            let values = ["-a_ksp_rtol", "-A_ksp_max_it", "-flag", "-gone"].map(|name| options.get(name));
+            Ok((all, left, values, ["-flag", "-slip", "-none"].map(|name| options.used(name))))
+        };
+        let waiting = state()?;
+        assert_eq!(session.petsc_version(), None);
+        let mut ksp = Ksp::new(&session, "a_")?;
+        assert!(session.petsc_version().is_some_and(|version| version.starts_with("3.")));
+        assert_eq!(state()?, waiting);
+        assert_eq!(waiting.1, ["-a_ksp_max_it", "-a_ksp_rtol", "-slip"]);
+        assert_eq!(waiting.2, [Some("1e-3"), Some("9"), Some(""), None].map(|value| value.map(str::to_owned)));
+        assert_eq!(waiting.3, [true, false, false]);
+        ksp.set_operator(&chain(&session, 30)?)?;
+        ksp.set_from_options()?;
+        assert_eq!(ksp.tolerance(), 1e-3);
+        assert_eq!(options.left()?.len(), 1);
+        options.clear("-slip")
+    };
+    expect_success(alone("petsc_waits_till_it_is_needed_and_takes_over_the_options", 0, &[], inside));
+}
+
+/// Options in the environment are PETSc's to read: then it does not wait.
+#[test]
+fn petsc_starts_at_once_where_it_has_options() {
+    let inside = || {
+        let session = Session::start(&[])?;
+        assert!(session.petsc_version().is_some());
+        assert_eq!(session.options().get("-up_ksp_type").as_deref(), Some("cg"));
+        session.options().mark_used("-up_ksp_type")
+    };
+    let environment = [("PETSC_OPTIONS", "-up_ksp_type cg")];
+    expect_success(alone("petsc_starts_at_once_where_it_has_options", 0, &environment, inside));
+}
+
+/// One rank that needs PETSc before the others would wait for them for ever.
+#[test]
+fn several_ranks_start_petsc_together() {
+    let inside = || {
+        let session = Session::start(&[])?;
+        assert!(session.size() == 2 && session.petsc_version().is_some());
+        Ok(())
+    };
+    expect_success(alone("several_ranks_start_petsc_together", 2, &[], inside));
+}

@@ -3,7 +3,7 @@
 //! PETSc reports an error frame by frame, innermost first, through a handler. Ours records the frames and prints
 //! nothing; [`check`] picks them up when the code has come back to Rust.
 
-use super::ffi;
+use super::{ffi, library};
 use crate::error::{Error, Kind, Result};
 use std::cell::RefCell;
 use std::ffi::{CStr, c_char, c_int, c_void};
@@ -20,30 +20,39 @@ thread_local! {
     static TRACE: RefCell<Trace> = RefCell::default();
 }
 
-/// Calls one PETSc function and checks its return code: `petsc!(MatMult(a, x, y))?`.
+/// Calls one PETSc function, of a PETSc that is started if it waits, and checks its return code: `petsc!(MatMult(a, x, y))?`.
 ///
 /// It stands for an `unsafe` call: who uses it vouches for the pointers. They are valid because each wrapper owns its
 /// PETSc object and holds a session token.
 macro_rules! petsc {
     ($function:ident($($argument:expr),* $(,)?)) => {
-        $crate::petsc::error::check(stringify!($function), || unsafe { $crate::petsc::ffi::$function($($argument),*) })
+        $crate::petsc::error::check(stringify!($function), |petsc| unsafe { petsc.$function($($argument),*) })
     };
 }
 pub(super) use petsc;
 
 /// Runs `call` and turns a nonzero code into an error that says what PETSc said.
-pub(super) fn check(function: &str, call: impl FnOnce() -> ffi::PetscErrorCode) -> Result<()> {
+pub(super) fn check(function: &str, call: impl FnOnce(&ffi::Library) -> ffi::PetscErrorCode) -> Result<()> {
+    check_in(library::running()?, function, call)
+}
+
+/// The same for a PETSc that does not run yet, or no longer.
+pub(super) fn check_in(
+    library: &ffi::Library,
+    function: &str,
+    call: impl FnOnce(&ffi::Library) -> ffi::PetscErrorCode,
+) -> Result<()> {
     TRACE.take();
-    let code = call();
+    let code = call(library);
     // PETSc 3.18 has an int here, newer ones an enum; both fit.
-    if code as i64 == 0 { Ok(()) } else { Err(failure(function, code)) }
+    if code as i64 == 0 { Ok(()) } else { Err(failure(library, function, code)) }
 }
 
 /// The error of a failed call.
-fn failure(function: &str, code: ffi::PetscErrorCode) -> Error {
+fn failure(library: &ffi::Library, function: &str, code: ffi::PetscErrorCode) -> Error {
     let trace = TRACE.take();
     let mut error = Error::new(Kind::Solver, format!("PETSc failed in {function}"));
-    let kind = meaning(code);
+    let kind = meaning(library, code);
     error = match (trace.message.is_empty(), kind) {
         (false, Some(kind)) => error.because(format!("{} ({kind})", trace.message)),
         (false, None) => error.because(trace.message),
@@ -57,11 +66,11 @@ fn failure(function: &str, code: ffi::PetscErrorCode) -> Error {
 }
 
 /// PETSc's general text for an error code.
-fn meaning(code: ffi::PetscErrorCode) -> Option<String> {
+fn meaning(library: &ffi::Library, code: ffi::PetscErrorCode) -> Option<String> {
     let mut text: *const c_char = std::ptr::null();
     // SAFETY: PETSc sets the pointer to a static text or to null; no message of the error itself is asked for.
     unsafe {
-        ffi::PetscErrorMessage(code as _, &mut text, std::ptr::null_mut());
+        library.PetscErrorMessage(code as _, &mut text, std::ptr::null_mut());
         (!text.is_null()).then(|| string(text))
     }
     .filter(|text| !text.is_empty())

@@ -28,6 +28,7 @@ mod failure;
 mod ffi;
 mod ksp;
 mod launcher;
+mod library;
 mod matrix;
 mod metis;
 mod mumps;
@@ -38,6 +39,7 @@ mod reason;
 mod requirements;
 mod session;
 mod vector;
+mod waiting;
 
 pub use blas::{cholesky, cholesky_solve};
 pub use ksp::{Ksp, Solved};

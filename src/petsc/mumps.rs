@@ -42,7 +42,7 @@ const OWN: [(usize, &str); 8] = [
 /// ```
 pub struct Schur {
     /// MUMPS' own struct; it keeps pointers into the arrays below.
-    mumps: Box<ffi::DMUMPS_STRUC_C>,
+    mumps: Box<ffi::mumps::DMUMPS_STRUC_C>,
     rows: Vec<Int>,
     columns: Vec<Int>,
     values: Vec<f64>,
@@ -236,7 +236,7 @@ impl Schur {
     fn call(&mut self, job: Int) -> Result<()> {
         self.mumps.job = job;
         // SAFETY: every pointer in the struct is null or leads to an array of ours that has the length set beside it.
-        unsafe { ffi::dmumps_c(&mut *self.mumps) };
+        unsafe { ffi::mumps::dmumps_c(&mut *self.mumps) };
         let (first, second) = (self.mumps.infog[0], self.mumps.infog[1]);
         if first >= 0 { Ok(()) } else { Err(failure(job, first, second)) }
     }

@@ -1,7 +1,7 @@
 //! PETSc's options: one table in a process.
 
 use super::error::{petsc, string};
-use super::{Session, ffi};
+use super::{Session, ffi, library, waiting};
 use crate::error::{Error, Kind, Result};
 use std::collections::BTreeMap;
 use std::ffi::{CString, c_char};
@@ -72,9 +72,13 @@ impl Options {
     /// # Errors
     /// When the name does not begin with a letter after its dash or has a blank, or a text has a zero byte.
     pub fn set(&self, name: &str, value: Option<&str>) -> Result<()> {
-        let name = key(name)?;
-        let value = value.map(text).transpose()?;
-        petsc!(PetscOptionsSetValue(null_mut(), name.as_ptr(), value.as_ref().map_or(null_mut(), |v| v.as_ptr())))
+        if library::runs() {
+            return set(name, value);
+        }
+        key(name)?;
+        value.map(text).transpose()?;
+        waiting::set(&dashed(name), value);
+        Ok(())
     }
 
     /// Value of an option; empty for one without a value, `None` for one that is not set.
@@ -94,8 +98,12 @@ impl Options {
     /// # Errors
     /// When the name is not one of an option.
     pub fn clear(&self, name: &str) -> Result<()> {
-        let name = key(name)?;
-        petsc!(PetscOptionsClearValue(null_mut(), name.as_ptr()))
+        let known = key(name)?;
+        if !library::runs() {
+            waiting::clear(&dashed(name));
+            return Ok(());
+        }
+        petsc!(PetscOptionsClearValue(null_mut(), known.as_ptr()))
     }
 
     /// All options that are set, by name.
@@ -106,20 +114,23 @@ impl Options {
     /// # Errors
     /// When PETSc is out of memory.
     pub fn all(&self) -> Result<Vec<Entry>> {
+        if !library::runs() {
+            return Ok(waiting::entries(false));
+        }
         let mut entries: BTreeMap<String, Option<String>> = self.left()?.into_iter().collect();
         let mut whole: *mut c_char = null_mut();
         petsc!(PetscOptionsGetAll(null_mut(), &mut whole))?;
         // SAFETY: PETSc made the text and ends it with a zero byte; its own function frees it, once.
         let words = unsafe {
             let words = string(whole);
-            if let Some(free) = ffi::PetscTrFree {
+            if let Some(free) = *library::running()?.address::<*const Option<ffi::Free>>("PetscTrFree")? {
                 free(whole.cast(), 0, c"Options::all".as_ptr(), c"options.rs".as_ptr());
             }
             words
         };
         for word in words.split_whitespace().filter(|word| word.starts_with('-')) {
             if !entries.contains_key(word) && self.used(word) {
-                entries.insert(word.to_owned(), self.read(word)?);
+                entries.insert(word.to_owned(), read(word)?);
             }
         }
         Ok(entries.into_iter().collect())
@@ -127,6 +138,9 @@ impl Options {
 
     /// Whether PETSc, or [`mark_used`](Self::mark_used), has read an option that is set.
     pub fn used(&self, name: &str) -> bool {
+        if !library::runs() {
+            return waiting::used(&dashed(name));
+        }
         let Ok(name) = key(name) else { return false };
         let mut used = ffi::PetscBool_PETSC_FALSE;
         // This one PETSc function wants the name without its dash.
@@ -140,7 +154,12 @@ impl Options {
     /// # Errors
     /// When the name is not one of an option.
     pub fn mark_used(&self, name: &str) -> Result<()> {
-        self.read(name).map(drop)
+        if library::runs() {
+            return read(name).map(drop);
+        }
+        key(name)?;
+        waiting::read(&dashed(name));
+        Ok(())
     }
 
     /// The options that nobody has read so far, by name.
@@ -148,6 +167,9 @@ impl Options {
     /// # Errors
     /// When PETSc is out of memory.
     pub fn left(&self) -> Result<Vec<Entry>> {
+        if !library::runs() {
+            return Ok(waiting::entries(true));
+        }
         let mut count = 0;
         let (mut names, mut values) = (null_mut(), null_mut());
         petsc!(PetscOptionsLeftGet(null_mut(), &mut count, &mut names, &mut values))?;
@@ -163,16 +185,23 @@ impl Options {
         entries.sort();
         Ok(entries)
     }
+}
 
-    /// Value of an option, marking it as read.
-    fn read(&self, name: &str) -> Result<Option<String>> {
-        let name = key(name)?;
-        let mut value: *const c_char = std::ptr::null();
-        let mut set = ffi::PetscBool_PETSC_FALSE;
-        petsc!(PetscOptionsFindPair(null_mut(), std::ptr::null(), name.as_ptr(), &mut value, &mut set))?;
-        // SAFETY: null, or a text that PETSc keeps till the option changes; it is copied.
-        Ok((!value.is_null()).then(|| unsafe { string(value) }))
-    }
+/// Sets an option of the running PETSc.
+pub(super) fn set(name: &str, value: Option<&str>) -> Result<()> {
+    let name = key(name)?;
+    let value = value.map(text).transpose()?;
+    petsc!(PetscOptionsSetValue(null_mut(), name.as_ptr(), value.as_ref().map_or(null_mut(), |v| v.as_ptr())))
+}
+
+/// Value of an option of the running PETSc, marking it as read.
+pub(super) fn read(name: &str) -> Result<Option<String>> {
+    let name = key(name)?;
+    let mut value: *const c_char = std::ptr::null();
+    let mut set = ffi::PetscBool_PETSC_FALSE;
+    petsc!(PetscOptionsFindPair(null_mut(), std::ptr::null(), name.as_ptr(), &mut value, &mut set))?;
+    // SAFETY: null, or a text that PETSc keeps till the option changes; it is copied.
+    Ok((!value.is_null()).then(|| unsafe { string(value) }))
 }
 
 /// The name with its dash.

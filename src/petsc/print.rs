@@ -1,6 +1,6 @@
 //! Catching what PETSc prints, to have a view of an object or a help text as a string.
 
-use super::ffi;
+use super::{ffi, library};
 use std::cell::RefCell;
 use std::ffi::{c_char, c_void};
 
@@ -14,20 +14,22 @@ const LONGEST: usize = 1 << 16;
 /// Runs `action` and returns its result and all that PETSc printed meanwhile, which is not shown.
 pub(super) fn caught<T>(action: impl FnOnce() -> T) -> (T, String) {
     /// Puts PETSc's own printer back, also when `action` panics.
-    struct Restore(ffi::Printf);
+    struct Restore(*mut ffi::Printf, ffi::Printf);
     impl Drop for Restore {
         fn drop(&mut self) {
             // SAFETY: see below.
-            unsafe { ffi::PetscVFPrintf = self.0 };
+            unsafe { *self.0 = self.1 };
         }
     }
     CAUGHT.take();
-    // SAFETY: PETSc is used by one thread, that of the session, so nobody reads the hook meanwhile.
-    let restore = unsafe {
-        let before = Restore(ffi::PetscVFPrintf);
-        ffi::PetscVFPrintf = append;
+    // SAFETY: the variable has this type; PETSc is used by one thread, that of the session, so nobody reads the hook meanwhile.
+    let hook = library::running().and_then(|petsc| unsafe { petsc.address::<*mut ffi::Printf>("PetscVFPrintf") });
+    // without PETSc the action itself tells the error
+    let restore = hook.ok().map(|hook| unsafe {
+        let before = Restore(hook, *hook);
+        *hook = append;
         before
-    };
+    });
     let result = action();
     drop(restore);
     (result, String::from_utf8_lossy(&CAUGHT.take()).into_owned())
@@ -38,7 +40,12 @@ unsafe extern "C" fn append(_file: *mut c_void, format: *const c_char, list: *mu
     let mut text = vec![0_u8; LONGEST];
     let mut length = 0;
     // SAFETY: PETSc writes at most `LONGEST` bytes with the final zero; format and list come from PETSc as they are.
-    let code = unsafe { ffi::PetscVSNPrintf(text.as_mut_ptr().cast(), LONGEST, format, &mut length, list) };
+    let code = unsafe {
+        let Ok(print) = library::open().and_then(|petsc| petsc.address::<ffi::Format>("PetscVSNPrintf")) else {
+            return Default::default();
+        };
+        print(text.as_mut_ptr().cast(), LONGEST, format, &mut length, list)
+    };
     let end = text.iter().position(|byte| *byte == 0).unwrap_or(0);
     CAUGHT.with_borrow_mut(|caught| caught.extend_from_slice(&text[..end]));
     code

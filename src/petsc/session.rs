@@ -1,11 +1,10 @@
 //! The life of MPI and PETSc in this process.
 
-use super::error::{petsc, record};
-use super::{Options, blas, ffi, launcher};
+use super::error::petsc;
+use super::{Options, blas, launcher, library, waiting};
 use crate::error::{Error, Kind, Result};
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
-use std::ffi::{CString, c_char, c_int};
 use std::io::Write;
 use std::rc::Rc;
 use std::sync::Once;
@@ -23,10 +22,12 @@ static STARTED: AtomicBool = AtomicBool::new(false);
 /// use winkler::petsc::Session;
 /// let session = Session::start(&[])?;
 /// assert_eq!((session.rank(), session.size()), (0, 1));
-/// assert!(session.petsc_version().starts_with("3."));
+/// assert_eq!(session.petsc_version(), None); // PETSc itself waits till something needs it
+/// let ksp = winkler::petsc::Ksp::new(&session, "")?;
+/// assert!(session.petsc_version().is_some_and(|version| version.starts_with("3.")));
 /// assert!(!session.blas_name().is_empty());
 /// assert!(Session::start(&[]).is_err()); // one a process, also after it ended
-/// drop(session);
+/// drop((ksp, session));
 /// assert!(Session::start(&[]).is_err());
 /// assert!(std::env::var_os("OMPI_MCA_btl").is_none()); // nothing is left for child processes
 /// # Ok::<(), winkler::error::Error>(())
@@ -41,7 +42,7 @@ struct Running {
 }
 
 impl Session {
-    /// Starts MPI, then PETSc with the options in `words` (as typed: `-ksp_type`, `cg`), in `PETSC_OPTIONS`, in
+    /// Starts MPI, then PETSc (at once, or where a lone process gives it no options, when it is first needed) with the options in `words` (as typed: `-ksp_type`, `cg`), in `PETSC_OPTIONS`, in
     /// `.petscrc` and in the file of `-options_file`. PETSc installs no signal handlers. With several ranks a panic on
     /// one of them ends them all.
     ///
@@ -49,16 +50,6 @@ impl Session {
     /// `Kind::Solver` when a session was started before in this process, when MPI runs already, or when PETSc refuses
     /// an option; PETSc's message is among the causes.
     pub fn start(words: &[String]) -> Result<Session> {
-        let nul = |_| Error::new(Kind::Solver, "a PETSc option contains a zero byte");
-        // PETSc keeps a pointer to these words till its end; they are leaked, once.
-        let mut arguments = Vec::with_capacity(words.len() + 3);
-        for word in std::iter::once("winkler").chain(words.iter().map(String::as_str)).chain([NO_SIGNALS]) {
-            arguments.push(CString::new(word).map_err(nul)?.into_raw());
-        }
-        let mut count = arguments.len() as c_int;
-        arguments.push(std::ptr::null_mut());
-        let mut arguments: *mut *mut c_char = Vec::leak(arguments).as_mut_ptr();
-
         if STARTED.swap(true, Ordering::SeqCst) {
             return Err(Error::new(Kind::Solver, "PETSc was already started in this process")
                 .help("start one session and clone it"));
@@ -67,21 +58,17 @@ impl Session {
             .ok_or_else(|| Error::new(Kind::Solver, "MPI was already started in this process by other code"))?;
         let world = SimpleCommunicator::world();
         abort_on_panic(world.size() > 1);
-        // Pushed first, so that errors of the start are recorded too and handlers that the user asks for
-        // (-on_error_abort, -start_in_debugger) come on top.
-        petsc!(PetscPushErrorHandler(Some(record), std::ptr::null_mut()))?;
-        let (count, arguments) = (&raw mut count, &raw mut arguments);
-        let started = petsc!(PetscInitialize(count, arguments, std::ptr::null(), std::ptr::null()));
-        if let Err(error) = started {
+        if world.size() == 1 && library::may_wait(words) {
+            return Ok(Session(Rc::new(Running { world, _universe: universe })));
+        }
+        if let Err(error) = library::start(words) {
             // The other ranks may still wait for this one inside PETSc; ending MPI here would wait for them.
             if world.size() > 1 {
                 std::mem::forget(universe);
             }
             return Err(error);
         }
-        let session = Session(Rc::new(Running { world, _universe: universe }));
-        session.options().clear(NO_SIGNALS)?;
-        Ok(session)
+        Ok(Session(Rc::new(Running { world, _universe: universe })))
     }
 
     /// The options of this process.
@@ -111,12 +98,15 @@ impl Session {
         &self.0.world
     }
 
-    /// Version of PETSc at run time, such as `3.18.5`.
-    pub fn petsc_version(&self) -> String {
+    /// Version of PETSc at run time, such as `3.18.5`; `None` while nothing has needed it.
+    pub fn petsc_version(&self) -> Option<String> {
+        if !library::runs() {
+            return None;
+        }
         let (mut major, mut minor, mut patch, mut release) = (0, 0, 0, 0);
         match petsc!(PetscGetVersionNumber(&mut major, &mut minor, &mut patch, &mut release)) {
-            Ok(()) => format!("{major}.{minor}.{patch}"),
-            Err(_) => "unknown".to_owned(),
+            Ok(()) => Some(format!("{major}.{minor}.{patch}")),
+            Err(_) => None,
         }
     }
 
@@ -136,7 +126,7 @@ impl Session {
         // Nothing can be done about an output that is closed.
         let _ = std::io::stdout().flush();
         // SAFETY: a null file means all files of the C library.
-        unsafe { ffi::fflush(std::ptr::null_mut()) };
+        unsafe { super::ffi::fflush(std::ptr::null_mut()) };
         if self.size() > 1 || launcher::seen() {
             self.0.world.abort(code);
         }
@@ -144,13 +134,10 @@ impl Session {
     }
 }
 
-/// Leaves the signals to Rust, so that a panic or a stack overflow prints its own message.
-const NO_SIGNALS: &str = "-no_signal_handler";
-
 impl Drop for Running {
     fn drop(&mut self) {
-        // What the user asked to see at the end (-log_view) is printed here; there is nobody left to tell an error.
-        let _ = petsc!(PetscFinalize());
+        library::end();
+        waiting::forget();
     }
 }
 

@@ -65,7 +65,7 @@ fn run(words: &[String]) -> Result<()> {
 
     let error = u.iter().zip(&exact).map(|(u, exact)| (u - exact).abs()).fold(0.0, f64::max);
     if session.rank() == 0 {
-        println!("PETSc {}, {}", session.petsc_version(), session.blas_name());
+        println!("PETSc {}, {}", session.petsc_version().unwrap_or_default(), session.blas_name());
         println!("{} unknowns, {} with {}", n * n, ksp.ksp_type(), ksp.pc_type());
         println!("{} iterations: {}", solved.iterations, solved.reason);
         println!("largest error {error:.3e}");

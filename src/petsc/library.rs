@@ -1,0 +1,102 @@
+//! PETSc's library: opened and started by the first call that needs it.
+//!
+//! It brings a hundred other libraries, which take longer to load than a small scene to solve. A lone process whose bodies are
+//! all condensed makes no object of PETSc and never opens it.
+
+use super::error::{check_in, record};
+use super::{ffi, waiting};
+use crate::error::{Error, Kind, Result};
+use std::cell::Cell;
+use std::ffi::{CString, c_char, c_int};
+use std::path::Path;
+use std::ptr::{null, null_mut};
+use std::sync::OnceLock;
+
+/// The file that this program was built with.
+const FILE: &str = env!("WINKLER_PETSC_LIBRARY");
+
+/// Leaves the signals to Rust, so that a panic or a stack overflow prints its own message.
+const NO_SIGNALS: &str = "-no_signal_handler";
+
+thread_local! {
+    /// Whether PETSc runs; it belongs to the thread of the session.
+    static RUNS: Cell<bool> = const { Cell::new(false) };
+}
+
+/// The functions of PETSc, from its file.
+pub(super) fn open() -> Result<&'static ffi::Library> {
+    static LIBRARY: OnceLock<std::result::Result<ffi::Library, String>> = OnceLock::new();
+    // SAFETY: the file is that of the headers the declarations were made from, or one with the same name; its
+    // initialisers are those of any program that links it.
+    let opened = LIBRARY.get_or_init(|| unsafe { ffi::Library::new(FILE) }.map_err(|cause| cause.to_string()));
+    opened.as_ref().map_err(|cause| {
+        Error::new(Kind::Solver, format!("PETSc cannot be loaded from {FILE}"))
+            .because(cause.clone())
+            .help("install the PETSc that winkler was built with, or build winkler again (scripts/setup)")
+    })
+}
+
+/// Whether PETSc has been started and not ended.
+pub(super) fn runs() -> bool {
+    RUNS.get()
+}
+
+/// Whether nothing is lost if PETSc starts later, or never: it has no options to read.
+pub(super) fn may_wait(words: &[String]) -> bool {
+    let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    let home = std::env::var_os("HOME").map(|home| Path::new(&home).join(".petscrc"));
+    let file = |path: &Path| path.exists();
+    words.is_empty()
+        && !["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"].into_iter().any(set)
+        && !home.is_some_and(|path| file(&path))
+        && ![".petscrc", "petscrc"].into_iter().any(|name| file(Path::new(name)))
+}
+
+/// The functions of the running PETSc, which is started if it waited, with the options that were set meanwhile.
+pub(super) fn running() -> Result<&'static ffi::Library> {
+    if !runs() {
+        start(&[])?;
+        waiting::hand_over()?;
+    }
+    open()
+}
+
+/// Starts PETSc with the options in `words`, in the environment and in its files. MPI runs already.
+pub(super) fn start(words: &[String]) -> Result<()> {
+    let library = open()?;
+    let nul = |_| Error::new(Kind::Solver, "a PETSc option contains a zero byte");
+    // PETSc keeps a pointer to these words till its end; they are leaked, once.
+    let mut arguments = Vec::with_capacity(words.len() + 3);
+    for word in std::iter::once("winkler").chain(words.iter().map(String::as_str)).chain([NO_SIGNALS]) {
+        arguments.push(CString::new(word).map_err(nul)?.into_raw());
+    }
+    let mut count = arguments.len() as c_int;
+    arguments.push(null_mut());
+    let mut arguments: *mut *mut c_char = Vec::leak(arguments).as_mut_ptr();
+    let (count, arguments) = (&raw mut count, &raw mut arguments);
+    // Pushed first, so that errors of the start are recorded too and handlers that the user asks for
+    // (-on_error_abort, -start_in_debugger) come on top.
+    // SAFETY: the handler has PETSc's own type; the words live till the end of the process.
+    check_in(library, "PetscPushErrorHandler", |petsc| unsafe {
+        petsc.PetscPushErrorHandler(Some(record), null_mut())
+    })?;
+    check_in(library, "PetscInitialize", |petsc| unsafe { petsc.PetscInitialize(count, arguments, null(), null()) })?;
+    RUNS.set(true);
+    let name = CString::new(NO_SIGNALS).map_err(nul)?;
+    check_in(library, "PetscOptionsClearValue", |petsc| unsafe {
+        petsc.PetscOptionsClearValue(null_mut(), name.as_ptr())
+    })
+}
+
+/// Ends PETSc, if it runs. What the user asked to see at the end (-log_view) is printed here; there is nobody left to tell an
+/// error.
+pub(super) fn end() {
+    if !runs() {
+        return;
+    }
+    if let Ok(library) = open() {
+        // SAFETY: no object of PETSc is left: each held the session.
+        let _ = check_in(library, "PetscFinalize", |petsc| unsafe { petsc.PetscFinalize() });
+    }
+    RUNS.set(false);
+}
