@@ -119,12 +119,13 @@ pub trait Body {
     /// Failures of the solver library; not converging is told in [`Solved`].
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
 
-    /// How far solves have to reduce r, unless the user says: a hint to iterative inner solvers.
+    /// How far solves have to reduce r, unless the user says: a hint to iterative inner solvers. False if solves are what they
+    /// are.
     ///
     /// # Errors
     /// Failures of the solver library.
-    fn precision(&mut self, _rtol: f64) -> Result<()> {
-        Ok(())
+    fn precision(&mut self, _rtol: f64) -> Result<bool> {
+        Ok(false)
     }
 
     /// z = M^-1 r with a fixed symmetric M near G: what preconditions conjugate gradients over all bodies. Costs no more than

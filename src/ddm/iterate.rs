@@ -9,7 +9,7 @@ use super::held;
 use super::interval::{Interval, interval};
 use super::layer::Layer;
 use super::lift::{lift, move_rigidly};
-use super::method::{FINE, Here, Method, Step};
+use super::method::{FINE, Here, Method, ROUGH, Step};
 use super::model::Model;
 use super::origin::Origin;
 use super::progress::{Observer, Row};
@@ -163,6 +163,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         model.precision(settings.methods[active].precision())?;
         let from = origin.as_ref().map_or(&[][..], |origin| origin.trace());
         let method = &settings.methods[active];
+        let mut rough = method.is_joint();
         let (sweep, row, verdict) = loop {
             model.robin(&weight)?;
             let relaxed = last.as_ref().filter(|last| last.relaxed).map(|last| (&last.sweep, last.length));
@@ -175,10 +176,11 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
             row.energy += origin.as_ref().map_or(0.0, |origin| origin.energy);
             row.error = row.residual * method.amplification().sqrt();
             let verdict = watch.judge(&seen, &settings.stop, &row);
-            // good by an old Robin term is not yet good by the one that belongs here
-            if method.is_joint() && matches!(verdict, Verdict::End(Status::Converged)) {
+            // good by an old Robin term or a rough solve is not yet good by the ones that belong here
+            if rough && matches!(verdict, Verdict::End(Status::Converged)) {
+                rough = false;
                 let own = robin.weight(model, &settings.zone, &layer, k);
-                if own != weight {
+                if model.precision(ROUGH)? || own != weight {
                     weight = own;
                     continue;
                 }

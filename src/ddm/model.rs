@@ -155,12 +155,13 @@ impl Model {
         }
     }
 
-    /// Tells every body how far its solves have to reduce r.
+    /// Tells every body how far its solves have to reduce r. Whether that matters to one of them.
     ///
     /// # Errors
     /// Failures of the solver library.
-    pub fn precision(&mut self, rtol: f64) -> Result<()> {
-        self.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.precision(rtol))
+    pub fn precision(&mut self, rtol: f64) -> Result<bool> {
+        let mut bodies = self.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
+        bodies.try_fold(false, |matters, body| Ok(body.precision(rtol)? || matters))
     }
 
     /// Gives every body its Robin term `weight` = omega psi kappa of each contact row (37)-(38).

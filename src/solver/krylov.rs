@@ -28,6 +28,9 @@ pub struct Krylov {
 /// Growth of the iterations, over those of a fresh preconditioner, at which a new one is made.
 const WORN: f64 = 1.5;
 
+/// Iterations that tell nothing of the pace.
+const FEW: usize = 4;
+
 impl Krylov {
     /// Starts from G = K, with the options of prefix `<body>_` that stand in the database now. `near_null_space` are the
     /// rigid motions that algebraic multigrid (GAMG) wants to know, one entry a dof each.
@@ -90,7 +93,7 @@ impl InnerSolver for Krylov {
         self.set_up()?;
         let solved = self.ksp.solve(r, z)?;
         let direct = self.ksp.ksp_type() == "preonly";
-        if self.keeps {
+        if self.keeps && solved.iterations > FEW {
             // the next change of G brings a new preconditioner if this one is worn
             let pace = solved.iterations as f64 / -self.ksp.tolerance().log10();
             self.stale |= pace > WORN * *self.fresh.get_or_insert(pace);
@@ -101,8 +104,11 @@ impl InnerSolver for Krylov {
         })
     }
 
-    fn precision(&mut self, rtol: f64) -> Result<()> {
-        if self.free { self.ksp.set_tolerance(rtol) } else { Ok(()) }
+    fn precision(&mut self, rtol: f64) -> Result<bool> {
+        if self.free {
+            self.ksp.set_tolerance(rtol)?;
+        }
+        Ok(self.free)
     }
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {

@@ -47,12 +47,12 @@ pub trait InnerSolver {
     /// Failures of the solver library; not converging is told in [`Solved`].
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
 
-    /// How far solves have to reduce r, unless the user says.
+    /// How far solves have to reduce r, unless the user says; false if solves are what they are.
     ///
     /// # Errors
     /// Failures of the solver library.
-    fn precision(&mut self, _rtol: f64) -> Result<()> {
-        Ok(())
+    fn precision(&mut self, _rtol: f64) -> Result<bool> {
+        Ok(false)
     }
 
     /// z = M^-1 r with a fixed symmetric M near G: one application of the preconditioner of an iterative solver, a whole solve

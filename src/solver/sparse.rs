@@ -205,7 +205,7 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         done
     }
 
-    fn precision(&mut self, rtol: f64) -> Result<()> {
+    fn precision(&mut self, rtol: f64) -> Result<bool> {
         self.solver.precision(rtol)
     }
 

@@ -142,7 +142,7 @@ impl Plan {
                         parts: Vec::new(),
                         overrides,
                         mesh_overrides: mesh.clone(),
-                        words: [&request.petsc[..], &solver.words].concat(),
+                        words: [&precise(method)[..], &request.petsc, &solver.words].concat(),
                         ranks,
                     });
                 }
@@ -184,6 +184,12 @@ impl Plan {
             }
         }
     }
+}
+
+/// Words for the yardstick: a solve that ends at 1e-8, unless another tolerance is typed.
+fn precise(method: Option<&str>) -> Vec<String> {
+    let words = ["-ksp_rtol", "1e-8"].map(str::to_owned);
+    if method == Some(LINEAR) { words.to_vec() } else { Vec::new() }
 }
 
 impl Case {

@@ -30,6 +30,8 @@ pub(super) struct Run {
     pub memory: u64,
     /// `report.json`; null if there is none.
     pub report: Value,
+    /// Inner iterations of its last sweep; `None` without a history of two rows.
+    pub last_sweep: Option<f64>,
 }
 
 /// Starts runs.
@@ -135,6 +137,7 @@ impl Runner {
             cpu: ended.used.as_ref().map_or(f64::NAN, |used| (used.rusage.utime + used.rusage.stime).as_secs_f64()),
             memory: ended.used.map_or(0, |used| used.rusage.maxrss),
             report: if ended.late { Value::Null } else { report },
+            last_sweep: last_sweep(&folder.join("history.csv")),
         })
     }
 
@@ -172,6 +175,15 @@ impl Runner {
         let said = String::from_utf8_lossy(&fs::read(&path).unwrap_or_default()).into_owned();
         Ok(Ended { used: answer.ok().and_then(|used| used.ok()), late, seconds, said })
     }
+}
+
+/// Inner iterations between the last two rows of a history.
+fn last_sweep(history: &Path) -> Option<f64> {
+    let mut reader = csv::Reader::from_path(history).ok()?;
+    let column = reader.headers().ok()?.iter().position(|name| name == "inner_iterations")?;
+    let counts = reader.records().map(|row| row.ok()?.get(column)?.parse().ok()).collect::<Option<Vec<f64>>>()?;
+    let [.., before, last] = counts[..] else { return None };
+    Some(last - before)
 }
 
 /// What the waiting thread tells.

@@ -140,8 +140,13 @@ impl Row {
             let body_solves = at(first, "/body_solves").unwrap_or(0.0);
             let bodies = first.report["bodies"].as_array().map_or(0, Vec::len) as f64;
             let each = |time: &str, count: f64| row.number(time).map_or(f64::NAN, |time| time / count * bodies);
-            let linear = each("factor_seconds", row.number("factorizations").unwrap_or(0.0))
-                + each("solve_seconds", body_solves);
+            let all = row.number("inner_iterations").unwrap_or(0.0);
+            // the start solves with very stiff springs, which takes an iterative solver longer; one sweep solves each body once
+            let solve = match (first.last_sweep, row.number("solve_seconds")) {
+                (Some(sweep), Some(seconds)) if all > 0.0 => seconds * sweep / all,
+                _ => each("solve_seconds", body_solves),
+            };
+            let linear = each("factor_seconds", row.number("factorizations").unwrap_or(0.0)) + solve;
             row.numbers.extend(linear.is_finite().then_some(("linear_seconds", linear)));
         }
         // of the bodies that have a closed form, the worst

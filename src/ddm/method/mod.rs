@@ -77,6 +77,9 @@ pub(super) const FINE: f64 = 1e-6;
 /// Precision of solves that measure: of the residual, two digits more than this are right.
 pub(super) const ROUGH: f64 = 1e-2;
 
+/// Precision of solves that measure an iterate on the way: of the residual, one digit is right.
+pub(super) const COARSE: f64 = 0.3;
+
 /// A way to make the next iterate.
 pub trait Method {
     /// Name, as in the scene and the table.

@@ -50,13 +50,16 @@ impl Newton {
     /// the quadratic convergence gives, and never more than the run asks for.
     fn forcing(&mut self, here: &Here) -> f64 {
         let ratio = here.residual / self.last;
-        // with a solver of its own a step costs little beside what it takes to measure the next iterate
         let (low, high, margin) = match self.inner {
-            Inner::Direct(_) if self.last.is_infinite() => (1e-2, 1e-2, 0.1),
-            Inner::Direct(_) => (1e-6, 1e-2, 0.1),
+            Inner::Direct(_) if self.last.is_infinite() => (0.1, 0.1, 0.1),
+            Inner::Direct(_) => (1e-6, 0.1, 0.1),
             Inner::Sweep => (1e-3, 0.3, 0.5),
         };
         self.last = here.residual;
+        // a start without energy has no relative residual
+        if !here.residual.is_finite() {
+            return high;
+        }
         let wish = (0.9 * ratio * ratio).clamp(low, high);
         wish.max(margin * here.target / here.residual).min(high)
     }
@@ -219,7 +222,10 @@ impl Method for Newton {
     }
 
     fn precision(&self) -> f64 {
-        super::ROUGH
+        match self.inner {
+            Inner::Direct(_) => super::COARSE,
+            Inner::Sweep => super::ROUGH,
+        }
     }
 
     fn amplification(&self) -> f64 {
