@@ -100,6 +100,7 @@ fn forecast(outcome: &Outcome) -> Option<ForecastReport> {
 fn outlook(outcome: &Outcome) -> String {
     match forecast(outcome).map(|forecast| forecast.iterations) {
         None => String::new(),
+        Some(Some(0.0)) => "; that is enough, but pressures still move or a body lacks balance".to_owned(),
         Some(None) => "; at this rate no number is enough".to_owned(),
         Some(Some(more)) => format!("; about {more} more at this rate"),
     }

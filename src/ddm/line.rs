@@ -30,6 +30,11 @@ impl<'a> Line<'a> {
         Self { model, compression: &layer.compression, closing, slope: -sums[0] - pushed, curvature: sums[1] }
     }
 
+    /// v'K v.
+    pub fn curvature(&self) -> f64 {
+        self.curvature
+    }
+
     /// d/dt F1(u + t v).
     pub fn derivative(&self, t: f64) -> f64 {
         let mut sum = self.slope + t * self.curvature;

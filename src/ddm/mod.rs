@@ -23,6 +23,7 @@ mod progress;
 pub mod ritz;
 pub mod robin;
 mod scale;
+mod steady;
 pub mod stop;
 pub mod sweep;
 mod watch;

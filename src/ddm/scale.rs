@@ -6,7 +6,6 @@
 
 use super::layer::Layer;
 use super::model::Model;
-use super::stop::StopRule;
 use crate::linalg::dot;
 
 /// A solution this much smaller than the start is measured by the start.
@@ -49,13 +48,9 @@ impl Scale {
         if numerator <= 0.0 { 0.0 } else { (numerator / reference.max(self.energy)).sqrt() }
     }
 
-    /// Whether the last step changed no pressure by more than ten times the residual that is asked for, relative to the
-    /// largest. The residual is one of energies: where a layer is stiff, or hardly holds a body, it sees too little of the
-    /// pressure.
-    pub fn is_steady(&self, before: &[f64], now: &[f64], stop: &StopRule) -> bool {
-        let Some(tolerance) = stop.residual else { return true };
-        let peak = now.iter().copied().fold(self.pressure, f64::max);
-        before.iter().zip(now).all(|(before, now)| (now - before).abs() <= 10.0 * tolerance * peak)
+    /// The largest pressure, by which errors of pressures are measured.
+    pub fn peak(&self, pressure: &[f64]) -> f64 {
+        pressure.iter().copied().fold(self.pressure, f64::max)
     }
 
     /// What the forces on a body lack in balance, as a share of those of its contacts, the most over all rigid motions that

@@ -6,6 +6,7 @@ use super::layer::Layer;
 use super::model::Model;
 use super::progress::Row;
 use super::scale::Scale;
+use super::steady::{Steady, most_apart};
 use super::stop::{Cycle, Floor, StopRule, relative_increment};
 use super::sweep::Sweep;
 
@@ -51,6 +52,7 @@ pub(super) struct Watch {
     scale: Scale,
     floor: Floor,
     cycle: Cycle,
+    steady: Steady,
 }
 
 impl Watch {
@@ -98,20 +100,22 @@ impl Watch {
             return Verdict::End(Status::InnerSolver { body: *body, reason: reason.clone() });
         }
         let met = stop.is_met(row.residual, row.increment);
-        let steady = last.is_none_or(|last| self.scale.is_steady(&last.pressure, &layer.pressure, stop));
+        let steady = stop.residual.is_none_or(|tolerance| {
+            let moved = last.map_or(0.0, |last| most_apart(&last.pressure, &layer.pressure));
+            let peak = self.scale.peak(&layer.pressure);
+            moved.max(self.steady.missing(row.residual, &layer.pressure, peak)) <= 10.0 * tolerance * peak
+        });
         let imbalance = self.scale.imbalance(model, layer);
         let balanced = stop.residual.is_none_or(|tolerance| imbalance <= 10.0 * tolerance);
         if met && steady && balanced {
             return Verdict::End(Status::Converged);
         }
+        self.steady.note(row.residual, &layer.pressure);
         let closed = layer.compression.iter().map(|&c| c > 0.0);
         if let Some(period) = self.cycle.period(&iterate.trace, closed, row.residual, row.energy) {
             return Verdict::End(Status::Cycle { period });
         }
         let stalled = self.floor.is_suspected(row.residual);
-        if stalled && met && imbalance <= UNBALANCED {
-            return Verdict::End(Status::Attainable);
-        }
         if stalled && imbalance <= UNBALANCED && row.residual <= BELIEVABLE && is_rounding(seen) {
             return Verdict::End(Status::Attainable);
         }
@@ -128,13 +132,20 @@ const UNBALANCED: f64 = 1e-3;
 /// Largest residual that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
 const BELIEVABLE: f64 = 1e-4;
 
-/// Whether the residual is no larger than what rounding alone can make.
+/// Whether the residual is no larger than what rounding alone can make: of K u, of forces, and of compressions, which a stiff
+/// layer answers with forces of its own.
 fn is_rounding(seen: &Seen) -> bool {
     let Seen { model, iterate, layer, sweep, .. } = *seen;
     let mut floor = [0.0];
+    let points = model.points();
+    let trembling = |q: usize| {
+        let terms = iterate.trace[q].abs() + iterate.trace[points + q].abs() + model.gap[q].abs();
+        layer.force[q] + model.weight[q] * layer.tangent[q] * terms
+    };
+    let force: Vec<f64> = (0..points).map(trembling).collect();
     for (index, slot) in model.bodies.iter().enumerate() {
         if let Some(body) = &slot.local {
-            floor[0] += body.rounding(&iterate.states[index], &model.at_rows(index, &layer.force));
+            floor[0] += body.rounding(&iterate.states[index], &model.at_rows(index, &force));
         }
     }
     model.exchange.sum(&mut floor);

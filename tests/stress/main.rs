@@ -4,7 +4,7 @@ mod random;
 mod runs;
 mod scenes;
 
-use runs::{Recipe, Verdict};
+use runs::{Answer, Recipe, Verdict};
 use scenes::Expect;
 use std::path::Path;
 use winkler::petsc::Session;
@@ -16,30 +16,79 @@ const SERIES: [(u64, &[&str]); 4] = [(1, &["auto"]), (2, &["auto"]), (3, &["auto
 /// Scenes of each series.
 const SCENES: usize = 24;
 
-/// Default settings converge on the scenes of a series that have a solution, agree with Newton's method, and say so when there is none.
+/// Runs scenes, all in one session, as a process has but one.
+struct Bench {
+    session: Session,
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn start() -> Self {
+        let session = Session::start(&[]).expect("one session in this process");
+        Self { session, folder: tempfile::tempdir().expect("a temporary folder") }
+    }
+
+    /// What methods make of a scene, and the scene in words.
+    fn run(&self, seed: u64, index: usize, methods: &[&str]) -> (Vec<(Verdict, Answer)>, String) {
+        let case = scenes::scene(seed, index, &Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes"));
+        let path = self.folder.path().join(format!("{seed}-{index}.toml"));
+        std::fs::write(&path, &case.text).expect("a scene can be written");
+        let reference = runs::reference(&self.session, &path, &case).expect("a session that lives");
+        let by = |name: &&str| {
+            let recipe = Recipe::new(name, &case);
+            let answer = runs::by_method(&self.session, &path, &recipe).expect("a session that lives");
+            (runs::judge(&case, &reference, &answer), answer)
+        };
+        (methods.iter().map(by).collect(), case.line.clone())
+    }
+}
+
 #[test]
-fn random_scenes_are_solved_by_default() {
-    let session = Session::start(&[]).expect("one session in this process");
-    let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes");
-    let folder = tempfile::tempdir().expect("a temporary folder");
+fn random_scenes() {
+    let bench = Bench::start();
+    scenes_are_solved_by_default(&bench);
+    no_method_claims_what_it_has_not(&bench);
+}
+
+/// Default settings converge on the scenes of a series that have a solution, agree with Newton's method, and say so when there is none.
+fn scenes_are_solved_by_default(bench: &Bench) {
     let mut bad = Vec::new();
     for (seed, methods) in SERIES {
         for index in 0..SCENES {
-            let case = scenes::scene(seed, index, &meshes);
-            let path = folder.path().join(format!("{seed}-{index}.toml"));
-            std::fs::write(&path, &case.text).expect("a scene can be written");
-            let reference = runs::reference(&session, &path, &case).expect("a session that lives");
-            for name in methods {
-                let answer = runs::by_method(&session, &path, &Recipe::new(name, &case)).expect("a session that lives");
-                let verdict = runs::judge(&case, &reference, &answer);
+            let (answers, scene) = bench.run(seed, index, methods);
+            for (name, (verdict, answer)) in methods.iter().zip(answers) {
                 if !matches!(verdict, Verdict::Right | Verdict::Named) {
-                    bad.push(format!("{seed} {index} {name}: {verdict:?}, {}: {}", answer.message, case.line));
+                    bad.push(format!("{seed} {index} {name}: {verdict:?}, {}: {scene}", answer.message));
                 }
             }
         }
     }
     let advice = "`scripts/stress --seed SEED --only INDEX --keep DIR` writes the scene file";
     assert!(bad.is_empty(), "{advice}\n{}", bad.join("\n"));
+}
+
+/// Scenes on which slow methods said converged with pressures 1e-6 to 7e-6 off: their last step was short, or went along modes that
+/// the contact does not feel.
+const DECEPTIVE: [(u64, usize, &str); 5] =
+    [(1, 54, "anderson"), (1, 60, "anderson"), (2, 46, "aitken"), (2, 57, "aitken"), (3, 137, "aitken")];
+
+/// Scenes of series 3 on which a rule that is not monotone stepped out of the range of numbers.
+const STEEP: [usize; 3] = [20, 25, 47];
+
+fn no_method_claims_what_it_has_not(bench: &Bench) {
+    for (seed, index, name) in DECEPTIVE {
+        for (verdict, answer) in bench.run(seed, index, &[name]).0 {
+            assert!(!matches!(verdict, Verdict::Wrong(_)), "{seed} {index} {name}: {verdict:?}, {}", answer.message);
+            assert_ne!(answer.status, "attainable", "{seed} {index} {name}: rounding is far");
+        }
+    }
+    for index in STEEP {
+        assert_ne!(bench.run(3, index, &["barzilai-borwein"]).0[0].1.status, "not-finite", "scene {index}");
+    }
+    // the residual is met, but a body is not in balance yet: that is neither converged nor rounding
+    let answer = &bench.run(1, 123, &["0.6"]).0[0].1;
+    assert_eq!(answer.status, "iteration-limit");
+    assert!(answer.residual <= 1e-8 && answer.message.contains("lacks balance"), "{}", answer.message);
 }
 
 /// All numbers that follow a word in a scene.

@@ -1,15 +1,26 @@
 //! The rule of Barzilai and Borwein.
 
-use super::{GammaRule, Here, LineSearch, Ritz, Unbounded};
-use crate::ddm::field::local_dot;
+use super::{GammaRule, Here, Ritz, Unbounded};
+use crate::ddm::line::Line;
+use crate::linalg::dot;
+use std::collections::VecDeque;
+
+/// Iterates over whose largest F1 no step may go.
+const WINDOW: usize = 10;
+
+/// Share of u'Ku + sum omega p c below which a growth of F1 is rounding.
+const ROUNDING: f64 = 1e-14;
 
 /// gamma^k = s'G s / s'y with s the last step and y the change of the residual: the inverse of a Rayleigh quotient of
 /// G^-1 F1''. The first step is an exact line search.
 ///
-/// The rule is not monotone; every tenth step is an exact line search, so that F1 falls in the end whatever the laws do.
+/// The rule is not monotone. F1 may rise, but not above the largest of the last [`WINDOW`] iterates (the nonmonotone line search of
+/// Grippo, Lampariello and Lucidi, 1986, as Raydan uses it, 1997): a step that goes further is cut to the exact one.
 #[derive(Debug, Default)]
 pub struct BarzilaiBorwein {
     last: Option<Last>,
+    /// F1 of the last iterates, less that of the present one.
+    recent: VecDeque<f64>,
 }
 
 #[derive(Debug)]
@@ -17,23 +28,37 @@ struct Last {
     gamma: f64,
     /// r'z of the last iterate.
     decrement: f64,
-    z: Vec<Vec<f64>>,
+    /// z'K z.
+    curvature: f64,
+    /// B_a z_a + B_b z_b at each point.
+    closing: Vec<f64>,
+    /// Force at each point.
+    force: Vec<f64>,
 }
 
 impl GammaRule for BarzilaiBorwein {
-    fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Here, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
         let quotient = self.last.as_ref().map(|last| {
-            // s = gamma z0, G s = gamma r0, y = r0 - r: s'Gs / s'y = gamma r0'z0 / (r0'z0 - r'z0)
-            let mut product = [local_dot(&here.sweep.residual, &last.z)];
-            here.model.exchange.sum(&mut product);
-            last.gamma * last.decrement / (last.decrement - product[0])
+            // s = gamma z, G s = gamma r, y = K s + B' (change of force)
+            let stiffer: Vec<f64> = here.layer.force.iter().zip(&last.force).map(|(now, then)| now - then).collect();
+            last.gamma * last.decrement / (last.gamma * last.curvature + dot(&stiffer, &last.closing))
         });
+        let (decrement, residual) = (here.decrement(), here.residual);
+        let line = Line::new(here.model, here.layer, &here.sweep.residual, &here.sweep.correction);
+        let slack = ROUNDING * decrement / (residual * residual);
+        let worst = self.recent.iter().copied().fold(0.0, f64::max) + slack;
         let gamma = match quotient {
-            Some(gamma) if gamma > 0.0 && gamma.is_finite() && !here.k.is_multiple_of(10) => gamma,
-            _ => LineSearch.gamma(here, ritz)?,
+            Some(gamma) if gamma > 0.0 && gamma.is_finite() && line.change(gamma) <= worst => gamma,
+            _ => line.minimize(1e-6)?,
         };
-        let z = here.sweep.correction.states.clone();
-        self.last = Some(Last { gamma, decrement: here.decrement(), z });
+        let change = line.change(gamma);
+        if self.recent.len() == WINDOW - 1 {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(0.0);
+        self.recent.iter_mut().for_each(|above| *above -= change);
+        let (curvature, closing) = (line.curvature(), here.sweep.correction.closing());
+        self.last = Some(Last { gamma, decrement, curvature, closing, force: here.layer.force.clone() });
         Ok(gamma)
     }
 
