@@ -230,6 +230,24 @@ fn a_sweep_keeps_condensed_bodies() {
     assert_eq!(counts(&sweep(&["method.gamma=0.5,0.6"], &["--set", "solver=mumps"])[1])[0], 2);
 }
 
+/// The set-up before the first sweep serves the sweeps: one preconditioner a body, and those of the Newton matrix. The first
+/// step, whose start has no energy to compare with, is as rough as the next.
+#[test]
+fn a_joint_method_over_multigrid_makes_one_preconditioner_a_body() {
+    let run = coarse("groove", &["--set", "solver=hypre", "--set", "method={}"]);
+    assert_eq!(run.text("method"), "newton");
+    let history = run.history();
+    // two bodies in the first row
+    assert_eq!(history.counts("factorizations")[0], 2);
+    let joint = run.count("factorizations") - 2;
+    assert!((1..=run.count("iterations")).contains(&joint), "{joint}");
+    let its = history.counts("inner_iterations");
+    assert_eq!(its.last(), Some(&run.count("inner_iterations")));
+    let steps: Vec<usize> = its.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(steps.iter().all(|&step| step < 60), "{steps:?}");
+    assert!(2 * steps[0] < its[its.len() - 1] / 2, "{steps:?}");
+}
+
 #[test]
 fn petsc_is_loaded_only_by_runs_that_make_its_objects() {
     assert!(coarse("groove", &["--set", "solver=condensed"]).report["petsc"].is_null());

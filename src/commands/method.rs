@@ -59,6 +59,12 @@ pub fn make(session: &Session, scene: &Scene, model: &Model, condensed: bool) ->
     Ok(Made { methods, prefix })
 }
 
+/// Whether a scene's first method joins the bodies, as far as that can be told before they are set up.
+pub fn begins_jointly(session: &Session, scene: &Scene, model: &Model, condensed: bool) -> bool {
+    let joins = session.size() == 1 && (condensed || multigrid(session, model));
+    matches!(scene.method.name, MethodName::Newton) || (matches!(scene.method.name, MethodName::Auto) && joins)
+}
+
 fn rule(gamma: &Gamma) -> Box<dyn GammaRule> {
     match gamma {
         Gamma::Stationary(gamma) => Box::new(Stationary(*gamma)),

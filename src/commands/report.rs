@@ -152,7 +152,7 @@ pub fn report(
         },
         symbolic_factorizations: counts.symbolic,
         body_solves: counts.solves,
-        inner_iterations: counts.inner_iterations,
+        inner_iterations: counts.inner_iterations + coupled(|counts| counts.inner_iterations as f64) as usize,
         robin_updates: counts.robin_updates,
         robin_updates_skipped: counts.robin_skipped,
         dense_factorizations: counts.dense_factorizations

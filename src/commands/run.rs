@@ -224,9 +224,10 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
 /// # Errors
 /// Unknown PETSc options, failures of PETSc.
 pub fn set_up(session: &Session, scene: &Scene, prepared: &mut Prepared, clock: &mut Clock) -> Result<()> {
-    let failed = ddm::prepare(&mut prepared.problem.model);
-    agree(session, failed)?;
     let condensed = prepared.condensed.len() == prepared.problem.bodies.len();
+    let lifts = !method::begins_jointly(session, scene, &prepared.problem.model, condensed);
+    let failed = ddm::prepare(&mut prepared.problem.model, lifts);
+    agree(session, failed)?;
     let made = agree(session, method::make(session, scene, &prepared.problem.model, condensed))?;
     prepared.methods = made.methods;
     let names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();

@@ -173,6 +173,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
             let mut row = watch.measure(&seen);
             (row.iteration, row.sweeps, row.seconds) = (k, sweeper.sweeps, clock.elapsed().as_secs_f64());
             row.factorizations += method.coupled().factorizations;
+            row.inner_iterations += method.coupled().inner_iterations;
             row.energy += origin.as_ref().map_or(0.0, |origin| origin.energy);
             row.error = row.residual * method.amplification().sqrt();
             let verdict = watch.judge(&seen, &settings.stop, &row);

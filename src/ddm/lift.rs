@@ -6,6 +6,7 @@
 
 use super::body::Solved;
 use super::field::Field;
+use super::held;
 use super::method::ROUGH;
 use super::model::{BodySlot, Model};
 use crate::error::Result;
@@ -21,15 +22,16 @@ const MISSED: f64 = 1e-3;
 /// Steps; each gains a factor of about `STIFF` over the surface's compliance.
 const STEPS: usize = 4;
 
-/// Gives every body that lives here the springs of the lift and sets its solver up, so that a refusal of the solver or
-/// of an option comes before the first sweep. The start then finds its factorisation made.
+/// Gives every body that lives here a Robin term and sets its solver up, so that a refusal of the solver or of an option comes
+/// before the first sweep. The start then finds its factorisation made: that of the lift's springs, or for a start that
+/// only moves bodies ([`move_rigidly`]) that of soft ones, near which the first sweep is.
 ///
 /// # Errors
 /// Failures of the solver library.
-pub fn prepare(model: &mut Model) -> Result<()> {
-    for slot in &mut model.bodies {
-        let springs = springs(slot);
-        if let Some(body) = &mut slot.local {
+pub fn prepare(model: &mut Model, lifts: bool) -> Result<()> {
+    for index in 0..model.bodies.len() {
+        let springs = if lifts { springs(&model.bodies[index]) } else { held::natural_springs(model, index) };
+        if let Some(body) = &mut model.bodies[index].local {
             body.robin(&springs)?;
             body.set_up()?;
         }
