@@ -123,6 +123,7 @@ const CASES: &[Case] = &[
     ("[method]", "[method]\nsteps = [0.5, 0.9]", "[0.5, 0.9]", "the last load step is not the full load", "with 1"),
     ("[method]", "[method]\nsteps = [0, 1]", "0", "the factor is 0", ""),
     ("[method]", "[method]\nsteps = 0", "0", "the number of load steps must lie between 1 and 1000", ""),
+    ("[method]", "[method]\nsteps = [0.5, 0.9]", "[0.5, 0.9]", "the last load step is not the full load", "end the list with 1"),
     ("start = { normal = 1e-4 }", "start = \"nested\"\nsteps = 3", "3", "load steps after a start from a coarser mesh", "nested"),
     ("[[contact]]", "adapt = { error = 1e-3 }\n[[contact]]", "", "", ""),
     // The mesh.
