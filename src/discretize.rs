@@ -76,7 +76,8 @@ pub struct Assembled {
     pub body: ElasticBody,
     /// All contact rows of the body, pair by pair.
     pub rows: Csr,
-    /// Rigid motions of the free body, for multigrid's near-null space.
+    /// Motions with hardly any strain in a few cells, for multigrid's near-null space: the rigid ones of the free body, in one of
+    /// revolution those of its meridian.
     pub motions: Vec<RigidMotion>,
     /// Those that its supports leave.
     pub left: Vec<FreeMotion>,
@@ -186,7 +187,7 @@ pub fn discretize<const D: usize>(
     exchange: Box<dyn Exchange>,
     maker: &mut dyn Maker,
 ) -> Result<Problem> {
-    let parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh)).collect::<Result<Vec<_>>>()?;
+    let parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
     for found in pairs::all(scene, mesh, cut, &parts, keep)? {
@@ -201,10 +202,7 @@ pub fn discretize<const D: usize>(
     let (mut assemblies, mut assemblies_avoided) = (0, 0);
     for (index, mut part) in parts.into_iter().enumerate() {
         let (segments, rows) = rows_of(index, &pairs, part.space.dofs());
-        let free: Vec<RigidMotion> = rigid::modes(&part.space.nodes)
-            .into_iter()
-            .map(|motion| RigidMotion { displacement: part.held.frame.dofs(&motion.displacement), ..motion })
-            .collect();
+        let free = part.in_dofs(rigid::of(&part.space));
         let nodal_load = part.load(mesh)?;
         let load = part.load_on_dofs(nodal_load.clone());
         let gauged = gauge::fix(&mut part, &free, &rows, &load);
@@ -227,14 +225,14 @@ pub fn discretize<const D: usize>(
             row_stiffness: Vec::new(),
             motions,
         };
-        let mut resultant =
-            std::array::from_fn(|c| if c < D { nodal_load.iter().skip(c).step_by(D).sum() } else { 0.0 });
+        let mut resultant = part.space.net_force(std::array::from_fn(|c| nodal_load.iter().skip(c).step_by(D).sum()));
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
         let surface: f64 = slot.segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
         let elasticity = elastic::of(part.spec, &part.space, mesh, scene.plane)?;
         let modulus = elastic::modulus(&part.space, &elasticity, share(&slot.segments, &pairs));
         let held = slot.motions.len() == gauge::felt_by_none(&slot.motions).len();
-        let stiffness = if held && surface > 0.0 { modulus * surface / part.space.measure() } else { 0.0 };
+        let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
+        let stiffness = if held && surface > 0.0 { modulus * surface / volume } else { 0.0 };
         maker.plan(&Outline {
             name: &slot.name,
             dimension: D,
@@ -256,7 +254,7 @@ pub fn discretize<const D: usize>(
                 dimension: D,
                 body,
                 rows,
-                motions: free,
+                motions: part.smooth(free),
                 left,
             })?);
         }

@@ -10,8 +10,8 @@ mod pair;
 pub mod pieces;
 pub mod side;
 
-pub use crate::fem::pad;
+pub use crate::fem::{cross, pad};
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
-pub use pair::{ContactPair, Fault, add, assemble, cross};
+pub use pair::{ContactPair, Fault, add, assemble};
 pub use side::Side;

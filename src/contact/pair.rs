@@ -26,7 +26,7 @@ pub struct ContactPair {
     pub nodes: Vec<u32>,
     /// Positions of the points on side a, n.
     pub position: Vec<[f64; 3]>,
-    /// omega_q > 0, length or area, n.
+    /// omega_q > 0, length or area (in bodies of revolution that of a ring), n.
     pub weight: Vec<f64>,
     /// Unit normals from side a to side b, n.
     pub normal: Vec<[f64; 3]>,
@@ -104,7 +104,7 @@ pub fn assemble<const D: usize>(
             }
         }
     }
-    let tiny = 1e-12 * a.mean_measure();
+    let tiny = 1e-12 * points.values().map(|point| point.weight).fold(0.0, f64::max);
     let order = super::order::along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&n, _)| n));
     if order.is_empty() {
         return Err(Fault::NoPartner);
@@ -143,8 +143,8 @@ pub fn assemble<const D: usize>(
             for (n, share) in shares(&sum.sides[side], sum.weight) {
                 let entry = normal.map(|normal| sign * share * normal);
                 nodal.extend((0..D).map(|c| (D * n as usize + c, entry[c])));
-                add(&mut resultant, pad(entry));
-                add(&mut moment, cross(pad(of.space.nodes[n as usize]), pad(entry)));
+                add(&mut resultant, of.space.net_force(entry));
+                add(&mut moment, of.space.net_moment(n, entry));
                 let (node, dofs) = of.frame.force(n, entry);
                 for (c, value) in dofs.into_iter().enumerate() {
                     *entries.entry(D * node as usize + c).or_insert(0.0) += value;
@@ -173,11 +173,6 @@ pub fn assemble<const D: usize>(
         pair.gap.push(distance + own);
     }
     Ok(pair)
-}
-
-/// Vector product.
-pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|c| a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3])
 }
 
 /// sum += v.

@@ -40,7 +40,11 @@ impl<'a, const D: usize> Side<'a, D> {
                 (0..D).for_each(|c| sum[c] += area[c]);
             }
         }
-        for normal in normals.values_mut() {
+        for (&node, normal) in &mut normals {
+            // a surface of revolution goes on beyond the axis as its mirror image
+            if space.on_axis(node) && normal[1] != 0.0 {
+                normal[0] = 0.0;
+            }
             *normal = unit(*normal);
         }
         Self { name, space, facets, prescribed, frame, normals }

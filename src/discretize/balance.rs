@@ -1,7 +1,7 @@
 //! Forces and moments on a body at the end: loads, contacts, supports, springs, rigid surfaces, and what their sum lacks.
 
 use super::supports::Held;
-use crate::contact::{add, cross, pad};
+use crate::contact::{add, pad};
 use crate::fem::assemble::{self, NodalBlock, NodeGraph};
 use crate::fem::{Elasticity, Frame, Space};
 use crate::linalg::Csr;
@@ -18,9 +18,10 @@ pub struct Resultant {
 }
 
 impl Resultant {
-    fn add(&mut self, x: [f64; 3], force: [f64; 3]) {
-        add(&mut self.force, force);
-        add(&mut self.moment, cross(x, force));
+    /// Adds a force at a node.
+    fn add<const D: usize>(&mut self, space: &Space<D>, node: u32, force: [f64; D]) {
+        add(&mut self.force, space.net_force(force));
+        add(&mut self.moment, space.net_moment(node, force));
     }
 }
 
@@ -77,13 +78,12 @@ impl<const D: usize> Forces<D> {
         let mut supports = vec![Resultant::default(); self.supports];
         let mut rigid = vec![Resultant::default(); self.held.rigid.len()];
         for (node, reaction) in self.reactions(u, &known) {
-            let x = pad(self.space.nodes[node as usize]);
-            sum.grow(x, pad(reaction));
+            sum.grow(node, reaction);
             match self.held.rigid.iter().position(|(_, nodes)| nodes.binary_search(&node).is_ok()) {
-                Some(surface) => rigid[surface].add(x, pad(reaction)),
+                Some(surface) => rigid[surface].add(&self.space, node, reaction),
                 None => {
                     for (support, part) in self.held.split(node, reaction) {
-                        supports[support].add(x, pad(part));
+                        supports[support].add(&self.space, node, part);
                     }
                 }
             }
@@ -114,17 +114,18 @@ struct Sum<'a, const D: usize> {
 impl<const D: usize> Sum<'_, D> {
     fn of(&mut self, forces: &[f64]) -> Resultant {
         let mut resultant = Resultant::default();
-        for (x, force) in self.space.nodes.iter().zip(forces.chunks_exact(D)) {
-            let force: [f64; 3] = std::array::from_fn(|c| force.get(c).copied().unwrap_or(0.0));
-            resultant.add(pad(*x), force);
-            self.grow(pad(*x), force);
+        for (node, force) in forces.chunks_exact(D).enumerate() {
+            let force: [f64; D] = std::array::from_fn(|c| force[c]);
+            resultant.add(self.space, node as u32, force);
+            self.grow(node as u32, force);
         }
         resultant
     }
 
-    fn grow(&mut self, x: [f64; 3], force: [f64; 3]) {
+    fn grow(&mut self, node: u32, force: [f64; D]) {
         let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
-        self.size[0] += length(force);
-        self.size[1] += length(force) * length(x);
+        let size = length(self.space.net_force(force));
+        self.size[0] += size;
+        self.size[1] += size * length(pad(self.space.nodes[node as usize]));
     }
 }

@@ -57,6 +57,9 @@ pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw)
                 .label(value)
                 .help("a strain must cost energy, whatever its direction: look for a slip among the constants")
         }
+        Flaw::Twists => Error::scene(place, format!("body `{name}`: a body of revolution would twist{at}"))
+            .label("strains of the meridian cause shear stresses along the circles")
+            .help("in axisymmetric scenes one axis of the material runs along the circles: turn axes 1 and 2 alone"),
     }
 }
 
@@ -70,8 +73,8 @@ pub fn modulus<const D: usize>(space: &Space<D>, elasticity: &Elasticity, share:
     if elasticity.is_constant() {
         return in_cell(0);
     }
-    let sum: f64 = (0..space.cell_count()).map(|cell| space.cell_measure(cell) * in_cell(cell)).sum();
-    sum / space.measure()
+    let sum: f64 = (0..space.cell_count()).map(|cell| space.share(cell) * in_cell(cell)).sum();
+    sum / (0..space.cell_count()).map(|cell| space.share(cell)).sum::<f64>()
 }
 
 /// What the user should know: linear elements are too stiff where the volume can hardly change.

@@ -137,9 +137,9 @@ struct OnBody<'a, const D: usize> {
 }
 
 impl<const D: usize> OnBody<'_, D> {
-    /// Stress of a displacement gradient at an integration point of a cell; assembly was there, so the law has a value.
-    fn stress(&self, cell: usize, x: [f64; D], h: &[[f64; D]; D]) -> [f64; 6] {
-        self.shape.elasticity.at(cell, pad(x)).map_or([0.0; 6], |material| material.stress(h))
+    /// Stress of a strain at an integration point of a cell; assembly was there, so the law has a value.
+    fn stress(&self, cell: usize, x: [f64; D], strain: &[f64; 6]) -> [f64; 6] {
+        self.shape.elasticity.at(cell, pad(x)).map_or([0.0; 6], |material| material.stress(strain))
     }
 }
 
@@ -159,11 +159,11 @@ impl<const D: usize> OnBody<'_, D> {
 
 impl<const D: usize> Recovered for OnBody<'_, D> {
     fn energy_errors(&self) -> Vec<f64> {
-        self.recovery.energy_errors(&|cell, x, h| self.stress(cell, x, h))
+        self.recovery.energy_errors(&|cell, x, strain| self.stress(cell, x, strain))
     }
 
     fn interpolation_residual(&self) -> Vec<f64> {
-        self.recovery.interpolation_residual(&|cell, x, h| self.stress(cell, x, h))
+        self.recovery.interpolation_residual(&|cell, x, strain| self.stress(cell, x, strain))
     }
 
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {

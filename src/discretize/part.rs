@@ -11,7 +11,7 @@ use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
 use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
-use crate::scene::{BodySpec, LoadKind};
+use crate::scene::{BodySpec, LoadKind, Plane};
 
 /// A body of the scene with its space, supports and springs.
 pub struct Part<'a, const D: usize> {
@@ -27,13 +27,39 @@ pub struct Part<'a, const D: usize> {
 
 impl<'a, const D: usize> Part<'a, D> {
     /// Finds the body's cells in the mesh and applies its supports.
-    pub fn new(spec: &'a BodySpec, mesh: &Mesh<D>) -> Result<Self> {
+    ///
+    /// # Errors
+    /// Refusals of the scene against its mesh, and bodies of revolution with points of negative radius.
+    pub fn new(spec: &'a BodySpec, mesh: &Mesh<D>, plane: Plane) -> Result<Self> {
         let group = find_group(mesh, &spec.name, &[D], "body")?;
-        let space = Space::new(mesh, group, spec.order);
+        let mut space = Space::new(mesh, group, spec.order);
+        if plane == Plane::Axisymmetric {
+            space = space.revolved();
+            if let Some(x) = space.nodes.iter().find(|x| x[0] < 0.0) {
+                let message =
+                    format!("body `{}` has a negative radius at {}", spec.name.value, point(contact::pad(*x)));
+                return Err(Error::mesh(&mesh.path, None, message).help(
+                    "axisymmetric bodies are drawn as meridians, x >= 0 with the axis at x = 0: leave one half away",
+                ));
+            }
+        }
         let held = Held::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| springs::blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
         Ok(Self { spec, space, held, springs })
+    }
+
+    /// Rigid motions of the nodes as motions of the dofs.
+    pub fn in_dofs(&self, motions: Vec<RigidMotion>) -> Vec<RigidMotion> {
+        let turned =
+            |motion: RigidMotion| RigidMotion { displacement: self.held.frame.dofs(&motion.displacement), ..motion };
+        motions.into_iter().map(turned).collect()
+    }
+
+    /// The motions that multigrid must know of a body with these rigid ones. Far from the axis a ring is nearly as soft
+    /// against radial displacements and turns of its section as a plane body.
+    pub fn smooth(&self, rigid: Vec<RigidMotion>) -> Vec<RigidMotion> {
+        if self.space.axisymmetric { self.in_dofs(rigid::modes(&self.space.nodes)) } else { rigid }
     }
 
     /// Prescribed (dof, value), sorted by dof.
@@ -56,11 +82,7 @@ impl<'a, const D: usize> Part<'a, D> {
         }
         let (nodal, all) = (left.iter().map(turned).collect(), free.iter().map(turned).collect::<Vec<_>>());
         let left = rigid::left_by_springs(nodal, &all, &springs);
-        let back = |motion: RigidMotion| RigidMotion {
-            displacement: self.held.frame.dofs(&motion.displacement),
-            name: motion.name,
-        };
-        left.into_iter().map(back).collect()
+        self.in_dofs(left)
     }
 
     /// Nodal forces of the loads, but for those on rigid surfaces. Supports are not regarded.
@@ -74,6 +96,10 @@ impl<'a, const D: usize> Part<'a, D> {
                 return Err(not_on_body(&spec.on, &name.value));
             }
             let area = surface::measure(&self.space, &facets);
+            if area == 0.0 {
+                let message = format!("body `{}`: `{}` lies on the axis and has no area", name.value, spec.on.value);
+                return Err(Error::scene(&spec.on.place, message).help("remove this load: nothing can act there"));
+            }
             surface::surface_load(
                 &self.space,
                 &facets,

@@ -14,8 +14,8 @@ use std::collections::{BTreeMap, HashMap};
 struct Condition<const D: usize> {
     direction: [f64; D],
     value: f64,
-    /// Number of the support in the scene.
-    support: usize,
+    /// Number of the support in the scene; none for the symmetry of a body of revolution.
+    support: Option<usize>,
 }
 
 /// What the supports and rigid surfaces of a body come to.
@@ -25,8 +25,8 @@ pub struct Held<const D: usize> {
     pub frame: Frame<D>,
     /// Prescribed dofs and their values.
     pub prescribed: HashMap<usize, f64>,
-    /// Independent directions held at each node (at the master of tied ones), with the number of their support.
-    directions: BTreeMap<u32, Vec<([f64; D], usize)>>,
+    /// Independent directions held at each node (at the master of tied ones), with the number of their support, if it is one.
+    directions: BTreeMap<u32, Vec<([f64; D], Option<usize>)>>,
     /// Tied nodes of each rigid load, with its number.
     pub rigid: Vec<(usize, Vec<u32>)>,
 }
@@ -43,7 +43,7 @@ impl<const D: usize> Held<D> {
     pub fn new(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<Self> {
         let mut held = Held::default();
         held.tie(spec, space, mesh)?;
-        let mut conditions: BTreeMap<u32, Vec<Condition<D>>> = BTreeMap::new();
+        let mut conditions = held.symmetry(space);
         for (support, fix) in spec.fix.iter().enumerate() {
             let dimensions: Vec<usize> = if fix.normal.is_some() { vec![D - 1] } else { (0..=D).rev().collect() };
             let group = find_group(mesh, &fix.on, &dimensions, "support")?;
@@ -60,6 +60,7 @@ impl<const D: usize> Held<D> {
                 for &(direction, field) in &held_here {
                     let value =
                         field.eval_finite("the displacement of this support", pad(space.nodes[node as usize]))?;
+                    let support = Some(support);
                     conditions.entry(held.frame.node(node)).or_default().push(Condition { direction, value, support });
                 }
             }
@@ -69,6 +70,15 @@ impl<const D: usize> Held<D> {
         }
         held.refuse_pushed_supports(spec)?;
         Ok(held)
+    }
+
+    /// In a body of revolution nodes on the axis and rigid surfaces have no radial displacement.
+    fn symmetry(&self, space: &Space<D>) -> BTreeMap<u32, Vec<Condition<D>>> {
+        let radial = Condition { direction: unit(0), value: 0.0, support: None };
+        let on_axis = (0..space.nodes.len() as u32).filter(|&node| space.on_axis(node));
+        let masters = self.rigid.iter().flat_map(|(_, nodes)| nodes.first().copied());
+        let held = on_axis.chain(masters).filter(|_| space.axisymmetric);
+        held.map(|node| (self.frame.node(node), vec![radial])).collect()
     }
 
     /// Ties the nodes of rigid surfaces.
@@ -160,6 +170,7 @@ impl<const D: usize> Held<D> {
             let LoadKind::Force { total, .. } = &load.kind else { continue };
             let force: [f64; D] = std::array::from_fn(|c| total[c]);
             for (direction, support) in nodes.first().and_then(|node| self.directions.get(node)).into_iter().flatten() {
+                let Some(support) = support else { continue };
                 if dot(&force, direction).abs() > 1e-12 * dot(&force, &force).sqrt() {
                     let on = &spec.fix[*support].on;
                     let message = format!(
@@ -183,9 +194,10 @@ impl<const D: usize> Held<D> {
         let n = DMatrix::from_fn(directions.len(), D, |i, c| directions[i].0[c]);
         let right = &n * DVector::from_fn(D, |c, _| reaction[c]);
         let Some(shares) = (&n * n.transpose()).lu().solve(&right) else { return Vec::new() };
-        let part =
-            |(i, (direction, support)): (usize, &([f64; D], usize))| (*support, direction.map(|d| d * shares[i]));
-        directions.iter().enumerate().map(part).collect()
+        let part = |(i, (direction, support)): (usize, &([f64; D], Option<usize>))| {
+            Some(((*support)?, direction.map(|d| d * shares[i])))
+        };
+        directions.iter().enumerate().filter_map(part).collect()
     }
 
     /// Nodes at which supports act, and tied ones.
@@ -229,7 +241,8 @@ fn contradiction<const D: usize>(
     other: Option<&Condition<D>>,
     x: [f64; D],
 ) -> Error {
-    let on = &spec.fix[condition.support].on;
+    // symmetry comes first: what contradicts it is a support
+    let on = condition.support.map_or(&spec.name, |support| &spec.fix[support].on);
     let what = match (0..D).find(|&c| condition.direction[c] == 1.0) {
         Some(c) => format!("the {} displacement", ["x", "y", "z"][c]),
         None => format!("the displacement along {}", point(pad(condition.direction))),
@@ -239,7 +252,8 @@ fn contradiction<const D: usize>(
         .label("this one and an earlier one")
         .help("make both values equal, or let the surfaces not meet");
     match other {
-        Some(other) => error.because(earlier(&spec.fix[other.support].on)),
+        Some(Condition { support: Some(support), .. }) => error.because(earlier(&spec.fix[*support].on)),
+        Some(_) => error.because("bodies of revolution have no radial displacement on the axis and on rigid surfaces"),
         None => error,
     }
 }

@@ -167,8 +167,8 @@ pub enum Defect {
     Elasticity(usize, [f64; 3], Flaw),
 }
 
-/// Stiffness matrix of a space on a graph. Where the elasticity varies within a cell it is taken at the points of a rule of
-/// degree 2 (P1) or 5 (P2).
+/// Stiffness matrix of a space on a graph. Where the elasticity varies within a cell, and in bodies of revolution, it is taken
+/// at the points of a rule of degree 2 (P1) or 5 (P2); all of these lie off the axis.
 ///
 /// # Errors
 /// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity.
@@ -188,6 +188,7 @@ fn stiffness_on<const D: usize, const N: usize>(
     let affine = quadrature::simplex::<N>(if space.order == Order::P1 { 1 } else { 2 });
     let curved = quadrature::simplex::<N>(5);
     let varying = quadrature::simplex::<N>(if space.order == Order::P1 { 2 } else { 5 });
+    let mut hoop = Vec::new();
     let stride = space.stride;
     let mut local = vec![[[0.0; D]; D]; stride * stride];
     let mut x = vec![[0.0; D]; stride];
@@ -198,6 +199,7 @@ fn stiffness_on<const D: usize, const N: usize>(
         let constant = elasticity.constant_in(index);
         let rule = match (constant, is_straight(&x, N)) {
             (None, _) => &varying,
+            _ if space.axisymmetric => &varying,
             (_, true) => &affine,
             _ => &curved,
         };
@@ -205,14 +207,22 @@ fn stiffness_on<const D: usize, const N: usize>(
         for (l, weight) in rule.points.iter().zip(&rule.weights) {
             let (gradient, measure) = element::gradients::<D, N>(space.order, &x, l).ok_or(Defect::Inverted(index))?;
             let gradient = &gradient[..stride];
+            let mut weight = weight * measure;
+            if space.axisymmetric {
+                let phi = element::values(space.order, l);
+                let at = interpolate(&x, &phi);
+                weight *= space.circle(&at);
+                hoop.clear();
+                hoop.extend(phi[..stride].iter().map(|&phi| space.hoop(&at, phi)));
+            }
             match constant {
-                Some(material) => material.accumulate(gradient, weight * measure, &mut local),
+                Some(material) => material.accumulate(gradient, &hoop, weight, &mut local),
                 None => {
                     let at = pad(interpolate(&x, &element::values(space.order, l)));
                     let material = elasticity
                         .at(index, at)
                         .map_err(|flaw| Defect::Elasticity(elasticity.region(index), at, flaw))?;
-                    material.accumulate(gradient, weight * measure, &mut local);
+                    material.accumulate(gradient, &hoop, weight, &mut local);
                 }
             }
         }
@@ -261,7 +271,8 @@ fn body_force_on<const D: usize, const N: usize>(
     density: &dyn Fn([f64; D]) -> [f64; D],
     load: &mut [f64],
 ) {
-    let rule = quadrature::simplex::<N>(if space.order == Order::P1 { 2 } else { 5 });
+    let low = space.order == Order::P1 && !space.axisymmetric;
+    let rule = quadrature::simplex::<N>(if low { 2 } else { 5 });
     for index in 0..space.cell_count() {
         let x = space.cell_nodes(index);
         let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
@@ -270,9 +281,10 @@ fn body_force_on<const D: usize, const N: usize>(
             let phi = element::values(space.order, l);
             let at = interpolate(&x, &phi);
             let force = density(at);
+            let weight = weight * measure * space.circle(&at);
             for (a, &node) in cell.iter().enumerate() {
                 for c in 0..D {
-                    load[D * node as usize + c] += weight * measure * phi[a] * force[c];
+                    load[D * node as usize + c] += weight * phi[a] * force[c];
                 }
             }
         }

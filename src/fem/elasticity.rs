@@ -1,5 +1,6 @@
 //! Elasticity of a body: constants of the scene, the same everywhere, by region, or functions of the place.
 
+use super::cross;
 use super::material::{Material, Tensor};
 use crate::scene::{AxesSpec, Constants, ElasticitySpec, Plane};
 
@@ -30,6 +31,8 @@ pub enum Flaw {
     Axes(&'static str),
     /// C is not positive definite (4): its least eigenvalue, or NaN if C is not finite.
     NotCoercive(f64),
+    /// The meridian plane of a body of revolution is no plane of symmetry: the body would twist.
+    Twists,
 }
 
 impl Elasticity {
@@ -47,7 +50,7 @@ impl Elasticity {
         let law = |(index, spec): (usize, &&ElasticitySpec)| {
             let mut law = Law { spec: (*spec).clone(), constant: None };
             if spec.is_constant() {
-                let tensor = tensor(spec, [0.0; 3]).map_err(|flaw| (index, flaw))?;
+                let tensor = tensor(spec, [0.0; 3], plane).map_err(|flaw| (index, flaw))?;
                 let material = material(spec, tensor, [0.0; 3], dimension, plane);
                 law.constant = Some((material, tensor.moduli(dimension, plane)));
             }
@@ -84,7 +87,10 @@ impl Elasticity {
         let law = &self.laws[self.region(cell)];
         match &law.constant {
             Some((material, _)) => Ok(*material),
-            None => tensor(&law.spec, x).map(|tensor| material(&law.spec, tensor, x, self.dimension, self.plane)),
+            None => {
+                let tensor = tensor(&law.spec, x, self.plane)?;
+                Ok(material(&law.spec, tensor, x, self.dimension, self.plane))
+            }
         }
     }
 
@@ -96,7 +102,7 @@ impl Elasticity {
         let law = &self.laws[self.region(cell)];
         match &law.constant {
             Some((_, moduli)) => Ok(*moduli),
-            None => tensor(&law.spec, x).map(|tensor| tensor.moduli(self.dimension, self.plane)),
+            None => tensor(&law.spec, x, self.plane).map(|tensor| tensor.moduli(self.dimension, self.plane)),
         }
     }
 }
@@ -111,7 +117,7 @@ fn material(spec: &ElasticitySpec, tensor: Tensor, x: [f64; 3], dimension: usize
 }
 
 /// C in x, y, z at a point, coercive (4).
-fn tensor(spec: &ElasticitySpec, x: [f64; 3]) -> Result<Tensor, Flaw> {
+fn tensor(spec: &ElasticitySpec, x: [f64; 3], plane: Plane) -> Result<Tensor, Flaw> {
     const POSITIVE: &str = "must be greater than 0";
     let positive = |name, value| match value > 0.0 && value < f64::INFINITY {
         true => Ok(()),
@@ -144,10 +150,14 @@ fn tensor(spec: &ElasticitySpec, x: [f64; 3]) -> Result<Tensor, Flaw> {
     if !own.is_coercive() {
         return Err(Flaw::NotCoercive(own.least_eigenvalue()));
     }
-    match &spec.axes {
-        Some(axes) => Ok(own.rotated(&directions(axes, x)?)),
-        None => Ok(own),
+    let tensor = match &spec.axes {
+        Some(axes) => own.rotated(&directions(axes, x)?),
+        None => own,
+    };
+    if plane == Plane::Axisymmetric && !tensor.keeps_plane() {
+        return Err(Flaw::Twists);
     }
+    Ok(tensor)
 }
 
 /// Directions 1, 2, 3 of the material at a point: orthonormal rows, right-handed.
@@ -185,10 +195,6 @@ fn turned(v: [f64; 3], axis: [f64; 3], angle: f64) -> [f64; 3] {
     let along: f64 = (0..3).map(|c| axis[c] * v[c]).sum();
     let across = cross(axis, v);
     std::array::from_fn(|c| cosine * v[c] + sine * across[c] + (1.0 - cosine) * along * axis[c])
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
 }
 
 fn norm(v: [f64; 3]) -> f64 {

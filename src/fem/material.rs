@@ -1,5 +1,6 @@
 //! Linear elastic material at a point: Hooke's law sigma = C eps (2) and the bounds on C (4).
 
+use super::slope::Slope;
 use crate::scene::Plane;
 use nalgebra::{Matrix3, Matrix6};
 
@@ -11,6 +12,9 @@ const VOIGT: [usize; 6] = [0, 1, 2, 4, 5, 3];
 
 /// Share of a diagonal entry that elimination must leave of it: less is zero in double precision.
 const SINGULAR: f64 = 1e-13;
+
+/// Entries of C below this share of the largest one are rounding of turned axes.
+const TWISTLESS: f64 = 1e-12;
 
 /// Elasticity tensor C of space as a matrix: stress (xx yy zz xy yz xz) = C times strain in the same order, shear strains
 /// counted twice (2 eps_xy). Symmetric; unit of stress.
@@ -71,6 +75,12 @@ impl Tensor {
         Self(std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (turned[(i, j)] + turned[(j, i)]))))
     }
 
+    /// Whether the plane x, y is one of symmetry: its strains cause no shear out of it, beyond rounding.
+    pub fn keeps_plane(&self) -> bool {
+        let largest = self.0.as_flattened().iter().fold(0.0, |max: f64, c| max.max(c.abs()));
+        (0..4).all(|i| [4, 5].iter().all(|&j| self.0[i][j].abs() <= TWISTLESS * largest))
+    }
+
     fn matrix(&self) -> Matrix6<f64> {
         Matrix6::from_fn(|i, j| self.0[i][j])
     }
@@ -103,13 +113,14 @@ impl Tensor {
     }
 
     /// Stiffness against uniaxial stress along x, y and z of a body that is held in one direction across it, mean of both:
-    /// E/(1 - nu^2) if isotropic. In plane problems z is held (plane strain) or free (plane stress) and the z entry is zero.
+    /// E/(1 - nu^2) if isotropic. In plane problems z is held (plane strain, bodies of revolution) or free (plane stress) and
+    /// the z entry is zero.
     pub fn moduli(&self, dimension: usize, plane: Plane) -> [f64; 3] {
         let Some(s) = self.matrix().try_inverse() else { return [0.0; 3] };
         let held = |i: usize, j: usize| 1.0 / (s[(i, i)] - s[(i, j)].powi(2) / s[(j, j)]);
         std::array::from_fn(|i| match (dimension, plane) {
             (2, _) if i == 2 => 0.0,
-            (2, Plane::Strain) => held(i, 2),
+            (2, Plane::Strain | Plane::Axisymmetric) => held(i, 2),
             (2, Plane::Stress) => 1.0 / s[(i, i)],
             _ => 0.5 * (held(i, (i + 1) % 3) + held(i, (i + 2) % 3)),
         })
@@ -165,34 +176,46 @@ impl Material {
     }
 
     /// Adds `weight` times the D x D blocks B_a' C B_b of the stiffness density for all nodes a <= b to `local[a n + b]`,
-    /// where n is the number of gradients: `gradient[a]` is that of the shape function of node a.
-    pub fn accumulate<const D: usize>(&self, gradient: &[[f64; D]], weight: f64, local: &mut [[[f64; D]; D]]) {
+    /// where n is the number of gradients: `gradient[a]` is that of the shape function of node a. In a body of revolution
+    /// `hoop[a]` is that function over r; it is empty in others.
+    pub fn accumulate<const D: usize>(
+        &self,
+        gradient: &[[f64; D]],
+        hoop: &[f64],
+        weight: f64,
+        local: &mut [[[f64; D]; D]],
+    ) {
         match self.lame {
-            Some((lambda, mu)) => isotropic_blocks(weight * lambda, weight * mu, gradient, local),
-            None => self.blocks(gradient, weight, local),
+            Some((lambda, mu)) => {
+                isotropic_blocks(weight * lambda, weight * mu, gradient, local);
+                isotropic_hoops(weight * lambda, weight * mu, gradient, hoop, local);
+            }
+            None => self.blocks(gradient, hoop, weight, local),
         }
     }
 
-    fn blocks<const D: usize>(&self, gradient: &[[f64; D]], weight: f64, local: &mut [[[f64; D]; D]]) {
+    fn blocks<const D: usize>(&self, gradient: &[[f64; D]], hoop: &[f64], weight: f64, local: &mut [[[f64; D]; D]]) {
         let n = gradient.len();
         for b in 0..n {
             for j in 0..D {
-                let mut h = [[0.0; D]; D];
-                h[j] = gradient[b].map(|g| weight * g);
-                let stress = self.stress(&h);
+                let mut slope = Slope::<D>::ZERO;
+                slope.h[j] = gradient[b].map(|g| weight * g);
+                slope.hoop = hoop.get(b).filter(|_| j == 0).map_or(0.0, |hoop| weight * hoop);
+                let stress = self.stress(&slope.strain());
                 for a in 0..=b {
+                    let block = &mut local[a * n + b];
                     for i in 0..D {
                         let force: f64 = (0..D).map(|k| stress[component(i, k)] * gradient[a][k]).sum();
-                        local[a * n + b][i][j] += force;
+                        block[i][j] += force;
                     }
+                    block[0][j] += hoop.get(a).map_or(0.0, |hoop| stress[2] * hoop);
                 }
             }
         }
     }
 
-    /// Stress (xx yy zz xy yz xz) of a displacement gradient `h[i][j]` = du_i/dx_j (1), (2).
-    pub fn stress<const D: usize>(&self, h: &[[f64; D]; D]) -> [f64; 6] {
-        let strain = strain(h);
+    /// Stress (xx yy zz xy yz xz) of a strain (xx yy zz, and 2 eps of xy yz xz) (2).
+    pub fn stress(&self, strain: &[f64; 6]) -> [f64; 6] {
         std::array::from_fn(|i| (0..6).map(|j| self.stiffness.0[i][j] * strain[j]).sum())
     }
 }
@@ -229,6 +252,27 @@ fn isotropic_blocks<const D: usize>(lambda: f64, mu: f64, gradient: &[[f64; D]],
                 }
                 block[i][i] += mu * product;
             }
+        }
+    }
+}
+
+/// What the circles of a body of revolution add: with e = div u + u_r/r, lambda e e' + 2 mu (u_r/r) (u_r'/r).
+fn isotropic_hoops<const D: usize>(
+    lambda: f64,
+    mu: f64,
+    gradient: &[[f64; D]],
+    hoop: &[f64],
+    local: &mut [[[f64; D]; D]],
+) {
+    let n = hoop.len();
+    for a in 0..n {
+        for b in a..n {
+            let block = &mut local[a * n + b];
+            for i in 0..D {
+                block[0][i] += lambda * hoop[a] * gradient[b][i];
+                block[i][0] += lambda * gradient[a][i] * hoop[b];
+            }
+            block[0][0] += (lambda + 2.0 * mu) * hoop[a] * hoop[b];
         }
     }
 }

@@ -13,6 +13,7 @@ pub mod norms;
 pub mod quadrature;
 pub mod recovery;
 pub mod rigid;
+pub mod slope;
 pub mod space;
 pub mod stress;
 pub mod surface;
@@ -21,9 +22,15 @@ pub use assemble::{ElasticBody, NodeGraph};
 pub use elasticity::Elasticity;
 pub use frame::Frame;
 pub use material::Material;
+pub use slope::Slope;
 pub use space::{Facets, Space};
 
 /// A vector of 2 or 3 components as 3.
 pub fn pad<const D: usize>(v: [f64; D]) -> [f64; 3] {
     std::array::from_fn(|c| if c < D { v[c] } else { 0.0 })
+}
+
+/// Vector product.
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3])
 }

@@ -1,16 +1,15 @@
 //! Norms of errors: a finite element displacement against a known one.
 
 use super::elasticity::Elasticity;
-use super::material::strain;
 use super::space::Space;
-use super::{assemble, element, pad, quadrature};
+use super::{Slope, assemble, element, pad, quadrature};
 
 /// Norms of a displacement of one body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Norms {
     /// L2 norm: root of the integral of u.u.
     pub l2: f64,
-    /// H1 seminorm: root of the integral of grad u : grad u.
+    /// H1 seminorm: root of the integral of grad u : grad u, in bodies of revolution with (u_r/r)^2 in it.
     pub h1: f64,
     /// Energy norm: root of the integral of eps(u) : C eps(u), twice the strain energy.
     pub energy: f64,
@@ -58,19 +57,19 @@ fn error_on<const D: usize, const N: usize>(
             let phi = element::values(space.order, l);
             let at = assemble::interpolate(&x, &phi);
             let known = exact(at);
-            let (value, slope) = (assemble::interpolate(&nodal, &phi), space.displacement_gradient(cell, &gradient, u));
-            let difference = Known {
-                value: std::array::from_fn(|i| value[i] - known.value[i]),
-                gradient: std::array::from_fn(|i| std::array::from_fn(|j| slope[i][j] - known.gradient[i][j])),
-            };
+            let value = assemble::interpolate(&nodal, &phi);
+            let exact_slope = Slope { h: known.gradient, hoop: space.hoop(&at, known.value[0]) };
+            let mut difference = space.slope(cell, &at, &phi, &gradient, u);
+            difference.add(-1.0, &exact_slope);
+            let off = std::array::from_fn(|i| value[i] - known.value[i]);
             let material = elasticity.at(index, pad(at)).ok();
-            for (sum, field) in squares.iter_mut().zip([difference, known]) {
-                let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
-                let stress = material.map_or([0.0; 6], |material| material.stress(&field.gradient));
-                let energy: f64 = stress.iter().zip(strain(&field.gradient)).map(|(s, e)| s * e).sum();
-                sum.l2 += weight * measure * square(&field.value);
-                sum.h1 += weight * measure * square(field.gradient.as_flattened());
-                sum.energy += weight * measure * energy;
+            let weight = weight * measure * space.circle(&at);
+            for (sum, (value, slope)) in squares.iter_mut().zip([(off, difference), (known.value, exact_slope)]) {
+                let strain = slope.strain();
+                let stress = material.map_or([0.0; 6], |material| material.stress(&strain));
+                sum.l2 += weight * value.iter().map(|v| v * v).sum::<f64>();
+                sum.h1 += weight * slope.square();
+                sum.energy += weight * stress.iter().zip(strain).map(|(s, e)| s * e).sum::<f64>();
             }
         }
     }

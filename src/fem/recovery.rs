@@ -10,6 +10,7 @@ mod patch;
 #[cfg(test)]
 mod tests;
 
+use super::Slope;
 use super::assemble::interpolate;
 use super::element;
 use super::quadrature;
@@ -19,8 +20,8 @@ use bubble::Bubble;
 use patch::Patch;
 use std::collections::{BTreeSet, HashMap};
 
-/// Stress (xx yy zz xy yz xz) in a cell at a point of a displacement gradient.
-pub type Law<'a, const D: usize> = &'a dyn Fn(usize, [f64; D], &[[f64; D]; D]) -> [f64; 6];
+/// Stress (xx yy zz xy yz xz) in a cell at a point of a strain (xx yy zz, and 2 eps of xy yz xz).
+pub type Law<'a, const D: usize> = &'a dyn Fn(usize, [f64; D], &[f64; 6]) -> [f64; 6];
 
 /// A displacement with the polynomials recovered from it.
 pub struct Recovery<'a, const D: usize> {
@@ -28,31 +29,6 @@ pub struct Recovery<'a, const D: usize> {
     displacement: &'a [f64],
     /// Polynomial of each vertex; `None` at mid-edge nodes.
     patches: Vec<Option<Patch<D>>>,
-}
-
-fn add<const D: usize>(sum: &mut [[f64; D]; D], factor: f64, term: &[[f64; D]; D]) {
-    for (sum, term) in sum.iter_mut().flatten().zip(term.iter().flatten()) {
-        *sum += factor * term;
-    }
-}
-
-/// Discrete gradient of a cell at a barycentric point.
-fn gradient_at<const D: usize>(gradient: &[[f64; D]], cell: &[u32], u: &[f64]) -> [[f64; D]; D] {
-    let mut h = [[0.0; D]; D];
-    for (a, &node) in cell.iter().enumerate() {
-        for c in 0..D {
-            for j in 0..D {
-                h[c][j] += u[D * node as usize + c] * gradient[a][j];
-            }
-        }
-    }
-    h
-}
-
-/// sigma(h) : h.
-fn density<const D: usize>(stress: &[f64; 6], h: &[[f64; D]; D]) -> f64 {
-    let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
-    (0..D).flat_map(|i| (0..D).map(move |j| (i, j))).map(|(i, j)| stress[place[i][j]] * h[i][j]).sum()
 }
 
 impl<'a, const D: usize> Recovery<'a, D> {
@@ -77,6 +53,10 @@ impl<'a, const D: usize> Recovery<'a, D> {
             for (opposite, &node) in cell[..N].iter().enumerate() {
                 around[node as usize].push(index as u32);
                 let mut key: [u32; D] = std::array::from_fn(|k| cell[if k < opposite { k } else { k + 1 }]);
+                // beyond the axis a body of revolution goes on
+                if key.iter().all(|&node| space.on_axis(node)) {
+                    continue;
+                }
                 key.sort_unstable();
                 *facets.entry(key).or_default() += 1;
             }
@@ -118,6 +98,13 @@ impl<'a, const D: usize> Recovery<'a, D> {
         }
     }
 
+    /// Gradient of the polynomial of a vertex.
+    fn recovered(&self, node: u32, at: &[f64; D]) -> Slope<D> {
+        let patch = self.patch(node);
+        let hoop = if self.space.axisymmetric { self.space.hoop(at, patch.value(at)[0]) } else { 0.0 };
+        Slope { h: patch.gradient(at), hoop }
+    }
+
     /// Squared energy norm of the difference of recovered and discrete stress on each cell.
     pub fn energy_errors(&self, law: Law<D>) -> Vec<f64> {
         match D {
@@ -133,13 +120,16 @@ impl<'a, const D: usize> Recovery<'a, D> {
             let mut sum = 0.0;
             for (l, weight) in rule.points.iter().zip(&rule.weights) {
                 let Some((gradient, measure)) = element::gradients::<D, N>(self.space.order, &x, l) else { continue };
-                let at = interpolate(&x, &element::values(self.space.order, l));
-                let mut difference = gradient_at(&gradient, cell, self.displacement);
-                difference.iter_mut().flatten().for_each(|h| *h = -*h);
+                let phi = element::values(self.space.order, l);
+                let at = interpolate(&x, &phi);
+                let mut difference = Slope::ZERO;
+                difference.add(-1.0, &self.space.slope(cell, &at, &phi, &gradient, self.displacement));
                 for (l, &node) in l.iter().zip(cell) {
-                    add(&mut difference, *l, &self.patch(node).gradient(&at));
+                    difference.add(*l, &self.recovered(node, &at));
                 }
-                sum += weight * measure * density(&law(index, at, &difference), &difference);
+                let strain = difference.strain();
+                let density: f64 = law(index, at, &strain).iter().zip(strain).map(|(s, e)| s * e).sum();
+                sum += weight * measure * self.space.circle(&at) * density;
             }
             sum
         };
@@ -167,21 +157,25 @@ impl<'a, const D: usize> Recovery<'a, D> {
             for (l, weight) in rule.points.iter().zip(&rule.weights) {
                 let Some((gradient, measure)) = element::gradients::<D, N>(self.space.order, &x, l) else { continue };
                 let Some((hats, _)) = element::gradients::<D, N>(Order::P1, &x[..N], l) else { continue };
-                let at = interpolate(&x, &element::values(self.space.order, l));
-                let mut slope = [[0.0; D]; D];
+                let phi = element::values(self.space.order, l);
+                let at = interpolate(&x, &phi);
+                let mut slope = Slope::<D>::ZERO;
                 for (bubble, coefficient) in &bubbles {
                     let d = bubble.slopes(l);
                     for j in 0..D {
                         let along: f64 = (0..N).map(|k| d[k] * hats[k][j]).sum();
-                        (0..D).for_each(|c| slope[c][j] += coefficient[c] * along);
+                        (0..D).for_each(|c| slope.h[c][j] += coefficient[c] * along);
                     }
+                    slope.hoop += self.space.hoop(&at, bubble.value(l) * coefficient[0]);
                 }
-                let stress = law(index, at, &slope);
+                let stress = law(index, at, &slope.strain());
+                let weight = weight * measure * self.space.circle(&at);
                 for (a, &node) in cell.iter().enumerate() {
                     for c in 0..D {
                         let work: f64 = (0..D).map(|j| stress[place[c][j]] * gradient[a][j]).sum();
-                        residual[D * node as usize + c] -= weight * measure * work;
+                        residual[D * node as usize + c] -= weight * work;
                     }
+                    residual[D * node as usize] -= weight * stress[2] * self.space.hoop(&at, phi[a]);
                 }
             }
         }

@@ -1,6 +1,7 @@
 //! Rigid motions of a body and what its supports leave of them.
 
 use super::assemble::NodalBlock;
+use super::space::Space;
 use crate::linalg::kernel;
 use nalgebra::{DMatrix, DVector};
 
@@ -36,6 +37,15 @@ pub fn free(left: &[RigidMotion], prescribed: &[(usize, f64)], load: &[f64]) -> 
             FreeMotion { work: crate::linalg::dot(&displacement, load), displacement }
         })
         .collect()
+}
+
+/// The rigid motions of a body; of one of revolution the translation along its axis alone.
+pub fn of<const D: usize>(space: &Space<D>) -> Vec<RigidMotion> {
+    let mut all = modes(&space.nodes);
+    if space.axisymmetric {
+        all = vec![all.swap_remove(1)];
+    }
+    all
 }
 
 /// The 3 (2D) or 6 (3D) rigid motions about the centre of `nodes`: translations, then rotations, scaled to

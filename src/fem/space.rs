@@ -1,11 +1,14 @@
 //! The finite element space of one body: its nodes, cells and boundary facets, numbered within the body.
 
-use super::element;
+use super::{Slope, cross, element, pad};
 use crate::mesh::{Group, Mesh};
 use crate::scene::Order;
 use std::collections::{HashMap, HashSet};
 
 const ABSENT: u32 = u32::MAX;
+
+/// Share of the largest radius below which a node lies on the axis of a body of revolution.
+pub const ON_AXIS: f64 = 1e-10;
 
 /// Nodes and cells of one body. Nodes are numbered as the cells meet them, so that neighbours in the mesh file
 /// stay neighbours in memory.
@@ -19,6 +22,8 @@ pub struct Space<const D: usize> {
     pub stride: usize,
     /// Body node numbers, `stride` per cell, in the local order of [`element`].
     pub cells: Vec<u32>,
+    /// Whether the body is one of revolution, of which this is the meridian: x is the radius, y runs along the axis.
+    pub axisymmetric: bool,
     /// Body node of each mesh point, or `ABSENT`.
     from_mesh: Vec<u32>,
 }
@@ -43,6 +48,7 @@ impl<const D: usize> Space<D> {
             nodes: Vec::new(),
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
+            axisymmetric: false,
             from_mesh: vec![ABSENT; mesh.points.len()],
         };
         for cell in group.connectivity.chunks_exact(group.stride) {
@@ -64,8 +70,46 @@ impl<const D: usize> Space<D> {
         let touching = |index: &usize| cell(*index).iter().any(|&node| marked[node as usize]);
         let kept: Vec<usize> = (0..self.cell_count()).filter(touching).collect();
         let cells = kept.iter().flat_map(|&index| cell(index)).copied().collect();
-        let nodes = self.nodes.clone();
-        (Space { order: self.order, nodes, stride: self.stride, cells, from_mesh: Vec::new() }, kept)
+        (Space { nodes: self.nodes.clone(), cells, from_mesh: Vec::new(), ..*self }, kept)
+    }
+
+    /// The meridian of a body of revolution. Nodes whose radius is rounding of the largest one get the radius zero.
+    pub fn revolved(mut self) -> Self {
+        let largest = self.nodes.iter().fold(0.0, |max: f64, x| max.max(x[0].abs()));
+        self.nodes.iter_mut().filter(|x| x[0].abs() <= ON_AXIS * largest).for_each(|x| x[0] = 0.0);
+        self.axisymmetric = true;
+        self
+    }
+
+    /// Length 2 pi r of the circle that a point of a meridian stands for; 1 in other bodies. Integrals over cells and facets
+    /// are weighted with it.
+    pub fn circle(&self, at: &[f64; D]) -> f64 {
+        if self.axisymmetric { std::f64::consts::TAU * at[0] } else { 1.0 }
+    }
+
+    /// Stretch u_r/r of the circle through a point off the axis; zero in bodies that are not of revolution.
+    pub fn hoop(&self, at: &[f64; D], radial: f64) -> f64 {
+        if self.axisymmetric { radial / at[0] } else { 0.0 }
+    }
+
+    /// Whether a node lies on the axis of a body of revolution.
+    pub fn on_axis(&self, node: u32) -> bool {
+        self.axisymmetric && self.nodes[node as usize][0] == 0.0
+    }
+
+    /// What a force at nodes, in a body of revolution on their circles, adds to the sum of forces: radial ones cancel.
+    pub fn net_force(&self, force: [f64; D]) -> [f64; 3] {
+        let mut net = pad(force);
+        if self.axisymmetric {
+            net[0] = 0.0;
+        }
+        net
+    }
+
+    /// What a force at a node adds to the sum of moments about the origin: nothing in a body of revolution.
+    pub fn net_moment(&self, node: u32, force: [f64; D]) -> [f64; 3] {
+        let (x, f) = (pad(self.nodes[node as usize]), pad(force));
+        if self.axisymmetric { [0.0; 3] } else { cross(x, f) }
     }
 
     /// Number of degrees of freedom.
@@ -78,9 +122,14 @@ impl<const D: usize> Space<D> {
         self.cells.len() / self.stride
     }
 
-    /// Area (volume) of all cells, by their corners.
+    /// Area (volume) of all cells, by their corners; of a body of revolution the area of its meridian.
     pub fn measure(&self) -> f64 {
         (0..self.cell_count()).map(|i| self.cell_measure(i)).sum()
+    }
+
+    /// What a cell adds to the measure of the body, by its corners: in a body of revolution the volume of a ring.
+    pub fn share(&self, i: usize) -> f64 {
+        self.cell_measure(i) * self.circle(&self.centroid(i))
     }
 
     /// Area (volume) of cell `i`, by its corners.
@@ -96,8 +145,9 @@ impl<const D: usize> Space<D> {
         (0..3).map(|i| normal[i] * c[i]).sum::<f64>().abs() / 6.0
     }
 
-    /// du_i/dx_j in a cell (its node numbers) from the gradients of its shape functions; `u` has one entry a dof.
-    pub fn displacement_gradient(&self, cell: &[u32], gradient: &[[f64; D]], u: &[f64]) -> [[f64; D]; D] {
+    /// Gradient of a displacement in a cell (its node numbers) at a point `at`, where its shape functions have the values `phi`
+    /// and these gradients; `u` has one entry a dof.
+    pub fn slope(&self, cell: &[u32], at: &[f64; D], phi: &[f64], gradient: &[[f64; D]], u: &[f64]) -> Slope<D> {
         let mut h = [[0.0; D]; D];
         for (&node, gradient) in cell.iter().zip(gradient) {
             for i in 0..D {
@@ -106,7 +156,14 @@ impl<const D: usize> Space<D> {
                 }
             }
         }
-        h
+        let radial = || cell.iter().zip(phi).map(|(&node, phi)| phi * u[D * node as usize]).sum::<f64>();
+        let hoop = match self.axisymmetric {
+            false => 0.0,
+            // the limit of u_r/r
+            true if at[0] == 0.0 => h[0][0],
+            true => radial() / at[0],
+        };
+        Slope { h, hoop }
     }
 
     /// Mean of the corners of cell `i`.

@@ -6,7 +6,8 @@ use super::{assemble, element, pad, quadrature};
 use crate::scene::Order;
 use nalgebra::Matrix3;
 
-/// Stress at every node: the volume-weighted mean over its cells of the cell's stress at the node.
+/// Stress at every node: the mean over its cells, weighted by their measures, of the cell's stress at the node. In bodies of
+/// revolution zz is the stress along the circles.
 ///
 /// `u` has one entry a dof; the result one (xx yy zz xy yz xz) a node. Where the elasticity has no value at a node (the axis
 /// of cylindrical axes, say), that of an integration point of the cell serves.
@@ -27,13 +28,14 @@ fn nodal_on<const D: usize, const N: usize>(space: &Space<D>, elasticity: &Elast
         let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
         for (l, &node) in places.iter().zip(cell) {
             let Some((gradient, measure)) = element::gradients::<D, N>(space.order, &x, l) else { continue };
-            let h = space.displacement_gradient(cell, &gradient, u);
-            let material = elasticity.at(index, pad(space.nodes[node as usize])).or_else(|_| {
+            let at = space.nodes[node as usize];
+            let slope = space.slope(cell, &at, &element::values(space.order, l), &gradient, u);
+            let material = elasticity.at(index, pad(at)).or_else(|_| {
                 elasticity.at(index, pad(assemble::interpolate(&x, &element::values(space.order, &inside))))
             });
             // assembly was there: it has a value
             let Ok(material) = material else { continue };
-            let stress = material.stress(&h);
+            let stress = material.stress(&slope.strain());
             volume[node as usize] += measure;
             for (sum, stress) in sum[node as usize].iter_mut().zip(stress) {
                 *sum += measure * stress;

@@ -36,7 +36,8 @@ fn on_facets<const D: usize>(space: &Space<D>, facets: &Facets<D>, visit: &mut V
             let measure = area.iter().map(|a| a * a).sum::<f64>().sqrt();
             let normal = area.map(|a| a / measure);
             let phi = element::values(space.order, l);
-            visit(facets.facet(index), &phi, weight * measure, interpolate(&x, &phi), normal);
+            let at = interpolate(&x, &phi);
+            visit(facets.facet(index), &phi, weight * measure * space.circle(&at), at, normal);
         }
     }
 }
@@ -61,7 +62,7 @@ pub fn foundation<const D: usize>(
     blocks
 }
 
-/// Length (area) of a surface.
+/// Length (area) of a surface, in bodies of revolution the area that the curve sweeps over.
 pub fn measure<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
     let mut sum = 0.0;
     on_facets(space, facets, &mut |_, _, weight, _, _| sum += weight);

@@ -20,7 +20,8 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         &["title", "dimension", "plane", "mesh", "body", "contact", "method", "solver", "estimate", "adapt", "output"];
     let keys = Keys::open(tree, "the scene", KEYS)?;
     let dimension = dimension(&keys)?;
-    let decoder = Decoder { dimension: dimension.value, folder: path.parent().unwrap_or(Path::new("")) };
+    let plane = plane(&keys, dimension.value)?;
+    let decoder = Decoder { dimension: dimension.value, plane, folder: path.parent().unwrap_or(Path::new("")) };
     let title = match keys.get("title") {
         Some(node) => node.string()?.to_owned(),
         None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
@@ -35,7 +36,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     Ok(Scene {
         path: path.to_owned(),
         title,
-        plane: decoder.plane(&keys)?,
+        plane,
         mesh: decoder.mesh(keys.require("mesh")?)?,
         bodies: decoder.bodies(&keys)?,
         contacts,
@@ -53,6 +54,8 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
 struct Decoder<'a> {
     /// Space dimension: 2 or 3.
     dimension: usize,
+    /// What the plane stands for.
+    plane: Plane,
     /// Folder of the scene file.
     folder: &'a Path,
 }
@@ -108,18 +111,6 @@ impl Decoder<'_> {
             return Err(Error::scene(place, count).help(format!("the dimension of the scene is {}", self.dimension)));
         }
         Ok(items)
-    }
-
-    fn plane(&self, keys: &Keys) -> Result<Plane> {
-        let Some(entry) = keys.entry("plane") else {
-            return Ok(Plane::Strain);
-        };
-        if self.dimension == 3 {
-            return Err(Error::scene(&entry.key_place, "`plane` in a problem in space")
-                .label("only plane problems have it")
-                .help("remove it, or set dimension = 2"));
-        }
-        choose(&entry.node, "plane", &[("strain", Plane::Strain), ("stress", Plane::Stress)])
     }
 
     fn mesh(&self, node: &Node) -> Result<MeshSource> {
@@ -180,6 +171,18 @@ fn dimension(keys: &Keys) -> Result<Located<usize>> {
         3 => Ok(Located::new(3, node.place.clone())),
         other => Err(node.refuse(format!("the dimension is {other}")).label("must be 2 or 3")),
     }
+}
+
+fn plane(keys: &Keys, dimension: usize) -> Result<Plane> {
+    let Some(entry) = keys.entry("plane") else {
+        return Ok(Plane::Strain);
+    };
+    if dimension == 3 {
+        return Err(Error::scene(&entry.key_place, "`plane` in a problem in space")
+            .label("only plane problems have it")
+            .help("remove it, or set dimension = 2"));
+    }
+    choose(&entry.node, "plane", &Plane::ALL)
 }
 
 /// Named numbers for Gmsh, sorted by name.

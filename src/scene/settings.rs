@@ -16,10 +16,7 @@ impl Scene {
         settings.insert("title".into(), json!(self.title));
         settings.insert("dimension".into(), json!(self.dimension.value));
         if self.dimension.value == 2 {
-            let plane = match self.plane {
-                Plane::Strain => "strain",
-                Plane::Stress => "stress",
-            };
+            let plane = Plane::ALL.iter().find(|(_, plane)| *plane == self.plane).map(|(name, _)| *name);
             settings.insert("plane".into(), json!(plane));
         }
         settings.insert("mesh".into(), mesh(&self.mesh));

@@ -19,7 +19,7 @@ pub struct Scene {
     pub title: String,
     /// Space dimension: 2 or 3.
     pub dimension: Located<usize>,
-    /// Plane strain (default) or plane stress; plane problems only.
+    /// Plane strain (default), plane stress or bodies of revolution; plane problems only.
     pub plane: Plane,
     /// Where the mesh comes from.
     pub mesh: MeshSource,
@@ -41,13 +41,21 @@ pub struct Scene {
     pub output: OutputSpec,
 }
 
-/// Plane problems: which out-of-plane component vanishes.
+/// What the plane of a plane problem stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Plane {
     /// No out-of-plane strain.
     Strain,
     /// No out-of-plane stress.
     Stress,
+    /// A meridian of bodies of revolution: x is the radius, y runs along the axis.
+    Axisymmetric,
+}
+
+impl Plane {
+    /// The choices with their names in the scene.
+    pub const ALL: [(&'static str, Plane); 3] =
+        [("strain", Plane::Strain), ("stress", Plane::Stress), ("axisymmetric", Plane::Axisymmetric)];
 }
 
 /// Where the mesh comes from; paths are relative to the scene file's folder and already joined with it.

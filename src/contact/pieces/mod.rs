@@ -27,7 +27,7 @@ pub struct Shared<const D: usize> {
     pub facet_b: usize,
     /// Barycentric coordinates of the projection along the normal of side a.
     pub at_b: [f64; D],
-    /// Length (area) that belongs to the point, measured on side a.
+    /// Length (area) that belongs to the point, measured on side a; in bodies of revolution the area of a ring.
     pub weight: f64,
     /// Distance to the projection, negative where the surfaces overlap.
     pub gap: f64,

@@ -39,7 +39,7 @@ pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Vec<Shared<2>> {
                     at_a: [1.0 - s, s],
                     facet_b: index,
                     at_b: [1.0 - t, t],
-                    weight: weight * (high - low) * length(facet.tangent(s)),
+                    weight: weight * (high - low) * length(facet.tangent(s)) * a.space.circle(&from),
                     gap: other.distance(t, from, normal),
                 });
             }

@@ -44,13 +44,21 @@ impl<const D: usize> Patch<D> {
             return None;
         }
         let (mut gram, mut right) = (DMatrix::zeros(n, n), DMatrix::zeros(n, D));
-        for &node in nodes {
-            let x = at(node);
+        let mut add = |x: [f64; D], u: [f64; D]| {
             let value = |monomial: &Vec<usize>| monomial.iter().map(|&i| (x[i] - centre[i]) / size).product();
             let row: Vec<f64> = monomials.iter().map(value).collect();
             for i in 0..n {
                 (0..n).for_each(|j| gram[(i, j)] += row[i] * row[j]);
-                (0..D).for_each(|c| right[(i, c)] += row[i] * u[D * node as usize + c]);
+                (0..D).for_each(|c| right[(i, c)] += row[i] * u[c]);
+            }
+        };
+        for &node in nodes {
+            let (mut x, mut u): ([f64; D], [f64; D]) = (at(node), std::array::from_fn(|c| u[D * node as usize + c]));
+            add(x, u);
+            // around the axis of a body of revolution u_r is odd in r, u_y even: no one-sided fit
+            if space.axisymmetric && centre[0] == 0.0 {
+                (x[0], u[0]) = (-x[0], -u[0]);
+                add(x, u);
             }
         }
         let factor = gram.cholesky()?;
@@ -61,6 +69,17 @@ impl<const D: usize> Patch<D> {
         let solution = factor.solve(&right);
         let term = |(i, monomial)| (monomial, std::array::from_fn(|c| solution[(i, c)]));
         Some(Self { centre, size, terms: monomials.into_iter().enumerate().map(term).collect() })
+    }
+
+    /// Value at a point.
+    pub fn value(&self, x: &[f64; D]) -> [f64; D] {
+        let local: [f64; D] = std::array::from_fn(|i| (x[i] - self.centre[i]) / self.size);
+        let mut value = [0.0; D];
+        for (monomial, coefficient) in &self.terms {
+            let product: f64 = monomial.iter().map(|&i| local[i]).product();
+            (0..D).for_each(|c| value[c] += product * coefficient[c]);
+        }
+        value
     }
 
     /// Gradient u_c,j at a point.

@@ -4,7 +4,7 @@ use super::{Decoder, elasticity};
 use crate::error::{Error, Located, Result};
 use crate::scene::expression::Field;
 use crate::scene::read::{Keys, Node, Value};
-use crate::scene::{BodySpec, Load, LoadKind, Order, SpringKind, SpringSpec, Support};
+use crate::scene::{BodySpec, Load, LoadKind, Order, Plane, SpringKind, SpringSpec, Support};
 
 /// Names of components, for supports.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -130,7 +130,7 @@ impl Decoder<'_> {
         let kind = match (keys.get("pressure"), keys.get("traction"), keys.get("force")) {
             (Some(pressure), ..) => LoadKind::Pressure(self.field(pressure)?),
             (_, Some(traction), _) => LoadKind::Traction(self.vector(traction)?),
-            (.., Some(force)) => LoadKind::Force { total: self.numbers(force)?, rigid },
+            (.., Some(force)) => LoadKind::Force { total: self.total(force)?, rigid },
             (None, None, None) => {
                 let components = &["tx", "ty", "tz"][..self.dimension];
                 let advice =
@@ -143,6 +143,18 @@ impl Decoder<'_> {
 }
 
 impl Decoder<'_> {
+    /// A force on a whole boundary.
+    fn total(&self, node: &Node) -> Result<[f64; 3]> {
+        let total = self.numbers(node)?;
+        if self.plane == Plane::Axisymmetric && total[0] != 0.0 {
+            return Err(node
+                .refuse("a total force across the axis in an axisymmetric scene")
+                .label("radial forces cancel all around: the first component must be 0")
+                .help("for a radial load give pressure = p or traction = [tr, ta]"));
+        }
+        Ok(total)
+    }
+
     /// A vector of numbers.
     fn numbers(&self, node: &Node) -> Result<[f64; 3]> {
         let mut numbers = [0.0; 3];
