@@ -3,8 +3,10 @@
 mod common;
 
 use common::{Run, Scene, root, solve};
+use std::collections::HashMap;
 use std::f64::consts::PI;
-use winkler::fem::{Elasticity, Space, stress};
+use winkler::contact::Side;
+use winkler::fem::{Elasticity, Frame, Space, stress};
 use winkler::mesh::load;
 use winkler::scene::{self, Order};
 
@@ -49,7 +51,7 @@ impl Tube {
             Transfinite Curve {1, 2, 3, 4} = n + 1;
             Curve Loop(1) = {1, 2, 3, 4}; Plane Surface(1) = {1}; Transfinite Surface {1};
             Physical Surface(\"tube\") = {1}; Physical Curve(\"bottom\") = {1}; Physical Curve(\"outside\") = {2};
-            Physical Curve(\"top\") = {3}; Physical Curve(\"inside\") = {4}; Physical Point(\"corner\") = {3};";
+            Physical Curve(\"top\") = {3}; Physical Curve(\"inside\") = {4}; Physical Point(\"corner\") = {3};\n";
         let folder = tempfile::tempdir().expect("a temporary folder");
         let file = folder.path().join("tube.geo");
         std::fs::write(&file, SCRIPT).expect("a script can be written");
@@ -76,7 +78,7 @@ impl Tube {
             let told = format!("{what} P{degree}: orders {orders:.2?}, {errors:?}");
             println!("{told}");
             let least = f64::from(degree) - 0.1;
-            assert!(orders[0] > least + 1.0 && orders[1] > least && errors[2][1] < last, "{told}");
+            assert!(orders[0] > least + 0.95 && orders[1] > least && errors[2][1] < last, "{told}");
         }
     }
 }
@@ -103,7 +105,8 @@ fn tube_under_pressure() {
 /// cylindrical axes.
 #[test]
 fn tube_of_fibres() {
-    let (e, nu12, nu13, nu23) = ([1.2e4, 1e4, 9e4], 0.3, 0.04, 0.05);
+    let e: [f64; 3] = [1.2e4, 1e4, 9e4];
+    let (nu12, nu13, nu23) = (0.3, 0.04, 0.05);
     // compliance of r, y, t; eps_y = 0
     let s = |i: usize, j: usize| match (i.min(j), i.max(j)) {
         (i, j) if i == j => 1.0 / e[i],
@@ -136,8 +139,9 @@ fn loads_all_around() {
     let material = "young = 100\npoisson = 0";
     let area = 3.0 * PI;
     let exact = |keys: &str, u: &str| {
-        let errors = Tube::new(material, &format!("{keys}\nexact = [\"0\", \"{u}\"]")).errors(&[]);
-        assert!(errors.iter().all(|error| *error < 1e-11), "{keys}: {errors:?}");
+        let tube = Tube::new(material, &format!("{keys}\nexact = [\"0\", \"{u}\"]"));
+        let error = solved(&tube.scene, &[]).number("bodies/0/error_l2");
+        assert!(error < 1e-11, "{keys}: {error}");
     };
     let held = "fix = [{ on = \"bottom\", y = 0 }]";
     exact(&format!("{held}\nload = [{{ on = \"top\", pressure = 5 }}]"), "-y/20");
@@ -149,6 +153,19 @@ fn loads_all_around() {
     exact(&format!("{foundation}\nload = [{{ on = \"top\", pressure = 5 }}]"), "-y/20 - 1/40");
     let circle = "spring = [{ on = \"corner\", stiffness = [0, 8] }]";
     exact(&format!("{circle}\nload = [{{ on = \"top\", force = [0, 5], rigid = true }}]"), "5/8");
+}
+
+/// A rigid surface does not widen: under a total force it is where the same force pulls when it is held.
+#[test]
+fn a_rigid_surface() {
+    let material = "young = 100\npoisson = 0.3";
+    let held = "{ on = \"bottom\", y = 0 }";
+    let pulled =
+        solved(&Tube::new(material, &format!("fix = [{held}, {{ on = \"top\", x = 0, y = 0.05 }}]")).scene, &[]);
+    let force = pulled.number("bodies/0/balance/supports/1/force/1");
+    let load = format!("load = [{{ on = \"top\", force = [0, {force:e}], rigid = true }}]");
+    let run = solved(&Tube::new(material, &format!("fix = [{held}]\n{load}")).scene, &[]);
+    close("-F1", -run.number("F1"), 0.05 * force / 2.0, 1e-10);
 }
 
 /// A tube that spins between plates: u = A r + B/r - f r^3/(8 M), M = lambda + 2 mu, under the force f r.
@@ -228,7 +245,9 @@ fn a_shell_under_pressure() {
         let errors = [8, 16, 32].map(|n| {
             let run = solved(&scene, &[&format!("mesh.set.no={n}"), &format!("body.0.order={degree}")]);
             let effectivity = run.number("discretization_error/energy") / run.number("bodies/0/error_energy");
-            assert!((0.85..1.25).contains(&effectivity), "P{degree}, {n}: estimated over true error {effectivity}");
+            // coarse quadratic elements see too much, as in the plane
+            let range = if n == 8 { 0.9..2.0 } else { 0.9..1.25 };
+            assert!(range.contains(&effectivity), "P{degree}, {n}: estimated over true error {effectivity}");
             ["error_l2", "error_h1"].map(|norm| run.number(&format!("bodies/0/{norm}")))
         });
         let orders = [0, 1].map(|norm| order(&errors.map(|error| error[norm])));
@@ -245,13 +264,25 @@ fn shells_in_contact() {
     for (degree, least, last) in [(1, 1.9, 4e-4), (2, 2.8, 4e-6)] {
         let orders = [0, 1].map(|body| format!("body.{body}.order={degree}"));
         let errors = ["{ni=6, no=8}", "{ni=12, no=16}", "{ni=24, no=32}"].map(|set| {
-            let run = solved(case("shells"), &[&orders[0], &orders[1], &format!("mesh.set={set}")]);
+            let sets = [&orders[0], &orders[1], "estimate=true", &format!("mesh.set={set}")];
+            let run = solved(case("shells"), &sets);
             let table = run.contact();
             let squares = table["pressure"].iter().zip(&table["weight"]);
             let sum: f64 = squares.map(|(p, w)| w * (p / 8.485_601_823_078_518 - 1.0).powi(2)).sum();
             // half a sphere of radius 1
             let area: f64 = table["weight"].iter().sum();
             close("area", area, 2.0 * PI, 1e-2);
+            for body in 0..2 {
+                // radial forces of a body are none as a whole
+                assert_eq!(run.forces(0)[body][0], 0.0);
+                assert!(run.number(&format!("bodies/{body}/balance/force_imbalance")) < 1e-9);
+            }
+            let axis = (0..table.rows()).find(|&q| table["x"][q] < 0.03).expect("a point at the axis");
+            let (estimated, exact) = (table["pressure_error"][axis], 8.485_601_823_078_518 - table["pressure"][axis]);
+            assert!(
+                degree == 1 || set.contains("ni=6,") || (estimated / exact - 1.0).abs() < 0.1,
+                "{estimated} {exact}"
+            );
             (sum / area).sqrt()
         });
         println!("shells P{degree}: order {:.2}, {errors:?}", order(&errors));
@@ -283,6 +314,22 @@ fn soft_layer() {
         assert!((p - exact).abs() < 0.006 * 373.11, "p({r}) = {p}, closed form {exact}");
     }
     close("force", run.forces(0)[1][1], 586.081, 1e-8);
+}
+
+/// A surface of revolution is smooth where it meets the axis: its normal there is along the axis.
+#[test]
+fn normals_on_the_axis() {
+    let scene = scene::load(&case("shells"), &[]).expect("a scene");
+    for degree in [Order::P1, Order::P2] {
+        let mesh = load::<2>(&scene.mesh, degree).expect("a mesh").mesh;
+        let space = Space::new(&mesh, mesh.group("inner").expect("a body"), degree).revolved();
+        let facets = space.facets(mesh.group("inner_contact").expect("a surface"));
+        let (free, frame) = (HashMap::new(), Frame::default());
+        let side = Side::new("inner_contact", &space, facets, &free, &frame);
+        let on_axis: Vec<_> = side.normals.iter().filter(|(node, _)| space.on_axis(**node)).collect();
+        assert_eq!(on_axis.len(), 1);
+        assert_eq!(*on_axis[0].1, [0.0, 1.0]);
+    }
 }
 
 /// u = (a x, b y) has one stress everywhere, on the axis too: the one along the circles is that along the radius.
