@@ -338,31 +338,25 @@ fn axisymmetric_scenes() {
     };
     refused_for("pressure = 10", "force = [1, -10]", SCENE, &["force across the axis", "must be 0", "pressure = p"]);
     refused_for("\"axisymmetric\"", "\"axisymetric\"", SCENE, &["`axisymetric`", "did you mean `axisymmetric`?"]);
-    let axis = "on = \"lower_axis\", x = ";
+    let axis = "on = \"lower_end\", x = ";
     refused_for(
         &format!("{axis}0"),
         &format!("{axis}0.1"),
         SCENE,
         &["two values of the x displacement", "on the axis"],
     );
-    refused_for(
-        "{ on = \"lower_face\",",
-        "{ on = \"lower_axis\",",
-        SCENE,
-        &["`lower_axis` lies on the axis", "no area"],
-    );
+    refused_for("{ on = \"lower_face\",", "{ on = \"lower_end\",", SCENE, &["`lower_end` lies on the axis", "no area"]);
     let fibres = "orthotropic = { E1 = 5, E2 = 1, E3 = 1, nu12 = 0.3, nu13 = 0.3, nu23 = 0.3, G12 = 1, G13 = 1, G23 = 1 }\n\
                   axes = { angle = 0.5, axis = [1, 1, 0] }\n";
     let lower = "name = \"lower\"\nyoung = 2.1e5\npoisson = 0.3\n";
     refused_for(lower, &format!("name = \"lower\"\n{fibres}"), SCENE, &["`lower`", "would twist", "turn axes 1 and 2"]);
-    let wavy = Scene::edited("hertz-line", "dimension = 2 ", "plane = \"axisymmetric\"\ndimension = 2 ");
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let script = std::fs::read_to_string(root().join("meshes/hertz-line/hertz-line.geo")).expect("a script");
-    let moved = folder.path().join("moved.geo");
-    std::fs::write(&moved, script + "Translate {-1, 0, 0} { Surface{1, 11}; }\n").expect("a script");
-    let at = root().join("meshes/hertz-line/hertz-line.geo");
-    let text = wavy.text.replace(&at.display().to_string(), &moved.display().to_string());
-    refused(&solve(Scene::new(text), &[]), MESH, &["moved.geo", "negative radius at (-1, ", "x >= 0"]);
+    let (script, moved) = (root().join("meshes/patch/patch.geo"), folder.path().join("moved.geo"));
+    let text = std::fs::read_to_string(&script).expect("a script");
+    std::fs::write(&moved, text.replace("Point(4) = {0,", "Point(4) = {-0.5,")).expect("a script");
+    let scene = Scene::edited("patch", "dimension = 2 ", "plane = \"axisymmetric\"\ndimension = 2 ");
+    let scene = Scene::new(scene.text.replace(&script.display().to_string(), &moved.display().to_string()));
+    refused(&solve(&scene, &[]), MESH, &["moved.geo", "`lower` has a negative radius at (-", "x >= 0"]);
     let space = Scene::edited("patch-3d", "dimension = 3", "plane = \"axisymmetric\"\ndimension = 3");
     refused(&solve(&space, &[]), SCENE, &["`plane` in a problem in space"]);
 }
