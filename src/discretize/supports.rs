@@ -18,6 +18,9 @@ struct Condition<const D: usize> {
     support: Option<usize>,
 }
 
+/// A held direction, with the number of its support if it is one.
+type Direction<const D: usize> = ([f64; D], Option<usize>);
+
 /// What the supports and rigid surfaces of a body come to.
 #[derive(Debug, Clone, Default)]
 pub struct Held<const D: usize> {
@@ -25,8 +28,8 @@ pub struct Held<const D: usize> {
     pub frame: Frame<D>,
     /// Prescribed dofs and their values.
     pub prescribed: HashMap<usize, f64>,
-    /// Independent directions held at each node (at the master of tied ones), with the number of their support, if it is one.
-    directions: BTreeMap<u32, Vec<([f64; D], Option<usize>)>>,
+    /// Independent directions held at each node (at the master of tied ones).
+    directions: BTreeMap<u32, Vec<Direction<D>>>,
     /// Tied nodes of each rigid load, with its number.
     pub rigid: Vec<(usize, Vec<u32>)>,
 }
@@ -194,9 +197,8 @@ impl<const D: usize> Held<D> {
         let n = DMatrix::from_fn(directions.len(), D, |i, c| directions[i].0[c]);
         let right = &n * DVector::from_fn(D, |c, _| reaction[c]);
         let Some(shares) = (&n * n.transpose()).lu().solve(&right) else { return Vec::new() };
-        let part = |(i, (direction, support)): (usize, &([f64; D], Option<usize>))| {
-            Some(((*support)?, direction.map(|d| d * shares[i])))
-        };
+        let part =
+            |(i, (direction, support)): (usize, &Direction<D>)| Some(((*support)?, direction.map(|d| d * shares[i])));
         directions.iter().enumerate().filter_map(part).collect()
     }
 

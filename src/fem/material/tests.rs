@@ -65,9 +65,9 @@ fn hookes_law_in_turned_axes() {
 fn orthotropic_moduli() {
     let c = Tensor::orthotropic(&ORTHOTROPIC).expect("a material");
     let [e1, e2, e3, nu12, nu13, nu23, g12, g13, g23] = ORTHOTROPIC;
-    let tension = |strain: [f64; 3], along: usize| {
+    let tension = |normal: [f64; 3], along: usize| {
         let mut h = [[0.0; 3]; 3];
-        (0..3).for_each(|i| h[i][i] = strain[i]);
+        (0..3).for_each(|i| h[i][i] = normal[i]);
         let s = material::<3>(c, Plane::Strain).stress(&strain(&h));
         (0..6).for_each(|i| assert!((s[i] - f64::from(i == along)).abs() < 1e-13, "{along} {s:?}"));
     };
@@ -124,9 +124,9 @@ fn plane_stress_of_a_triclinic_material() {
     let ours = material::<2>(tensor, Plane::Stress).stress(&strain(&h));
     // strains out of the plane from the compliance: eps = S sigma
     let compliance = tensor.matrix().try_inverse().expect("a material");
-    let strain: Vec<f64> = (0..6).map(|i| (0..6).map(|j| compliance[(i, j)] * ours[j]).sum()).collect();
+    let all: Vec<f64> = (0..6).map(|i| (0..6).map(|j| compliance[(i, j)] * ours[j]).sum()).collect();
     for (i, exact) in [(0, 0.3), (1, 0.7), (3, -0.6)] {
-        assert!((strain[i] - exact).abs() < 1e-13, "{i}: {strain:?}");
+        assert!((all[i] - exact).abs() < 1e-13, "{i}: {all:?}");
     }
     assert_eq!([ours[2], ours[4], ours[5]], [0.0; 3]);
     // plane strain: stress out of the plane from the law of space
