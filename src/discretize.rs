@@ -106,7 +106,7 @@ pub struct BodyInfo {
     /// Stiffness of the body against a uniform contact pressure, per area: modulus over depth (area or volume over the length
     /// or area of its contact surfaces); zero if supports leave it a motion that contact feels.
     pub stiffness: f64,
-    /// Sum of its loads.
+    /// Sum of its loads; in a body of revolution radial ones add up as if they had one direction.
     pub load: [f64; 3],
     /// Rank that owns the body.
     pub rank: usize,
@@ -225,7 +225,8 @@ pub fn discretize<const D: usize>(
             row_stiffness: Vec::new(),
             motions,
         };
-        let mut resultant = part.space.net_force(std::array::from_fn(|c| nodal_load.iter().skip(c).step_by(D).sum()));
+        let mut resultant =
+            contact::pad(std::array::from_fn::<f64, D, _>(|c| nodal_load.iter().skip(c).step_by(D).sum()));
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
         let surface: f64 = slot.segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
         let elasticity = elastic::of(part.spec, &part.space, mesh, scene.plane)?;

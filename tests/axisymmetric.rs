@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Run, Scene, root, solve};
+use common::{Run, Scene, root, solve, winkler};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use winkler::contact::Side;
@@ -290,12 +290,61 @@ fn shells_in_contact() {
     }
 }
 
+/// Lamé's tubes pressed on each other between plates: loads and contact are radial, with no sum.
+#[test]
+fn tubes_in_contact() {
+    const SCRIPT: &str = "r() = {0.5, 1, 1, 1.6};
+        For s In {0 : 1}
+          p = 10*s + 1;
+          Point(p) = {r(2*s), 0, 0}; Point(p + 1) = {r(2*s + 1), 0, 0};
+          Point(p + 2) = {r(2*s + 1), 1, 0}; Point(p + 3) = {r(2*s), 1, 0};
+          Line(p) = {p, p + 1}; Line(p + 1) = {p + 1, p + 2}; Line(p + 2) = {p + 2, p + 3}; Line(p + 3) = {p + 3, p};
+          Transfinite Curve {p : p + 3} = 9 + 2*s;
+          Curve Loop(p) = {p : p + 3}; Plane Surface(p) = {p}; Transfinite Surface {p};
+        EndFor
+        Physical Surface(\"inner\") = {1}; Physical Surface(\"outer\") = {11};
+        Physical Curve(\"inner_ends\") = {1, 3}; Physical Curve(\"outer_ends\") = {11, 13};
+        Physical Curve(\"inner_contact\") = {2}; Physical Curve(\"outer_contact\") = {14};
+        Physical Curve(\"outer_face\") = {12};\n";
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("tubes.geo");
+    std::fs::write(&file, SCRIPT).expect("a script can be written");
+    let body = |name: &str, young: f64, poisson: f64, load: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nyoung = {young}\npoisson = {poisson}\norder = 2\n\
+             fix = [{{ on = \"{name}_ends\", y = 0 }}]\nload = [{load}]\n"
+        )
+    };
+    let scene = Scene::new(format!(
+        "dimension = 2\nplane = \"axisymmetric\"\nmesh = \"{}\"\n{}{}[[contact]]\n\
+         between = [\"inner_contact\", \"outer_contact\"]\nlayer = {{ linear = {{ stiffness = 1e5 }} }}\n",
+        file.display(),
+        body("inner", 2.1e5, 0.3, ""),
+        body("outer", 7e4, 0.2, "{ on = \"outer_face\", pressure = 10 }"),
+    ));
+    let run = solved(&scene, &[]);
+    for p in &run.contact()["pressure"] {
+        close("pressure", *p, 8.985_959_438, 1e-4);
+    }
+    close("area", run.number("pairs/0/contact_length"), 2.0 * PI, 1e-12);
+    assert_eq!(run.forces(0), [[0.0; 3]; 2]);
+    // what is said before the first sweep knows of the load all the same
+    let check = winkler(&["check", &scene.path.display().to_string()]);
+    assert!(
+        check.stdout.contains("area 6.283185, gap") && check.stdout.contains("mean pressure 1.6"),
+        "{}",
+        check.stdout
+    );
+}
+
 /// V5: two spheres under their force, and how the pressure falls to the edge.
 #[test]
 fn hertz() {
     let run = solved(case("hertz-sphere"), &[]);
     close("peak", run.number("pairs/0/peak_pressure"), 279.83, 0.01);
     close("radius", (run.number("pairs/0/contact_length") / PI).sqrt(), 1.0, 0.02);
+    // where c = 0 between two points, without the decision to which of them the edge belongs
+    close("edge", run.number("pairs/0/contact_ends/0/0"), 1.0, 0.005);
     close("force", run.forces(0)[1][1], 586.081, 1e-8);
     let table = run.contact();
     for (r, p) in table["x"].iter().zip(&table["pressure"]).filter(|(r, _)| **r < 0.9) {

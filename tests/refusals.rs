@@ -346,6 +346,8 @@ fn axisymmetric_scenes() {
         &["two values of the x displacement", "on the axis"],
     );
     refused_for("{ on = \"lower_face\",", "{ on = \"lower_end\",", SCENE, &["`lower_end` lies on the axis", "no area"]);
+    let spring = "name = \"lower\"\nspring = [{ on = \"lower_end\", normal = 1 }]";
+    refused_for("name = \"lower\"", spring, SCENE, &["`lower_end` lies on the axis"]);
     let fibres = "orthotropic = { E1 = 5, E2 = 1, E3 = 1, nu12 = 0.3, nu13 = 0.3, nu23 = 0.3, G12 = 1, G13 = 1, G23 = 1 }\n\
                   axes = { angle = 0.5, axis = [1, 1, 0] }\n";
     let lower = "name = \"lower\"\nyoung = 2.1e5\npoisson = 0.3\n";

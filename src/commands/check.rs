@@ -86,7 +86,7 @@ fn print(scene: &Scene, prepared: &Prepared, solvers: &str) {
             pair.surfaces[1],
             pair.len(),
             pair.surfaces[0],
-            if pair.along_curve { "length" } else { "area" },
+            pair.measure,
             pair.weight.iter().sum::<f64>(),
             sci(low, 3),
             sci(high, 3)

@@ -373,7 +373,7 @@ pub fn contact_surface(name: &str, prepared: &Prepared, outcome: &Outcome, i: us
             ("compression", 1, outcome.layer.compression[range.clone()].to_vec()),
             ("pressure", 1, outcome.layer.pressure[range].to_vec()),
             ("normal", 3, pair.normal.as_flattened().to_vec()),
-            (if pair.along_curve { "length" } else { "area" }, 1, pair.weight.clone()),
+            (pair.measure, 1, pair.weight.clone()),
         ],
     )
 }

@@ -46,6 +46,8 @@ pub struct ContactPair {
     pub moment: [Vec<[f64; 3]>; 2],
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
+    /// What the weights are: `"length"`, or in space and for bodies of revolution `"area"`.
+    pub measure: &'static str,
     /// Law of the layer.
     pub law: Rc<dyn LayerLaw>,
     /// Facets of side a without a partner, and all of them.
@@ -130,6 +132,7 @@ pub fn assemble<const D: usize>(
         resultant: [Vec::new(), Vec::new()],
         moment: [Vec::new(), Vec::new()],
         along_curve: D == 2,
+        measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
         law: law.into(),
         uncovered: (covered.iter().filter(|&&c| !c).count(), covered.len()),
     };

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Kind, Located, Result};
 use crate::mesh::{Group, Mesh};
+use crate::scene::BodySpec;
 use crate::scene::expression::Field;
 
 /// A mesh group by name, of one of the dimensions in order of preference.
@@ -39,6 +40,12 @@ pub fn find_group<'m, const D: usize>(
 pub fn not_on_body(on: &Located<String>, body: &str) -> Error {
     Error::scene(&on.place, format!("`{}` does not touch body `{body}`", on.value))
         .help("a support or load acts on a physical group of its own body")
+}
+
+/// The refusal of a load or spring on the axis of a body of revolution.
+pub fn without_area(on: &Located<String>, spec: &BodySpec) -> Error {
+    Error::scene(&on.place, format!("body `{}`: `{}` lies on the axis and has no area", spec.name.value, on.value))
+        .help("remove this line: per area nothing acts there")
 }
 
 /// Where an earlier support or load stands that a refused one meets.

@@ -1,7 +1,7 @@
 //! One body of the scene on its mesh: space, supports, loads, stiffness.
 
 use super::elastic;
-use super::find::{find_group, not_on_body, point};
+use super::find::{find_group, not_on_body, point, without_area};
 use super::springs;
 use super::supports::Held;
 use crate::contact;
@@ -97,8 +97,7 @@ impl<'a, const D: usize> Part<'a, D> {
             }
             let area = surface::measure(&self.space, &facets);
             if area == 0.0 {
-                let message = format!("body `{}`: `{}` lies on the axis and has no area", name.value, spec.on.value);
-                return Err(Error::scene(&spec.on.place, message).help("remove this load: nothing can act there"));
+                return Err(without_area(&spec.on, self.spec));
             }
             surface::surface_load(
                 &self.space,

@@ -1,6 +1,6 @@
 //! Springs of a body to the ground: per area on surfaces, each at the points of point groups.
 
-use super::find::{find_group, not_on_body};
+use super::find::{find_group, not_on_body, without_area};
 use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::fem::assemble::NodalBlock;
@@ -48,7 +48,11 @@ pub fn blocks<const D: usize>(
         let node = |node: u32| NodalBlock { nodes: [node; 2], block: at(space.nodes[node as usize], [0.0; D]) };
         space.nodes_on(group).into_iter().map(node).collect()
     } else {
-        surface::foundation(space, &space.facets(group), &at)
+        let facets = space.facets(group);
+        if facets.count() > 0 && surface::measure(space, &facets) == 0.0 {
+            return Err(without_area(&spring.on, spec));
+        }
+        surface::foundation(space, &facets, &at)
     };
     match fault.into_inner() {
         Some(error) => Err(error),
