@@ -6,7 +6,7 @@ use common::{Scene, case, distance, solve, text_of, winkler};
 use std::collections::HashMap;
 use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 use winkler::contact::pieces::{self, Cut, Reach};
-use winkler::contact::{ContactPair, Side, assemble};
+use winkler::contact::{Carriers, ContactPair, Side, assemble};
 use winkler::fem::{Frame, Space, assemble as fem};
 use winkler::mesh::{Mesh, load};
 use winkler::scene::{self, Order};
@@ -85,7 +85,14 @@ struct Sums {
     moments: f64,
 }
 
-fn sums<const D: usize>(mesh: &Mesh<D>, order: [Order; 2], cut: Cut<D>, bodies: [&str; 2], groups: [&str; 2]) -> Sums {
+/// A pair on two surfaces of a mesh, the first of which carries the points, with the spaces of both bodies.
+fn pair_on<const D: usize>(
+    mesh: &Mesh<D>,
+    order: [Order; 2],
+    cut: Cut<D>,
+    bodies: [&str; 2],
+    groups: [&str; 2],
+) -> (ContactPair, Vec<Space<D>>) {
     let (free, frame) = (HashMap::new(), Frame::default());
     let spaces: Vec<Space<D>> =
         (0..2).map(|k| Space::new(mesh, mesh.group(bodies[k]).expect("a body"), order[k])).collect();
@@ -96,7 +103,12 @@ fn sums<const D: usize>(mesh: &Mesh<D>, order: [Order; 2], cut: Cut<D>, bodies: 
     let (a, b) = (side(0), side(1));
     let shared = cut(&a, &b, &Reach::between(&a, &b));
     let layer = scene::load(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
-    let pair: ContactPair = assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &layer).expect("a pair");
+    let pair = assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &layer).expect("a pair");
+    (pair, spaces)
+}
+
+fn sums<const D: usize>(mesh: &Mesh<D>, order: [Order; 2], cut: Cut<D>, bodies: [&str; 2], groups: [&str; 2]) -> Sums {
+    let (pair, spaces) = pair_on(mesh, order, cut, bodies, groups);
     let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
     for (side, space) in spaces.iter().enumerate() {
         for q in 0..pair.len() {
@@ -170,6 +182,48 @@ fn moments_on_plane_surfaces() {
             assert!((sums.measure - 1.0).abs() < 1e-13, "{}", sums.measure);
             assert!(sums.forces < 1e-14 && sums.moments < 1e-10, "{} {}", sums.forces, sums.moments);
             assert_eq!(sums.gap, [0.0; 2]);
+        }
+    }
+}
+
+/// Quadratic triangles carry their points at the mid-edges, where B_a takes the displacement of that node alone. A block on a
+/// larger one covers some facets of that in part: they carry points at their vertices, and all weights stay positive.
+#[test]
+fn points_of_quadratic_triangles() {
+    let folder = tempfile::TempDir::new().expect("a temporary folder");
+    let script = "SetFactory(\"OpenCASCADE\");\nDefineConstant[ h = {0.3, Name \"h\"} ];\n\
+        Box(1) = {0, 0, 0, 1, 1, 0.5};\nBox(2) = {0.3, 0.2, 0.5, 0.5, 0.55, 0.5};\n\
+        Mesh.MeshSizeMin = h; Mesh.MeshSizeMax = h;\n\
+        Physical Volume(\"large\") = {1}; Physical Surface(\"large_face\") = {6};\n\
+        Physical Volume(\"small\") = {2}; Physical Surface(\"small_face\") = {11};\n";
+    std::fs::write(folder.path().join("blocks.geo"), script).expect("a script");
+    let text = "dimension = 3\nmesh = { geo = \"blocks.geo\", set = { h = 0.3 } }\n[[body]]\nname = \"large\"\nyoung = 1\npoisson = 0.3\n";
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, text).expect("a scene");
+    let mesh = load::<3>(&scene::load(&path, &[]).expect("a scene").mesh, Order::P2).expect("a mesh").mesh;
+    for (bodies, kinds) in [
+        (["small", "large"], vec![Some(Carriers::MidEdges)]),
+        (["large", "small"], vec![None, Some(Carriers::Vertices), Some(Carriers::MidEdges)]),
+    ] {
+        let groups = bodies.map(|body| format!("{body}_face"));
+        let groups = groups.each_ref().map(String::as_str);
+        let (pair, spaces) = pair_on(&mesh, [Order::P2; 2], pieces::space, bodies, groups);
+        assert!(kinds.iter().all(|kind| pair.carriers.contains(kind)), "{bodies:?}: {:?}", pair.carriers);
+        assert!(pair.carriers.iter().all(|kind| kinds.contains(kind)), "{bodies:?}: {:?}", pair.carriers);
+        assert!(pair.weight.iter().all(|&weight| weight > 0.0), "{bodies:?}: {:?}", pair.weight);
+        let sums = sums(&mesh, [Order::P2; 2], pieces::space, bodies, groups);
+        assert!((sums.measure - 0.5 * 0.55).abs() < 1e-13, "{bodies:?}: {}", sums.measure);
+        assert!(sums.forces < 1e-14 && sums.moments < 1e-10, "{bodies:?}: {} {}", sums.forces, sums.moments);
+        if kinds.len() > 1 {
+            continue;
+        }
+        for q in 0..pair.len() {
+            let entries: Vec<(usize, f64)> = pair.rows[0].row(q).filter(|entry| entry.1 != 0.0).collect();
+            let [(dof, share)] = entries[..] else { panic!("{entries:?} at point {q}") };
+            assert_eq!(dof / 3, pair.nodes[q] as usize);
+            assert!((share.abs() - 1.0).abs() < 1e-12, "{share}");
+            let node = spaces[0].nodes[dof / 3];
+            assert!((0..3).all(|c| (pair.position[q][c] - node[c]).abs() < 1e-12), "{node:?}");
         }
     }
 }

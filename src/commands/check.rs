@@ -51,7 +51,7 @@ fn pairs(scene: &Scene, prepared: &Prepared) -> serde_json::Value {
             "points": pair.len(),
             "length": pair.weight.iter().sum::<f64>(),
             "gap": [low, high],
-            "facets_uncovered": pair.uncovered.0,
+            "facets_uncovered": pair.uncovered(),
             "mean_pressure": coupling.pressure,
             "theta": coupling.theta,
             "expected_sweeps": coupling.sweeps.iter().map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),

@@ -317,7 +317,7 @@ fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) 
         points: pair.len(),
         carrier: pair.surfaces[0].clone(),
         theta: sides.map(|side| coupling.theta[side]),
-        facets_uncovered: pair.uncovered.0,
+        facets_uncovered: pair.uncovered(),
         layer_energy: layer.energy[i],
         force: sides.map(|side| sum(&pair.resultant[side])),
         moment: sides.map(|side| sum(&pair.moment[side])),

@@ -203,7 +203,7 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
     }
     warnings.extend(problem.bodies.iter().filter_map(|body| body.warning.clone()));
     for (pair, contact) in problem.model.pairs.iter().zip(&problem.contacts) {
-        let (without, all) = pair.uncovered;
+        let (without, all) = (pair.uncovered(), pair.carriers.len());
         if without > 0 {
             let names = contact.spec.between.each_ref().map(|name| &name.value);
             warnings.push(format!("{} - {}: {without} of {all} facets have no partner", names[0], names[1]));

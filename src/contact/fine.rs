@@ -73,24 +73,14 @@ impl<const D: usize> Fine<D> {
             fine.gap.push(distance + gap(super::pad(from)));
             fine.size.push(length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
             fine.normal.push(normal);
-            // where mid-edges carry no point, the vertices do
-            let phi = element::values(a.facets.order, &point.at_a);
-            let all = nodes.iter().all(|node| point_of.contains_key(node));
-            let shape = |k: usize| {
-                if all {
-                    phi[k]
-                } else if k < D {
-                    point.at_a[k]
-                } else {
-                    0.0
-                }
-            };
-            let of_point = |(k, node): (usize, &u32)| point_of.get(node).map(|&q| (q, shape(k)));
-            let mut row: Vec<(usize, f64)> = nodes.iter().enumerate().filter_map(of_point).collect();
+            let carriers = pair.carriers[point.facet_a];
+            let shape = carriers.map(|c| c.interpolation(a.facets.order, &point.at_a)).unwrap_or_default();
+            let of_point = |(node, shape): (&u32, f64)| point_of.get(node).map(|&q| (q, shape));
+            let mut row: Vec<(usize, f64)> =
+                nodes.iter().zip(shape).filter(|(_, shape)| *shape != 0.0).filter_map(of_point).collect();
             row.sort_unstable_by_key(|entry| entry.0);
-            let near = (0..D).max_by(|&i, &j| point.at_a[i].total_cmp(&point.at_a[j]));
-            let near = near.and_then(|k| point_of.get(&nodes[k]).copied()).or(row.first().map(|entry| entry.0));
-            fine.nearest.push(near.unwrap_or(0));
+            let nearest = row.iter().max_by(|p, q| p.1.total_cmp(&q.1));
+            fine.nearest.push(nearest.map_or(0, |entry| entry.0));
             fine.interpolation.push_row(row);
         }
         fine

@@ -3,6 +3,7 @@
 //! Data flow: two [`Side`]s -> [`pieces`] (integration points that both sides share) -> [`ContactPair`]
 //! (weights, rows B_a and B_b, gaps), which knows no dimension. Layer laws live in [`law`].
 
+mod basis;
 pub mod fine;
 pub mod law;
 pub mod order;
@@ -11,6 +12,7 @@ pub mod pieces;
 pub mod side;
 
 pub use crate::fem::{cross, pad};
+pub use basis::Carriers;
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
 pub use pair::{ContactPair, Fault, add, assemble};

@@ -1,13 +1,13 @@
 //! The arrays of a contact pair: all that the method knows of two surfaces.
 
+use super::basis::{Carriers, PressureBasis};
 use super::law::{self, LayerLaw};
 use super::pieces::Shared;
 use super::side::Side;
 use crate::error::Error;
 use crate::fem::{element, pad};
 use crate::linalg::Csr;
-use crate::scene::{LayerSpec, Order};
-use nalgebra::DMatrix;
+use crate::scene::LayerSpec;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
@@ -50,8 +50,8 @@ pub struct ContactPair {
     pub measure: &'static str,
     /// Law of the layer.
     pub law: Rc<dyn LayerLaw>,
-    /// Facets of side a without a partner, and all of them.
-    pub uncovered: (usize, usize),
+    /// Which nodes of each facet of side a carry points; `None` where it has no partner.
+    pub carriers: Vec<Option<Carriers>>,
 }
 
 /// Why a pair could not be made.
@@ -68,8 +68,9 @@ pub enum Fault {
 /// Makes the arrays of a pair from shared integration points.
 ///
 /// `bodies` are the numbers of the bodies of side a and b, `gap(x)` the scene's own gap, added to the geometric one.
-/// Points: the nodes of side a with the dual basis diag(int phi) M^-1 phi of each facet's covered part; a facet on which
-/// that gives a weight that is not positive (quadratic, partly covered) takes the hats of its vertices.
+/// Points: the nodes of side a with the dual basis diag(int phi) M^-1 phi of each facet's covered part, of quadratic triangles
+/// the mid-edges with that of the whole triangle; a facet on which that gives a weight that is not safely positive (quadratic,
+/// partly covered) takes the hats of its vertices.
 ///
 /// # Errors
 /// [`Fault`] if nothing is covered, the gap is not finite, or the law is none.
@@ -82,13 +83,13 @@ pub fn assemble<const D: usize>(
     law: &LayerSpec,
 ) -> Result<ContactPair, Fault> {
     let mut points: HashMap<u32, Accumulator> = HashMap::new();
-    let mut covered = vec![false; a.facets.count()];
+    let mut carriers = vec![None; a.facets.count()];
     let group = shared.chunk_by(|p, q| p.facet_a == q.facet_a);
     for chunk in group {
         let facet = chunk[0].facet_a;
-        covered[facet] = true;
         let nodes = a.facets.facet(facet);
         let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk);
+        carriers[facet] = Some(basis.carriers());
         for point in chunk {
             let phi = element::values(a.facets.order, &point.at_a);
             let psi = element::values(b.facets.order, &point.at_b);
@@ -134,7 +135,7 @@ pub fn assemble<const D: usize>(
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
         law: law.into(),
-        uncovered: (covered.iter().filter(|&&c| !c).count(), covered.len()),
+        carriers,
     };
     for q in 0..pair.nodes.len() {
         let node = pair.nodes[q];
@@ -205,60 +206,15 @@ struct Accumulator {
     sides: [BTreeMap<u32, f64>; 2],
 }
 
-/// The functions mu_i on the covered part of one facet of side a.
-enum PressureBasis {
-    /// mu = C phi.
-    Dual(DMatrix<f64>),
-    /// mu_i = L_i at vertices, zero at mid-edges.
-    Hats(usize),
-}
-
-impl PressureBasis {
-    fn on<const D: usize>(order: Order, count: usize, chunk: &[Shared<D>]) -> Self {
-        // quadratic triangles have vertex weights of zero: the dual basis does not exist there
-        if order == Order::P2 && D == 3 {
-            return Self::Hats(D);
-        }
-        let mut mass = DMatrix::zeros(count, count);
-        let mut integral = vec![0.0; count];
-        for point in chunk {
-            let phi = element::values(order, &point.at_a);
-            for i in 0..count {
-                integral[i] += point.weight * phi[i];
-                for j in 0..count {
-                    mass[(i, j)] += point.weight * phi[i] * phi[j];
-                }
-            }
-        }
-        let total: f64 = integral.iter().sum();
-        if integral.iter().any(|&w| w <= 1e-6 * total) {
-            return Self::Hats(D);
-        }
-        match mass.cholesky() {
-            Some(factor) => {
-                let mut dual = factor.inverse();
-                for (i, mut row) in dual.row_iter_mut().enumerate() {
-                    row *= integral[i];
-                }
-                Self::Dual(dual)
-            }
-            None => Self::Hats(D),
-        }
-    }
-
-    fn value<const D: usize>(&self, i: usize, phi: &[f64], l: &[f64; D]) -> f64 {
-        match self {
-            Self::Dual(c) => c.row(i).iter().zip(phi).map(|(c, phi)| c * phi).sum(),
-            Self::Hats(vertices) if i < *vertices => l[i],
-            Self::Hats(_) => 0.0,
-        }
-    }
-}
-
 impl ContactPair {
     /// Number of points.
     pub fn len(&self) -> usize {
         self.weight.len()
+    }
+
+    /// Facets of side a without a partner.
+    pub fn uncovered(&self) -> usize {
+        self.carriers.iter().filter(|carriers| carriers.is_none()).count()
     }
 
     /// Whether the pair has no points; [`assemble`] makes none such.

@@ -110,7 +110,7 @@ fn make_pair<const D: usize>(
         return Err(Error::scene(&spec.between[0].place, message)
             .help("move a body, give a larger gap, or let the layer take it: overlap = \"compress\""));
     }
-    let surface = ContactSurface::new(&a, &shared, &pair);
+    let surface = ContactSurface::new(&a, &pair);
     let fine = fine.then(|| Fine::new(&a, &b, &shared, &pair, &gap));
     Ok(Contact { spec, pair, fine, swapped, surface })
 }

@@ -1,30 +1,30 @@
 //! The mesh of a contact surface for output: the covered facets of side a, and where their values come from.
 
-use crate::contact::pieces::Shared;
 use crate::contact::{ContactPair, Side, pad};
+use crate::fem::element;
 use crate::output::vtu::{CellKind, Grid};
 use crate::scene::Order;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// The covered facets of the side that carries the points.
 pub struct ContactSurface {
     points: Vec<[f64; 3]>,
     cell: CellKind,
     connectivity: Vec<u32>,
-    /// For each point of the mesh the contact points whose mean is its value; none where nothing is known.
-    sources: Vec<Vec<usize>>,
+    /// For each point of the mesh the contact points that its values come from, with their shares; none where nothing is
+    /// known.
+    sources: Vec<Vec<(usize, f64)>>,
 }
 
 impl ContactSurface {
-    /// The facets of side a that share an integration point with side b.
-    pub fn new<const D: usize>(a: &Side<D>, shared: &[Shared<D>], pair: &ContactPair) -> Self {
-        let mut covered = vec![false; a.facets.count()];
-        shared.iter().for_each(|point| covered[point.facet_a] = true);
-        let facets = a.facets.only(&covered);
+    /// The facets of side a that have a partner on side b.
+    pub fn new<const D: usize>(a: &Side<D>, pair: &ContactPair) -> Self {
         let of_node: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
+        let order = a.facets.order;
+        let places = element::nodes::<D>(order);
         let mut surface = Self {
             points: Vec::new(),
-            cell: match (D, facets.order) {
+            cell: match (D, order) {
                 (2, Order::P1) => CellKind::Line,
                 (2, Order::P2) => CellKind::QuadraticLine,
                 (_, Order::P1) => CellKind::Triangle,
@@ -34,40 +34,54 @@ impl ContactSurface {
             sources: Vec::new(),
         };
         let mut number: HashMap<u32, u32> = HashMap::new();
-        for i in 0..facets.count() {
-            let nodes = facets.facet(i);
-            for (local, node) in nodes.iter().enumerate() {
-                let next = surface.points.len() as u32;
-                let at = *number.entry(*node).or_insert(next);
+        let mut sums: Vec<(f64, BTreeMap<usize, f64>)> = Vec::new();
+        let covered = pair.carriers.iter().enumerate().filter_map(|(facet, carriers)| Some((facet, (*carriers)?)));
+        for (facet, carriers) in covered {
+            let nodes = a.facets.facet(facet);
+            for (place, node) in places.iter().zip(nodes) {
+                let at = *number.entry(*node).or_insert(surface.points.len() as u32);
                 surface.connectivity.push(at);
-                if at < next {
-                    continue;
+                if at as usize == surface.points.len() {
+                    surface.points.push(pad(a.space.nodes[*node as usize]));
+                    sums.push((0.0, BTreeMap::new()));
                 }
-                surface.points.push(pad(a.space.nodes[*node as usize]));
-                // a mid-edge without a point of its own lies between two vertices
-                let ends = match local.checked_sub(D) {
-                    Some(edge) if !of_node.contains_key(node) => {
-                        let (from, to) = crate::fem::element::EDGES[edge];
-                        vec![nodes[from], nodes[to]]
-                    }
-                    _ => vec![*node],
-                };
-                surface.sources.push(ends.iter().filter_map(|end| of_node.get(end).copied()).collect());
+                let (facets, sum) = &mut sums[at as usize];
+                *facets += 1.0;
+                for (shape, of) in carriers.interpolation(order, place).iter().zip(nodes) {
+                    let source = of_node.get(of).filter(|_| *shape != 0.0);
+                    source.into_iter().for_each(|&q| *sum.entry(q).or_insert(0.0) += shape);
+                }
+            }
+        }
+        // a node without a point of its own has the mean of what the facets around it make of theirs
+        surface.sources = sums
+            .into_iter()
+            .map(|(facets, sum)| sum.into_iter().map(|(q, share)| (q, share / facets)).collect())
+            .collect();
+        for (node, &at) in &number {
+            if let Some(&q) = of_node.get(node) {
+                surface.sources[at as usize] = vec![(q, 1.0)];
             }
         }
         surface
     }
 
     /// The mesh with arrays of values at the contact points: name, components per point, values. Points of the mesh that no
-    /// contact point serves get NaN.
+    /// contact point serves get NaN; where values are extrapolated, they stay between those that they come from, so that
+    /// a pressure is never negative nor above its peak.
     pub fn grid(&self, name: String, arrays: &[(&str, usize, Vec<f64>)]) -> Grid {
         let spread = |components: usize, values: &[f64]| {
-            let mean = |sources: &Vec<usize>, c: usize| {
-                sources.iter().map(|q| values[components * q + c]).sum::<f64>() / sources.len() as f64
+            let at = |sources: &Vec<(usize, f64)>, c: usize| {
+                let of = |q: usize| values[components * q + c];
+                let extreme =
+                    |pick: fn(f64, f64) -> f64| sources.iter().fold(f64::NAN, |all, &(q, _)| pick(all, of(q)));
+                let value: f64 = sources.iter().map(|&(q, share)| share * of(q)).sum();
+                // without sources the bounds are NaN, which `max` would leave out
+                if sources.is_empty() { f64::NAN } else { value.max(extreme(f64::min)).min(extreme(f64::max)) }
             };
             self.sources
                 .iter()
-                .flat_map(|sources| (0..components).map(|c| mean(sources, c)).collect::<Vec<_>>())
+                .flat_map(|sources| (0..components).map(|c| at(sources, c)).collect::<Vec<_>>())
                 .collect()
         };
         Grid {
