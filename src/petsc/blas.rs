@@ -1,4 +1,4 @@
-//! The BLAS and LAPACK that PETSc runs on: which it is, its threads, and its dense Cholesky factorisation. The reference BLAS is
+//! The BLAS and LAPACK that MUMPS and PETSc run on: which it is, its threads, and its dense Cholesky factorisation. The reference BLAS is
 //! up to 11 times slower in factorisations, so a run says it.
 
 use crate::error::{Error, Kind, Result};
@@ -19,6 +19,16 @@ unsafe extern "C" {
     fn dladdr(address: *const c_void, location: *mut Location) -> c_int;
 }
 
+/// Address of a function of the BLAS and LAPACK in use, null if there is none.
+///
+/// MUMPS is linked and brings them; PETSc, opened later, gets the same ones. The linker leaves MUMPS out of a program that does not
+/// name it.
+fn address(name: &CStr) -> *mut c_void {
+    std::hint::black_box(super::ffi::mumps::dmumps_c as *const c_void);
+    // SAFETY: a null library means the default search order, and the name ends with a zero byte.
+    unsafe { dlsym(std::ptr::null_mut(), name.as_ptr()) }
+}
+
 /// File of the library that the name `dgemm_` leads to in this process, with links resolved: of several BLAS in the
 /// memory map it is the one in use.
 fn file() -> Option<PathBuf> {
@@ -28,10 +38,9 @@ fn file() -> Option<PathBuf> {
         symbol: std::ptr::null(),
         address: std::ptr::null_mut(),
     };
-    // SAFETY: a null library means the default search order; dladdr fills `found` with texts that live as long as the
-    // library is loaded.
+    let address = address(c"dgemm_");
+    // SAFETY: dladdr fills `found` with texts that live as long as the library is loaded.
     let file = unsafe {
-        let address = dlsym(std::ptr::null_mut(), c"dgemm_".as_ptr());
         if address.is_null() || dladdr(address, &mut found) == 0 || found.file.is_null() {
             return None;
         }
@@ -66,8 +75,7 @@ type Solve = unsafe extern "C" fn(
 
 /// A function of the LAPACK that PETSc runs on.
 fn lapack(name: &CStr) -> Result<*mut c_void> {
-    // SAFETY: a null library means the default search order, and the name ends with a zero byte.
-    let address = unsafe { dlsym(std::ptr::null_mut(), name.as_ptr()) };
+    let address = address(name);
     if address.is_null() {
         let name = name.to_string_lossy();
         return Err(Error::new(Kind::Solver, format!("no LAPACK is loaded: `{name}` is not there"))
@@ -141,12 +149,12 @@ const UPPER: &CStr = c"U";
 
 /// Asks OpenBLAS for a number of threads; false if another BLAS is in use, which keeps its own number.
 pub(super) fn set_threads(count: usize) -> bool {
-    // SAFETY: the name is looked up in the loaded libraries; OpenBLAS declares it as void (int).
+    let address = address(c"openblas_set_num_threads");
+    if address.is_null() {
+        return false;
+    }
+    // SAFETY: OpenBLAS declares it as void (int).
     unsafe {
-        let address = dlsym(std::ptr::null_mut(), c"openblas_set_num_threads".as_ptr());
-        if address.is_null() {
-            return false;
-        }
         let set: extern "C" fn(c_int) = std::mem::transmute(address);
         set(count.clamp(1, 1024) as c_int);
     }
