@@ -282,6 +282,22 @@ fn adapted_meshes_in_space() {
     assert!(error < 1e-2 && error > 1e-3, "{error:e}\n{}", run.said());
 }
 
+/// Quadratic tetrahedra, whose points are at the mid-edges of their facets: the graded slice has the pressures of the plane, with
+/// fewer than 10 000 dofs, and the estimate tells how well.
+#[test]
+fn pressures_of_quadratic_tetrahedra() {
+    let graded = |name: &str, n: &str, more: &[&str]| {
+        let n = format!("mesh.set.n={n}");
+        let args = [&["--set", &n], more].concat();
+        solve(root().join(format!("meshes/{name}/graded.toml")), &args).converged()
+    };
+    let better = graded("groove-held", "4", &[]).contact();
+    let run = graded("groove3d", "0.8", &["--estimate"]);
+    let error = distance_from(&run.contact(), &better);
+    assert!(error < 1.8e-3 && run.count("dofs") < 10_000, "{error:e}\n{}", run.said());
+    is_effective(run.number("discretization_error/pressure/0"), error, "pressures in space");
+}
+
 /// Meshes that may not grow end the run with a status of its own; a finished mesh cannot be adapted.
 #[test]
 fn limits_of_adaptation() {

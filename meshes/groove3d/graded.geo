@@ -1,5 +1,6 @@
 // The blocks of ../groove-held, 4 x 1 in the plane and 1 thick: elements are small where the pressure changes, and `long` times
-// longer across than there. The size at the contact is `tip` over n between `before` and the end of the contact.
+// longer across than there. They are smallest around the edge of the groove, where the pressure bends most, and grow with the
+// distance from there.
 DefineConstant[ n = {1, Name "n"} ];         // fineness
 DefineConstant[ long = {8, Name "long"} ];   // length along z over the least size in the plane
 DefineConstant[ thickness = {1, Name "thickness"} ];
@@ -9,13 +10,16 @@ height = 1;
 edge = 3;       // of the groove
 end = 3.45435;  // of the contact for B = 2.5e-5, a = 0.5; near it for other layers
 
-far = 0.7/n;    // size away from the contact
-near = 0.15/n;  // along the contact
-tip = 0.025/n;  // around the edge and the end
-growth = 0.7;   // of the size with the distance
-before = 0.2;   // where the small elements begin, before the edge
-apart = 1e-3;    // between the blocks: Gmsh merges extruded nodes that coincide, so the scene says `touching`
-layers = Ceil(thickness/(long*tip));
+far = 0.8/n;     // size away from the contact
+near = 0.3/n;    // along the contact
+rise = 0.5/n;    // its growth with the height above the contact
+tip = 0.056/n;   // size around the edge
+growth = 0.45/n; // its growth with the distance
+before = 0.15;   // where the small elements begin, before the edge
+behind = 0.25;   // where they end, behind it
+
+apart = 1e-3;   // between the blocks: Gmsh merges extruded nodes that coincide, so the scene says `touching`
+layers = Ceil(thickness/(0.75*long*tip)); // the least edges in the plane are 0.75 tip
 
 For body In {0 : 1}
   p = 10*body;
@@ -38,7 +42,7 @@ EndFor
 
 Field[1] = MathEval;
 Field[1].F = Sprintf("min(%g, min(%g + %g*abs(y - %g), %g + %g*sqrt(max(max(%g - x, x - %g), 0)^2 + (y - %g)^2)))",
-  far, near, growth, height, tip, growth, edge - before, end, height);
+  far, near, rise, height, tip, growth, edge - before, edge + behind, height);
 Background Field = 1;
 Mesh.MeshSizeExtendFromBoundary = 0;
 Mesh.MeshSizeFromPoints = 0;
