@@ -165,3 +165,32 @@ fn newton_on_two_ranks() {
     }
     assert_eq!(serial.contact()["pressure"], parallel.contact()["pressure"]);
 }
+
+/// A tower of blocks that only contact holds, under a load that leans: each joint carries the whole of it. Rigid motions are deflated, so
+/// its height does not matter: without that the sweeps are 27 and 53.
+#[test]
+fn a_tower_takes_as_long_as_a_wall() {
+    let geo = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/stack/stack.geo");
+    let tower = |rows: usize| {
+        let mut text =
+            format!("dimension = 2\nmesh = {{ geo = \"{geo}\", set = {{ rows = {rows}, n1 = 4, n2 = 3, n3 = 5 }} }}\n");
+        for block in 1..=rows {
+            let bottom = if block == 1 { "{ on = \"b1_bottom\", y = 0 }, " } else { "" };
+            let fix = format!("fix = [{bottom}{{ on = \"b{block}_left\", x = 0 }}]");
+            text += &format!("[[body]]\nname = \"b{block}\"\nyoung = 2.1e5\npoisson = 0.3\n{fix}\n");
+        }
+        text += &format!("load = [{{ on = \"b{rows}_top\", pressure = \"10 + 2*x\" }}]\n");
+        for block in 1..rows {
+            let between = format!("between = [\"b{block}_top\", \"b{}_bottom\"]", block + 1);
+            text += &format!("[[contact]]\n{between}\nlayer = {{ linear = {{ stiffness = 2e5 }} }}\n");
+        }
+        let run = solve(Scene::new(text), &["--method", "newton-robin"]).converged();
+        for joint in 0..rows - 1 {
+            let force = run.number(&format!("pairs/{joint}/force/0/1"));
+            assert!((force + 11.0).abs() < 1e-6, "joint {joint} of {rows} blocks carries {force}");
+        }
+        run.count("sweeps")
+    };
+    let sweeps = [tower(4), tower(12)];
+    assert!(sweeps[0] <= 20 && sweeps[1] == sweeps[0], "{sweeps:?}");
+}

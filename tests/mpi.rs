@@ -70,6 +70,17 @@ fn messages_are_one_a_sweep_and_five() {
     assert_eq!(solve(case("groove"), &["--set", "mesh.set.n=8"]).converged().count("messages"), 0);
 }
 
+/// Conjugate gradients send two messages a step, and a Newton step its line search: with bodies that supports hold, and with one
+/// whose rigid motions are deflated.
+#[test]
+fn deflation_sends_no_message() {
+    for scene in ["groove", "groove-held"] {
+        let sets = ["--method", "newton-robin", "--set", "mesh.set.n=8", "--set", "method.stop={residual=1e-8}"];
+        let run = solve_on(2, case(scene), &sets).converged();
+        assert_eq!(run.count("messages"), 2 * run.count("sweeps") + run.count("iterations") + 3, "{scene}");
+    }
+}
+
 #[test]
 fn a_rank_without_a_body_is_told_of() {
     let run = solve_on(3, case("groove"), &["--set", "mesh.set.n=8"]).converged();

@@ -84,7 +84,7 @@ pub fn move_rigidly(model: &mut Model, trace: &[f64]) -> Result<(Field, Option<(
 }
 
 /// Least squares: amounts of some vectors that together come nearest to another.
-fn fit(vectors: &[Vec<f64>], to: &[f64]) -> Vec<f64> {
+pub(super) fn fit(vectors: &[Vec<f64>], to: &[f64]) -> Vec<f64> {
     let count = vectors.len();
     let normal = DMatrix::from_fn(count, count, |i, j| dot(&vectors[i], &vectors[j]));
     let right = DVector::from_fn(count, |i, _| dot(&vectors[i], to));

@@ -6,6 +6,7 @@
 mod balance;
 pub mod body;
 mod closing;
+mod coarse;
 pub mod field;
 pub mod forecast;
 pub mod gamma;

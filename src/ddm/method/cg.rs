@@ -1,8 +1,11 @@
 //! Conjugate gradients for the Newton system (35), preconditioned by the Robin sweep.
 
 use super::Here;
+use crate::ddm::coarse::Coarse;
 use crate::ddm::field::{Field, apply_stiffness, local_dot};
+use crate::ddm::model::Model;
 use crate::error::Result;
+use crate::linalg::{axpy, dot};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// What conjugate gradients found. A direction without stiffness (a body that its contact does not hold now) ends them; if
@@ -16,6 +19,9 @@ pub struct Solution {
     pub spectrum: Option<(f64, f64)>,
 }
 
+/// Share of r'z that a first direction without stiffness has at least.
+const FLAT: f64 = 1e-8;
+
 /// Solves (K + B' diag(omega kappa) B) x = r until r'G^-1 r has fallen by `reduction` squared, or after `most` steps. The sweep
 /// at the iterate is the first preconditioned residual. `kappa_weight` is omega kappa at the points.
 ///
@@ -26,39 +32,50 @@ pub fn solve(here: &mut Here, kappa_weight: &[f64], reduction: f64, most: usize)
     let mut z = here.sweep.correction.clone();
     let mut rz: f64 = here.decrement();
     let goal = rz * reduction * reduction;
-    let mut direction = z.clone();
+    let coarse = Coarse::new(here.model, kappa_weight);
+    let image = coarse.as_ref().map(|coarse| coarse.deflate(here.model, &mut z));
     let mut x = z.zero_like();
+    let mut direction = z;
     let mut energy = 0.0;
     let (mut alphas, mut betas) = (Vec::new(), Vec::new());
     for step in 0..most {
+        // the first step is the best in the span of the sweep and the rigid motions; what follows begins anew from there
+        let first = coarse.as_ref().zip(image.as_ref()).filter(|_| step == 0);
         let mut image = apply_stiffness(here.model, &direction);
         let closing = direction.closing();
         let spring: Vec<f64> = kappa_weight.iter().zip(&closing).map(|(w, s)| w * s).collect();
-        let mut stiffness = [local_dot(&image, &direction.states)];
-        here.model.exchange.sum(&mut stiffness);
+        let mut sums = vec![local_dot(&image, &direction.states)];
+        sums.extend(first.iter().flat_map(|(coarse, _)| coarse.part_here(&r)));
+        here.model.exchange.sum(&mut sums);
         let layer: f64 = spring.iter().zip(&closing).map(|(f, s)| f * s).sum();
-        let curvature = stiffness[0] + layer;
-        // p'Gp of the direction is at least r'z: a flat direction has a curvature that is nothing beside it
+        let curvature = sums[0] + layer;
+        if let Some((coarse, image)) = first {
+            let motion = coarse.motion(&sums[1..]);
+            coarse.add(here.model, 1.0, &motion, &mut x);
+            let push: Vec<f64> = kappa_weight.iter().zip(x.closing()).map(|(w, s)| -w * s).collect();
+            add_rows(here.model, &push, &mut r);
+            energy += dot(motion.as_slice(), &sums[1..]);
+            rz -= motion.dot(image);
+        }
+        // p'Gp of the direction is at least r'z: a flat direction has a curvature that is nothing beside it. One of which rigid
+        // motions leave nothing but rounding is flat, too
         if curvature.is_nan() || curvature <= 1e-13 * rz {
-            if step == 0 {
+            if step == 0 && rz > FLAT * here.decrement() {
                 x = direction;
             }
             break;
         }
-        for (index, y) in image.iter_mut().enumerate() {
-            let rows = here.model.at_rows(index, &spring);
-            if let Some(body) = &here.model.bodies[index].local {
-                body.add_rows(&rows, y);
-            }
-        }
-        let alpha = rz / curvature;
+        add_rows(here.model, &spring, &mut image);
+        let alpha = rz.max(0.0) / curvature;
         x.add(alpha, &direction);
         energy += alpha * rz;
         let old = r.clone();
         for (r, y) in r.iter_mut().zip(&image) {
-            crate::linalg::axpy(-alpha, y, r);
+            axpy(-alpha, y, r);
         }
-        alphas.push(alpha);
+        if first.is_none() {
+            alphas.push(alpha);
+        }
         let last = step + 1 == most;
         if last {
             break;
@@ -66,17 +83,33 @@ pub fn solve(here: &mut Here, kappa_weight: &[f64], reduction: f64, most: usize)
         let sweep = here.sweeper.precondition(here.model, r, &old)?;
         r = sweep.residual;
         let new: f64 = sweep.decrement.iter().sum();
-        z = sweep.correction;
+        let mut z = sweep.correction;
+        if let Some(coarse) = &coarse {
+            coarse.deflate(here.model, &mut z);
+        }
         if !new.is_finite() || new <= goal {
             break;
         }
         // the flexible rule: the preconditioner may be an inexact solve
-        let beta = (new - sweep.product) / rz;
-        betas.push(beta.max(0.0));
+        if first.is_some() {
+            direction = z;
+        } else {
+            let beta = (new - sweep.product) / rz;
+            betas.push(beta.max(0.0));
+            direction.add_to(beta, &z);
+        }
         rz = new;
-        direction.add_to(beta, &z);
     }
     Ok(Solution { x, energy, spectrum: ritz(&alphas, &betas) })
+}
+
+/// y += B' `force` in every body that lives here, for forces at the points.
+fn add_rows(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
+    for (index, y) in y.iter_mut().enumerate() {
+        if let Some(body) = &model.bodies[index].local {
+            body.add_rows(&model.at_rows(index, force), y);
+        }
+    }
 }
 
 /// Extreme eigenvalues of the Lanczos matrix of a conjugate gradient iteration.
