@@ -317,6 +317,23 @@ fn pairs_are_found_on_the_mesh() {
     );
 }
 
+/// Arrays of the nodes of a surface file by name; `points` are their coordinates.
+fn surface_of<const N: usize>(run: &common::Run, stem: &str, names: [&str; N]) -> [Vec<f64>; N] {
+    let vtk = Vtk::import(run.folder.join(format!("{stem}.vtu"))).expect("a surface");
+    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { panic!("no grid") };
+    let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
+    names.map(|name| {
+        if name == "points" {
+            return piece.points.cast_into::<f64>().expect("points");
+        }
+        let found = piece.data.point.iter().find_map(|attribute| match attribute {
+            Attribute::DataArray(array) if array.name == name => array.data.cast_into::<f64>(),
+            _ => None,
+        });
+        found.unwrap_or_else(|| panic!("no array {name}"))
+    })
+}
+
 /// The surface file has the pressures of the contact table at its points.
 #[test]
 fn surfaces_are_written() {
@@ -327,21 +344,11 @@ fn surfaces_are_written() {
         let collection = std::fs::read_to_string(run.folder.join("bodies.pvd")).expect("a collection");
         assert!(collection.contains(&format!("file=\"{stem}.vtu\"")), "{collection}");
         assert!(run.report["files"].to_string().contains(&format!("{stem}.vtu")));
-        let vtk = Vtk::import(run.folder.join(format!("{stem}.vtu"))).expect("a surface");
-        let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { panic!("no grid") };
-        let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
-        let array = |name: &str| -> Vec<f64> {
-            let found = piece.data.point.iter().find_map(|attribute| match attribute {
-                Attribute::DataArray(array) if array.name == name => array.data.cast_into::<f64>(),
-                _ => None,
-            });
-            found.unwrap_or_else(|| panic!("no array {name}"))
-        };
-        let points = piece.points.cast_into::<f64>().expect("points");
-        let (pressure, gap, normal) = (array("pressure"), array("gap"), array("normal"));
+        let [points, pressure, compression, gap, normal] =
+            surface_of(&run, &stem, ["points", "pressure", "compression", "gap", "normal"]);
         assert_eq!((pressure.len(), gap.len()), (points.len() / 3, points.len() / 3));
         assert!(pressure.iter().all(|p| (8.0..11.0).contains(p)), "{name} {set}: {pressure:?}");
-        assert!(array("compression").iter().all(|c| *c > 0.0));
+        assert!(compression.iter().all(|c| *c > 0.0));
         for (x, n) in points.chunks(3).zip(normal.chunks(3)) {
             let length: f64 = n.iter().map(|n| n * n).sum::<f64>().sqrt();
             assert!((length - 1.0).abs() < 0.05, "{name}: a normal of length {length}");
@@ -354,6 +361,24 @@ fn surfaces_are_written() {
         let largest = |values: &[f64]| values.iter().copied().fold(f64::MIN, f64::max);
         assert!((largest(&pressure) / largest(&run.contact()["pressure"]) - 1.0).abs() < 1e-12);
     }
+}
+
+/// The vertices of quadratic facets, which carry no points, have what the mid-edges around them make of a linear gap; the least and
+/// the greatest one, at two corners, stay within the values of these.
+#[test]
+fn vertices_between_points_at_mid_edges() {
+    let sets = ["body.0.order=2", "body.1.order=2", "contact.0.gap=1e-6*(x+y)", "output.vtu=true"];
+    let run = run("patch-3d", &sets);
+    let [x, gap] = surface_of(&run, "contact-lower-upper", ["points", "gap"]);
+    let gap: Vec<f64> = gap.iter().map(|gap| 1e6 * gap).collect();
+    for (x, gap) in x.chunks(3).zip(&gap) {
+        let exact = x[0] + x[1];
+        let at_corner = !(1e-9..=2.0 - 1e-9).contains(&exact);
+        let apart = if at_corner { 1.0 / 6.0 } else { 0.0 };
+        assert!(((gap - exact).abs() - apart).abs() < 1e-9, "{x:?} {gap}");
+    }
+    // three elements along each edge
+    assert_eq!(gap.len(), 49);
 }
 
 #[test]
