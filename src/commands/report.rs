@@ -148,6 +148,7 @@ pub fn report(
         factorizations: counts.factorizations + coupled(|counts| counts.factorizations as f64) as usize,
         inner_times: InnerTimes {
             factor: counts.factor_seconds + coupled(|counts| counts.factor_seconds),
+            first: counts.first_seconds,
             solve: counts.solve_seconds + coupled(|counts| counts.solve_seconds),
         },
         symbolic_factorizations: counts.symbolic,
@@ -224,7 +225,7 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
 }
 
 /// Numbers before the words about the solvers.
-const HEAD: usize = 12;
+const HEAD: usize = 13;
 
 /// Most bytes of the words about a solver.
 const WORDS: usize = 64;
@@ -252,6 +253,7 @@ impl Shared {
             message[8] += counts.solve_seconds;
             message[9] += counts.dense_factorizations as f64;
             message[11] += counts.factorizations_avoided as f64;
+            message[12] += counts.first_seconds;
             let place = &mut message[HEAD + WORDS * index..];
             place
                 .iter_mut()
@@ -274,6 +276,7 @@ impl Shared {
                 solve_seconds: message[8],
                 dense_factorizations: count(9),
                 factorizations_avoided: count(11),
+                first_seconds: message[12],
             },
             assemblies: count(6),
             assemblies_avoided: count(10),

@@ -42,6 +42,8 @@ pub struct BodyCounts {
     pub robin_skipped: usize,
     /// Wall seconds in factorisations or preconditioner set-ups.
     pub factor_seconds: f64,
+    /// Of these, seconds in the first one, which has the symbolic factorisation in it.
+    pub first_seconds: f64,
     /// Wall seconds in solves, set-ups apart.
     pub solve_seconds: f64,
 }

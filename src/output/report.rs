@@ -151,6 +151,8 @@ pub struct StepPairReport {
 pub struct InnerTimes {
     /// Factorisations and preconditioner set-ups.
     pub factor: f64,
+    /// Of these, the first one of each body, with its symbolic factorisation.
+    pub first: f64,
     /// Solves.
     pub solve: f64,
 }

@@ -190,6 +190,7 @@ impl Body for CondensedBody {
                     factorizations: usize::from(!condensed.kept),
                     factorizations_avoided: usize::from(condensed.kept),
                     symbolic: usize::from(!condensed.kept),
+                    first_seconds: if condensed.kept { 0.0 } else { condensed.seconds },
                     factor_seconds: counts.factor_seconds + if condensed.kept { 0.0 } else { condensed.seconds },
                     ..counts
                 }

@@ -201,7 +201,11 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     fn set_up(&mut self) -> Result<()> {
         let began = Instant::now();
         let done = self.solver.set_up();
-        self.counts.factor_seconds += began.elapsed().as_secs_f64();
+        let seconds = began.elapsed().as_secs_f64();
+        self.counts.factor_seconds += seconds;
+        if self.counts.first_seconds == 0.0 {
+            self.counts.first_seconds = seconds;
+        }
         done
     }
 

@@ -146,7 +146,7 @@ impl Row {
                 (Some(sweep), Some(seconds)) if all > 0.0 => seconds * sweep / all,
                 _ => each("solve_seconds", body_solves),
             };
-            let linear = each("factor_seconds", row.number("factorizations").unwrap_or(0.0)) + solve;
+            let linear = at(first, "/inner_times/first").unwrap_or(f64::NAN) + solve;
             row.numbers.extend(linear.is_finite().then_some(("linear_seconds", linear)));
         }
         // of the bodies that have a closed form, the worst
