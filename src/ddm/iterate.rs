@@ -9,14 +9,14 @@ use super::held;
 use super::interval::{Interval, interval};
 use super::layer::Layer;
 use super::lift::{lift, move_rigidly};
-use super::method::{FINE, Here, Method, ROUGH, Step};
+use super::measure::{At, Measuring};
+use super::method::{FINE, Here, Method, Step};
 use super::model::Model;
 use super::origin::Origin;
 use super::progress::{Observer, Row};
-use super::robin::{self, Robin, RobinRule};
+use super::robin::{Robin, RobinRule};
 use super::stop::StopRule;
-use super::sweep::Sweeper;
-use super::watch::{Last, Seen, Verdict, Watch};
+use super::watch::{Last, Verdict};
 use super::zone::RobinZone;
 use crate::error::Result;
 use std::time::Instant;
@@ -137,9 +137,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     }
     // an estimate of the discretisation's error needs the iterates whole
     let mut origin = settings.balance.is_none().then(|| Origin::take(model, &mut iterate));
-    let mut robin = Robin::new(settings.robin.clone());
-    let mut watch = Watch::default();
-    let mut sweeper = Sweeper::default();
+    let mut measuring = Measuring::new(clock, Robin::new(settings.robin.clone()));
     let mut last: Option<Last> = None;
     let mut rows: Vec<Row> = Vec::new();
     let mut balance = settings.balance.take().map(Balance::new);
@@ -148,46 +146,17 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     let (status, layer, weight) = loop {
         let k = updates;
         let layer = Layer::at(model, &iterate.trace);
-        let mut weight = robin.weight(model, &settings.zone, &layer, k);
-        if let Some(old) = before.take().filter(|_| settings.methods[active].is_joint())
-            && robin::is_of_the_size(model, &old, &weight)
-        {
-            weight = old;
-        }
+        let old = before.take().filter(|_| settings.methods[active].is_joint());
+        let mut weight = measuring.weight(model, settings, &layer, k, old);
         if early.is_none() {
             early = held::unheld(model, &weight).map(|free| Status::Unheld { body: free.body, motion: free.name });
         }
         if let Some(status) = early {
             break (status, layer, weight);
         }
-        model.precision(settings.methods[active].precision())?;
-        let from = origin.as_ref().map_or(&[][..], |origin| origin.trace());
-        let method = &settings.methods[active];
-        let mut rough = method.is_joint();
-        let (sweep, row, verdict) = loop {
-            model.robin(&weight)?;
-            let relaxed = last.as_ref().filter(|last| last.relaxed).map(|last| (&last.sweep, last.length));
-            let sweep = sweeper.sweep(model, &iterate, &layer, &weight, relaxed)?;
-            let seen =
-                Seen { model, iterate: &iterate, origin: from, layer: &layer, sweep: &sweep, last: last.as_ref() };
-            let mut row = watch.measure(&seen);
-            (row.iteration, row.sweeps, row.seconds) = (k, sweeper.sweeps, clock.elapsed().as_secs_f64());
-            row.factorizations += method.coupled().factorizations;
-            row.inner_iterations += method.coupled().inner_iterations;
-            row.energy += origin.as_ref().map_or(0.0, |origin| origin.energy);
-            row.error = row.residual * method.amplification().sqrt();
-            let verdict = watch.judge(&seen, &settings.stop, &row);
-            // good by an old Robin term or a rough solve is not yet good by the ones that belong here
-            if rough && matches!(verdict, Verdict::End(Status::Converged)) {
-                rough = false;
-                let own = robin.weight(model, &settings.zone, &layer, k);
-                if model.precision(ROUGH)? || own != weight {
-                    weight = own;
-                    continue;
-                }
-            }
-            break (sweep, row, verdict);
-        };
+        let at = At { k, iterate: &iterate, layer: &layer, origin: origin.as_ref(), last: last.as_ref() };
+        let method = &*settings.methods[active];
+        let (sweep, row, verdict) = measuring.measure(model, settings, method, &at, &mut weight)?;
         observer.row(&row);
         let (residual, error) = (row.residual, row.error);
         rows.push(row);
@@ -205,8 +174,8 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
             break (Status::Converged, layer, weight);
         }
         let target = settings.stop.residual.unwrap_or(0.0);
-        let mut here =
-            Here { model, sweeper: &mut sweeper, k, layer: &layer, weight: &weight, sweep: &sweep, residual, target };
+        let sweeper = &mut measuring.sweeper;
+        let mut here = Here { model, sweeper, k, layer: &layer, weight: &weight, sweep: &sweep, residual, target };
         let step = settings.methods[active].step(&mut here)?;
         let (direction, length, relaxed) = match step {
             Step::Unbounded => break (Status::Unbounded, layer, weight),
@@ -244,8 +213,8 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     Ok(Outcome {
         status,
         iterations: updates,
-        sweeps: sweeper.sweeps,
-        solves_skipped: sweeper.solves_skipped,
+        sweeps: measuring.sweeper.sweeps,
+        solves_skipped: measuring.sweeper.solves_skipped,
         iterate,
         layer,
         weight,

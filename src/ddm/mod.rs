@@ -17,6 +17,7 @@ pub mod layer;
 mod lift;
 pub mod line;
 pub mod linear;
+mod measure;
 pub mod method;
 pub mod model;
 mod origin;
