@@ -81,6 +81,7 @@ impl Measuring {
             let mut row = self.watch.measure(&seen);
             (row.iteration, row.sweeps, row.seconds) = (k, self.sweeper.sweeps, self.clock.elapsed().as_secs_f64());
             row.factorizations += method.coupled().factorizations;
+            row.inner_iterations += method.coupled().inner_iterations;
             row.energy += origin.map_or(0.0, |origin| origin.energy);
             row.error = row.residual * method.amplification().sqrt();
             let verdict = self.watch.judge(&seen, &settings.stop, &row);
