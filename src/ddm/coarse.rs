@@ -11,7 +11,7 @@ use crate::linalg::{axpy, dot};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Share of the largest eigenvalue of A, scaled to ones on its diagonal, below which contact does not resist a motion.
-const FREE: f64 = 1e-10;
+const FREE: f64 = 1e-7;
 
 /// E and A^+ for springs at the contact points. Motions are numbered through body by body.
 pub struct Coarse<'a> {

@@ -19,6 +19,9 @@ pub struct Solution {
     pub spectrum: Option<(f64, f64)>,
 }
 
+/// Steps without a smaller residual after which deflated conjugate gradients end.
+const STUCK: usize = 30;
+
 /// Share of r'z that a first direction without stiffness has at least.
 const FLAT: f64 = 1e-8;
 
@@ -37,6 +40,7 @@ pub fn solve(here: &mut Here, kappa_weight: &[f64], reduction: f64, most: usize)
     let mut x = z.zero_like();
     let mut direction = z;
     let mut energy = 0.0;
+    let mut best = (f64::INFINITY, 0);
     let (mut alphas, mut betas) = (Vec::new(), Vec::new());
     for step in 0..most {
         // the first step is the best in the span of the sweep and the rigid motions; what follows begins anew from there
@@ -87,7 +91,12 @@ pub fn solve(here: &mut Here, kappa_weight: &[f64], reduction: f64, most: usize)
         if let Some(coarse) = &coarse {
             coarse.deflate(here.model, &mut z);
         }
-        if !new.is_finite() || new <= goal {
+        if new < best.0 {
+            best = (new, step);
+        }
+        // rigid motions that are out of balance by rounding stay so: no direction has a part in them
+        let stuck = coarse.is_some() && step - best.1 > STUCK;
+        if !new.is_finite() || new <= goal || stuck {
             break;
         }
         // the flexible rule: the preconditioner may be an inexact solve
