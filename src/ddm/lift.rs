@@ -7,6 +7,7 @@
 use super::body::Solved;
 use super::field::Field;
 use super::held;
+use super::layer::Layer;
 use super::method::ROUGH;
 use super::model::{BodySlot, Model};
 use crate::error::Result;
@@ -19,6 +20,11 @@ const STIFF: f64 = 1e4;
 const SOFT: f64 = 10.0;
 /// Share of the start's trace that a rough lift may miss.
 const MISSED: f64 = 1e-3;
+/// Times the energy of the layers at the trace, beyond which a rough lift is too deep: a law of p ~ c^10 turns a small miss into
+/// any pressure.
+const DEEPER: f64 = 100.0;
+/// Energy of layers that rounding closes, over what the start's trace would cost the nodes under it.
+const ROUNDING: f64 = 1e-12;
 /// Steps; each gains a factor of about `STIFF` over the surface's compliance.
 const STEPS: usize = 4;
 
@@ -44,17 +50,19 @@ fn springs(slot: &BodySlot) -> Vec<f64> {
 }
 
 /// The iterate with about the given trace, for a method that needs no equilibrium inside: bodies are moved rigidly, and only
-/// one that is then far from its trace is deformed, roughly. The second value is as in [`lift`].
+/// one that is then far from its trace is deformed, roughly. Where what is missed drives the surfaces far deeper into each other
+/// than the trace would, it is lifted after all. The second value is as in [`lift`].
 ///
 /// # Errors
 /// Failures of the solver library.
 pub fn move_rigidly(model: &mut Model, trace: &[f64]) -> Result<(Field, Option<(usize, String)>)> {
     model.precision(ROUGH)?;
     let mut iterate = Field::rest(model);
-    let mut failed = None;
+    let (mut failed, mut cost) = (None, 0.0);
     for index in 0..model.bodies.len() {
         let target = model.of_body(index, trace);
         let slot = &mut model.bodies[index];
+        cost += slot.row_stiffness.iter().zip(&target).map(|(k, t)| k * t * t).sum::<f64>();
         let Some(body) = &mut slot.local else { continue };
         let u = &mut iterate.states[index];
         let mut rows = vec![0.0; target.len()];
@@ -80,7 +88,10 @@ pub fn move_rigidly(model: &mut Model, trace: &[f64]) -> Result<(Field, Option<(
         axpy(1.0, &z, u);
     }
     iterate.retrace(model);
-    Ok((iterate, failed))
+    let energy = |trace: &[f64]| Layer::at(model, trace).energy.iter().sum::<f64>();
+    // not a number counts as deep, rounding does not
+    let shallow = energy(&iterate.trace) <= DEEPER * energy(trace) + ROUNDING * cost;
+    if shallow { Ok((iterate, failed)) } else { lift(model, trace) }
 }
 
 /// Least squares: amounts of some vectors that together come nearest to another.

@@ -85,6 +85,8 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     for index in STEEP {
         assert_ne!(bench.run(3, index, &["barzilai-borwein"]).0[0].1.status, "not-finite", "scene {index}");
     }
+    // rigid motions alone miss the start's trace by little, and p ~ c^10 makes 1e48 of it
+    assert_eq!(bench.run(7, 276, &["auto"]).0[0].1.status, "converged");
     // the residual is met, but a body is not in balance yet: that is neither converged nor rounding
     let answer = &bench.run(1, 123, &["0.6"]).0[0].1;
     assert_eq!(answer.status, "iteration-limit");
