@@ -30,7 +30,7 @@ pub fn make(session: &Session, scene: &Scene, model: &Model, condensed: bool) ->
     let over_sweeps = || Box::new(Newton::new(Inner::Sweep)) as Box<dyn Method>;
     let joined = |coupled: Box<dyn Coupled>| Box::new(Newton::new(Inner::Direct(coupled))) as Box<dyn Method>;
     let typed = options::asks_for_ksp(session, WHOLE)?;
-    let small = || (condensed && session.size() == 1).then(|| dense(model)).flatten();
+    let small = || is_small(session, model, condensed).then(|| dense(model)).flatten();
     let mut prefix = None;
     let methods = match scene.method.name {
         MethodName::Auto => {
@@ -59,9 +59,9 @@ pub fn make(session: &Session, scene: &Scene, model: &Model, condensed: bool) ->
     Ok(Made { methods, prefix })
 }
 
-/// Whether a scene's first method joins the bodies, as far as that can be told before they are set up.
+/// Whether a scene's first method joins the bodies, which may not be set up yet.
 pub fn begins_jointly(session: &Session, scene: &Scene, model: &Model, condensed: bool) -> bool {
-    let joins = session.size() == 1 && (condensed || multigrid(session, model));
+    let joins = is_small(session, model, condensed) || multigrid(session, model);
     matches!(scene.method.name, MethodName::Newton) || (matches!(scene.method.name, MethodName::Auto) && joins)
 }
 
@@ -76,14 +76,16 @@ fn rule(gamma: &Gamma) -> Box<dyn GammaRule> {
     }
 }
 
-/// All bodies as one dense matrix, if they are condensed to few dofs.
+/// Whether the Newton matrix of all bodies is small and dense.
+fn is_small(session: &Session, model: &Model, condensed: bool) -> bool {
+    let dofs: usize = model.bodies.iter().filter_map(|slot| slot.local.as_ref()).map(|body| body.len()).sum();
+    condensed && session.size() == 1 && dofs <= DENSE
+}
+
+/// All bodies as one dense matrix.
 fn dense(model: &Model) -> Option<Box<dyn Coupled>> {
-    let dofs = model.bodies.iter().map(|slot| Some(slot.local.as_ref()?.matrices()?.len())).sum::<Option<usize>>()?;
-    if dofs > DENSE {
-        return None;
-    }
     let union = Union::of(model, true)?.without_zeros();
-    let solver = Dense::new(dofs, union.stiffness.values.clone());
+    let solver = Dense::new(union.stiffness.rows(), union.stiffness.values.clone());
     Some(Box::new(Monolithic::new(union, solver)))
 }
 

@@ -45,11 +45,10 @@ pub(super) fn runs() -> bool {
 pub(super) fn may_wait(words: &[String]) -> bool {
     let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let home = std::env::var_os("HOME").map(|home| Path::new(&home).join(".petscrc"));
-    let file = |path: &Path| path.exists();
     words.is_empty()
         && !["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"].into_iter().any(set)
-        && !home.is_some_and(|path| file(&path))
-        && ![".petscrc", "petscrc"].into_iter().any(|name| file(Path::new(name)))
+        && !home.is_some_and(|path| path.exists())
+        && ![".petscrc", "petscrc"].into_iter().any(|name| Path::new(name).exists())
 }
 
 /// The functions of the running PETSc, which is started if it waited, with the options that were set meanwhile.
