@@ -5,6 +5,7 @@
 //! one a sweep. As K E = 0, E'H and A are sums over contact points, which every rank knows: no message, no solve.
 
 use super::field::Field;
+use super::joint::Joint;
 use super::lift::fit;
 use super::model::Model;
 use crate::linalg::{axpy, dot};
@@ -15,7 +16,7 @@ const FREE: f64 = 1e-7;
 
 /// E and A^+ for springs at the contact points. Motions are numbered through body by body.
 pub struct Coarse<'a> {
-    /// First motion of each body, and the number of all.
+    /// First motion of each body.
     first: Vec<usize>,
     /// For each body that lives here, each of its motions as the end of a state.
     amounts: Vec<Vec<Vec<f64>>>,
@@ -26,18 +27,16 @@ pub struct Coarse<'a> {
 impl<'a> Coarse<'a> {
     /// For springs `weight` = omega kappa at the points; none if supports hold all bodies.
     pub fn new(model: &Model, weight: &'a [f64]) -> Option<Self> {
-        let mut first = vec![0];
-        for slot in &model.bodies {
-            first.push(first[first.len() - 1] + slot.motions.len());
-        }
-        if first[first.len() - 1] == 0 {
+        let joint = Joint::of(model);
+        if joint.count() == 0 {
             return None;
         }
         let amounts = model.bodies.iter().map(|slot| match slot.local.as_ref().and_then(|body| body.matrices()) {
             Some(matrices) => slot.motions.iter().map(|motion| fit(matrices.traces, &motion.trace)).collect(),
             None => Vec::new(),
         });
-        let inverse = pseudo_inverse(&stiffness(model, weight, &first));
+        let inverse = pseudo_inverse(&joint.stiffness(weight));
+        let first = (0..model.bodies.len()).map(|body| joint.of_body(body).start).collect();
         Some(Self { amounts: amounts.collect(), first, weight, inverse })
     }
 
@@ -85,33 +84,6 @@ impl<'a> Coarse<'a> {
         self.add(model, -1.0, &self.motion(image.as_slice()), z);
         image
     }
-}
-
-/// A = (B E)' diag(`weight`) (B E).
-fn stiffness(model: &Model, weight: &[f64], first: &[usize]) -> DMatrix<f64> {
-    // what each pair feels: number of a motion, its trace there
-    let mut felt: Vec<Vec<(usize, &[f64])>> = vec![Vec::new(); model.pairs.len()];
-    for (body, slot) in model.bodies.iter().enumerate() {
-        let mut next = 0;
-        for segment in &slot.segments {
-            let rows = next..next + model.range(segment.pair).len();
-            next = rows.end;
-            for (i, motion) in slot.motions.iter().enumerate() {
-                felt[segment.pair].push((first[body] + i, &motion.trace[rows.clone()]));
-            }
-        }
-    }
-    let count = first[first.len() - 1];
-    let mut stiffness = DMatrix::zeros(count, count);
-    for (pair, felt) in felt.iter().enumerate() {
-        let weight = &weight[model.range(pair)];
-        for &(i, u) in felt {
-            for &(j, v) in felt {
-                stiffness[(i, j)] += (0..weight.len()).map(|q| weight[q] * u[q] * v[q]).sum::<f64>();
-            }
-        }
-    }
-    stiffness
 }
 
 /// The pseudo-inverse of a positive semidefinite matrix whose rows may differ much in size.

@@ -1,5 +1,6 @@
 //! Is every rigid motion of every body held, by supports or by its Robin term?
 
+use super::joint::Joint;
 use super::model::{BodySlot, Model};
 use crate::linalg::kernel;
 use nalgebra::DMatrix;
@@ -44,22 +45,11 @@ pub fn weak_motion(model: &Model, body: usize, weight: &[f64], share: f64) -> Op
 /// Whether some rigid motion of all bodies together is hardly resisted by the layers' stiffness `weight` = omega kappa at the
 /// points: then the Newton matrix is singular, or so near to it that a factorisation means nothing.
 pub fn joint_is_weak(model: &Model, weight: &[f64]) -> bool {
-    let points = model.points();
-    let mut motions = Vec::new();
-    let mut natural = 0.0f64;
-    for (body, slot) in model.bodies.iter().enumerate() {
-        let springs = natural_springs(model, body);
-        for motion in &slot.motions {
-            let mut trace = vec![0.0; 2 * points];
-            model.put(body, &motion.trace, &mut trace);
-            motions.push((0..points).map(|q| trace[q] + trace[points + q]).collect::<Vec<f64>>());
-            natural = natural.max(springs.iter().zip(&motion.trace).map(|(k, m)| k * m * m).sum());
-        }
-    }
-    let joint = DMatrix::from_fn(motions.len(), motions.len(), |i, j| {
-        (0..points).map(|q| weight[q] * motions[i][q] * motions[j][q]).sum()
-    });
-    !kernel(&joint, natural, 1e-9).is_empty()
+    let of_body = |(body, slot): (usize, &BodySlot)| {
+        springs(slot, &natural_springs(model, body)).diagonal().iter().copied().fold(0.0, f64::max)
+    };
+    let natural = model.bodies.iter().enumerate().map(of_body).fold(0.0, f64::max);
+    !kernel(&Joint::of(model).stiffness(weight), natural, 1e-9).is_empty()
 }
 
 /// Springs at a body's contact rows that together are about as stiff as the body: the stiffness under each point, spread

@@ -1,0 +1,73 @@
+//! The free rigid motions of all bodies together, as the contact points feel them: closings B E of the motions E.
+//!
+//! Motions are numbered through body by body. As K E = 0, what is asked of them here are sums over contact points.
+
+use super::model::{Model, Motion, Segment};
+use nalgebra::DMatrix;
+use std::ops::Range;
+
+/// The free rigid motions of all bodies.
+pub struct Joint<'a> {
+    /// First motion of each body, and the number of all.
+    first: Vec<usize>,
+    /// For each pair its points among all, and what it feels: number of a motion, its trace there.
+    pairs: Vec<(Range<usize>, Vec<Felt<'a>>)>,
+}
+
+/// Number of a motion, and its trace on a pair.
+type Felt<'a> = (usize, &'a [f64]);
+
+impl<'a> Joint<'a> {
+    /// Of bodies with these contact rows and free motions; `points` are the points of each pair.
+    pub fn new(bodies: impl IntoIterator<Item = (&'a [Segment], &'a [Motion])>, points: &[usize]) -> Self {
+        let mut first = vec![0];
+        let mut next = 0;
+        let range = |&count: &usize| {
+            next += count;
+            (next - count..next, Vec::new())
+        };
+        let mut pairs: Vec<(Range<usize>, Vec<Felt>)> = points.iter().map(range).collect();
+        for (segments, motions) in bodies {
+            let number = first[first.len() - 1];
+            let mut row = 0;
+            for segment in segments {
+                let (range, felt) = &mut pairs[segment.pair];
+                let rows = row..row + range.len();
+                row = rows.end;
+                felt.extend(motions.iter().enumerate().map(|(i, motion)| (number + i, &motion.trace[rows.clone()])));
+            }
+            first.push(number + motions.len());
+        }
+        Self { first, pairs }
+    }
+
+    /// Of the bodies of a model.
+    pub fn of(model: &'a Model) -> Self {
+        let points: Vec<usize> = (0..model.pairs.len()).map(|pair| model.range(pair).len()).collect();
+        Self::new(model.bodies.iter().map(|slot| (&slot.segments[..], &slot.motions[..])), &points)
+    }
+
+    /// Number of all motions.
+    pub fn count(&self) -> usize {
+        self.first[self.first.len() - 1]
+    }
+
+    /// Motions of a body.
+    pub fn of_body(&self, body: usize) -> Range<usize> {
+        self.first[body]..self.first[body + 1]
+    }
+
+    /// (B E)' diag(`weight`) (B E), for springs at the points.
+    pub fn stiffness(&self, weight: &[f64]) -> DMatrix<f64> {
+        let mut stiffness = DMatrix::zeros(self.count(), self.count());
+        for (range, felt) in &self.pairs {
+            let weight = &weight[range.clone()];
+            for &(i, u) in felt {
+                for &(j, v) in felt {
+                    stiffness[(i, j)] += (0..weight.len()).map(|q| weight[q] * u[q] * v[q]).sum::<f64>();
+                }
+            }
+        }
+        stiffness
+    }
+}
