@@ -119,6 +119,10 @@ fn hopeless(model: &Model) -> Option<Status> {
     rigid_closing(model).is_err().then_some(Status::Unbounded)
 }
 
+/// Residual at which bodies are about where they will stay: the origin of displacements is taken anew there, so that what is
+/// rounded with it does not depend on the start.
+const SETTLED: f64 = 1e-4;
+
 /// Runs the iteration: residual, stop, step and update of equations (41)-(42), until a rule ends it.
 ///
 /// # Errors
@@ -136,12 +140,13 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         early = failed.map(|(body, reason)| Status::InnerSolver { body, reason });
     }
     // an estimate of the discretisation's error needs the iterates whole
-    let mut origin = settings.balance.is_none().then(|| Origin::take(model, &mut iterate));
+    let floats = model.bodies.iter().any(|slot| !slot.motions.is_empty());
+    let mut origin = (floats && settings.balance.is_none()).then(|| Origin::take(model, &mut iterate));
     let mut measuring = Measuring::new(clock, Robin::new(settings.robin.clone()));
     let mut last: Option<Last> = None;
     let mut rows: Vec<Row> = Vec::new();
     let mut balance = settings.balance.take().map(Balance::new);
-    let (mut active, mut updates) = (0, 0);
+    let (mut active, mut updates, mut settled) = (0, 0, false);
     let mut before: Option<Vec<f64>> = None;
     let (status, layer, weight) = loop {
         let k = updates;
@@ -189,7 +194,9 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         if settings.methods[active].is_joint() {
             iterate.retrace(model);
         }
-        if origin.as_ref().is_some_and(|origin| origin.is_far_from(&iterate)) {
+        let settles = !settled && residual <= SETTLED;
+        settled |= settles;
+        if origin.as_ref().is_some_and(|origin| settles || origin.is_far_from(&iterate)) {
             origin = origin.map(|origin| {
                 origin.give(model, &mut iterate);
                 Origin::take(model, &mut iterate)

@@ -10,6 +10,9 @@ use super::model::Model;
 /// How many times an iterate's displacement its origin may be.
 const FAR: f64 = 10.0;
 
+/// Binary digits that an origin's amounts have.
+const DIGITS: u32 = 24;
+
 /// Rigid motions that were taken out of an iterate, and the gap as it was with them.
 pub struct Origin {
     motion: Field,
@@ -27,8 +30,10 @@ impl Origin {
             let Some(body) = slot.local.as_mut().filter(|body| body.rigid() > 0) else { continue };
             let (state, origin) = (&mut iterate.states[index], &mut motion.states[index]);
             let deformation = state.len() - body.rigid();
-            origin[deformation..].copy_from_slice(&state[deformation..]);
-            state[deformation..].fill(0.0);
+            for (origin, state) in origin[deformation..].iter_mut().zip(&mut state[deformation..]) {
+                *origin = short(*state);
+                *state -= *origin;
+            }
             // the residual at rest without contact is the load
             let mut load = vec![0.0; origin.len()];
             body.residual(&body.rest(), &vec![0.0; slot.row_stiffness.len()], &mut load);
@@ -62,5 +67,33 @@ impl Origin {
     pub fn give(self, model: &mut Model, iterate: &mut Field) {
         iterate.add(1.0, &self.motion);
         model.gap = self.gap;
+    }
+}
+
+/// `amount` with the leading digits only. Its products with the motion of a flat surface along an axis are then exact, and what
+/// rounding there is does not depend on the start.
+fn short(amount: f64) -> f64 {
+    let digits = f64::MANTISSA_DIGITS - DIGITS;
+    let scale = (1u64 << digits) as f64 + 1.0;
+    let product = amount * scale;
+    // Dekker's splitting
+    if product.is_finite() { product - (product - amount) } else { amount }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    /// 24 binary digits, nearest, and products with small whole numbers without rounding.
+    #[test]
+    fn few_digits_are_left() {
+        for amount in [10.0 + 3e-9, -0.1, 1e-300, 7.0f64.sqrt() * 1e40] {
+            let head = short(amount);
+            assert!(((head - amount) / amount).abs() <= 2f64.powi(-24), "{head}");
+            assert_eq!(short(head), head);
+            assert_eq!(3.0 * head - 2.0 * head, head);
+        }
+        assert_eq!(short(10.0 + 3e-9), 10.0);
+        assert_eq!(short(1e308), 1e308);
     }
 }

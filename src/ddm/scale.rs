@@ -11,6 +11,10 @@ use crate::linalg::dot;
 /// A solution this much smaller than the start is measured by the start.
 const NOTHING: f64 = 1e-6;
 
+/// Forces on a body that do less than this share of what work they could on a motion are measured by that share: they may go through
+/// the point about which it turns, and their work be rounding.
+const LITTLE: f64 = 1e-3;
+
 /// Least scales of a run, from its start.
 #[derive(Debug, Default)]
 pub struct Scale {
@@ -61,12 +65,13 @@ impl Scale {
         let mut most = 0.0f64;
         for (body, slot) in model.bodies.iter().enumerate() {
             let force = model.at_rows(body, &layer.force);
+            let total: f64 = force.iter().map(|force| force.abs()).sum();
             for motion in &slot.motions {
                 let arm = motion.trace.iter().fold(0.0f64, |max, m| max.max(m.abs()));
                 let acting: f64 = force.iter().zip(&motion.trace).map(|(force, m)| (force * m).abs()).sum();
                 let lacking = (motion.work - dot(&force, &motion.trace)).abs();
                 if lacking > 0.0 {
-                    most = most.max(lacking / acting.max(arm * self.force));
+                    most = most.max(lacking / acting.max(arm * self.force.max(LITTLE * total)));
                 }
             }
         }

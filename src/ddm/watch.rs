@@ -103,7 +103,8 @@ impl Watch {
         let steady = stop.residual.is_none_or(|tolerance| {
             let moved = last.map_or(0.0, |last| most_apart(&last.pressure, &layer.pressure));
             let peak = self.scale.peak(&layer.pressure);
-            moved.max(self.steady.missing(row.residual, &layer.pressure, peak)) <= 10.0 * tolerance * peak
+            let missing = self.steady.missing(row.residual, &layer.pressure, peak);
+            moved <= MOVED * tolerance * peak && missing <= tolerance * peak
         });
         let imbalance = self.scale.imbalance(model, layer);
         let balanced = stop.residual.is_none_or(|tolerance| imbalance <= 10.0 * tolerance);
@@ -126,6 +127,9 @@ impl Watch {
     }
 }
 
+/// How far the last step may have moved a pressure, relative to the largest, in units of the residual that is asked for.
+const MOVED: f64 = 3.0;
+
 /// Largest share of its contact forces that a body may lack in balance where rounding allows no less.
 const UNBALANCED: f64 = 1e-3;
 
@@ -138,17 +142,17 @@ fn is_rounding(seen: &Seen) -> bool {
     let Seen { model, iterate, layer, sweep, .. } = *seen;
     let mut floor = [0.0];
     let points = model.points();
-    let trembling = |q: usize| {
-        let terms = iterate.trace[q].abs() + iterate.trace[points + q].abs() + model.gap[q].abs();
-        layer.force[q] + model.weight[q] * layer.tangent[q] * terms
-    };
-    let force: Vec<f64> = (0..points).map(trembling).collect();
     for (index, slot) in model.bodies.iter().enumerate() {
         if let Some(body) = &slot.local {
-            floor[0] += body.rounding(&iterate.states[index], &model.at_rows(index, &force));
+            floor[0] += body.rounding(&iterate.states[index], &model.at_rows(index, &layer.force));
         }
     }
     model.exchange.sum(&mut floor);
+    // a force omega kappa e at a point is resisted by springs omega kappa at least
+    for q in 0..points {
+        let terms = iterate.trace[q].abs() + iterate.trace[points + q].abs() + model.gap[q].abs();
+        floor[0] += model.weight[q] * layer.tangent[q] * (f64::EPSILON * terms).powi(2);
+    }
     // the estimate counts each row's worst case once; smooth errors weigh more in G^-1
-    sweep.decrement.iter().sum::<f64>() <= 1e4 * floor[0]
+    sweep.decrement.iter().sum::<f64>() <= 3e3 * floor[0]
 }

@@ -8,11 +8,14 @@
 use crate::fem::rigid::FreeMotion;
 use crate::linalg::{Csr, axpy, dot};
 
-/// Orthonormal rigid motions that a body's supports leave free, with what they do at its contact rows.
+/// Orthogonal rigid motions that a body's supports leave free, with what they do at its contact rows.
 #[derive(Debug, Default)]
 pub struct Split {
-    /// R, one vector over the dofs each.
+    /// R, one vector over the dofs each. Their lengths lie between 1 and 2: they are scaled by powers of two, which leaves a
+    /// translation of a flat surface the same digits at all points, and few of them.
     motions: Vec<Vec<f64>>,
+    /// R'R, of which nothing but the diagonal is left.
+    squares: Vec<f64>,
     /// B R.
     traces: Vec<Vec<f64>>,
     /// R'f.
@@ -27,18 +30,19 @@ impl Split {
             let (mut motion, mut work) = (displacement.clone(), *work);
             // twice is enough
             for _ in 0..2 {
-                for (other, its_work) in split.motions.iter().zip(&split.work) {
-                    let part = dot(other, &motion);
+                for ((other, square), its_work) in split.motions.iter().zip(&split.squares).zip(&split.work) {
+                    let part = dot(other, &motion) / square;
                     axpy(-part, other, &mut motion);
                     work -= part * its_work;
                 }
             }
-            let norm = dot(&motion, &motion).sqrt();
-            motion.iter_mut().for_each(|u| *u /= norm);
+            let scale = dot(&motion, &motion).sqrt().log2().floor().exp2();
+            motion.iter_mut().for_each(|u| *u /= scale);
+            split.squares.push(dot(&motion, &motion));
             let mut trace = vec![0.0; rows.rows()];
             rows.multiply(&motion, &mut trace);
             split.traces.push(trace);
-            split.work.push(work / norm);
+            split.work.push(work / scale);
             split.motions.push(motion);
         }
         split
@@ -62,8 +66,8 @@ impl Split {
     /// Moves the rigid part of the dofs of a state to its end.
     pub fn separate(&self, state: &mut [f64]) {
         let (dofs, rigid) = state.split_at_mut(state.len() - self.count());
-        for (motion, a) in self.motions.iter().zip(rigid) {
-            let part = dot(motion, dofs);
+        for ((motion, square), a) in self.motions.iter().zip(&self.squares).zip(rigid) {
+            let part = dot(motion, dofs) / square;
             axpy(-part, motion, dofs);
             *a += part;
         }
@@ -100,9 +104,39 @@ impl Split {
     /// Gives the dofs of a force the rigid part that its end says.
     pub fn balance(&self, force: &mut [f64]) {
         let (dofs, rigid) = force.split_at_mut(force.len() - self.count());
-        for (motion, &a) in self.motions.iter().zip(&*rigid) {
-            let off = a - dot(motion, dofs);
+        for ((motion, square), &a) in self.motions.iter().zip(&self.squares).zip(&*rigid) {
+            let off = (a - dot(motion, dofs)) / square;
             axpy(off, motion, dofs);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three nodes on a line that slides and turns: deformation and rigid motion come apart and together again, and sliding moves
+    /// all contact rows by the same number.
+    #[test]
+    fn states_come_apart_and_together() {
+        let free = |displacement: [f64; 6]| FreeMotion { displacement: displacement.to_vec(), work: 3.0 };
+        let mut rows = Csr::new(6);
+        (0..3).for_each(|node| rows.push_row([(2 * node, 1.0)]));
+        let split = Split::new(&[free([1.0, 0.0, 1.0, 0.0, 1.0, 0.0]), free([0.5, 0.5, 0.5, 0.0, 0.5, -0.5])], &rows);
+        assert_eq!(split.traces()[0], [1.0; 3]);
+        assert!(dot(&split.motions()[0], &split.motions()[1]).abs() < 1e-15);
+        // of the second motion half the first is taken away, with its work
+        assert_eq!(split.work()[0], 3.0);
+        let shape = split.motions()[1][1] / 0.5;
+        assert!((split.work()[1] - 1.5 * shape).abs() < 1e-14);
+        let u = [0.3, 1.0, -0.2, 0.4, 0.7, -2.0];
+        let mut state = [&u[..], &[0.0, 0.0]].concat();
+        split.separate(&mut state);
+        assert!(split.motions().iter().all(|motion| dot(motion, &state[..6]).abs() < 1e-15));
+        assert!(split.join(&state).iter().zip(u).all(|(a, b)| (a - b).abs() < 1e-15));
+        let mut force = [&u[..], &[0.25, -4.0]].concat();
+        split.balance(&mut force);
+        let parts = split.rigid_part(&force[..6]);
+        assert!((parts[0] - 0.25).abs() < 1e-15 && (parts[1] + 4.0).abs() < 1e-14, "{parts:?}");
     }
 }

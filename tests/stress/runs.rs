@@ -17,7 +17,7 @@ const RESIDUAL: f64 = 1e-8;
 /// Relative residual of the reference.
 const REFERENCE: f64 = 1e-11;
 /// Pressures that differ by more, relative to the largest, are wrong.
-const TOLERANCE: f64 = 1e-6;
+const TOLERANCE: f64 = 1e-7;
 
 /// A method with the words that choose it in a scene.
 #[derive(Debug, Clone)]
