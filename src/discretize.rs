@@ -340,7 +340,7 @@ pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Vec<f64>> 
     let model = &problem.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
-    if let Start::Auto | Start::Nested = &scene.method.start {
+    if let Start::Auto | Start::Rigid | Start::Nested = &scene.method.start {
         return Ok(ddm::automatic_start(model));
     }
     if let Start::Normal(field) = &scene.method.start {

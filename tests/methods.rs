@@ -132,6 +132,28 @@ fn multigrid_over_all_bodies() {
     assert!(sweeps.count("inner_iterations") > multigrid.count("inner_iterations"));
 }
 
+/// A large curved contact begins with the pressures of a coarser mesh, and Newton's steps need not grow it from within.
+#[test]
+fn a_coarser_mesh_foretells_the_contact() {
+    let run = |start: &str| {
+        let start = format!("method={{start=\"{start}\"}}");
+        let sets = ["mesh.set={n=14,edge=1}", "body.0.order=1", "body.1.order=1", "solver=hypre", &start];
+        solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+    };
+    let (auto, rigid) = (run("auto"), run("rigid"));
+    assert!(rigid.report["coarser"].is_null() && !rigid.stdout.contains("coarser"), "{}", rigid.said());
+    assert!(auto.stdout.contains("start: pressures of a mesh of elements 3 times larger"), "{}", auto.said());
+    let (coarse, points) = (auto.count("coarser/dofs"), auto.count("coarser/points"));
+    assert!(10 * coarse < auto.count("dofs") && (20..100).contains(&points), "{coarse} dofs, {points} points");
+    let (few, many) = (auto.count("iterations"), rigid.count("iterations"));
+    assert!(2 * few <= many, "{few} and {many} iterations");
+    // the first step finds the contact but for its edge: 200 points
+    let closed = auto.history().counts("closed");
+    assert!(closed[0] < 20 && closed[1].abs_diff(closed[few]) <= 10, "{closed:?}");
+    let apart = distance(&auto.contact()["pressure"], &rigid.contact()["pressure"]);
+    assert!(apart < 1e-7, "{apart:e}");
+}
+
 /// The estimated spectrum of G^-1 F1'' lies around one: 1 - theta and 1 + theta.
 #[test]
 fn the_spectrum_is_symmetric_about_one() {

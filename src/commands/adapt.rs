@@ -10,7 +10,7 @@ use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::agree;
 use crate::petsc::Session;
-use crate::scene::{AdaptSpec, MeshSource, Scene, Start};
+use crate::scene::{AdaptSpec, MeshSource, Scene, Sizing, Start};
 use crate::solver::options;
 
 /// Cells of a body's first mesh.
@@ -141,7 +141,7 @@ impl Plan {
             return Ok(false);
         }
         if error <= goal.error {
-            if let MeshSource::Geo { sizes: Some(view), .. } = &self.scene.mesh {
+            if let MeshSource::Geo { sizes: Some(Sizing::View(view)), .. } = &self.scene.mesh {
                 let kept = if session.rank() == 0 { mesh::keep_final(&self.purpose, view) } else { Ok(()) };
                 agree(session, kept)?;
             }
@@ -174,6 +174,6 @@ fn view(sizes: Sizes) -> String {
 /// Lets the mesh of a scene follow sizes.
 fn follow(scene: &mut Scene, view: Option<String>) {
     if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
-        *sizes = view.map(Into::into);
+        *sizes = view.map(|view| Sizing::View(view.into()));
     }
 }

@@ -4,7 +4,7 @@ use crate::ddm::{Body, BodySlot};
 use crate::discretize::{Assembled, Maker, Outline};
 use crate::error::Result;
 use crate::petsc::Session;
-use crate::scene::{Preset, Scene};
+use crate::scene::{MethodName, Preset, Scene};
 use crate::solver::preset::{self, Size};
 use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory, options};
 use mpi::collective::SystemOperation;
@@ -17,6 +17,8 @@ pub struct Inner<'a> {
     asked: Option<Preset>,
     /// Bytes that the solvers so far leave, on the rank that has least.
     memory: usize,
+    /// Whether the method joins bodies that multigrid solves: their own solvers then only measure.
+    measures: bool,
     plans: Vec<Plan>,
     /// Condensed bodies that an earlier scene has left; `local` is there on the rank that owns it.
     kept: Vec<BodySlot>,
@@ -40,7 +42,9 @@ impl<'a> Inner<'a> {
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
-        Self { session, asked: scene.solver.preset, memory: least as usize, plans: Vec::new(), kept }
+        let joins = matches!(scene.method.name, MethodName::Auto | MethodName::Newton);
+        let measures = joins && session.size() == 1;
+        Self { session, asked: scene.solver.preset, memory: least as usize, measures, plans: Vec::new(), kept }
     }
 
     /// Why the solvers are what they are, in words: once if all bodies have the same.
@@ -86,6 +90,9 @@ impl Maker for Inner<'_> {
         let (preset, reason) = self.choose(name, &size)?;
         if matches!(preset, Preset::Mumps | Preset::Condensed) && memory == self.memory {
             self.memory = self.memory.saturating_sub(size.bytes(preset));
+        }
+        if preset == Preset::Hypre && self.measures {
+            preset::made_often(self.session, name)?;
         }
         preset::apply(self.session, name, preset)?;
         let retained = (preset == Preset::Condensed).then_some(retained);

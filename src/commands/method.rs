@@ -9,7 +9,7 @@ use crate::scene::{Gamma, MethodName, Preset, Scene};
 use crate::solver::{Dense, Krylov, Monolithic, Union, options, preset};
 
 /// Prefix of the PETSc options of the Newton matrix of all bodies.
-const WHOLE: &str = "newton";
+pub const WHOLE: &str = "newton";
 
 /// Dofs of all condensed bodies up to which their dense Newton matrix is factored: 0.2 s and 250 MB.
 const DENSE: usize = 3000;
@@ -63,6 +63,11 @@ pub fn make(session: &Session, scene: &Scene, model: &Model, condensed: bool) ->
 pub fn begins_jointly(session: &Session, scene: &Scene, model: &Model, condensed: bool) -> bool {
     let joins = is_small(session, model, condensed) || multigrid(session, model);
     matches!(scene.method.name, MethodName::Newton) || (matches!(scene.method.name, MethodName::Auto) && joins)
+}
+
+/// Whether a scene's first method joins all bodies by multigrid.
+pub fn joins_by_multigrid(session: &Session, scene: &Scene, model: &Model) -> bool {
+    matches!(scene.method.name, MethodName::Auto | MethodName::Newton) && multigrid(session, model)
 }
 
 fn rule(gamma: &Gamma) -> Box<dyn GammaRule> {

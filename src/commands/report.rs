@@ -136,6 +136,7 @@ pub fn report(
         iterations: outcome.iterations,
         sweeps: outcome.sweeps,
         method: outcome.method.to_owned(),
+        coarser: prepared.coarser,
         spectrum: outcome.spectrum.map(|(low, high)| [low, high]),
         forecast: forecast(outcome),
         gamma_interval: outcome.interval.map(|interval| IntervalReport {

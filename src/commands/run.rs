@@ -9,7 +9,7 @@ use crate::ddm::{self, BodySlot, Observer, Outcome, RobinRule, Settings, Status,
 use crate::discretize::{self, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
-use crate::output::StepReport;
+use crate::output::{CoarserReport, StepReport};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::scene::{MeshSource, Order, RobinSpec, Scene};
@@ -60,6 +60,10 @@ pub struct Prepared {
     pub problem: Problem,
     /// Start of the iteration, if it does not come from the scene.
     pub start: Option<Vec<f64>>,
+    /// Pressures at the contact points, about those of the solution, if something tells them.
+    pub foreseen: Option<Vec<f64>>,
+    /// The coarser mesh that told them.
+    pub coarser: Option<CoarserReport>,
     /// The methods, made by [`set_up`].
     pub methods: Vec<Box<dyn Method>>,
     /// Why the inner solver is what it is where no PETSc option was typed.
@@ -133,6 +137,8 @@ fn build<const D: usize>(
     Ok(Prepared {
         problem,
         start: None,
+        foreseen: None,
+        coarser: None,
         methods: Vec::new(),
         steps: Vec::new(),
         choice: inner.reason(),
@@ -301,6 +307,9 @@ pub fn iterate(
         },
         resume: None,
     };
+    if let Some(pressure) = prepared.foreseen.take() {
+        settings.methods[0].predict(pressure);
+    }
     let outcome = match scene.method.steps.is_empty() {
         true => ddm::solve(&mut prepared.problem.model, &mut settings, observer)?,
         false => steps::iterate(scene, prepared, &mut settings, observer)?,

@@ -1,6 +1,7 @@
 //! `winkler solve`: one scene, one run, all its results.
 
 use super::adapt::Plan;
+use super::foresee::foresee;
 use super::results::Recovered;
 use super::run::{self, Clock, Prepared};
 use super::{folder_of, load, report, results};
@@ -39,6 +40,7 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
     let (prepared, outcome, estimate, failed) = loop {
         let mut prepared = run::prepare(session, &plan.scene, &mut clock)?;
         prepared.start = plan.start(&prepared);
+        foresee(session, &plan.scene, &mut prepared, &mut clock)?;
         run::set_up(session, &plan.scene, &mut prepared, &mut clock)?;
         let all = session.options().all()?;
         let monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));

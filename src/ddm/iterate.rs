@@ -203,7 +203,8 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
             });
         }
         before = Some(weight);
-        last = Some(Last { sweep, relaxed, length, moved, pressure: layer.pressure });
+        let left = settings.methods[active].left();
+        last = Some(Last { sweep, relaxed, length, left, moved, pressure: layer.pressure });
     };
     model.precision(FINE)?;
     settings.methods[active].conclude(model, &layer, &weight);

@@ -67,7 +67,7 @@ fn held_safely(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
 }
 
 /// Growth of a body's whole Robin term, either way, beyond which an old one does not even serve to measure.
-const FAR: f64 = 100.0;
+const FAR: f64 = 10.0;
 
 /// Whether the Robin terms of two iterates are alike, body by body.
 pub(super) fn is_of_the_size(model: &Model, old: &[f64], new: &[f64]) -> bool {

@@ -18,6 +18,8 @@ pub(super) struct Last {
     pub relaxed: bool,
     /// How far it went along its direction.
     pub length: f64,
+    /// Share of the error that it left, as far as the method can tell.
+    pub left: f64,
     /// Change of the traces.
     pub moved: Vec<f64>,
     /// Pressures before it.
@@ -101,7 +103,7 @@ impl Watch {
         }
         let met = stop.is_met(row.residual, row.increment);
         let steady = stop.residual.is_none_or(|tolerance| {
-            let moved = last.map_or(0.0, |last| most_apart(&last.pressure, &layer.pressure));
+            let moved = last.map_or(0.0, |last| last.left * most_apart(&last.pressure, &layer.pressure));
             let peak = self.scale.peak(&layer.pressure);
             let missing = self.steady.missing(row.residual, &layer.pressure, peak);
             moved <= MOVED * tolerance * peak && missing <= tolerance * peak

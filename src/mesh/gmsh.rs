@@ -35,7 +35,7 @@ impl Gmsh {
         format!("{} {size} {}", self.program.display(), time.unwrap_or_default().as_nanos())
     }
 
-    /// Meshes a script into the file `output`. `home` is an empty folder, read instead of the user's own Gmsh options:
+    /// Meshes a script into the file `output`, with elements `times` as large as it asks for. `home` is an empty folder, read instead of the user's own Gmsh options:
     /// they would change meshes without changing the key in the cache.
     ///
     /// # Errors
@@ -44,14 +44,17 @@ impl Gmsh {
         &self,
         script: &Path,
         set: &[(String, f64)],
-        dimension: usize,
-        order: Order,
+        times: f64,
+        (dimension, order): (usize, Order),
         output: &Path,
         home: &Path,
     ) -> Result<()> {
         let mut command = Command::new(&self.program);
         command.arg(format!("-{dimension}"));
         command.args(["-order", if order == Order::P1 { "1" } else { "2" }, "-format", "msh41", "-bin", "-v", "2"]);
+        if times != 1.0 {
+            command.args(["-clscale", &times.to_string()]);
+        }
         for (name, value) in set {
             command.args(["-setnumber", name, &value.to_string()]);
         }

@@ -5,7 +5,7 @@ use super::gmsh::Gmsh;
 use super::script::Script;
 use super::{Mesh, msh};
 use crate::error::{Error, Located, Result};
-use crate::scene::{MeshSource, Order};
+use crate::scene::{MeshSource, Order, Sizing};
 use std::path::{Path, PathBuf};
 
 /// A mesh and where it came from.
@@ -45,7 +45,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<
             for ((name, _), place) in set.iter().zip(places) {
                 script.check(name, &Located::new(file.value.clone(), place.clone()))?;
             }
-            from_script(file, set, sizes.as_deref(), order, &folders())?
+            from_script(file, set, sizes.as_ref(), order, &folders())?
         }
         MeshSource::Msh { file } => from_file(file, order)?,
     };
@@ -78,7 +78,7 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order) -> Result<Lo
 pub(super) fn from_script<const D: usize>(
     file: &Located<PathBuf>,
     set: &[(String, f64)],
-    sizes: Option<&str>,
+    sizes: Option<&Sizing>,
     order: Order,
     folders: &[PathBuf],
 ) -> Result<Loaded<D>> {
@@ -100,8 +100,12 @@ pub(super) fn from_script<const D: usize>(
     }
     let workshop = Workshop::open(folders)?;
     let made = workshop.path().join(&name);
-    let sized = sizes.map(|sizes| super::sizes::script(file, &script, sizes, workshop.path())).transpose()?;
-    gmsh.run(sized.as_deref().unwrap_or(path), set, D, order, &made, workshop.path())?;
+    let (sized, times) = match sizes {
+        Some(Sizing::View(view)) => (Some(super::sizes::script(file, &script, view, workshop.path())?), 1.0),
+        Some(Sizing::Times(times)) => (None, *times),
+        None => (None, 1.0),
+    };
+    gmsh.run(sized.as_deref().unwrap_or(path), set, times, (D, order), &made, workshop.path())?;
     let bytes = std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause))?;
     let mesh = checked(path, &bytes, order)?;
     Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })
@@ -136,7 +140,7 @@ fn file_name<const D: usize>(
     path: &Path,
     script: &Script,
     set: &[(String, f64)],
-    sizes: Option<&str>,
+    sizes: Option<&Sizing>,
     order: Order,
     gmsh: &Gmsh,
 ) -> String {
@@ -150,8 +154,10 @@ fn file_name<const D: usize>(
     for text in &script.files {
         key.add(text);
     }
-    if let Some(sizes) = sizes {
-        key.add(sizes.as_bytes());
+    match sizes {
+        Some(Sizing::View(view)) => key.add(view.as_bytes()),
+        Some(Sizing::Times(times)) => key.add(&times.to_le_bytes()),
+        None => {}
     }
     key.file_name(&path.file_stem().unwrap_or_default().to_string_lossy())
 }

@@ -23,7 +23,7 @@ mod tests;
 pub use load::{Loaded, Origin, keep_final, load, recall_final};
 pub use msh::read;
 pub use quality::Quality;
-pub use sizes::view;
+pub use sizes::{follows, view};
 
 use crate::scene::Order;
 use std::path::PathBuf;

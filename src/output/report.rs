@@ -63,6 +63,8 @@ pub struct Report {
     pub discretization_error: Option<EstimateReport>,
     /// Meshes that were adapted to an error, one after another.
     pub rounds: Vec<RoundReport>,
+    /// The coarser mesh whose pressures the run began with.
+    pub coarser: Option<CoarserReport>,
     /// Estimated bounds of the spectrum of G^-1 F1''.
     pub spectrum: Option<[f64; 2]>,
     /// What more iterations would bring.
@@ -170,6 +172,21 @@ pub struct EstimateReport {
     pub pressure: Vec<f64>,
     /// Share of each body in the squared energy error, in the order of the scene.
     pub bodies: Vec<f64>,
+}
+
+/// A coarser mesh that was solved, roughly, for the start.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct CoarserReport {
+    /// How many times larger its elements are.
+    pub times: f64,
+    /// Degrees of freedom.
+    pub dofs: usize,
+    /// Contact points of all pairs.
+    pub points: usize,
+    /// Iterations.
+    pub iterations: usize,
+    /// Wall seconds, the making of the mesh included.
+    pub seconds: f64,
 }
 
 /// One mesh of an adaptation; errors are relative estimates.
@@ -304,6 +321,10 @@ impl Report {
             self.dofs,
             seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
         ));
+        if let Some(CoarserReport { times, dofs, iterations, seconds: taken, .. }) = self.coarser {
+            let cost = format!("{dofs} dofs, {iterations} iterations, {} s", seconds(taken));
+            lines.push(format!("  start: pressures of a mesh of elements {times} times larger ({cost})"));
+        }
         if !self.rounds.is_empty() {
             lines.push(
                 "  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds".to_owned(),

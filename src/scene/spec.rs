@@ -69,14 +69,23 @@ pub enum MeshSource {
         set: Vec<(String, f64)>,
         /// Where each name stands.
         places: Vec<Place>,
-        /// A field of sizes for Gmsh to follow instead of the script's own; no scene file has one.
-        sizes: Option<Arc<str>>,
+        /// Sizes of elements instead of the script's own; no scene file has them.
+        sizes: Option<Sizing>,
     },
     /// A mesh file, format 4.1, text or binary.
     Msh {
         /// The mesh file.
         file: Located<PathBuf>,
     },
+}
+
+/// Sizes of elements other than those that a Gmsh script asks for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Sizing {
+    /// A field of sizes for Gmsh to follow: a view of its own (`.pos`).
+    View(Arc<str>),
+    /// This many times those of the script. Structured meshes stay as they are.
+    Times(f64),
 }
 
 /// Polynomial order of the displacements.
@@ -325,8 +334,10 @@ pub enum Zone {
 /// Start of the iteration, given on the contact surfaces.
 #[derive(Debug, Clone)]
 pub enum Start {
-    /// Zero, and bodies that contact alone holds moved rigidly until the layers carry their loads.
+    /// As `Rigid`, and for large curved contacts in space the pressures of a coarser mesh, too.
     Auto,
+    /// Zero, and bodies that contact alone holds moved rigidly until the layers carry their loads.
+    Rigid,
     /// Zero normal displacement.
     Zero,
     /// The solution on a mesh of elements twice as large.

@@ -29,7 +29,7 @@ pub struct Krylov {
 const WORN: f64 = 1.5;
 
 /// Iterations that tell nothing of the pace.
-const FEW: usize = 4;
+const FEW: usize = 12;
 
 impl Krylov {
     /// Starts from G = K, with the options of prefix `<body>_` that stand in the database now. `near_null_space` are the

@@ -102,6 +102,8 @@ impl Union {
 pub struct Monolithic<S> {
     whole: SparseBody<S>,
     offset: Vec<usize>,
+    /// Whether it solves only as far as it is told.
+    inexact: bool,
 }
 
 impl<S: InnerSolver> Monolithic<S> {
@@ -117,13 +119,13 @@ impl<S: InnerSolver> Monolithic<S> {
             strain_constant: 0.0,
             carried: Vec::new(),
         };
-        Self { whole: SparseBody::new(body, union.rows, &[], solver), offset: union.offset }
+        Self { whole: SparseBody::new(body, union.rows, &[], solver), offset: union.offset, inexact: false }
     }
 }
 
 impl<S: InnerSolver> Coupled for Monolithic<S> {
     fn solve(&mut self, model: &Model, weight: &[f64], r: &[Vec<f64>], reduction: f64) -> Result<Option<Field>> {
-        self.whole.precision(reduction)?;
+        self.inexact = self.whole.precision(reduction)?;
         self.whole.robin(weight)?;
         let parts = || self.offset.windows(2).map(|part| part[0]..part[1]);
         let whole: Vec<f64> = parts().zip(r).flat_map(|(part, r)| &r[..part.len()]).copied().collect();
@@ -145,6 +147,10 @@ impl<S: InnerSolver> Coupled for Monolithic<S> {
 
     fn counts(&self) -> BodyCounts {
         self.whole.counts()
+    }
+
+    fn is_inexact(&self) -> bool {
+        self.inexact
     }
 }
 

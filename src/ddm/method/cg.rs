@@ -113,7 +113,7 @@ pub fn solve(here: &mut Here, kappa_weight: &[f64], reduction: f64, most: usize)
 }
 
 /// y += B' `force` in every body that lives here, for forces at the points.
-fn add_rows(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
+pub(super) fn add_rows(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
     for (index, y) in y.iter_mut().enumerate() {
         if let Some(body) = &model.bodies[index].local {
             body.add_rows(&model.at_rows(index, force), y);

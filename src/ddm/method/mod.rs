@@ -6,6 +6,7 @@ mod anderson;
 pub(super) mod cg;
 mod conjugate;
 mod newton;
+mod predicted;
 mod relaxed;
 
 pub use anderson::Anderson;
@@ -96,6 +97,9 @@ pub trait Method {
         FINE
     }
 
+    /// Contact pressures at the points, about those of the solution, for the first step. Most methods have no use for them.
+    fn predict(&mut self, _pressure: Vec<f64>) {}
+
     /// The step that leads on.
     ///
     /// # Errors
@@ -106,6 +110,11 @@ pub trait Method {
     /// NaN while nothing is known.
     fn amplification(&self) -> f64 {
         f64::NAN
+    }
+
+    /// Share of an iterate's error that the last step left, if the method can tell; one if not.
+    fn left(&self) -> f64 {
+        1.0
     }
 
     /// What was done with all bodies together, besides the sweeps.

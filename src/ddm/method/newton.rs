@@ -1,5 +1,6 @@
 //! Semismooth Newton (35) with exact line search on F1.
 
+use super::predicted::Predicted;
 use super::{Here, Method, Step, cg};
 use crate::ddm::BodyCounts;
 use crate::ddm::field::{Field, local_dot};
@@ -7,6 +8,7 @@ use crate::ddm::held;
 use crate::ddm::line::Line;
 use crate::ddm::model::Model;
 use crate::error::Result;
+use crate::linalg::axpy;
 
 /// How the Newton system is solved.
 pub enum Inner {
@@ -27,6 +29,9 @@ pub trait Coupled {
 
     /// What was done so far.
     fn counts(&self) -> BodyCounts;
+
+    /// Whether it solves only as far as it is told.
+    fn is_inexact(&self) -> bool;
 }
 
 /// Newton's method.
@@ -35,7 +40,19 @@ pub struct Newton {
     amplification: f64,
     spectrum: Option<(f64, f64)>,
     last: f64,
+    /// What the linear model of the last step missed, as a share of all contact forces.
+    missed: f64,
+    /// Share of the error that the last step left.
+    left: f64,
+    /// Pressures for the first step.
+    predicted: Option<Vec<f64>>,
 }
+
+/// Residual below which most of the contact is known.
+const NEAR: f64 = 0.1;
+
+/// Share of the residual asked for that an inexact solve aims at.
+const MARGIN: f64 = 0.1;
 
 /// Most conjugate gradient steps for one Newton system.
 const MOST: usize = 400;
@@ -43,16 +60,23 @@ const MOST: usize = 400;
 impl Newton {
     /// With this solver of its linear systems.
     pub fn new(inner: Inner) -> Self {
-        Self { inner, amplification: f64::NAN, spectrum: None, last: f64::INFINITY }
+        let nothing = f64::INFINITY;
+        let (amplification, last, missed) = (f64::NAN, nothing, nothing);
+        Self { inner, amplification, spectrum: None, last, missed, left: 1.0, predicted: None }
     }
 
     /// Forcing term: how far the linear system is solved. Far away a rough step does; near the end more would be lost than
     /// the quadratic convergence gives, and never more than the run asks for.
     fn forcing(&mut self, here: &Here) -> f64 {
+        if self.is_inexact() {
+            // what the model missed last is about what the next step can gain; near the end the noise of rough solves opens points
+            let (low, high) = (1e-6, if here.residual < NEAR { 0.02 } else { 0.1 });
+            return self.missed.clamp(low, high).max(0.2 * MARGIN * here.target / here.residual).min(high);
+        }
         let ratio = here.residual / self.last;
         let (low, high, margin) = match self.inner {
-            Inner::Direct(_) if self.last.is_infinite() => (0.1, 0.1, 0.1),
-            Inner::Direct(_) => (1e-6, 0.1, 0.1),
+            Inner::Direct(_) if self.last.is_infinite() => (0.1, 0.1, MARGIN),
+            Inner::Direct(_) => (1e-6, 0.1, MARGIN),
             Inner::Sweep => (1e-3, 0.3, 0.5),
         };
         self.last = here.residual;
@@ -113,6 +137,39 @@ impl Newton {
     }
 }
 
+impl Newton {
+    /// The step to about the displacements of the predicted pressures, once, if they hold all bodies and F1 falls.
+    fn foresee(&mut self, here: &mut Here) -> Result<Option<Step>> {
+        let (Some(pressure), Inner::Direct(coupled)) = (self.predicted.take(), &mut self.inner) else {
+            return Ok(None);
+        };
+        let Predicted { weight, mut force, precision } = Predicted::new(here.model, here.layer, &pressure);
+        if held::joint_is_weak(here.model, &weight) {
+            return Ok(None);
+        }
+        let push: Vec<f64> = force.iter().map(|force| -force).collect();
+        let mut r = here.sweep.residual.clone();
+        cg::add_rows(here.model, &push, &mut r);
+        let Some(direction) = coupled.solve(here.model, &weight, &r, precision)? else { return Ok(None) };
+        // a share of it would leave the same share of the way open, much more than the layers' compression
+        let length = if change(here, &direction, 1.0) < 0.0 { 1.0 } else { here.search(&direction).unwrap_or(0.0) };
+        if length == 0.0 {
+            return Ok(None);
+        }
+        axpy(1.0, &here.layer.force, &mut force);
+        self.missed = missed(here, &force, &weight, &direction, length);
+        Ok(Some(Step::Along(direction, length)))
+    }
+
+    /// Whether the linear systems are solved only as far as the forcing term says.
+    fn is_inexact(&self) -> bool {
+        matches!(&self.inner, Inner::Direct(coupled) if coupled.is_inexact())
+    }
+}
+
+/// How much larger the error of a pressure may be than the forcing term of the step says.
+const SPREAD: f64 = 5.0;
+
 /// Most solves with secants in a step.
 const ROUNDS: usize = 12;
 
@@ -125,6 +182,24 @@ const SHORT: f64 = 0.01;
 /// What F1 changes by along a direction.
 fn change(here: &mut Here, direction: &Field, length: f64) -> f64 {
     Line::new(here.model, here.layer, &here.sweep.residual, direction).change(length)
+}
+
+/// What a linear model of the layers misses after a step, as a share of all contact forces there: at the iterate it gives `force`
+/// at the points, with the slopes `weight` = omega kappa. A step that is not the whole direction misses what it leaves of it.
+fn missed(here: &Here, force: &[f64], weight: &[f64], direction: &Field, length: f64) -> f64 {
+    let closing = direction.closing();
+    let (mut apart, mut all) = (0.0, 0.0);
+    for (i, pair) in here.model.pairs.iter().enumerate() {
+        for q in here.model.range(i) {
+            let step = length * closing[q];
+            let pressure = pair.law.pressure(q - here.model.offset[i], here.layer.compression[q] + step);
+            let there = here.model.weight[q] * pressure;
+            apart += (there - force[q] - weight[q] * step).abs();
+            all += there;
+        }
+    }
+    let share: f64 = apart / all;
+    if share.is_nan() { f64::INFINITY } else { share.max((1.0 - length).abs()) }
 }
 
 /// Slopes of the layer from the iterate to where its law gives the pressures that the linear model predicts at the end of
@@ -178,6 +253,10 @@ impl Method for Newton {
     }
 
     fn step(&mut self, here: &mut Here) -> Result<Step> {
+        self.left = 1.0;
+        if let Some(step) = self.foresee(here)? {
+            return Ok(step);
+        }
         let forcing = self.forcing(here);
         let tangent = here.layer.tangent.clone();
         let (mut direction, energy) = self.solve(here, &tangent, forcing)?;
@@ -207,7 +286,22 @@ impl Method for Newton {
                 Err(_) => Step::Unbounded,
             });
         }
+        if self.is_inexact() {
+            let weight: Vec<f64> = here.model.weight.iter().zip(&here.layer.tangent).map(|(w, k)| w * k).collect();
+            self.missed = missed(here, &here.layer.force, &weight, &direction, length);
+            if self.missed <= here.target {
+                self.left = (SPREAD * forcing).min(1.0);
+            }
+        }
         Ok(Step::Along(direction, length))
+    }
+
+    fn left(&self) -> f64 {
+        self.left
+    }
+
+    fn predict(&mut self, pressure: Vec<f64>) {
+        self.predicted = Some(pressure);
     }
 
     fn coupled(&self) -> BodyCounts {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::mesh::load::from_script;
 use crate::mesh::{Origin, load};
-use crate::scene::MeshSource;
+use crate::scene::{MeshSource, Sizing};
 
 #[test]
 fn scripts_are_meshed_once_for_each_key() {
@@ -40,6 +40,10 @@ fn scripts_are_meshed_once_for_each_key() {
     assert_eq!(run(4.0, Order::P1).origin, Origin::Cache);
     // Nothing but meshes is left: n = 4, n = 3, order 2, and the moved one.
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 4);
+    // Elements twice as large are another mesh.
+    let set = [("n".into(), 4.0)];
+    let twice = from_script::<2>(&located(geo), &set, Some(&Sizing::Times(2.0)), Order::P1, &cache).unwrap();
+    assert_eq!((twice.origin, twice.mesh.group("left").unwrap().len()), (Origin::Gmsh, 2));
 }
 
 #[test]

@@ -77,8 +77,10 @@ impl Decoder<'_> {
 
     fn start(&self, node: &Node) -> Result<Start> {
         if let Value::String(_) = node.value {
-            return choose(node, "start", &[("auto", Start::Auto), ("zero", Start::Zero), ("nested", Start::Nested)])
-                .map_err(|error| error.help("it is \"auto\", \"zero\", \"nested\" or { normal = 1e-4 }"));
+            let words =
+                [("auto", Start::Auto), ("rigid", Start::Rigid), ("zero", Start::Zero), ("nested", Start::Nested)];
+            let all = "it is \"auto\", \"rigid\", \"zero\", \"nested\" or { normal = 1e-4 }";
+            return choose(node, "start", &words).map_err(|error| error.help(all));
         }
         let keys = Keys::open(node, "the start", &["normal"])?;
         Ok(Start::Normal(self.field(keys.require("normal")?)?))
