@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::mesh::load::from_script;
-use crate::mesh::{Origin, load};
+use crate::mesh::{Origin, follows, load};
 use crate::scene::{MeshSource, Sizing};
 
 #[test]
@@ -40,10 +40,28 @@ fn scripts_are_meshed_once_for_each_key() {
     assert_eq!(run(4.0, Order::P1).origin, Origin::Cache);
     // Nothing but meshes is left: n = 4, n = 3, order 2, and the moved one.
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 4);
-    // Elements twice as large are another mesh.
-    let set = [("n".into(), 4.0)];
-    let twice = from_script::<2>(&located(geo), &set, Some(&Sizing::Times(2.0)), Order::P1, &cache).unwrap();
-    assert_eq!((twice.origin, twice.mesh.group("left").unwrap().len()), (Origin::Gmsh, 2));
+}
+
+/// Elements twice as large are another mesh, if the script leaves them free.
+#[test]
+fn larger_elements() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = [folder.path().join("cache")];
+    let geo = folder.path().join("free.geo");
+    let run = |sizes: Option<&Sizing>| {
+        let loaded = from_script::<2>(&located(geo.clone()), &[], sizes, Order::P1, &cache).unwrap();
+        let follows =
+            follows(&MeshSource::Geo { file: located(geo.clone()), set: vec![], places: vec![], sizes: None });
+        (loaded.origin, loaded.mesh.group("left").unwrap().len(), follows)
+    };
+    let free = "Rectangle(1) = {0, 0, 0, 1, 1};\nMeshSize{:} = 0.125;\nPhysical Surface(\"all\") = {1};\n\
+                Physical Curve(\"left\") = {4};\n";
+    std::fs::write(&geo, format!("SetFactory(\"OpenCASCADE\");\n{free}")).unwrap();
+    assert_eq!(run(None), (Origin::Gmsh, 8, true));
+    assert_eq!(run(Some(&Sizing::Times(2.0))), (Origin::Gmsh, 4, true));
+    assert_eq!(run(Some(&Sizing::Times(2.0))), (Origin::Cache, 4, true));
+    std::fs::write(&geo, format!("SetFactory(\"OpenCASCADE\");\n{free}Transfinite Curve{{1:4}} = 9;\n")).unwrap();
+    assert_eq!(run(Some(&Sizing::Times(2.0))), (Origin::Gmsh, 8, false));
 }
 
 #[test]
