@@ -5,7 +5,7 @@
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 use winkler::error::Result;
-use winkler::petsc::{ConvergedReason, Int, Ksp, Matrix, Session};
+use winkler::petsc::{ConvergedReason, Int, Ksp, Matrix, Schur, Session};
 use winkler::solver::options::{UnreadKind, distribute, set_default, unread};
 
 /// After this, ranks that wait for each other are ended.
@@ -343,4 +343,44 @@ fn several_ranks_start_petsc_together() {
         Ok(())
     };
     expect_success(alone("several_ranks_start_petsc_together", 2, &[], inside));
+}
+
+/// Lower triangle of two uncoupled square grids of unit springs, one for each dof of a node: held by springs on one side, `side`
+/// rows of `side` nodes each.
+fn grids(side: usize) -> Vec<(usize, usize, f64)> {
+    let mut lower = Vec::new();
+    for node in 0..side * side {
+        let (row, column) = (node / side, node % side);
+        let before = [(row > 0).then(|| node - side), (column > 0).then(|| node - 1)];
+        let beyond = [row + 1 < side, column + 1 < side, row == 0];
+        let springs = before.iter().flatten().count() + beyond.into_iter().filter(|spring| *spring).count();
+        for dof in 0..2 {
+            lower.extend(before.iter().flatten().map(|other| (2 * node + dof, 2 * other + dof, -1.0)));
+            lower.push((2 * node + dof, 2 * node + dof, springs as f64));
+        }
+    }
+    lower
+}
+
+/// Small bodies of the plane are eliminated in MUMPS' own order, larger ones in that of METIS, unless an option says otherwise. The
+/// side of a grid opposite to the held one, moved as a whole, feels `side` springs in a row for each of its nodes.
+#[test]
+fn the_order_of_elimination_goes_with_the_size_and_not_into_the_complement() {
+    let output = alone("the_order_of_elimination_goes_with_the_size_and_not_into_the_complement", 0, &[], || {
+        let session = Session::start(&["-asked_mat_mumps_icntl_7", "1"].map(String::from))?;
+        // METIS is 1; 20 000 dofs are the last without it
+        for (body, side, order) in [("small", 100, 0), ("asked", 100, 1), ("large", 101, 1)] {
+            let dofs = 2 * side * side;
+            let retained: Vec<usize> = (dofs - 2 * side..dofs).collect();
+            let mut schur = Schur::analyse(&session, body, 2, dofs, &grids(side), &retained)?;
+            assert_eq!(schur.ordering(), order, "{body}");
+            schur.factor()?;
+            for row in schur.complement().chunks_exact(retained.len()) {
+                let force: f64 = row.iter().sum();
+                assert!((force * side as f64 - 1.0).abs() < 1e-10, "{body}: {force}");
+            }
+        }
+        Ok(())
+    });
+    expect_success(output);
 }

@@ -39,8 +39,8 @@ pub(super) fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<
     if function.is_null() {
         let name = LIBRARY.to_string_lossy();
         return Err(Error::new(Kind::Solver, format!("METIS ({name}) was not found"))
-            .because("the condensed solver takes its elimination order from it")
-            .help("`apt-get install libmetis5`, or take another solver: --set solver=mumps"));
+            .because("the condensed solver takes the elimination order of large bodies from it")
+            .help("`apt-get install libmetis5`, or take MUMPS' own order: -mat_mumps_icntl_7 0"));
     }
     let (mut count, mut order, mut position) = (nodes as i32, vec![-1; nodes], vec![-1; nodes]);
     // SAFETY: METIS 5 has these arguments; it reads the graph and writes one number a node to each of the last two.

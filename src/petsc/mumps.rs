@@ -9,6 +9,14 @@ use std::ptr::null_mut;
 /// Space beyond what the analysis expects, in per cent, tried one after the other.
 const ROOM: [i32; 4] = [20, 60, 200, 1000];
 
+/// Elimination orders, values of ICNTL(7): approximate minimum degree by MUMPS, and one that is given.
+const MINIMUM_DEGREE: Int = 0;
+const GIVEN: Int = 1;
+
+/// Bodies of up to this many dofs, at most two a node, are ordered by minimum degree. Nested dissection takes a third to half as
+/// long as all the rest there and saves hardly any fill: at most 8 %, but 18 % at 50 000 dofs. In space it saves a quarter at 12 000.
+const SMALL: usize = 20_000;
+
 /// Controls that belong to this binding.
 const OWN: [(usize, &str); 8] = [
     (5, "format of the matrix"),
@@ -56,8 +64,11 @@ impl Schur {
     /// Plans to eliminate all but the `retained` dofs. `lower` holds (row, column, value) of the lower triangle, row by row, each place once;
     /// `block_size` dofs belong to one node. Options `-<body>_mat_mumps_icntl_<i>` and `_cntl_<i>` are honoured.
     ///
+    /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1), in small bodies of the plane MUMPS' own approximate
+    /// minimum degree (0).
+    ///
     /// # Errors
-    /// When METIS is missing, an option cannot be used, or MUMPS refuses the pattern.
+    /// When METIS is needed and missing, an option cannot be used, or MUMPS refuses the pattern.
     pub fn analyse(
         session: &Session,
         body: &str,
@@ -77,25 +88,34 @@ impl Schur {
             rows: lower.iter().map(|entry| one(entry.0)).collect(),
             columns: lower.iter().map(|entry| one(entry.1)).collect(),
             values: lower.iter().map(|entry| entry.2).collect(),
-            positions: positions(block_size, rows, lower, retained)?,
+            positions: Vec::new(),
             retained: retained.iter().map(|&i| one(i)).collect(),
             complement: vec![0.0; retained.len() * retained.len()],
             _session: session.clone(),
         };
         schur.start()?;
+        schur.mumps.icntl[6] = if block_size <= 2 && rows <= SMALL { MINIMUM_DEGREE } else { GIVEN };
         schur.read_options(session, body)?;
         let mumps = &mut schur.mumps;
+        if mumps.icntl[6] == GIVEN {
+            schur.positions = positions(block_size, rows, lower, retained)?;
+            mumps.perm_in = schur.positions.as_mut_ptr();
+        }
         mumps.n = rows as Int;
         mumps.nnz = schur.values.len() as i64;
         mumps.irn = schur.rows.as_mut_ptr();
         mumps.jcn = schur.columns.as_mut_ptr();
         mumps.a = schur.values.as_mut_ptr();
-        mumps.perm_in = schur.positions.as_mut_ptr();
         mumps.size_schur = schur.retained.len() as Int;
         mumps.listvar_schur = schur.retained.as_mut_ptr();
         mumps.schur = schur.complement.as_mut_ptr();
         schur.call(1)?;
         Ok(schur)
+    }
+
+    /// The order of elimination that MUMPS took: INFOG(7), with the numbers of ICNTL(7).
+    pub fn ordering(&self) -> Int {
+        self.mumps.infog[6]
     }
 
     /// Memory in megabytes that the factorisation will take, S not counted.
@@ -198,8 +218,8 @@ impl Schur {
         self.call(-1)?;
         let icntl = &mut self.mumps.icntl;
         icntl[..4].copy_from_slice(&[-1, -1, -1, 0]);
-        // ordering given, complement asked for
-        (icntl[6], icntl[18]) = (1, 1);
+        // complement asked for
+        icntl[18] = 1;
         Ok(())
     }
 
