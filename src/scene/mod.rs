@@ -7,6 +7,7 @@ mod layer;
 mod overrides;
 mod read;
 mod settings;
+mod sizing;
 mod spec;
 #[cfg(test)]
 mod tests;
@@ -14,6 +15,7 @@ mod tests;
 pub use decode::reserved;
 pub use elasticity::*;
 pub use layer::{Bounds, FORMS, LawForm, LawKind, LayerSpec, Parameter};
+pub use sizing::Sizing;
 pub use spec::*;
 
 use crate::error::{Error, Kind, Result, Source};

@@ -5,10 +5,9 @@
 
 use super::expression::{Differentiable, Field};
 use super::layer::LayerSpec;
-use super::{ElasticitySpec, RegionSpec};
+use super::{ElasticitySpec, RegionSpec, Sizing};
 use crate::error::{Located, Place};
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// A checked scene.
 #[derive(Debug, Clone)]
@@ -77,15 +76,6 @@ pub enum MeshSource {
         /// The mesh file.
         file: Located<PathBuf>,
     },
-}
-
-/// Sizes of elements other than those that a Gmsh script asks for.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Sizing {
-    /// A field of sizes for Gmsh to follow: a view of its own (`.pos`).
-    View(Arc<str>),
-    /// This many times those of the script. Structured meshes stay as they are.
-    Times(f64),
 }
 
 /// Polynomial order of the displacements.
