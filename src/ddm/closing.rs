@@ -9,7 +9,16 @@ use crate::linalg::{axpy, dot};
 use nalgebra::{DMatrix, DVector};
 
 /// Newton steps of the small problem.
-const STEPS: usize = 200;
+const STEPS: usize = 50;
+
+/// Factor between the caps of laws that are too stiff to be met at once.
+const STIFFER: f64 = 10.0;
+
+/// Most caps: from a gap to compressions of 1e-30 of it.
+const CAPS: usize = 30;
+
+/// Share of the largest load that the small problem may lack in balance.
+const BALANCED: f64 = 1e-6;
 
 /// The trace of the rigid displacements that minimise F1 over the motions that supports leave free: no body is solved. Zero
 /// where supports hold everything, or where the layers answer beyond the range of numbers.
@@ -18,37 +27,91 @@ const STEPS: usize = 200;
 /// [`Unbounded`] if F1 falls for ever along such a motion. As bodies are elastic, F1 as a whole then has no minimum either:
 /// loads push a body away from all its contacts.
 pub fn rigid_closing(model: &Model) -> Result<Vec<f64>, Unbounded> {
-    let points = model.points();
     let motions: Vec<(Vec<f64>, f64)> = (0..model.bodies.len())
         .flat_map(|body| model.bodies[body].motions.iter().map(move |motion| (body, motion)))
         .map(|(body, motion)| {
-            let mut trace = vec![0.0; 2 * points];
+            let mut trace = vec![0.0; 2 * model.points()];
             model.put(body, &motion.trace, &mut trace);
             (trace, motion.work)
         })
         .collect();
-    let mut trace = vec![0.0; 2 * points];
-    if motions.is_empty() || motions.iter().all(|(_, work)| *work == 0.0) {
-        return Ok(trace);
+    let rest = vec![0.0; 2 * model.points()];
+    if motions.iter().all(|(_, work)| *work == 0.0) {
+        return Ok(rest);
     }
+    match descend(model, &motions, rest.clone(), f64::INFINITY)? {
+        End::Balanced(trace) => return Ok(trace),
+        End::Overflow => return Ok(rest),
+        End::Stuck(_) => {}
+    }
+    // a stiff layer that closes first hides the way on: with all layers as soft as the gaps are wide, all of them close, and
+    // each next cap begins near its end
+    let reach = model.gap.iter().fold(0.0f64, |most, gap| most.max(gap.abs()));
+    let load = motions.iter().map(|(_, work)| work.abs()).fold(0.0, f64::max);
+    let mut cap = load / (model.weight.iter().sum::<f64>() * if reach > 0.0 { reach } else { 1.0 });
+    let mut trace = rest;
+    for _ in 0..CAPS {
+        let Some(next) = descend(model, &motions, trace.clone(), cap)?.trace() else { break };
+        trace = next;
+        let (force, _) = capped(model, &trace, cap);
+        if force == Layer::at(model, &trace).force {
+            break;
+        }
+        cap *= STIFFER;
+    }
+    Ok(descend(model, &motions, trace.clone(), f64::INFINITY)?.trace().unwrap_or(trace))
+}
+
+/// How the small problem ended.
+enum End {
+    /// At its minimum.
+    Balanced(Vec<f64>),
+    /// Somewhere, out of steps.
+    Stuck(Vec<f64>),
+    /// At forces that are no numbers.
+    Overflow,
+}
+
+impl End {
+    fn trace(self) -> Option<Vec<f64>> {
+        match self {
+            End::Balanced(trace) | End::Stuck(trace) => Some(trace),
+            End::Overflow => None,
+        }
+    }
+}
+
+/// Forces of the layers and their tangents omega kappa, where no pressure is more than `cap` times the compression.
+fn capped(model: &Model, trace: &[f64], cap: f64) -> (Vec<f64>, Vec<f64>) {
+    let layer = Layer::at(model, trace);
+    let point = |q: usize| {
+        let (c, weight) = (layer.compression[q], model.weight[q]);
+        let soft = layer.pressure[q] <= cap * c || c <= 0.0 || cap.is_infinite();
+        if soft { (layer.force[q], weight * layer.tangent[q]) } else { (weight * cap * c, weight * cap) }
+    };
+    (0..model.points()).map(point).unzip()
+}
+
+/// Minimises F1 over `motions` (trace, work of the loads) from a trace on, under a `cap` of the layers, by Newton's method.
+fn descend(model: &Model, motions: &[(Vec<f64>, f64)], mut trace: Vec<f64>, cap: f64) -> Result<End, Unbounded> {
+    let points = model.points();
     let closing = |trace: &[f64], q: usize| trace[q] + trace[points + q];
     let soft = model.bodies.iter().map(|body| body.scale).fold(0.0, f64::max) * 1e-9;
     let count = motions.len();
     let load = motions.iter().map(|(_, work)| work.abs()).fold(0.0, f64::max);
     for _ in 0..STEPS {
-        let layer = Layer::at(model, &trace);
-        if layer.force.iter().any(|force| !force.is_finite()) {
-            return Ok(vec![0.0; 2 * points]);
+        let (force, spring) = capped(model, &trace, cap);
+        if force.iter().any(|force| !force.is_finite()) {
+            return Ok(End::Overflow);
         }
         let gradient = DVector::from_fn(count, |i, _| {
-            (0..points).map(|q| layer.force[q] * closing(&motions[i].0, q)).sum::<f64>() - motions[i].1
+            (0..points).map(|q| force[q] * closing(&motions[i].0, q)).sum::<f64>() - motions[i].1
         });
-        if gradient.amax() <= 1e-6 * load {
-            break;
+        if gradient.amax() <= BALANCED * load {
+            return Ok(End::Balanced(trace));
         }
         let mut stiffness = DMatrix::from_fn(count, count, |i, j| {
-            let spring = |q: usize| model.weight[q] * layer.tangent[q];
-            (0..points).map(|q| spring(q) * closing(&motions[i].0, q) * closing(&motions[j].0, q)).sum::<f64>()
+            (0..points).map(|q| spring[q] * closing(&motions[i].0, q) * closing(&motions[j].0, q)).sum::<f64>()
         });
         for i in 0..count {
             stiffness[(i, i)] += soft;
@@ -61,8 +124,8 @@ pub fn rigid_closing(model: &Model) -> Result<Vec<f64>, Unbounded> {
         let slope = |t: f64| {
             let mut moved = trace.clone();
             axpy(t, &direction, &mut moved);
-            let layer = Layer::at(model, &moved);
-            let push: f64 = (0..points).map(|q| layer.force[q] * closing(&direction, q)).sum();
+            let (force, _) = capped(model, &moved, cap);
+            let push: f64 = (0..points).map(|q| force[q] * closing(&direction, q)).sum();
             if push.is_nan() { f64::INFINITY } else { push - work }
         };
         match minimum(slope) {
@@ -70,7 +133,7 @@ pub fn rigid_closing(model: &Model) -> Result<Vec<f64>, Unbounded> {
             None => return Err(Unbounded),
         }
     }
-    Ok(trace)
+    Ok(End::Stuck(trace))
 }
 
 /// Layers that push this many times harder than loads and surfaces could make them start too deep.

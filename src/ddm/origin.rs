@@ -10,6 +10,9 @@ use super::model::Model;
 /// How many times an iterate's displacement its origin may be.
 const FAR: f64 = 10.0;
 
+/// How many times what was left of the iterate with the origin its displacement may become.
+const MOVED: f64 = 1e3;
+
 /// Binary digits that an origin's amounts have.
 const DIGITS: u32 = 24;
 
@@ -17,6 +20,8 @@ const DIGITS: u32 = 24;
 pub struct Origin {
     motion: Field,
     gap: Vec<f64>,
+    /// Largest trace of what was left of the iterate.
+    left: f64,
     /// What the loads have gained on these motions: to be added to F1.
     pub energy: f64,
 }
@@ -48,7 +53,7 @@ impl Origin {
         motion.trace = message.split_off(1);
         let gap = model.gap.clone();
         model.gap.iter_mut().zip(motion.closing()).for_each(|(gap, closing)| *gap -= closing);
-        Self { motion, gap, energy: message[0] }
+        Self { left: largest(&iterate.trace), motion, gap, energy: message[0] }
     }
 
     /// Traces of the motions.
@@ -56,11 +61,12 @@ impl Origin {
         &self.motion.trace
     }
 
-    /// Whether the motions are so much larger than where the iterate is that they do more harm than good: the start was no good.
+    /// Whether another origin would be a better one: motions so much larger than where the iterate is that they do more harm than
+    /// good, as the start was no good; or an iterate that has moved much farther than what bodies deform.
     pub fn is_far_from(&self, iterate: &Field) -> bool {
-        let size = |sum: &mut dyn Iterator<Item = f64>| sum.fold(0.0f64, |max, t| max.max(t.abs()));
-        let whole = size(&mut self.motion.trace.iter().zip(&iterate.trace).map(|(a, b)| a + b));
-        size(&mut self.motion.trace.iter().copied()) > FAR * whole
+        let whole: Vec<f64> = self.motion.trace.iter().zip(&iterate.trace).map(|(a, b)| a + b).collect();
+        let moved = self.left > 0.0 && largest(&iterate.trace) > MOVED * self.left;
+        moved || largest(&self.motion.trace) > FAR * largest(&whole)
     }
 
     /// Gives the motions back.
@@ -68,6 +74,11 @@ impl Origin {
         iterate.add(1.0, &self.motion);
         model.gap = self.gap;
     }
+}
+
+/// Largest entry by size.
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |max, value| max.max(value.abs()))
 }
 
 /// `amount` with the leading digits only. Its products with the motion of a flat surface along an axis are then exact, and what

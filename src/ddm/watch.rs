@@ -156,5 +156,5 @@ fn is_rounding(seen: &Seen) -> bool {
         floor[0] += model.weight[q] * layer.tangent[q] * (f64::EPSILON * terms).powi(2);
     }
     // the estimate counts each row's worst case once; smooth errors weigh more in G^-1
-    sweep.decrement.iter().sum::<f64>() <= 3e3 * floor[0]
+    sweep.decrement.iter().sum::<f64>() <= 1e3 * floor[0]
 }
