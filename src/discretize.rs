@@ -7,6 +7,7 @@ mod elastic;
 mod fields;
 mod find;
 mod gauge;
+mod mechanism;
 pub mod meshes;
 mod pairs;
 mod part;
@@ -29,6 +30,8 @@ use balance::Forces;
 pub use balance::{Balance, Resultant};
 use fields::{ErrorMaker, FieldMaker};
 use find::{placed, point};
+pub use mechanism::Mechanism;
+use mechanism::{Draft, Fixed};
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use std::rc::Rc;
@@ -160,6 +163,8 @@ pub struct Problem {
     pub bodies: Vec<BodyInfo>,
     /// Origin of each pair.
     pub contacts: Vec<ContactInfo>,
+    /// Free motions of several bodies together.
+    pub mechanisms: Vec<Mechanism>,
     /// Trace of the rigid motions that supports give bodies: states, and so the traces of iterates, are relative to them.
     pub carried: Vec<f64>,
     /// The meshes, kept only when an estimate of the error was asked for.
@@ -187,7 +192,7 @@ pub fn discretize<const D: usize>(
     exchange: Box<dyn Exchange>,
     maker: &mut dyn Maker,
 ) -> Result<Problem> {
-    let parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
+    let mut parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
     for found in pairs::all(scene, mesh, cut, &parts, keep)? {
@@ -200,12 +205,11 @@ pub fn discretize<const D: usize>(
     let owner = crate::parallel::owners(&loads, ranks.1);
     let (mut slots, mut infos, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
     let (mut assemblies, mut assemblies_avoided) = (0, 0);
-    for (index, mut part) in parts.into_iter().enumerate() {
-        let (segments, rows) = rows_of(index, &pairs, part.space.dofs());
-        let free = part.in_dofs(rigid::of(&part.space));
-        let nodal_load = part.load(mesh)?;
-        let load = part.load_on_dofs(nodal_load.clone());
-        let gauged = gauge::fix(&mut part, &free, &rows, &load);
+    let drafts = parts.iter().enumerate().map(|(index, part)| draft(index, part, &pairs, mesh));
+    let drafts = drafts.collect::<Result<Vec<_>>>()?;
+    let Fixed { gauged, mechanisms } = mechanism::fix(&mut parts, &drafts, &pairs);
+    for (index, ((part, draft), gauged)) in parts.into_iter().zip(drafts).zip(gauged).enumerate() {
+        let Draft { segments, rows, free, nodal_load, load } = draft;
         let prescribed: Vec<(usize, f64)> = part.prescribed_sorted();
         let (carried, prescribed) = carried::carried(&free, &prescribed)
             .filter(|_| part.springs.is_empty())
@@ -216,7 +220,7 @@ pub fn discretize<const D: usize>(
         }
         offsets.push(offset);
         let left = part.left(&free);
-        let motions: Vec<Motion> = left.iter().map(|motion| trace_of(motion, &rows, &load)).collect();
+        let motions: Vec<Motion> = left.iter().map(|motion| trace_of::<D>(motion, &rows, &load)).collect();
         let mut slot = BodySlot {
             name: part.spec.name.value.clone(),
             local: None,
@@ -293,10 +297,11 @@ pub fn discretize<const D: usize>(
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
+    model.adrift = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).map(Mechanism::adrift);
     let mut carried = vec![0.0; 2 * model.points()];
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);
-    Ok(Problem { model, bodies: infos, contacts, meshes, carried, assemblies, assemblies_avoided })
+    Ok(Problem { model, bodies: infos, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided })
 }
 
 impl Problem {
@@ -358,6 +363,15 @@ pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Vec<f64>> 
     Ok(trace)
 }
 
+/// What is known of a body before motions are fixed.
+fn draft<const D: usize>(index: usize, part: &Part<D>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Draft> {
+    let (segments, rows) = rows_of(index, pairs, part.space.dofs());
+    let free = part.in_dofs(rigid::of(&part.space));
+    let nodal_load = part.load(mesh)?;
+    let load = part.load_on_dofs(nodal_load.clone());
+    Ok(Draft { segments, rows, free, nodal_load, load })
+}
+
 /// Contact rows of a body over all pairs, in the order of its segments.
 fn rows_of(body: usize, pairs: &[ContactPair], dofs: usize) -> (Vec<Segment>, Csr) {
     let mut segments = Vec::new();
@@ -396,9 +410,9 @@ fn share(segments: &[Segment], pairs: &[ContactPair]) -> [f64; 3] {
     if total > 0.0 { sum.map(|sum| sum / total) } else { sum }
 }
 
-fn trace_of(motion: &RigidMotion, rows: &Csr, load: &[f64]) -> Motion {
+fn trace_of<const D: usize>(motion: &RigidMotion, rows: &Csr, load: &[f64]) -> Motion {
     let mut trace = vec![0.0; rows.rows()];
     rows.multiply(&motion.displacement, &mut trace);
-    let work = gauge::work(&motion.displacement, load);
+    let work = gauge::work::<D>(&motion.displacement, load);
     Motion { name: motion.name.clone(), trace, work }
 }

@@ -119,6 +119,22 @@ pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
     }
 }
 
+/// Least squares: amounts of some vectors that together come nearest to another.
+pub fn fit(vectors: &[Vec<f64>], to: &[f64]) -> Vec<f64> {
+    let count = vectors.len();
+    let normal = DMatrix::from_fn(count, count, |i, j| dot(&vectors[i], &vectors[j]));
+    let right = DVector::from_fn(count, |i, _| dot(&vectors[i], to));
+    let largest = (0..count).map(|i| normal[(i, i)]).fold(0.0, f64::max);
+    if largest == 0.0 {
+        return vec![0.0; count];
+    }
+    // combinations of the vectors that vanish stay out
+    match normal.svd(true, true).solve(&right, 1e-10 * largest) {
+        Ok(amounts) => amounts.as_slice().to_vec(),
+        Err(_) => vec![0.0; count],
+    }
+}
+
 /// Basis of the kernel of a small symmetric positive semidefinite matrix: eigenvectors of eigenvalues at most
 /// `tolerance * scale`. The basis is reduced so that pure motions come out pure where the kernel allows it.
 pub fn kernel(gram: &DMatrix<f64>, scale: f64, tolerance: f64) -> Vec<DVector<f64>> {

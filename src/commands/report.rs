@@ -7,7 +7,8 @@ use super::run::{Clock, Prepared};
 use super::steps;
 use crate::contact::ContactPair;
 use crate::ddm::forecast::{best_factor, best_gamma};
-use crate::ddm::{BodyCounts, Model, Outcome, Status};
+use crate::ddm::held::FreeMotion;
+use crate::ddm::{Adrift, BodyCounts, Model, Outcome, Status};
 use crate::discretize::Problem;
 use crate::estimate::Estimate;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
@@ -26,8 +27,8 @@ pub fn status_name(status: &Status) -> &'static str {
         Status::IterationLimit => "iteration-limit",
         Status::NotFinite { .. } => "not-finite",
         Status::Cycle { .. } => "cycle",
-        Status::Unheld { .. } => "unheld",
-        Status::Unbounded => "unbounded",
+        Status::Unheld { .. } | Status::Adrift(_) => "unheld",
+        Status::Unbounded { .. } => "unbounded",
         Status::InnerSolver { .. } => "inner-solver",
     }
 }
@@ -70,14 +71,38 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
              or a start that closes the contact (method.start)",
             name(body)
         ),
-        Status::Unbounded => format!(
-            "in iteration {k} the energy falls for ever: the loads push a body away from its contact, and no support stops it; \
-             add a support, or turn the load"
+        Status::Adrift(Adrift { bodies, motion, work }) => format!(
+            "bodies {}: nothing holds them together in their {motion}, which changes no gap, and loads work on it ({} of what \
+             forces of their sizes could): add a support, or balance the loads",
+            in_words(bodies.iter().map(name)),
+            sci(*work, 1)
         ),
+        Status::Unbounded { moving } => {
+            let part = |free: &FreeMotion| format!("`{}` ({})", name(&free.body), free.name);
+            let (what, from) = match &moving[..] {
+                [] => ("a body".to_owned(), "its contact, and no support stops it"),
+                [one] => (part(one), "its contact, and no support stops it"),
+                all => {
+                    (all.iter().map(part).collect::<Vec<_>>().join(", "), "their contacts, and no support stops them")
+                }
+            };
+            format!(
+                "in iteration {k} the energy falls for ever: the loads push {what} away from {from}; add a support, or turn the load"
+            )
+        }
         Status::InnerSolver { body, reason } => {
             let reason = if reason.is_empty() { "its rank knows more" } else { reason };
             format!("body `{}`: its inner solver failed in iteration {k}: {reason}", name(body))
         }
+    }
+}
+
+/// Names of bodies as in a sentence.
+pub fn in_words<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    let mut names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
+    match names.pop() {
+        Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
+        last => last.unwrap_or_default(),
     }
 }
 

@@ -2,11 +2,12 @@
 
 use super::inner::Inner;
 use super::method;
+use super::report::in_words;
 use super::steps;
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::method::Method;
 use crate::ddm::{self, BodySlot, Observer, Outcome, RobinRule, Settings, Status, StopRule};
-use crate::discretize::{self, Problem};
+use crate::discretize::{self, Mechanism, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
 use crate::output::{CoarserReport, StepReport};
@@ -207,6 +208,7 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
         warnings
             .push(format!("body {}: nothing holds its {motions}, no load works on it: fixed at one node", body.name));
     }
+    warnings.extend(problem.mechanisms.iter().map(|mechanism| mechanism_in_words(problem, mechanism)));
     warnings.extend(problem.bodies.iter().filter_map(|body| body.warning.clone()));
     for (pair, contact) in problem.model.pairs.iter().zip(&problem.contacts) {
         let (without, all) = (pair.uncovered(), pair.carriers.len());
@@ -223,6 +225,18 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// A free motion of several bodies as a warning.
+fn mechanism_in_words(problem: &Problem, mechanism: &Mechanism) -> String {
+    let name = |&body: &usize| &problem.bodies[body].name;
+    let bodies = in_words(mechanism.bodies.iter().map(name));
+    let end = match mechanism.fixed.as_ref().map(name) {
+        Some(body) => format!("no load works on it: fixed at nodes of `{body}`"),
+        None if mechanism.work == 0.0 => "no load works on it: displacements are free up to it".to_owned(),
+        None => "and loads work on it: there is no solution".to_owned(),
+    };
+    format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.name)
 }
 
 /// Factors every body for the start, then refuses options that nobody read.

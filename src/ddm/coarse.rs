@@ -6,9 +6,8 @@
 
 use super::field::Field;
 use super::joint::Joint;
-use super::lift::fit;
 use super::model::Model;
-use crate::linalg::{axpy, dot};
+use crate::linalg::{axpy, dot, fit};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Share of the largest eigenvalue of A, scaled to ones on its diagonal, below which contact does not resist a motion.

@@ -3,7 +3,7 @@
 use super::joint::Joint;
 use super::model::{BodySlot, Model};
 use crate::linalg::kernel;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// A spring stiffness below this share of the largest stiffness in the body drowns in rounding.
 const SAFE: f64 = 1e-13;
@@ -52,6 +52,16 @@ pub fn joint_is_weak(model: &Model, weight: &[f64]) -> bool {
     !kernel(&Joint::of(model).stiffness(weight), natural, 1e-9).is_empty()
 }
 
+/// A motion of all bodies as motions of each body that it moves.
+pub fn parts(model: &Model, joint: &Joint, amounts: &DVector<f64>) -> Vec<FreeMotion> {
+    let moves = |body: &usize| joint.of_body(*body).any(|i| amounts[i].abs() > 1e-6 * amounts.amax());
+    let part = |body: usize| {
+        let own = joint.of_body(body);
+        FreeMotion { body, name: name(&model.bodies[body], &amounts.rows(own.start, own.len()).into_owned()) }
+    };
+    (0..model.bodies.len()).filter(moves).map(part).collect()
+}
+
 /// Springs at a body's contact rows that together are about as stiff as the body: the stiffness under each point, spread
 /// over all of them.
 pub fn natural_springs(model: &Model, body: usize) -> Vec<f64> {
@@ -69,7 +79,7 @@ fn springs(slot: &BodySlot, weight: &[f64]) -> DMatrix<f64> {
     })
 }
 
-fn name(slot: &BodySlot, motion: &nalgebra::DVector<f64>) -> String {
+fn name(slot: &BodySlot, motion: &DVector<f64>) -> String {
     let largest = motion.amax();
     let parts = (0..slot.motions.len()).filter(|&i| motion[i].abs() > 1e-6 * largest);
     parts.map(|i| slot.motions[i].name.as_str()).collect::<Vec<_>>().join(" with ")

@@ -5,16 +5,17 @@ use super::body::BodyCounts;
 use super::closing::rigid_closing;
 use super::field::Field;
 use super::forecast::Forecast;
-use super::held;
+use super::held::{self, FreeMotion};
 use super::interval::{Interval, interval};
 use super::layer::Layer;
 use super::lift::{lift, move_rigidly};
 use super::measure::{At, Measuring};
 use super::method::{FINE, Here, Method, Step};
-use super::model::Model;
+use super::model::{Adrift, Model};
 use super::origin::Origin;
 use super::progress::{Observer, Row};
 use super::robin::{Robin, RobinRule};
+use super::scale::Scale;
 use super::stop::StopRule;
 use super::watch::{Last, Verdict};
 use super::zone::RobinZone;
@@ -67,8 +68,13 @@ pub enum Status {
         /// Name of its free rigid motion.
         motion: String,
     },
-    /// F1 falls for ever: loads push a body where neither a support nor a contact stops it.
-    Unbounded,
+    /// Loads move several bodies together in a way that changes no gap and that nothing holds.
+    Adrift(Adrift),
+    /// F1 falls for ever: loads push bodies where neither a support nor a contact stops them.
+    Unbounded {
+        /// The bodies and their motions, where they are known.
+        moving: Vec<FreeMotion>,
+    },
     /// A body's inner solver failed.
     InnerSolver {
         /// The body.
@@ -116,7 +122,10 @@ fn hopeless(model: &Model) -> Option<Status> {
     if let Some(free) = held::unheld(model, &springs) {
         return Some(Status::Unheld { body: free.body, motion: free.name });
     }
-    rigid_closing(model).is_err().then_some(Status::Unbounded)
+    if let Some(adrift) = &model.adrift {
+        return Some(Status::Adrift(adrift.clone()));
+    }
+    rigid_closing(model).err().map(|moving| Status::Unbounded { moving })
 }
 
 /// Residual at which bodies are about where they will stay: the origin of displacements is taken anew there, so that what is
@@ -130,6 +139,7 @@ const SETTLED: f64 = 1e-4;
 pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Observer) -> Result<Outcome> {
     let clock = Instant::now();
     let mut early = hopeless(model);
+    let scale = Scale::at_rest(model);
     let mut iterate = Field::rest(model);
     if let Some(field) = settings.resume.take() {
         iterate = field;
@@ -142,7 +152,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     // an estimate of the discretisation's error needs the iterates whole
     let floats = model.bodies.iter().any(|slot| !slot.motions.is_empty());
     let mut origin = (floats && settings.balance.is_none()).then(|| Origin::take(model, &mut iterate));
-    let mut measuring = Measuring::new(clock, Robin::new(settings.robin.clone()));
+    let mut measuring = Measuring::new(clock, Robin::new(settings.robin.clone()), scale);
     let mut last: Option<Last> = None;
     let mut rows: Vec<Row> = Vec::new();
     let mut balance = settings.balance.take().map(Balance::new);
@@ -183,7 +193,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
         let mut here = Here { model, sweeper, k, layer: &layer, weight: &weight, sweep: &sweep, residual, target };
         let step = settings.methods[active].step(&mut here)?;
         let (direction, length, relaxed) = match step {
-            Step::Unbounded => break (Status::Unbounded, layer, weight),
+            Step::Unbounded => break (Status::Unbounded { moving: Vec::new() }, layer, weight),
             Step::Sweep(gamma) => (None, gamma, true),
             Step::Along(direction, length) => (Some(direction), length, false),
         };

@@ -3,7 +3,7 @@
 //! Motions are numbered through body by body. As K E = 0, what is asked of them here are sums over contact points.
 
 use super::model::{Model, Motion, Segment};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
 /// The free rigid motions of all bodies.
@@ -69,5 +69,34 @@ impl<'a> Joint<'a> {
             }
         }
         stiffness
+    }
+
+    /// B E `amounts`: what each point closes by.
+    pub fn closing(&self, amounts: &DVector<f64>) -> Vec<f64> {
+        let mut closing = vec![0.0; self.pairs.last().map_or(0, |(range, _)| range.end)];
+        for (range, felt) in &self.pairs {
+            for &(i, trace) in felt.iter().filter(|(i, _)| amounts[*i] != 0.0) {
+                crate::linalg::axpy(amounts[i], trace, &mut closing[range.clone()]);
+            }
+        }
+        closing
+    }
+
+    /// (B E)' `force`: work of forces at the points on each motion.
+    pub fn work(&self, force: &[f64]) -> DVector<f64> {
+        let mut work = DVector::zeros(self.count());
+        for (range, felt) in &self.pairs {
+            felt.iter().for_each(|&(i, trace)| work[i] += crate::linalg::dot(trace, &force[range.clone()]));
+        }
+        work
+    }
+
+    /// B E point by point: the motions that a point feels, and what they close there.
+    pub fn columns(&self) -> Vec<Vec<(usize, f64)>> {
+        let of = |(range, felt): &(Range<usize>, Vec<Felt>)| {
+            let at = |q: usize| felt.iter().map(|&(i, trace)| (i, trace[q])).filter(|(_, t)| *t != 0.0).collect();
+            (0..range.len()).map(at).collect::<Vec<_>>()
+        };
+        self.pairs.iter().flat_map(of).collect()
     }
 }

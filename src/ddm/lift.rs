@@ -11,8 +11,7 @@ use super::layer::Layer;
 use super::method::ROUGH;
 use super::model::{BodySlot, Model};
 use crate::error::Result;
-use crate::linalg::{axpy, dot};
-use nalgebra::{DMatrix, DVector};
+use crate::linalg::{axpy, fit};
 
 /// Springs of the constraint B u = t over the stiffness of the nodes under them.
 const STIFF: f64 = 1e4;
@@ -92,22 +91,6 @@ pub fn move_rigidly(model: &mut Model, trace: &[f64]) -> Result<(Field, Option<(
     // not a number counts as deep, rounding does not
     let shallow = energy(&iterate.trace) <= DEEPER * energy(trace) + ROUNDING * cost;
     if shallow { Ok((iterate, failed)) } else { lift(model, trace) }
-}
-
-/// Least squares: amounts of some vectors that together come nearest to another.
-pub(super) fn fit(vectors: &[Vec<f64>], to: &[f64]) -> Vec<f64> {
-    let count = vectors.len();
-    let normal = DMatrix::from_fn(count, count, |i, j| dot(&vectors[i], &vectors[j]));
-    let right = DVector::from_fn(count, |i, _| dot(&vectors[i], to));
-    let largest = (0..count).map(|i| normal[(i, i)]).fold(0.0, f64::max);
-    if largest == 0.0 {
-        return vec![0.0; count];
-    }
-    // motions that contact does not feel stay out
-    match normal.svd(true, true).solve(&right, 1e-10 * largest) {
-        Ok(amounts) => amounts.as_slice().to_vec(),
-        Err(_) => vec![0.0; count],
-    }
 }
 
 /// The iterate with the given trace (values where a support prescribes the row are not taken: the support wins).

@@ -9,6 +9,7 @@ use super::model::Model;
 use super::origin::Origin;
 use super::progress::Row;
 use super::robin::{self, Robin};
+use super::scale::Scale;
 use super::sweep::{Sweep, Sweeper};
 use super::watch::{Last, Seen, Verdict, Watch};
 use crate::error::Result;
@@ -38,9 +39,9 @@ pub(super) struct At<'a> {
 }
 
 impl Measuring {
-    /// For a run that began at `clock`.
-    pub fn new(clock: Instant, robin: Robin) -> Self {
-        Self { clock, robin, watch: Watch::default(), sweeper: Sweeper::default() }
+    /// For a run that began at `clock`, with the scales of rest.
+    pub fn new(clock: Instant, robin: Robin, scale: Scale) -> Self {
+        Self { clock, robin, watch: Watch::new(scale), sweeper: Sweeper::default() }
     }
 
     /// The Robin term omega psi kappa for the sweep at an iterate. Steps of a joint method take nothing from it but a measure, for

@@ -48,6 +48,17 @@ pub struct Motion {
     pub work: f64,
 }
 
+/// A motion of several bodies together that changes no gap and that nothing holds, although loads do work on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adrift {
+    /// The bodies that it moves.
+    pub bodies: Vec<usize>,
+    /// Its name.
+    pub motion: String,
+    /// Work of the loads on it, as a share of what forces of their sizes could do.
+    pub work: f64,
+}
+
 /// A body in the model; the arrays are known on every rank, the body itself where it lives.
 pub struct BodySlot {
     /// Name in the scene.
@@ -76,6 +87,8 @@ pub struct Model {
     pub weight: Vec<f64>,
     /// d of all points, less what prescribed displacements close of it.
     pub gap: Vec<f64>,
+    /// Why there is no solution, where that is known beforehand.
+    pub adrift: Option<Adrift>,
     /// Connection to the other ranks.
     pub exchange: Box<dyn Exchange>,
 }
@@ -88,7 +101,7 @@ impl Model {
             offset.push(offset[offset.len() - 1] + pair.len());
         }
         let weight = pairs.iter().flat_map(|pair| pair.weight.iter().copied()).collect();
-        let mut model = Self { bodies, pairs, offset, weight, gap: Vec::new(), exchange };
+        let mut model = Self { bodies, pairs, offset, weight, gap: Vec::new(), adrift: None, exchange };
         model.scale_gaps(1.0);
         model
     }

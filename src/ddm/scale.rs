@@ -1,7 +1,7 @@
-//! What counts as nothing: energies, pressures and forces of the start, by which a solution that vanishes is measured.
+//! What counts as nothing: energies, pressures and forces of the start and of rest, by which a solution that vanishes is measured.
 //!
 //! Bodies that nothing presses together but an initial overlap, and that nothing holds, move apart until no pressure is left: all
-//! that a relative tolerance could refer to vanishes with the error. What remains then is the start. Its layers may answer
+//! that a relative tolerance could refer to vanishes with the error. What remains then is the start, or rest. Its layers may answer
 //! an overlap with any pressure, so each point counts for no more than the surfaces under it could answer elastically.
 
 use super::layer::Layer;
@@ -15,7 +15,7 @@ const NOTHING: f64 = 1e-6;
 /// the point about which it turns, and their work be rounding.
 const LITTLE: f64 = 1e-3;
 
-/// Least scales of a run, from its start.
+/// Least scales of a run, from rest and its start.
 #[derive(Debug, Default)]
 pub struct Scale {
     known: bool,
@@ -28,18 +28,29 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Takes the scales of the start, if they are not known; `strain` is u'Ku over all bodies.
+    /// Takes the scales of the start in, if that was not done; `strain` is u'Ku over all bodies.
     pub fn learn(&mut self, model: &Model, layer: &Layer, strain: f64) {
         if std::mem::replace(&mut self.known, true) {
             return;
         }
+        self.raise(model, layer, strain);
+    }
+
+    /// The scales of bodies at rest: an overlap of the scene, which a start may have opened.
+    pub fn at_rest(model: &Model) -> Self {
+        let mut scale = Self::default();
+        scale.raise(model, &Layer::at(model, &vec![0.0; 2 * model.points()]), 0.0);
+        scale
+    }
+
+    fn raise(&mut self, model: &Model, layer: &Layer, strain: f64) {
         let force = elastic(model, layer);
         let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
         let work = force.iter().zip(&layer.compression).map(|(f, c)| f * c.max(0.0)).sum::<f64>();
-        self.energy = NOTHING * NOTHING * finite(strain.abs() + work);
+        self.energy = self.energy.max(NOTHING * NOTHING * finite(strain.abs() + work));
         let pressure = force.iter().zip(&model.weight).map(|(f, w)| f / w).fold(0.0, f64::max);
-        self.pressure = NOTHING * finite(pressure);
-        self.force = NOTHING * finite(force.iter().sum());
+        self.pressure = self.pressure.max(NOTHING * finite(pressure));
+        self.force = self.force.max(NOTHING * finite(force.iter().sum()));
     }
 
     /// The relative residual: root of `numerator` = r'G^-1 r over `reference` = u'Ku + sum omega p c. A zero reference asks for

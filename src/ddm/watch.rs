@@ -58,6 +58,11 @@ pub(super) struct Watch {
 }
 
 impl Watch {
+    /// With the scales of rest.
+    pub fn new(scale: Scale) -> Self {
+        Self { scale, ..Self::default() }
+    }
+
     /// The row of an iterate: residual and F1 from the sweep at it, increments from the `step` that led to it.
     pub fn measure(&mut self, seen: &Seen) -> Row {
         let Seen { model, iterate, origin, layer, sweep, last } = *seen;

@@ -41,8 +41,16 @@ pub fn free(left: &[RigidMotion], prescribed: &[(usize, f64)], load: &[f64]) -> 
 
 /// The rigid motions of a body; of one of revolution the translation along its axis alone.
 pub fn of<const D: usize>(space: &Space<D>) -> Vec<RigidMotion> {
-    let mut all = modes(&space.nodes);
-    if space.axisymmetric {
+    of_all(&[space])
+}
+
+/// The rigid motions of several bodies as one, node by node and body by body.
+pub fn of_all<const D: usize>(spaces: &[&Space<D>]) -> Vec<RigidMotion> {
+    let mut all = match spaces {
+        [space] => modes(&space.nodes),
+        _ => modes(&spaces.iter().flat_map(|space| space.nodes.iter().copied()).collect::<Vec<_>>()),
+    };
+    if spaces.iter().any(|space| space.axisymmetric) {
         all = vec![all.swap_remove(1)];
     }
     all
