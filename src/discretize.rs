@@ -53,11 +53,11 @@ pub struct Outline<'a> {
 
 /// Gives bodies their inner solvers.
 pub trait Maker {
-    /// Decides on the solver of a body: called on every rank for every body, in the order of the scene.
+    /// Decides on the solvers of all bodies, in the order of the scene: called once, on every rank.
     ///
     /// # Errors
     /// Failures of PETSc's options.
-    fn plan(&mut self, outline: &Outline) -> Result<()>;
+    fn plan(&mut self, outlines: &[Outline]) -> Result<()>;
 
     /// Makes a body, on the rank that owns it, after its plan.
     ///
@@ -208,12 +208,20 @@ pub fn discretize<const D: usize>(
     let drafts = parts.iter().enumerate().map(|(index, part)| draft(index, part, &pairs, mesh));
     let drafts = drafts.collect::<Result<Vec<_>>>()?;
     let Fixed { gauged, mechanisms } = mechanism::fix(&mut parts, &drafts, &pairs);
-    for (index, ((part, draft), gauged)) in parts.into_iter().zip(drafts).zip(gauged).enumerate() {
+    let supported: Vec<Supported> =
+        parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
+    let outlines = parts.iter().zip(&drafts).zip(&supported).map(|((part, draft), supported)| Outline {
+        name: &part.spec.name.value,
+        dimension: D,
+        rows: &draft.rows,
+        prescribed: &supported.prescribed,
+        motions: &draft.free,
+    });
+    maker.plan(&outlines.collect::<Vec<_>>())?;
+    let drafts = drafts.into_iter().zip(supported);
+    for (index, ((part, (draft, supported)), gauged)) in parts.into_iter().zip(drafts).zip(gauged).enumerate() {
         let Draft { segments, rows, free, nodal_load, load } = draft;
-        let prescribed: Vec<(usize, f64)> = part.prescribed_sorted();
-        let (carried, prescribed) = carried::carried(&free, &prescribed)
-            .filter(|_| part.springs.is_empty())
-            .unwrap_or((Vec::new(), prescribed));
+        let Supported { carried, prescribed } = supported;
         let mut offset = vec![0.0; rows.rows()];
         if !carried.is_empty() {
             rows.multiply(&carried, &mut offset);
@@ -238,13 +246,6 @@ pub fn discretize<const D: usize>(
         let held = slot.motions.len() == gauge::felt_by_none(&slot.motions).len();
         let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
         let stiffness = if held && surface > 0.0 { modulus * surface / volume } else { 0.0 };
-        maker.plan(&Outline {
-            name: &slot.name,
-            dimension: D,
-            rows: &rows,
-            prescribed: &prescribed,
-            motions: &free,
-        })?;
         if let Some(before) = maker.kept(&slot.name) {
             slot = BodySlot { segments: slot.segments, motions: slot.motions, ..before };
             assemblies_avoided += 1;
@@ -370,6 +371,22 @@ fn draft<const D: usize>(index: usize, part: &Part<D>, pairs: &[ContactPair], me
     let nodal_load = part.load(mesh)?;
     let load = part.load_on_dofs(nodal_load.clone());
     Ok(Draft { segments, rows, free, nodal_load, load })
+}
+
+/// What supports prescribe.
+struct Supported {
+    /// Displacement by which they move the body as one, one entry a dof; empty for none.
+    carried: Vec<f64>,
+    /// (dof, value) besides it, sorted by dof.
+    prescribed: Vec<(usize, f64)>,
+}
+
+/// What the supports of a body prescribe; `free` are the rigid motions of the free body.
+fn supported<const D: usize>(part: &Part<D>, free: &[RigidMotion]) -> Supported {
+    let prescribed = part.prescribed_sorted();
+    let whole = carried::carried(free, &prescribed).filter(|_| part.springs.is_empty());
+    let (carried, prescribed) = whole.unwrap_or((Vec::new(), prescribed));
+    Supported { carried, prescribed }
 }
 
 /// Contact rows of a body over all pairs, in the order of its segments.

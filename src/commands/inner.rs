@@ -78,25 +78,54 @@ impl<'a> Inner<'a> {
             },
         })
     }
+
+    /// Lets the bodies agree where the method can join them and nobody said otherwise.
+    fn agree(&mut self) -> Result<()> {
+        if self.asked.is_some() || !self.measures {
+            return Ok(());
+        }
+        for plan in &self.plans {
+            if options::asks_for_ksp(self.session, &plan.name)? {
+                return Ok(());
+            }
+        }
+        agree(&mut self.plans);
+        Ok(())
+    }
+}
+
+/// Gives all bodies multigrid if one of them needs it: Newton's method joins them then, and is left with sweeps otherwise.
+fn agree(plans: &mut [Plan]) {
+    let Some(first) = plans.iter().find(|plan| plan.preset == Preset::Hypre).map(|plan| plan.name.clone()) else {
+        return;
+    };
+    for plan in plans.iter_mut().filter(|plan| plan.preset != Preset::Hypre) {
+        plan.preset = Preset::Hypre;
+        plan.reason = format!("{} dofs, and `{first}` has it: Newton's method joins the bodies", plan.dofs);
+    }
 }
 
 impl Maker for Inner<'_> {
-    fn plan(&mut self, outline: &Outline) -> Result<()> {
-        let &Outline { name, dimension, rows, prescribed, motions } = outline;
-        let retained = Retained::new(dimension, rows, prescribed, motions);
-        // a body that is kept has its memory already
-        let memory = if self.kept.iter().any(|slot| slot.name == name) { usize::MAX } else { self.memory };
-        let size = Size { dimension, dofs: rows.columns, retained: retained.dofs.len(), memory };
-        let (preset, reason) = self.choose(name, &size)?;
-        if matches!(preset, Preset::Mumps | Preset::Condensed) && memory == self.memory {
-            self.memory = self.memory.saturating_sub(size.bytes(preset));
+    fn plan(&mut self, outlines: &[Outline]) -> Result<()> {
+        for &Outline { name, dimension, rows, prescribed, motions } in outlines {
+            let retained = Retained::new(dimension, rows, prescribed, motions);
+            // a body that is kept has its memory already
+            let memory = if self.kept.iter().any(|slot| slot.name == name) { usize::MAX } else { self.memory };
+            let size = Size { dimension, dofs: rows.columns, retained: retained.dofs.len(), memory };
+            let (preset, reason) = self.choose(name, &size)?;
+            if matches!(preset, Preset::Mumps | Preset::Condensed) && memory == self.memory {
+                self.memory = self.memory.saturating_sub(size.bytes(preset));
+            }
+            self.plans.push(Plan { name: name.to_owned(), preset, reason, dofs: size.dofs, retained: Some(retained) });
         }
-        if preset == Preset::Hypre && self.measures {
-            preset::made_often(self.session, name)?;
+        self.agree()?;
+        for plan in &mut self.plans {
+            if plan.preset == Preset::Hypre && self.measures {
+                preset::made_often(self.session, &plan.name)?;
+            }
+            preset::apply(self.session, &plan.name, plan.preset)?;
+            plan.retained = plan.retained.take().filter(|_| plan.preset == Preset::Condensed);
         }
-        preset::apply(self.session, name, preset)?;
-        let retained = (preset == Preset::Condensed).then_some(retained);
-        self.plans.push(Plan { name: name.to_owned(), preset, reason, dofs: size.dofs, retained });
         Ok(())
     }
 
@@ -114,5 +143,30 @@ impl Maker for Inner<'_> {
     fn kept(&mut self, name: &str) -> Option<BodySlot> {
         let at = self.kept.iter().position(|slot| slot.name == name && slot.local.is_some())?;
         Some(self.kept.swap_remove(at))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bodies_agree_on_multigrid_alone() {
+        let plan = |name: &str, preset| Plan {
+            name: name.to_owned(),
+            preset,
+            reason: "its own".to_owned(),
+            dofs: 700,
+            retained: None,
+        };
+        let presets = |plans: &[Plan]| plans.iter().map(|plan| plan.preset).collect::<Vec<_>>();
+        let mut direct = [plan("a", Preset::Condensed), plan("b", Preset::Mumps)];
+        agree(&mut direct);
+        assert_eq!(presets(&direct), [Preset::Condensed, Preset::Mumps]);
+        let mut mixed = [plan("a", Preset::Condensed), plan("b", Preset::Hypre), plan("c", Preset::Mumps)];
+        agree(&mut mixed);
+        assert_eq!(presets(&mixed), [Preset::Hypre; 3]);
+        assert_eq!(mixed[1].reason, "its own");
+        assert!(mixed[2].reason.contains("700 dofs") && mixed[2].reason.contains("`b`"), "{}", mixed[2].reason);
     }
 }

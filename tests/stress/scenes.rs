@@ -313,6 +313,7 @@ pub fn scene(seed: u64, index: usize, meshes: &Path) -> Case {
             }
             if block == top && hold == Hold::Pressed {
                 let depth = if load == 0.0 { 0.0 } else { compliance };
+                pressure_scale = f64::max(pressure_scale, softest * depth / shape.height);
                 fix.push(on("top", format!("y = {:e}", -depth)));
                 body(&mut text, block, young[block - 1], poisson[block - 1], order[block - 1], &fix, &loads);
                 continue;

@@ -3,7 +3,9 @@
 //! From a start that knows nothing, Newton's steps grow the contact point by point: where the layer is open the linear model has no
 //! resistance, and the line search cuts. With pressures p0 the model is the tangent of each law at its own p0 instead,
 //!
-//!     K (u + d) + B' omega (p0 + kappa0 (c + B d - c0)) = f,      p(c0) = p0, kappa0 = p'(c0),     open where p0 = 0,
+//! ```text
+//! K (u + d) + B' omega (p0 + kappa0 (c + B d - c0)) = f,      p(c0) = p0, kappa0 = p'(c0),     open where p0 = 0,
+//! ```
 //!
 //! so that one linear solve leads to about the displacement of these pressures.
 
