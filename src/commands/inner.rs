@@ -1,5 +1,6 @@
 //! The inner solver of each body: what was asked for, or the program's choice and its reason.
 
+use super::method;
 use crate::ddm::{Body, BodySlot};
 use crate::discretize::{Assembled, Maker, Outline};
 use crate::error::Result;
@@ -29,6 +30,7 @@ struct Plan {
     name: String,
     preset: Preset,
     reason: String,
+    dimension: usize,
     dofs: usize,
     /// For a condensed body, until it is made.
     retained: Option<Retained>,
@@ -94,14 +96,22 @@ impl<'a> Inner<'a> {
     }
 }
 
-/// Gives all bodies multigrid if one of them needs it: Newton's method joins them then, and is left with sweeps otherwise.
+/// Gives all bodies multigrid if one of them needs it, or if together they have too much contact for one dense matrix: Newton's
+/// method joins them then, and is left with sweeps otherwise.
 fn agree(plans: &mut [Plan]) {
-    let Some(first) = plans.iter().find(|plan| plan.preset == Preset::Hypre).map(|plan| plan.name.clone()) else {
-        return;
+    let on_contact = |plan: &Plan| plan.retained.as_ref().map_or(0, |retained| retained.dofs.len());
+    let dense: usize = plans.iter().filter(|plan| plan.preset == Preset::Condensed).map(on_contact).sum();
+    let needs = plans.iter().find(|plan| plan.preset == Preset::Hypre).map(|plan| plan.name.clone());
+    let why = match needs {
+        Some(first) => format!("`{first}` has it, and Newton's method joins the bodies"),
+        None if plans.iter().all(|plan| plan.dimension == 3) && dense > method::DENSE => {
+            format!("{dense} of all bodies are on the contact: too many to join by dense algebra")
+        }
+        None => return,
     };
     for plan in plans.iter_mut().filter(|plan| plan.preset != Preset::Hypre) {
         plan.preset = Preset::Hypre;
-        plan.reason = format!("{} dofs, and `{first}` has it: Newton's method joins the bodies", plan.dofs);
+        plan.reason = format!("{} dofs; {why}", plan.dofs);
     }
 }
 
@@ -116,7 +126,8 @@ impl Maker for Inner<'_> {
             if matches!(preset, Preset::Mumps | Preset::Condensed) && memory == self.memory {
                 self.memory = self.memory.saturating_sub(size.bytes(preset));
             }
-            self.plans.push(Plan { name: name.to_owned(), preset, reason, dofs: size.dofs, retained: Some(retained) });
+            let (name, dofs, retained) = (name.to_owned(), size.dofs, Some(retained));
+            self.plans.push(Plan { name, preset, reason, dimension, dofs, retained });
         }
         self.agree()?;
         for plan in &mut self.plans {
@@ -149,24 +160,47 @@ impl Maker for Inner<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linalg::Csr;
+
+    /// A body in space whose contact rows are `contact` dofs.
+    fn plan(name: &str, preset: Preset, contact: usize) -> Plan {
+        let mut rows = Csr::new(30_000);
+        (0..contact).for_each(|i| rows.push_row([(3 * i, 1.0)]));
+        let prescribed: Vec<(usize, f64)> = (29_000..30_000).map(|dof| (dof, 0.0)).collect();
+        let retained = Some(Retained::new(3, &rows, &prescribed, &[]));
+        Plan { name: name.to_owned(), preset, reason: "its own".to_owned(), dimension: 3, dofs: 30_000, retained }
+    }
+
+    fn presets(plans: &[Plan]) -> Vec<Preset> {
+        plans.iter().map(|plan| plan.preset).collect()
+    }
 
     #[test]
     fn bodies_agree_on_multigrid_alone() {
-        let plan = |name: &str, preset| Plan {
-            name: name.to_owned(),
-            preset,
-            reason: "its own".to_owned(),
-            dofs: 700,
-            retained: None,
-        };
-        let presets = |plans: &[Plan]| plans.iter().map(|plan| plan.preset).collect::<Vec<_>>();
-        let mut direct = [plan("a", Preset::Condensed), plan("b", Preset::Mumps)];
+        let mut direct = [plan("a", Preset::Condensed, 10), plan("b", Preset::Mumps, 10)];
         agree(&mut direct);
         assert_eq!(presets(&direct), [Preset::Condensed, Preset::Mumps]);
-        let mut mixed = [plan("a", Preset::Condensed), plan("b", Preset::Hypre), plan("c", Preset::Mumps)];
+        let mut mixed = [plan("a", Preset::Condensed, 10), plan("b", Preset::Hypre, 10), plan("c", Preset::Mumps, 10)];
         agree(&mut mixed);
         assert_eq!(presets(&mixed), [Preset::Hypre; 3]);
         assert_eq!(mixed[1].reason, "its own");
-        assert!(mixed[2].reason.contains("700 dofs") && mixed[2].reason.contains("`b`"), "{}", mixed[2].reason);
+        assert!(mixed[2].reason.contains("30000 dofs; `b` has it"), "{}", mixed[2].reason);
+    }
+
+    /// Two contacts of 1500 dofs are joined by dense algebra, with one dof more they are not; in the plane they stay.
+    #[test]
+    fn wide_contacts_are_joined_by_multigrid() {
+        let pair = |more: usize| [plan("a", Preset::Condensed, 1500), plan("b", Preset::Condensed, 1500 + more)];
+        let mut narrow = pair(0);
+        agree(&mut narrow);
+        assert_eq!(presets(&narrow), [Preset::Condensed; 2]);
+        let mut flat = pair(1);
+        flat.iter_mut().for_each(|plan| plan.dimension = 2);
+        agree(&mut flat);
+        assert_eq!(presets(&flat), [Preset::Condensed; 2]);
+        let mut wide = pair(1);
+        agree(&mut wide);
+        assert_eq!(presets(&wide), [Preset::Hypre; 2]);
+        assert!(wide[0].reason.contains("3001 of all bodies"), "{}", wide[0].reason);
     }
 }

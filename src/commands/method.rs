@@ -12,7 +12,7 @@ use crate::solver::{Dense, Krylov, Monolithic, Union, options, preset};
 pub const WHOLE: &str = "newton";
 
 /// Dofs of all condensed bodies up to which their dense Newton matrix is factored: 0.2 s and 250 MB.
-const DENSE: usize = 3000;
+pub const DENSE: usize = 3000;
 
 /// The methods of a scene.
 pub struct Made {
