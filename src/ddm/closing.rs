@@ -24,7 +24,7 @@ pub fn rigid_closing(model: &Model) -> Result<Vec<f64>, Vec<FreeMotion>> {
     let joint = Joint::of(model);
     let work: Vec<f64> = model.bodies.iter().flat_map(|slot| &slot.motions).map(|motion| motion.work).collect();
     let work = DVector::from_vec(work);
-    let (trace, balanced) = balance(model).unwrap_or((vec![0.0; 2 * model.points()], false));
+    let (trace, balanced) = balance(model, &joint, &work).unwrap_or((vec![0.0; 2 * model.points()], false));
     if !balanced && let Some(motion) = Cone::new(&joint).gain(&work) {
         return Err(held::parts(model, &joint, &motion));
     }
@@ -48,19 +48,7 @@ fn opened(model: &Model, joint: &Joint, work: &DVector<f64>, mut trace: Vec<f64>
     if layer.compression.iter().zip(joint.closing(&motion)).any(opens) {
         // bodies give way by about what they are compressed elsewhere
         let deepest = layer.compression.iter().copied().fold(0.0, f64::max);
-        axpy(2.0 * deepest, &trace_of(model, joint, &motion), &mut trace);
-    }
-    trace
-}
-
-/// The trace of rigid motions of the bodies.
-fn trace_of(model: &Model, joint: &Joint, amounts: &DVector<f64>) -> Vec<f64> {
-    let mut trace = vec![0.0; 2 * model.points()];
-    for (body, slot) in model.bodies.iter().enumerate() {
-        let mut rows = vec![0.0; slot.row_stiffness.len()];
-        let own = joint.of_body(body).map(|i| amounts[i]);
-        slot.motions.iter().zip(own).for_each(|(motion, a)| axpy(a, &motion.trace, &mut rows));
-        model.put(body, &rows, &mut trace);
+        axpy(2.0 * deepest, &joint.trace(model, &motion), &mut trace);
     }
     trace
 }

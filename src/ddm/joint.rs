@@ -82,6 +82,18 @@ impl<'a> Joint<'a> {
         closing
     }
 
+    /// The trace of E `amounts`, for the model whose motions these are.
+    pub fn trace(&self, model: &Model, amounts: &DVector<f64>) -> Vec<f64> {
+        let mut trace = vec![0.0; 2 * model.points()];
+        for (body, slot) in model.bodies.iter().enumerate() {
+            let mut rows = vec![0.0; slot.row_stiffness.len()];
+            let own = self.of_body(body).map(|i| amounts[i]);
+            slot.motions.iter().zip(own).for_each(|(motion, a)| crate::linalg::axpy(a, &motion.trace, &mut rows));
+            model.put(body, &rows, &mut trace);
+        }
+        trace
+    }
+
     /// (B E)' `force`: work of forces at the points on each motion.
     pub fn work(&self, force: &[f64]) -> DVector<f64> {
         let mut work = DVector::zeros(self.count());
