@@ -234,6 +234,7 @@ pub fn discretize<const D: usize>(
             local: None,
             segments,
             scale: 0.0,
+            stiffness: 0.0,
             row_stiffness: Vec::new(),
             motions,
         };
@@ -245,9 +246,10 @@ pub fn discretize<const D: usize>(
         let modulus = elastic::modulus(&part.space, &elasticity, share(&slot.segments, &pairs));
         let held = slot.motions.len() == gauge::felt_by_none(&slot.motions).len();
         let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
-        let stiffness = if held && surface > 0.0 { modulus * surface / volume } else { 0.0 };
+        slot.stiffness = modulus * surface / volume;
+        let stiffness = if held { slot.stiffness } else { 0.0 };
         if let Some(before) = maker.kept(&slot.name) {
-            slot = BodySlot { segments: slot.segments, motions: slot.motions, ..before };
+            slot = BodySlot { segments: slot.segments, motions: slot.motions, stiffness: slot.stiffness, ..before };
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 {
             let left = rigid::free(&left, &prescribed, &load);
@@ -298,7 +300,7 @@ pub fn discretize<const D: usize>(
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
-    model.adrift = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).map(Mechanism::adrift);
+    model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).map(Mechanism::for_model);
     let mut carried = vec![0.0; 2 * model.points()];
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);
@@ -338,30 +340,31 @@ pub fn robin_zone(scene: &Scene) -> RobinZone {
     }
 }
 
-/// The scene's start as a trace vector of the model.
+/// The scene's start, at a share `factor` of the loads.
 ///
 /// # Errors
 /// A start that is not finite at a contact point.
-pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Vec<f64>> {
+pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<ddm::Start> {
     let model = &problem.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
-    if let Start::Auto | Start::Rigid | Start::Nested = &scene.method.start {
-        return Ok(ddm::automatic_start(model));
-    }
-    if let Start::Normal(field) = &scene.method.start {
-        let positions = model.pairs.iter().flat_map(|pair| &pair.position);
-        for (q, &x) in positions.enumerate() {
-            let value = field.eval(x) / factor;
-            if !value.is_finite() {
-                return Err(placed(field, format!("the start is {value} at {}", point(x))));
+    match &scene.method.start {
+        Start::Auto | Start::Nested => return Ok(ddm::Start::Automatic),
+        Start::Zero => {}
+        Start::Normal(field) => {
+            let positions = model.pairs.iter().flat_map(|pair| &pair.position);
+            for (q, &x) in positions.enumerate() {
+                let value = field.eval(x) / factor;
+                if !value.is_finite() {
+                    return Err(placed(field, format!("the start is {value} at {}", point(x))));
+                }
+                trace[q] = value;
+                trace[points + q] = value;
             }
-            trace[q] = value;
-            trace[points + q] = value;
         }
     }
     axpy(-1.0, &problem.carried, &mut trace);
-    Ok(trace)
+    Ok(ddm::Start::Trace(trace))
 }
 
 /// What is known of a body before motions are fixed.

@@ -6,7 +6,6 @@ mod balance;
 pub mod bench;
 pub mod carry;
 pub mod check;
-pub mod foresee;
 pub mod inner;
 pub mod mesh;
 pub mod method;

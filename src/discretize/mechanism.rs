@@ -6,7 +6,7 @@
 use super::gauge;
 use super::part::Part;
 use crate::contact::ContactPair;
-use crate::ddm::{Adrift, Joint, Motion, Segment};
+use crate::ddm::{self, Joint, Motion, Segment};
 use crate::fem::Space;
 use crate::fem::rigid::{self, RigidMotion};
 use crate::linalg::{Csr, axpy, dot, fit, kernel};
@@ -58,8 +58,8 @@ pub struct Mechanism {
 
 impl Mechanism {
     /// For a run that cannot begin.
-    pub fn adrift(&self) -> Adrift {
-        Adrift { bodies: self.bodies.clone(), motion: self.name.clone(), work: self.work }
+    pub fn for_model(&self) -> ddm::Mechanism {
+        ddm::Mechanism { bodies: self.bodies.clone(), motion: self.name.clone(), work: self.work }
     }
 }
 

@@ -324,10 +324,8 @@ pub enum Zone {
 /// Start of the iteration, given on the contact surfaces.
 #[derive(Debug, Clone)]
 pub enum Start {
-    /// As `Rigid`, and for large curved contacts in space the pressures of a coarser mesh, too.
+    /// Rigid bodies on their own surfaces.
     Auto,
-    /// Zero, and bodies that contact alone holds moved rigidly until the layers carry their loads.
-    Rigid,
     /// Zero normal displacement.
     Zero,
     /// The solution on a mesh of elements twice as large.

@@ -176,6 +176,15 @@ pub fn asks_for_ksp(session: &Session, body: &str) -> Result<bool> {
     }))
 }
 
+/// Whether the user typed an option for this body alone, in the command line or the scene.
+///
+/// # Errors
+/// When PETSc refuses, which it does not for options it has taken before.
+pub fn names_body(session: &Session, body: &str) -> Result<bool> {
+    let all = session.options().all()?;
+    Ok(all.iter().any(|(name, _)| body_of(name, &[body]).is_some() && origin(name).is_none()))
+}
+
 /// Lets `cholesky` and `lu` mean MUMPS, in the solver of a body and in those nested in it (`-sub_pc_type lu`), where
 /// `-pc_factor_mat_solver_type` was not given: PETSc's own factorisation is over 20 times slower.
 ///

@@ -106,6 +106,14 @@ pub fn made_often(session: &Session, body: &str) -> Result<()> {
     MADE_OFTEN.iter().try_for_each(|(name, value)| options::set_default(session, body, name, Some(value)))
 }
 
+/// The solver that the options in force make for a prefix, in words.
+pub fn in_words(session: &Session, prefix: &str) -> String {
+    let in_force = |name: &str| session.options().get(&format!("-{prefix}_{name}"));
+    let package = in_force("pc_factor_mat_solver_type").map_or(String::new(), |package| format!(" by {package}"));
+    let word = |name: &str| in_force(name).unwrap_or_default();
+    format!("{} + {}{package}", word("ksp_type"), word("pc_type"))
+}
+
 /// Sets the defaults of a body's solver: after the typed options, and only for the KSP and PC in force. A condensed body has
 /// no KSP and no defaults.
 ///

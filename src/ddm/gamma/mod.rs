@@ -12,7 +12,7 @@ pub use spectral::Spectral;
 
 use super::forecast::{best_factor, relaxed_factor};
 use super::line::Unbounded;
-use super::method::Here;
+use super::acceleration::Here;
 use super::ritz::Ritz;
 
 /// Chooses gamma^k after the sweep of iteration k.

@@ -78,8 +78,8 @@ impl Decoder<'_> {
     fn start(&self, node: &Node) -> Result<Start> {
         if let Value::String(_) = node.value {
             let words =
-                [("auto", Start::Auto), ("rigid", Start::Rigid), ("zero", Start::Zero), ("nested", Start::Nested)];
-            let all = "it is \"auto\", \"rigid\", \"zero\", \"nested\" or { normal = 1e-4 }";
+                [("auto", Start::Auto), ("zero", Start::Zero), ("nested", Start::Nested)];
+            let all = "it is \"auto\", \"zero\", \"nested\" or { normal = 1e-4 }";
             return choose(node, "start", &words).map_err(|error| error.help(all));
         }
         let keys = Keys::open(node, "the start", &["normal"])?;

@@ -1,6 +1,6 @@
 //! The paper's iteration: u <- u + gamma z.
 
-use super::{Here, Layer, Method, Model, Step};
+use super::{Acceleration, Here, Layer, Model, Step};
 use crate::ddm::gamma::GammaRule;
 use crate::ddm::ritz::Ritz;
 use crate::error::Result;
@@ -21,7 +21,7 @@ impl Relaxed {
     }
 }
 
-impl Method for Relaxed {
+impl Acceleration for Relaxed {
     fn name(&self) -> &'static str {
         "robin"
     }

@@ -1,6 +1,6 @@
 //! Nonlinear conjugate gradients, preconditioned by the Robin sweep.
 
-use super::{Here, Layer, Method, Model, Step};
+use super::{Acceleration, Here, Layer, Model, Step};
 use crate::ddm::field::{Field, local_dot};
 use crate::ddm::forecast::gradients_factor;
 use crate::ddm::line::Line;
@@ -21,7 +21,7 @@ struct Last {
     closed: Vec<bool>,
 }
 
-impl Method for Conjugate {
+impl Acceleration for Conjugate {
     fn name(&self) -> &'static str {
         "ncg"
     }

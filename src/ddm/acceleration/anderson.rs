@@ -1,6 +1,6 @@
 //! Anderson acceleration of the sweep, safeguarded by F1.
 
-use super::{Here, Layer, Method, Model, Step};
+use super::{Acceleration, Here, Layer, Model, Step};
 use crate::ddm::field::Field;
 use crate::ddm::line::Line;
 use crate::ddm::ritz::Ritz;
@@ -48,7 +48,7 @@ impl Anderson {
     }
 }
 
-impl Method for Anderson {
+impl Acceleration for Anderson {
     fn name(&self) -> &'static str {
         "anderson"
     }

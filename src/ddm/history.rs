@@ -1,4 +1,4 @@
-//! What the iteration tells the world while it runs: one row per iteration, to an observer.
+//! The history of a run: one row per iteration, shown to an observer while it runs.
 
 /// One row of the iteration history: iterate u^k and the step that leads on from it.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -7,12 +7,15 @@ pub struct Row {
     pub step: usize,
     /// k: updates made so far.
     pub iteration: usize,
-    /// Relative residual of the iterate (docs/theory.md).
+    /// The number by which the run ends (docs/theory.md): of sweeps the relative residual of the iterate, of Newton's method its
+    /// relative error.
     pub residual: f64,
     /// Largest of `increments`; NaN in row 0, before the first update.
     pub increment: f64,
-    /// Estimate of the relative error of the iterate in the energy norm; NaN while nothing is known of the spectrum.
+    /// Relative error of the iterate in the energy norm; NaN while nothing is known of it.
     pub error: f64,
+    /// Whether `error` is a bound; else it is an estimate.
+    pub is_bound: bool,
     /// The paper's rho of each body, in the order of the scene: relative increment of the normal displacements
     /// that led to this iterate.
     pub increments: Vec<f64>,

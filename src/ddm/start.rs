@@ -1,0 +1,215 @@
+//! The start: rigid bodies on their own surfaces.
+//!
+//! The same problem with K = 0 in the rigid motions E that supports leave free, and each layer in series with a spring rho0 that
+//! stands for the surfaces of the two bodies: pressure p at the approach s of the rigid surfaces is the place with c + p/rho0 = s on
+//! the law. With w the work of the loads on E, the energy
+//!
+//! ```text
+//! sum omega Pi(s) - w'a,      s = B E a - d,    Pi' = p,    0 <= Pi'' <= rho0
+//! ```
+//!
+//! is convex in a few unknowns a body, and its slopes are bounded whatever the law. Its places begin the iteration.
+//!
+//! It has no minimum exactly when loads push bodies away from all that could stop them: a motion a that closes no contact,
+//! B E a <= 0, and gains, w'a > 0 (Farkas). Elastic bodies then have no equilibrium either.
+
+use super::layer_state::Layer;
+use super::line::{self, Unbounded};
+use super::model::Model;
+use super::rigid::{FreeMotion, Motions, TOLERANCE};
+use crate::linalg::dot;
+use nalgebra::DVector;
+
+/// Where a run begins.
+#[derive(Debug, Clone)]
+pub struct RigidStart {
+    /// Amounts of the free motions of all bodies.
+    pub amounts: DVector<f64>,
+    /// Places on the laws.
+    pub places: Layer,
+    /// Traces of E a, less what the surfaces give way: B u - d is the compression of the places.
+    pub trace: Vec<f64>,
+}
+
+/// Share of the springs rho0 that resists every motion: of one that no closed contact resists, a step goes as far as the line
+/// search finds contact. A step then closes pressed contacts by this share of what it opens others.
+const PROXIMAL: f64 = 1e-9;
+
+/// Share of a motion that may close contacts by rounding and [`PROXIMAL`]. A motion that is felt at a meshed circle of 1000 edges
+/// closes 1e-5 of itself.
+const CLOSES: f64 = 1e-6;
+
+/// Share of the forces on a motion that may be out of balance: the start needs no more digits than the elastic bodies leave of it.
+const BALANCED: f64 = 1e-6;
+
+/// Newton steps at most; random scenes and walls of 4096 bricks take 2 to 20.
+const STEPS: usize = 200;
+
+/// The start of a model, or the motion along which its energy falls for ever.
+///
+/// # Errors
+/// Which bodies move how, if loads push them away for ever.
+pub fn find(model: &Model) -> Result<RigidStart, Vec<FreeMotion>> {
+    let motions = Motions::of(model);
+    let work: Vec<f64> = model.bodies.iter().flat_map(|slot| &slot.motions).map(|motion| motion.work).collect();
+    let rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope: surface_slopes(model) };
+    let mut amounts = DVector::zeros(motions.count());
+    if motions.count() > 0 {
+        amounts = rigid.minimize().map_err(|motion| motions.names(model, &motion))?;
+        rigid.open_idle(&mut amounts);
+    }
+    let layer = rigid.places(&amounts);
+    let mut trace = motions.trace(model, &amounts);
+    let (points, rows) = (model.points(), model.row_stiffness());
+    for q in 0..points {
+        // side a carries the points: it can give way at each by itself
+        let side = if rows[q] > 0.0 { q } else { points + q };
+        if rows[side] > 0.0 {
+            trace[side] -= layer.pressure[q] / rigid.slope[q];
+        }
+    }
+    Ok(RigidStart { amounts, places: layer, trace })
+}
+
+/// The places of surfaces that approach each other by B u - d without giving way, for a trace of rigid surfaces.
+pub fn at(model: &Model, trace: &[f64]) -> Layer {
+    met(model, &model.compression(trace), &surface_slopes(model))
+}
+
+fn met(model: &Model, approach: &[f64], slope: &[f64]) -> Layer {
+    Layer::meet(model, approach, &vec![0.0; approach.len()], slope)
+}
+
+/// rho0: stiffness per area of the two bodies of each point in series, as wholes.
+pub fn surface_slopes(model: &Model) -> Vec<f64> {
+    let (points, rows) = (model.points(), model.row_stiffness());
+    let largest = model.bodies.iter().map(|slot| slot.stiffness).fold(f64::MIN_POSITIVE, f64::max);
+    let mut slopes = Vec::with_capacity(points);
+    for (i, pair) in model.pairs.iter().enumerate() {
+        slopes.extend(model.range(i).map(|q| {
+            // a row without stiffness cannot move
+            let compliance = |side: usize| match rows[side * points + q] {
+                0.0 => 0.0,
+                _ => model.bodies[pair.bodies[side]].stiffness.recip(),
+            };
+            let sum = compliance(0) + compliance(1);
+            if sum > 0.0 { sum.recip() } else { largest }
+        }));
+    }
+    slopes
+}
+
+struct Rigid<'a> {
+    model: &'a Model,
+    motions: &'a Motions<'a>,
+    /// w.
+    work: DVector<f64>,
+    /// rho0.
+    slope: Vec<f64>,
+}
+
+impl Rigid<'_> {
+    /// s = B E a - d.
+    fn approach(&self, amounts: &DVector<f64>) -> Vec<f64> {
+        let closing = self.motions.closing(amounts);
+        closing.iter().zip(&self.model.gap).map(|(closing, gap)| closing - gap).collect()
+    }
+
+    fn places(&self, amounts: &DVector<f64>) -> Layer {
+        met(self.model, &self.approach(amounts), &self.slope)
+    }
+
+    /// omega Pi'': springs of law and surfaces in series.
+    fn springs(&self, places: &Layer) -> Vec<f64> {
+        let series = |q: usize| {
+            let (law, surface) = (places.tangent[q], self.slope[q]);
+            let slope = if law.is_finite() { law * surface / (law + surface) } else { surface };
+            self.model.weight[q] * slope
+        };
+        (0..self.slope.len()).map(series).collect()
+    }
+
+    /// A solution of springs x = load, with [`PROXIMAL`] springs everywhere.
+    fn solve(&self, springs: &[f64], load: &DVector<f64>) -> DVector<f64> {
+        let all = springs.iter().zip(&self.slope).zip(&self.model.weight);
+        let all: Vec<f64> = all.map(|((spring, slope), weight)| spring + PROXIMAL * slope * weight).collect();
+        self.motions.springs(&all).factor(TOLERANCE).solve(load)
+    }
+
+    /// Whether a motion opens contacts only.
+    fn opens(&self, closing: &[f64]) -> bool {
+        let most = closing.iter().fold(0.0f64, |most, s| most.max(s.abs()));
+        closing.iter().all(|&s| s <= CLOSES * most)
+    }
+
+    /// The minimum, by Newton's method with line search.
+    ///
+    /// # Errors
+    /// A motion along which the energy falls for ever.
+    fn minimize(&self) -> Result<DVector<f64>, DVector<f64>> {
+        let model = self.model;
+        // drawn together as far as the surfaces let them, contact is found from the closed side
+        let everywhere: Vec<f64> = self.slope.iter().zip(&model.weight).map(|(slope, weight)| slope * weight).collect();
+        let drawn: Vec<f64> = everywhere.iter().zip(&model.gap).map(|(spring, gap)| spring * gap).collect();
+        let mut amounts = self.solve(&everywhere, &(&self.work + self.motions.work(&drawn)));
+        let largest = self.work.amax();
+        for _ in 0..STEPS {
+            let places = self.places(&amounts);
+            let push = self.motions.work(&places.force);
+            let acting = self.motions.sizes(&places.force);
+            let lacking = &self.work - &push;
+            let small = |i: usize| BALANCED * (acting[i].max(self.work[i].abs()).max(BALANCED * largest));
+            if (0..lacking.len()).all(|i| lacking[i].abs() <= small(i)) {
+                break;
+            }
+            let step = self.solve(&self.springs(&places), &lacking);
+            let closing = self.motions.closing(&step);
+            let gain = step.dot(&self.work);
+            if gain > BALANCED * step.amax() * largest && self.opens(&closing) {
+                return Err(step);
+            }
+            let start = places.force;
+            let slope = |t: f64| {
+                let approach = self.approach(&(&amounts + t * &step));
+                let force = met(model, &approach, &self.slope).force;
+                dot(&force, &closing) - gain
+            };
+            let first = dot(&start, &closing) - gain;
+            match line::zero(slope, first, 1e-3) {
+                Ok(t) => amounts += t * &step,
+                Err(Unbounded) => return Err(step),
+            }
+        }
+        Ok(amounts)
+    }
+
+    /// Opens the contacts that an overlap alone presses together, and loads do not, if bodies can move so without closing others.
+    /// Any part of the overlap that is left would be a pressure that vanishes slowly.
+    fn open_idle(&self, amounts: &mut DVector<f64>) {
+        let places = self.places(amounts);
+        let force = |pair: usize| places.force[self.model.range(pair)].iter().sum::<f64>();
+        let most = (0..self.model.pairs.len()).map(force).fold(0.0, f64::max);
+        let unloaded = self.work.iter().all(|&work| work == 0.0);
+        let mut idle = vec![false; places.force.len()];
+        for pair in (0..self.model.pairs.len()).filter(|&pair| unloaded || force(pair) <= BALANCED.sqrt() * most) {
+            self.model.range(pair).for_each(|q| idle[q] = places.compression[q] > 0.0);
+        }
+        if !idle.contains(&true) {
+            return;
+        }
+        let mut springs = self.springs(&places);
+        let away: Vec<f64> = (0..idle.len()).map(|q| if idle[q] { -self.model.weight[q] } else { 0.0 }).collect();
+        idle.iter().zip(&mut springs).filter(|(idle, _)| **idle).for_each(|(_, spring)| *spring = 0.0);
+        let motion = self.solve(&springs, &self.motions.work(&away));
+        let closing = self.motions.closing(&motion);
+        if !self.opens(&closing) {
+            return;
+        }
+        // bodies give way by about what they are compressed elsewhere
+        let deepest = places.compression.iter().copied().fold(0.0, f64::max);
+        let approach = self.approach(amounts);
+        let needed = (0..idle.len()).filter(|&q| idle[q] && closing[q] < 0.0);
+        let way = needed.map(|q| (approach[q] + deepest) / -closing[q]).fold(0.0, f64::max);
+        *amounts += way * motion;
+    }
+}
