@@ -3,7 +3,9 @@
 //! Newton's steps from rigid motions grow the contact point by point, and each costs a multigrid set-up and a solve of all
 //! bodies. A mesh of elements three times as large has 27 times fewer dofs, and tells the pressures to an element of its own.
 
-use super::run::{self, Clock, Prepared};
+use super::clock::Clock;
+use super::prepared::Prepared;
+use super::run;
 use super::{carry, method, report};
 use crate::ddm::{Layer, Silent, Status, automatic_start};
 use crate::error::Result;
