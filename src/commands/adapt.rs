@@ -1,6 +1,8 @@
 //! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
 
-use super::run::{self, Clock, Prepared};
+use super::clock::Clock;
+use super::prepared::Prepared;
+use super::run;
 use super::{carry, report};
 use crate::ddm::{Outcome, Start};
 use crate::error::{Error, Result};

@@ -5,7 +5,7 @@
 //! the same sweep the condition (1 + theta)/(1 - theta). The estimate takes the stiffest single mode that is known without a
 //! solve, uniform pressure, at the pressure that the loads would give if they were spread evenly: an order of magnitude.
 
-use super::run::Prepared;
+use super::prepared::Prepared;
 use crate::contact::ContactPair;
 use crate::scene::{Gamma, Scene};
 

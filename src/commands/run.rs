@@ -1,88 +1,25 @@
 //! From a scene to a solved problem: mesh, discretisation, inner solvers, options, iteration.
 
+use super::clock::Clock;
 use super::inner::{Inner, Linear, WHOLE};
 use super::method;
-use super::report::in_words;
+use super::prepared::Prepared;
 use super::steps;
+use super::verdict::in_words;
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::{self, BodySlot, Method, Observer, Outcome, Settings, Start, Status, StopRule};
+use crate::ddm::{self, BodySlot, Observer, Outcome, Settings, Status, StopRule};
 use crate::discretize::{self, Mechanism, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
-use crate::output::StepReport;
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::scene::{MeshSource, Order, Scene};
 use crate::solver::options;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
-use std::collections::BTreeMap;
-use std::time::Instant;
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
 const LARGE_FRONTS: usize = 30_000;
-
-/// Wall seconds of the phases of a run.
-#[derive(Debug, Clone)]
-pub struct Clock {
-    began: Instant,
-    last: Instant,
-    /// Seconds by phase.
-    pub times: BTreeMap<String, f64>,
-}
-
-impl Default for Clock {
-    fn default() -> Self {
-        let now = Instant::now();
-        Self { began: now, last: now, times: BTreeMap::new() }
-    }
-}
-
-impl Clock {
-    /// Ends a phase.
-    pub fn phase(&mut self, name: &str) {
-        let now = Instant::now();
-        *self.times.entry(name.to_owned()).or_default() += (now - self.last).as_secs_f64();
-        self.last = now;
-    }
-
-    /// Seconds since the run began, noted as `total`.
-    pub fn total(&mut self) -> f64 {
-        let total = self.began.elapsed().as_secs_f64();
-        self.times.insert("total".to_owned(), total);
-        total
-    }
-}
-
-/// A problem that is ready to be solved, with what the user should know of its making.
-pub struct Prepared {
-    /// The discrete problem.
-    pub problem: Problem,
-    /// Start of the iteration, if it does not come from the scene.
-    pub start: Option<Start>,
-    /// How linear steps are solved.
-    pub linear: Linear,
-    /// The method, made by [`set_up`].
-    pub method: Option<Method>,
-    /// Why the inner solver is what it is where no PETSc option was typed.
-    pub choice: String,
-    /// Load steps so far.
-    pub steps: Vec<StepReport>,
-    /// Warnings.
-    pub warnings: Vec<String>,
-    /// Names of the condensed bodies, with which another run can go on.
-    pub condensed: Vec<String>,
-}
-
-impl Prepared {
-    /// Takes the condensed bodies out, their counts begun anew, for another scene with the same bodies.
-    pub fn take_condensed(&mut self) -> Vec<BodySlot> {
-        let mut slots = std::mem::take(&mut self.problem.model.bodies);
-        slots.retain(|slot| self.condensed.contains(&slot.name));
-        slots.iter_mut().filter_map(|slot| slot.local.as_mut()).for_each(|body| body.begin_anew());
-        slots
-    }
-}
 
 /// Builds the discrete problem of a scene; bodies get their inner solvers but nothing is factored.
 ///

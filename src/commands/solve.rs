@@ -1,8 +1,10 @@
 //! `winkler solve`: one scene, one run, all its results.
 
 use super::adapt::Plan;
+use super::clock::Clock;
+use super::prepared::Prepared;
 use super::results::Recovered;
-use super::run::{self, Clock, Prepared};
+use super::run;
 use super::{folder_of, load, report, results};
 use crate::ddm::{Observer, Outcome, Row};
 use crate::error::{Error, Kind, Result};

@@ -3,8 +3,8 @@
 //! At a share s of all loads and prescribed displacements, u/s solves the problem of the full loads with the gap d/s and the layer
 //! p(s c)/s. So a step changes gaps and laws alone: no body is assembled, reduced or factored anew.
 
-use super::report::{message, sides, status_name};
-use super::run::Prepared;
+use super::prepared::{Prepared, sides};
+use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
 use crate::ddm::{self, Field, Method, Model, Observer, Outcome, Row, Settings, Start, Status};
 use crate::discretize;

@@ -136,6 +136,16 @@ impl<'a> Motions<'a> {
         work
     }
 
+    /// |(B E)'| |`force`|: what forces at the points, of any signs, could do on each motion.
+    pub fn sizes(&self, force: &[f64]) -> DVector<f64> {
+        let mut sizes = DVector::zeros(self.count());
+        let size = |trace: &[f64], range: &Range<usize>| -> f64 {
+            trace.iter().zip(&force[range.clone()]).map(|(t, f)| (t * f).abs()).sum()
+        };
+        self.felt().for_each(|(range, motion, trace)| sizes[motion] += size(trace, range));
+        sizes
+    }
+
     /// What pairs feel: points, number of the motion, its trace there.
     fn felt(&self) -> impl Iterator<Item = (&Range<usize>, usize, &'a [f64])> {
         self.pairs.iter().flat_map(move |(range, ends)| {

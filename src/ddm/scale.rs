@@ -4,7 +4,6 @@
 //! that a relative tolerance could refer to vanishes with the error. What remains then is rest, or the start. Its layers may answer
 //! an overlap with any pressure, so the surfaces give way first ([`start::at`]).
 
-use super::layer_state::Layer;
 use super::model::Model;
 use super::start;
 use crate::linalg::dot;

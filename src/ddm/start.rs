@@ -16,7 +16,7 @@
 use super::layer_state::Layer;
 use super::line::{self, Unbounded};
 use super::model::Model;
-use super::rigid::{FreeMotion, Motions, TOLERANCE};
+use super::rigid::{Moved, Motions, TOLERANCE};
 use crate::linalg::dot;
 use nalgebra::DVector;
 
@@ -49,7 +49,7 @@ const STEPS: usize = 200;
 ///
 /// # Errors
 /// Which bodies move how, if loads push them away for ever.
-pub fn find(model: &Model) -> Result<RigidStart, Vec<FreeMotion>> {
+pub fn find(model: &Model) -> Result<RigidStart, Vec<Moved>> {
     let motions = Motions::of(model);
     let work: Vec<f64> = model.bodies.iter().flat_map(|slot| &slot.motions).map(|motion| motion.work).collect();
     let rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope: surface_slopes(model) };

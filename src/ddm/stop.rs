@@ -2,7 +2,7 @@
 
 use super::linear::Failure;
 use super::model::Mechanism;
-use super::rigid::FreeMotion;
+use super::rigid::Moved;
 use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -26,13 +26,13 @@ pub enum Status {
         period: usize,
     },
     /// Neither supports nor the Robin term hold a body.
-    Underconstrained(FreeMotion),
+    Underconstrained(Moved),
     /// Loads move several bodies together in a way that changes no gap and that nothing holds.
     Mechanism(Mechanism),
     /// F1 falls for ever: loads push bodies where neither a support nor a contact stops them.
     Unbounded {
         /// The bodies and their motions, where they are known.
-        moving: Vec<FreeMotion>,
+        moving: Vec<Moved>,
     },
     /// An inner solver failed.
     InnerSolver(Failure),

@@ -1,7 +1,7 @@
 //! Pairs that the scene leaves to be found: boundary facets of different bodies that face each other within a distance.
 
-use super::pairs::Surface;
 use super::part::Part;
+use super::surface::Surface;
 use crate::contact::Side;
 use crate::contact::pieces::{Cut, Reach, Search};
 use crate::contact::side::unit;

@@ -6,7 +6,7 @@
 use super::gauge;
 use super::part::Part;
 use crate::contact::ContactPair;
-use crate::ddm::{self, Joint, Motion, Segment};
+use crate::ddm::{self, Motion, Motions, Segment};
 use crate::fem::Space;
 use crate::fem::rigid::{self, RigidMotion};
 use crate::linalg::{Csr, axpy, dot, fit, kernel};
@@ -129,7 +129,11 @@ impl<const D: usize> Search<'_, '_, D> {
     /// What contact makes of motions of each body.
     fn felt(&self, motions: &[Vec<Motion>]) -> DMatrix<f64> {
         let bodies = self.drafts.iter().zip(motions).map(|(draft, motions)| (&draft.segments[..], &motions[..]));
-        Joint::new(bodies, &self.points).stiffness(&self.weight)
+        let motions = Motions::new(bodies, &self.points);
+        let (springs, n) = (motions.springs(&self.weight), motions.count());
+        let unit = |j: usize| DVector::from_fn(n, |i, _| f64::from(u8::from(i == j)));
+        let columns: Vec<DVector<f64>> = (0..n).map(|j| springs.multiply(&unit(j))).collect();
+        DMatrix::from_fn(n, n, |i, j| columns[j][i])
     }
 
     /// The rigid motions of some bodies as one: for each body those of its nodes.

@@ -3,6 +3,7 @@
 mod dual;
 mod grammar;
 mod operators;
+mod slip;
 #[cfg(test)]
 mod tests;
 mod token;
@@ -12,8 +13,8 @@ pub use dual::Differentiable;
 use crate::error::{Error, Place, Result};
 use exmex::{Express, FlatEx, NumberMatcher};
 use operators::Operators;
+use slip::Slip;
 use std::fmt;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// An expression such as `5e-4 * max(0, 1 - (x - 4)^2)^1.5`, parsed once and cheap to clone.
@@ -198,43 +199,4 @@ impl Field {
 
 fn coordinate(name: &str) -> Option<usize> {
     COORDINATES.iter().position(|known| *known == name)
-}
-
-/// What is wrong with an expression, at a byte range of its text.
-#[derive(Debug)]
-struct Slip {
-    span: Range<usize>,
-    message: String,
-    label: String,
-    help: Option<String>,
-}
-
-impl Slip {
-    fn new(span: Range<usize>, message: impl Into<String>) -> Self {
-        Self { span, message: message.into(), label: String::new(), help: None }
-    }
-
-    fn label(mut self, label: &str) -> Self {
-        self.label = label.to_owned();
-        self
-    }
-
-    fn help(mut self, help: impl Into<String>) -> Self {
-        self.help = Some(help.into());
-        self
-    }
-
-    /// The error, with the caret inside the string where its text is verbatim in the source (no escapes).
-    fn into_error(self, text: &str, place: &Place) -> Error {
-        let written = place.source.text.get(place.span.clone()).unwrap_or_default();
-        let exact = written.find(text).filter(|_| !text.is_empty()).map(|offset| {
-            let start = place.span.start + offset;
-            Place { source: place.source.clone(), span: start + self.span.start..start + self.span.end }
-        });
-        let error = Error::scene(exact.as_ref().unwrap_or(place), self.message).label(self.label);
-        match self.help {
-            Some(help) => error.help(help),
-            None => error,
-        }
-    }
 }

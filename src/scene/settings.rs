@@ -179,7 +179,6 @@ fn method(method: &MethodSpec) -> Value {
     };
     let start = match &method.start {
         Start::Auto => json!("auto"),
-        Start::Rigid => json!("rigid"),
         Start::Zero => json!("zero"),
         Start::Nested => json!("nested"),
         Start::Normal(normal) => json!({ "normal": field(normal) }),

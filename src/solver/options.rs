@@ -9,6 +9,7 @@
 //! 3. the objects are made and set up;
 //! 4. [`mark_copies`] and [`unread()`] find what nobody read: a slip of the keyboard ends the run before it starts.
 
+mod global;
 mod probe;
 mod split;
 mod unread;
@@ -266,7 +267,7 @@ pub fn forbidden_body_name(name: &str) -> Option<&'static str> {
         );
     }
     let family = FAMILIES.iter().any(|family| family.strip_suffix('_') == Some(name));
-    if family || unread::is_global_word(name) || MORE_WORDS.contains(&name) {
+    if family || global::is_global_word(name) || MORE_WORDS.contains(&name) {
         return Some("options of PETSc itself begin with this word");
     }
     None

@@ -4,7 +4,8 @@
 
 use crate::scenes::{Case, Expect};
 use std::path::Path;
-use winkler::commands::run::{self, Clock};
+use winkler::commands::clock::Clock;
+use winkler::commands::run;
 use winkler::commands::{report, results};
 use winkler::ddm::{Silent, Status};
 use winkler::error::Result;

@@ -4,8 +4,8 @@
 //! positions. So the grammar is ours, and `exmex` is handed a text in which every operation has parentheses
 //! and `max(a, b)` is `(a max b)`.
 
-use super::Slip;
 use super::operators::{BINARY, COMPARISON, INFIX, POWER, SIGN, UNARY};
+use super::slip::Slip;
 use super::token::{self, Token};
 use crate::error::nearest;
 use std::ops::Range;

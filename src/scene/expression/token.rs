@@ -1,7 +1,7 @@
 //! Words of an expression.
 
-use super::Slip;
 use super::operators::INFIX;
+use super::slip::Slip;
 use std::ops::Range;
 
 /// One word of an expression.
