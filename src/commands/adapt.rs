@@ -12,7 +12,9 @@ use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::agree;
 use crate::petsc::Session;
-use crate::scene::{AdaptSpec, MeshSource, Scene, Sizing, Start};
+use crate::problem::mesh::{MeshSource, Sizing};
+use crate::problem::method::Start;
+use crate::scene::{AdaptSpec, Scene};
 use crate::solver::options;
 
 /// Cells of a body's first mesh.

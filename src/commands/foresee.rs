@@ -12,7 +12,11 @@ use crate::error::Result;
 use crate::mesh;
 use crate::output::{CoarserReport, ContactTable};
 use crate::petsc::Session;
-use crate::scene::{MeshSource, Preset, Scene, Sizing, Start, StopSpec};
+use crate::problem::mesh::{MeshSource, Sizing};
+use crate::problem::method::Start;
+use crate::problem::solver::Preset;
+use crate::problem::stop::StopRule;
+use crate::scene::Scene;
 use crate::solver::{options, preset};
 use std::time::Instant;
 
@@ -41,7 +45,7 @@ pub fn foresee(session: &Session, scene: &Scene, prepared: &mut Prepared, clock:
         let before = if let Some(Sizing::Times(times)) = sizes { *times } else { 1.0 };
         *sizes = Some(Sizing::Times(COARSER * before));
     }
-    coarse.method.stop = StopSpec { residual: Some(ROUGH), increment: None, balanced: false, ..coarse.method.stop };
+    coarse.method.stop = StopRule { residual: Some(ROUGH), increment: None, balanced: false, ..coarse.method.stop };
     coarse.solver.preset = None;
     coarse.estimate = false;
     options::withdraw(session)?;

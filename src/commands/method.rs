@@ -5,7 +5,9 @@ use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule
 use crate::ddm::method::{Anderson, Conjugate, Coupled, Inner, Method, Newton, Relaxed};
 use crate::error::{Error, Kind, Result};
 use crate::petsc::Session;
-use crate::scene::{Gamma, MethodName, Preset, Scene};
+use crate::problem::method::{Gamma, MethodName};
+use crate::problem::solver::Preset;
+use crate::scene::Scene;
 use crate::solver::{Dense, Krylov, Monolithic, Union, options, preset};
 
 /// Prefix of the PETSc options of the Newton matrix of all bodies.

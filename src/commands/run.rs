@@ -7,13 +7,15 @@ use super::prepared::Prepared;
 use super::steps;
 use super::verdict::in_words;
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::{self, BodySlot, Observer, Outcome, RobinRule, Settings, Status, StopRule};
+use crate::ddm::{self, BodySlot, Observer, Outcome, Settings, Status};
 use crate::discretize::{self, Mechanism, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
-use crate::scene::{MeshSource, Order, RobinSpec, Scene};
+use crate::problem::mesh::MeshSource;
+use crate::problem::order::Order;
+use crate::scene::Scene;
 use crate::solver::options;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
@@ -236,15 +238,10 @@ pub fn iterate(
     let stop = &scene.method.stop;
     prepared.steps.clear();
     let mut settings = Settings {
-        zone: discretize::robin_zone(scene),
-        robin: match scene.method.robin {
-            RobinSpec::Tangent => RobinRule::Tangent,
-            RobinSpec::Frozen => RobinRule::Frozen,
-            RobinSpec::Floor(floor) => RobinRule::Floor(floor),
-            RobinSpec::Auto => RobinRule::Auto,
-        },
+        zone: scene.method.psi.clone(),
+        robin: scene.method.robin,
         methods: std::mem::take(&mut prepared.methods),
-        stop: StopRule { residual: stop.residual, increment: stop.increment, iterations: stop.iterations },
+        stop: stop.clone(),
         interval: scene.method.interval,
         balance: prepared.problem.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _),
         start: match prepared.start.take() {

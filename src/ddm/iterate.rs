@@ -14,18 +14,18 @@ use super::method::{FINE, Here, Method, Step};
 use super::model::{Adrift, Model};
 use super::origin::Origin;
 use super::progress::{Observer, Row};
-use super::robin::{Robin, RobinRule};
+use super::robin::Robin;
 use super::scale::Scale;
-use super::stop::StopRule;
 use super::watch::{Last, Verdict};
-use super::zone::RobinZone;
 use crate::error::Result;
+use crate::problem::robin::{RobinRule, Zone};
+use crate::problem::stop::StopRule;
 use std::time::Instant;
 
 /// What the method needs to know besides the model.
 pub struct Settings {
     /// Robin zone psi.
-    pub zone: RobinZone,
+    pub zone: Zone,
     /// Robin coefficient on it.
     pub robin: RobinRule,
     /// How steps are made: the first method, and those to change to when progress stops.
@@ -152,7 +152,7 @@ pub fn solve(model: &mut Model, settings: &mut Settings, observer: &mut dyn Obse
     // an estimate of the discretisation's error needs the iterates whole
     let floats = model.bodies.iter().any(|slot| !slot.motions.is_empty());
     let mut origin = (floats && settings.balance.is_none()).then(|| Origin::take(model, &mut iterate));
-    let mut measuring = Measuring::new(clock, Robin::new(settings.robin.clone()), scale);
+    let mut measuring = Measuring::new(clock, Robin::new(settings.robin), scale);
     let mut last: Option<Last> = None;
     let mut rows: Vec<Row> = Vec::new();
     let mut balance = settings.balance.take().map(Balance::new);

@@ -46,7 +46,4 @@ pub use layer::Layer;
 pub use lift::prepare;
 pub use model::{Adrift, BodySlot, Exchange, Model, Motion, Segment, Serial};
 pub use progress::{Observer, Row, Silent};
-pub use robin::RobinRule;
-pub use stop::StopRule;
 pub use sweep::Sweep;
-pub use zone::RobinZone;

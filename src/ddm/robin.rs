@@ -6,20 +6,7 @@
 use super::held;
 use super::layer::Layer;
 use super::model::Model;
-use super::zone::RobinZone;
-
-/// Rule for the Robin coefficient kappa on the zone.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RobinRule {
-    /// kappa = p'(c^k), as in the paper.
-    Tangent,
-    /// That of the start all the way, made safe as in `Auto`: one factorisation a run (Theorem 3 allows it).
-    Frozen,
-    /// kappa = max(p'(c^k), floor) everywhere on the contact surfaces.
-    Floor(f64),
-    /// The tangent on the zone, and enough more for a body that it does not hold safely.
-    Auto,
-}
+use crate::problem::robin::{RobinRule, Zone};
 
 /// The rule with what it remembers.
 #[derive(Debug)]
@@ -35,7 +22,7 @@ impl Robin {
     }
 
     /// omega psi kappa of every contact row in iteration `k`.
-    pub fn weight(&mut self, model: &Model, zone: &RobinZone, layer: &Layer, k: usize) -> Vec<f64> {
+    pub fn weight(&mut self, model: &Model, zone: &Zone, layer: &Layer, k: usize) -> Vec<f64> {
         let tangent = || {
             let points = zone.robin_weight(model, layer, k);
             [&points[..], &points[..]].concat()

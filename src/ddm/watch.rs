@@ -7,8 +7,9 @@ use super::model::Model;
 use super::progress::Row;
 use super::scale::Scale;
 use super::steady::{Steady, most_apart};
-use super::stop::{Cycle, Floor, StopRule, relative_increment};
+use super::stop::{Cycle, Floor, relative_increment};
 use super::sweep::Sweep;
+use crate::problem::stop::StopRule;
 
 /// The step that led to an iterate.
 pub(super) struct Last {
