@@ -16,7 +16,7 @@ mod supports;
 mod surface;
 
 use crate::contact::{self, ContactPair};
-use crate::ddm::{self, Body, BodySlot, Exchange, Model, Motion, RobinZone, Segment};
+use crate::ddm::{self, Body, BodySlot, Exchange, Model, Motion, Segment};
 use crate::error::Result;
 use crate::fem::{
     ElasticBody,
@@ -25,7 +25,9 @@ use crate::fem::{
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Mesh;
 use crate::output::vtu::BodyField;
-use crate::scene::{ContactSpec, Scene, Start, Zone};
+use crate::problem::contact::ContactSpec;
+use crate::problem::method::Start;
+use crate::scene::Scene;
 use balance::Forces;
 pub use balance::{Balance, Resultant};
 use fields::{ErrorMaker, FieldMaker};
@@ -323,19 +325,6 @@ impl Problem {
             let rows = self.model.of_body(body, &message[count..]);
             let slot = &mut self.model.bodies[body];
             (slot.scale, slot.row_stiffness) = (message[body], rows);
-        }
-    }
-}
-
-/// psi of the scene for the method.
-pub fn robin_zone(scene: &Scene) -> RobinZone {
-    match &scene.method.psi {
-        Zone::None => RobinZone::None,
-        Zone::Full => RobinZone::Full,
-        Zone::Active => RobinZone::Active,
-        Zone::Subset(field) => {
-            let field = field.clone();
-            RobinZone::Subset(Box::new(move |x, k| field.is_true_at(x, k)))
         }
     }
 }

@@ -10,11 +10,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms from the ground up; each may use those below it.
-const ROOMS: [&str; 16] = [
+const ROOMS: [&str; 18] = [
     "error",
     "linalg",
     "petsc",
-    "scene",
+    "expression",
+    "problem",
     "mesh",
     "fem",
     "contact",
@@ -22,6 +23,7 @@ const ROOMS: [&str; 16] = [
     "parallel",
     "solver",
     "output",
+    "scene",
     "discretize",
     "estimate",
     "commands",
@@ -30,7 +32,8 @@ const ROOMS: [&str; 16] = [
 ];
 
 /// Rooms that may use less than what lies below them.
-const NARROW: [(&str, &[&str]); 2] = [("ddm", &["error", "linalg", "contact"]), ("output", &["error", "ddm"])];
+const NARROW: [(&str, &[&str]); 2] =
+    [("ddm", &["error", "linalg", "contact", "problem"]), ("output", &["error", "ddm"])];
 
 /// Files that may know the space dimension: those of the first rooms, and the one that picks it.
 const SPATIAL: [&str; 7] = ["scene", "mesh", "fem", "contact", "discretize", "commands/run.rs", "commands/mesh.rs"];

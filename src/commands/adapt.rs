@@ -12,7 +12,9 @@ use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::agree;
 use crate::petsc::Session;
-use crate::scene::{self, AdaptSpec, MeshSource, MethodName, Scene, Sizing};
+use crate::problem::mesh::{MeshSource, Sizing};
+use crate::problem::method::{self, MethodName};
+use crate::scene::{AdaptSpec, Scene};
 use crate::solver::options;
 
 /// Cells of a body's first mesh.
@@ -47,7 +49,7 @@ impl Plan {
     /// A scene whose mesh cannot follow sizes; what [`run::prepare`] refuses.
     pub fn new(session: &Session, scene: Scene, clock: &mut Clock) -> Result<Self> {
         let goal = scene.adapt.clone();
-        let nested = matches!(scene.method.start, scene::Start::Nested);
+        let nested = matches!(scene.method.start, method::Start::Nested);
         let mut settings = scene.settings();
         ["output", "solver", "method"].iter().for_each(|key| settings[*key] = serde_json::Value::Null);
         let mut plan = Self {

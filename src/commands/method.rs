@@ -3,12 +3,12 @@
 use super::inner::{Linear, WHOLE};
 use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
-use crate::ddm::{Coefficient, LinearStep, Method, Model, RobinRule, Start, Sweeps, first_springs};
-use crate::discretize;
+use crate::ddm::{Coefficient, LinearStep, Method, Model, Start, Sweeps, first_springs};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::Csr;
 use crate::petsc::Session;
-use crate::scene::{Gamma, MethodName, RobinSpec, Scene};
+use crate::problem::method::{Gamma, MethodName};
+use crate::scene::Scene;
 use crate::solver::{Dense, Krylov, Monolithic, Union};
 
 /// Makes the method of a scene and the solvers it needs, set up; refusals come before the first sweep.
@@ -22,7 +22,7 @@ pub fn make(
     linear: Linear,
     start: &Start,
 ) -> Result<Method> {
-    let coefficient = || Coefficient::new(discretize::robin_zone(scene), robin_rule(scene));
+    let coefficient = || Coefficient::new(scene.method.psi.clone(), scene.method.robin);
     let acceleration: Box<dyn Acceleration> = match scene.method.name {
         MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => {
             return Ok(Method::Newton(linear_step(session, scene, model, linear, coefficient(), start)?));
@@ -68,15 +68,6 @@ fn linear_step(
         step.set_up(&springs)?;
     }
     Ok(step)
-}
-
-fn robin_rule(scene: &Scene) -> RobinRule {
-    match scene.method.robin {
-        RobinSpec::Tangent => RobinRule::Tangent,
-        RobinSpec::Frozen => RobinRule::Frozen,
-        RobinSpec::Floor(floor) => RobinRule::Floor(floor),
-        RobinSpec::Auto => RobinRule::Auto,
-    }
 }
 
 fn rule(gamma: &Gamma) -> Box<dyn GammaRule> {

@@ -7,7 +7,8 @@
 
 use super::prepared::Prepared;
 use crate::contact::ContactPair;
-use crate::scene::{Gamma, Scene};
+use crate::problem::method::Gamma;
+use crate::scene::Scene;
 
 /// Estimates for a pair.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,13 +7,15 @@ use super::prepared::Prepared;
 use super::steps;
 use super::verdict::in_words;
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::{self, BodySlot, Observer, Outcome, Settings, Status, StopRule};
+use crate::ddm::{self, BodySlot, Observer, Outcome, Settings, Status};
 use crate::discretize::{self, Mechanism, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
-use crate::scene::{MeshSource, Order, Scene};
+use crate::problem::mesh::MeshSource;
+use crate::problem::order::Order;
+use crate::scene::Scene;
 use crate::solver::options;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
@@ -237,7 +239,7 @@ pub fn iterate(
     let stop = &scene.method.stop;
     prepared.steps.clear();
     let mut settings = Settings {
-        stop: StopRule { residual: stop.residual, increment: stop.increment, iterations: stop.iterations },
+        stop: stop.clone(),
         interval: scene.method.interval,
         balance: prepared.problem.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _),
         start: prepared.start.take().unwrap_or_default(),

@@ -6,50 +6,26 @@
 use super::layer_state::Layer;
 use super::model::Model;
 use super::rigid::{self, Moved};
+use crate::problem::robin::{RobinRule, Zone};
 use nalgebra::DMatrix;
-
-/// Choice of psi, the indicator of the Robin zone.
-pub enum RobinZone {
-    /// psi = 0: Neumann-Neumann.
-    None,
-    /// psi = 1 on all contact surfaces.
-    Full,
-    /// psi = chi = \[c > 0\], equation (36).
-    Active,
-    /// psi = \[x in S^k\], any subsets: position and iteration k decide.
-    Subset(Box<dyn Fn([f64; 3], usize) -> bool>),
-}
-
-/// Rule for the Robin coefficient kappa on the zone.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RobinRule {
-    /// kappa = p'(c^k), as in the paper.
-    Tangent,
-    /// That of the start all the way, made safe as in `Auto`: one factorisation a run (Theorem 3 allows it).
-    Frozen,
-    /// kappa = max(p'(c^k), floor) everywhere on the contact surfaces.
-    Floor(f64),
-    /// The tangent on the zone, and enough more for a body that it does not hold safely.
-    Auto,
-}
 
 /// Zone and rule with what the rule remembers.
 pub struct Coefficient {
-    zone: RobinZone,
+    zone: Zone,
     rule: RobinRule,
     frozen: Option<Vec<f64>>,
 }
 
 impl Coefficient {
     /// Starts with nothing remembered.
-    pub fn new(zone: RobinZone, rule: RobinRule) -> Self {
+    pub fn new(zone: Zone, rule: RobinRule) -> Self {
         Self { zone, rule, frozen: None }
     }
 
     /// omega psi kappa of every contact row (2n, layout of a trace vector) for layers at these places in iteration `k`.
     pub fn weight(&mut self, model: &Model, layer: &Layer, k: usize) -> Vec<f64> {
         let tangent = || {
-            let points = self.zone.weight(model, layer, k);
+            let points = tangents(&self.zone, model, layer, k);
             [&points[..], &points[..]].concat()
         };
         match &self.rule {
@@ -67,24 +43,22 @@ impl Coefficient {
     }
 }
 
-impl RobinZone {
-    /// omega psi kappa at every point in iteration `k`.
-    fn weight(&self, model: &Model, layer: &Layer, k: usize) -> Vec<f64> {
-        let inside = |pair: usize, q: usize| match self {
-            RobinZone::None => false,
-            RobinZone::Full => true,
-            RobinZone::Active => layer.compression[q] > 0.0,
-            RobinZone::Subset(holds) => holds(model.pairs[pair].position[q - model.offset[pair]], k),
-        };
-        let mut weight = vec![0.0; model.points()];
-        for pair in 0..model.pairs.len() {
-            for q in model.range(pair).filter(|&q| inside(pair, q)) {
-                let law = &model.pairs[pair].law;
-                weight[q] = model.weight[q] * law.robin_tangent(q - model.offset[pair], layer.compression[q]);
-            }
+/// omega psi kappa at every point in iteration `k`.
+fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Vec<f64> {
+    let inside = |pair: usize, q: usize| match zone {
+        Zone::None => false,
+        Zone::Full => true,
+        Zone::Active => layer.compression[q] > 0.0,
+        Zone::Subset(holds) => holds.is_true_at(model.pairs[pair].position[q - model.offset[pair]], k),
+    };
+    let mut weight = vec![0.0; model.points()];
+    for pair in 0..model.pairs.len() {
+        for q in model.range(pair).filter(|&q| inside(pair, q)) {
+            let law = &model.pairs[pair].law;
+            weight[q] = model.weight[q] * law.robin_tangent(q - model.offset[pair], layer.compression[q]);
         }
-        weight
     }
+    weight
 }
 
 /// The first body that nothing holds under the Robin term `weight` (omega psi kappa of the contact rows), and its motion: springs

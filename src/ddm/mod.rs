@@ -34,7 +34,7 @@ mod sweeps;
 
 pub use balance::{Discretisation, SHARE};
 pub use body::{Body, BodyCounts, Energy, Matrices, Solved};
-pub use coefficient::{Coefficient, RobinRule, RobinZone};
+pub use coefficient::Coefficient;
 pub use extend::prepare;
 pub use field::Field;
 pub use forecast::Forecast;
@@ -45,6 +45,6 @@ pub use linear::{LinearStep, Solution};
 pub use model::{BodySlot, Exchange, Mechanism, Model, Motion, Segment, Serial};
 pub use rigid::{Motions, Moved};
 pub use solve::{Method, Outcome, Settings, Start, first_springs, solve};
-pub use stop::{Status, StopRule};
+pub use stop::Status;
 pub use sweep::Sweep;
 pub use sweeps::Sweeps;

@@ -11,8 +11,9 @@ use super::model::Model;
 use super::origin::Origin;
 use super::scale::Scale;
 use super::sweep::Sweep;
-use super::stop::{Cycle, Floor, Status, StopRule, relative_increment};
+use super::stop::{Cycle, Floor, Status, relative_increment};
 use crate::error::Result;
+use crate::problem::stop::StopRule;
 use std::time::Instant;
 
 /// A run under way.

@@ -16,9 +16,10 @@ use super::origin::Origin;
 use super::run::{End, Run};
 use super::scale::Scale;
 use super::start::{self, RigidStart};
-use super::stop::{Cycle, Floor, Status, StopRule};
+use super::stop::{Cycle, Floor, Status};
 use super::{newton, robin};
 use crate::error::Result;
+use crate::problem::stop::StopRule;
 use std::time::Instant;
 
 /// How iterates are made.

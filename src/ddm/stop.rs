@@ -45,26 +45,6 @@ impl Status {
     }
 }
 
-/// Rules of a run; the first one met ends it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct StopRule {
-    /// Relative residual, or relative error of Newton's method, at most this.
-    pub residual: Option<f64>,
-    /// The paper's rule: rho of every body at most this.
-    pub increment: Option<f64>,
-    /// Updates at most.
-    pub iterations: usize,
-}
-
-impl StopRule {
-    /// Whether an iterate with this residual, reached by this increment (NaN before the first update), is good
-    /// enough.
-    pub fn is_met(&self, residual: f64, increment: f64) -> bool {
-        self.residual.is_some_and(|tolerance| residual <= tolerance)
-            || self.increment.is_some_and(|tolerance| increment <= tolerance)
-    }
-}
-
 /// The paper's rho: norm of the increment of normal displacements over the norm of the displacements. Zero over zero
 /// is zero.
 pub fn relative_increment(step: &[f64], now: &[f64]) -> f64 {

@@ -7,7 +7,7 @@ use crate::contact::pieces::{Cut, Reach, Search};
 use crate::contact::side::unit;
 use crate::error::{Error, Result};
 use crate::fem::Facets;
-use crate::scene::AutoContact;
+use crate::problem::contact::AutoContact;
 
 /// Facets face each other if the cosine between the normal of one and minus that of the other is larger.
 const FACING: f64 = 0.5;

@@ -9,7 +9,8 @@ use crate::contact::{self, ContactPair, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::Facets;
 use crate::mesh::{Group, Mesh};
-use crate::scene::{ContactSpec, Overlap, Scene};
+use crate::problem::contact::{ContactSpec, Overlap};
+use crate::scene::Scene;
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {

@@ -11,7 +11,8 @@ use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
 use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
-use crate::scene::{BodySpec, LoadKind, Plane};
+use crate::problem::body::{BodySpec, LoadKind};
+use crate::problem::elasticity::Plane;
 
 /// A body of the scene with its space, supports and springs.
 pub struct Part<'a, const D: usize> {

@@ -3,7 +3,7 @@
 use crate::contact::{ContactPair, Side, pad};
 use crate::fem::{Facets, element};
 use crate::output::vtu::{CellKind, Grid};
-use crate::scene::Order;
+use crate::problem::order::Order;
 use std::collections::{BTreeMap, HashMap};
 
 /// One surface of a pair: facets of a body.

@@ -1,7 +1,7 @@
 //! Linear elastic material at a point: Hooke's law sigma = C eps (2) and the bounds on C (4).
 
 use super::slope::{PAIRS, Slope};
-use crate::scene::Plane;
+use crate::problem::elasticity::Plane;
 use nalgebra::{Matrix3, Matrix6};
 
 /// Component behind each Voigt number 11 22 33 23 13 12.

@@ -2,7 +2,7 @@
 
 use super::{Slope, cross, element, pad};
 use crate::mesh::{Group, Mesh};
-use crate::scene::Order;
+use crate::problem::order::Order;
 use std::collections::{HashMap, HashSet};
 
 const ABSENT: u32 = u32::MAX;

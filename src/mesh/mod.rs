@@ -26,7 +26,7 @@ pub use msh::read;
 pub use quality::Quality;
 pub use sizes::{follows, view};
 
-use crate::scene::Order;
+use crate::problem::order::Order;
 use std::path::PathBuf;
 
 /// A mesh: points and named groups of simplices.

@@ -73,7 +73,7 @@ impl Series {
     }
 }
 
-/// The history of one run, for [`convergence`].
+/// The history of one run, for [`Plot::convergence`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvergenceSeries {
     /// Name of the run.
@@ -82,7 +82,7 @@ pub struct ConvergenceSeries {
     pub rows: Vec<(usize, f64, f64)>,
 }
 
-/// A pressure along a surface, for [`pressure`].
+/// A pressure along a surface, for [`Plot::pressure`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressureSeries {
     /// Name in the legend.

@@ -3,7 +3,7 @@
 use super::{memory, options};
 use crate::error::Result;
 use crate::petsc::Session;
-use crate::scene::Preset;
+use crate::problem::solver::Preset;
 
 /// Options of algebraic multigrid by hypre for elasticity with many solves a set-up; docs/solvers.md has the
 /// measurements behind them.
@@ -65,7 +65,7 @@ impl Size {
 /// The preset for a body whose scene names none, with the reason.
 ///
 /// ```
-/// use winkler::{scene::Preset, solver::preset::{Size, choose}};
+/// use winkler::{problem::solver::Preset, solver::preset::{Size, choose}};
 /// let size = Size { dimension: 3, dofs: 98_000, retained: 1024, memory: 8_000_000_000 };
 /// assert_eq!(choose(&size).0, Preset::Condensed);
 /// // too little memory for a factor, or too many dofs: multigrid

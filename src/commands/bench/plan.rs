@@ -4,7 +4,10 @@ use super::request::{Request, usage};
 use crate::commands::case_of;
 use crate::commands::sweep::{axis, combinations};
 use crate::error::Result;
-use crate::scene::{MethodName, Order, Preset, Scene};
+use crate::problem::method::MethodName;
+use crate::problem::order::Order;
+use crate::problem::solver::Preset;
+use crate::scene::Scene;
 use std::path::PathBuf;
 
 /// All runs.

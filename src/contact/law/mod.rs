@@ -1,7 +1,8 @@
 //! Laws of Winkler layers: pressure against compression.
 //!
 //! The paper writes sigma_n = g(w) with w = -c; here p(c) = -g(-c). A law is monotone with p(0) = 0 and a
-//! bounded tangent on bounded ranges, conditions (6)-(7). A new law is a new file, a form of the scene and a line in [`make`].
+//! bounded tangent on bounded ranges, conditions (6)-(7). A new law is a new file, a form in
+//! [`layer`](crate::problem::layer) and a line in [`make`].
 
 mod cubic;
 mod exponential;

@@ -1,6 +1,6 @@
 use super::*;
 use crate::error::{Place, Source};
-use crate::scene::expression::Differentiable;
+use crate::expression::Differentiable;
 use std::sync::Arc;
 
 /// Every law must be its own energy's derivative, its tangent its pressure's, and increase: from far below `scale` to far

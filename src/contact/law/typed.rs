@@ -3,7 +3,7 @@
 use super::quadrature::integral;
 use super::{LayerLaw, Response};
 use crate::error::{Error, Result};
-use crate::scene::expression::Differentiable;
+use crate::expression::Differentiable;
 
 /// An expression p(c) at one place, continued as a straight line beyond its end.
 #[derive(Debug, Clone)]

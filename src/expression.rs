@@ -1,4 +1,4 @@
-//! Numbers that the user may write as expressions in the coordinates: gaps, loads, zones.
+//! Numbers that the user may write as expressions in the coordinates: gaps, loads, zones, laws of layers.
 
 mod dual;
 mod grammar;

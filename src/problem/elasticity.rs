@@ -1,7 +1,7 @@
-//! The elastic constants of a body as the user gives them.
+//! What bodies are made of: elastic constants and their axes.
 
-use super::expression::Field;
 use crate::error::{Located, Place};
+use crate::expression::Field;
 
 /// Elastic constants of a body or of one of its regions, in axes of their own.
 #[derive(Debug, Clone)]
@@ -88,4 +88,21 @@ impl ElasticitySpec {
         }
         fields.iter().all(|field| matches!(field, Field::Constant(_)))
     }
+}
+
+/// What the plane of a plane problem stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Plane {
+    /// No out-of-plane strain.
+    Strain,
+    /// No out-of-plane stress.
+    Stress,
+    /// A meridian of bodies of revolution: x is the radius, y runs along the axis.
+    Axisymmetric,
+}
+
+impl Plane {
+    /// The choices with their names in the scene.
+    pub const ALL: [(&'static str, Plane); 3] =
+        [("strain", Plane::Strain), ("stress", Plane::Stress), ("axisymmetric", Plane::Axisymmetric)];
 }

@@ -171,7 +171,7 @@ impl fmt::Debug for Differentiable {
 mod tests {
     use super::*;
     use crate::error::Source;
-    use crate::scene::expression::operators;
+    use crate::expression::operators;
 
     fn parse(text: &str) -> Differentiable {
         let source = Source { name: "scene.toml".into(), text: format!("pressure = \"{text}\"\n") };

@@ -1,6 +1,6 @@
-//! Laws of layers as a scene gives them.
+//! Laws of layers: their forms and parameters.
 
-use super::expression::{Differentiable, Field};
+use crate::expression::{Differentiable, Field};
 
 /// Law of a Winkler layer.
 #[derive(Debug, Clone)]

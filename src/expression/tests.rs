@@ -173,7 +173,7 @@ fn slips_are_pointed_at() {
         let error = parse(text).expect_err(text);
         assert!(error.message().contains(message), "{text}: {error}");
         assert!(error.advice().unwrap_or_default().contains(help), "{text}: {error}");
-        assert_eq!(super::super::tests::caret(&error), caret, "{text}: {error}");
+        assert_eq!(crate::error::caret(&error), caret, "{text}: {error}");
     }
     for text in ["", "  "] {
         assert_eq!(parse(text).expect_err(text).message(), "the expression is empty");
