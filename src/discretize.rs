@@ -236,7 +236,8 @@ pub fn discretize<const D: usize>(
             local: None,
             segments,
             scale: 0.0,
-            stiffness: 0.0,
+            modulus: 0.0,
+            depth: 0.0,
             row_stiffness: Vec::new(),
             motions,
         };
@@ -248,10 +249,10 @@ pub fn discretize<const D: usize>(
         let modulus = elastic::modulus(&part.space, &elasticity, share(&slot.segments, &pairs));
         let held = slot.motions.len() == gauge::felt_by_none(&slot.motions).len();
         let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
-        slot.stiffness = modulus * surface / volume;
-        let stiffness = if held { slot.stiffness } else { 0.0 };
+        (slot.modulus, slot.depth) = (modulus, volume / surface);
+        let stiffness = if held && surface > 0.0 { modulus / slot.depth } else { 0.0 };
         if let Some(before) = maker.kept(&slot.name) {
-            slot = BodySlot { segments: slot.segments, motions: slot.motions, stiffness: slot.stiffness, ..before };
+            slot = BodySlot { local: before.local, scale: before.scale, row_stiffness: before.row_stiffness, ..slot };
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 {
             let left = rigid::free(&left, &prescribed, &load);

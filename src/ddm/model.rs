@@ -71,8 +71,10 @@ pub struct BodySlot {
     pub motions: Vec<Motion>,
     /// Largest diagonal entry of K.
     pub scale: f64,
-    /// Stiffness of the body as a whole against pressure on its contact surfaces, per area: modulus over depth.
-    pub stiffness: f64,
+    /// Elastic modulus against pressure on its contact surfaces, E/(1 - nu^2) or about that.
+    pub modulus: f64,
+    /// Its size across its contact surfaces.
+    pub depth: f64,
     /// b diag(K) b' of each contact row b: stiffness of the nodes under a point.
     pub row_stiffness: Vec<f64>,
 }

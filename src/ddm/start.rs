@@ -45,6 +45,12 @@ const BALANCED: f64 = 1e-6;
 /// Newton steps at most; random scenes and walls of 4096 bricks take 2 to 20.
 const STEPS: usize = 200;
 
+/// Problems with a new rho0 each, that of the contact found before.
+const ROUNDS: usize = 8;
+
+/// Change of rho0 below which it stays.
+const SETTLED: f64 = 0.2;
+
 /// The start of a model, or the motion along which its energy falls for ever.
 ///
 /// # Errors
@@ -52,10 +58,20 @@ const STEPS: usize = 200;
 pub fn find(model: &Model) -> Result<RigidStart, Vec<Moved>> {
     let motions = Motions::of(model);
     let work: Vec<f64> = model.bodies.iter().flat_map(|slot| &slot.motions).map(|motion| motion.work).collect();
-    let rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope: surface_slopes(model) };
+    let mut rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope: surface_slopes(model) };
     let mut amounts = DVector::zeros(motions.count());
     if motions.count() > 0 {
-        amounts = rigid.minimize().map_err(|motion| motions.names(model, &motion))?;
+        for _ in 0..ROUNDS {
+            amounts = rigid.minimize().map_err(|motion| motions.names(model, &motion))?;
+            let approach = rigid.approach(&amounts);
+            let slope = slopes(model, |q| approach[q] > 0.0);
+            let settled = slope.iter().zip(&rigid.slope).all(|(new, old)| (new - old).abs() <= SETTLED * old);
+            // a contact that opens as a whole keeps its slope
+            slope.into_iter().zip(&mut rigid.slope).filter(|(new, _)| new.is_finite()).for_each(|(new, old)| *old = new);
+            if settled {
+                break;
+            }
+        }
         rigid.open_idle(&mut amounts);
     }
     let layer = rigid.places(&amounts);
@@ -80,17 +96,34 @@ fn met(model: &Model, approach: &[f64], slope: &[f64]) -> Layer {
     Layer::meet(model, approach, &vec![0.0; approach.len()], slope)
 }
 
-/// rho0: stiffness per area of the two bodies of each point in series, as wholes.
+/// Stiffness of an elastic foundation over E*/a, with the half width or radius a of the contact, in the plane and in space: it then has
+/// the contact of Hertz (Johnson, Contact Mechanics, 1985, section 4.3).
+const FOUNDATION: [f64; 2] = [1.18, 1.70];
+
+/// rho0: stiffness per area of the two bodies of each point in series, for contact all over their surfaces.
 pub fn surface_slopes(model: &Model) -> Vec<f64> {
+    slopes(model, |_| true)
+}
+
+/// The same for contact at the points that are `closed`: each body gives way as over its depth, or as over its contact if that is
+/// smaller.
+fn slopes(model: &Model, closed: impl Fn(usize) -> bool) -> Vec<f64> {
     let (points, rows) = (model.points(), model.row_stiffness());
-    let largest = model.bodies.iter().map(|slot| slot.stiffness).fold(f64::MIN_POSITIVE, f64::max);
+    let stiffness = |body: usize, per_modulus: f64| {
+        let slot = &model.bodies[body];
+        slot.modulus * per_modulus.max(slot.depth.recip())
+    };
+    let largest = (0..model.bodies.len()).map(|body| stiffness(body, 0.0)).fold(f64::MIN_POSITIVE, f64::max);
     let mut slopes = Vec::with_capacity(points);
     for (i, pair) in model.pairs.iter().enumerate() {
+        let area: f64 = model.range(i).filter(|&q| closed(q)).map(|q| model.weight[q]).sum();
+        let half = if pair.measure == "length" { 0.5 * area } else { (area / std::f64::consts::PI).sqrt() };
+        let per_modulus = FOUNDATION[usize::from(pair.measure != "length")] / half;
         slopes.extend(model.range(i).map(|q| {
             // a row without stiffness cannot move
             let compliance = |side: usize| match rows[side * points + q] {
                 0.0 => 0.0,
-                _ => model.bodies[pair.bodies[side]].stiffness.recip(),
+                _ => stiffness(pair.bodies[side], per_modulus).recip(),
             };
             let sum = compliance(0) + compliance(1);
             if sum > 0.0 { sum.recip() } else { largest }
