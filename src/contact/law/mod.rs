@@ -62,36 +62,6 @@ pub trait LayerLaw: std::fmt::Debug {
         self.response(point, c).pressure
     }
 
-    fn meet(&self, point: usize, s: f64, rho: f64) -> f64 {
-        if !(s > 0.0) { return s; }
-        let (mut low, mut high) = (0.0f64, s);
-        for _ in 0..2000 {
-            let mid = if low > 0.0 { (low * high).sqrt() } else { high * 1e-3 };
-            if mid <= low || mid >= high { break; }
-            let v = mid + self.pressure(point, mid) / rho;
-            if v < s { low = mid } else { high = mid }
-            if high < 1e-300 { break; }
-        }
-        high
-    }
-    fn compression(&self, point: usize, p: f64) -> f64 {
-        if !(p > 0.0) { return 0.0; }
-        let (mut low, mut high) = (1e-300f64, 1e30f64);
-        for _ in 0..2000 {
-            let mid = (low * high).sqrt();
-            if mid <= low || mid >= high { break; }
-            if self.pressure(point, mid) < p { low = mid } else { high = mid }
-        }
-        high
-    }
-    fn duality_gap(&self, point: usize, c: f64, p: f64) -> f64 {
-        let c0 = self.compression(point, p);
-        let mut sum = 0.0;
-        let c1 = c.max(0.0);
-        for i in 0..16 { let t = (i as f64 + 0.5) / 16.0; sum += (self.pressure(point, c0 + t * (c1 - c0)) - p) * (c1 - c0) / 16.0; }
-        sum.max(0.0) + p * (c1 - c)
-    }
-
     /// g'(-c) of (38): the tangent of the paper's law g, which also runs through tension as an odd function. For `c > 0` it is
     /// p'(c). Robin terms of open points use it; pressure never does.
     fn robin_tangent(&self, point: usize, c: f64) -> f64 {
