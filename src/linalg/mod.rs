@@ -3,6 +3,15 @@
 //! Dense algebra comes from `nalgebra`. The sparse type is our own because its index type must be PETSc's
 //! 32-bit integer, so that a pattern goes to PETSc as it is.
 
+mod blocks;
+#[cfg(test)]
+mod blocks_tests;
+mod degree;
+mod factor;
+
+pub use blocks::Blocks;
+pub use factor::{Factor, TOLERANCE};
+
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// A sparse matrix in compressed rows: row `i` holds columns `col[ptr[i]..ptr[i+1]]`, sorted.

@@ -1,0 +1,95 @@
+//! Symmetric positive semidefinite matrices of small dense blocks, one row of blocks a body.
+
+use super::factor::Factor;
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// A symmetric matrix of dense blocks; only those that are not zero are stored.
+#[derive(Debug, Clone)]
+pub struct Blocks {
+    /// First unknown of each block row, and the number of all.
+    first: Vec<usize>,
+    /// Row i: its blocks (i, j) with j >= i.
+    rows: Vec<BTreeMap<usize, DMatrix<f64>>>,
+}
+
+impl Blocks {
+    /// Zero, with this number of unknowns in each row of blocks; zero unknowns are allowed.
+    pub fn new(sizes: &[usize]) -> Self {
+        let mut first = vec![0];
+        sizes.iter().for_each(|size| first.push(first[first.len() - 1] + size));
+        Self { first, rows: vec![BTreeMap::new(); sizes.len()] }
+    }
+
+    /// A matrix of a single block.
+    pub fn single(block: &DMatrix<f64>) -> Self {
+        let mut blocks = Self::new(&[block.nrows()]);
+        blocks.add(0, 0, block);
+        blocks
+    }
+
+    /// Number of rows of blocks.
+    pub fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.first[self.rows.len()]
+    }
+
+    /// Unknowns of a row of blocks.
+    pub fn range(&self, i: usize) -> Range<usize> {
+        self.first[i]..self.first[i + 1]
+    }
+
+    /// Adds a block at (i, j), and its transpose at (j, i) if that is another place.
+    pub fn add(&mut self, i: usize, j: usize, block: &DMatrix<f64>) {
+        debug_assert_eq!(block.shape(), (self.range(i).len(), self.range(j).len()));
+        if i > j {
+            return self.add(j, i, &block.transpose());
+        }
+        if !block.is_empty() {
+            self.rows[i].entry(j).and_modify(|sum| *sum += block).or_insert_with(|| block.clone());
+        }
+    }
+
+    /// Adds to the diagonal, one entry an unknown.
+    pub fn add_diagonal(&mut self, diagonal: &DVector<f64>) {
+        for i in 0..self.rows() {
+            let range = self.range(i);
+            self.add(i, i, &DMatrix::from_diagonal(&diagonal.rows(range.start, range.len())));
+        }
+    }
+
+    /// The block (i, i).
+    pub fn diagonal(&self, i: usize) -> DMatrix<f64> {
+        let size = self.range(i).len();
+        self.rows[i].get(&i).cloned().unwrap_or_else(|| DMatrix::zeros(size, size))
+    }
+
+    /// Stored blocks (i, j, block) with i <= j, row by row.
+    pub fn stored(&self) -> impl Iterator<Item = (usize, usize, &DMatrix<f64>)> {
+        self.rows.iter().enumerate().flat_map(|(i, row)| row.iter().map(move |(&j, block)| (i, j, block)))
+    }
+
+    /// A x.
+    pub fn multiply(&self, x: &DVector<f64>) -> DVector<f64> {
+        let mut y = DVector::zeros(self.unknowns());
+        for (i, j, block) in self.stored() {
+            let (own, other) = (self.range(i), self.range(j));
+            y.rows_mut(own.start, own.len()).gemv(1.0, block, &x.rows(other.start, other.len()), 1.0);
+            if i != j {
+                y.rows_mut(other.start, other.len()).gemv_tr(1.0, block, &x.rows(own.start, own.len()), 1.0);
+            }
+        }
+        y
+    }
+
+    /// Factors the matrix and finds its kernel: see [`Factor`]. `tolerance` is [`TOLERANCE`](super::TOLERANCE) unless there is
+    /// a reason.
+    pub fn factor(&self, tolerance: f64) -> Factor {
+        Factor::new(self, tolerance)
+    }
+}

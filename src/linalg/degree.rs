@@ -1,0 +1,62 @@
+//! An order in which to eliminate the vertices of a graph so that few edges are added: minimum degree.
+
+use std::collections::BTreeSet;
+
+/// The vertices in the order of their elimination, each with those that it is connected to then.
+///
+/// `graph` has the neighbours of each vertex, sorted, without itself. At every step a vertex of least degree is taken, the first
+/// of them, and its neighbours are connected to each other (George, Liu: The evolution of the minimum degree ordering
+/// algorithm, 1989; here on the explicit graph, which is small: one vertex a body).
+pub fn order(mut graph: Vec<Vec<usize>>) -> Vec<(usize, Vec<usize>)> {
+    let mut queue: BTreeSet<(usize, usize)> = graph.iter().enumerate().map(|(v, near)| (near.len(), v)).collect();
+    let mut order = Vec::with_capacity(graph.len());
+    while let Some((_, vertex)) = queue.pop_first() {
+        let near = std::mem::take(&mut graph[vertex]);
+        for &other in &near {
+            let before = graph[other].len();
+            let joined = union(&graph[other], &near, [vertex, other]);
+            if joined.len() != before {
+                queue.remove(&(before, other));
+                queue.insert((joined.len(), other));
+            }
+            graph[other] = joined;
+        }
+        order.push((vertex, near));
+    }
+    order
+}
+
+/// Members of either of two sorted lists, but for two of them.
+fn union(a: &[usize], b: &[usize], without: [usize; 2]) -> Vec<usize> {
+    let mut all = Vec::with_capacity(a.len() + b.len());
+    let (mut i, mut k) = (0, 0);
+    while i < a.len() || k < b.len() {
+        let next = a.get(i).copied().unwrap_or(usize::MAX).min(b.get(k).copied().unwrap_or(usize::MAX));
+        i += usize::from(a.get(i) == Some(&next));
+        k += usize::from(b.get(k) == Some(&next));
+        if !without.contains(&next) {
+            all.push(next);
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn leaves_go_before_their_tree_and_a_ring_is_closed() {
+        // a star with centre 0: no edge is added, and the centre is among the last two
+        let star = vec![vec![1, 2, 3, 4], vec![0], vec![0], vec![0], vec![0]];
+        let order = super::order(star);
+        assert!(order.iter().all(|(_, near)| near.len() <= 1));
+        assert!(order[3..].iter().any(|(vertex, _)| *vertex == 0));
+        // a ring of five: each has two neighbours until three are left
+        let ring = (0..5).map(|v: usize| {
+            let mut near = vec![(v + 1) % 5, (v + 4) % 5];
+            near.sort_unstable();
+            near
+        });
+        let degrees: Vec<usize> = super::order(ring.collect()).into_iter().map(|(_, near)| near.len()).collect();
+        assert_eq!(degrees, [2, 2, 2, 1, 0]);
+    }
+}
