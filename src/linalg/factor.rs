@@ -23,6 +23,10 @@ use std::ops::Range;
 ///   block, all others move by their distance, and so do their rounding errors: the pivot is 2.5e-9 on that wall, e'e 2.4e7.
 pub const TOLERANCE: f64 = 1e-13;
 
+/// Parts of a free motion below this share of its largest are rounding: it is known to the root of [`TOLERANCE`], 3e-7, and to
+/// less than that where springs differ much.
+pub const PART: f64 = 1e-6;
+
 /// LDL' of a symmetric positive semidefinite matrix, unknowns scaled to ones on the diagonal, bodies in an order of minimum
 /// degree, unknowns of a body by their pivots, largest first.
 ///
@@ -86,11 +90,11 @@ impl Column {
 }
 
 impl Factor {
-    /// Factors a matrix.
-    pub(super) fn new(matrix: &Blocks, tolerance: f64) -> Self {
+    /// Factors a matrix whose unknowns are scaled with `scale`, one entry each.
+    pub(super) fn new(matrix: &Blocks, scale: Vec<f64>, tolerance: f64) -> Self {
         let mut factor = Self {
             count: matrix.unknowns(),
-            scale: scale(matrix, tolerance),
+            scale,
             columns: structure(matrix),
             kernel: Vec::new(),
             left_out: Vec::new(),
@@ -305,7 +309,7 @@ struct Work {
 }
 
 /// 1/root of each diagonal entry, zero where it is rounding.
-fn scale(matrix: &Blocks, tolerance: f64) -> Vec<f64> {
+pub(super) fn unit_diagonal(matrix: &Blocks, tolerance: f64) -> Vec<f64> {
     let of = |i: usize| {
         let diagonal = matrix.diagonal(i).diagonal();
         let least = tolerance * tolerance * diagonal.iter().copied().fold(0.0, f64::max);
