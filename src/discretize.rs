@@ -3,6 +3,7 @@
 mod auto;
 mod balance;
 mod carried;
+mod draft;
 mod elastic;
 mod fields;
 mod find;
@@ -16,7 +17,7 @@ mod supports;
 mod surface;
 
 use crate::contact::{self, ContactPair};
-use crate::ddm::{self, Body, BodySlot, Exchange, Model, Motion, Segment};
+use crate::ddm::{self, Body, BodySlot, Exchange, Model, Segment};
 use crate::error::Result;
 use crate::fem::{
     ElasticBody,
@@ -30,10 +31,11 @@ use crate::problem::method::Start;
 use crate::scene::Scene;
 use balance::Forces;
 pub use balance::{Balance, Resultant};
+use draft::{Draft, Loose};
 use fields::{ErrorMaker, FieldMaker};
 use find::{placed, point};
+use mechanism::Fixed;
 pub use mechanism::Mechanism;
-use mechanism::{Draft, Fixed};
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use std::rc::Rc;
@@ -207,9 +209,10 @@ pub fn discretize<const D: usize>(
     let owner = crate::parallel::owners(&loads, ranks.1);
     let (mut slots, mut infos, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
     let (mut assemblies, mut assemblies_avoided) = (0, 0);
-    let drafts = parts.iter().enumerate().map(|(index, part)| draft(index, part, &pairs, mesh));
+    let drafts = parts.iter().zip(draft::segments(parts.len(), &pairs));
+    let drafts = drafts.map(|(part, segments)| Draft::new(part, segments, &pairs, mesh));
     let drafts = drafts.collect::<Result<Vec<_>>>()?;
-    let Fixed { gauged, mechanisms } = mechanism::fix(&mut parts, &drafts, &pairs);
+    let Fixed { gauged, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs);
     let supported: Vec<Supported> =
         parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
     let outlines = parts.iter().zip(&drafts).zip(&supported).map(|((part, draft), supported)| Outline {
@@ -221,7 +224,8 @@ pub fn discretize<const D: usize>(
     });
     maker.plan(&outlines.collect::<Vec<_>>())?;
     let drafts = drafts.into_iter().zip(supported);
-    for (index, ((part, (draft, supported)), gauged)) in parts.into_iter().zip(drafts).zip(gauged).enumerate() {
+    let known = gauged.into_iter().zip(loose);
+    for (index, ((part, (draft, supported)), (gauged, loose))) in parts.into_iter().zip(drafts).zip(known).enumerate() {
         let Draft { segments, rows, free, nodal_load, load } = draft;
         let Supported { carried, prescribed } = supported;
         let mut offset = vec![0.0; rows.rows()];
@@ -229,8 +233,7 @@ pub fn discretize<const D: usize>(
             rows.multiply(&carried, &mut offset);
         }
         offsets.push(offset);
-        let left = part.left(&free);
-        let motions: Vec<Motion> = left.iter().map(|motion| trace_of::<D>(motion, &rows, &load)).collect();
+        let Loose { left, motions, unfelt } = loose;
         let mut slot = BodySlot {
             name: part.spec.name.value.clone(),
             local: None,
@@ -247,7 +250,7 @@ pub fn discretize<const D: usize>(
         let surface: f64 = slot.segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
         let elasticity = elastic::of(part.spec, &part.space, mesh, scene.plane)?;
         let modulus = elastic::modulus(&part.space, &elasticity, share(&slot.segments, &pairs));
-        let held = slot.motions.len() == gauge::felt_by_none(&slot.motions).len();
+        let held = slot.motions.len() == unfelt.len();
         let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
         (slot.modulus, slot.depth) = (modulus, volume / surface);
         let stiffness = if held && surface > 0.0 { modulus / slot.depth } else { 0.0 };
@@ -277,7 +280,7 @@ pub fn discretize<const D: usize>(
             dofs: space.dofs(),
             supported: held.supported(),
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),
-            left_by_all: gauge::felt_by_none(&slot.motions).into_iter().map(|(name, _)| name).collect(),
+            left_by_all: unfelt.into_iter().map(|(name, _)| name).collect(),
             gauged,
             warning: elastic::warning(part.spec, &space, scene.plane),
             stiffness,
@@ -357,15 +360,6 @@ pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<ddm::Start
     Ok(ddm::Start::Trace(trace))
 }
 
-/// What is known of a body before motions are fixed.
-fn draft<const D: usize>(index: usize, part: &Part<D>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Draft> {
-    let (segments, rows) = rows_of(index, pairs, part.space.dofs());
-    let free = part.in_dofs(rigid::of(&part.space));
-    let nodal_load = part.load(mesh)?;
-    let load = part.load_on_dofs(nodal_load.clone());
-    Ok(Draft { segments, rows, free, nodal_load, load })
-}
-
 /// What supports prescribe.
 struct Supported {
     /// Displacement by which they move the body as one, one entry a dof; empty for none.
@@ -380,23 +374,6 @@ fn supported<const D: usize>(part: &Part<D>, free: &[RigidMotion]) -> Supported 
     let whole = carried::carried(free, &prescribed).filter(|_| part.springs.is_empty());
     let (carried, prescribed) = whole.unwrap_or((Vec::new(), prescribed));
     Supported { carried, prescribed }
-}
-
-/// Contact rows of a body over all pairs, in the order of its segments.
-fn rows_of(body: usize, pairs: &[ContactPair], dofs: usize) -> (Vec<Segment>, Csr) {
-    let mut segments = Vec::new();
-    let mut rows = Csr::new(dofs);
-    for (index, pair) in pairs.iter().enumerate() {
-        for side in 0..2 {
-            if pair.bodies[side] == body {
-                segments.push(Segment { pair: index, side });
-                for q in 0..pair.len() {
-                    rows.push_row(pair.rows[side].row(q));
-                }
-            }
-        }
-    }
-    (segments, rows)
 }
 
 /// The rows of these segments for displacements of the nodes.
@@ -418,11 +395,4 @@ fn share(segments: &[Segment], pairs: &[ContactPair]) -> [f64; 3] {
     }
     let total: f64 = sum.iter().sum();
     if total > 0.0 { sum.map(|sum| sum / total) } else { sum }
-}
-
-fn trace_of<const D: usize>(motion: &RigidMotion, rows: &Csr, load: &[f64]) -> Motion {
-    let mut trace = vec![0.0; rows.rows()];
-    rows.multiply(&motion.displacement, &mut trace);
-    let work = gauge::work::<D>(&motion.displacement, load);
-    Motion { name: motion.name.clone(), trace, work }
 }

@@ -231,7 +231,7 @@ fn refusals() {
     refused(fix, &fixed("{ on = \"lower\", symmetry = true }"), "symmetry", &["no curve `lower`", "is a region"]);
     let load = "load = [{ on = \"upper_face\", pressure = 10 }]";
     let pushed = "load = [{ on = \"upper_face\", force = [1, -40], rigid = true }]";
-    refused(load, pushed, "rigid", &["on `upper_face` pushes against the support on `upper_axis`", "line 19"]);
+    refused(load, pushed, "rigid = true", &["on `upper_face` pushes against the support on `upper_axis`", "line 19"]);
     let two = "load = [{ on = \"upper_face\", force = [0, -40], rigid = true },\n  { on = \"upper_end\", force = [0, 0], rigid = true }]";
     refused(load, two, "upper_end\", f", &["the rigid surfaces `upper_face` and `upper_end` meet", "line 20"]);
     let spring = |text: &str| format!("{load}\nspring = [{text}]");

@@ -4,8 +4,8 @@
 //! combinations nothing holds is the kernel of [`Motions::springs`]; [`TOLERANCE`] says what is nothing.
 
 use super::model::{Model, Motion, Segment};
-pub use crate::linalg::TOLERANCE;
 use crate::linalg::{Blocks, axpy, dot};
+pub use crate::linalg::{PART, TOLERANCE};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
@@ -32,10 +32,6 @@ pub struct Moved {
     /// Name of the motion.
     pub name: String,
 }
-
-/// Parts of a motion below this share of the largest are rounding: a kernel vector of a matrix that is rounded by
-/// [`TOLERANCE`] is known to its root, 3e-7, and by some more where the least springs are soft.
-pub const PART: f64 = 1e-6;
 
 impl<'a> Motions<'a> {
     /// Of bodies with these contact rows and free motions; `points` are the points of each pair.
@@ -77,6 +73,11 @@ impl<'a> Motions<'a> {
     /// Motions of a body.
     pub fn of_body(&self, body: usize) -> Range<usize> {
         self.first[body]..self.first[body + 1]
+    }
+
+    /// The body of a motion.
+    pub fn body_of(&self, motion: usize) -> usize {
+        self.first.partition_point(|&first| first <= motion) - 1
     }
 
     /// (B E)' diag(`weight`) (B E), for springs at the points, one entry a point: a block a body.

@@ -3,45 +3,21 @@
 //! Each body is held by its neighbours then, and all of them are not. As with the motions of one body ([`gauge`]) there is a
 //! solution if the loads do no work on such a motion: one node of one body is fixed against it, without reaction.
 
+use super::draft::{Draft, Loose, NO_WORK, works};
 use super::gauge;
 use super::part::Part;
 use crate::contact::ContactPair;
 use crate::ddm::{self, Motion, Motions, Segment};
 use crate::fem::Space;
 use crate::fem::rigid::{self, RigidMotion};
-use crate::linalg::{Csr, axpy, dot, fit, kernel};
+use crate::linalg::{Blocks, PART, TOLERANCE, axpy, dot, fit};
 use nalgebra::{DMatrix, DVector};
+use std::collections::HashMap;
 
-/// A motion whose largest displacement is about one is free if the mean square of what it closes, and of what it moves supports by,
-/// is no more than this.
-const FREE: f64 = 1e-13;
-
-/// A rigid motion of a whole group that closes more than this share of its displacement is out of reach of the mesh.
+/// A rigid motion of a whole group that closes more than this share of its displacement is out of reach of the mesh. Not a matter
+/// of rounding: chords of the arc between neighbouring nodes leave it by 1/8 of their angle squared, and two meshes turn against
+/// each other by that much: 0.03 are chords of 28 degrees.
 const FLAWED: f64 = 0.03;
-
-/// Parts of a motion below this share of the largest are rounding.
-const ROUNDING: f64 = 1e-6;
-
-/// A body before it is assembled.
-pub struct Draft {
-    /// Its contact rows, pair by pair.
-    pub segments: Vec<Segment>,
-    /// These rows; columns: its dofs.
-    pub rows: Csr,
-    /// Rigid motions of the free body, in its dofs.
-    pub free: Vec<RigidMotion>,
-    /// Loads on its nodes.
-    pub nodal_load: Vec<f64>,
-    /// Loads on its dofs.
-    pub load: Vec<f64>,
-}
-
-impl Draft {
-    /// Motions as contact and loads see them.
-    pub fn motions<const D: usize>(&self, all: &[RigidMotion]) -> Vec<Motion> {
-        all.iter().map(|motion| super::trace_of::<D>(motion, &self.rows, &self.load)).collect()
-    }
-}
 
 /// A free motion of several bodies together.
 #[derive(Debug, Clone)]
@@ -69,37 +45,49 @@ pub struct Fixed {
     pub gauged: Vec<Vec<String>>,
     /// Motions of several bodies.
     pub mechanisms: Vec<Mechanism>,
+    /// The motions left to each body.
+    pub loose: Vec<Loose>,
 }
 
 /// Fixes the motions that nothing feels and no load works on: of whole groups of bodies, of each body alone, then what is left.
 pub fn fix<const D: usize>(parts: &mut [Part<D>], drafts: &[Draft], pairs: &[ContactPair]) -> Fixed {
-    // points count by their share in a pair, so that motions count alike wherever they are felt
-    let share = |pair: &ContactPair| {
-        let all: f64 = pair.weight.iter().sum();
-        pair.weight.iter().map(|weight| weight / all).collect::<Vec<f64>>()
-    };
-    let points = pairs.iter().map(ContactPair::len).collect();
-    let mut search =
-        Search { parts, drafts, points, weight: pairs.iter().flat_map(share).collect(), found: Vec::new() };
+    let loose = parts.iter().zip(drafts).map(|(part, draft)| draft.loose(part)).collect();
+    let mut search = Search { parts, drafts, pairs, loose, found: Vec::new() };
     for group in groups(drafts.len(), pairs) {
-        if group.iter().all(|&body| !search.left(body).is_empty()) {
-            search.fix(|search| search.of_group(&group));
+        if group.iter().all(|&body| !search.loose[body].left.is_empty()) {
+            let all = search.of_group(&group);
+            if !search.works_on(&all) {
+                search.fix(all, |search| search.of_group(&group));
+            }
         }
     }
-    let gauged = search.parts.iter_mut().zip(drafts).map(|(part, draft)| gauge::fix(part, draft)).collect();
-    while search.found.iter().all(|mechanism| mechanism.work == 0.0) && search.fix(Search::of_some) {}
-    Fixed { gauged, mechanisms: search.found }
+    let bodies = search.parts.iter_mut().zip(drafts).zip(&mut search.loose);
+    let gauged = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose)).collect();
+    if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
+        search.fix_some();
+    }
+    Fixed { gauged, mechanisms: search.found, loose: search.loose }
 }
 
-/// Bodies that pairs connect, two at least.
+/// Bodies that pairs connect, two at least, in the order of the first of them.
 fn groups(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<usize>> {
-    let mut group: Vec<usize> = (0..bodies).collect();
-    for pair in pairs {
-        let [a, b] = pair.bodies.map(|body| group[body]);
-        group.iter_mut().filter(|number| **number == a.max(b)).for_each(|number| *number = a.min(b));
+    // each body points to one before it, or to itself: the first of its group in the end
+    let mut before: Vec<usize> = (0..bodies).collect();
+    fn first(before: &mut [usize], mut body: usize) -> usize {
+        while before[body] != body {
+            before[body] = before[before[body]];
+            body = before[body];
+        }
+        body
     }
-    let members = |number: usize| (0..bodies).filter(|&body| group[body] == number).collect::<Vec<_>>();
-    (0..bodies).map(members).filter(|bodies| bodies.len() > 1).collect()
+    for pair in pairs {
+        let [a, b] = pair.bodies.map(|body| first(&mut before, body));
+        before[a.max(b)] = a.min(b);
+    }
+    let mut members = vec![Vec::new(); bodies];
+    (0..bodies).for_each(|body| members[first(&mut before, body)].push(body));
+    members.retain(|bodies| bodies.len() > 1);
+    members
 }
 
 /// A motion of some bodies: the displacement of the dofs of each.
@@ -111,29 +99,55 @@ struct Moving {
     error: f64,
 }
 
+/// The contact rows of some bodies, pairs numbered among those that these touch.
+struct Rows {
+    segments: Vec<Vec<Segment>>,
+    /// Points of each pair.
+    points: Vec<usize>,
+    /// Share of each point in its pair, so that motions count alike wherever they are felt.
+    weight: Vec<f64>,
+}
+
+impl Rows {
+    /// Of bodies in the order of `drafts`.
+    fn new<'d>(drafts: impl Iterator<Item = &'d Draft>, pairs: &[ContactPair]) -> Self {
+        let mut rows = Self { segments: Vec::new(), points: Vec::new(), weight: Vec::new() };
+        let mut number = HashMap::new();
+        for draft in drafts {
+            let own = draft.segments.iter().map(|segment| {
+                let pair = *number.entry(segment.pair).or_insert_with(|| {
+                    let weight = &pairs[segment.pair].weight;
+                    let all: f64 = weight.iter().sum();
+                    rows.weight.extend(weight.iter().map(|weight| weight / all));
+                    rows.points.push(weight.len());
+                    rows.points.len() - 1
+                });
+                Segment { pair, side: segment.side }
+            });
+            rows.segments.push(own.collect());
+        }
+        rows
+    }
+
+    /// What these rows feel of motions of each body.
+    fn feel<'a>(&'a self, motions: impl Iterator<Item = &'a [Motion]>) -> Motions<'a> {
+        Motions::new(self.segments.iter().map(Vec::as_slice).zip(motions), &self.points)
+    }
+}
+
 struct Search<'p, 's, const D: usize> {
     parts: &'p mut [Part<'s, D>],
     drafts: &'p [Draft],
-    /// Points of each pair.
-    points: Vec<usize>,
-    weight: Vec<f64>,
+    pairs: &'p [ContactPair],
+    /// The motions that supports and springs leave to each body now.
+    loose: Vec<Loose>,
     found: Vec<Mechanism>,
 }
 
 impl<const D: usize> Search<'_, '_, D> {
-    /// The motions that supports and springs leave to a body.
-    fn left(&self, body: usize) -> Vec<RigidMotion> {
-        self.parts[body].left(&self.drafts[body].free)
-    }
-
-    /// What contact makes of motions of each body.
-    fn felt(&self, motions: &[Vec<Motion>]) -> DMatrix<f64> {
-        let bodies = self.drafts.iter().zip(motions).map(|(draft, motions)| (&draft.segments[..], &motions[..]));
-        let motions = Motions::new(bodies, &self.points);
-        let (springs, n) = (motions.springs(&self.weight), motions.count());
-        let unit = |j: usize| DVector::from_fn(n, |i, _| f64::from(u8::from(i == j)));
-        let columns: Vec<DVector<f64>> = (0..n).map(|j| springs.multiply(&unit(j))).collect();
-        DMatrix::from_fn(n, n, |i, j| columns[j][i])
+    /// Contact rows of some bodies.
+    fn rows(&self, bodies: &[usize]) -> Rows {
+        Rows::new(bodies.iter().map(|&body| &self.drafts[body]), self.pairs)
     }
 
     /// The rigid motions of some bodies as one: for each body those of its nodes.
@@ -159,63 +173,64 @@ impl<const D: usize> Search<'_, '_, D> {
         let all: Vec<Vec<RigidMotion>> =
             self.as_one(group).into_iter().zip(group).map(|(nodal, &body)| self.parts[body].in_dofs(nodal)).collect();
         let count = all[0].len();
-        let mut motions = vec![Vec::new(); self.drafts.len()];
-        for (own, &body) in all.iter().zip(group) {
-            motions[body] = self.drafts[body].motions::<D>(own);
-        }
         let mut held = DMatrix::zeros(count, count);
         for (own, &body) in all.iter().zip(group) {
-            let left: Vec<Vec<f64>> = self.left(body).into_iter().map(|motion| motion.displacement).collect();
+            let left: Vec<&[f64]> = self.loose[body].left.iter().map(|motion| &motion.displacement[..]).collect();
             let off: Vec<Vec<f64>> = own.iter().map(|motion| rest(&motion.displacement, &left)).collect();
             held += DMatrix::from_fn(count, count, |i, j| dot(&off[i], &off[j]) / off[i].len() as f64);
         }
-        // all bodies move by the same motion
-        let together = DMatrix::from_fn(count * group.len(), count, |i, j| f64::from(u8::from(i % count == j)));
-        let felt = together.transpose() * self.felt(&motions) * &together;
+        let motions: Vec<Vec<Motion>> =
+            all.iter().zip(group).map(|(own, &body)| self.drafts[body].motions::<D>(own)).collect();
+        let rows = self.rows(group);
+        let felt = rows.feel(motions.iter().map(Vec::as_slice));
         let moving = |weights: DVector<f64>| {
-            let error = weights.dot(&(&felt * &weights)).max(0.0).sqrt() / weights.amax();
+            // all bodies move by the same motion
+            let amounts = DVector::from_fn(felt.count(), |i, _| weights[i % count]);
+            let square: f64 = felt.closing(&amounts).iter().zip(&rows.weight).map(|(c, weight)| weight * c * c).sum();
             let parts = all.iter().map(|own| rigid::combine(own, &weights));
             let (mut names, displacement): (Vec<_>, Vec<_>) =
                 parts.map(|motion| (motion.name, motion.displacement)).unzip();
+            let error = square.sqrt() / weights.amax();
             Moving { bodies: group.to_vec(), displacement, name: names.swap_remove(0), error }
         };
-        let mut free = kernel(&held, 1.0, FREE);
+        let mut free = Blocks::free(&held, 1.0, TOLERANCE);
         // translations come first
-        let first = |weights: &DVector<f64>| weights.iter().position(|weight| weight.abs() > ROUNDING * weights.amax());
+        let first = |weights: &DVector<f64>| weights.iter().position(|weight| weight.abs() > PART);
         free.sort_by_key(first);
         free.into_iter().map(moving).filter(|moving| moving.error <= FLAWED).collect()
     }
 
-    /// Motions of some bodies that contact does not feel, where it feels those of each alone.
-    fn of_some(&self) -> Vec<Moving> {
-        let left: Vec<Vec<RigidMotion>> = (0..self.drafts.len()).map(|body| self.left(body)).collect();
-        let motions: Vec<Vec<Motion>> =
-            self.drafts.iter().zip(&left).map(|(draft, left)| draft.motions::<D>(left)).collect();
-        if motions.iter().any(|own| !gauge::felt_by_none(own).is_empty()) {
+    /// Motions of some of these bodies that contact does not feel, all others at rest; none if contact does not feel a motion of
+    /// one of them alone.
+    fn of_some(&self, bodies: &[usize]) -> Vec<Moving> {
+        if bodies.iter().any(|&body| !self.loose[body].unfelt.is_empty()) {
             return Vec::new();
         }
-        let moving = |weights: DVector<f64>| {
-            let small = ROUNDING * weights.amax();
-            let mut next = 0;
+        let rows = self.rows(bodies);
+        let felt = rows.feel(bodies.iter().map(|&body| &self.loose[body].motions[..]));
+        let factor = felt.springs(&rows.weight).factor(TOLERANCE);
+        let moving = |entries: &Vec<(usize, f64)>| {
             let mut moving = Moving { bodies: Vec::new(), displacement: Vec::new(), name: String::new(), error: 0.0 };
             let mut each = Vec::new();
-            for (body, left) in left.iter().enumerate() {
-                let own = weights.rows(next, left.len());
-                next += left.len();
-                if own.iter().all(|weight| weight.abs() <= small) {
-                    continue;
-                }
+            let entries: Vec<(usize, f64)> = entries.iter().filter(|(_, a)| a.abs() > PART).copied().collect();
+            for own in entries.chunk_by(|a, b| felt.body_of(a.0) == felt.body_of(b.0)) {
+                let (at, body) = (felt.body_of(own[0].0), bodies[felt.body_of(own[0].0)]);
+                let left = &self.loose[body].left;
+                let mut weights = DVector::zeros(left.len());
                 let mut displacement = vec![0.0; self.parts[body].space.dofs()];
-                left.iter().zip(own.iter()).for_each(|(motion, &a)| axpy(a, &motion.displacement, &mut displacement));
+                for &(motion, amount) in own {
+                    let motion = motion - felt.of_body(at).start;
+                    weights[motion] = amount;
+                    axpy(amount, &left[motion].displacement, &mut displacement);
+                }
                 moving.bodies.push(body);
                 moving.displacement.push(displacement);
-                let name = rigid::combine(left, &own.into_owned()).name;
-                each.push(format!("{name} of {}", self.parts[body].spec.name.value));
+                each.push(format!("{} of {}", rigid::combine(left, &weights).name, self.parts[body].spec.name.value));
             }
             moving.name = self.name_as_one(&moving).unwrap_or_else(|| each.join(", "));
             moving
         };
-        kernel(&self.felt(&motions), 1.0, FREE).into_iter().map(moving).collect()
+        factor.kernel_entries().iter().map(moving).collect()
     }
 
     /// The name of a motion that moves its bodies like one.
@@ -224,29 +239,63 @@ impl<const D: usize> Search<'_, '_, D> {
         let nodal: Vec<f64> = nodal.flat_map(|(&body, v)| self.parts[body].held.frame.displacements(v)).collect();
         let spaces: Vec<&Space<D>> = moving.bodies.iter().map(|&body| &self.parts[body].space).collect();
         let whole = rigid::of_all(&spaces);
-        let vectors: Vec<Vec<f64>> = whole.iter().map(|motion| motion.displacement.clone()).collect();
+        let vectors: Vec<&[f64]> = whole.iter().map(|motion| &motion.displacement[..]).collect();
         let off = rest(&nodal, &vectors);
-        let is_one = dot(&off, &off) <= ROUNDING * ROUNDING * dot(&nodal, &nodal);
+        let is_one = dot(&off, &off) <= PART * PART * dot(&nodal, &nodal);
         is_one.then(|| rigid::combine(&whole, &DVector::from_vec(fit(&vectors, &nodal))).name)
     }
 
-    /// Fixes motions of the same bodies, or notes that loads do work on one. Whether there may be other ones to fix.
-    fn fix(&mut self, motions: impl Fn(&Self) -> Vec<Moving>) -> bool {
-        let mut all = motions(self);
-        let works: Vec<f64> = all.iter().map(|moving| self.work(moving).abs()).collect();
-        if let Some(most) = (0..works.len()).max_by(|&i, &j| works[i].total_cmp(&works[j])).filter(|&i| works[i] > 0.0)
-        {
-            let Moving { bodies, name, .. } = all.swap_remove(most);
-            self.found.push(Mechanism { bodies, name, work: works[most], fixed: None });
-            return false;
+    /// Fixes what motions of some bodies are left, until there are none, loads work on one, or one cannot be fixed.
+    fn fix_some(&mut self) {
+        let every: Vec<usize> = (0..self.drafts.len()).collect();
+        loop {
+            let mut all = self.of_some(&every);
+            let mut goes_on = !self.works_on(&all) && !all.is_empty();
+            if !goes_on {
+                return;
+            }
+            // motions of other bodies stay what they are when some are fixed
+            let mut touched = vec![false; every.len()];
+            while let Some(first) = all.first() {
+                let bodies = first.bodies.clone();
+                let (same, other) = all.into_iter().partition(|moving| moving.bodies == bodies);
+                all = other;
+                if bodies.iter().all(|&body| !touched[body]) {
+                    bodies.iter().for_each(|&body| touched[body] = true);
+                    goes_on &= self.fix(same, |search| search.of_some(&bodies));
+                }
+            }
+            if !goes_on {
+                return;
+            }
         }
+    }
+
+    /// Notes the motion that loads work on most. Whether there is one.
+    fn works_on(&mut self, all: &[Moving]) -> bool {
+        let works: Vec<f64> = all.iter().map(|moving| self.work(moving).abs()).collect();
+        let most = (0..works.len()).max_by(|&i, &j| works[i].total_cmp(&works[j])).filter(|&i| works[i] > 0.0);
+        self.found.extend(most.map(|i| Mechanism {
+            bodies: all[i].bodies.clone(),
+            name: all[i].name.clone(),
+            work: works[i],
+            fixed: None,
+        }));
+        most.is_some()
+    }
+
+    /// Fixes motions of the same bodies; `again` finds those that are left. Whether the first was fixed.
+    fn fix(&mut self, all: Vec<Moving>, again: impl Fn(&Self) -> Vec<Moving>) -> bool {
         let Some(bodies) = all.first().map(|moving| moving.bodies.clone()) else { return false };
-        all.retain(|moving| moving.bodies == bodies);
         let names: Vec<&str> = all.iter().map(|moving| moving.name.as_str()).collect();
         let mut mechanism = Mechanism { name: names.join("; "), bodies, work: 0.0, fixed: None };
+        let count = all.len();
+        let mut left = all;
         // a motion that is left when others are fixed is another one: it turns about their nodes
-        for _ in 0..all.len() {
-            let left = motions(self);
+        for number in 0..count {
+            if number > 0 {
+                left = again(self);
+            }
             let same = left.iter().find(|moving| moving.bodies == mechanism.bodies);
             let fixed = same.and_then(|moving| self.pin(moving));
             mechanism.fixed = mechanism.fixed.or(fixed);
@@ -261,16 +310,16 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// Work of the loads on a motion, as a share of the largest possible; zero if it is rounding or an error of the mesh.
     fn work(&self, moving: &Moving) -> f64 {
-        let of = |(&body, u): (&usize, &Vec<f64>)| gauge::works::<D>(u, &self.drafts[body].load);
+        let of = |(&body, u): (&usize, &Vec<f64>)| works::<D>(u, &self.drafts[body].load);
         let each = moving.bodies.iter().zip(&moving.displacement).map(of);
         let [work, largest] = each.fold([0.0; 2], |[sum, most], [work, size]| [sum + work, most + size]);
-        if work.abs() <= largest * moving.error.max(gauge::NO_WORK) { 0.0 } else { work / largest }
+        if work.abs() <= largest * moving.error.max(NO_WORK) { 0.0 } else { work / largest }
     }
 
     /// Fixes a motion at one node of the largest body that has one where the motion is not small; returns the body.
     fn pin(&mut self, moving: &Moving) -> Option<usize> {
         let candidate = |(&body, u): (&usize, &Vec<f64>)| {
-            let dof = gauge::candidate(&self.parts[body], &self.drafts[body].rows, u)?;
+            let dof = self.drafts[body].candidate(&self.parts[body], u)?;
             Some((body, dof, u[dof].abs()))
         };
         let mut all: Vec<(usize, usize, f64)> =
@@ -280,6 +329,7 @@ impl<const D: usize> Search<'_, '_, D> {
         let size = |found: &(usize, usize, f64)| extent(&self.parts[found.0].space);
         let &(body, dof, _) = all.iter().rev().max_by(|a, b| size(a).total_cmp(&size(b)))?;
         self.parts[body].held.prescribed.insert(dof, 0.0);
+        self.loose[body] = self.drafts[body].loose(&self.parts[body]);
         Some(body)
     }
 }
@@ -288,7 +338,7 @@ impl<const D: usize> Search<'_, '_, D> {
 const NEAR: f64 = 1e-2;
 
 /// What a displacement is besides some motions.
-fn rest(displacement: &[f64], motions: &[Vec<f64>]) -> Vec<f64> {
+fn rest(displacement: &[f64], motions: &[&[f64]]) -> Vec<f64> {
     let mut rest = displacement.to_vec();
     fit(motions, displacement).iter().zip(motions).for_each(|(&a, motion)| axpy(-a, motion, &mut rest));
     rest

@@ -2,7 +2,7 @@
 
 use super::assemble::NodalBlock;
 use super::space::Space;
-use crate::linalg::kernel;
+use crate::linalg::{Blocks, PART, TOLERANCE};
 use nalgebra::{DMatrix, DVector};
 
 /// A rigid motion: displacement of every node and a name for messages.
@@ -23,20 +23,14 @@ pub struct FreeMotion {
     pub work: f64,
 }
 
-/// A motion moves supported dofs by no more than this, or it is not free.
-const HELD: f64 = 1e-12;
-
-/// The motions of [`left_by_supports`] with the work that `load` does on them; without those that supports hold a little.
+/// The motions of [`left_by_supports`] with the work that `load` does on them.
 pub fn free(left: &[RigidMotion], prescribed: &[(usize, f64)], load: &[f64]) -> Vec<FreeMotion> {
-    let is_free = |motion: &&RigidMotion| prescribed.iter().all(|entry| motion.displacement[entry.0].abs() <= HELD);
-    left.iter()
-        .filter(is_free)
-        .map(|motion| {
-            let mut displacement = motion.displacement.clone();
-            prescribed.iter().for_each(|entry| displacement[entry.0] = 0.0);
-            FreeMotion { work: crate::linalg::dot(&displacement, load), displacement }
-        })
-        .collect()
+    let of = |motion: &RigidMotion| {
+        let mut displacement = motion.displacement.clone();
+        prescribed.iter().for_each(|entry| displacement[entry.0] = 0.0);
+        FreeMotion { work: crate::linalg::dot(&displacement, load), displacement }
+    };
+    left.iter().map(of).collect()
 }
 
 /// The rigid motions of a body; of one of revolution the translation along its axis alone.
@@ -88,7 +82,7 @@ pub fn modes<const D: usize>(nodes: &[[f64; D]]) -> Vec<RigidMotion> {
 /// The rigid motions that vanish on the prescribed dofs: a basis of what the supports leave free.
 pub fn left_by_supports(motions: &[RigidMotion], prescribed: &[(usize, f64)]) -> Vec<RigidMotion> {
     let rows = DMatrix::from_fn(prescribed.len(), motions.len(), |i, j| motions[j].displacement[prescribed[i].0]);
-    kernel(&(rows.transpose() * &rows), prescribed.len().max(1) as f64, 1e-13)
+    Blocks::free(&(rows.transpose() * &rows), prescribed.len().max(1) as f64, TOLERANCE)
         .into_iter()
         .map(|weights| combine(motions, &weights))
         .collect()
@@ -114,7 +108,7 @@ pub fn left_by_springs<const D: usize>(
         return left;
     }
     let gram = DMatrix::from_fn(left.len(), left.len(), |i, j| energy(&left[i], &left[j]));
-    kernel(&gram, scale, 1e-12).into_iter().map(|weights| combine(&left, &weights)).collect()
+    Blocks::free(&gram, scale, TOLERANCE).into_iter().map(|weights| combine(&left, &weights)).collect()
 }
 
 /// Combination of motions, named after the parts that matter.
@@ -123,7 +117,7 @@ pub fn combine(motions: &[RigidMotion], weights: &DVector<f64>) -> RigidMotion {
     let mut name = Vec::new();
     let mut displacement = vec![0.0; motions.first().map_or(0, |m| m.displacement.len())];
     for (motion, &weight) in motions.iter().zip(weights.iter()) {
-        if weight.abs() > 1e-6 * largest {
+        if weight.abs() > PART * largest {
             name.push(motion.name.as_str());
         }
         crate::linalg::axpy(weight / largest, &motion.displacement, &mut displacement);

@@ -4,11 +4,13 @@
 //! 32-bit integer, so that a pattern goes to PETSc as it is.
 
 mod blocks;
+#[cfg(test)]
+mod blocks_tests;
 mod degree;
 mod factor;
 
 pub use blocks::Blocks;
-pub use factor::{Factor, TOLERANCE};
+pub use factor::{Factor, PART, TOLERANCE};
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -127,10 +129,10 @@ pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
 }
 
 /// Least squares: amounts of some vectors that together come nearest to another.
-pub fn fit(vectors: &[Vec<f64>], to: &[f64]) -> Vec<f64> {
+pub fn fit<V: AsRef<[f64]>>(vectors: &[V], to: &[f64]) -> Vec<f64> {
     let count = vectors.len();
-    let normal = DMatrix::from_fn(count, count, |i, j| dot(&vectors[i], &vectors[j]));
-    let right = DVector::from_fn(count, |i, _| dot(&vectors[i], to));
+    let normal = DMatrix::from_fn(count, count, |i, j| dot(vectors[i].as_ref(), vectors[j].as_ref()));
+    let right = DVector::from_fn(count, |i, _| dot(vectors[i].as_ref(), to));
     let largest = (0..count).map(|i| normal[(i, i)]).fold(0.0, f64::max);
     if largest == 0.0 {
         return vec![0.0; count];

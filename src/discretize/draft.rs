@@ -1,0 +1,114 @@
+//! A body before it is assembled: its contact rows, its loads, and the rigid motions that supports leave it.
+
+use super::part::Part;
+use crate::contact::ContactPair;
+use crate::ddm::{Motion, Segment, rigid as joint};
+use crate::error::Result;
+use crate::fem::rigid::{self, RigidMotion};
+use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
+use crate::mesh::Mesh;
+use nalgebra::{DMatrix, DVector};
+
+/// Share of the largest possible work below which the work of the loads is rounding.
+pub const NO_WORK: f64 = 1e-9;
+
+/// A body before it is assembled.
+pub struct Draft {
+    /// Its contact rows, pair by pair.
+    pub segments: Vec<Segment>,
+    /// These rows; columns: its dofs.
+    pub rows: Csr,
+    /// Rigid motions of the free body, in its dofs.
+    pub free: Vec<RigidMotion>,
+    /// Loads on its nodes.
+    pub nodal_load: Vec<f64>,
+    /// Loads on its dofs.
+    pub load: Vec<f64>,
+}
+
+/// The rigid motions that supports and springs leave to a body.
+pub struct Loose {
+    /// In the dofs of the body.
+    pub left: Vec<RigidMotion>,
+    /// As contact and loads see them.
+    pub motions: Vec<Motion>,
+    /// Combinations of them that no contact row feels: name and weights.
+    pub unfelt: Vec<(String, DVector<f64>)>,
+}
+
+/// Which contact rows each body has, pair by pair.
+pub fn segments(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<Segment>> {
+    let mut segments = vec![Vec::new(); bodies];
+    for (pair, sides) in pairs.iter().enumerate() {
+        (0..2).for_each(|side| segments[sides.bodies[side]].push(Segment { pair, side }));
+    }
+    segments
+}
+
+impl Draft {
+    /// A body with its contact rows and loads.
+    pub fn new<const D: usize>(
+        part: &Part<D>,
+        segments: Vec<Segment>,
+        pairs: &[ContactPair],
+        mesh: &Mesh<D>,
+    ) -> Result<Self> {
+        let mut rows = Csr::new(part.space.dofs());
+        for &Segment { pair, side } in &segments {
+            (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].rows[side].row(q)));
+        }
+        let free = part.in_dofs(rigid::of(&part.space));
+        let nodal_load = part.load(mesh)?;
+        let load = part.load_on_dofs(nodal_load.clone());
+        Ok(Self { segments, rows, free, nodal_load, load })
+    }
+
+    /// Motions as contact and loads see them.
+    pub fn motions<const D: usize>(&self, all: &[RigidMotion]) -> Vec<Motion> {
+        let of = |motion: &RigidMotion| {
+            let mut trace = vec![0.0; self.rows.rows()];
+            self.rows.multiply(&motion.displacement, &mut trace);
+            Motion { name: motion.name.clone(), trace, work: work::<D>(&motion.displacement, &self.load) }
+        };
+        all.iter().map(of).collect()
+    }
+
+    /// What supports and springs leave to the body now.
+    pub fn loose<const D: usize>(&self, part: &Part<D>) -> Loose {
+        let left = part.left(&self.free);
+        let motions = self.motions::<D>(&left);
+        let unfelt = felt_by_none(&motions);
+        Loose { left, motions, unfelt }
+    }
+
+    /// The dof outside the contact rows, so that these stay as they are, that a motion moves most, unless that is little.
+    pub fn candidate<const D: usize>(&self, part: &Part<D>, displacement: &[f64]) -> Option<usize> {
+        let mut in_rows = vec![false; displacement.len()];
+        self.rows.col.iter().for_each(|&dof| in_rows[dof as usize] = true);
+        let candidates = (0..in_rows.len()).filter(|dof| !in_rows[*dof] && !part.held.prescribed.contains_key(dof));
+        let size = |dof: &usize| displacement[*dof].abs();
+        candidates.max_by(|a, b| size(a).total_cmp(&size(b))).filter(|dof| size(dof) > 1e-3)
+    }
+}
+
+/// Combinations of motions that no contact row feels: name and weights.
+fn felt_by_none(motions: &[Motion]) -> Vec<(String, DVector<f64>)> {
+    let felt = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
+    let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));
+    let names = || motions.iter().map(|motion| motion.name.as_str());
+    let named = |weights: DVector<f64>| (joint::combined(names(), weights.iter().copied()), weights);
+    Blocks::free(&felt, rows as f64, TOLERANCE).into_iter().map(named).collect()
+}
+
+/// Work of a load on a displacement; exactly zero if it is rounding.
+pub fn work<const D: usize>(displacement: &[f64], load: &[f64]) -> f64 {
+    let [work, largest] = works::<D>(displacement, load);
+    if work.abs() <= NO_WORK * largest { 0.0 } else { work }
+}
+
+/// Work of a load on a displacement, and the largest that forces and displacements of these sizes can do, node by node.
+pub fn works<const D: usize>(displacement: &[f64], load: &[f64]) -> [f64; 2] {
+    let size = |v: &[f64]| dot(v, v).sqrt();
+    let nodes = displacement.chunks_exact(D).zip(load.chunks_exact(D));
+    [dot(displacement, load), nodes.map(|(u, f)| size(u) * size(f)).sum()]
+}
