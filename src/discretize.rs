@@ -233,7 +233,7 @@ pub fn discretize<const D: usize>(
             rows.multiply(&carried, &mut offset);
         }
         offsets.push(offset);
-        let Loose { left, motions, unfelt } = loose;
+        let Loose { left, motions, sprung, unfelt } = loose;
         let mut slot = BodySlot {
             name: part.spec.name.value.clone(),
             local: None,
@@ -243,6 +243,7 @@ pub fn discretize<const D: usize>(
             depth: 0.0,
             row_stiffness: Vec::new(),
             motions,
+            sprung,
         };
         let mut resultant =
             contact::pad(std::array::from_fn::<f64, D, _>(|c| nodal_load.iter().skip(c).step_by(D).sum()));

@@ -169,13 +169,7 @@ fn ratio(all: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
 pub struct Nodal(pub Rc<dyn Meshes>);
 
 impl Discretisation for Nodal {
-    fn error(
-        &mut self,
-        model: &mut Model,
-        step: &mut dyn LinearStep,
-        iterate: &Field,
-        layer: &Layer,
-    ) -> Result<f64> {
+    fn error(&mut self, model: &mut Model, step: &mut dyn LinearStep, iterate: &Field, layer: &Layer) -> Result<f64> {
         let estimate = estimate(&*self.0, model, step, iterate, layer)?;
         Ok(estimate.nodal.min(estimate.energy))
     }

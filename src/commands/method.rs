@@ -15,13 +15,7 @@ use crate::solver::{Dense, Krylov, Monolithic, Union};
 ///
 /// # Errors
 /// Failures of PETSc.
-pub fn make(
-    session: &Session,
-    scene: &Scene,
-    model: &mut Model,
-    linear: Linear,
-    start: &Start,
-) -> Result<Method> {
+pub fn make(session: &Session, scene: &Scene, model: &mut Model, linear: Linear, start: &Start) -> Result<Method> {
     let coefficient = || Coefficient::new(scene.method.psi.clone(), scene.method.robin);
     let acceleration: Box<dyn Acceleration> = match scene.method.name {
         MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => {
@@ -60,9 +54,9 @@ fn linear_step(
             let dense = |stiffness: &Csr| Ok(Dense::new(stiffness.rows(), stiffness.values.clone()));
             Box::new(Monolithic::new(union.without_zeros(), dense))
         }
-        _ => Box::new(Monolithic::new(union, move |stiffness: &Csr| {
-            Krylov::new(&session, WHOLE, block, stiffness, &[])
-        })),
+        _ => {
+            Box::new(Monolithic::new(union, move |stiffness: &Csr| Krylov::new(&session, WHOLE, block, stiffness, &[])))
+        }
     };
     if let Some(springs) = first_springs(model, start) {
         step.set_up(&springs)?;

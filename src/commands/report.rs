@@ -67,8 +67,7 @@ pub fn report(
         inner_iterations: counts.inner_iterations + joint.inner_iterations,
         robin_updates: counts.robin_updates,
         robin_updates_skipped: counts.robin_skipped,
-        dense_factorizations: counts.dense_factorizations
-            + joint.dense_factorizations,
+        dense_factorizations: counts.dense_factorizations + joint.dense_factorizations,
         assemblies: shared.assemblies,
         assemblies_avoided: shared.assemblies_avoided,
         factorizations_avoided: counts.factorizations_avoided,

@@ -61,7 +61,9 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
                 [] => "a motion of a body".to_owned(),
                 all => all.iter().map(part).collect::<Vec<_>>().join(" and "),
             };
-            format!("unbounded: no support or contact resists {what}, and the loads push that way; add a support, or turn the load")
+            format!(
+                "unbounded: no support or contact resists {what}, and the loads push that way; add a support, or turn the load"
+            )
         }
         Status::InnerSolver(failure) => {
             let reason = if failure.reason.is_empty() { "its rank knows more" } else { &failure.reason };

@@ -13,13 +13,7 @@ pub trait Discretisation {
     ///
     /// # Errors
     /// Failures of the solver library.
-    fn error(
-        &mut self,
-        model: &mut Model,
-        linear: &mut dyn LinearStep,
-        iterate: &Field,
-        layer: &Layer,
-    ) -> Result<f64>;
+    fn error(&mut self, model: &mut Model, linear: &mut dyn LinearStep, iterate: &Field, layer: &Layer) -> Result<f64>;
 }
 
 /// Share of the discretisation's error that the iteration's may have.

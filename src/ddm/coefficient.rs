@@ -68,7 +68,10 @@ pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<Moved> {
         let slot = &model.bodies[body];
         let springs = springs(model, body, &model.of_body(body, weight));
         let free = crate::linalg::kernel(&springs, slot.scale, rigid::TOLERANCE);
-        Some(Moved { body, name: rigid::combined(slot.motions.iter().map(|motion| &motion.name[..]), free.first()?.iter().copied()) })
+        Some(Moved {
+            body,
+            name: rigid::combined(slot.motions.iter().map(|motion| &motion.name[..]), free.first()?.iter().copied()),
+        })
     })
 }
 

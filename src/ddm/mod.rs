@@ -42,7 +42,7 @@ pub use history::{Observer, Row, Silent};
 pub use interval::Interval;
 pub use layer_state::Layer;
 pub use linear::{LinearStep, Solution};
-pub use model::{BodySlot, Exchange, Mechanism, Model, Motion, Segment, Serial};
+pub use model::{BodySlot, Exchange, Mechanism, Model, Motion, Segment, Serial, Sprung};
 pub use rigid::{Motions, Moved};
 pub use solve::{Method, Outcome, Settings, Start, first_springs, solve};
 pub use stop::Status;

@@ -6,6 +6,7 @@
 use super::body::Body;
 use crate::contact::ContactPair;
 use crate::error::Result;
+use nalgebra::DMatrix;
 use std::ops::Range;
 
 /// Sums over the ranks of a parallel run. Every entry is non-zero on one rank only, so sums are exact and every rank
@@ -59,6 +60,15 @@ pub struct Mechanism {
     pub work: f64,
 }
 
+/// Rigid motions that springs to the ground resist, beside those that nothing holds: a start moves bodies on soft springs, too.
+#[derive(Debug, Clone)]
+pub struct Sprung {
+    /// The motions that supports leave.
+    pub motions: Vec<Motion>,
+    /// Stiffness of the springs in terms of them.
+    pub stiffness: DMatrix<f64>,
+}
+
 /// A body in the model; the arrays are known on every rank, the body itself where it lives.
 pub struct BodySlot {
     /// Name in the scene.
@@ -69,6 +79,8 @@ pub struct BodySlot {
     pub segments: Vec<Segment>,
     /// Rigid motions that its supports leave free.
     pub motions: Vec<Motion>,
+    /// The motions that supports leave, if springs resist some of them.
+    pub sprung: Option<Sprung>,
     /// Largest diagonal entry of K.
     pub scale: f64,
     /// Elastic modulus against pressure on its contact surfaces, E/(1 - nu^2) or about that.

@@ -31,8 +31,14 @@ impl Origin {
         let mut energy = [0.0];
         let mut first = 0;
         for (index, slot) in model.bodies.iter_mut().enumerate() {
-            let own = first..first + slot.motions.len();
+            let count = slot.sprung.as_ref().map_or(slot.motions.len(), |sprung| sprung.motions.len());
+            let own = first..first + count;
             first = own.end;
+            // what springs hold is no free motion: it stays part of the displacements
+            if slot.sprung.is_some() {
+                motion.states[index].fill(0.0);
+                continue;
+            }
             let Some(body) = slot.local.as_mut() else { continue };
             let state = &mut motion.states[index];
             state.fill(0.0);

@@ -10,8 +10,8 @@ use super::linear::{Failure, LinearStep};
 use super::model::Model;
 use super::origin::Origin;
 use super::scale::Scale;
-use super::sweep::Sweep;
 use super::stop::{Cycle, Floor, Status, relative_increment};
+use super::sweep::Sweep;
 use crate::error::Result;
 use crate::problem::stop::StopRule;
 use std::time::Instant;
@@ -207,7 +207,8 @@ impl Run<'_> {
         }
         let imbalance = self.scale.imbalance(self.model, &layer.force);
         // what is known of the error counts: a small residual of a slow mode is no small error
-        let balanced = self.stop.residual.is_none_or(|tolerance| imbalance <= SPARE * tolerance && !(error > SPARE * tolerance));
+        let balanced =
+            self.stop.residual.is_none_or(|tolerance| imbalance <= SPARE * tolerance && !(error > SPARE * tolerance));
         if self.stop.is_met(residual, increment) && balanced {
             return Ok(Some(Status::Converged));
         }

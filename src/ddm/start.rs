@@ -1,6 +1,6 @@
 //! The start: rigid bodies on their own surfaces.
 //!
-//! The same problem with K = 0 in the rigid motions E that supports leave free, and each layer in series with a spring rho0 that
+//! The same problem in the rigid motions E that supports leave free, where K is that of springs to the ground alone, and each layer in series with a spring rho0 that
 //! stands for the surfaces of the two bodies: pressure p at the approach s of the rigid surfaces is the place with c + p/rho0 = s on
 //! the law. With w the work of the loads on E, the energy
 //!
@@ -15,8 +15,8 @@
 
 use super::layer_state::Layer;
 use super::line::{self, Unbounded};
-use super::model::Model;
-use super::rigid::{Moved, Motions, TOLERANCE};
+use super::model::{Model, Sprung};
+use super::rigid::{Motions, Moved, TOLERANCE};
 use crate::linalg::dot;
 use nalgebra::DVector;
 
@@ -56,18 +56,22 @@ const SETTLED: f64 = 0.2;
 /// # Errors
 /// Which bodies move how, if loads push them away for ever.
 pub fn find(model: &Model) -> Result<RigidStart, Vec<Moved>> {
-    let motions = Motions::of(model);
-    let work: Vec<f64> = model.bodies.iter().flat_map(|slot| &slot.motions).map(|motion| motion.work).collect();
+    let motions = Motions::with_springs(model);
+    let work: Vec<f64> = motions.bodies().iter().copied().flatten().map(|motion| motion.work).collect();
     let mut rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope: surface_slopes(model) };
     let mut amounts = DVector::zeros(motions.count());
     if motions.count() > 0 {
         for _ in 0..ROUNDS {
-            amounts = rigid.minimize().map_err(|motion| motions.names(model, &motion))?;
+            amounts = rigid.minimize().map_err(|motion| motions.names(&motion))?;
             let approach = rigid.approach(&amounts);
             let slope = slopes(model, |q| approach[q] > 0.0);
             let settled = slope.iter().zip(&rigid.slope).all(|(new, old)| (new - old).abs() <= SETTLED * old);
             // a contact that opens as a whole keeps its slope
-            slope.into_iter().zip(&mut rigid.slope).filter(|(new, _)| new.is_finite()).for_each(|(new, old)| *old = new);
+            slope
+                .into_iter()
+                .zip(&mut rigid.slope)
+                .filter(|(new, _)| new.is_finite())
+                .for_each(|(new, old)| *old = new);
             if settled {
                 break;
             }
@@ -166,7 +170,24 @@ impl Rigid<'_> {
     fn solve(&self, springs: &[f64], load: &DVector<f64>) -> DVector<f64> {
         let all = springs.iter().zip(&self.slope).zip(&self.model.weight);
         let all: Vec<f64> = all.map(|((spring, slope), weight)| spring + PROXIMAL * slope * weight).collect();
-        self.motions.springs(&all).factor(TOLERANCE).solve(load)
+        let mut stiffness = self.motions.springs(&all);
+        self.grounded().for_each(|(body, sprung)| stiffness.add(body, body, &sprung.stiffness));
+        stiffness.factor(TOLERANCE).solve(load)
+    }
+
+    /// Bodies on springs.
+    fn grounded(&self) -> impl Iterator<Item = (usize, &Sprung)> {
+        self.model.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)))
+    }
+
+    /// Forces of the springs to the ground on each motion.
+    fn pull(&self, amounts: &DVector<f64>) -> DVector<f64> {
+        let mut pull = DVector::zeros(amounts.len());
+        for (body, sprung) in self.grounded() {
+            let own = self.motions.of_body(body);
+            pull.rows_mut(own.start, own.len()).copy_from(&(&sprung.stiffness * amounts.rows(own.start, own.len())));
+        }
+        pull
     }
 
     /// Whether a motion opens contacts only.
@@ -190,24 +211,25 @@ impl Rigid<'_> {
             let places = self.places(&amounts);
             let push = self.motions.work(&places.force);
             let acting = self.motions.sizes(&places.force);
-            let lacking = &self.work - &push;
+            let lacking = &self.work - &push - self.pull(&amounts);
             let small = |i: usize| BALANCED * (acting[i].max(self.work[i].abs()).max(BALANCED * largest));
             if (0..lacking.len()).all(|i| lacking[i].abs() <= small(i)) {
                 break;
             }
             let step = self.solve(&self.springs(&places), &lacking);
             let closing = self.motions.closing(&step);
-            let gain = step.dot(&self.work);
-            if gain > BALANCED * step.amax() * largest && self.opens(&closing) {
+            let (gain, resisted) = (step.dot(&self.work), step.dot(&self.pull(&step)));
+            if resisted <= CLOSES * gain && gain > BALANCED * step.amax() * largest && self.opens(&closing) {
                 return Err(step);
             }
             let start = places.force;
+            let held = step.dot(&self.pull(&amounts)) - gain;
             let slope = |t: f64| {
                 let approach = self.approach(&(&amounts + t * &step));
                 let force = met(model, &approach, &self.slope).force;
-                dot(&force, &closing) - gain
+                dot(&force, &closing) + held + t * resisted
             };
-            let first = dot(&start, &closing) - gain;
+            let first = dot(&start, &closing) + held;
             match line::zero(slope, first, 1e-3) {
                 Ok(t) => amounts += t * &step,
                 Err(Unbounded) => return Err(step),

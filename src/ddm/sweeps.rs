@@ -11,8 +11,8 @@ use super::model::Model;
 use super::rigid::{Motions, TOLERANCE};
 use super::sweep::Sweeper;
 use crate::error::Result;
-use crate::linalg::{axpy, dot, fit};
 use crate::linalg::Factor;
+use crate::linalg::{axpy, dot, fit};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Iterations at most: conjugate gradients lose their directions to rounding long before.

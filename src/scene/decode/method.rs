@@ -79,8 +79,7 @@ impl Decoder<'_> {
 
     fn start(&self, node: &Node) -> Result<Start> {
         if let Value::String(_) = node.value {
-            let words =
-                [("auto", Start::Auto), ("zero", Start::Zero), ("nested", Start::Nested)];
+            let words = [("auto", Start::Auto), ("zero", Start::Zero), ("nested", Start::Nested)];
             let all = "it is \"auto\", \"zero\", \"nested\" or { normal = 1e-4 }";
             return choose(node, "start", &words).map_err(|error| error.help(all));
         }
