@@ -18,6 +18,7 @@ pub mod run;
 pub mod solve;
 pub mod steps;
 pub mod sweep;
+mod words;
 
 use crate::error::Result;
 use crate::petsc::Session;

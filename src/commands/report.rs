@@ -5,6 +5,7 @@ use super::preflight;
 use super::results;
 use super::run::{Clock, Prepared};
 use super::steps;
+pub use super::words::in_words;
 use crate::contact::ContactPair;
 use crate::ddm::forecast::{best_factor, best_gamma};
 use crate::ddm::held::FreeMotion;
@@ -94,15 +95,6 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
             let reason = if reason.is_empty() { "its rank knows more" } else { reason };
             format!("body `{}`: its inner solver failed in iteration {k}: {reason}", name(body))
         }
-    }
-}
-
-/// Names of bodies as in a sentence.
-pub fn in_words<'a>(names: impl Iterator<Item = &'a String>) -> String {
-    let mut names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
-    match names.pop() {
-        Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
-        last => last.unwrap_or_default(),
     }
 }
 

@@ -1,6 +1,43 @@
-//! Compact numbering: points that no group uses go.
+//! The groups of a mesh by name; and compact numbering: points that no group uses go.
 
 use super::Group;
+use std::collections::HashMap;
+use std::ops::{Deref, DerefMut};
+
+/// The groups of a mesh, in the order of the file, found by their names, which are unique.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Groups {
+    list: Vec<Group>,
+    place: HashMap<String, usize>,
+}
+
+impl Groups {
+    /// The group of a name.
+    pub fn named(&self, name: &str) -> Option<&Group> {
+        self.place.get(name).map(|&place| &self.list[place])
+    }
+}
+
+impl From<Vec<Group>> for Groups {
+    fn from(list: Vec<Group>) -> Self {
+        Self { place: list.iter().zip(0..).map(|(group, place)| (group.name.clone(), place)).collect(), list }
+    }
+}
+
+impl Deref for Groups {
+    type Target = [Group];
+
+    fn deref(&self) -> &[Group] {
+        &self.list
+    }
+}
+
+/// For the simplices; names stay what they are.
+impl DerefMut for Groups {
+    fn deref_mut(&mut self) -> &mut [Group] {
+        &mut self.list
+    }
+}
 
 /// Renumbers the points that the groups use, in their old order, and gives the old number of each new one.
 /// `count` is the number of points before; every number in the groups is below it.

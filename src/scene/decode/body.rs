@@ -5,6 +5,7 @@ use crate::error::{Error, Located, Result};
 use crate::scene::expression::Field;
 use crate::scene::read::{Keys, Node, Value};
 use crate::scene::{BodySpec, Load, LoadKind, Order, Plane, SpringKind, SpringSpec, Support};
+use std::collections::HashSet;
 
 /// Names of components, for supports.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -27,9 +28,10 @@ impl Decoder<'_> {
             return Err(list.refuse("the scene has no body").help("a body starts with the line [[body]]"));
         }
         let mut bodies: Vec<BodySpec> = Vec::new();
+        let mut names = HashSet::new();
         for item in items {
             let body = self.body(item)?;
-            if bodies.iter().any(|other| other.name.value == body.name.value) {
+            if !names.insert(body.name.value.clone()) {
                 let message = format!("two bodies are called `{}`", body.name.value);
                 return Err(Error::scene(&body.name.place, message)
                     .label("taken by an earlier body")
