@@ -109,7 +109,7 @@ pub struct Outcome {
 }
 
 /// Iterations without progress after which Newton's method, and sweeps, may be at the floor of rounding.
-const PATIENCE: [usize; 2] = [3, 20];
+const PATIENCE: [usize; 2] = [2, 20];
 
 /// Runs a method on a model from its start until a rule ends it.
 ///
@@ -189,14 +189,17 @@ fn infeasible(model: &Model) -> std::result::Result<RigidStart, Status> {
     if let Some(mechanism) = &model.mechanism {
         return Err(Status::Mechanism(mechanism.clone()));
     }
-    start::find(model).map_err(|moving| Status::Unbounded { moving })
+    start::find(model, None).map_err(|moving| Status::Unbounded { moving })
 }
 
 /// The places from which Newton's method begins.
 fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
     match begin {
         Start::Automatic => rigid.places.clone(),
-        Start::Trace(trace) => start::at(model, trace),
+        Start::Trace(trace) => match start::find(model, Some(trace)) {
+            Ok(rigid) => rigid.places,
+            Err(_) => start::at(model, trace),
+        },
         Start::Resume(field) => Layer::at(model, &field.trace),
         Start::Pressure(pressure) => {
             let mut compression = Vec::with_capacity(pressure.len());
