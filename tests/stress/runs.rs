@@ -168,7 +168,7 @@ pub enum Verdict {
 
 /// Judges an answer by the reference.
 pub fn judge(case: &Case, reference: &Answer, answer: &Answer) -> Verdict {
-    let named = ["unheld", "unbounded", "refused"].contains(&answer.status.as_str());
+    let named = ["underconstrained", "unbounded", "refused"].contains(&answer.status.as_str());
     if !answer.claims {
         let may = match case.expect {
             Expect::Solution => floats(case, reference),
@@ -180,7 +180,7 @@ pub fn judge(case: &Case, reference: &Answer, answer: &Answer) -> Verdict {
         return Verdict::Wrong("there is no solution".to_owned());
     }
     // a run that says that rounding stops it makes no promise of accuracy
-    let off_is = |why: String| if answer.status == "attainable" { Verdict::Failed } else { Verdict::Wrong(why) };
+    let off_is = |why: String| if answer.status == "roundoff-limited" { Verdict::Failed } else { Verdict::Wrong(why) };
     if let Some(carried) = case.carried {
         let off = answer.force.iter().map(|force| (force - carried).abs() / carried).fold(0.0, f64::max);
         if carried > 0.0 && off > TOLERANCE {
