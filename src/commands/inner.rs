@@ -3,9 +3,9 @@
 //! Newton's method on one rank joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
 //! bodies then need no solver of their own. Else every body has one, and sweeps solve the linear steps.
 
-use crate::ddm::{Body, BodySlot};
 use crate::discretize::{Assembled, Maker, Outline};
 use crate::error::{Error, Kind, Result};
+use crate::model::{Body, BodySlot};
 use crate::petsc::Session;
 use crate::problem::method::MethodName;
 use crate::problem::solver::Preset;
