@@ -1,7 +1,7 @@
 //! From a scene to a solved problem: mesh, discretisation, inner solvers, options, iteration.
 
 use super::clock::Clock;
-use super::inner::{Inner, Linear, WHOLE};
+use super::inner::{Inner, WHOLE};
 use super::method;
 use super::prepared::Prepared;
 use super::steps;
@@ -15,6 +15,7 @@ use crate::model::BodySlot;
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::problem::mesh::MeshSource;
+use crate::problem::method::Linear;
 use crate::problem::order::Order;
 use crate::scene::Scene;
 use crate::solver::options;
