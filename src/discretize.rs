@@ -17,7 +17,7 @@ mod supports;
 mod surface;
 
 use crate::contact::{self, ContactPair};
-use crate::ddm::{self, Body, BodySlot, Exchange, Model, RobinZone, Segment};
+use crate::ddm::{self, Body, BodySlot, Exchange, Model, Segment};
 use crate::error::Result;
 use crate::fem::{
     ElasticBody,
@@ -26,7 +26,9 @@ use crate::fem::{
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Mesh;
 use crate::output::vtu::BodyField;
-use crate::scene::{ContactSpec, Scene, Start, Zone};
+use crate::problem::contact::ContactSpec;
+use crate::problem::method::Start;
+use crate::scene::Scene;
 use balance::Forces;
 pub use balance::{Balance, Resultant};
 use draft::{Draft, Loose};
@@ -231,14 +233,17 @@ pub fn discretize<const D: usize>(
             rows.multiply(&carried, &mut offset);
         }
         offsets.push(offset);
-        let Loose { left, motions, unfelt } = loose;
+        let Loose { left, motions, sprung, unfelt } = loose;
         let mut slot = BodySlot {
             name: part.spec.name.value.clone(),
             local: None,
             segments,
             scale: 0.0,
+            modulus: 0.0,
+            depth: 0.0,
             row_stiffness: Vec::new(),
             motions,
+            sprung,
         };
         let mut resultant =
             contact::pad(std::array::from_fn::<f64, D, _>(|c| nodal_load.iter().skip(c).step_by(D).sum()));
@@ -248,9 +253,10 @@ pub fn discretize<const D: usize>(
         let modulus = elastic::modulus(&part.space, &elasticity, share(&slot.segments, &pairs));
         let held = slot.motions.len() == unfelt.len();
         let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
-        let stiffness = if held && surface > 0.0 { modulus * surface / volume } else { 0.0 };
+        (slot.modulus, slot.depth) = (modulus, volume / surface);
+        let stiffness = if held && surface > 0.0 { modulus / slot.depth } else { 0.0 };
         if let Some(before) = maker.kept(&slot.name) {
-            slot = BodySlot { segments: slot.segments, motions: slot.motions, ..before };
+            slot = BodySlot { local: before.local, scale: before.scale, row_stiffness: before.row_stiffness, ..slot };
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 {
             let left = rigid::free(&left, &prescribed, &load);
@@ -301,7 +307,7 @@ pub fn discretize<const D: usize>(
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
-    model.adrift = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).map(Mechanism::adrift);
+    model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).map(Mechanism::for_model);
     let mut carried = vec![0.0; 2 * model.points()];
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);
@@ -328,43 +334,31 @@ impl Problem {
     }
 }
 
-/// psi of the scene for the method.
-pub fn robin_zone(scene: &Scene) -> RobinZone {
-    match &scene.method.psi {
-        Zone::None => RobinZone::None,
-        Zone::Full => RobinZone::Full,
-        Zone::Active => RobinZone::Active,
-        Zone::Subset(field) => {
-            let field = field.clone();
-            RobinZone::Subset(Box::new(move |x, k| field.is_true_at(x, k)))
-        }
-    }
-}
-
-/// The scene's start as a trace vector of the model.
+/// The scene's start, at a share `factor` of the loads.
 ///
 /// # Errors
 /// A start that is not finite at a contact point.
-pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Vec<f64>> {
+pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<ddm::Start> {
     let model = &problem.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
-    if let Start::Auto | Start::Rigid | Start::Nested = &scene.method.start {
-        return Ok(ddm::automatic_start(model));
-    }
-    if let Start::Normal(field) = &scene.method.start {
-        let positions = model.pairs.iter().flat_map(|pair| &pair.position);
-        for (q, &x) in positions.enumerate() {
-            let value = field.eval(x) / factor;
-            if !value.is_finite() {
-                return Err(placed(field, format!("the start is {value} at {}", point(x))));
+    match &scene.method.start {
+        Start::Auto | Start::Nested => return Ok(ddm::Start::Automatic),
+        Start::Zero => {}
+        Start::Normal(field) => {
+            let positions = model.pairs.iter().flat_map(|pair| &pair.position);
+            for (q, &x) in positions.enumerate() {
+                let value = field.eval(x) / factor;
+                if !value.is_finite() {
+                    return Err(placed(field, format!("the start is {value} at {}", point(x))));
+                }
+                trace[q] = value;
+                trace[points + q] = value;
             }
-            trace[q] = value;
-            trace[points + q] = value;
         }
     }
     axpy(-1.0, &problem.carried, &mut trace);
-    Ok(trace)
+    Ok(ddm::Start::Trace(trace))
 }
 
 /// What supports prescribe.

@@ -237,3 +237,17 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .min_by_key(|(distance, candidate)| (*distance, candidate.to_string()))
         .map(|(_, candidate)| candidate)
 }
+
+/// The text that the caret of a rendered error marks.
+#[cfg(test)]
+pub(crate) fn caret(error: &Error) -> String {
+    let shown = error.render(false);
+    let lines: Vec<&str> = shown.lines().collect();
+    let marks = lines.iter().position(|line| line.trim_start().trim_start_matches('|').trim_start().starts_with('^'));
+    let Some(marks) = marks.filter(|at| *at > 0) else {
+        return String::new();
+    };
+    let start = lines[marks].chars().position(|c| c == '^').unwrap_or(0);
+    let length = lines[marks].chars().skip(start).take_while(|c| *c == '^').count();
+    lines[marks - 1].chars().skip(start).take(length).collect()
+}

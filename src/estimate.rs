@@ -6,9 +6,9 @@
 
 pub mod sizes;
 
-use crate::ddm::{Discretisation, Field, Layer, Model, linear};
+use crate::ddm::{Discretisation, Field, Layer, LinearStep, Model, linear};
 use crate::discretize::meshes::Meshes;
-use crate::error::Result;
+use crate::error::{Error, Kind, Result};
 use std::rc::Rc;
 
 /// Estimated errors of a discrete solution.
@@ -39,16 +39,16 @@ const SAFETY: f64 = 1.25;
 /// Fall of the residual in the solve for the nodal errors.
 const ROUGH: f64 = 1e-2;
 
-/// Estimates the error of an iterate. `weight` = omega psi kappa is the Robin term that the model carries. Collective.
+/// Estimates the error of an iterate; `step` solves for the response of the bodies. Collective.
 ///
 /// # Errors
 /// Failures of the solver library.
 pub fn estimate(
     meshes: &dyn Meshes,
     model: &mut Model,
+    step: &mut dyn LinearStep,
     iterate: &Field,
     layer: &Layer,
-    weight: &[f64],
 ) -> Result<Estimate> {
     let count = model.bodies.len();
     let mut displacements = Vec::new();
@@ -107,7 +107,8 @@ pub fn estimate(
         meshes.forces(body, load);
     }
 
-    let (nodal, squared) = linear::respond(model, layer, weight, &loads, ROUGH)?;
+    let response = linear::respond(model, step, layer, &loads, ROUGH)?;
+    let (nodal, squared) = response.map_err(|failure| Error::new(Kind::Solver, failure.reason))?;
     let mut strain = [0.0];
     for (slot, state) in model.bodies.iter_mut().zip(&iterate.states) {
         if let Some(body) = &mut slot.local {
@@ -168,8 +169,8 @@ fn ratio(all: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
 pub struct Nodal(pub Rc<dyn Meshes>);
 
 impl Discretisation for Nodal {
-    fn error(&mut self, model: &mut Model, iterate: &Field, layer: &Layer, weight: &[f64]) -> Result<f64> {
-        let estimate = estimate(&*self.0, model, iterate, layer, weight)?;
+    fn error(&mut self, model: &mut Model, step: &mut dyn LinearStep, iterate: &Field, layer: &Layer) -> Result<f64> {
+        let estimate = estimate(&*self.0, model, step, iterate, layer)?;
         Ok(estimate.nodal.min(estimate.energy))
     }
 }

@@ -1,7 +1,8 @@
 //! Frictionless contact of N elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition.
 //!
-//! Data flows one way: scene file -> [`scene::Scene`] -> [`mesh::Mesh`] -> [`fem`] bodies and [`contact`] pairs ->
-//! [`ddm::Model`] -> sweeps -> [`ddm::Outcome`] -> [`report`](commands::report). The loop is [`ddm::iterate`].
+//! Data flows one way: scene file -> [`scene::Scene`], made of the types in [`problem`] -> [`mesh::Mesh`] ->
+//! [`fem`] bodies and [`contact`] pairs -> [`ddm::Model`] -> sweeps -> [`ddm::Outcome`] -> [`report`](commands::report). The
+//! loop is [`ddm::iterate`].
 #![deny(unsafe_code)]
 // indices of tensors, rows and nodes read like the formulas
 #![allow(clippy::needless_range_loop)]
@@ -14,6 +15,7 @@ pub mod ddm;
 pub mod discretize;
 pub mod error;
 pub mod estimate;
+pub mod expression;
 pub mod fem;
 pub mod linalg;
 pub mod mesh;
@@ -21,5 +23,6 @@ pub mod output;
 pub mod parallel;
 #[allow(unsafe_code)]
 pub mod petsc;
+pub mod problem;
 pub mod scene;
 pub mod solver;

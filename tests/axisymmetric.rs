@@ -8,7 +8,8 @@ use std::f64::consts::PI;
 use winkler::contact::Side;
 use winkler::fem::{Elasticity, Frame, Space, stress};
 use winkler::mesh::load;
-use winkler::scene::{self, Order};
+use winkler::problem::order::Order;
+use winkler::scene;
 
 /// Lamé's lambda and mu.
 fn lame(young: f64, poisson: f64) -> (f64, f64) {

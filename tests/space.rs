@@ -9,7 +9,8 @@ use winkler::contact::pieces::{self, Cut, Reach};
 use winkler::contact::{Carriers, ContactPair, Side, assemble};
 use winkler::fem::{Frame, Space, assemble as fem};
 use winkler::mesh::{Mesh, load};
-use winkler::scene::{self, Order};
+use winkler::problem::order::Order;
+use winkler::scene;
 
 /// Runs a case with overrides of its scene; the run must converge.
 fn run(name: &str, set: &[&str]) -> common::Run {

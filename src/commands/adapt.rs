@@ -1,8 +1,10 @@
 //! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
 
-use super::run::{self, Clock, Prepared};
+use super::clock::Clock;
+use super::prepared::Prepared;
+use super::run;
 use super::{carry, report};
-use crate::ddm::{Outcome, Status};
+use crate::ddm::{Outcome, Start};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Sizes};
@@ -10,7 +12,9 @@ use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::agree;
 use crate::petsc::Session;
-use crate::scene::{AdaptSpec, MeshSource, Scene, Sizing, Start};
+use crate::problem::mesh::{MeshSource, Sizing};
+use crate::problem::method::{self, MethodName};
+use crate::scene::{AdaptSpec, Scene};
 use crate::solver::options;
 
 /// Cells of a body's first mesh.
@@ -45,7 +49,7 @@ impl Plan {
     /// A scene whose mesh cannot follow sizes; what [`run::prepare`] refuses.
     pub fn new(session: &Session, scene: Scene, clock: &mut Clock) -> Result<Self> {
         let goal = scene.adapt.clone();
-        let nested = matches!(scene.method.start, Start::Nested);
+        let nested = matches!(scene.method.start, method::Start::Nested);
         let mut settings = scene.settings();
         ["output", "solver", "method"].iter().for_each(|key| settings[*key] = serde_json::Value::Null);
         let mut plan = Self {
@@ -96,8 +100,12 @@ impl Plan {
     }
 
     /// The start of this round, if an earlier one gives it.
-    pub fn start(&self, prepared: &Prepared) -> Option<Vec<f64>> {
-        (!self.carried.is_empty()).then(|| carry::trace(&self.carried, prepared))
+    pub fn start(&self, scene: &Scene, prepared: &Prepared) -> Option<Start> {
+        let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
+        (!self.carried.is_empty()).then(|| match newton {
+            true => Start::Pressure(carry::pressure(&self.carried, prepared)),
+            false => Start::Trace(carry::trace(&self.carried, prepared)),
+        })
     }
 
     /// Whether another round follows this one. Collective.
@@ -112,7 +120,7 @@ impl Plan {
         estimate: Option<&Estimate>,
         clock: &mut Clock,
     ) -> Result<bool> {
-        let good = matches!(outcome.status, Status::Converged | Status::Attainable);
+        let good = outcome.status.is_solved();
         let pairs = prepared.problem.model.pairs.len();
         if let Some(finer) = self.finer.take() {
             if good {

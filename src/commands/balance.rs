@@ -1,7 +1,7 @@
 //! Forces on every body, from the ranks that own them to the report.
 
+use super::prepared::Prepared;
 use super::results::{self, Recovered};
-use super::run::Prepared;
 use crate::ddm::Outcome;
 use crate::discretize::Balance;
 use crate::output::{BalanceReport, ForceReport};

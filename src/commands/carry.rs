@@ -1,7 +1,7 @@
 //! A solution carried from one mesh to another: its displacements or its pressures on the contact surfaces start the next
 //! iteration.
 
-use super::run::Prepared;
+use super::prepared::Prepared;
 use crate::contact::ContactPair;
 use crate::output::ContactTable;
 use rstar::RTree;

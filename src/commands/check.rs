@@ -1,6 +1,8 @@
 //! `winkler check`: builds everything, solves nothing, says what is there.
 
-use super::run::{self, Clock, Prepared};
+use super::clock::Clock;
+use super::prepared::Prepared;
+use super::run;
 use super::{load, preflight, report};
 use crate::error::Result;
 use crate::output::{say, sci};

@@ -1,15 +1,38 @@
-//! The inner solver of each body: what was asked for, or the program's choice and its reason.
+//! The inner solvers: what was asked for, or the program's choice and its reason.
+//!
+//! Newton's method on one rank joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
+//! bodies then need no solver of their own. Else every body has one, and sweeps solve the linear steps.
 
-use super::method;
 use crate::ddm::{Body, BodySlot};
 use crate::discretize::{Assembled, Maker, Outline};
-use crate::error::Result;
+use crate::error::{Error, Kind, Result};
 use crate::petsc::Session;
-use crate::scene::{MethodName, Preset, Scene};
+use crate::problem::method::MethodName;
+use crate::problem::solver::Preset;
+use crate::scene::Scene;
 use crate::solver::preset::{self, Size};
 use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory, options};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
+
+/// Prefix of the PETSc options of the matrix of all bodies.
+pub const WHOLE: &str = "newton";
+
+/// Dofs of all condensed bodies up to which their dense matrix is factored: 0.2 s and 250 MB.
+const DENSE: usize = 3000;
+
+/// How the linear steps of Newton's method are solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Linear {
+    /// One dense matrix of condensed bodies.
+    Dense,
+    /// One sparse factorisation of all bodies.
+    Direct,
+    /// Conjugate gradients with multigrid of all bodies.
+    Multigrid,
+    /// Conjugate gradients over the Robin sweep: every body by itself.
+    Sweeps,
+}
 
 /// Chooses and makes the inner solvers of a scene's bodies.
 pub struct Inner<'a> {
@@ -18,8 +41,9 @@ pub struct Inner<'a> {
     asked: Option<Preset>,
     /// Bytes that the solvers so far leave, on the rank that has least.
     memory: usize,
-    /// Whether the method joins bodies that multigrid solves: their own solvers then only measure.
-    measures: bool,
+    method: MethodName,
+    /// How linear steps are solved, from the plan on.
+    linear: Linear,
     plans: Vec<Plan>,
     /// Condensed bodies that an earlier scene has left; `local` is there on the rank that owns it.
     kept: Vec<BodySlot>,
@@ -36,6 +60,13 @@ struct Plan {
     retained: Option<Retained>,
 }
 
+impl Plan {
+    /// Dofs that a condensed body would keep.
+    fn on_contact(&self) -> usize {
+        self.retained.as_ref().map_or(0, |retained| retained.dofs.len())
+    }
+}
+
 impl<'a> Inner<'a> {
     /// Starts from the memory that is free now; collective. `kept` are bodies of an earlier scene that serve this one, too.
     pub fn new(session: &'a Session, scene: &Scene, kept: Vec<BodySlot>) -> Self {
@@ -44,9 +75,15 @@ impl<'a> Inner<'a> {
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
-        let joins = matches!(scene.method.name, MethodName::Auto | MethodName::Newton);
-        let measures = joins && session.size() == 1;
-        Self { session, asked: scene.solver.preset, memory: least as usize, measures, plans: Vec::new(), kept }
+        Self {
+            session,
+            asked: scene.solver.preset,
+            memory: least as usize,
+            method: scene.method.name,
+            linear: Linear::Sweeps,
+            plans: Vec::new(),
+            kept,
+        }
     }
 
     /// Why the solvers are what they are, in words: once if all bodies have the same.
@@ -65,6 +102,11 @@ impl<'a> Inner<'a> {
         condensed.map(|plan| plan.name.clone()).collect()
     }
 
+    /// How linear steps are solved.
+    pub fn linear(&self) -> Linear {
+        self.linear
+    }
+
     fn choose(&self, name: &str, size: &Size) -> Result<(Preset, String)> {
         let typed = options::asks_for_ksp(self.session, name)?;
         let condensable = size.can_condense() && !typed;
@@ -81,36 +123,64 @@ impl<'a> Inner<'a> {
         })
     }
 
-    /// Lets the bodies agree where the method can join them and nobody said otherwise.
-    fn agree(&mut self) -> Result<()> {
-        if self.asked.is_some() || !self.measures {
-            return Ok(());
+    /// How linear steps are solved, once bodies have their presets.
+    fn join(&mut self) -> Result<Linear> {
+        let newton = matches!(self.method, MethodName::Auto | MethodName::Newton);
+        if newton && self.method == MethodName::Newton && self.session.size() > 1 {
+            return Err(Error::new(Kind::Usage, "method `newton` solves for all bodies together and runs on one rank")
+                .help("choose newton-robin, or start without mpiexec"));
         }
+        if !newton || self.session.size() > 1 {
+            return Ok(Linear::Sweeps);
+        }
+        let asks = |prefix: &str| options::asks_for_ksp(self.session, prefix);
+        let mut typed = false;
         for plan in &self.plans {
-            if options::asks_for_ksp(self.session, &plan.name)? {
-                return Ok(());
+            typed |= asks(&plan.name)?;
+            // what is typed for one body reaches that body
+            if self.method == MethodName::Auto && options::names_body(self.session, &plan.name)? && asks(&plan.name)? {
+                return Ok(Linear::Sweeps);
             }
         }
-        agree(&mut self.plans);
-        Ok(())
+        if self.asked.is_none() && !typed {
+            agree(&mut self.plans);
+        }
+        let names: Vec<&str> = self.plans.iter().map(|plan| plan.name.as_str()).chain([WHOLE]).collect();
+        options::distribute(self.session, &names)?;
+        let all = |preset: Preset| self.plans.iter().all(|plan| plan.preset == preset);
+        let dense: usize = self.plans.iter().map(Plan::on_contact).sum();
+        let pc = options::typed(self.session, WHOLE, "pc_type");
+        Ok(match pc.as_deref() {
+            Some("hypre") => Linear::Multigrid,
+            Some("cholesky" | "lu") => Linear::Direct,
+            Some(_) if self.method == MethodName::Auto => Linear::Sweeps,
+            None if all(Preset::Condensed) && dense <= DENSE && !asks(WHOLE)? => Linear::Dense,
+            None if all(Preset::Hypre) => Linear::Multigrid,
+            None if self.plans.iter().any(|plan| matches!(plan.preset, Preset::Gamg | Preset::Icc))
+                && self.method == MethodName::Auto =>
+            {
+                Linear::Sweeps
+            }
+            _ => Linear::Direct,
+        })
     }
 }
 
-/// Gives all bodies multigrid if one of them needs it, or if together they have too much contact for one dense matrix: Newton's
-/// method joins them then, and is left with sweeps otherwise.
+/// Gives all bodies what Newton's method can join: multigrid if one of them needs it, or if together they have too much contact in
+/// space for one dense matrix; in the plane one factorisation then.
 fn agree(plans: &mut [Plan]) {
-    let on_contact = |plan: &Plan| plan.retained.as_ref().map_or(0, |retained| retained.dofs.len());
-    let dense: usize = plans.iter().filter(|plan| plan.preset == Preset::Condensed).map(on_contact).sum();
+    let dense: usize = plans.iter().filter(|plan| plan.preset == Preset::Condensed).map(Plan::on_contact).sum();
     let needs = plans.iter().find(|plan| plan.preset == Preset::Hypre).map(|plan| plan.name.clone());
-    let why = match needs {
-        Some(first) => format!("`{first}` has it, and Newton's method joins the bodies"),
-        None if plans.iter().all(|plan| plan.dimension == 3) && dense > method::DENSE => {
-            format!("{dense} of all bodies are on the contact: too many to join by dense algebra")
+    let (preset, why) = match needs {
+        Some(first) => (Preset::Hypre, format!("`{first}` has it, and Newton's method joins the bodies")),
+        None if dense > DENSE => {
+            let preset = if plans.iter().all(|plan| plan.dimension == 3) { Preset::Hypre } else { Preset::Mumps };
+            (preset, format!("{dense} of all bodies are on the contact: too many to join by dense algebra"))
         }
         None => return,
     };
-    for plan in plans.iter_mut().filter(|plan| plan.preset != Preset::Hypre) {
-        plan.preset = Preset::Hypre;
+    for plan in plans.iter_mut().filter(|plan| plan.preset != preset) {
+        plan.preset = preset;
         plan.reason = format!("{} dofs; {why}", plan.dofs);
     }
 }
@@ -129,13 +199,20 @@ impl Maker for Inner<'_> {
             let (name, dofs, retained) = (name.to_owned(), size.dofs, Some(retained));
             self.plans.push(Plan { name, preset, reason, dimension, dofs, retained });
         }
-        self.agree()?;
+        self.linear = self.join()?;
         for plan in &mut self.plans {
-            if plan.preset == Preset::Hypre && self.measures {
-                preset::made_often(self.session, &plan.name)?;
-            }
-            preset::apply(self.session, &plan.name, plan.preset)?;
             plan.retained = plan.retained.take().filter(|_| plan.preset == Preset::Condensed);
+        }
+        match self.linear {
+            Linear::Dense => {}
+            Linear::Direct => preset::apply(self.session, WHOLE, Preset::Mumps)?,
+            Linear::Multigrid => {
+                preset::made_often(self.session, WHOLE)?;
+                preset::apply(self.session, WHOLE, Preset::Hypre)?;
+            }
+            Linear::Sweeps => {
+                self.plans.iter().try_for_each(|plan| preset::apply(self.session, &plan.name, plan.preset))?;
+            }
         }
         Ok(())
     }
@@ -146,9 +223,17 @@ impl Maker for Inner<'_> {
         if let Some(retained) = plan.and_then(|plan| plan.retained.take()) {
             return Ok(Box::new(CondensedBody::new(self.session, &name, dimension, body, left, retained)));
         }
-        let modes: Vec<Vec<f64>> = motions.into_iter().map(|motion| motion.displacement).collect();
-        let krylov = Krylov::new(self.session, &name, dimension, &body.stiffness, &modes)?;
-        Ok(Box::new(SparseBody::new(body, rows, &left, krylov)))
+        let session = self.session.clone();
+        let words = match self.linear {
+            Linear::Sweeps => preset::in_words(&session, &name),
+            _ => preset::in_words(&session, WHOLE),
+        };
+        let modes: Vec<Vec<f64>> = match self.linear {
+            Linear::Sweeps => motions.into_iter().map(|motion| motion.displacement).collect(),
+            _ => Vec::new(),
+        };
+        let make = move |stiffness: &crate::linalg::Csr| Krylov::new(&session, &name, dimension, stiffness, &modes);
+        Ok(Box::new(SparseBody::new(body, rows, &left, make, words)))
     }
 
     fn kept(&mut self, name: &str) -> Option<BodySlot> {
@@ -187,7 +272,8 @@ mod tests {
         assert!(mixed[2].reason.contains("30000 dofs; `b` has it"), "{}", mixed[2].reason);
     }
 
-    /// Two contacts of 1500 dofs are joined by dense algebra, with one dof more they are not; in the plane they stay.
+    /// Two contacts of 1500 dofs are joined by dense algebra, with one dof more they are not; in the plane one factorisation
+    /// joins them then.
     #[test]
     fn wide_contacts_are_joined_by_multigrid() {
         let pair = |more: usize| [plan("a", Preset::Condensed, 1500), plan("b", Preset::Condensed, 1500 + more)];
@@ -197,7 +283,7 @@ mod tests {
         let mut flat = pair(1);
         flat.iter_mut().for_each(|plan| plan.dimension = 2);
         agree(&mut flat);
-        assert_eq!(presets(&flat), [Preset::Condensed; 2]);
+        assert_eq!(presets(&flat), [Preset::Mumps; 2]);
         let mut wide = pair(1);
         agree(&mut wide);
         assert_eq!(presets(&wide), [Preset::Hypre; 2]);

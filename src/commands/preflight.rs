@@ -5,9 +5,10 @@
 //! the same sweep the condition (1 + theta)/(1 - theta). The estimate takes the stiffest single mode that is known without a
 //! solve, uniform pressure, at the pressure that the loads would give if they were spread evenly: an order of magnitude.
 
-use super::run::Prepared;
+use super::prepared::Prepared;
 use crate::contact::ContactPair;
-use crate::scene::{Gamma, Scene};
+use crate::problem::method::Gamma;
+use crate::scene::Scene;
 
 /// Estimates for a pair.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,135 +1,28 @@
 //! Outcome -> report, contact tables and plots.
 
 use super::balance;
+use super::clock::Clock;
 use super::preflight;
+use super::prepared::{Prepared, sides};
 use super::results;
-use super::run::{Clock, Prepared};
 use super::steps;
-pub use super::words::in_words;
+use super::verdict::{forecast, message, status_name};
 use crate::contact::ContactPair;
-use crate::ddm::forecast::{best_factor, best_gamma};
-use crate::ddm::held::FreeMotion;
-use crate::ddm::{Adrift, BodyCounts, Model, Outcome, Status};
+use crate::ddm::{BodyCounts, Outcome, Status};
 use crate::discretize::Problem;
 use crate::estimate::Estimate;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::vtu::Grid;
-use crate::output::{
-    BodyReport, ContactTable, EstimateReport, ForecastReport, InnerTimes, IntervalReport, PairReport, Report, sci,
-};
+use crate::output::{BodyReport, ContactTable, EstimateReport, InnerTimes, IntervalReport, PairReport, Report};
 use crate::petsc::Session;
 use crate::scene::Scene;
-
-/// Name of a status in `report.json`.
-pub fn status_name(status: &Status) -> &'static str {
-    match status {
-        Status::Converged => "converged",
-        Status::Attainable => "attainable",
-        Status::IterationLimit => "iteration-limit",
-        Status::NotFinite { .. } => "not-finite",
-        Status::Cycle { .. } => "cycle",
-        Status::Unheld { .. } | Status::Adrift(_) => "unheld",
-        Status::Unbounded { .. } => "unbounded",
-        Status::InnerSolver { .. } => "inner-solver",
-    }
-}
 
 /// Exit code of a run that ended like this.
 pub fn exit_code(prepared: &Prepared, outcome: &Outcome) -> i32 {
     match outcome.status {
-        Status::Converged | Status::Attainable if steps::warnings(&prepared.steps).is_empty() => 0,
+        Status::Converged | Status::RoundoffLimited if steps::warnings(&prepared.steps).is_empty() => 0,
         _ => 1,
     }
-}
-
-/// The status in words: what happened, to which body, in which iteration, and what to try.
-pub fn message(outcome: &Outcome, model: &Model) -> String {
-    let k = outcome.iterations;
-    let name = |body: &usize| &model.bodies[*body].name;
-    let residual = outcome.rows.last().map_or(f64::NAN, |row| row.residual);
-    // what turns the step shorter in the paper's iteration; other methods choose it themselves
-    let other = if outcome.method == "robin" { "a smaller method.gamma, or --method auto" } else { "another --method" };
-    match &outcome.status {
-        Status::Converged => format!("converged in {k} iterations"),
-        Status::Attainable => {
-            format!("residual {} after {k} iterations: rounding allows no less", sci(residual, 1))
-        }
-        Status::IterationLimit => format!(
-            "not converged in {k} iterations, residual {}: allow more (method.stop.iterations{}) or try {}",
-            sci(residual, 1),
-            outlook(outcome),
-            advice(outcome).unwrap_or_else(|| other.to_owned())
-        ),
-        Status::NotFinite { body } => format!(
-            "body `{}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}",
-            name(body)
-        ),
-        Status::Cycle { period } => {
-            format!("the iterates repeat every {period} iterations (seen in iteration {k}): try {other}")
-        }
-        Status::Unheld { body, motion } => format!(
-            "body `{}`: nothing holds its {motion} in iteration {k}: neither a support nor the Robin zone; add a support, \
-             or a start that closes the contact (method.start)",
-            name(body)
-        ),
-        Status::Adrift(Adrift { bodies, motion, work }) => format!(
-            "bodies {}: nothing holds them together in their {motion}, which changes no gap, and loads work on it ({} of what \
-             forces of their sizes could): add a support, or balance the loads",
-            in_words(bodies.iter().map(name)),
-            sci(*work, 1)
-        ),
-        Status::Unbounded { moving } => {
-            let part = |free: &FreeMotion| format!("`{}` ({})", name(&free.body), free.name);
-            let (what, from) = match &moving[..] {
-                [] => ("a body".to_owned(), "its contact, and no support stops it"),
-                [one] => (part(one), "its contact, and no support stops it"),
-                all => {
-                    (all.iter().map(part).collect::<Vec<_>>().join(", "), "their contacts, and no support stops them")
-                }
-            };
-            format!(
-                "in iteration {k} the energy falls for ever: the loads push {what} away from {from}; add a support, or turn the load"
-            )
-        }
-        Status::InnerSolver { body, reason } => {
-            let reason = if reason.is_empty() { "its rank knows more" } else { reason };
-            format!("body `{}`: its inner solver failed in iteration {k}: {reason}", name(body))
-        }
-    }
-}
-
-/// What more iterations would bring, for the report.
-fn forecast(outcome: &Outcome) -> Option<ForecastReport> {
-    let goes_on = matches!(
-        outcome.status,
-        Status::Converged | Status::Attainable | Status::IterationLimit | Status::Cycle { .. }
-    );
-    let forecast = outcome.forecast.as_ref().filter(|_| goes_on)?;
-    Some(ForecastReport {
-        factor: forecast.factor,
-        iterations: Some(forecast.iterations).filter(|iterations| iterations.is_finite()),
-        best_gamma: outcome.spectrum.map(best_gamma),
-        best_factor: outcome.spectrum.map(best_factor),
-    })
-}
-
-/// The iterations left in words, to follow the advice to allow more.
-fn outlook(outcome: &Outcome) -> String {
-    match forecast(outcome).map(|forecast| forecast.iterations) {
-        None => String::new(),
-        Some(Some(0.0)) => "; that is enough, but pressures still move or a body lacks balance".to_owned(),
-        Some(None) => "; at this rate no number is enough".to_owned(),
-        Some(Some(more)) => format!("; about {more} more at this rate"),
-    }
-}
-
-/// What helps the paper's iteration where the spectrum is known.
-fn advice(outcome: &Outcome) -> Option<String> {
-    let spectrum = outcome.spectrum.filter(|_| outcome.method == "robin")?;
-    let (gamma, factor) = (best_gamma(spectrum), best_factor(spectrum));
-    // near one the digits that matter are those of the difference
-    let factor = if factor > 0.99 { format!("1 - {}", sci(1.0 - factor, 1)) } else { format!("{factor:.3}") };
-    Some(format!("--method auto; the best number for method.gamma is {gamma:.2}, a factor of {factor} an iteration"))
 }
 
 /// Fills the report of a run.
@@ -144,7 +37,7 @@ pub fn report(
     let model = &prepared.problem.model;
     let shared = Shared::gather(prepared);
     let counts = &shared.counts;
-    let coupled = |part: fn(&BodyCounts) -> f64| outcome.coupled.iter().map(part).sum::<f64>();
+    let joint = &outcome.joint;
     let last = outcome.rows.last();
     let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
     let mut report = Report {
@@ -153,7 +46,6 @@ pub fn report(
         iterations: outcome.iterations,
         sweeps: outcome.sweeps,
         method: outcome.method.to_owned(),
-        coarser: prepared.coarser,
         spectrum: outcome.spectrum.map(|(low, high)| [low, high]),
         forecast: forecast(outcome),
         gamma_interval: outcome.interval.map(|interval| IntervalReport {
@@ -162,20 +54,20 @@ pub fn report(
             lower: interval.lower,
             upper: interval.upper,
         }),
-        error_estimate: finite(last.map(|row| row.error)),
-        factorizations: counts.factorizations + coupled(|counts| counts.factorizations as f64) as usize,
+        error_bound: finite(last.filter(|row| row.is_bound).map(|row| row.error)),
+        error_estimate: finite(last.filter(|row| !row.is_bound).map(|row| row.error)),
+        factorizations: counts.factorizations + joint.factorizations,
         inner_times: InnerTimes {
-            factor: counts.factor_seconds + coupled(|counts| counts.factor_seconds),
+            factor: counts.factor_seconds + joint.factor_seconds,
             first: counts.first_seconds,
-            solve: counts.solve_seconds + coupled(|counts| counts.solve_seconds),
+            solve: counts.solve_seconds + joint.solve_seconds,
         },
         symbolic_factorizations: counts.symbolic,
         body_solves: counts.solves,
-        inner_iterations: counts.inner_iterations + coupled(|counts| counts.inner_iterations as f64) as usize,
+        inner_iterations: counts.inner_iterations + joint.inner_iterations,
         robin_updates: counts.robin_updates,
         robin_updates_skipped: counts.robin_skipped,
-        dense_factorizations: counts.dense_factorizations
-            + coupled(|counts| counts.dense_factorizations as f64) as usize,
+        dense_factorizations: counts.dense_factorizations + joint.dense_factorizations,
         assemblies: shared.assemblies,
         assemblies_avoided: shared.assemblies_avoided,
         factorizations_avoided: counts.factorizations_avoided,
@@ -314,11 +206,6 @@ pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
         pressure: estimate.pressure.clone(),
         bodies: estimate.bodies.iter().map(share).collect(),
     }
-}
-
-/// Sides of pair `i` in the order of the scene.
-pub fn sides(prepared: &Prepared, i: usize) -> [usize; 2] {
-    if prepared.problem.contacts[i].swapped { [1, 0] } else { [0, 1] }
 }
 
 fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) -> PairReport {

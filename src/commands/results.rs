@@ -1,6 +1,6 @@
 //! What the displacements of a body say: fields for output, largest stresses with their places, errors against a known answer.
 
-use super::run::Prepared;
+use super::prepared::Prepared;
 use crate::ddm::Outcome;
 use crate::error::Result;
 use crate::output::BodyReport;

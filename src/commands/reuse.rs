@@ -1,7 +1,9 @@
 //! What a run of a sweep takes over from the run before it: K and f of a body do not depend on method, layers and gaps, so a
 //! condensed body is kept as it is, and where only the method changes the whole problem.
 
-use super::run::{self, Clock, Prepared};
+use super::clock::Clock;
+use super::prepared::Prepared;
+use super::run;
 use crate::error::Result;
 use crate::parallel::Ranks;
 use crate::petsc::Session;

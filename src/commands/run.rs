@@ -1,91 +1,27 @@
 //! From a scene to a solved problem: mesh, discretisation, inner solvers, options, iteration.
 
-use super::inner::Inner;
+use super::clock::Clock;
+use super::inner::{Inner, Linear, WHOLE};
 use super::method;
-use super::report::in_words;
+use super::prepared::Prepared;
 use super::steps;
+use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::method::Method;
-use crate::ddm::{self, BodySlot, Observer, Outcome, RobinRule, Settings, Status, StopRule};
+use crate::ddm::{self, BodySlot, Observer, Outcome, Settings, Status};
 use crate::discretize::{self, Mechanism, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
-use crate::output::{CoarserReport, StepReport};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
-use crate::scene::{MeshSource, Order, RobinSpec, Scene};
+use crate::problem::mesh::MeshSource;
+use crate::problem::order::Order;
+use crate::scene::Scene;
 use crate::solver::options;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
-use std::collections::BTreeMap;
-use std::time::Instant;
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
 const LARGE_FRONTS: usize = 30_000;
-
-/// Wall seconds of the phases of a run.
-#[derive(Debug, Clone)]
-pub struct Clock {
-    began: Instant,
-    last: Instant,
-    /// Seconds by phase.
-    pub times: BTreeMap<String, f64>,
-}
-
-impl Default for Clock {
-    fn default() -> Self {
-        let now = Instant::now();
-        Self { began: now, last: now, times: BTreeMap::new() }
-    }
-}
-
-impl Clock {
-    /// Ends a phase.
-    pub fn phase(&mut self, name: &str) {
-        let now = Instant::now();
-        *self.times.entry(name.to_owned()).or_default() += (now - self.last).as_secs_f64();
-        self.last = now;
-    }
-
-    /// Seconds since the run began, noted as `total`.
-    pub fn total(&mut self) -> f64 {
-        let total = self.began.elapsed().as_secs_f64();
-        self.times.insert("total".to_owned(), total);
-        total
-    }
-}
-
-/// A problem that is ready to be solved, with what the user should know of its making.
-pub struct Prepared {
-    /// The discrete problem.
-    pub problem: Problem,
-    /// Start of the iteration, if it does not come from the scene.
-    pub start: Option<Vec<f64>>,
-    /// Pressures at the contact points, about those of the solution, if something tells them.
-    pub foreseen: Option<Vec<f64>>,
-    /// The coarser mesh that told them.
-    pub coarser: Option<CoarserReport>,
-    /// The methods, made by [`set_up`].
-    pub methods: Vec<Box<dyn Method>>,
-    /// Why the inner solver is what it is where no PETSc option was typed.
-    pub choice: String,
-    /// Load steps so far.
-    pub steps: Vec<StepReport>,
-    /// Warnings.
-    pub warnings: Vec<String>,
-    /// Names of the condensed bodies, with which another run can go on.
-    pub condensed: Vec<String>,
-}
-
-impl Prepared {
-    /// Takes the condensed bodies out, their counts begun anew, for another scene with the same bodies.
-    pub fn take_condensed(&mut self) -> Vec<BodySlot> {
-        let mut slots = std::mem::take(&mut self.problem.model.bodies);
-        slots.retain(|slot| self.condensed.contains(&slot.name));
-        slots.iter_mut().filter_map(|slot| slot.local.as_mut()).for_each(|body| body.begin_anew());
-        slots
-    }
-}
 
 /// Builds the discrete problem of a scene; bodies get their inner solvers but nothing is factored.
 ///
@@ -138,9 +74,8 @@ fn build<const D: usize>(
     Ok(Prepared {
         problem,
         start: None,
-        foreseen: None,
-        coarser: None,
-        methods: Vec::new(),
+        linear: inner.linear(),
+        method: None,
         steps: Vec::new(),
         choice: inner.reason(),
         warnings,
@@ -244,15 +179,17 @@ fn mechanism_in_words(problem: &Problem, mechanism: &Mechanism) -> String {
 /// # Errors
 /// Unknown PETSc options, failures of PETSc.
 pub fn set_up(session: &Session, scene: &Scene, prepared: &mut Prepared, clock: &mut Clock) -> Result<()> {
-    let condensed = prepared.condensed.len() == prepared.problem.bodies.len();
-    let lifts = !method::begins_jointly(session, scene, &prepared.problem.model, condensed);
-    let failed = ddm::prepare(&mut prepared.problem.model, lifts);
-    agree(session, failed)?;
-    let made = agree(session, method::make(session, scene, &prepared.problem.model, condensed))?;
-    prepared.methods = made.methods;
+    if prepared.start.is_none() && scene.method.steps.is_empty() {
+        prepared.start = Some(discretize::start(scene, &prepared.problem, 1.0)?);
+    }
+    let start = prepared.start.clone().unwrap_or_default();
+    let made = method::make(session, scene, &mut prepared.problem.model, prepared.linear, &start);
+    prepared.method = Some(agree(session, made)?);
     let names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();
     let mut names: Vec<&str> = names.iter().map(String::as_str).collect();
-    names.extend(made.prefix);
+    if matches!(prepared.linear, Linear::Direct | Linear::Multigrid) {
+        names.push(WHOLE);
+    }
     let any = |flags: &mut [u8]| {
         if session.size() > 1 && !flags.is_empty() {
             let mine = flags.to_vec();
@@ -302,32 +239,19 @@ pub fn iterate(
     let stop = &scene.method.stop;
     prepared.steps.clear();
     let mut settings = Settings {
-        zone: discretize::robin_zone(scene),
-        robin: match scene.method.robin {
-            RobinSpec::Tangent => RobinRule::Tangent,
-            RobinSpec::Frozen => RobinRule::Frozen,
-            RobinSpec::Floor(floor) => RobinRule::Floor(floor),
-            RobinSpec::Auto => RobinRule::Auto,
-        },
-        methods: std::mem::take(&mut prepared.methods),
-        stop: StopRule { residual: stop.residual, increment: stop.increment, iterations: stop.iterations },
+        stop: stop.clone(),
         interval: scene.method.interval,
         balance: prepared.problem.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _),
-        start: match prepared.start.take() {
-            Some(start) => start,
-            None if scene.method.steps.is_empty() => discretize::start(scene, &prepared.problem, 1.0)?,
-            // each step has its own
-            None => Vec::new(),
-        },
-        resume: None,
+        start: prepared.start.take().unwrap_or_default(),
     };
-    if let Some(pressure) = prepared.foreseen.take() {
-        settings.methods[0].predict(pressure);
-    }
+    let Some(mut method) = prepared.method.take() else {
+        return Err(Error::new(Kind::Solver, "a run was begun before its method was made"));
+    };
     let outcome = match scene.method.steps.is_empty() {
-        true => ddm::solve(&mut prepared.problem.model, &mut settings, observer)?,
-        false => steps::iterate(scene, prepared, &mut settings, observer)?,
+        true => ddm::solve(&mut prepared.problem.model, &mut method, &mut settings, observer)?,
+        false => steps::iterate(scene, prepared, &mut method, &mut settings, observer)?,
     };
+    prepared.method = Some(method);
     clock.phase("iterate");
     Ok(outcome)
 }
@@ -337,10 +261,11 @@ pub fn iterate(
 /// # Errors
 /// Failures of PETSc.
 pub fn estimate(prepared: &mut Prepared, outcome: &Outcome, clock: &mut Clock) -> Result<Option<Estimate>> {
-    let good = matches!(outcome.status, Status::Converged | Status::Attainable | Status::IterationLimit);
+    let good = outcome.status.is_solved() || outcome.status == Status::IterationLimit;
     let Some(meshes) = prepared.problem.meshes.clone().filter(|_| good) else { return Ok(None) };
-    let Outcome { iterate, layer, weight, .. } = outcome;
-    let estimate = estimate::estimate(&*meshes, &mut prepared.problem.model, iterate, layer, weight)?;
+    let Some(method) = &mut prepared.method else { return Ok(None) };
+    let Outcome { iterate, layer, .. } = outcome;
+    let estimate = estimate::estimate(&*meshes, &mut prepared.problem.model, method.linear(), iterate, layer)?;
     clock.phase("estimate");
     Ok(Some(estimate))
 }

@@ -1,9 +1,10 @@
 //! `winkler solve`: one scene, one run, all its results.
 
 use super::adapt::Plan;
-use super::foresee::foresee;
+use super::clock::Clock;
+use super::prepared::Prepared;
 use super::results::Recovered;
-use super::run::{self, Clock, Prepared};
+use super::run;
 use super::{folder_of, load, report, results};
 use crate::ddm::{Observer, Outcome, Row};
 use crate::error::{Error, Kind, Result};
@@ -39,8 +40,7 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
     let mut plan = Plan::new(session, scene, &mut clock)?;
     let (prepared, outcome, estimate, failed) = loop {
         let mut prepared = run::prepare(session, &plan.scene, &mut clock)?;
-        prepared.start = plan.start(&prepared);
-        foresee(session, &plan.scene, &mut prepared, &mut clock)?;
+        prepared.start = plan.start(&plan.scene, &prepared);
         run::set_up(session, &plan.scene, &mut prepared, &mut clock)?;
         let all = session.options().all()?;
         let monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));

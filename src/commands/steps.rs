@@ -3,10 +3,10 @@
 //! At a share s of all loads and prescribed displacements, u/s solves the problem of the full loads with the gap d/s and the layer
 //! p(s c)/s. So a step changes gaps and laws alone: no body is assembled, reduced or factored anew.
 
-use super::report::{message, sides, status_name};
-use super::run::Prepared;
+use super::prepared::{Prepared, sides};
+use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
-use crate::ddm::{self, Field, Model, Observer, Outcome, Row, Settings, Status};
+use crate::ddm::{self, Field, Method, Model, Observer, Outcome, Row, Settings, Start, Status};
 use crate::discretize;
 use crate::error::Result;
 use crate::output::{StepPairReport, StepReport};
@@ -21,6 +21,7 @@ use std::rc::Rc;
 pub fn iterate(
     scene: &Scene,
     prepared: &mut Prepared,
+    method: &mut Method,
     settings: &mut Settings,
     observer: &mut dyn Observer,
 ) -> Result<Outcome> {
@@ -40,12 +41,14 @@ pub fn iterate(
         }
         match before.take() {
             Some((field, share)) => {
-                settings.resume = Some(rescaled(&prepared.problem.model, field, share / factor));
-                settings.methods.iter_mut().for_each(|method| method.restart());
+                settings.start = Start::Resume(rescaled(&prepared.problem.model, field, share / factor));
+                if let Method::Sweeps { acceleration, .. } = method {
+                    acceleration.restart();
+                }
             }
             None => settings.start = discretize::start(scene, &prepared.problem, factor)?,
         }
-        let mut outcome = ddm::solve(&mut prepared.problem.model, settings, &mut all)?;
+        let mut outcome = ddm::solve(&mut prepared.problem.model, method, settings, &mut all)?;
         all.iterations += outcome.iterations;
         all.sweeps += outcome.sweeps;
         all.seconds += outcome.rows.last().map_or(0.0, |row| row.seconds);
@@ -57,7 +60,7 @@ pub fn iterate(
             outcome.rows = all.rows;
             return Ok(outcome);
         }
-        if matches!(outcome.status, Status::Converged | Status::Attainable | Status::IterationLimit) {
+        if outcome.status.is_solved() || outcome.status == Status::IterationLimit {
             before = Some((outcome.iterate, factor));
         }
     }
@@ -106,7 +109,7 @@ fn entry(prepared: &Prepared, outcome: &Outcome, factor: f64) -> StepReport {
 
 /// Warnings of the steps before the last one that were not solved.
 pub fn warnings(steps: &[StepReport]) -> Vec<String> {
-    let solved = [Status::Converged, Status::Attainable].map(|status| status_name(&status));
+    let solved = [Status::Converged, Status::RoundoffLimited].map(|status| status_name(&status));
     let before = steps.iter().take(steps.len().saturating_sub(1)).enumerate();
     let bad = before.filter(|(_, step)| !solved.contains(&step.status.as_str()));
     bad.map(|(i, step)| format!("load step {} (factor {}): {}", i + 1, step.factor, step.message)).collect()

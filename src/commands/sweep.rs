@@ -1,6 +1,7 @@
 //! `winkler sweep`: a scene over values of its keys, one row a run.
 
-use super::run::{self, Clock};
+use super::clock::Clock;
+use super::run;
 use super::{folder_of, report, results, reuse};
 use crate::ddm::Silent;
 use crate::error::{Error, Kind, Result};

@@ -2,7 +2,7 @@
 
 use super::pieces::Shared;
 use crate::fem::element::{self, EDGES};
-use crate::scene::Order;
+use crate::problem::order::Order;
 use nalgebra::DMatrix;
 
 /// The nodes of a facet that carry a pressure.

@@ -7,7 +7,7 @@ use super::side::Side;
 use crate::error::Error;
 use crate::fem::{element, pad};
 use crate::linalg::Csr;
-use crate::scene::LayerSpec;
+use crate::problem::layer::LayerSpec;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 

@@ -1,19 +1,19 @@
-//! Stopping where the error of the iteration is small beside that of the discretisation: more would be in vain.
+//! Stopping where the error of the iteration is small beside that of the discretisation: more would change nothing.
 
 use super::field::Field;
-use super::layer::Layer;
+use super::layer_state::Layer;
+use super::linear::LinearStep;
 use super::model::Model;
 use crate::error::Result;
 
 /// Knows how far the discrete problem is from the continuous one.
 pub trait Discretisation {
     /// Relative error of the discrete solution near an iterate, in the norm of [`Row::error`](super::Row): the part of it that
-    /// iterates share a space with, so that it bounds what the nodal values are worth. `weight` = omega psi kappa is the
-    /// Robin term that the model carries.
+    /// iterates share a space with, so that it bounds what the nodal values are worth.
     ///
     /// # Errors
     /// Failures of the solver library.
-    fn error(&mut self, model: &mut Model, iterate: &Field, layer: &Layer, weight: &[f64]) -> Result<f64>;
+    fn error(&mut self, model: &mut Model, linear: &mut dyn LinearStep, iterate: &Field, layer: &Layer) -> Result<f64>;
 }
 
 /// Share of the discretisation's error that the iteration's may have.
@@ -40,16 +40,16 @@ impl Balance {
     pub fn is_met(
         &mut self,
         model: &mut Model,
+        linear: &mut dyn LinearStep,
         iterate: &Field,
         layer: &Layer,
-        weight: &[f64],
         error: f64,
     ) -> Result<bool> {
         let worth_asking = self.last.map_or(FIRST, |last| SHARE * last);
         if error.is_nan() || error > worth_asking {
             return Ok(false);
         }
-        let now = self.rule.error(model, iterate, layer, weight)?;
+        let now = self.rule.error(model, linear, iterate, layer)?;
         self.last = Some(now);
         Ok(error <= SHARE * now)
     }
@@ -58,14 +58,14 @@ impl Balance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ddm::Serial;
+    use crate::ddm::{Serial, Sweeps};
     use std::cell::Cell;
     use std::rc::Rc;
 
     struct Fixed(Rc<Cell<usize>>, Vec<f64>);
 
     impl Discretisation for Fixed {
-        fn error(&mut self, _: &mut Model, _: &Field, _: &Layer, _: &[f64]) -> Result<f64> {
+        fn error(&mut self, _: &mut Model, _: &mut dyn LinearStep, _: &Field, _: &Layer) -> Result<f64> {
             self.0.set(self.0.get() + 1);
             Ok(self.1.remove(0))
         }
@@ -77,8 +77,9 @@ mod tests {
         let mut balance = Balance::new(Box::new(Fixed(asked.clone(), vec![0.1, 0.02, 0.02])));
         let mut model = Model::new(Vec::new(), Vec::new(), Box::new(Serial));
         let layer = Layer::default();
+        let mut linear = Sweeps::carried();
         let mut ask = |error: f64| {
-            let met = balance.is_met(&mut model, &Field::default(), &layer, &[], error).unwrap();
+            let met = balance.is_met(&mut model, &mut linear, &Field::default(), &layer, error).unwrap();
             (met, asked.get())
         };
         assert_eq!(ask(f64::NAN), (false, 0));

@@ -130,6 +130,19 @@ pub trait Body {
         Ok(false)
     }
 
+    /// Share of the energy norm of z that solves may be off: zero for a direct solver.
+    fn accuracy(&self) -> f64 {
+        0.0
+    }
+
+    /// Makes [`Body::matrices`] known, which may take an elimination.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn reveal(&mut self) -> Result<()> {
+        Ok(())
+    }
+
     /// z = M^-1 r with a fixed symmetric M near G: what preconditions conjugate gradients over all bodies. Costs no more than
     /// a solve, and for an iterative inner solver only one application of its preconditioner.
     ///

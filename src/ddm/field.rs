@@ -1,5 +1,6 @@
 //! Vectors over all bodies: iterates, corrections, directions.
 
+use super::body::Energy;
 use super::model::Model;
 use crate::linalg::{axpy, dot};
 
@@ -16,6 +17,12 @@ impl Field {
     /// All bodies at rest, with the traces of that.
     pub fn rest(model: &Model) -> Field {
         let state = |slot: &super::BodySlot| slot.local.as_ref().map_or(Vec::new(), |body| body.rest());
+        Field { states: model.bodies.iter().map(state).collect(), trace: vec![0.0; 2 * model.points()] }
+    }
+
+    /// No displacement of any body.
+    pub fn zero(model: &Model) -> Field {
+        let state = |slot: &super::BodySlot| vec![0.0; slot.local.as_ref().map_or(0, |body| body.len())];
         Field { states: model.bodies.iter().map(state).collect(), trace: vec![0.0; 2 * model.points()] }
     }
 
@@ -38,7 +45,7 @@ impl Field {
         update(&mut self.trace, &other.trace);
     }
 
-    /// Makes the traces anew from the states: both are added to on their own, and part by the rounding of large steps.
+    /// Makes the traces anew from the states: both are added to on their own, and differ by the rounding of large steps.
     /// Collective.
     pub fn retrace(&mut self, model: &Model) {
         self.trace_here(model);
@@ -88,4 +95,30 @@ pub fn apply_stiffness(model: &mut Model, v: &Field) -> Vec<Vec<f64>> {
         y
     };
     model.bodies.iter_mut().zip(&v.states).map(apply).collect()
+}
+
+/// r = f - K u - B' `force` (26) in every body that lives here, for forces at the points (n), with the sum of the energies of u.
+pub fn residual(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Energy) {
+    let mut sum = Energy::default();
+    let mut all = Vec::with_capacity(u.states.len());
+    for (index, state) in u.states.iter().enumerate() {
+        let rows = model.at_rows(index, force);
+        let mut r = vec![0.0; state.len()];
+        if let Some(body) = &mut model.bodies[index].local {
+            let energy = body.residual(state, &rows, &mut r);
+            sum.strain += energy.strain;
+            sum.potential += energy.potential;
+        }
+        all.push(r);
+    }
+    (all, sum)
+}
+
+/// y += B' `force` in every body that lives here, for forces at the points (n).
+pub fn add_forces(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
+    for (index, y) in y.iter_mut().enumerate() {
+        if let Some(body) = &model.bodies[index].local {
+            body.add_rows(&model.at_rows(index, force), y);
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! What a run that ends now would still need: iterations left, from the spectrum of G^-1 F1'' and the method's own rate.
 
-use super::progress::Row;
+use super::history::Row;
 
 /// What bounds of the spectrum tell of the iterations to come.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,10 +3,11 @@
 //! The theorem asks for constants of F1' over all displacements. A layer has them on bounded ranges only, so they are taken over
 //! the level set {F1 <= F1(u0)} of the start, which an iteration that descends never leaves.
 
-use super::held;
-use super::layer::Layer;
-use super::linear;
+use super::layer_state::Layer;
 use super::model::Model;
+use super::rigid::{Motions, TOLERANCE};
+use super::sweep::Sweeper;
+use super::sweeps::gradients;
 use crate::contact::law::LayerLaw;
 use crate::error::Result;
 
@@ -37,12 +38,11 @@ const MOST: usize = 300;
 /// Places between the ends of a range where a tangent is looked at, for laws that neither stiffen nor soften all the way.
 const BETWEEN: usize = 32;
 
-/// The interval at a solution with this `layer` and Robin term `weight` = omega psi kappa; `excess` is F1(u0) - F1 of the
-/// solution. None if the eigenvalues cannot be found. Collective: solves with G.
+/// The interval at a solution with this `layer`, for the Robin term that the model carries; `excess` is F1(u0) - F1 of the solution. None if the eigenvalues cannot be found. Collective: solves with G.
 ///
 /// # Errors
 /// Failures of the solver library.
-pub fn interval(model: &mut Model, layer: &Layer, weight: &[f64], excess: f64) -> Result<Option<Interval>> {
+pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<Interval>> {
     let (mut least, mut most) = (vec![0.0; model.points()], vec![0.0; model.points()]);
     for (i, pair) in model.pairs.iter().enumerate() {
         for q in model.range(i) {
@@ -51,22 +51,42 @@ pub fn interval(model: &mut Model, layer: &Layer, weight: &[f64], excess: f64) -
             (least[q], most[q]) = tangents(&*pair.law, point, range);
         }
     }
-    let start = rows(model);
-    let Some((_, upper)) = linear::spectrum(model, layer, weight, &most, &start, MOST)? else { return Ok(None) };
-    let springs: Vec<f64> = model.weight.iter().zip(&least).map(|(w, k)| w * k).collect();
-    let lower = match held::joint_is_weak(model, &springs) {
+    let start = loads(model);
+    let Some((_, upper)) = spectrum(model, &most, &start)? else { return Ok(None) };
+    let springs = model.forces(&least);
+    let motions = Motions::of(model);
+    let lower = match motions.springs(&springs).factor(TOLERANCE).rank() < motions.count() {
         true => 0.0,
-        false => linear::spectrum(model, layer, weight, &least, &start, MOST)?.map_or(0.0, |(low, _)| low),
+        false => spectrum(model, &least, &start)?.map_or(0.0, |(low, _)| low),
     };
     // modes without a trace have the eigenvalue one
     Ok(Some(Interval { lower: lower.min(1.0), upper: upper.max(1.0) }))
 }
 
+/// Fall of the error after which extreme eigenvalues have settled.
+const SETTLED: f64 = 1e-9;
+
+/// Extreme eigenvalues of G^-1 (K + B' diag(omega slope) B) among the displacements that loads on the contact rows cause, with the
+/// Robin term that the model carries.
+fn spectrum(model: &mut Model, slope: &[f64], load: &[Vec<f64>]) -> Result<Option<(f64, f64)>> {
+    let springs = model.forces(slope);
+    let found = gradients(model, &mut Sweeper::default(), &springs, load, (SETTLED, MOST))?;
+    Ok(found.ok().and_then(|found| found.spectrum))
+}
+
 /// Forces on the contact rows in which every mode has a part.
-fn rows(model: &Model) -> Vec<f64> {
+fn loads(model: &Model) -> Vec<Vec<f64>> {
     let points = model.points();
     let share = |i: usize| 0.1 + (0.618_033_988_749_895 * (i + 1) as f64).fract();
-    (0..2 * points).map(|i| model.weight[i % points] * share(i)).collect()
+    let rows: Vec<f64> = (0..2 * points).map(|i| model.weight[i % points] * share(i)).collect();
+    let load = |(index, slot): (usize, &super::BodySlot)| {
+        slot.local.as_ref().map_or(Vec::new(), |body| {
+            let mut load = vec![0.0; body.len()];
+            body.add_rows(&model.of_body(index, &rows), &mut load);
+            load
+        })
+    };
+    model.bodies.iter().enumerate().map(load).collect()
 }
 
 /// Compressions that a point can have in the level set. F1 is convex, and what it exceeds its minimum by is at least what any

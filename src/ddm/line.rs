@@ -1,7 +1,7 @@
 //! F1 along a line: exact line search on a convex function.
 
 use super::field::{Field, apply_stiffness, local_dot};
-use super::layer::Layer;
+use super::layer_state::Layer;
 use super::model::Model;
 
 /// The derivative of F1(u + t v): linear and quadratic terms of the bodies, laws of the layers at every point.
@@ -70,44 +70,51 @@ impl<'a> Line<'a> {
     /// # Errors
     /// [`Unbounded`] if F1 still falls at t = 1e18.
     pub fn minimize(&self, accuracy: f64) -> Result<f64, Unbounded> {
-        let start = self.derivative(0.0);
-        if start >= 0.0 {
-            return Ok(0.0);
-        }
-        let target = accuracy * start.abs();
-        let (mut low, mut high) = ((0.0, start), (1.0, self.derivative(1.0)));
-        while high.1 < -target {
-            if high.0 > 1e18 {
-                return Err(Unbounded);
-            }
-            low = high;
-            high.0 *= 4.0;
-            high.1 = self.derivative(high.0);
-        }
-        // Illinois variant of the secant rule, bisection where a law is too steep for it
-        let (mut weight_low, mut weight_high) = (low.1, high.1);
-        for _ in 0..200 {
-            if high.1 <= target {
-                return Ok(high.0);
-            }
-            let secant = (low.0 * weight_high - high.0 * weight_low) / (weight_high - weight_low);
-            let middle = 0.5 * (low.0 + high.0);
-            let steep = !high.1.is_finite() || high.1 > 1e3 * low.1.abs();
-            let t = if steep || !(secant > low.0 && secant < high.0) { middle } else { secant };
-            let value = self.derivative(t);
-            if value.abs() <= target || high.0 - low.0 <= 1e-15 * high.0 {
-                return Ok(t);
-            }
-            if value < 0.0 {
-                low = (t, value);
-                weight_low = value;
-                weight_high *= 0.5;
-            } else {
-                high = (t, value);
-                weight_high = value;
-                weight_low *= 0.5;
-            }
-        }
-        Ok(low.0)
+        zero(|t| self.derivative(t), self.derivative(0.0), accuracy)
     }
+}
+
+/// The zero t >= 0 of an increasing function with the value `start` at 0, to `accuracy` relative to it; 0 if that is not negative.
+///
+/// # Errors
+/// [`Unbounded`] if the function is still negative at t = 1e18.
+pub fn zero(value: impl Fn(f64) -> f64, start: f64, accuracy: f64) -> Result<f64, Unbounded> {
+    if start >= 0.0 {
+        return Ok(0.0);
+    }
+    let target = accuracy * start.abs();
+    let (mut low, mut high) = ((0.0, start), (1.0, value(1.0)));
+    while high.1 < -target {
+        if high.0 > 1e18 {
+            return Err(Unbounded);
+        }
+        low = high;
+        high.0 *= 4.0;
+        high.1 = value(high.0);
+    }
+    // Illinois variant of the secant rule, bisection where a law is too steep for it
+    let (mut weight_low, mut weight_high) = (low.1, high.1);
+    for _ in 0..200 {
+        if high.1 <= target {
+            return Ok(high.0);
+        }
+        let secant = (low.0 * weight_high - high.0 * weight_low) / (weight_high - weight_low);
+        let middle = 0.5 * (low.0 + high.0);
+        let steep = !high.1.is_finite() || high.1 > 1e3 * low.1.abs();
+        let t = if steep || !(secant > low.0 && secant < high.0) { middle } else { secant };
+        let there = value(t);
+        if there.abs() <= target || high.0 - low.0 <= 1e-15 * high.0 {
+            return Ok(t);
+        }
+        if there < 0.0 {
+            low = (t, there);
+            weight_low = there;
+            weight_high *= 0.5;
+        } else {
+            high = (t, there);
+            weight_high = there;
+            weight_low *= 0.5;
+        }
+    }
+    Ok(low.0)
 }

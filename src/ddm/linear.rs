@@ -1,28 +1,106 @@
-//! The linearised problem at an iterate: the response of the bodies and their layers to small loads.
+//! The linear step: (K + B' diag(omega kappa) B) x = r over all bodies (35).
+//!
+//! How it is solved is a choice of inner solver, not a method of its own: one dense matrix of condensed bodies, one sparse
+//! factorisation, conjugate gradients with multigrid of all bodies, or with the Robin sweep ([`super::sweeps`]). A new way is a new
+//! file with the trait [`LinearStep`].
 
+use super::body::BodyCounts;
 use super::field::Field;
-use super::layer::Layer;
-use super::method::{Here, cg};
+use super::layer_state::Layer;
 use super::model::Model;
-use super::sweep::Sweeper;
+use super::rigid::{Motions, TOLERANCE};
+use super::start::surface_slopes;
 use crate::error::Result;
 
-/// Steps of conjugate gradients at most.
-const MOST: usize = 200;
+/// A system to be solved.
+pub struct System<'a> {
+    /// Bodies with K and B.
+    pub model: &'a mut Model,
+    /// Places of the layers.
+    pub places: &'a Layer,
+    /// omega kappa at the points, n.
+    pub springs: &'a [f64],
+    /// r, a state of each body that lives here.
+    pub residual: &'a [Vec<f64>],
+    /// How far an iterative solver has to reduce the energy norm of the error.
+    pub reduction: f64,
+}
 
-/// Solves (K + B' diag(omega kappa) B) w = r until the residual has fallen by `reduction`, and gives w with its squared energy
-/// norm w'r. `loads` is r, one entry a dof of each body that lives here; `weight` = omega psi kappa is the Robin term that the
-/// model carries.
+/// A solution of a [`System`].
+pub struct Solution {
+    /// x, with its traces.
+    pub field: Field,
+    /// x'r, the squared energy norm of x.
+    pub energy: f64,
+    /// Estimated energy norm of the error of x; zero for a direct solver.
+    pub error: f64,
+}
+
+/// A solver that gave up, in its own words.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Failure {
+    /// The body whose solver it was; none for one of all bodies together.
+    pub body: Option<usize>,
+    /// Its reason.
+    pub reason: String,
+}
+
+/// What a solver made of a system.
+pub type Solved = std::result::Result<Solution, Failure>;
+
+/// A solver of the linear step.
+pub trait LinearStep {
+    /// Name in the table and the report.
+    fn name(&self) -> &'static str;
+
+    /// Sets its solver up for the first step, with these springs omega kappa at the points, so that a refusal of the solver or of an
+    /// option comes before it.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn set_up(&mut self, _springs: &[f64]) -> Result<()> {
+        Ok(())
+    }
+
+    /// Solves a system. Collective.
+    ///
+    /// # Errors
+    /// Failures of the solver library; a solver that does not reach its tolerance is told in [`Solved`].
+    fn solve(&mut self, system: System) -> Result<Solved>;
+
+    /// What was done so far with all bodies together, besides what bodies count themselves.
+    fn counts(&self) -> BodyCounts {
+        BodyCounts::default()
+    }
+
+    /// Sweeps made so far.
+    fn sweeps(&self) -> usize {
+        0
+    }
+
+    /// One line about the solver of all bodies together; empty if each has its own.
+    fn describe(&self) -> String {
+        String::new()
+    }
+
+    /// Estimated bounds of the spectrum of the preconditioned matrix, if it has seen enough.
+    fn spectrum(&self) -> Option<(f64, f64)> {
+        None
+    }
+}
+
+/// The response w of the bodies and their layers to small loads: (K + B' diag(omega kappa) B) w = r, with its squared energy norm.
+/// `loads` is r, one entry a dof of each body that lives here.
 ///
 /// # Errors
 /// Failures of the solver library.
 pub fn respond(
     model: &mut Model,
-    layer: &Layer,
-    weight: &[f64],
+    step: &mut dyn LinearStep,
+    places: &Layer,
     loads: &[Vec<f64>],
     reduction: f64,
-) -> Result<(Field, f64)> {
+) -> Result<std::result::Result<(Field, f64), Failure>> {
     let mut residual = Vec::new();
     for (slot, load) in model.bodies.iter_mut().zip(loads) {
         residual.push(match &mut slot.local {
@@ -30,56 +108,21 @@ pub fn respond(
             None => Vec::new(),
         });
     }
-    let spring = springs(model, &layer.tangent);
-    let solution = solve(model, layer, weight, residual, &spring, (reduction, MOST))?;
-    Ok((solution.x, solution.energy))
+    let springs = resisting(model, places.springs(model));
+    let system = System { model, places, springs: &springs, residual: &residual, reduction };
+    Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy)))
 }
 
-/// Extreme eigenvalues of G^-1 (K + B' diag(omega slope) B) among the displacements that forces at the contact rows cause, by at
-/// most `most` Lanczos steps from the forces `rows` (layout of a trace vector); `weight` as in [`respond`].
-///
-/// # Errors
-/// Failures of the solver library.
-pub fn spectrum(
-    model: &mut Model,
-    layer: &Layer,
-    weight: &[f64],
-    slope: &[f64],
-    rows: &[f64],
-    most: usize,
-) -> Result<Option<(f64, f64)>> {
-    let mut residual = Vec::new();
-    for index in 0..model.bodies.len() {
-        let force = model.of_body(index, rows);
-        residual.push(model.bodies[index].local.as_ref().map_or(Vec::new(), |body| {
-            let mut load = vec![0.0; body.len()];
-            body.add_rows(&force, &mut load);
-            load
-        }));
+/// Share of the springs of whole surfaces that resists motions which no closed contact resists: they then go far, but not without end.
+const PROXIMAL: f64 = 1e-3;
+
+/// The springs omega kappa of a linear step, n, with a little everywhere if some rigid motion of the bodies together would else meet no
+/// resistance: a contact that is open now may be what stops it.
+pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
+    let motions = Motions::of(model);
+    if motions.count() > 0 && motions.springs(&springs).factor(TOLERANCE).rank() < motions.count() {
+        let slopes = surface_slopes(model);
+        springs.iter_mut().enumerate().for_each(|(q, spring)| *spring += PROXIMAL * model.weight[q] * slopes[q]);
     }
-    let spring = springs(model, slope);
-    Ok(solve(model, layer, weight, residual, &spring, (SETTLED, most))?.spectrum)
-}
-
-/// Fall of the residual after which extreme eigenvalues have settled.
-const SETTLED: f64 = 1e-9;
-
-/// omega slope at the points.
-fn springs(model: &Model, slope: &[f64]) -> Vec<f64> {
-    model.weight.iter().zip(slope).map(|(w, k)| w * k).collect()
-}
-
-fn solve(
-    model: &mut Model,
-    layer: &Layer,
-    weight: &[f64],
-    residual: Vec<Vec<f64>>,
-    spring: &[f64],
-    (reduction, most): (f64, usize),
-) -> Result<cg::Solution> {
-    let mut sweeper = Sweeper::default();
-    let sweep = sweeper.precondition(model, residual.clone(), &residual)?;
-    let mut here =
-        Here { model, sweeper: &mut sweeper, k: 0, layer, weight, sweep: &sweep, residual: 1.0, target: reduction };
-    cg::solve(&mut here, spring, reduction, most)
+    springs
 }

@@ -1,54 +1,50 @@
 //! The method: Robin-Robin domain decomposition for the nonlinear variational equation (26).
 //!
-//! Start with [`iterate`]: the loop. It works on point arrays (compression, pressure, tangent, weight) and on
-//! bodies that answer the verbs of [`Body`]; it knows no dimension, no element, no mesh and no PETSc.
+//! Start with the two loops: [`robin`](self), the paper's, and Newton's, each one screen. They work on point arrays (compression,
+//! pressure, tangent, weight) and on bodies that answer the verbs of [`Body`]; they know no dimension, no element, no mesh and no
+//! PETSc.
 
+pub mod acceleration;
 mod balance;
 pub mod body;
-mod closing;
-mod coarse;
-mod cone;
-mod fall;
+mod bound;
+mod coefficient;
+mod extend;
 pub mod field;
 pub mod forecast;
 pub mod gamma;
-pub mod held;
+pub mod history;
 pub mod interval;
-pub mod iterate;
-mod joint;
-pub mod layer;
-mod lift;
+pub mod layer_state;
 pub mod line;
 pub mod linear;
-mod measure;
-pub mod method;
 pub mod model;
+mod newton;
 mod origin;
-mod progress;
 pub mod rigid;
 pub mod ritz;
-pub mod robin;
+mod robin;
+mod run;
 mod scale;
-mod steady;
+pub mod solve;
+pub mod start;
 pub mod stop;
 pub mod sweep;
-mod watch;
-pub mod zone;
+mod sweeps;
 
 pub use balance::{Discretisation, SHARE};
 pub use body::{Body, BodyCounts, Energy, Matrices, Solved};
-pub use closing::{automatic_start, rigid_closing};
+pub use coefficient::Coefficient;
+pub use extend::prepare;
 pub use field::Field;
 pub use forecast::Forecast;
+pub use history::{Observer, Row, Silent};
 pub use interval::Interval;
-pub use iterate::{Outcome, Settings, Status, solve};
-pub use joint::Joint;
-pub use layer::Layer;
-pub use lift::prepare;
-pub use model::{Adrift, BodySlot, Exchange, Model, Motion, Segment, Serial};
-pub use progress::{Observer, Row, Silent};
-pub use rigid::Motions;
-pub use robin::RobinRule;
-pub use stop::StopRule;
+pub use layer_state::Layer;
+pub use linear::{LinearStep, Solution};
+pub use model::{BodySlot, Exchange, Mechanism, Model, Motion, Segment, Serial, Sprung};
+pub use rigid::{Motions, Moved};
+pub use solve::{Method, Outcome, Settings, Start, first_springs, solve};
+pub use stop::Status;
 pub use sweep::Sweep;
-pub use zone::RobinZone;
+pub use sweeps::Sweeps;

@@ -6,6 +6,7 @@
 use super::body::Body;
 use crate::contact::ContactPair;
 use crate::error::Result;
+use nalgebra::DMatrix;
 use std::ops::Range;
 
 /// Sums over the ranks of a parallel run. Every entry is non-zero on one rank only, so sums are exact and every rank
@@ -50,13 +51,22 @@ pub struct Motion {
 
 /// A motion of several bodies together that changes no gap and that nothing holds, although loads do work on it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Adrift {
+pub struct Mechanism {
     /// The bodies that it moves.
     pub bodies: Vec<usize>,
     /// Its name.
     pub motion: String,
     /// Work of the loads on it, as a share of what forces of their sizes could do.
     pub work: f64,
+}
+
+/// Rigid motions that springs to the ground resist, beside those that nothing holds: a start moves bodies on soft springs, too.
+#[derive(Debug, Clone)]
+pub struct Sprung {
+    /// The motions that supports leave.
+    pub motions: Vec<Motion>,
+    /// Stiffness of the springs in terms of them.
+    pub stiffness: DMatrix<f64>,
 }
 
 /// A body in the model; the arrays are known on every rank, the body itself where it lives.
@@ -69,8 +79,14 @@ pub struct BodySlot {
     pub segments: Vec<Segment>,
     /// Rigid motions that its supports leave free.
     pub motions: Vec<Motion>,
+    /// The motions that supports leave, if springs resist some of them.
+    pub sprung: Option<Sprung>,
     /// Largest diagonal entry of K.
     pub scale: f64,
+    /// Elastic modulus against pressure on its contact surfaces, E/(1 - nu^2) or about that.
+    pub modulus: f64,
+    /// Its size across its contact surfaces.
+    pub depth: f64,
     /// b diag(K) b' of each contact row b: stiffness of the nodes under a point.
     pub row_stiffness: Vec<f64>,
 }
@@ -88,7 +104,7 @@ pub struct Model {
     /// d of all points, less what prescribed displacements close of it.
     pub gap: Vec<f64>,
     /// Why there is no solution, where that is known beforehand.
-    pub adrift: Option<Adrift>,
+    pub mechanism: Option<Mechanism>,
     /// Connection to the other ranks.
     pub exchange: Box<dyn Exchange>,
 }
@@ -101,7 +117,7 @@ impl Model {
             offset.push(offset[offset.len() - 1] + pair.len());
         }
         let weight = pairs.iter().flat_map(|pair| pair.weight.iter().copied()).collect();
-        let mut model = Self { bodies, pairs, offset, weight, gap: Vec::new(), adrift: None, exchange };
+        let mut model = Self { bodies, pairs, offset, weight, gap: Vec::new(), mechanism: None, exchange };
         model.scale_gaps(1.0);
         model
     }
@@ -127,6 +143,25 @@ impl Model {
                     - self.pairs[pair].prescribed[1][local];
             }
         }
+    }
+
+    /// c = B u - d at the points (n), for a trace vector.
+    pub fn compression(&self, trace: &[f64]) -> Vec<f64> {
+        let points = self.points();
+        // + 0.0 turns -0.0, which depends on the order of a sum, into 0.0
+        (0..points).map(|q| trace[q] + trace[points + q] - self.gap[q] + 0.0).collect()
+    }
+
+    /// omega p, for pressures p at the points (n).
+    pub fn forces(&self, pressure: &[f64]) -> Vec<f64> {
+        self.weight.iter().zip(pressure).map(|(weight, pressure)| weight * pressure).collect()
+    }
+
+    /// Stiffness of the nodes under every contact row (2n, layout of a trace vector).
+    pub fn row_stiffness(&self) -> Vec<f64> {
+        let mut all = vec![0.0; 2 * self.points()];
+        (0..self.bodies.len()).for_each(|body| self.put(body, &self.bodies[body].row_stiffness, &mut all));
+        all
     }
 
     /// Number of contact points of all pairs.

@@ -3,7 +3,7 @@
 //! Motions are numbered through body by body. As K E = 0, what is asked of them here are sums over contact points. Which of their
 //! combinations nothing holds is the kernel of [`Motions::springs`]; [`TOLERANCE`] says what is nothing.
 
-use super::model::{Model, Motion, Segment};
+use super::model::{BodySlot, Model, Motion, Segment};
 use crate::linalg::{Blocks, axpy, dot};
 pub use crate::linalg::{PART, TOLERANCE};
 use nalgebra::{DMatrix, DVector};
@@ -13,6 +13,8 @@ use std::ops::Range;
 pub struct Motions<'a> {
     /// First motion of each body, and the number of all.
     first: Vec<usize>,
+    /// Motions of each body.
+    bodies: Vec<&'a [Motion]>,
     /// For each pair its points among all, and the bodies at its sides.
     pairs: Vec<(Range<usize>, Vec<End<'a>>)>,
 }
@@ -36,7 +38,7 @@ pub struct Moved {
 impl<'a> Motions<'a> {
     /// Of bodies with these contact rows and free motions; `points` are the points of each pair.
     pub fn new(bodies: impl IntoIterator<Item = (&'a [Segment], &'a [Motion])>, points: &[usize]) -> Self {
-        let mut first = vec![0];
+        let (mut first, mut all) = (vec![0], Vec::new());
         let mut next = 0;
         let range = |&count: &usize| {
             next += count;
@@ -55,14 +57,29 @@ impl<'a> Motions<'a> {
                 ends.push(End { body, traces });
             }
             first.push(first[body] + motions.len());
+            all.push(motions);
         }
-        Self { first, pairs }
+        Self { first, bodies: all, pairs }
     }
 
-    /// Of the bodies of a model.
+    /// Of the bodies of a model: motions that neither supports nor springs hold.
     pub fn of(model: &'a Model) -> Self {
+        Self::of_model(model, |slot| &slot.motions)
+    }
+
+    /// Of the bodies of a model: motions that supports leave, with those that springs to the ground resist.
+    pub fn with_springs(model: &'a Model) -> Self {
+        Self::of_model(model, |slot| slot.sprung.as_ref().map_or(&slot.motions, |sprung| &sprung.motions))
+    }
+
+    fn of_model(model: &'a Model, motions: impl Fn(&'a BodySlot) -> &'a Vec<Motion>) -> Self {
         let points: Vec<usize> = (0..model.pairs.len()).map(|pair| model.range(pair).len()).collect();
-        Self::new(model.bodies.iter().map(|slot| (&slot.segments[..], &slot.motions[..])), &points)
+        Self::new(model.bodies.iter().map(|slot| (&slot.segments[..], &motions(slot)[..])), &points)
+    }
+
+    /// Motions of each body.
+    pub fn bodies(&self) -> &[&'a [Motion]] {
+        &self.bodies
     }
 
     /// Number of all motions.
@@ -120,11 +137,11 @@ impl<'a> Motions<'a> {
     /// The trace of E `amounts`, for the model whose motions these are.
     pub fn trace(&self, model: &Model, amounts: &DVector<f64>) -> Vec<f64> {
         let mut trace = vec![0.0; 2 * model.points()];
-        for (body, slot) in model.bodies.iter().enumerate() {
-            let Some(motion) = slot.motions.first() else { continue };
+        for (body, motions) in self.bodies.iter().enumerate() {
+            let Some(motion) = motions.first() else { continue };
             let mut rows = vec![0.0; motion.trace.len()];
             let own = self.of_body(body).map(|i| amounts[i]);
-            slot.motions.iter().zip(own).for_each(|(motion, a)| axpy(a, &motion.trace, &mut rows));
+            motions.iter().zip(own).for_each(|(motion, a)| axpy(a, &motion.trace, &mut rows));
             model.put(body, &rows, &mut trace);
         }
         trace
@@ -135,6 +152,16 @@ impl<'a> Motions<'a> {
         let mut work = DVector::zeros(self.count());
         self.felt().for_each(|(range, motion, trace)| work[motion] += dot(trace, &force[range.clone()]));
         work
+    }
+
+    /// |(B E)'| |`force`|: what forces at the points, of any signs, could do on each motion.
+    pub fn sizes(&self, force: &[f64]) -> DVector<f64> {
+        let mut sizes = DVector::zeros(self.count());
+        let size = |trace: &[f64], range: &Range<usize>| -> f64 {
+            trace.iter().zip(&force[range.clone()]).map(|(t, f)| (t * f).abs()).sum()
+        };
+        self.felt().for_each(|(range, motion, trace)| sizes[motion] += size(trace, range));
+        sizes
     }
 
     /// What pairs feel: points, number of the motion, its trace there.
@@ -148,15 +175,15 @@ impl<'a> Motions<'a> {
     }
 
     /// The bodies that a combined motion moves, and how.
-    pub fn names(&self, model: &Model, amounts: &DVector<f64>) -> Vec<Moved> {
+    pub fn names(&self, amounts: &DVector<f64>) -> Vec<Moved> {
         let least = PART * amounts.amax();
-        let of_body = |(body, slot): (usize, &super::BodySlot)| {
-            let own = amounts.rows(self.first[body], slot.motions.len());
+        let of_body = |(body, motions): (usize, &&[Motion])| {
+            let own = amounts.rows(self.first[body], motions.len());
             let moves = own.amax() > least;
-            let name = combined(slot.motions.iter().map(|motion| &motion.name[..]), own.iter().copied());
+            let name = combined(motions.iter().map(|motion| &motion.name[..]), own.iter().copied());
             moves.then_some(Moved { body, name })
         };
-        model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()).filter_map(of_body).collect()
+        self.bodies.iter().enumerate().filter(|(_, motions)| !motions.is_empty()).filter_map(of_body).collect()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Bounds of the spectrum of G^-1 F1'' from the directions that a method went along.
 
 use super::field::{Field, apply_stiffness, local_dot};
-use super::layer::Layer;
+use super::layer_state::Layer;
 use super::model::Model;
 use nalgebra::{DMatrix, SymmetricEigen};
 

@@ -1,93 +1,80 @@
-//! The Robin coefficient: what stands in diag(omega psi kappa) of G.
+//! The paper's loop (41)-(42), and faster ones over the same sweep.
 //!
-//! Any symmetric positive definite G leads to the same solution; it decides how fast. Weights are kept for each contact row,
-//! in the layout of a trace vector, because the two bodies of a pair may need different ones.
+//! ```text
+//! layers      c = B u - d,   p = p(c)
+//! Robin term  G_s = K_s + B_s' omega psi kappa B_s                            (37)-(38)
+//! sweep       G_s z_s = r_s = f_s - K_s u_s - B_s' omega p                    (41)  every body by itself
+//! update      u <- u + gamma z                                                (42)
+//! ```
 
-use super::held;
-use super::layer::Layer;
-use super::model::Model;
-use super::zone::RobinZone;
+use super::acceleration::{Acceleration, Here, Step};
+use super::coefficient::{Coefficient, underconstrained};
+use super::field::Field;
+use super::layer_state::Layer;
+use super::linear::LinearStep;
+use super::run::{End, Run, Swept};
+use super::stop::Status;
+use super::sweep::{Sweep, Sweeper};
+use crate::error::Result;
 
-/// Rule for the Robin coefficient kappa on the zone.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RobinRule {
-    /// kappa = p'(c^k), as in the paper.
-    Tangent,
-    /// That of the start all the way, made safe as in `Auto`: one factorisation a run (Theorem 3 allows it).
-    Frozen,
-    /// kappa = max(p'(c^k), floor) everywhere on the contact surfaces.
-    Floor(f64),
-    /// The tangent on the zone, and enough more for a body that it does not hold safely.
-    Auto,
+/// The step that led to an iterate.
+pub(super) struct Last {
+    /// The sweep before it.
+    pub sweep: Sweep,
+    /// gamma, if it went along the sweep's correction.
+    pub relaxed: Option<f64>,
+    /// How far it went along its direction.
+    pub length: f64,
+    /// Change of the traces.
+    pub moved: Vec<f64>,
 }
 
-/// The rule with what it remembers.
-#[derive(Debug)]
-pub struct Robin {
-    rule: RobinRule,
-    frozen: Option<Vec<f64>>,
-}
+/// Iterates from a displacement until a rule ends it; `linear` serves estimates of the mesh's error.
+///
+/// # Errors
+/// Failures of the solver library. Not converging is a status.
+pub(super) fn iterate(
+    run: &mut Run,
+    acceleration: &mut dyn Acceleration,
+    coefficient: &mut Coefficient,
+    linear: &mut dyn LinearStep,
+    mut u: Field,
+) -> Result<End> {
+    let mut sweeper = Sweeper::default();
+    let mut last: Option<Last> = None;
+    let end = |status, u, layer, weight, sweeper: &Sweeper| {
+        let (sweeps, skipped) = (sweeper.sweeps, sweeper.solves_skipped);
+        Ok(End { status, iterate: u, layer, weight, sweeps, skipped })
+    };
+    for k in 0.. {
+        let layer = Layer::at(run.model, &u.trace);
+        let weight = coefficient.weight(run.model, &layer, k);
+        if let Some(moved) = underconstrained(run.model, &weight) {
+            return end(Status::Underconstrained(moved), u, layer, weight, &sweeper);
+        }
+        run.model.robin(&weight)?;
+        let relaxed = last.as_ref().and_then(|last| Some((&last.sweep, last.relaxed?)));
+        let sweep = sweeper.sweep(run.model, &u, &layer, &weight, relaxed)?;
 
-impl Robin {
-    /// Starts with nothing remembered.
-    pub fn new(rule: RobinRule) -> Self {
-        Self { rule, frozen: None }
-    }
-
-    /// omega psi kappa of every contact row in iteration `k`.
-    pub fn weight(&mut self, model: &Model, zone: &RobinZone, layer: &Layer, k: usize) -> Vec<f64> {
-        let tangent = || {
-            let points = zone.robin_weight(model, layer, k);
-            [&points[..], &points[..]].concat()
-        };
-        match &self.rule {
-            RobinRule::Tangent => tangent(),
-            RobinRule::Frozen => self.frozen.get_or_insert_with(|| held_safely(model, tangent())).clone(),
-            RobinRule::Floor(floor) => {
-                let mut weight = tangent();
-                let points = model.points();
-                for (q, weight) in weight.iter_mut().enumerate() {
-                    *weight = weight.max(floor * model.weight[q % points]);
-                }
-                weight
+        let reached = last.as_ref().map(|last| (&last.moved[..], last.length));
+        let (amplification, sweeps) = (acceleration.amplification().sqrt(), sweeper.sweeps);
+        let swept = Swept { k, u: &u, layer: &layer, sweep: &sweep, last: reached, amplification, sweeps };
+        if let Some(status) = run.end_of_sweep(&swept, linear)? {
+            return end(status, u, layer, weight, &sweeper);
+        }
+        let residual = run.rows[run.rows.len() - 1].residual;
+        let mut here = Here { model: run.model, k, layer: &layer, weight: &weight, sweep: &sweep, residual };
+        let (direction, length, relaxed) = match acceleration.step(&mut here)? {
+            Step::Unbounded => {
+                return end(Status::Unbounded { moving: Vec::new() }, u, layer, weight, &sweeper);
             }
-            RobinRule::Auto => held_safely(model, tangent()),
-        }
+            Step::Sweep(gamma) => (None, gamma, Some(gamma)),
+            Step::Along(direction, length) => (Some(direction), length, None),
+        };
+        let direction = direction.as_ref().unwrap_or(&sweep.correction);
+        u.add(length, direction);
+        let moved = direction.trace.iter().map(|t| length * t).collect();
+        last = Some(Last { sweep, relaxed, length, moved });
     }
-}
-
-/// The weights, with more for every body that they do not hold safely.
-fn held_safely(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
-    for body in 0..model.bodies.len() {
-        if held::weak_motion(model, body, &weight, WEAK).is_some() {
-            hold(model, body, &mut weight);
-        }
-    }
-    weight
-}
-
-/// Growth of a body's whole Robin term, either way, beyond which an old one does not even serve to measure.
-const FAR: f64 = 10.0;
-
-/// Whether the Robin terms of two iterates are alike, body by body.
-pub(super) fn is_of_the_size(model: &Model, old: &[f64], new: &[f64]) -> bool {
-    (0..model.bodies.len()).all(|body| {
-        let [old, new] = [old, new].map(|weight| model.of_body(body, weight).iter().sum::<f64>());
-        old <= FAR * new && new <= FAR * old
-    })
-}
-
-/// A motion held by less than this share of what [`hold`] gives is not held safely.
-const WEAK: f64 = 1e-3;
-
-/// Gives every contact row of a body at least the stiffness of the body's own surface as a whole.
-fn hold(model: &Model, body: usize, weight: &mut [f64]) {
-    let springs = held::natural_springs(model, body);
-    let mut next = 0;
-    for range in model.trace_ranges(body).collect::<Vec<_>>() {
-        for i in range {
-            weight[i] = weight[i].max(springs[next]);
-            next += 1;
-        }
-    }
+    unreachable!("the limit of iterations ends the loop")
 }

@@ -1,25 +1,47 @@
-//! When to stop: residual, the paper's increment rule, rounding floor, cycles.
+//! When a run ends, and what that is called.
 
+use super::linear::Failure;
+use super::model::Mechanism;
+use super::rigid::Moved;
 use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// Rules of a run; the first one met ends it.
+/// How a run ended.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StopRule {
-    /// Relative residual at most this.
-    pub residual: Option<f64>,
-    /// The paper's rule: rho of every body at most this.
-    pub increment: Option<f64>,
-    /// Updates at most.
-    pub iterations: usize,
+pub enum Status {
+    /// A stopping rule was met.
+    Converged,
+    /// The error cannot fall further in this arithmetic.
+    RoundoffLimited,
+    /// The limit of iterations was reached.
+    IterationLimit,
+    /// A number that is not finite came up in a body.
+    NotFinite {
+        /// The first such body.
+        body: usize,
+    },
+    /// The iterates repeat.
+    Cycle {
+        /// Updates after which they come back.
+        period: usize,
+    },
+    /// Neither supports nor the Robin term hold a body.
+    Underconstrained(Moved),
+    /// Loads move several bodies together in a way that changes no gap and that nothing holds.
+    Mechanism(Mechanism),
+    /// F1 falls for ever: loads push bodies where neither a support nor a contact stops them.
+    Unbounded {
+        /// The bodies and their motions, where they are known.
+        moving: Vec<Moved>,
+    },
+    /// An inner solver failed.
+    InnerSolver(Failure),
 }
 
-impl StopRule {
-    /// Whether an iterate with this residual, reached by this increment (NaN before the first update), is good
-    /// enough.
-    pub fn is_met(&self, residual: f64, increment: f64) -> bool {
-        self.residual.is_some_and(|tolerance| residual <= tolerance)
-            || self.increment.is_some_and(|tolerance| increment <= tolerance)
+impl Status {
+    /// Whether the last iterate is a solution.
+    pub fn is_solved(&self) -> bool {
+        matches!(self, Status::Converged | Status::RoundoffLimited)
     }
 }
 
@@ -30,35 +52,34 @@ pub fn relative_increment(step: &[f64], now: &[f64]) -> f64 {
     if norm(step) == 0.0 { 0.0 } else { norm(step) / norm(now) }
 }
 
-/// Watches for progress: at the rounding floor the residual stays where it is.
+/// Watches for progress: at the rounding floor the error stays where it is.
 #[derive(Debug)]
 pub struct Floor {
     best: f64,
     since: usize,
-}
-
-impl Default for Floor {
-    fn default() -> Self {
-        Self { best: f64::INFINITY, since: 0 }
-    }
+    patience: usize,
 }
 
 impl Floor {
-    /// Iterations without a residual a tenth below the best one, after which rounding is suspected.
-    const PATIENCE: usize = 20;
+    /// Largest error that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
+    const BELIEVABLE: f64 = 1e-4;
 
-    /// Notes a residual; true when it is time to compare it with the rounding errors.
-    pub fn is_suspected(&mut self, residual: f64) -> bool {
-        if residual < 0.9 * self.best {
-            self.best = residual;
+    /// Of a method that reduces the error to nine tenths at least in so many iterations.
+    pub fn new(patience: usize) -> Self {
+        Self { best: f64::INFINITY, since: 0, patience }
+    }
+
+    /// Notes an error; true when it is time to compare it with the rounding errors.
+    pub fn is_reached(&mut self, error: f64) -> bool {
+        if error < 0.9 * self.best {
+            self.best = error;
             self.since = 0;
         } else {
             self.since += 1;
         }
-        self.since > 0 && self.since.is_multiple_of(Self::PATIENCE)
+        self.since > 0 && self.since.is_multiple_of(self.patience) && error <= Self::BELIEVABLE
     }
 }
-
 /// Recognises an iteration that runs in a circle: the same traces again, or the same contact sets again and again without
 /// progress.
 #[derive(Debug, Default)]
@@ -152,8 +173,8 @@ mod tests {
 
     #[test]
     fn stalling_is_suspected_only_after_a_while() {
-        let mut floor = Floor::default();
-        assert!((0..200).all(|k| !floor.is_suspected(0.95f64.powi(k))));
-        assert!((0..20).any(|_| floor.is_suspected(1e-4)));
+        let mut floor = Floor::new(20);
+        assert!((0..200).all(|k| !floor.is_reached(0.95f64.powi(k))));
+        assert!((0..20).any(|_| floor.is_reached(1e-5)));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::body::{Energy, Solved};
 use super::field::Field;
-use super::layer::Layer;
+use super::layer_state::Layer;
 use super::model::Model;
 use crate::error::Result;
 use crate::linalg::{axpy, dot};

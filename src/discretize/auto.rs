@@ -1,13 +1,13 @@
 //! Pairs that the scene leaves to be found: boundary facets of different bodies that face each other within a distance.
 
-use super::pairs::Surface;
 use super::part::Part;
+use super::surface::Surface;
 use crate::contact::Side;
 use crate::contact::pieces::{Cut, Reach, Search};
 use crate::contact::side::unit;
 use crate::error::{Error, Result};
 use crate::fem::Facets;
-use crate::scene::AutoContact;
+use crate::problem::contact::AutoContact;
 use std::collections::HashSet;
 
 /// Facets face each other if the cosine between the normal of one and minus that of the other is larger.

@@ -2,7 +2,7 @@
 
 use super::part::Part;
 use crate::contact::ContactPair;
-use crate::ddm::{Motion, Segment, rigid as joint};
+use crate::ddm::{Motion, Segment, Sprung, rigid as joint};
 use crate::error::Result;
 use crate::fem::rigid::{self, RigidMotion};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
@@ -32,7 +32,9 @@ pub struct Loose {
     pub left: Vec<RigidMotion>,
     /// As contact and loads see them.
     pub motions: Vec<Motion>,
-    /// Combinations of them that no contact row feels: name and weights.
+    /// Those that supports alone leave, if springs resist some of them.
+    pub sprung: Option<Sprung>,
+    /// Combinations of the motions that no contact row feels: name and weights.
     pub unfelt: Vec<(String, DVector<f64>)>,
 }
 
@@ -78,7 +80,9 @@ impl Draft {
         let left = part.left(&self.free);
         let motions = self.motions::<D>(&left);
         let unfelt = felt_by_none(&motions);
-        Loose { left, motions, unfelt }
+        let sprung = part.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
+        let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions::<D>(&all), stiffness });
+        Loose { left, motions, sprung, unfelt }
     }
 
     /// The dof outside the contact rows, so that these stay as they are, that a motion moves most, unless that is little.

@@ -6,7 +6,9 @@ use crate::error::{Error, Result};
 use crate::fem::Space;
 use crate::fem::elasticity::{Elasticity, Flaw};
 use crate::mesh::Mesh;
-use crate::scene::{BodySpec, Constants, ElasticitySpec, Order, Plane};
+use crate::problem::body::BodySpec;
+use crate::problem::elasticity::{Constants, ElasticitySpec, Plane};
+use crate::problem::order::Order;
 
 /// The elasticity of a body.
 ///

@@ -5,7 +5,7 @@ use crate::contact;
 use crate::error::{Error, Result};
 use crate::fem::{Elasticity, Space, norms, stress};
 use crate::output::vtu::{BodyField, CellKind};
-use crate::scene::BodySpec;
+use crate::problem::body::BodySpec;
 use std::rc::Rc;
 
 /// Displacements of all nodes -> fields for output.

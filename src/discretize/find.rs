@@ -1,9 +1,9 @@
 //! Mesh groups by name, and refusals that point into the scene.
 
 use crate::error::{Error, Kind, Located, Result};
+use crate::expression::Field;
 use crate::mesh::{Group, Mesh};
-use crate::scene::BodySpec;
-use crate::scene::expression::Field;
+use crate::problem::body::BodySpec;
 
 /// A mesh group by name, of one of these dimensions.
 pub fn find_group<'m, const D: usize>(

@@ -7,7 +7,7 @@ use super::draft::{Draft, Loose, NO_WORK, works};
 use super::gauge;
 use super::part::Part;
 use crate::contact::ContactPair;
-use crate::ddm::{Adrift, Motion, Motions, Segment};
+use crate::ddm::{self, Motion, Motions, Segment};
 use crate::fem::Space;
 use crate::fem::rigid::{self, RigidMotion};
 use crate::linalg::{Blocks, PART, TOLERANCE, axpy, dot, fit};
@@ -34,8 +34,8 @@ pub struct Mechanism {
 
 impl Mechanism {
     /// For a run that cannot begin.
-    pub fn adrift(&self) -> Adrift {
-        Adrift { bodies: self.bodies.clone(), motion: self.name.clone(), work: self.work }
+    pub fn for_model(&self) -> ddm::Mechanism {
+        ddm::Mechanism { bodies: self.bodies.clone(), motion: self.name.clone(), work: self.work }
     }
 }
 

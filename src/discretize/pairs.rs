@@ -3,24 +3,15 @@
 use super::auto;
 use super::find::{find_group, placed, point};
 use super::part::Part;
-use super::surface::ContactSurface;
+use super::surface::{ContactSurface, Surface};
 use crate::contact::pieces::{Cut, Reach};
 use crate::contact::{self, ContactPair, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::Facets;
 use crate::mesh::{Group, Mesh};
-use crate::scene::{ContactSpec, Overlap, Scene};
+use crate::problem::contact::{ContactSpec, Overlap};
+use crate::scene::Scene;
 use std::collections::{BTreeSet, HashSet};
-
-/// One surface of a pair: facets of a body.
-pub struct Surface<'a, const D: usize> {
-    /// Number of the body.
-    pub body: usize,
-    /// Name of the physical group, or of the body if the pair was found.
-    pub name: &'a str,
-    /// The facets, oriented outwards.
-    pub facets: Facets<D>,
-}
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {

@@ -11,7 +11,9 @@ use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
 use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
-use crate::scene::{BodySpec, LoadKind, Plane};
+use crate::problem::body::{BodySpec, LoadKind};
+use crate::problem::elasticity::Plane;
+use nalgebra::DMatrix;
 
 /// A body of the scene with its space, supports and springs.
 pub struct Part<'a, const D: usize> {
@@ -83,6 +85,25 @@ impl<'a, const D: usize> Part<'a, D> {
         let (nodal, all) = (left.iter().map(turned).collect(), free.iter().map(turned).collect::<Vec<_>>());
         let left = rigid::left_by_springs(nodal, &all, &springs);
         self.in_dofs(left)
+    }
+
+    /// The rigid motions that supports leave, in the body's dofs, with the stiffness of the springs in terms of them; none without
+    /// springs.
+    pub fn sprung(&self, free: &[RigidMotion]) -> Option<(Vec<RigidMotion>, DMatrix<f64>)> {
+        let springs = self.springs.concat();
+        if springs.is_empty() {
+            return None;
+        }
+        let left = rigid::left_by_supports(free, &self.prescribed_sorted());
+        let nodal: Vec<RigidMotion> = left
+            .iter()
+            .map(|motion| RigidMotion {
+                name: motion.name.clone(),
+                displacement: self.held.frame.displacements(&motion.displacement),
+            })
+            .collect();
+        let stiffness = rigid::of_springs(&nodal, &springs);
+        Some((left, stiffness))
     }
 
     /// Nodal forces of the loads, but for those on rigid surfaces. Supports are not regarded.

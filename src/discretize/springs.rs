@@ -3,11 +3,11 @@
 use super::find::{find_group, not_on_body, without_area};
 use crate::contact::pad;
 use crate::error::{Error, Result};
+use crate::expression::Field;
 use crate::fem::assemble::NodalBlock;
 use crate::fem::{Space, surface};
 use crate::mesh::Mesh;
-use crate::scene::expression::Field;
-use crate::scene::{BodySpec, SpringKind, SpringSpec};
+use crate::problem::body::{BodySpec, SpringKind, SpringSpec};
 use std::cell::RefCell;
 
 /// The stiffnesses between nodes that a spring of the scene adds to K.

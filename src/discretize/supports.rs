@@ -5,7 +5,7 @@ use crate::contact::pad;
 use crate::error::{Error, Place, Result};
 use crate::fem::{Facets, Frame, Space};
 use crate::mesh::{Group, Mesh};
-use crate::scene::{BodySpec, LoadKind};
+use crate::problem::body::{BodySpec, LoadKind};
 use nalgebra::{DMatrix, DVector};
 use std::collections::{BTreeMap, HashMap};
 

@@ -1,10 +1,20 @@
-//! The mesh of a contact surface for output: the covered facets of side a, and where their values come from.
+//! A contact surface of a pair; its mesh for output: the covered facets of side a, and where their values come from.
 
 use crate::contact::{ContactPair, Side, pad};
-use crate::fem::element;
+use crate::fem::{Facets, element};
 use crate::output::vtu::{CellKind, Grid};
-use crate::scene::Order;
+use crate::problem::order::Order;
 use std::collections::{BTreeMap, HashMap};
+
+/// One surface of a pair: facets of a body.
+pub struct Surface<'a, const D: usize> {
+    /// Number of the body.
+    pub body: usize,
+    /// Name of the physical group, or of the body if the pair was found.
+    pub name: &'a str,
+    /// The facets, oriented outwards.
+    pub facets: Facets<D>,
+}
 
 /// The covered facets of the side that carries the points.
 pub struct ContactSurface {

@@ -10,7 +10,7 @@ use super::pad;
 use super::quadrature;
 use super::space::Space;
 use crate::linalg::Csr;
-use crate::scene::Order;
+use crate::problem::order::Order;
 
 /// Which nodes of a body are coupled: compressed rows of sorted node numbers, symmetric, with diagonal.
 #[derive(Debug, Clone)]

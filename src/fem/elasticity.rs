@@ -2,7 +2,7 @@
 
 use super::cross;
 use super::material::{Material, Tensor};
-use crate::scene::{AxesSpec, Constants, ElasticitySpec, Plane};
+use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, Plane};
 
 /// Elasticity of a body, cell by cell.
 #[derive(Debug, Clone)]

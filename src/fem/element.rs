@@ -9,7 +9,7 @@
 //! One function serves lines, triangles and tetrahedra: phi_i = L_i, or L_i (2 L_i - 1) at vertices and
 //! 4 L_i L_j on edges.
 
-use crate::scene::Order;
+use crate::problem::order::Order;
 
 /// Edges of the simplex with four vertices in the order of the mid-edge nodes; a triangle uses 01 12 02 and a
 /// line 01.

@@ -1,11 +1,8 @@
 //! Linear elastic material at a point: Hooke's law sigma = C eps (2) and the bounds on C (4).
 
-use super::slope::Slope;
-use crate::scene::Plane;
+use super::slope::{PAIRS, Slope};
+use crate::problem::elasticity::Plane;
 use nalgebra::{Matrix3, Matrix6};
-
-/// Index pairs of the components of stress and strain: xx yy zz xy yz xz, the order of VTK.
-pub const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
 /// Component behind each Voigt number 11 22 33 23 13 12.
 const VOIGT: [usize; 6] = [0, 1, 2, 4, 5, 3];
@@ -218,15 +215,6 @@ impl Material {
     pub fn stress(&self, strain: &[f64; 6]) -> [f64; 6] {
         std::array::from_fn(|i| (0..6).map(|j| self.stiffness.0[i][j] * strain[j]).sum())
     }
-}
-
-/// Strain (xx yy zz, and 2 eps of xy yz xz) of a displacement gradient (3).
-pub fn strain<const D: usize>(h: &[[f64; D]; D]) -> [f64; 6] {
-    PAIRS.map(|(i, j)| match (i < D && j < D, i == j) {
-        (false, _) => 0.0,
-        (_, true) => h[i][i],
-        _ => h[i][j] + h[j][i],
-    })
 }
 
 /// Place of the component (i, j) of a symmetric tensor among [`PAIRS`].

@@ -15,7 +15,7 @@ use super::assemble::interpolate;
 use super::element;
 use super::quadrature;
 use super::space::Space;
-use crate::scene::Order;
+use crate::problem::order::Order;
 use bubble::Bubble;
 use patch::Patch;
 use std::collections::{BTreeSet, HashMap};

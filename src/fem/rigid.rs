@@ -88,12 +88,8 @@ pub fn left_by_supports(motions: &[RigidMotion], prescribed: &[(usize, f64)]) ->
         .collect()
 }
 
-/// Of the motions in `left`, those that springs do not feel; `all` are the motions of the free body, which set the scale.
-pub fn left_by_springs<const D: usize>(
-    left: Vec<RigidMotion>,
-    all: &[RigidMotion],
-    springs: &[NodalBlock<D>],
-) -> Vec<RigidMotion> {
+/// Stiffness of springs in terms of motions of the nodes.
+pub fn of_springs<const D: usize>(motions: &[RigidMotion], springs: &[NodalBlock<D>]) -> DMatrix<f64> {
     let energy = |a: &RigidMotion, b: &RigidMotion| -> f64 {
         let at = |motion: &RigidMotion, node: u32, c: usize| motion.displacement[D * node as usize + c];
         let of = |spring: &NodalBlock<D>| -> f64 {
@@ -103,11 +99,20 @@ pub fn left_by_springs<const D: usize>(
         };
         springs.iter().map(of).sum()
     };
-    let scale = all.iter().map(|motion| energy(motion, motion)).fold(0.0, f64::max);
+    DMatrix::from_fn(motions.len(), motions.len(), |i, j| energy(&motions[i], &motions[j]))
+}
+
+/// Of the motions in `left`, those that springs do not feel; `all` are the motions of the free body, which set the scale.
+pub fn left_by_springs<const D: usize>(
+    left: Vec<RigidMotion>,
+    all: &[RigidMotion],
+    springs: &[NodalBlock<D>],
+) -> Vec<RigidMotion> {
+    let scale = of_springs(all, springs).diagonal().max();
     if scale == 0.0 {
         return left;
     }
-    let gram = DMatrix::from_fn(left.len(), left.len(), |i, j| energy(&left[i], &left[j]));
+    let gram = of_springs(&left, springs);
     Blocks::free(&gram, scale, TOLERANCE).into_iter().map(|weights| combine(&left, &weights)).collect()
 }
 

@@ -1,6 +1,7 @@
 //! The gradient of a displacement at a point, in plane bodies, in space, and in bodies of revolution.
 
-use super::material;
+/// Index pairs of the components of stress and strain: xx yy zz xy yz xz, the order of VTK.
+pub const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
 /// Gradient of a displacement at a point.
 ///
@@ -28,7 +29,7 @@ impl<const D: usize> Slope<D> {
 
     /// Strain (xx yy zz, and 2 eps of xy yz xz) (3); the circles are stretched along z.
     pub fn strain(&self) -> [f64; 6] {
-        let mut strain = material::strain(&self.h);
+        let mut strain = strain(&self.h);
         strain[2] += self.hoop;
         strain
     }
@@ -37,4 +38,13 @@ impl<const D: usize> Slope<D> {
     pub fn square(&self) -> f64 {
         self.h.as_flattened().iter().map(|h| h * h).sum::<f64>() + self.hoop * self.hoop
     }
+}
+
+/// Strain (xx yy zz, and 2 eps of xy yz xz) of a displacement gradient (3).
+pub fn strain<const D: usize>(h: &[[f64; D]; D]) -> [f64; 6] {
+    PAIRS.map(|(i, j)| match (i < D && j < D, i == j) {
+        (false, _) => 0.0,
+        (_, true) => h[i][i],
+        _ => h[i][j] + h[j][i],
+    })
 }

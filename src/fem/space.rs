@@ -3,7 +3,7 @@
 use super::numbering::Numbering;
 use super::{Slope, cross, element, pad};
 use crate::mesh::{Group, Mesh};
-use crate::scene::Order;
+use crate::problem::order::Order;
 use std::cell::OnceCell;
 use std::collections::{HashMap, HashSet};
 

@@ -3,7 +3,7 @@
 use super::elasticity::Elasticity;
 use super::space::Space;
 use super::{assemble, element, pad, quadrature};
-use crate::scene::Order;
+use crate::problem::order::Order;
 use nalgebra::Matrix3;
 
 /// Stress at every node: the mean over its cells, weighted by their measures, of the cell's stress at the node. In bodies of

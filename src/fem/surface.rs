@@ -3,7 +3,7 @@
 use super::assemble::{NodalBlock, interpolate};
 use super::space::{Facets, Space, area_vector};
 use super::{element, quadrature};
-use crate::scene::Order;
+use crate::problem::order::Order;
 
 /// Adds a surface load to `load`; `traction(x, n)` is force per area at a point with outer unit normal n.
 pub fn surface_load<const D: usize>(

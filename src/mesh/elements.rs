@@ -5,7 +5,7 @@ use super::nodes::Nodes;
 use super::physical::Physical;
 use super::simplex::{self, Kind, THINGS};
 use crate::error::Result;
-use crate::scene::Order;
+use crate::problem::order::Order;
 
 /// Reads the section's contents into the groups; gives the order of the elements, if there is one but points.
 ///

@@ -1,7 +1,7 @@
 //! Calls the program Gmsh.
 
 use crate::error::{Error, Kind, Result};
-use crate::scene::Order;
+use crate::problem::order::Order;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::UNIX_EPOCH;

@@ -1,8 +1,37 @@
 //! The groups of a mesh by name; and compact numbering: points that no group uses go.
 
-use super::Group;
 use std::collections::HashMap;
 use std::ops::{Deref, DerefMut};
+
+/// A named group of simplices of one dimension.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Group {
+    /// Name of the physical group.
+    pub name: String,
+    /// Dimension of its simplices: 0 points, 1 lines, 2 triangles, 3 tetrahedra.
+    pub dimension: usize,
+    /// Points per simplex.
+    pub stride: usize,
+    /// Point numbers, `stride` per simplex. Only cells have an orientation that means something.
+    pub connectivity: Vec<u32>,
+}
+
+impl Group {
+    /// Number of simplices.
+    pub fn len(&self) -> usize {
+        self.connectivity.len() / self.stride
+    }
+
+    /// Whether there is no simplex; never so in a mesh that was read.
+    pub fn is_empty(&self) -> bool {
+        self.connectivity.is_empty()
+    }
+
+    /// The simplices, each as its `stride` point numbers.
+    pub fn simplices(&self) -> std::slice::ChunksExact<'_, u32> {
+        self.connectivity.chunks_exact(self.stride)
+    }
+}
 
 /// The groups of a mesh, in the order of the file, found by their names, which are unique.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

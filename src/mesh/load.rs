@@ -5,7 +5,8 @@ use super::gmsh::Gmsh;
 use super::script::Script;
 use super::{Mesh, msh};
 use crate::error::{Error, Located, Result};
-use crate::scene::{MeshSource, Order, Sizing};
+use crate::problem::mesh::{MeshSource, Sizing};
+use crate::problem::order::Order;
 use std::path::{Path, PathBuf};
 
 /// A mesh and where it came from.

@@ -46,7 +46,7 @@ fn spread(x: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Order;
+    use crate::problem::order::Order;
 
     #[test]
     fn bits_interleave() {

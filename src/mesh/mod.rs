@@ -20,13 +20,13 @@ mod sizes;
 #[cfg(test)]
 mod tests;
 
-pub use groups::Groups;
+pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, recall_final};
 pub use msh::read;
 pub use quality::Quality;
 pub use sizes::{follows, view};
 
-use crate::scene::Order;
+use crate::problem::order::Order;
 use std::path::PathBuf;
 
 /// A mesh: points and named groups of simplices.
@@ -47,36 +47,6 @@ pub struct Mesh<const D: usize> {
     pub order: Order,
     /// Named groups, in the order of the file.
     pub groups: Groups,
-}
-
-/// A named group of simplices of one dimension.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Group {
-    /// Name of the physical group.
-    pub name: String,
-    /// Dimension of its simplices: 0 points, 1 lines, 2 triangles, 3 tetrahedra.
-    pub dimension: usize,
-    /// Points per simplex.
-    pub stride: usize,
-    /// Point numbers, `stride` per simplex. Only cells have an orientation that means something.
-    pub connectivity: Vec<u32>,
-}
-
-impl Group {
-    /// Number of simplices.
-    pub fn len(&self) -> usize {
-        self.connectivity.len() / self.stride
-    }
-
-    /// Whether there is no simplex; never so in a mesh that was read.
-    pub fn is_empty(&self) -> bool {
-        self.connectivity.is_empty()
-    }
-
-    /// The simplices, each as its `stride` point numbers.
-    pub fn simplices(&self) -> std::slice::ChunksExact<'_, u32> {
-        self.connectivity.chunks_exact(self.stride)
-    }
 }
 
 impl<const D: usize> Mesh<D> {

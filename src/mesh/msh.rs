@@ -6,7 +6,7 @@ use super::physical::Physical;
 use super::simplex::THINGS;
 use super::{Group, Mesh, elements, groups};
 use crate::error::{Error, Result};
-use crate::scene::Order;
+use crate::problem::order::Order;
 use std::path::Path;
 
 /// Reads a `.msh` file.

@@ -1,6 +1,6 @@
 //! Facts about single simplices: sizes, orientation, Gmsh's numbering.
 
-use crate::scene::Order;
+use crate::problem::order::Order;
 
 /// What Gmsh calls things of dimension 0 to 3, as in `Physical Surface`.
 pub const THINGS: [&str; 4] = ["Point", "Curve", "Surface", "Volume"];

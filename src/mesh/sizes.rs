@@ -2,7 +2,7 @@
 
 use super::script::Script;
 use crate::error::{Error, Located, Result};
-use crate::scene::MeshSource;
+use crate::problem::mesh::MeshSource;
 use std::path::{Path, PathBuf};
 
 /// Writes the script that meshes another one to a field of sizes into the folder `work`; gives its path. `field` is a view of

@@ -6,7 +6,7 @@ mod loading;
 
 use super::{Group, Mesh, msh, simplex};
 use crate::error::{Located, Place, Source};
-use crate::scene::Order;
+use crate::problem::order::Order;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

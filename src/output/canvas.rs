@@ -17,6 +17,15 @@ const FINE: f64 = 20.0;
 /// A place in pixels: x to the right, y down.
 pub(super) type Pixel = (f64, f64);
 
+/// The rectangle of the axes, in pixels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    pub left: f64,
+    pub right: f64,
+    pub top: f64,
+    pub bottom: f64,
+}
+
 /// Where a text is held, horizontally.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Hold {

@@ -1,13 +1,16 @@
-//! Drawing of a [`Plot`]: frame, grid, curves, legend.
+//! Drawing of a [`Plot`] as SVG: frame, grid, curves, legend.
 
-use super::canvas::{Canvas, Font, HEIGHT, Hold, Pixel, WIDTH, shorten, svg, text_width};
+use super::canvas::{Canvas, Font, Frame, HEIGHT, Hold, Pixel, WIDTH, shorten, svg, text_width};
+use super::folder::write_whole;
 use super::format::superscript;
 use super::legend::{Entry, Legend};
 use super::look::{GREY, looks};
 use super::plot::{Plot, Series};
 use super::ticks::{Scale, drawable};
+use crate::error::Result;
 use plotters::style::{BLACK, Color, RGBColor, WHITE};
-use std::io;
+use std::io::{self, Write};
+use std::path::Path;
 
 const FRAME: RGBColor = RGBColor(60, 60, 60);
 const GRID: RGBColor = RGBColor(222, 222, 222);
@@ -19,20 +22,29 @@ const TICK_SIZE: f64 = 12.5;
 /// Labels that an axis has at most, about.
 const TICKS: usize = 8;
 
-/// The rectangle of the axes, in pixels.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
-    pub left: f64,
-    pub right: f64,
-    pub top: f64,
-    pub bottom: f64,
+impl Plot {
+    /// Writes the plot as SVG, 900 by 560 pixels, on white.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(draw(self)?.as_bytes())
+    }
+
+    /// Writes the plot as an SVG file, the whole file or nothing.
+    ///
+    /// # Errors
+    /// [`Kind::File`](crate::error::Kind::File) when it cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        write_whole(path, |out| self.write(out))
+    }
 }
 
 /// Draws a plot and returns the SVG text.
 ///
 /// # Errors
 /// Those of plotters; drawing to memory has none that are known.
-pub(super) fn draw(plot: &Plot) -> io::Result<String> {
+fn draw(plot: &Plot) -> io::Result<String> {
     let points = || plot.series.iter().flat_map(|series| series.points.iter().copied());
     // A point that one axis cannot show must not stretch the other.
     let shown = |(x, y): &(f64, f64)| drawable(*x, plot.x.log) && drawable(*y, plot.y.log);
@@ -199,7 +211,7 @@ fn draw_axes(canvas: &Canvas, frame: Frame, plot: &Plot, x: &Scale, y: &Scale) -
 
 #[cfg(test)]
 mod tests {
-    use super::super::plot::{Axis, Style};
+    use super::super::plot::{Axis, ConvergenceSeries, Style};
     use super::*;
 
     fn plot(points: Vec<(f64, f64)>, log: bool) -> Plot {
@@ -261,5 +273,18 @@ mod tests {
         let inside = right_end(f64::from);
         let outside = right_end(|k| f64::from(k % 2));
         assert!(outside < inside - 1000.0, "{outside} {inside}");
+    }
+
+    #[test]
+    fn a_file_is_written_and_a_missing_folder_told() {
+        let base = tempfile::tempdir().unwrap();
+        let path = base.path().join("convergence.svg");
+        let rows = vec![(0, 1.0, f64::NAN), (1, 0.1, 0.5), (2, 0.0, 0.05)];
+        let plot = Plot::convergence("Two blocks", &[ConvergenceSeries { label: String::new(), rows }]);
+        plot.save(&path).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains("Two blocks") && text.contains("10⁻¹"), "{text}");
+        let error = plot.save(&base.path().join("no/x.svg")).unwrap_err();
+        assert!(error.message().contains("x.svg"));
     }
 }

@@ -1,7 +1,6 @@
 //! The legend: inside the axes where it covers no curve, else beside them.
 
-use super::canvas::{Canvas, Font, Hold, Pixel, shorten, text_width};
-use super::chart::Frame;
+use super::canvas::{Canvas, Font, Frame, Hold, Pixel, shorten, text_width};
 use super::look::Look;
 use plotters::style::{BLACK, Color, RGBColor, WHITE};
 use std::io;

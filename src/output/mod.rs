@@ -29,8 +29,8 @@ pub use format::{sci, seconds};
 pub use history::HistoryWriter;
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, PressureSeries, Series, Style};
 pub use report::{
-    BalanceReport, BodyReport, CoarserReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport,
-    PairReport, Report, RoundReport, StepPairReport, StepReport,
+    BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, PairReport,
+    Report, RoundReport, StepPairReport, StepReport,
 };
 pub use table::{IterationTable, Verbosity};
 pub use vtu::{BodyField, CellKind, Grid};

@@ -1,10 +1,4 @@
-//! The plots of a run as SVG files: convergence, contact pressure, and lines in general.
-
-use super::chart;
-use super::folder::write_whole;
-use crate::error::Result;
-use std::io::{self, Write};
-use std::path::Path;
+//! The plots of a run: convergence, contact pressure, and lines in general.
 
 /// A plot: curves over two axes.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,7 +73,7 @@ impl Series {
     }
 }
 
-/// The history of one run, for [`convergence`].
+/// The history of one run, for [`Plot::convergence`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvergenceSeries {
     /// Name of the run.
@@ -88,7 +82,7 @@ pub struct ConvergenceSeries {
     pub rows: Vec<(usize, f64, f64)>,
 }
 
-/// A pressure along a surface, for [`pressure`].
+/// A pressure along a surface, for [`Plot::pressure`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressureSeries {
     /// Name in the legend.
@@ -154,46 +148,6 @@ impl Plot {
             series: series.collect(),
         }
     }
-
-    /// Writes the plot as SVG, 900 by 560 pixels, on white.
-    ///
-    /// # Errors
-    /// Those of `out`.
-    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(chart::draw(self)?.as_bytes())
-    }
-
-    /// Writes the plot as an SVG file, the whole file or nothing.
-    ///
-    /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) when it cannot be written.
-    pub fn save(&self, path: &Path) -> Result<()> {
-        write_whole(path, |out| self.write(out))
-    }
-}
-
-/// Saves [`Plot::convergence`].
-///
-/// # Errors
-/// [`Kind::File`](crate::error::Kind::File) when it cannot be written.
-pub fn convergence(path: &Path, title: &str, runs: &[ConvergenceSeries]) -> Result<()> {
-    Plot::convergence(title, runs).save(path)
-}
-
-/// Saves [`Plot::pressure`].
-///
-/// # Errors
-/// [`Kind::File`](crate::error::Kind::File) when it cannot be written.
-pub fn pressure(path: &Path, title: &str, x_label: &str, curves: &[PressureSeries]) -> Result<()> {
-    Plot::pressure(title, x_label, curves).save(path)
-}
-
-/// Saves any plot.
-///
-/// # Errors
-/// [`Kind::File`](crate::error::Kind::File) when it cannot be written.
-pub fn lines(path: &Path, plot: &Plot) -> Result<()> {
-    plot.save(path)
 }
 
 #[cfg(test)]
@@ -227,16 +181,5 @@ mod tests {
         assert_eq!(plot.series[0].label, "run");
         assert_eq!(plot.series[0].points, [(0.0, 7.0), (1.0, 5.0)]);
         assert_eq!(plot.series[1].style, Style::Dashed);
-    }
-
-    #[test]
-    fn a_file_is_written_and_a_missing_folder_told() {
-        let base = tempfile::tempdir().unwrap();
-        let path = base.path().join("convergence.svg");
-        convergence(&path, "Two blocks", &[run("a")]).unwrap();
-        let text = std::fs::read_to_string(&path).unwrap();
-        assert!(text.contains("Two blocks") && text.contains("10⁻¹"), "{text}");
-        let error = convergence(&base.path().join("no/x.svg"), "", &[]).unwrap_err();
-        assert!(error.message().contains("x.svg"));
     }
 }

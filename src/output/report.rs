@@ -18,7 +18,7 @@ pub struct Report {
     pub ranks: usize,
     /// Title of the scene.
     pub title: String,
-    /// How the run ended: `converged`, `attainable`, `iteration-limit`, `not-finite`, `cycle`, `unheld`,
+    /// How the run ended: `converged`, `roundoff-limited`, `iteration-limit`, `not-finite`, `cycle`, `underconstrained`,
     /// `unbounded`, `inner-solver`.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
@@ -55,16 +55,16 @@ pub struct Report {
     pub messages: usize,
     /// Load steps, if they were asked for, the full load included.
     pub steps: Vec<StepReport>,
-    /// Relative residual of the result.
+    /// The number by which the run ended: of sweeps the relative residual, of Newton's method the largest of its relative errors.
     pub residual: Option<f64>,
-    /// Estimate of the relative error of the iteration in the energy norm.
+    /// Bound of the relative error of the iteration in the energy norm, where it is one.
+    pub error_bound: Option<f64>,
+    /// Estimate of that error where there is no bound.
     pub error_estimate: Option<f64>,
     /// Estimated errors of the discretisation, if they were asked for.
     pub discretization_error: Option<EstimateReport>,
     /// Meshes that were adapted to an error, one after another.
     pub rounds: Vec<RoundReport>,
-    /// The coarser mesh whose pressures the run began with.
-    pub coarser: Option<CoarserReport>,
     /// Estimated bounds of the spectrum of G^-1 F1''.
     pub spectrum: Option<[f64; 2]>,
     /// What more iterations would bring.
@@ -172,21 +172,6 @@ pub struct EstimateReport {
     pub pressure: Vec<f64>,
     /// Share of each body in the squared energy error, in the order of the scene.
     pub bodies: Vec<f64>,
-}
-
-/// A coarser mesh that was solved, roughly, for the start.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct CoarserReport {
-    /// How many times larger its elements are.
-    pub times: f64,
-    /// Degrees of freedom.
-    pub dofs: usize,
-    /// Contact points of all pairs.
-    pub points: usize,
-    /// Iterations.
-    pub iterations: usize,
-    /// Wall seconds, the making of the mesh included.
-    pub seconds: f64,
 }
 
 /// One mesh of an adaptation; errors are relative estimates.
@@ -311,20 +296,17 @@ impl Report {
         let mut lines = vec![format!("{}: {}", self.title, self.message)];
         let number = |value: Option<f64>| sci(value.unwrap_or(f64::NAN), 2);
         lines.push(format!(
-            "  {}: {} iterations, {} sweeps, {} factorizations, residual {}, estimated error {}, {} dofs, {} s",
+            "  {}: {} iterations, {} sweeps, {} factorizations, residual {}, {} {}, {} dofs, {} s",
             self.method,
             self.iterations,
             self.sweeps,
             self.factorizations,
             number(self.residual),
-            number(self.error_estimate),
+            if self.error_bound.is_some() { "error at most" } else { "estimated error" },
+            number(self.error_bound.or(self.error_estimate)),
             self.dofs,
             seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
         ));
-        if let Some(CoarserReport { times, dofs, iterations, seconds: taken, .. }) = self.coarser {
-            let cost = format!("{dofs} dofs, {iterations} iterations, {} s", seconds(taken));
-            lines.push(format!("  start: pressures of a mesh of elements {times} times larger ({cost})"));
-        }
         if !self.rounds.is_empty() {
             lines.push(
                 "  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds".to_owned(),

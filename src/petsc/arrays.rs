@@ -1,6 +1,6 @@
 //! The arrays of a sparse matrix: checked, then owned by PETSc's matrix.
 
-use super::error::petsc;
+use super::library::petsc;
 use super::{Int, ffi};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::RSMPI_COMM_SELF;

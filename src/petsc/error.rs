@@ -1,9 +1,9 @@
 //! PETSc's return codes as [`Error`], with PETSc's own message.
 //!
 //! PETSc reports an error frame by frame, innermost first, through a handler. Ours records the frames and prints
-//! nothing; [`check`] picks them up when the code has come back to Rust.
+//! nothing; [`check_in`] picks them up when the code has come back to Rust.
 
-use super::{ffi, library};
+use super::ffi;
 use crate::error::{Error, Kind, Result};
 use std::cell::RefCell;
 use std::ffi::{CStr, c_char, c_int, c_void};
@@ -20,23 +20,7 @@ thread_local! {
     static TRACE: RefCell<Trace> = RefCell::default();
 }
 
-/// Calls one PETSc function, of a PETSc that is started if it waits, and checks its return code: `petsc!(MatMult(a, x, y))?`.
-///
-/// It stands for an `unsafe` call: who uses it vouches for the pointers. They are valid because each wrapper owns its
-/// PETSc object and holds a session token.
-macro_rules! petsc {
-    ($function:ident($($argument:expr),* $(,)?)) => {
-        $crate::petsc::error::check(stringify!($function), |petsc| unsafe { petsc.$function($($argument),*) })
-    };
-}
-pub(super) use petsc;
-
 /// Runs `call` and turns a nonzero code into an error that says what PETSc said.
-pub(super) fn check(function: &str, call: impl FnOnce(&ffi::Library) -> ffi::PetscErrorCode) -> Result<()> {
-    check_in(library::running()?, function, call)
-}
-
-/// The same for a PETSc that does not run yet, or no longer.
 pub(super) fn check_in(
     library: &ffi::Library,
     function: &str,

@@ -1,6 +1,6 @@
 //! Preconditioners and factorisations that fail, and getting over it.
 
-use super::error::petsc;
+use super::library::petsc;
 use super::{Int, Ksp, ffi};
 use crate::error::Result;
 use std::ptr::null_mut;

@@ -13,6 +13,9 @@ include!(concat!(env!("OUT_DIR"), "/petsc.rs"));
 
 use std::ffi::{c_char, c_int, c_void};
 
+/// PETSc's integer, of rows and columns.
+pub type Int = PetscInt;
+
 /// MUMPS, which is linked.
 pub mod mumps {
     include!(concat!(env!("OUT_DIR"), "/mumps.rs"));

@@ -1,8 +1,9 @@
 //! Linear solvers.
 
-use super::error::{petsc, string};
+use super::error::string;
+use super::library::petsc;
 use super::matrix::same;
-use super::options::text;
+use super::table::text;
 use super::vector::Vector;
 use super::{ConvergedReason, FAMILIES, Int, Matrix, Session, ffi, print};
 use crate::error::{Error, Kind, Result};

@@ -4,7 +4,7 @@
 //! all condensed makes no object of PETSc and never opens it.
 
 use super::error::{check_in, record};
-use super::{ffi, waiting};
+use super::{ffi, table, waiting};
 use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
 use std::ffi::{CString, c_char, c_int};
@@ -55,9 +55,31 @@ pub(super) fn may_wait(words: &[String]) -> bool {
 pub(super) fn running() -> Result<&'static ffi::Library> {
     if !runs() {
         start(&[])?;
-        waiting::hand_over()?;
+        let library = open()?;
+        for (name, value, is_read) in waiting::take() {
+            table::set(library, &name, value.as_deref())?;
+            if is_read {
+                table::read(library, &name)?;
+            }
+        }
     }
     open()
+}
+
+/// Calls one PETSc function, of a PETSc that is started if it waits, and checks its return code: `petsc!(MatMult(a, x, y))?`.
+///
+/// It stands for an `unsafe` call: who uses it vouches for the pointers. They are valid because each wrapper owns its
+/// PETSc object and holds a session token.
+macro_rules! petsc {
+    ($function:ident($($argument:expr),* $(,)?)) => {
+        $crate::petsc::library::check(stringify!($function), |petsc| unsafe { petsc.$function($($argument),*) })
+    };
+}
+pub(super) use petsc;
+
+/// [`check_in`] for the PETSc that runs, which is started if it waited.
+pub(super) fn check(function: &str, call: impl FnOnce(&ffi::Library) -> ffi::PetscErrorCode) -> Result<()> {
+    check_in(running()?, function, call)
 }
 
 /// Starts PETSc with the options in `words`, in the environment and in its files. MPI runs already.

@@ -1,18 +1,15 @@
 //! Sparse matrices.
 
 use super::arrays::{Arrays, attach, check, free};
-use super::error::petsc;
-use super::options::text;
+use super::library::petsc;
+use super::table::text;
 use super::vector::Vector;
-use super::{Session, ffi};
+use super::{Int, Session, ffi};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::RSMPI_COMM_SELF;
 use std::cell::Cell;
 use std::ptr::null_mut;
 use std::rc::Rc;
-
-/// PETSc's integer, of rows and columns.
-pub type Int = ffi::PetscInt;
 
 /// A square sparse matrix of this process (PETSc's sequential AIJ, rows compressed).
 ///

@@ -38,16 +38,19 @@ mod reason;
 #[cfg(test)]
 mod requirements;
 mod session;
+mod table;
 mod vector;
 mod waiting;
 
 pub use blas::{cholesky, cholesky_solve};
+pub use ffi::Int;
 pub use ksp::{Ksp, Solved};
-pub use matrix::{Int, Matrix};
+pub use matrix::Matrix;
 pub use mumps::Schur;
-pub use options::{Entry, FAMILIES, Options};
+pub use options::{FAMILIES, Options};
 pub use reason::ConvergedReason;
 pub use session::Session;
+pub use waiting::Entry;
 
 /// Runs `action` and returns its result and all that PETSc printed meanwhile, which is not shown.
 ///

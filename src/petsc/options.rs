@@ -1,10 +1,12 @@
 //! PETSc's options: one table in a process.
 
-use super::error::{petsc, string};
-use super::{Session, ffi, library, waiting};
-use crate::error::{Error, Kind, Result};
+use super::error::string;
+use super::library::petsc;
+use super::table::{dashed, key, text};
+use super::{Entry, Session, ffi, library, table, waiting};
+use crate::error::Result;
 use std::collections::BTreeMap;
-use std::ffi::{CString, c_char};
+use std::ffi::c_char;
 use std::ptr::null_mut;
 
 /// How the options of a solver begin after its prefix: objects, and objects nested in them.
@@ -58,22 +60,21 @@ pub struct Options {
     _session: Session,
 }
 
-/// An option: its name with the dash, and its value if it has one.
-pub type Entry = (String, Option<String>);
+impl Session {
+    /// The options of this process.
+    pub fn options(&self) -> Options {
+        Options { _session: self.clone() }
+    }
+}
 
 impl Options {
-    /// The table of the running session.
-    pub(super) fn new(session: &Session) -> Self {
-        Options { _session: session.clone() }
-    }
-
     /// Sets an option, replacing its value.
     ///
     /// # Errors
     /// When the name does not begin with a letter after its dash or has a blank, or a text has a zero byte.
     pub fn set(&self, name: &str, value: Option<&str>) -> Result<()> {
         if library::runs() {
-            return set(name, value);
+            return table::set(library::running()?, name, value);
         }
         key(name)?;
         value.map(text).transpose()?;
@@ -130,7 +131,7 @@ impl Options {
         };
         for word in words.split_whitespace().filter(|word| word.starts_with('-')) {
             if !entries.contains_key(word) && self.used(word) {
-                entries.insert(word.to_owned(), read(word)?);
+                entries.insert(word.to_owned(), table::read(library::running()?, word)?);
             }
         }
         Ok(entries.into_iter().collect())
@@ -155,7 +156,7 @@ impl Options {
     /// When the name is not one of an option.
     pub fn mark_used(&self, name: &str) -> Result<()> {
         if library::runs() {
-            return read(name).map(drop);
+            return table::read(library::running()?, name).map(drop);
         }
         key(name)?;
         waiting::read(&dashed(name));
@@ -185,43 +186,4 @@ impl Options {
         entries.sort();
         Ok(entries)
     }
-}
-
-/// Sets an option of the running PETSc.
-pub(super) fn set(name: &str, value: Option<&str>) -> Result<()> {
-    let name = key(name)?;
-    let value = value.map(text).transpose()?;
-    petsc!(PetscOptionsSetValue(null_mut(), name.as_ptr(), value.as_ref().map_or(null_mut(), |v| v.as_ptr())))
-}
-
-/// Value of an option of the running PETSc, marking it as read.
-pub(super) fn read(name: &str) -> Result<Option<String>> {
-    let name = key(name)?;
-    let mut value: *const c_char = std::ptr::null();
-    let mut set = ffi::PetscBool_PETSC_FALSE;
-    petsc!(PetscOptionsFindPair(null_mut(), std::ptr::null(), name.as_ptr(), &mut value, &mut set))?;
-    // SAFETY: null, or a text that PETSc keeps till the option changes; it is copied.
-    Ok((!value.is_null()).then(|| unsafe { string(value) }))
-}
-
-/// The name with its dash.
-fn dashed(name: &str) -> String {
-    if name.starts_with('-') { name.to_owned() } else { format!("-{name}") }
-}
-
-/// The name as PETSc wants it, checked: PETSc takes any text and never finds it again.
-fn key(name: &str) -> Result<CString> {
-    let name = dashed(name);
-    let valid =
-        name.strip_prefix('-').is_some_and(|bare| bare.trim_start_matches('-').starts_with(char::is_alphabetic))
-            && !name.contains(char::is_whitespace);
-    if !valid {
-        return Err(Error::new(Kind::Solver, format!("`{name}` is not the name of a PETSc option")));
-    }
-    text(&name)
-}
-
-/// A C text.
-pub(super) fn text(text: &str) -> Result<CString> {
-    CString::new(text).map_err(|_| Error::new(Kind::Solver, format!("a zero byte in a PETSc option: {text:?}")))
 }

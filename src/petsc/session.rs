@@ -1,7 +1,7 @@
 //! The life of MPI and PETSc in this process.
 
-use super::error::petsc;
-use super::{Options, blas, launcher, library, waiting};
+use super::library::petsc;
+use super::{blas, launcher, library, waiting};
 use crate::error::{Error, Kind, Result};
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
@@ -71,11 +71,6 @@ impl Session {
         Ok(Session(Rc::new(Running { world, _universe: universe })))
     }
 
-    /// The options of this process.
-    pub fn options(&self) -> Options {
-        Options::new(self)
-    }
-
     /// Lets OpenBLAS use `count` threads in this process, unless the user set OPENBLAS_NUM_THREADS or OMP_NUM_THREADS.
     /// Returns whether the number is in force.
     pub fn set_blas_threads(&self, count: usize) -> bool {
@@ -137,7 +132,7 @@ impl Session {
 impl Drop for Running {
     fn drop(&mut self) {
         library::end();
-        waiting::forget();
+        drop(waiting::take());
     }
 }
 

@@ -1,6 +1,6 @@
 //! Vectors: PETSc's headers, made once, over slices that belong to Rust.
 
-use super::error::petsc;
+use super::library::petsc;
 use super::{Int, Session, ffi};
 use crate::error::Result;
 use mpi::ffi::RSMPI_COMM_SELF;

@@ -1,9 +1,10 @@
 //! Options that were set while PETSc waits to be started: its table till then.
 
-use super::options::Entry;
-use crate::error::Result;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+
+/// An option: its name with the dash, and its value if it has one.
+pub type Entry = (String, Option<String>);
 
 #[derive(Default)]
 struct Slot {
@@ -53,18 +54,7 @@ pub(super) fn entries(unread: bool) -> Vec<Entry> {
     TABLE.with_borrow(|table| table.iter().filter_map(entry).collect())
 }
 
-/// Gives all options to PETSc, which has just been started.
-pub(super) fn hand_over() -> Result<()> {
-    for (name, slot) in TABLE.take() {
-        super::options::set(&name, slot.value.as_deref())?;
-        if slot.read {
-            super::options::read(&name)?;
-        }
-    }
-    Ok(())
-}
-
-/// Forgets all options, with the end of the session.
-pub(super) fn forget() {
-    TABLE.take();
+/// Takes all options out: name, value, and whether it was read.
+pub(super) fn take() -> impl Iterator<Item = (String, Option<String>, bool)> {
+    TABLE.take().into_iter().map(|(name, slot)| (name, slot.value, slot.read))
 }

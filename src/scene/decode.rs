@@ -6,12 +6,13 @@ mod elasticity;
 mod layer;
 mod method;
 
-pub use body::reserved;
-
-use super::expression::{Differentiable, Field};
 use super::read::{Keys, Node, Value};
-use super::{AdaptSpec, MeshSource, OutputSpec, Plane, Preset, Scene, SolverSpec};
 use crate::error::{Error, Located, Place, Result, nearest};
+use crate::expression::{Differentiable, Field};
+use crate::problem::elasticity::Plane;
+use crate::problem::mesh::MeshSource;
+use crate::problem::solver::{Preset, SolverSpec};
+use crate::scene::{AdaptSpec, OutputSpec, Scene};
 use std::path::{Path, PathBuf};
 
 /// Checks a whole scene, read from `path`. Looks whether the mesh file is there.

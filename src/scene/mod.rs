@@ -1,22 +1,14 @@
 //! What the user wrote: TOML -> checked [`Scene`]. Every refusal names file, line, and the way out.
 
 mod decode;
-mod elasticity;
-pub mod expression;
-mod layer;
 mod overrides;
 mod read;
 mod settings;
-mod sizing;
 mod spec;
 #[cfg(test)]
 mod tests;
 
-pub use decode::reserved;
-pub use elasticity::*;
-pub use layer::{Bounds, FORMS, LawForm, LawKind, LayerSpec, Parameter};
-pub use sizing::Sizing;
-pub use spec::*;
+pub use spec::{AdaptSpec, OutputSpec, Scene};
 
 use crate::error::{Error, Kind, Result, Source};
 use std::path::Path;

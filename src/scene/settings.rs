@@ -1,10 +1,17 @@
 //! The scene echoed with all defaults filled in, for the report.
 
-use super::expression::Field;
-use super::{
-    AxesSpec, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, LayerSpec, LoadKind, MeshSource, MethodName,
-    MethodSpec, Order, Overlap, Plane, RobinSpec, Scene, SolverSpec, SpringKind, Start, StopSpec, Zone,
-};
+use crate::expression::Field;
+use crate::problem::body::{BodySpec, LoadKind, SpringKind};
+use crate::problem::contact::{ContactSpec, Overlap};
+use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, Plane};
+use crate::problem::layer::LayerSpec;
+use crate::problem::mesh::MeshSource;
+use crate::problem::method::{Gamma, MethodName, MethodSpec, Start};
+use crate::problem::order::Order;
+use crate::problem::robin::{RobinRule, Zone};
+use crate::problem::solver::SolverSpec;
+use crate::problem::stop::StopRule;
+use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 
 impl Scene {
@@ -179,12 +186,11 @@ fn method(method: &MethodSpec) -> Value {
     };
     let start = match &method.start {
         Start::Auto => json!("auto"),
-        Start::Rigid => json!("rigid"),
         Start::Zero => json!("zero"),
         Start::Nested => json!("nested"),
         Start::Normal(normal) => json!({ "normal": field(normal) }),
     };
-    let StopSpec { residual, increment, balanced, iterations } = &method.stop;
+    let StopRule { residual, increment, balanced, iterations } = &method.stop;
     let mut stop = Map::new();
     insert(&mut stop, "residual", residual.map(|value| json!(value)));
     insert(&mut stop, "increment", increment.map(|value| json!(value)));
@@ -198,10 +204,10 @@ fn method(method: &MethodSpec) -> Value {
         rule => json!(Gamma::NAMED.iter().find(|(_, named)| named == rule).map(|(name, _)| name)),
     };
     let robin = match method.robin {
-        RobinSpec::Tangent => json!("tangent"),
-        RobinSpec::Frozen => json!("frozen"),
-        RobinSpec::Floor(floor) => json!({ "floor": floor }),
-        RobinSpec::Auto => json!("auto"),
+        RobinRule::Tangent => json!("tangent"),
+        RobinRule::Frozen => json!("frozen"),
+        RobinRule::Floor(floor) => json!({ "floor": floor }),
+        RobinRule::Auto => json!("auto"),
     };
     let name = MethodName::ALL.iter().find(|(_, named)| *named == method.name).map(|(name, _)| name);
     let mut map = json!({ "name": name, "psi": psi, "robin": robin, "start": start, "stop": stop });

@@ -1,5 +1,14 @@
 use super::*;
-use crate::scene::expression::Field;
+use crate::expression::Field;
+use crate::problem::body::{BodySpec, LoadKind};
+use crate::problem::elasticity::{Constants, Plane};
+use crate::problem::layer::{LawKind, LayerSpec};
+use crate::problem::mesh::MeshSource;
+use crate::problem::method::{Gamma, MethodName, Start};
+use crate::problem::order::Order;
+use crate::problem::robin::{RobinRule, Zone};
+use crate::problem::solver::{Preset, SolverSpec};
+use crate::problem::stop::StopRule;
 
 /// The scene of docs/scene-file.md, and its mesh file beside it.
 const GROOVE: &str = r#"title = "Groove with a nonlinear Winkler layer"
@@ -41,19 +50,6 @@ fn load_text(text: &str, overrides: &[&str]) -> Result<Scene> {
     }
     let overrides: Vec<_> = overrides.iter().map(|text| text.to_string()).collect();
     load(&folder.path().join("scene.toml"), &overrides)
-}
-
-/// The text that the caret of a rendered error marks.
-pub(super) fn caret(error: &Error) -> String {
-    let shown = error.render(false);
-    let lines: Vec<&str> = shown.lines().collect();
-    let marks = lines.iter().position(|line| line.trim_start().trim_start_matches('|').trim_start().starts_with('^'));
-    let Some(marks) = marks.filter(|at| *at > 0) else {
-        return String::new();
-    };
-    let start = lines[marks].chars().position(|c| c == '^').unwrap_or(0);
-    let length = lines[marks].chars().skip(start).take_while(|c| *c == '^').count();
-    lines[marks - 1].chars().skip(start).take(length).collect()
 }
 
 /// The constants of an isotropic, homogeneous body.
@@ -98,7 +94,7 @@ fn the_groove_is_read() {
     assert!(matches!(scene.method.start, Start::Normal(Field::Constant(1e-4))));
     assert_eq!(
         scene.method.stop,
-        StopSpec { residual: None, increment: Some(1e-3), balanced: false, iterations: 2000 }
+        StopRule { residual: None, increment: Some(1e-3), balanced: false, iterations: 2000 }
     );
     assert_eq!(scene.solver, SolverSpec { preset: None, options: vec![] });
     assert_eq!(scene.output, OutputSpec { dir: None, vtu: false, plots: true });
@@ -116,11 +112,11 @@ fn defaults_and_a_scene_in_space() {
     assert_eq!(scene.bodies[0].force.as_ref().unwrap()[0].eval([1.0, 2.0, 3.0]), 3.0);
     assert!(scene.contacts.is_empty());
     assert!(matches!(scene.method.start, Start::Auto));
-    assert_eq!((scene.method.name, scene.method.robin), (MethodName::Auto, RobinSpec::Auto));
+    assert_eq!((scene.method.name, scene.method.robin), (MethodName::Auto, RobinRule::Auto));
     assert_eq!(scene.method.gamma, Gamma::Stationary(0.6));
     assert_eq!(
         scene.method.stop,
-        StopSpec { residual: Some(1e-8), increment: None, balanced: false, iterations: 2000 }
+        StopRule { residual: Some(1e-8), increment: None, balanced: false, iterations: 2000 }
     );
     let options = vec!["-ksp_rtol".to_owned(), "1e-10".to_owned()];
     assert_eq!(scene.solver, SolverSpec { preset: Some(Preset::Hypre), options });

@@ -102,7 +102,7 @@ impl CondensedBody {
         let rest = schur.expand_condensed(&self.load, &vec![0.0; retained])?;
         let work = dot(&self.load, &rest);
         let body = ElasticBody {
-            stiffness: Csr::full(retained, schur.complement().to_vec()),
+            stiffness: Csr::full(retained, schur.take_complement()),
             load,
             prescribed: Vec::new(),
             energy_constant: self.whole.energy_constant - 0.5 * work,
@@ -110,8 +110,8 @@ impl CondensedBody {
             lifting,
             carried: Vec::new(),
         };
-        let solver = Dense::new(retained, schur.take_complement());
-        let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, solver);
+        let dense = move |stiffness: &Csr| Ok(Dense::new(retained, stiffness.values.clone()));
+        let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, dense, String::new());
         Ok(Condensed { kept: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
     }
 }
@@ -162,6 +162,10 @@ impl Body for CondensedBody {
 
     fn set_up(&mut self) -> Result<()> {
         self.condense()?.body.set_up()
+    }
+
+    fn reveal(&mut self) -> Result<()> {
+        self.condense().map(|_| ())
     }
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {

@@ -111,6 +111,15 @@ impl InnerSolver for Krylov {
         Ok(self.free)
     }
 
+    fn accuracy(&self) -> f64 {
+        match (self.ksp.ksp_type().as_str(), self.ksp.pc_type().as_str()) {
+            ("preonly", "cholesky" | "lu") => 0.0,
+            // one application of a preconditioner leaves any share
+            ("preonly", _) => 1.0,
+            _ => self.ksp.tolerance(),
+        }
+    }
+
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         if !self.multigrid {
             return self.solve(r, z);

@@ -55,6 +55,11 @@ pub trait InnerSolver {
         Ok(false)
     }
 
+    /// Share of the energy norm of z that solves may be off: zero for a direct solver.
+    fn accuracy(&self) -> f64 {
+        0.0
+    }
+
     /// z = M^-1 r with a fixed symmetric M near G: one application of the preconditioner of an iterative solver, a whole solve
     /// of a direct one.
     ///

@@ -4,11 +4,11 @@
 //! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. One rank.
 
 use super::{InnerSolver, SparseBody};
-use crate::ddm::method::Coupled;
+use crate::ddm::linear::{Failure, LinearStep, Solution, Solved, System};
 use crate::ddm::{Body, BodyCounts, Field, Model};
 use crate::error::Result;
 use crate::fem::ElasticBody;
-use crate::linalg::{Csr, axpy};
+use crate::linalg::{Csr, axpy, dot};
 
 /// Stiffness matrices side by side and the rows that couple them, on the states of the bodies.
 ///
@@ -102,13 +102,11 @@ impl Union {
 pub struct Monolithic<S> {
     whole: SparseBody<S>,
     offset: Vec<usize>,
-    /// Whether it solves only as far as it is told.
-    inexact: bool,
 }
 
 impl<S: InnerSolver> Monolithic<S> {
-    /// The joined bodies, and a solver whose matrix is their K.
-    pub fn new(union: Union, solver: S) -> Self {
+    /// The joined bodies, and what makes a solver of their K.
+    pub fn new(union: Union, make: impl FnOnce(&Csr) -> Result<S> + 'static) -> Self {
         let n = union.stiffness.rows();
         let body = ElasticBody {
             stiffness: union.stiffness,
@@ -119,19 +117,29 @@ impl<S: InnerSolver> Monolithic<S> {
             strain_constant: 0.0,
             carried: Vec::new(),
         };
-        Self { whole: SparseBody::new(body, union.rows, &[], solver), offset: union.offset, inexact: false }
+        Self { whole: SparseBody::new(body, union.rows, &[], make, String::new()), offset: union.offset }
     }
 }
 
-impl<S: InnerSolver> Coupled for Monolithic<S> {
-    fn solve(&mut self, model: &Model, weight: &[f64], r: &[Vec<f64>], reduction: f64) -> Result<Option<Field>> {
-        self.inexact = self.whole.precision(reduction)?;
-        self.whole.robin(weight)?;
+impl<S: InnerSolver> LinearStep for Monolithic<S> {
+    fn name(&self) -> &'static str {
+        "newton"
+    }
+
+    fn set_up(&mut self, springs: &[f64]) -> Result<()> {
+        self.whole.robin(springs)?;
+        self.whole.set_up()
+    }
+
+    fn solve(&mut self, system: System) -> Result<Solved> {
+        let System { model, springs, residual, reduction, .. } = system;
+        self.whole.precision(reduction)?;
+        self.whole.robin(springs)?;
         let parts = || self.offset.windows(2).map(|part| part[0]..part[1]);
-        let whole: Vec<f64> = parts().zip(r).flat_map(|(part, r)| &r[..part.len()]).copied().collect();
+        let whole: Vec<f64> = parts().zip(residual).flat_map(|(part, r)| &r[..part.len()]).copied().collect();
         let mut x = vec![0.0; whole.len()];
-        if self.whole.solve(&whole, &mut x)?.failure.is_some() || x.iter().any(|x| !x.is_finite()) {
-            return Ok(None);
+        if let Some(reason) = self.whole.solve(&whole, &mut x)?.failure {
+            return Ok(Err(Failure { body: None, reason }));
         }
         let mut states: Vec<Vec<f64>> = parts().map(|part| x[part].to_vec()).collect();
         for (slot, state) in model.bodies.iter().zip(&mut states) {
@@ -140,17 +148,18 @@ impl<S: InnerSolver> Coupled for Monolithic<S> {
                 body.separate(state);
             }
         }
+        let energy: f64 = states.iter().zip(residual).map(|(x, r)| dot(x, r)).sum();
         let mut field = Field { states, trace: vec![0.0; 2 * model.points()] };
         field.retrace(model);
-        Ok(Some(field))
+        Ok(Ok(Solution { field, energy, error: self.whole.accuracy() * energy.max(0.0).sqrt() }))
     }
 
     fn counts(&self) -> BodyCounts {
         self.whole.counts()
     }
 
-    fn is_inexact(&self) -> bool {
-        self.inexact
+    fn describe(&self) -> String {
+        self.whole.describe()
     }
 }
 

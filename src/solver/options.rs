@@ -9,6 +9,7 @@
 //! 3. the objects are made and set up;
 //! 4. [`mark_copies`] and [`unread()`] find what nobody read: a slip of the keyboard ends the run before it starts.
 
+mod global;
 mod probe;
 mod split;
 mod unread;
@@ -176,6 +177,15 @@ pub fn asks_for_ksp(session: &Session, body: &str) -> Result<bool> {
     }))
 }
 
+/// Whether the user typed an option for this body alone, in the command line or the scene.
+///
+/// # Errors
+/// When PETSc refuses, which it does not for options it has taken before.
+pub fn names_body(session: &Session, body: &str) -> Result<bool> {
+    let all = session.options().all()?;
+    Ok(all.iter().any(|(name, _)| body_of(name, &[body]).is_some() && origin(name).is_none()))
+}
+
 /// Lets `cholesky` and `lu` mean MUMPS, in the solver of a body and in those nested in it (`-sub_pc_type lu`), where
 /// `-pc_factor_mat_solver_type` was not given: PETSc's own factorisation is over 20 times slower.
 ///
@@ -257,7 +267,7 @@ pub fn forbidden_body_name(name: &str) -> Option<&'static str> {
         );
     }
     let family = FAMILIES.iter().any(|family| family.strip_suffix('_') == Some(name));
-    if family || unread::is_global_word(name) || MORE_WORDS.contains(&name) {
+    if family || global::is_global_word(name) || MORE_WORDS.contains(&name) {
         return Some("options of PETSc itself begin with this word");
     }
     None

@@ -3,7 +3,7 @@
 use super::{memory, options};
 use crate::error::Result;
 use crate::petsc::Session;
-use crate::scene::Preset;
+use crate::problem::solver::Preset;
 
 /// Options of algebraic multigrid by hypre for elasticity with many solves a set-up; docs/solvers.md has the
 /// measurements behind them.
@@ -65,7 +65,7 @@ impl Size {
 /// The preset for a body whose scene names none, with the reason.
 ///
 /// ```
-/// use winkler::{scene::Preset, solver::preset::{Size, choose}};
+/// use winkler::{problem::solver::Preset, solver::preset::{Size, choose}};
 /// let size = Size { dimension: 3, dofs: 98_000, retained: 1024, memory: 8_000_000_000 };
 /// assert_eq!(choose(&size).0, Preset::Condensed);
 /// // too little memory for a factor, or too many dofs: multigrid
@@ -104,6 +104,14 @@ pub fn choose(size: &Size) -> (Preset, String) {
 /// Failures of PETSc's options database.
 pub fn made_often(session: &Session, body: &str) -> Result<()> {
     MADE_OFTEN.iter().try_for_each(|(name, value)| options::set_default(session, body, name, Some(value)))
+}
+
+/// The solver that the options in force make for a prefix, in words.
+pub fn in_words(session: &Session, prefix: &str) -> String {
+    let in_force = |name: &str| session.options().get(&format!("-{prefix}_{name}"));
+    let package = in_force("pc_factor_mat_solver_type").map_or(String::new(), |package| format!(" by {package}"));
+    let word = |name: &str| in_force(name).unwrap_or_default();
+    format!("{} + {}{package}", word("ksp_type"), word("pc_type"))
 }
 
 /// Sets the defaults of a body's solver: after the typed options, and only for the KSP and PC in force. A condensed body has

@@ -2,7 +2,7 @@
 
 use super::{InnerSolver, Split};
 use crate::ddm::{Body, BodyCounts, Energy, Matrices, Solved};
-use crate::error::Result;
+use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, dot};
 use std::time::Instant;
@@ -14,7 +14,7 @@ pub struct SparseBody<S> {
     body: ElasticBody,
     rows: Csr,
     split: Split,
-    solver: S,
+    solver: Solver<S>,
     /// Robin weight of each row that G has now.
     weight: Vec<f64>,
     /// Robin weight of each row when G was last far from what its preconditioner was made of.
@@ -29,9 +29,16 @@ pub struct SparseBody<S> {
 }
 
 impl<S: InnerSolver> SparseBody<S> {
-    /// Joins a body, its contact rows (columns: its dofs, none of them prescribed) and a solver whose matrix is K on a
-    /// pattern that holds B'B. `free` are the rigid motions that its supports leave.
-    pub fn new(body: ElasticBody, rows: Csr, free: &[FreeMotion], solver: S) -> Self {
+    /// Joins a body, its contact rows (columns: its dofs, none of them prescribed) and a solver that `make` makes of K, on a
+    /// pattern that holds B'B, when something is first to be solved. `free` are the rigid motions that its supports leave.
+    pub fn new(
+        body: ElasticBody,
+        rows: Csr,
+        free: &[FreeMotion],
+        make: impl FnOnce(&Csr) -> Result<S> + 'static,
+        words: String,
+    ) -> Self {
+        let solver = Solver::Later { make: Some(Box::new(make)), words };
         let coupling = Coupling::new(&body.stiffness, &rows);
         let split = Split::new(free, &rows);
         let weight = vec![0.0; rows.rows()];
@@ -42,11 +49,6 @@ impl<S: InnerSolver> SparseBody<S> {
         Self { body, rows, split, solver, weight, prepared, row_stiffness, coupling, counts, before, product }
     }
 
-    /// The inner solver.
-    pub fn solver(&self) -> &S {
-        &self.solver
-    }
-
     /// Displacements of all dofs for a state.
     pub fn join(&self, u: &[f64]) -> Vec<f64> {
         self.split.join(u)
@@ -54,6 +56,42 @@ impl<S: InnerSolver> SparseBody<S> {
 
     fn dofs(&self) -> usize {
         self.body.load.len()
+    }
+}
+
+/// Makes a solver of K.
+type Maker<S> = Box<dyn FnOnce(&Csr) -> Result<S>>;
+
+/// An inner solver, made when it is first needed: a body that is only measured, or joined with others, needs none.
+enum Solver<S> {
+    Later {
+        make: Option<Maker<S>>,
+        /// What it will be, for reports.
+        words: String,
+    },
+    Now(S),
+}
+
+impl<S> Solver<S> {
+    /// The solver, made of K if it is not there.
+    fn of(&mut self, stiffness: &Csr) -> Result<&mut S> {
+        if let Solver::Later { make, .. } = self
+            && let Some(make) = make.take()
+        {
+            *self = Solver::Now(make(stiffness)?);
+        }
+        match self {
+            Solver::Now(solver) => Ok(solver),
+            Solver::Later { .. } => Err(Error::new(Kind::Solver, "an inner solver could not be made")),
+        }
+    }
+
+    /// The solver, if it was made.
+    fn made(&self) -> Option<&S> {
+        match self {
+            Solver::Now(solver) => Some(solver),
+            Solver::Later { .. } => None,
+        }
     }
 }
 
@@ -128,7 +166,8 @@ impl<S: InnerSolver> SparseBody<S> {
         self.set_up()?;
         self.counts.solves += 1;
         let began = Instant::now();
-        let solved = solve(&mut self.solver, &mut z[..self.body.load.len()])?;
+        let solver = self.solver.of(&self.body.stiffness)?;
+        let solved = solve(solver, &mut z[..self.body.load.len()])?;
         self.counts.solve_seconds += began.elapsed().as_secs_f64();
         self.counts.inner_iterations += solved.iterations;
         z[self.body.load.len()..].fill(0.0);
@@ -199,12 +238,12 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         if far {
             self.prepared.copy_from_slice(weight);
         }
-        self.solver.update(&mut |g| coupling.write(stiffness, weight, g), far)
+        self.solver.of(&self.body.stiffness)?.update(&mut |g| coupling.write(stiffness, weight, g), far)
     }
 
     fn set_up(&mut self) -> Result<()> {
         let began = Instant::now();
-        let done = self.solver.set_up();
+        let done = self.solver.of(&self.body.stiffness).and_then(InnerSolver::set_up);
         let seconds = began.elapsed().as_secs_f64();
         self.counts.factor_seconds += seconds;
         if self.counts.first_seconds == 0.0 {
@@ -214,12 +253,16 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn precision(&mut self, rtol: f64) -> Result<bool> {
-        self.solver.precision(rtol)
+        self.solver.of(&self.body.stiffness)?.precision(rtol)
     }
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         let n = self.dofs();
         self.apply(z, |solver, z| solver.solve(&r[..n], z))
+    }
+
+    fn accuracy(&self) -> f64 {
+        self.solver.made().map_or(1.0, InnerSolver::accuracy)
     }
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
@@ -251,16 +294,17 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn counts(&self) -> BodyCounts {
-        let (symbolic, factorizations) = self.solver.factorizations();
+        let Some(solver) = self.solver.made() else { return self.counts };
+        let (symbolic, factorizations) = solver.factorizations();
         let (symbolic, factorizations) = (symbolic - self.before.0, factorizations - self.before.1);
-        if self.solver.is_dense() {
+        if solver.is_dense() {
             return BodyCounts { dense_factorizations: factorizations, ..self.counts };
         }
         BodyCounts { symbolic, factorizations, ..self.counts }
     }
 
     fn begin_anew(&mut self) {
-        self.before = self.solver.factorizations();
+        self.before = self.solver.made().map_or((0, 0), InnerSolver::factorizations);
         self.counts = BodyCounts::default();
     }
 
@@ -284,6 +328,9 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn describe(&self) -> String {
-        self.solver.describe()
+        match &self.solver {
+            Solver::Now(solver) => solver.describe(),
+            Solver::Later { words, .. } => words.clone(),
+        }
     }
 }

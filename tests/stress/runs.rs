@@ -4,9 +4,10 @@
 
 use crate::scenes::{Case, Expect};
 use std::path::Path;
-use winkler::commands::run::{self, Clock};
+use winkler::commands::clock::Clock;
+use winkler::commands::run;
 use winkler::commands::{report, results};
-use winkler::ddm::{Silent, Status};
+use winkler::ddm::Silent;
 use winkler::error::Result;
 use winkler::petsc::Session;
 use winkler::scene;
@@ -132,7 +133,7 @@ fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Re
         seconds,
         force: (0..model.pairs.len()).map(|i| model.range(i).map(|q| outcome.layer.force[q]).sum()).collect(),
         pressure: outcome.layer.pressure,
-        claims: matches!(outcome.status, Status::Converged | Status::Attainable),
+        claims: outcome.status.is_solved(),
     })
 }
 

@@ -6,53 +6,23 @@ mod compare;
 mod errors;
 mod plan;
 mod process;
+mod request;
 mod table;
 
+pub use request::Request;
+
 use super::folder_of;
-use crate::error::{Error, Kind, Result};
+use crate::error::Result;
 use crate::output::{Folder, say};
 use crate::scene::Scene;
 use indicatif::{ProgressBar, ProgressStyle};
 use plan::{Case, Plan};
 use process::Runner;
+use request::usage;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 use table::{Row, Table};
-
-/// What the user typed.
-pub struct Request {
-    /// Scene files.
-    pub scenes: Vec<PathBuf>,
-    /// Folder of results, if typed.
-    pub folder: Option<PathBuf>,
-    /// Overrides of scene keys for every run.
-    pub overrides: Vec<String>,
-    /// `KEY=V1,V2,...`; several make all combinations.
-    pub over: Vec<String>,
-    /// Inner solvers: names of presets with commas between, or one string of PETSc options each.
-    pub solvers: Vec<String>,
-    /// Methods; none for the scene's own.
-    pub methods: Vec<String>,
-    /// Element orders; none for the scene's own.
-    pub orders: Vec<usize>,
-    /// Numbers of ranks.
-    pub ranks: Vec<usize>,
-    /// Runs of each combination.
-    pub repeat: usize,
-    /// Contact table, or folder of them, that errors are measured against.
-    pub against: Option<PathBuf>,
-    /// Seconds after which a run is ended.
-    pub timeout: f64,
-    /// Seconds after which no further run begins.
-    pub budget: f64,
-    /// Whether to measure one linear factor-and-solve of the bodies, too.
-    pub linear: bool,
-    /// Whether rows that the folder has already are kept.
-    pub resume: bool,
-    /// PETSc options for every run.
-    pub petsc: Vec<String>,
-}
 
 /// Runs all combinations, writes `bench.csv` row by row and the plots at the end; returns the exit code: 1 if a run did
 /// not converge, was refused or did not end in time.
@@ -79,7 +49,7 @@ pub fn bench(request: &Request) -> Result<i32> {
         let is_new = kept.is_none();
         let row = match kept {
             Some(row) => row,
-            None if plan.is_beyond(case, &table.rows) => Row::skipped(case, "an earlier mesh took too long"),
+            None if table.is_beyond(&plan, case) => Row::skipped(case, "an earlier mesh took too long"),
             None if began.elapsed().as_secs_f64() >= request.budget => Row::skipped(case, "the budget is spent"),
             None => measure(case, &runner, &reference, &mut meshed)?,
         };
@@ -156,9 +126,4 @@ fn known_error(
         return Some((error, "displacement, exact"));
     }
     Some((compare::closed_form(scene, &tables)?, "pressure, reference"))
-}
-
-/// A refusal of the command line.
-fn usage(message: impl Into<String>) -> Error {
-    Error::new(Kind::Usage, message)
 }

@@ -1,11 +1,13 @@
 //! Which runs a benchmark makes: all combinations of what was asked for.
 
-use super::table::Row;
-use super::{Request, usage};
+use super::request::{Request, usage};
 use crate::commands::case_of;
 use crate::commands::sweep::{axis, combinations};
 use crate::error::Result;
-use crate::scene::{MethodName, Order, Preset, Scene};
+use crate::problem::method::MethodName;
+use crate::problem::order::Order;
+use crate::problem::solver::Preset;
+use crate::scene::Scene;
 use std::path::PathBuf;
 
 /// All runs.
@@ -149,14 +151,6 @@ impl Plan {
             }
         }
         self.cases.append(&mut cases);
-    }
-
-    /// Whether a case differs by its mesh alone from a row that did not end in time: lists of meshes go from coarse to fine.
-    pub fn is_beyond(&self, case: &Case, rows: &[Row]) -> bool {
-        let is_mesh =
-            |column: usize| column > 0 && self.keys.get(column - 1).is_some_and(|key| key.starts_with("mesh."));
-        let like = |row: &Row| (0..row.key.len()).all(|column| is_mesh(column) || row.key[column] == case.key[column]);
-        rows.iter().any(|row| row.is_late() && like(row))
     }
 
     /// The scene of a name.

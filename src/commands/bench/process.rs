@@ -1,7 +1,7 @@
 //! One run as a process of its own: its words, its time, its memory.
 
 use super::plan::Case;
-use super::{Request, usage};
+use super::request::{Request, usage};
 use crate::error::{Error, Result};
 use crate::output::safe_name;
 use nix::sys::signal::{Signal, kill};

@@ -1,8 +1,8 @@
 //! The rows of a benchmark, in memory and in `bench.csv`.
 
-use super::Request;
 use super::plan::{Case, LINEAR, Plan};
 use super::process::{RUNS, Run};
+use super::request::Request;
 use crate::error::{Error, Result};
 use crate::output::{Folder, sci, seconds};
 use serde_json::Value;
@@ -245,7 +245,7 @@ impl Row {
 }
 
 fn is_good(status: &str) -> bool {
-    matches!(status, "converged" | "attainable" | LINEAR)
+    matches!(status, "converged" | "roundoff-limited" | LINEAR)
 }
 
 /// The middle of some numbers, the mean of the two middle ones if their count is even.
@@ -293,6 +293,14 @@ impl<'a> Table<'a> {
     pub fn kept(&self, case: &Case) -> Option<Row> {
         let is_to_do = |row: &Row| matches!(row.status.as_str(), "killed" | "failed" | SKIPPED);
         self.old.iter().find(|row| row.key == case.key && !is_to_do(row)).cloned()
+    }
+
+    /// Whether a case differs by its mesh alone from a row that did not end in time: lists of meshes go from coarse to fine.
+    pub fn is_beyond(&self, plan: &Plan, case: &Case) -> bool {
+        let is_mesh =
+            |column: usize| column > 0 && plan.keys.get(column - 1).is_some_and(|key| key.starts_with("mesh."));
+        let like = |row: &Row| (0..row.key.len()).all(|column| is_mesh(column) || row.key[column] == case.key[column]);
+        self.rows.iter().any(|row| row.is_late() && like(row))
     }
 
     /// Adds a row and writes it at once: what was measured is kept whatever comes next.

@@ -1,5 +1,7 @@
 //! Exponential layer.
 
+use super::gap::{by_quadrature, exp_less_line};
+use super::root::meeting;
 use super::{LayerLaw, Response};
 
 /// p(c) = p0 (e^(c/c0) - 1), continued as a straight line beyond e^60: no load gets there, but trial states do, and
@@ -8,6 +10,9 @@ use super::{LayerLaw, Response};
 pub struct Exponential {
     p0: f64,
     c0: f64,
+    /// Where the straight line begins, and the law there.
+    end: f64,
+    at_end: Response,
 }
 
 /// c/c0 beyond which the law is a straight line.
@@ -16,26 +21,48 @@ const LINE: f64 = 60.0;
 impl Exponential {
     /// p0 > 0 is a pressure, c0 > 0 the compression over which the slope grows by e.
     pub fn new(p0: f64, c0: f64) -> Self {
-        Self { p0, c0 }
+        let mut law = Self { p0, c0, end: LINE * c0, at_end: Response::default() };
+        law.at_end = law.compressed(0, law.end);
+        law
     }
 }
 
 impl LayerLaw for Exponential {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         let s = (c / self.c0).min(LINE);
-        let beyond = c - s * self.c0;
         let growth = s.exp_m1();
-        // e^s - 1 - s loses all digits where s is small
-        let work = if s < 1e-2 {
-            s * s * (0.5 + s * (1.0 / 6.0 + s * (1.0 / 24.0 + s * (1.0 / 120.0 + s / 720.0))))
-        } else {
-            growth - s
-        };
         let curve = Response {
             pressure: self.p0 * growth,
             tangent: self.p0 / self.c0 * s.exp(),
-            energy: self.p0 * self.c0 * work,
+            energy: self.p0 * self.c0 * exp_less_line(s),
         };
-        if c <= LINE * self.c0 { curve } else { curve.straight(beyond) }
+        if c <= self.end { curve } else { curve.straight(c - self.end) }
+    }
+
+    fn meet_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
+        let beyond = self.at_end.straight_meet(self.end, s, rho);
+        if beyond > 0.0 {
+            return self.end + beyond;
+        }
+        // the smaller of the c that p = 0 and c = 0 would give: the sum is between s and 2 s there
+        let start = s.min(self.compression_loaded(point, rho * s));
+        meeting(s, rho, [0.0, s.min(self.end)], start, |c| self.pressure_and_tangent(point, c))
+    }
+
+    fn compression_loaded(&self, _point: usize, pressure: f64) -> f64 {
+        match pressure <= self.at_end.pressure {
+            true => self.c0 * (pressure / self.p0).ln_1p(),
+            false => self.end + self.at_end.straight_compression(pressure),
+        }
+    }
+
+    fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
+        if c > self.end || pressure > self.at_end.pressure {
+            return by_quadrature(self, point, c, pressure);
+        }
+        // with c's distance d from the graph, in c0: (p + p0) c0 (e^d - 1 - d)
+        let slope = pressure + self.p0;
+        let way = ((self.pressure(point, c) - pressure) / slope).ln_1p();
+        slope * self.c0 * exp_less_line(way)
     }
 }

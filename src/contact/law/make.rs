@@ -2,8 +2,8 @@
 
 use super::{Cubic, Exponential, LayerLaw, Linear, PerPoint, Power, Table, Typed};
 use crate::error::{Error, Kind, Result};
-use crate::scene::expression::Field;
-use crate::scene::{LawForm, LawKind, LayerSpec};
+use crate::expression::Field;
+use crate::problem::layer::{LawForm, LawKind, LayerSpec};
 
 /// Makes the law of a layer; `position` are the contact points.
 ///

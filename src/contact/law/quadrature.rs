@@ -15,8 +15,13 @@ const DEPTH: usize = 30;
 
 /// Integral of `f` from `a` to `b`, by halving until the rule and its halves agree to 1e-13 of the whole.
 pub fn integral(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
+    integral_to(f, a, b, 1e-13, 0.0)
+}
+
+/// The same until they agree to a share of the whole or to `rounding`, the error that the values of `f` make of it.
+pub fn integral_to(f: &dyn Fn(f64) -> f64, a: f64, b: f64, share: f64, rounding: f64) -> f64 {
     let whole = rule(f, a, b);
-    halves(f, a, b, whole, 1e-13 * whole.abs(), DEPTH)
+    halves(f, a, b, whole, rounding.max(share * whole.abs()), DEPTH)
 }
 
 fn halves(f: &dyn Fn(f64) -> f64, a: f64, b: f64, whole: f64, tolerance: f64, depth: usize) -> f64 {

@@ -1,5 +1,6 @@
 //! Measured layer: a smooth increasing curve through given points.
 
+use super::root::{meeting, root};
 use super::{LayerLaw, Response};
 
 /// Monotone piecewise cubic curve through (0, 0) and points (c, p), continued as a straight line beyond the last one.
@@ -21,6 +22,13 @@ struct Knot {
 }
 
 impl Table {
+    /// The two knots around the place where `value` of (c, p), which increases along the curve, is `target`; only the
+    /// last one beyond it.
+    fn around(&self, target: f64, value: impl Fn(&Knot) -> f64) -> (&Knot, Option<&Knot>) {
+        let above = self.knots.partition_point(|knot| value(knot) < target).max(1);
+        (&self.knots[above - 1], self.knots.get(above))
+    }
+
     /// A curve through points (c, p), both increasing from (0, 0), which is not among them; at least one point.
     pub fn new(points: &[[f64; 2]]) -> Self {
         let mut knots = vec![Knot::default()];
@@ -45,6 +53,18 @@ impl Table {
     }
 }
 
+impl Knot {
+    fn response(&self) -> Response {
+        Response { pressure: self.pressure, tangent: self.slope, energy: self.energy }
+    }
+}
+
+/// Pressure and tangent of the curve between two knots.
+fn steepness(a: &Knot, b: &Knot, c: f64) -> (f64, f64) {
+    let Response { pressure, tangent, .. } = piece(a, b, c);
+    (pressure, tangent)
+}
+
 /// The curve between two knots, at c.
 fn piece(a: &Knot, b: &Knot, c: f64) -> Response {
     let h = b.c - a.c;
@@ -63,13 +83,32 @@ fn piece(a: &Knot, b: &Knot, c: f64) -> Response {
 impl LayerLaw for Table {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         // NaN stays in the first piece
-        let above = self.knots.partition_point(|knot| knot.c < c).max(1);
-        match self.knots.get(above) {
-            Some(b) => piece(&self.knots[above - 1], b, c),
-            None => {
-                let end = self.knots[above - 1];
-                Response { pressure: end.pressure, tangent: end.slope, energy: end.energy }.straight(c - end.c)
+        match self.around(c, |knot| knot.c) {
+            (a, Some(b)) => piece(a, b, c),
+            (end, None) => end.response().straight(c - end.c),
+        }
+    }
+
+    fn meet_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
+        let sum = |knot: &Knot| knot.c + knot.pressure / rho;
+        match self.around(s, sum) {
+            (a, Some(b)) => {
+                let start = a.c + (b.c - a.c) * ((s - sum(a)) / (sum(b) - sum(a)));
+                meeting(s, rho, [a.c, b.c], start, |c| steepness(a, b, c))
             }
+            (end, None) => end.c + end.response().straight_meet(end.c, s, rho),
+        }
+    }
+
+    fn compression_loaded(&self, _point: usize, pressure: f64) -> f64 {
+        match self.around(pressure, |knot| knot.pressure) {
+            (a, Some(b)) => {
+                let start = a.c + (b.c - a.c) * ((pressure - a.pressure) / (b.pressure - a.pressure));
+                match root(pressure, [a.c, b.c], start, |c| steepness(a, b, c)) {
+                    Ok(c) | Err(c) => c,
+                }
+            }
+            (end, None) => end.c + end.response().straight_compression(pressure),
         }
     }
 }

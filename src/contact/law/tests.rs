@@ -1,6 +1,8 @@
 use super::*;
 use crate::error::{Place, Source};
-use crate::scene::expression::Differentiable;
+use crate::expression::Differentiable;
+use std::cell::Cell;
+use std::rc::Rc;
 use std::sync::Arc;
 
 /// Every law must be its own energy's derivative, its tangent its pressure's, and increase: from far below `scale` to far
@@ -109,4 +111,280 @@ fn expressions_that_are_no_laws() {
     // as far as they are laws, they are
     assert!(typed("1e5*c - 1e7*c^3", Some(0.05)).is_ok());
     assert!(typed("1e-5*c/(1e-4 - c)", Some(9e-5)).is_ok());
+}
+
+/// Laws of every kind, each with a compression where it is curved.
+fn all_laws() -> Vec<(Box<dyn LayerLaw>, f64)> {
+    let table = [[1e-5, 2.0], [1.5e-5, 2.1], [2e-5, 40.0], [1e-4, 41.0]];
+    let mut laws: Vec<(Box<dyn LayerLaw>, f64)> = vec![
+        (Box::new(Linear { stiffness: 3e7 }), 1e-5),
+        (Box::new(Exponential::new(3.0, 2e-5)), 5e-5),
+        (Box::new(Cubic { k1: 1e5, k3: 4e14 }), 2e-5),
+        (Box::new(Cubic { k1: 1e5, k3: 0.0 }), 2e-5),
+        (Box::new(Table::new(&table)), 2e-5),
+        (Box::new(Table::new(&[[1e-5, 2.0]])), 1e-5),
+        (Box::new(Scaled { law: Rc::new(Power::new(1e-6, 0.3)), factor: 0.3 }), 1e-6),
+        (Box::new(Scaled { law: Rc::new(typed("1e5*c + 3e9*c^2", None).expect("a law")), factor: 0.3 }), 1e-4),
+        (Box::new(PerPoint(vec![Power::new(1e-6, 0.3), Power::new(1e-4, 0.2)])), 1e-6),
+    ];
+    for a in [1.0, 0.5, 0.3, 0.1, 0.05, 0.02] {
+        laws.push((Box::new(Power::new(1e-6, a)), 1e-6));
+    }
+    for (text, end) in [
+        ("1e5*c + 3e9*c^2", None),
+        ("1e5*c + 3e9*c^2", Some(4e-5)),
+        ("20*sinh(c/4e-5)*exp(c/4e-5) + 1e5*c", None),
+        ("1e5*c + max(0, c - 3e-5)*1e6", None),
+        ("x*1e5*c + y*1e7*c^1.5", Some(5.0)),
+    ] {
+        laws.push((Box::new(typed(text, end).expect(text)), 3e-5));
+    }
+    laws
+}
+
+/// Powers of ten from 10^low to 10^high, not at round numbers.
+fn decades(low: i32, high: i32, each: i32) -> impl Iterator<Item = f64> {
+    (low * each..=high * each).map(move |i| 1.137 * 10f64.powf(f64::from(i) / f64::from(each)))
+}
+
+/// Relative rounding of p(c) by that of c.
+fn rounding(law: &dyn LayerLaw, c: f64) -> f64 {
+    let (pressure, tangent) = law.pressure_and_tangent(0, c);
+    let exponent = c * (tangent / pressure);
+    2.0 * f64::EPSILON * (1.0 + if exponent.is_finite() { exponent } else { 0.0 })
+}
+
+#[test]
+fn a_line_meets_the_graph_once() {
+    for (law, _) in all_laws() {
+        for rho in decades(-20, 20, 1) {
+            let (mut last, mut last_s) = (0.0, 0.0);
+            for s in decades(-30, 30, 3).flat_map(|s| [s, s * 1.001]) {
+                let c = law.meet(0, s, rho);
+                let pressure = law.pressure(0, c);
+                let error = (c + pressure / rho - s) / s;
+                let share = pressure / rho / s;
+                let allowed = 4.0 * f64::EPSILON + share * rounding(&*law, c);
+                assert!(error.abs() <= allowed, "{law:?}: c = {c} at s = {s}, rho = {rho}: {error:e} > {allowed:e}");
+                // neither c nor p/rho grows by more than s
+                let (gained, spring) = (c - last, (pressure - law.pressure(0, last)) / rho);
+                let slack = allowed * s;
+                assert!(gained >= -slack && spring >= -slack, "{law:?} falls at s = {s}, rho = {rho}");
+                assert!(gained <= s - last_s + slack && spring <= s - last_s + slack, "{law:?} jumps at {s}, {rho}");
+                (last, last_s) = (c, s);
+            }
+        }
+        for s in [0.0, -2.5, f64::NEG_INFINITY] {
+            assert_eq!(law.meet(0, s, 1e5), s);
+        }
+        assert!(law.meet(0, f64::NAN, 1e5).is_nan());
+        assert_eq!(law.meet(0, 1e-3, f64::INFINITY), 1e-3);
+    }
+}
+
+#[test]
+fn compression_inverts_pressure() {
+    for (law, scale) in all_laws() {
+        for c in decades(-8, 4, 7).map(|c| scale * c) {
+            let pressure = law.pressure(0, c);
+            if pressure < f64::MIN_POSITIVE || pressure == f64::INFINITY {
+                continue;
+            }
+            let found = law.compression(0, pressure);
+            let error = law.pressure(0, found) / pressure - 1.0;
+            // a^p of an exponent that is rounded
+            let allowed = rounding(&*law, c) * 2.0 + 2e-16 * pressure.ln().abs();
+            assert!(error.abs() <= allowed, "{law:?}: {found} for p({c}): {error:e} > {allowed:e}");
+        }
+        for pressure in [0.0, -1.0, f64::NEG_INFINITY] {
+            assert_eq!(law.compression(0, pressure), 0.0);
+        }
+        assert_eq!(law.compression(0, f64::INFINITY), f64::INFINITY);
+        assert!(law.compression(0, f64::NAN).is_nan());
+    }
+}
+
+#[derive(Debug)]
+struct Saturating;
+
+impl LayerLaw for Saturating {
+    fn compressed(&self, _point: usize, c: f64) -> Response {
+        Response { pressure: c / (1.0 + c), tangent: (1.0 + c).powi(-2), energy: c - c.ln_1p() }
+    }
+}
+
+/// A law with a rigid stop at c = 1, after which it is not a number.
+#[derive(Debug)]
+struct Ending;
+
+impl LayerLaw for Ending {
+    fn compressed(&self, _point: usize, c: f64) -> Response {
+        let left = (1.0 - c).sqrt();
+        Response { pressure: 1.0 - left, tangent: 0.5 / left, energy: c - (2.0 - 2.0 * left.powi(3)) / 3.0 }
+    }
+}
+
+#[test]
+fn what_a_law_cannot_reach() {
+    assert!((Saturating.compression(0, 0.75) - 3.0).abs() < 1e-14);
+    assert_eq!(Saturating.compression(0, 1.5), f64::INFINITY);
+    assert_eq!(Saturating.duality_gap(0, 1.0, 1.5), f64::INFINITY);
+    // c = 0.5 has the pressure 1/3
+    let exact = (2.0 - 3f64.ln()) - (0.5 - 1.5f64.ln()) - 1.5 / 3.0;
+    let found = Saturating.duality_gap(0, 2.0, 1.0 / 3.0);
+    assert!((found / exact - 1.0).abs() < 1e-5, "{found} {exact}");
+    assert_eq!(Ending.compression(0, 1.5), f64::INFINITY);
+    assert!((Ending.compression(0, 0.5) - 0.75).abs() < 1e-15);
+    assert!((Ending.meet(0, 30.0, 1.0) - 1.0).abs() < 1e-15);
+    assert_eq!(Ending.duality_gap(0, 1.5, 0.5), f64::INFINITY);
+}
+
+/// The integral of p(.) - pressure from the graph to c > 0, far from the graph.
+fn brute_gap(law: &dyn LayerLaw, c: f64, pressure: f64) -> f64 {
+    let (mut low, mut high) = (0u64, f64::MAX.to_bits());
+    while high - low > 1 {
+        let middle = u64::midpoint(low, high);
+        if law.pressure(0, f64::from_bits(middle)) < pressure { low = middle } else { high = middle }
+    }
+    // pieces of a tenth in c each, so that nothing is between the points of a rule
+    let (mut from, mut sum) = (f64::from_bits(high), 0.0);
+    while from != c {
+        let to = if c > from { (from * 1.1).min(c) } else { (from / 1.1).max(c) };
+        // an open layer's share is below all digits
+        let to = if to < 1e-6 * f64::from_bits(high) && c < from { c } else { to };
+        let noise = 4.0 * f64::EPSILON * pressure * (to - from).abs();
+        sum += quadrature::integral_to(&|c| law.pressure(0, c) - pressure, from, to, 1e-9, noise);
+        from = to;
+    }
+    sum
+}
+
+#[test]
+fn the_gap_is_the_area_between_the_graph_and_a_corner() {
+    for (law, scale) in all_laws() {
+        let gap = |c: f64, pressure: f64| law.duality_gap(0, c, pressure);
+        for c in decades(-3, 1, 2).map(|c| scale * c) {
+            let Response { pressure, energy, .. } = law.response(0, c);
+            if !(1e-200..=1e200).contains(&pressure) {
+                continue;
+            }
+            assert!((gap(c, 0.0) / energy - 1.0).abs() < 1e-10);
+            for ratio in [1e-6, 1e-2, 0.3, 0.49, 0.51, 0.8, 0.97, 0.999, 1.001, 1.02, 1.2, 1.49, 1.51, 2.0, 10.0] {
+                let found = gap(c, ratio * pressure);
+                let expected = brute_gap(&*law, c, ratio * pressure);
+                let error = found / expected - 1.0;
+                assert!(error.abs() < 2e-5, "{law:?} at {c}, {ratio} p: {found} {expected} {error:e}");
+            }
+            // P*(p) by its definition, and the rectangle of an open gap
+            let conjugate = c * pressure - energy;
+            assert!((gap(0.0, pressure) / conjugate - 1.0).abs() < 2e-5, "{law:?} at {c}: P* {conjugate}");
+            let open = conjugate + 3.0 * scale * pressure;
+            assert!((gap(-3.0 * scale, pressure) / open - 1.0).abs() < 2e-5);
+            assert_eq!(gap(c, -1e-300), f64::INFINITY);
+            assert!(gap(f64::NAN, pressure).is_nan() && gap(c, f64::NAN).is_nan());
+        }
+        assert_eq!(gap(-1.0, 0.0), 0.0);
+        assert_eq!(gap(0.0, 0.0), 0.0);
+    }
+}
+
+#[test]
+fn the_gap_keeps_its_digits_near_the_graph() {
+    for (law, scale) in all_laws() {
+        for c in decades(-2, 1, 5).map(|c| scale * c) {
+            let Response { pressure, tangent, .. } = law.response(0, c);
+            if !(1e-200..=1e200).contains(&pressure) {
+                continue;
+            }
+            let mut last = 0.0;
+            // a scaled law rounds the pressure
+            let rounding = 2.0 * f64::EPSILON * pressure;
+            assert!(law.duality_gap(0, c, pressure) <= rounding * (rounding / tangent));
+            for away in decades(-13, -5, 2) {
+                for sign in [1.0, -1.0] {
+                    let other = pressure * (1.0 + sign * away);
+                    let difference = pressure - other;
+                    // where c has lost the digits of the way to the graph, that is straight
+                    let expected = match away > 1e-8 {
+                        true => brute_gap(&*law, c, other),
+                        false => 0.5 * difference * (difference / tangent),
+                    };
+                    let found = law.duality_gap(0, c, other);
+                    let error = found / expected - 1.0;
+                    // scaling rounds the pressure on the way in and p(c) on the way out
+                    let scaled = if format!("{law:?}").starts_with("Scaled") { 4.0 * f64::EPSILON / away } else { 0.0 };
+                    assert!(
+                        error.abs() < 1e-3 + scaled,
+                        "{law:?} at {c}, {away:e} off: {found:e} {expected:e} {error:e}"
+                    );
+                    assert!(sign < 0.0 || found > last, "{law:?} at {c}, {away:e} off: {found:e} after {last:e}");
+                    last = found.max(last);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn at_a_kink_the_gap_is_a_bound() {
+    let law = typed("1e5*c + max(0, c - 3e-5)*1e6", None).expect("a law");
+    let c = 3e-5;
+    let p = law.pressure(0, c);
+    for away in decades(-13, -6, 3) {
+        // the corner (c + d, p - e) has a triangle on each side of the kink
+        let (d, e) = (c * away, p * away);
+        let (beyond, below) = (c + d, p - e);
+        let area = 0.5 * ((beyond - c).powi(2) * 1.1e6 + (p - below).powi(2) / 1e5) + (beyond - c) * (p - below);
+        let found = law.duality_gap(0, beyond, below);
+        let above = if away > 1e-11 { 1.001 } else { 11.0 };
+        assert!(found > 0.999 * area && found < above * area, "{away:e}: {found:e} {area:e}");
+    }
+}
+
+/// A law that counts how often it is asked, and leaves everything else to the common searches.
+#[derive(Debug)]
+struct Counted<L>(L, Cell<usize>);
+
+impl<L: LayerLaw> LayerLaw for Counted<L> {
+    fn compressed(&self, point: usize, c: f64) -> Response {
+        self.1.set(self.1.get() + 1);
+        self.0.compressed(point, c)
+    }
+}
+
+#[test]
+fn searches_ask_a_law_a_few_times() {
+    fn most<L: LayerLaw>(law: L, scale: f64) -> [usize; 2] {
+        let law = Counted(law, Cell::new(0));
+        let mut most = [0; 2];
+        for s in decades(-4, 4, 5).map(|s| scale * s) {
+            for rho in decades(-3, 9, 1) {
+                let before = law.1.get();
+                let c = law.meet(0, s, rho);
+                most[0] = most[0].max(law.1.get() - before);
+                assert!((c - law.0.meet(0, s, rho)).abs() <= 1e-14 * c);
+            }
+            let pressure = law.0.pressure(0, s);
+            if pressure > 1e-300 && pressure < 1e300 {
+                let before = law.1.get();
+                law.compression(0, pressure);
+                most[1] = most[1].max(law.1.get() - before);
+            }
+        }
+        most
+    }
+    for a in [1.0, 0.5, 0.3, 0.1, 0.05, 0.02] {
+        let most = most(Power::new(1e-6, a), 1e-6);
+        assert!(most[0] <= 8 && most[1] <= 8, "a = {a}: {most:?}");
+    }
+    let quadratic = most(typed("1e5*c + 3e9*c^2", None).expect("a law"), 1e-4);
+    assert!(quadratic[0] <= 8 && quadratic[1] <= 8, "{quadratic:?}");
+    // bends and kinks that mislead Newton's method
+    let bent = [
+        most(Exponential::new(3.0, 2e-5), 1e-6),
+        most(typed("20*sinh(c/4e-5)*exp(c/4e-5) + 1e5*c", None).expect("a law"), 1e-5),
+        most(typed("1e5*c + max(0, c - 3e-5)*1e6", None).expect("a law"), 1e-5),
+        most(Table::new(&[[1e-5, 2.0], [1.5e-5, 2.1], [2e-5, 40.0], [1e-4, 41.0]]), 1e-5),
+    ];
+    assert!(bent.iter().flatten().all(|&count| count <= 20), "{bent:?}");
 }

@@ -1,9 +1,10 @@
 //! A layer's law typed in the scene.
 
 use super::quadrature::integral;
+use super::root::{meeting, root};
 use super::{LayerLaw, Response};
 use crate::error::{Error, Result};
-use crate::scene::expression::Differentiable;
+use crate::expression::Differentiable;
 
 /// An expression p(c) at one place, continued as a straight line beyond its end.
 #[derive(Debug, Clone)]
@@ -100,5 +101,31 @@ impl LayerLaw for Typed {
     fn pressure(&self, point: usize, c: f64) -> f64 {
         // the energy costs most
         if c > 0.0 && c <= self.end { self.curve(c) } else { self.response(point, c).pressure }
+    }
+
+    fn pressure_and_tangent(&self, _point: usize, c: f64) -> (f64, f64) {
+        if c <= self.end {
+            return self.value(c);
+        }
+        let Response { pressure, tangent, .. } = self.at_end.straight(c - self.end);
+        (pressure, tangent)
+    }
+
+    fn meet_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
+        let beyond = self.at_end.straight_meet(self.end, s, rho);
+        if beyond > 0.0 {
+            return self.end + beyond;
+        }
+        let high = s.min(self.end);
+        meeting(s, rho, [0.0, high], high, |c| self.value(c))
+    }
+
+    fn compression_loaded(&self, _point: usize, pressure: f64) -> f64 {
+        if self.end.is_finite() && pressure > self.at_end.pressure {
+            return self.end + self.at_end.straight_compression(pressure);
+        }
+        // expressions come in any units
+        let (start, high) = if self.end.is_finite() { (self.end, self.end) } else { (1.0, f64::MAX) };
+        root(pressure, [0.0, high], start, |c| self.value(c)).unwrap_or(f64::INFINITY)
     }
 }

@@ -4,7 +4,7 @@ use super::search::{Reach, Search};
 use super::{SNAP, Shared};
 use crate::contact::side::{Side, length};
 use crate::fem::{element, quadrature};
-use crate::scene::Order;
+use crate::problem::order::Order;
 
 /// Integration points of the common pieces of two plane curves, grouped by facet of side a.
 pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Vec<Shared<2>> {

@@ -11,7 +11,7 @@ use super::{SNAP, Shared};
 use crate::contact::side::{Side, length, unit};
 use crate::fem::space::area_vector;
 use crate::fem::{assemble, element, quadrature};
-use crate::scene::Order;
+use crate::problem::order::Order;
 
 /// Pieces smaller than this share of a facet are rounding.
 const TINY: f64 = 1e-11;

@@ -10,9 +10,9 @@ pub use barzilai::BarzilaiBorwein;
 pub use search::LineSearch;
 pub use spectral::Spectral;
 
+use super::acceleration::Here;
 use super::forecast::{best_factor, relaxed_factor};
 use super::line::Unbounded;
-use super::method::Here;
 use super::ritz::Ritz;
 
 /// Chooses gamma^k after the sweep of iteration k.

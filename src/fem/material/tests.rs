@@ -1,4 +1,5 @@
 use super::*;
+use crate::fem::slope::strain;
 
 /// A stable material without any symmetry, the constants C11 C12 ... C66 in Voigt's order.
 const TRICLINIC: [f64; 21] =

@@ -3,7 +3,7 @@
 use super::*;
 use crate::mesh::load::from_script;
 use crate::mesh::{Origin, follows, load};
-use crate::scene::{MeshSource, Sizing};
+use crate::problem::mesh::{MeshSource, Sizing};
 
 #[test]
 fn scripts_are_meshed_once_for_each_key() {

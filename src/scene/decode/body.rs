@@ -2,16 +2,18 @@
 
 use super::{Decoder, elasticity};
 use crate::error::{Error, Located, Result};
-use crate::scene::expression::Field;
+use crate::expression::Field;
+use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Support};
+use crate::problem::elasticity::Plane;
+use crate::problem::order::Order;
 use crate::scene::read::{Keys, Node, Value};
-use crate::scene::{BodySpec, Load, LoadKind, Order, Plane, SpringKind, SpringSpec, Support};
 use std::collections::HashSet;
 
 /// Names of components, for supports.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Whether PETSc options start with this word, so that a body of this name could not have options of its own.
-pub fn reserved(name: &str) -> bool {
+fn reserved(name: &str) -> bool {
     const WORDS: &[&str] = &[
         "ksp", "pc", "mat", "vec", "sub", "mg", "snes", "ts", "tao", "dm", "is", "log", "options", "help", "malloc",
         "info", "on", "fp", "newton",

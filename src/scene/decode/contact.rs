@@ -2,9 +2,9 @@
 
 use super::{Decoder, choose};
 use crate::error::{Error, Located, Result};
-use crate::scene::expression::Field;
+use crate::expression::Field;
+use crate::problem::contact::{AutoContact, ContactSpec, Overlap};
 use crate::scene::read::{Keys, Node, Value};
-use crate::scene::{AutoContact, ContactSpec, Overlap};
 use std::collections::HashSet;
 
 impl Decoder<'_> {

@@ -2,9 +2,9 @@
 
 use super::Decoder;
 use crate::error::{Error, Result};
-use crate::scene::expression::Field;
+use crate::expression::Field;
+use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, RegionSpec};
 use crate::scene::read::{Keys, Node, Value};
-use crate::scene::{AxesSpec, Constants, ElasticitySpec, RegionSpec};
 
 /// Keys that say what a body is made of.
 pub const KEYS: [&str; 5] = ["young", "poisson", "orthotropic", "anisotropic", "axes"];

@@ -2,9 +2,9 @@
 
 use super::Decoder;
 use crate::error::{Error, Result};
-use crate::scene::expression::{Differentiable, Field};
+use crate::expression::{Differentiable, Field};
+use crate::problem::layer::{FORMS, LawForm, LayerSpec};
 use crate::scene::read::{Keys, Node};
-use crate::scene::{FORMS, LawForm, LayerSpec};
 
 impl Decoder<'_> {
     pub(super) fn layer(&self, node: &Node) -> Result<LayerSpec> {

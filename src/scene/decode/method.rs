@@ -2,9 +2,11 @@
 
 use super::{Decoder, choose};
 use crate::error::{Result, nearest};
-use crate::scene::expression::Field;
+use crate::expression::Field;
+use crate::problem::method::{Gamma, MethodName, MethodSpec, Start};
+use crate::problem::robin::{RobinRule, Zone};
+use crate::problem::stop::StopRule;
 use crate::scene::read::{Keys, Node, Value};
-use crate::scene::{Gamma, MethodName, MethodSpec, RobinSpec, Start, StopSpec, Zone};
 
 impl Decoder<'_> {
     /// The method, defaults where nothing is said.
@@ -24,7 +26,7 @@ impl Decoder<'_> {
                 if says("psi") || says("gamma") || says("robin") || rule { MethodName::Robin } else { default.name }
             }
         };
-        let usual = if name == MethodName::Robin { RobinSpec::Tangent } else { default.robin };
+        let usual = if name == MethodName::Robin { RobinRule::Tangent } else { default.robin };
         let start = keys.get("start").map_or(Ok(default.start), |start| self.start(start))?;
         let steps = keys.get("steps");
         if let (Some(steps), Start::Nested) = (steps, &start) {
@@ -77,9 +79,8 @@ impl Decoder<'_> {
 
     fn start(&self, node: &Node) -> Result<Start> {
         if let Value::String(_) = node.value {
-            let words =
-                [("auto", Start::Auto), ("rigid", Start::Rigid), ("zero", Start::Zero), ("nested", Start::Nested)];
-            let all = "it is \"auto\", \"rigid\", \"zero\", \"nested\" or { normal = 1e-4 }";
+            let words = [("auto", Start::Auto), ("zero", Start::Zero), ("nested", Start::Nested)];
+            let all = "it is \"auto\", \"zero\", \"nested\" or { normal = 1e-4 }";
             return choose(node, "start", &words).map_err(|error| error.help(all));
         }
         let keys = Keys::open(node, "the start", &["normal"])?;
@@ -100,13 +101,13 @@ fn gamma(node: &Node) -> Result<Gamma> {
     }
 }
 
-fn robin(node: &Node) -> Result<RobinSpec> {
+fn robin(node: &Node) -> Result<RobinRule> {
     if let Value::String(_) = node.value {
-        let words = [("tangent", RobinSpec::Tangent), ("frozen", RobinSpec::Frozen), ("auto", RobinSpec::Auto)];
+        let words = [("tangent", RobinRule::Tangent), ("frozen", RobinRule::Frozen), ("auto", RobinRule::Auto)];
         return choose(node, "Robin coefficient", &words);
     }
     let keys = Keys::open(node, "the Robin coefficient", &["floor"])?;
-    keys.require("floor")?.positive("the floor").map(RobinSpec::Floor)
+    keys.require("floor")?.positive("the floor").map(RobinRule::Floor)
 }
 
 fn depth(node: &Node) -> Result<usize> {
@@ -135,8 +136,8 @@ fn load_steps(node: &Node) -> Result<Vec<f64>> {
     }
 }
 
-fn stop(node: &Node) -> Result<StopSpec> {
-    let default = StopSpec::default();
+fn stop(node: &Node) -> Result<StopRule> {
+    let default = StopRule::default();
     let keys = Keys::open(node, "the stop rule", &["residual", "increment", "balanced", "iterations"])?;
     let tolerance = |key: &str| keys.get(key).map(|node| node.positive("the tolerance")).transpose();
     let increment = tolerance("increment")?;
@@ -154,5 +155,5 @@ fn stop(node: &Node) -> Result<StopSpec> {
         (given, _) => given,
     };
     let balanced = keys.get("balanced").map_or(Ok(false), Node::boolean)?;
-    Ok(StopSpec { residual, increment, balanced, iterations })
+    Ok(StopRule { residual, increment, balanced, iterations })
 }

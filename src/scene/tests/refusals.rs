@@ -1,7 +1,7 @@
 //! Every refusal: its message, the word that the caret marks, and the way out.
 
-use super::{GROOVE, caret, load_text};
-use crate::error::Kind;
+use super::{GROOVE, load_text};
+use crate::error::{Kind, caret};
 
 /// Replacement in the groove scene; text under the caret; message; part of the help (empty: whatever).
 type Case = (&'static str, &'static str, &'static str, &'static str, &'static str);

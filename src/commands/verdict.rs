@@ -1,0 +1,118 @@
+//! How a run ended: the name of its status, and in words what happened and what to try.
+
+use super::words::in_words;
+use crate::ddm::forecast::{best_factor, best_gamma};
+use crate::ddm::{Mechanism, Model, Moved, Outcome, Status};
+use crate::output::{ForecastReport, sci};
+
+/// Name of a status in `report.json`.
+pub fn status_name(status: &Status) -> &'static str {
+    match status {
+        Status::Converged => "converged",
+        Status::RoundoffLimited => "roundoff-limited",
+        Status::IterationLimit => "iteration-limit",
+        Status::NotFinite { .. } => "not-finite",
+        Status::Cycle { .. } => "cycle",
+        Status::Underconstrained(_) | Status::Mechanism(_) => "underconstrained",
+        Status::Unbounded { .. } => "unbounded",
+        Status::InnerSolver { .. } => "inner-solver",
+    }
+}
+
+/// The status in words: what happened, to which body, in which iteration, and what to try.
+pub fn message(outcome: &Outcome, model: &Model) -> String {
+    let k = outcome.iterations;
+    let name = |body: &usize| &model.bodies[*body].name;
+    let residual = outcome.rows.last().map_or(f64::NAN, |row| row.residual);
+    // what turns the step shorter in the paper's iteration; other methods choose it themselves
+    let other = if outcome.method == "robin" { "a smaller method.gamma, or --method auto" } else { "another --method" };
+    match &outcome.status {
+        Status::Converged => format!("converged in {k} iterations"),
+        Status::RoundoffLimited => {
+            format!("{} {} after {k} iterations: rounding allows no less", measure(outcome), sci(residual, 1))
+        }
+        Status::IterationLimit => format!(
+            "not converged in {k} iterations, {} {}: allow more (method.stop.iterations{}) or try {}",
+            measure(outcome),
+            sci(residual, 1),
+            outlook(outcome),
+            advice(outcome).unwrap_or_else(|| other.to_owned())
+        ),
+        Status::NotFinite { body } => format!(
+            "body `{}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}",
+            name(body)
+        ),
+        Status::Cycle { period } => {
+            format!("the iterates repeat every {period} iterations (seen in iteration {k}): try {other}")
+        }
+        Status::Underconstrained(Moved { body, name: motion }) => format!(
+            "body `{}`: nothing holds its {motion} in iteration {k}: neither a support nor the Robin zone; add a support, \
+             or a start that closes the contact (method.start)",
+            name(body)
+        ),
+        Status::Mechanism(Mechanism { bodies, motion, work }) => format!(
+            "bodies {}: nothing holds them together in their {motion}, which changes no gap, and loads work on it ({} of what \
+             forces of their sizes could): add a support, or balance the loads",
+            in_words(bodies.iter().map(name)),
+            sci(*work, 1)
+        ),
+        Status::Unbounded { moving } => {
+            let part = |free: &Moved| format!("{} of `{}`", free.name, name(&free.body));
+            let what = match &moving[..] {
+                [] => "a motion of a body".to_owned(),
+                all => all.iter().map(part).collect::<Vec<_>>().join(" and "),
+            };
+            format!(
+                "unbounded: no support or contact resists {what}, and the loads push that way; add a support, or turn the load"
+            )
+        }
+        Status::InnerSolver(failure) => {
+            let reason = if failure.reason.is_empty() { "its rank knows more" } else { &failure.reason };
+            let whose = failure.body.map_or("all bodies".to_owned(), |body| format!("body `{}`", name(&body)));
+            format!("{whose}: the inner solver failed in iteration {k}: {reason}")
+        }
+    }
+}
+
+/// What the number is by which a run ends.
+fn measure(outcome: &Outcome) -> &'static str {
+    match outcome.rows.last() {
+        Some(row) if row.is_bound => "error bound",
+        _ if outcome.method.starts_with("newton") => "estimated error",
+        _ => "residual",
+    }
+}
+
+/// What more iterations would bring, for the report.
+pub fn forecast(outcome: &Outcome) -> Option<ForecastReport> {
+    let goes_on = matches!(
+        outcome.status,
+        Status::Converged | Status::RoundoffLimited | Status::IterationLimit | Status::Cycle { .. }
+    );
+    let forecast = outcome.forecast.as_ref().filter(|_| goes_on)?;
+    Some(ForecastReport {
+        factor: forecast.factor,
+        iterations: Some(forecast.iterations).filter(|iterations| iterations.is_finite()),
+        best_gamma: outcome.spectrum.map(best_gamma),
+        best_factor: outcome.spectrum.map(best_factor),
+    })
+}
+
+/// The iterations left in words, to follow the advice to allow more.
+fn outlook(outcome: &Outcome) -> String {
+    match forecast(outcome).map(|forecast| forecast.iterations) {
+        None => String::new(),
+        Some(Some(0.0)) => "; that is enough, but pressures still move or a body lacks balance".to_owned(),
+        Some(None) => "; at this rate no number is enough".to_owned(),
+        Some(Some(more)) => format!("; about {more} more at this rate"),
+    }
+}
+
+/// What helps the paper's iteration where the spectrum is known.
+fn advice(outcome: &Outcome) -> Option<String> {
+    let spectrum = outcome.spectrum.filter(|_| outcome.method == "robin")?;
+    let (gamma, factor) = (best_gamma(spectrum), best_factor(spectrum));
+    // near one the digits that matter are those of the difference
+    let factor = if factor > 0.99 { format!("1 - {}", sci(1.0 - factor, 1)) } else { format!("{factor:.3}") };
+    Some(format!("--method auto; the best number for method.gamma is {gamma:.2}, a factor of {factor} an iteration"))
+}

@@ -1,0 +1,66 @@
+//! Fenchel's gap: the area between a law's graph and the corner of a compression and a pressure.
+
+use super::LayerLaw;
+use super::quadrature::integral_to;
+
+/// Error of a quadrature, as a share of the gap: it goes into bounds that are a factor above the error they bound.
+const SHARE: f64 = 1e-5;
+/// Rounding of a law's value, as a share of it: no quadrature gets below.
+const ROUNDING: f64 = 2.0 * f64::EPSILON;
+/// Share of c within which a difference of compressions is too rounded to integrate over: a root is found to a few
+/// steps of double numbers, 1e-3 of this many.
+const CLOSE: f64 = 4096.0 * f64::EPSILON;
+/// Relative difference of pressures within which a law is looked upon as straight, if its tangents at both ends say so.
+const NEAR: f64 = 1e-6;
+/// Relative difference of those tangents: two thirds of it are the error of the gap, upwards.
+const STRAIGHT: f64 = 5e-4;
+
+/// [`LayerLaw::duality_gap`].
+pub(super) fn gap<L: LayerLaw + ?Sized>(law: &L, point: usize, c: f64, pressure: f64) -> f64 {
+    if c.is_nan() || pressure.is_nan() {
+        f64::NAN
+    } else if pressure < 0.0 || pressure == f64::INFINITY || c.is_infinite() {
+        // an open layer without pressure is on the graph at any distance
+        if pressure == 0.0 && c < 0.0 { 0.0 } else { f64::INFINITY }
+    } else if pressure == 0.0 {
+        law.response(point, c).energy
+    } else {
+        // below c = 0 the area is a rectangle and no more
+        law.gap_loaded(point, c.max(0.0), pressure) + pressure * (-c).max(0.0)
+    }
+}
+
+/// [`LayerLaw::gap_loaded`] as the integral of p(.) - p from where the law has the pressure p to c.
+pub(super) fn by_quadrature<L: LayerLaw + ?Sized>(law: &L, point: usize, c: f64, pressure: f64) -> f64 {
+    let on_graph = law.compression(point, pressure);
+    if on_graph == f64::INFINITY {
+        return f64::INFINITY;
+    }
+    let excess = |c: f64| law.pressure(point, c) - pressure;
+    let (difference, way) = (excess(c), c - on_graph);
+    let short = way.abs() <= CLOSE * c;
+    if short || difference.abs() <= NEAR * pressure {
+        if difference == 0.0 {
+            return 0.0;
+        }
+        let [here, there] = [c, on_graph].map(|c| law.pressure_and_tangent(point, c).1);
+        let least = here.min(there);
+        if short || (here - there).abs() < STRAIGHT * least {
+            // the way is rounded, the difference of pressures is not; the flatter side gives the larger gap
+            return 0.5 * difference * (difference / least);
+        }
+    }
+    let rounding = ROUNDING * pressure * way.abs();
+    let gap = integral_to(&excess, on_graph, c, SHARE, rounding);
+    // NaN: beyond what double numbers hold, or beyond the end of a law
+    if gap.is_nan() { f64::INFINITY } else { gap.max(0.0) }
+}
+
+/// e^x - 1 - x, with its digits where it is small.
+pub(super) fn exp_less_line(x: f64) -> f64 {
+    if x.abs() < 1e-2 {
+        x * x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x * (1.0 / 120.0 + x / 720.0))))
+    } else {
+        x.exp_m1() - x
+    }
+}

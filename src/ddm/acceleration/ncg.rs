@@ -1,0 +1,72 @@
+//! Nonlinear conjugate gradients, preconditioned by the Robin sweep.
+
+use super::{Acceleration, Here, Layer, Model, Step};
+use crate::ddm::field::{Field, local_dot};
+use crate::ddm::forecast::gradients_factor;
+use crate::ddm::line::Line;
+use crate::ddm::ritz::Ritz;
+use crate::error::Result;
+
+/// Polak and Ribière's rule with exact line search on F1, restarted when the contact set changes.
+#[derive(Default)]
+pub struct Conjugate {
+    last: Option<Last>,
+    ritz: Ritz,
+}
+
+struct Last {
+    direction: Field,
+    residual: Vec<Vec<f64>>,
+    decrement: f64,
+    closed: Vec<bool>,
+}
+
+impl Acceleration for Conjugate {
+    fn name(&self) -> &'static str {
+        "ncg"
+    }
+
+    fn step(&mut self, here: &mut Here) -> Result<Step> {
+        let closed: Vec<bool> = here.layer.compression.iter().map(|&c| c > 0.0).collect();
+        let z = &here.sweep.correction;
+        let mut direction = z.clone();
+        if let Some(last) = self.last.take().filter(|last| last.closed == closed) {
+            let mut products =
+                [local_dot(&last.residual, &z.states), local_dot(&here.sweep.residual, &last.direction.states)];
+            here.model.exchange.sum(&mut products);
+            let beta = ((here.decrement() - products[0]) / last.decrement).max(0.0);
+            // a direction that does not descend is not conjugate any more
+            if here.decrement() + beta * products[1] > 0.0 {
+                direction = last.direction;
+                direction.add_to(beta, z);
+            }
+        }
+        let line = Line::new(here.model, here.layer, &here.sweep.residual, &direction);
+        let Ok(length) = line.minimize(1e-8) else { return Ok(Step::Unbounded) };
+        self.ritz.observe(here.model, &direction);
+        self.ritz.bounds(here.model, here.layer, here.weight);
+        let residual = here.sweep.residual.clone();
+        self.last = Some(Last { direction: direction.clone(), residual, decrement: here.decrement(), closed });
+        Ok(Step::Along(direction, length))
+    }
+
+    fn amplification(&self) -> f64 {
+        self.spectrum().map_or(f64::NAN, |(low, _)| low.recip().max(1.0))
+    }
+
+    fn spectrum(&self) -> Option<(f64, f64)> {
+        self.ritz.known()
+    }
+
+    fn factor(&self) -> Option<f64> {
+        self.spectrum().map(gradients_factor)
+    }
+
+    fn conclude(&mut self, model: &Model, layer: &Layer, weight: &[f64]) {
+        self.ritz.bounds(model, layer, weight);
+    }
+
+    fn restart(&mut self) {
+        self.last = None;
+    }
+}

@@ -1,0 +1,89 @@
+//! How far an iterate in equilibrium is from the solution: a bound by duality.
+//!
+//! After a linear step, displacements u and pressures p are in equilibrium: K u + B' omega p = f. Convex duality (Fenchel; engineers
+//! know it as the error in the constitutive relation) gives, with the energy P of the law and its complementary energy P*,
+//!
+//! ```text
+//! |u - u_exact|_K^2 / 2  <=  F1(u) - min F1  <=  gap = sum omega ( P(c) + P*(p) - c p ),      c = B u - d,
+//! ```
+//!
+//! each term of which is zero on the graph of the law and positive beside it. No spectrum, no history, no constants.
+
+use super::layer_state::Layer;
+use super::model::Model;
+use super::run::{Measured, Run};
+
+/// What an iterate in equilibrium misses.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Gap {
+    /// The gap, energy. At points of negative pressure, whose gap is infinite, the work of what the new places change there.
+    pub energy: f64,
+    /// Whether no pressure is negative, so that it is a bound.
+    pub is_bound: bool,
+    /// Largest |p - p(c)|.
+    pub mismatch: f64,
+    /// sum omega (p - p_q)^2/rho with the pressures p_q of the new places: what a step changes, work.
+    pub change: f64,
+    /// sum omega |p - p_q| over sum omega p_q.
+    pub share: f64,
+}
+
+impl Gap {
+    /// Of compressions c and equilibrium pressures p, n each, with the places that lines of slope `rho` lead to.
+    pub fn new(model: &Model, compression: &[f64], pressure: &[f64], places: &Layer, rho: &[f64]) -> Self {
+        let mut gap = Self { is_bound: true, ..Self::default() };
+        let mut apart = 0.0;
+        for (i, pair) in model.pairs.iter().enumerate() {
+            for q in model.range(i) {
+                let (point, weight) = (q - model.offset[i], model.weight[q]);
+                let (c, p) = (compression[q], pressure[q]);
+                let moved = p - places.pressure[q];
+                let change = weight * moved * moved / rho[q];
+                gap.change += change;
+                apart += weight * moved.abs();
+                gap.mismatch = gap.mismatch.max((p - pair.law.pressure(point, c)).abs());
+                if p < 0.0 {
+                    gap.is_bound = false;
+                    gap.energy += change;
+                } else {
+                    gap.energy += weight * pair.law.duality_gap(point, c, p);
+                }
+            }
+        }
+        let all: f64 = places.force.iter().sum();
+        gap.share = if apart == 0.0 { 0.0 } else { apart / all };
+        gap
+    }
+}
+
+/// The relative errors by which a run of Newton's method ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reached {
+    /// Error in the energy norm: of the layers by the gap, of the linear step by its solver.
+    pub error: f64,
+    /// Whether that is a bound: no pressure is negative, and the linear step is exact to rounding.
+    pub is_bound: bool,
+    /// Largest difference of a pressure from its law, relative to the largest pressure.
+    pub pressure: f64,
+    /// Share of its contact forces that a body lacks in balance, the most over all.
+    pub imbalance: f64,
+}
+
+impl Reached {
+    /// Of an iterate with the gap `gap` and the pressures p; `linear` is the error of the linear step in the energy norm.
+    pub(super) fn new(run: &Run, measured: &Measured, gap: &Gap, linear: f64, p: &[f64], places: &Layer) -> Self {
+        let absolute = (2.0 * gap.energy).sqrt() + linear;
+        Self {
+            error: run.scale.relative(absolute * absolute, measured.strain + places.work),
+            is_bound: gap.is_bound && linear == 0.0,
+            pressure: if gap.mismatch == 0.0 { 0.0 } else { gap.mismatch / run.scale.peak(&places.pressure) },
+            imbalance: run.scale.imbalance(run.model, &run.model.forces(p)),
+        }
+    }
+
+    /// The largest of the errors.
+    pub fn worst(&self) -> f64 {
+        let all = [self.error, self.pressure, self.imbalance];
+        all.into_iter().fold(0.0, |worst, error| if error.is_nan() || error > worst { error } else { worst })
+    }
+}

@@ -1,0 +1,106 @@
+//! The state of the layers: a place on the law of every contact point.
+//!
+//! The law of a point is a curve in the plane of compression c and pressure p: p = 0 for c <= 0, p = p(c) above. Newton's method
+//! keeps a place (c_q, p_q) on it that need not be the compression of the bodies' traces; sweeps take the place that is.
+
+use super::model::Model;
+
+/// A place on the law of every contact point, with the law's tangent there.
+#[derive(Debug, Clone, Default)]
+pub struct Layer {
+    /// c, n.
+    pub compression: Vec<f64>,
+    /// p(c), n: force per area.
+    pub pressure: Vec<f64>,
+    /// kappa = p'(c), n.
+    pub tangent: Vec<f64>,
+    /// omega p, n: force at each point.
+    pub force: Vec<f64>,
+    /// sum omega P(c) of each pair: energy of the layer.
+    pub energy: Vec<f64>,
+    /// sum omega p c over all pairs.
+    pub work: f64,
+    /// Points with c > 0.
+    pub closed: usize,
+}
+
+impl Layer {
+    /// The places at these compressions, n.
+    pub fn new(model: &Model, compression: Vec<f64>) -> Self {
+        let mut layer = Layer::default();
+        for (i, pair) in model.pairs.iter().enumerate() {
+            let mut energy = 0.0;
+            for q in model.range(i) {
+                let c = compression[q];
+                let response = pair.law.response(q - model.offset[i], c);
+                let force = model.weight[q] * response.pressure;
+                energy += model.weight[q] * response.energy;
+                // nothing times a gap without end is nothing
+                layer.work += if force == 0.0 { 0.0 } else { force * c };
+                layer.closed += usize::from(c > 0.0);
+                layer.pressure.push(response.pressure);
+                layer.tangent.push(response.tangent);
+                layer.force.push(force);
+            }
+            layer.energy.push(energy);
+        }
+        Self { compression, ..layer }
+    }
+
+    /// The places at the compressions of a trace vector: what the paper's iteration works with.
+    pub fn at(model: &Model, trace: &[f64]) -> Self {
+        Self::new(model, model.compression(trace))
+    }
+
+    /// The places where the laws meet lines of slope -`rho` (n, stiffness per area) through the states (c, p) that the linear model
+    /// of the layers gave, n each: c_q + p(c_q)/rho_q = c + p/rho_q (Minty). Such a place is the only one, and moves by no more
+    /// than the sum does, however steep or flat the law is.
+    pub fn meet(model: &Model, compression: &[f64], pressure: &[f64], rho: &[f64]) -> Self {
+        let mut places = Vec::with_capacity(compression.len());
+        for (i, pair) in model.pairs.iter().enumerate() {
+            places.extend(model.range(i).map(|q| {
+                let sum = compression[q] + pressure[q] / rho[q];
+                pair.law.meet(q - model.offset[i], sum, rho[q])
+            }));
+        }
+        Self::new(model, places)
+    }
+
+    /// omega kappa, n: springs of the linear model at the points.
+    pub fn springs(&self, model: &Model) -> Vec<f64> {
+        model.weight.iter().zip(&self.tangent).map(|(weight, tangent)| weight * tangent).collect()
+    }
+
+    /// p_q + kappa_q (c - c_q), n: pressures of the linear model at other compressions.
+    pub fn linear(&self, compression: &[f64]) -> Vec<f64> {
+        let at = |(q, c): (usize, &f64)| match self.tangent[q] {
+            0.0 => self.pressure[q],
+            tangent => self.pressure[q] + tangent * (c - self.compression[q]),
+        };
+        compression.iter().enumerate().map(at).collect()
+    }
+
+    /// Largest pressure.
+    pub fn peak(&self) -> f64 {
+        self.pressure.iter().copied().fold(0.0, f64::max)
+    }
+}
+
+/// Share of the stiffness of the nodes under a point at which Newton's places are taken. Any slope leads to the same solution, and
+/// from 0.003 to 1 of that stiffness 4879 random scenes took the same number of steps; with 3 and more, soft layers of a
+/// strongly curved law came into cycles.
+const SLOPE: f64 = 0.1;
+
+/// rho at every point: stiffness per area of the softer of the two surfaces, as their elements have it.
+pub fn meeting_slopes(model: &Model) -> Vec<f64> {
+    let points = model.points();
+    let rows = model.row_stiffness();
+    let largest = (0..2 * points).map(|i| rows[i] / model.weight[i % points]).fold(f64::MIN_POSITIVE, f64::max);
+    let slope = |q: usize| {
+        // a row without stiffness has prescribed dofs only: the other side alone gives way
+        let sides = [rows[q], rows[points + q]].into_iter().filter(|stiffness| *stiffness > 0.0);
+        let softer = sides.fold(f64::INFINITY, f64::min) / model.weight[q];
+        SLOPE * if softer.is_finite() { softer } else { largest }
+    };
+    (0..points).map(slope).collect()
+}

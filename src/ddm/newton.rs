@@ -1,0 +1,123 @@
+//! Semismooth Newton (35) with a state of its own in every layer.
+//!
+//! Each contact point keeps a place (c_q, p_q) on its law, with the tangent kappa_q there:
+//!
+//! ```text
+//! linear step    K u + B' omega (p_q + kappa_q (B u - d - c_q)) = f           all bodies together
+//! update         c = B u - d,   p = p_q + kappa_q (c - c_q)                   in equilibrium
+//!                the place where the law meets c_q + p_q/rho = c + p/rho      (Minty)
+//! ```
+//!
+//! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
+
+use super::bound::{Gap, Reached};
+use super::field::{Field, residual};
+use super::layer_state::{Layer, meeting_slopes};
+use super::line::Line;
+use super::linear::{LinearStep, System, resisting};
+use super::model::Model;
+use super::run::{End, Run};
+use crate::error::Result;
+
+/// Iterates from displacements and places until a rule ends it.
+///
+/// # Errors
+/// Failures of the solver library. Not converging is a status.
+pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
+    let rho = meeting_slopes(run.model);
+    let (mut forcing, mut progress) = (Forcing::default(), Progress::default());
+    loop {
+        let springs = resisting(run.model, places.springs(run.model));
+        let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
+        let (r, _) = residual(run.model, &u, &force);
+        let reduction = forcing.reduction();
+        let system = System { model: run.model, places: &places, springs: &springs, residual: &r, reduction };
+        let x = match linear.solve(system)? {
+            Ok(solution) => solution,
+            Err(failure) => return Ok(End::failed(failure, u, places, linear.sweeps())),
+        };
+        u.add(1.0, &x.field);
+        u.retrace(run.model);
+
+        let c = run.model.compression(&u.trace);
+        let p = places.linear(&c);
+        let met = Layer::meet(run.model, &c, &p, &rho);
+
+        let gap = Gap::new(run.model, &c, &p, &met, &rho);
+        let energy = residual(run.model, &u, &run.model.forces(&p)).1;
+        let measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
+        let reached = Reached::new(run, &measured, &gap, x.error, &p, &met);
+        if let Some(status) = run.end_of_step(&u, &x.field, &measured, &reached, &met, linear)? {
+            return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
+        }
+        forcing.learn(&gap, &reached, run.stop.residual);
+        let retreated = progress.is_lost(gap.change, measured.f1) && retreat(run.model, &mut u, &c, &x.field)?;
+        places = if retreated { Layer::at(run.model, &u.trace) } else { met };
+    }
+}
+
+/// How far inexact linear steps are solved.
+#[derive(Debug)]
+struct Forcing(f64);
+
+/// Error of the first linear step of an inexact solver, as a share of it: its places are a guess of the start.
+const FIRST: f64 = 1e-2;
+
+/// Share of what the places missed last that an inexact step may miss, too.
+const SHARE: f64 = 0.1;
+
+impl Default for Forcing {
+    fn default() -> Self {
+        Self(FIRST)
+    }
+}
+
+impl Forcing {
+    fn reduction(&self) -> f64 {
+        self.0
+    }
+
+    /// After a step with this gap: the next may miss a share of what this one did, and need not do better than what the run asks for.
+    fn learn(&mut self, gap: &Gap, reached: &Reached, target: Option<f64>) {
+        let enough = SHARE * target.unwrap_or(0.0) / reached.error;
+        self.0 = (SHARE * gap.share).max(enough).clamp(f64::EPSILON.sqrt(), FIRST);
+    }
+}
+
+/// Recognises steps that lead nowhere: stiff linear layers on few quadratic elements can come into a cycle of places, two of 4879
+/// random scenes did.
+#[derive(Debug)]
+struct Progress {
+    /// Least work that a step changed, steps since, and F1 of the last iterate.
+    best: f64,
+    since: usize,
+    f1: f64,
+}
+
+impl Default for Progress {
+    fn default() -> Self {
+        Self { best: f64::INFINITY, since: 0, f1: f64::INFINITY }
+    }
+}
+
+impl Progress {
+    /// Whether two steps in a row have changed more than an earlier one, and the last one raised F1.
+    fn is_lost(&mut self, change: f64, f1: f64) -> bool {
+        let rose = f1 > std::mem::replace(&mut self.f1, f1);
+        self.since = if change < self.best { 0 } else { self.since + 1 };
+        self.best = self.best.min(change);
+        self.since >= 2 && rose && f1.is_finite()
+    }
+}
+
+/// Takes back of a step x to u what raises F1, by exact search. Whether F1 falls on the way back.
+fn retreat(model: &mut Model, u: &mut Field, compression: &[f64], x: &Field) -> Result<bool> {
+    let layer = Layer::new(model, compression.to_vec());
+    let (r, _) = residual(model, u, &layer.force);
+    let mut back = x.zero_like();
+    back.add(-1.0, x);
+    let Ok(way) = Line::new(model, &layer, &r, &back).minimize(1e-2) else { return Ok(false) };
+    u.add(way, &back);
+    u.retrace(model);
+    Ok(way > 0.0)
+}

@@ -1,0 +1,262 @@
+//! What both loops share: the history of a run, its scales, when it ends, and who is told of it.
+
+use super::balance::Balance;
+use super::body::Energy;
+use super::bound::Reached;
+use super::field::Field;
+use super::history::{Observer, Row};
+use super::layer_state::Layer;
+use super::linear::{Failure, LinearStep};
+use super::model::Model;
+use super::origin::Origin;
+use super::scale::Scale;
+use super::stop::{Cycle, Floor, Status, relative_increment};
+use super::sweep::Sweep;
+use crate::error::Result;
+use crate::problem::stop::StopRule;
+use std::time::Instant;
+
+/// A run under way.
+pub(super) struct Run<'a> {
+    pub model: &'a mut Model,
+    pub stop: &'a StopRule,
+    pub balance: Option<Balance>,
+    pub observer: &'a mut dyn Observer,
+    pub began: Instant,
+    pub origin: Option<Origin>,
+    pub scale: Scale,
+    pub cycle: Cycle,
+    pub floor: Floor,
+    pub rows: Vec<Row>,
+}
+
+/// How a loop ended.
+pub(super) struct End {
+    pub status: Status,
+    /// The last iterate.
+    pub iterate: Field,
+    /// Its layers.
+    pub layer: Layer,
+    /// The Robin term that the model carries, for each contact row; empty for none.
+    pub weight: Vec<f64>,
+    pub sweeps: usize,
+    /// Solves of a body that were not needed.
+    pub skipped: usize,
+}
+
+impl End {
+    /// After a linear step that failed.
+    pub fn failed(failure: Failure, iterate: Field, layer: Layer, sweeps: usize) -> Self {
+        let status = Status::InnerSolver(failure);
+        Self { status, iterate, layer, weight: Vec::new(), sweeps, skipped: 0 }
+    }
+}
+
+/// What every rank knows of an iterate.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Measured {
+    /// u'Ku over all bodies.
+    pub strain: f64,
+    /// F1.
+    pub f1: f64,
+    pub factorizations: usize,
+    pub inner_iterations: usize,
+}
+
+impl Run<'_> {
+    /// Sums over the ranks what bodies know of an iterate; `energy` is that of the bodies that live here, `layer` the layers at
+    /// their compressions.
+    pub fn measure(&self, energy: Energy, layer: &Layer, linear: &dyn LinearStep) -> Measured {
+        let mut sums = [energy.strain, energy.potential, 0.0, 0.0];
+        for body in self.model.bodies.iter().filter_map(|slot| slot.local.as_ref()) {
+            let counts = body.counts();
+            sums[2] += counts.factorizations as f64;
+            sums[3] += counts.inner_iterations as f64;
+        }
+        self.model.exchange.sum(&mut sums);
+        let joint = linear.counts();
+        Measured {
+            strain: sums[0],
+            f1: sums[1] + layer.energy.iter().sum::<f64>(),
+            factorizations: sums[2] as usize + joint.factorizations,
+            inner_iterations: sums[3] as usize + joint.inner_iterations,
+        }
+    }
+
+    /// The row of iterate number `k`, reached by moving its traces by `moved` (none for a start), without its errors.
+    pub fn row(&self, k: usize, u: &Field, moved: Option<&[f64]>, measured: &Measured, closed: usize) -> Row {
+        let mut trace = u.trace.clone();
+        if let Some(origin) = &self.origin {
+            crate::linalg::axpy(1.0, origin.trace(), &mut trace);
+        }
+        let of = |body: usize| match moved {
+            None => f64::NAN,
+            Some(moved) => relative_increment(&self.model.of_body(body, moved), &self.model.of_body(body, &trace)),
+        };
+        let increments: Vec<f64> = (0..self.model.bodies.len()).map(of).collect();
+        Row {
+            iteration: k,
+            increment: increments.iter().copied().fold(f64::NAN, f64::max),
+            increments,
+            energy: measured.f1 + self.origin.as_ref().map_or(0.0, |origin| origin.energy),
+            closed,
+            points: self.model.points(),
+            factorizations: measured.factorizations,
+            inner_iterations: measured.inner_iterations,
+            seconds: self.began.elapsed().as_secs_f64(),
+            ..Row::default()
+        }
+    }
+
+    /// Shows a row and keeps it.
+    pub fn push(&mut self, row: Row) {
+        self.observer.row(&row);
+        self.rows.push(row);
+    }
+
+    /// Ends a step of Newton's method along x to u: its row, and the status if the run ends there.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn end_of_step(
+        &mut self,
+        u: &Field,
+        x: &Field,
+        measured: &Measured,
+        reached: &Reached,
+        places: &Layer,
+        linear: &mut dyn LinearStep,
+    ) -> Result<Option<Status>> {
+        let k = self.rows.len() + 1;
+        let mut row = self.row(k, u, Some(&x.trace), measured, places.closed);
+        (row.residual, row.error, row.is_bound) = (reached.worst(), reached.error, reached.is_bound);
+        (row.gamma, row.sweeps) = (1.0, linear.sweeps());
+        let increment = row.increment;
+        self.push(row);
+        let worst = reached.worst();
+        if let Some(body) = not_finite(self.model, x, worst) {
+            return Ok(Some(Status::NotFinite { body }));
+        }
+        if self.stop.is_met(worst, increment) {
+            return Ok(Some(Status::Converged));
+        }
+        if let Some(balance) = &mut self.balance
+            && balance.is_met(self.model, linear, u, places, reached.error)?
+        {
+            return Ok(Some(Status::Converged));
+        }
+        let closed = places.compression.iter().map(|&c| c > 0.0);
+        if let Some(period) = self.cycle.period(&u.trace, closed, worst, measured.f1) {
+            return Ok(Some(Status::Cycle { period }));
+        }
+        if self.floor.is_reached(worst) {
+            let floor = rounding(self.model, u, places).sqrt();
+            let reference = self.scale.energy(measured.strain + places.work).sqrt();
+            if reached.error * reference <= floor {
+                return Ok(Some(Status::RoundoffLimited));
+            }
+        }
+        Ok((k >= self.stop.iterations).then_some(Status::IterationLimit))
+    }
+}
+
+/// A sweep at an iterate, and how the iterate was reached.
+pub(super) struct Swept<'a> {
+    /// Number of the iterate.
+    pub k: usize,
+    pub u: &'a Field,
+    pub layer: &'a Layer,
+    pub sweep: &'a Sweep,
+    /// Change of the traces that led to it, and the length of the step.
+    pub last: Option<(&'a [f64], f64)>,
+    /// Error over residual, as far as it is known.
+    pub amplification: f64,
+    /// Sweeps so far.
+    pub sweeps: usize,
+}
+
+impl Run<'_> {
+    /// Ends a sweep: the row of its iterate, and the status if the run ends there.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn end_of_sweep(&mut self, swept: &Swept, linear: &mut dyn LinearStep) -> Result<Option<Status>> {
+        let Swept { k, u, layer, sweep, last, .. } = *swept;
+        let strain: f64 = sweep.energy.iter().map(|energy| energy.strain).sum();
+        let potential: f64 = sweep.energy.iter().map(|energy| energy.potential).sum();
+        let decrement: f64 = sweep.decrement.iter().sum();
+        let measured = Measured {
+            strain,
+            f1: potential + layer.energy.iter().sum::<f64>(),
+            factorizations: sweep.factorizations,
+            inner_iterations: sweep.inner_iterations,
+        };
+        let mut row = self.row(k, u, last.map(|last| last.0), &measured, layer.closed);
+        row.residual = self.scale.relative(decrement, strain + layer.work);
+        row.error = row.residual * swept.amplification;
+        row.gamma = last.map_or(f64::NAN, |last| last.1);
+        row.sweeps = swept.sweeps;
+        let (residual, error, increment) = (row.residual, row.error, row.increment);
+        self.push(row);
+        if let Some((body, reason)) = &sweep.failed {
+            let failure = Failure { body: Some(*body), reason: reason.clone() };
+            return Ok(Some(Status::InnerSolver(failure)));
+        }
+        if let Some(body) = not_finite(self.model, &sweep.correction, residual) {
+            return Ok(Some(Status::NotFinite { body }));
+        }
+        let imbalance = self.scale.imbalance(self.model, &layer.force);
+        // what is known of the error counts: a small residual of a slow mode is no small error
+        let balanced =
+            self.stop.residual.is_none_or(|tolerance| imbalance <= SPARE * tolerance && !(error > SPARE * tolerance));
+        if self.stop.is_met(residual, increment) && balanced {
+            return Ok(Some(Status::Converged));
+        }
+        if let Some(balance) = &mut self.balance
+            && balance.is_met(self.model, linear, u, layer, error)?
+        {
+            return Ok(Some(Status::Converged));
+        }
+        let closed = layer.compression.iter().map(|&c| c > 0.0);
+        if let Some(period) = self.cycle.period(&u.trace, closed, residual, measured.f1) {
+            return Ok(Some(Status::Cycle { period }));
+        }
+        if self.floor.is_reached(residual) && decrement <= rounding(self.model, u, layer) {
+            return Ok(Some(Status::RoundoffLimited));
+        }
+        Ok((k >= self.stop.iterations).then_some(Status::IterationLimit))
+    }
+}
+
+/// Factor on the tolerance of the residual for what is estimated besides it: error and balance.
+const SPARE: f64 = 10.0;
+
+/// A body in which a number is not finite, if the error is none.
+pub(super) fn not_finite(model: &Model, step: &Field, error: f64) -> Option<usize> {
+    let broken = |body: &usize| model.trace_ranges(*body).flatten().any(|i| !step.trace[i].is_finite());
+    let first = (0..model.bodies.len()).find(broken);
+    if error.is_finite() { first } else { first.or(Some(0)) }
+}
+
+/// What rounding alone can make of an iterate, squared energy norm: of K u, of forces, and of compressions, which a stiff layer
+/// answers with forces of its own.
+pub(super) fn rounding(model: &Model, u: &Field, layer: &Layer) -> f64 {
+    let mut floor = [0.0];
+    let points = model.points();
+    for (index, slot) in model.bodies.iter().enumerate() {
+        if let Some(body) = &slot.local {
+            floor[0] += body.rounding(&u.states[index], &model.at_rows(index, &layer.force));
+        }
+    }
+    model.exchange.sum(&mut floor);
+    // a force omega kappa e at a point is resisted by springs omega kappa at least
+    for q in 0..points {
+        let terms = u.trace[q].abs() + u.trace[points + q].abs() + model.gap[q].abs();
+        floor[0] += model.weight[q] * layer.tangent[q] * (f64::EPSILON * terms).powi(2);
+    }
+    ROUNDING * floor[0]
+}
+
+/// Squared factor between rounding errors and their estimate, which counts each row's worst case once: smooth errors weigh more in
+/// K^-1 than in the inverse of its diagonal.
+const ROUNDING: f64 = 1e3;

@@ -1,0 +1,269 @@
+//! A run from its start to its end, by either loop.
+
+use super::acceleration::Acceleration;
+use super::balance::{Balance, Discretisation};
+use super::body::BodyCounts;
+use super::coefficient::{Coefficient, underconstrained};
+use super::extend::extend;
+use super::field::Field;
+use super::forecast::Forecast;
+use super::history::{Observer, Row};
+use super::interval::{Interval, interval};
+use super::layer_state::Layer;
+use super::linear::{LinearStep, resisting};
+use super::model::Model;
+use super::origin::Origin;
+use super::run::{End, Run};
+use super::scale::Scale;
+use super::start::{self, RigidStart};
+use super::stop::{Cycle, Floor, Status};
+use super::{newton, robin};
+use crate::error::Result;
+use crate::problem::stop::StopRule;
+use std::time::Instant;
+
+/// How iterates are made.
+pub enum Method {
+    /// Newton's method, with a way to solve its linear steps.
+    Newton(Box<dyn LinearStep>),
+    /// Sweeps: the paper's iteration, or a faster one over the same sweep.
+    Sweeps {
+        /// How the next iterate is made from a sweep.
+        acceleration: Box<dyn Acceleration>,
+        /// The Robin term.
+        coefficient: Coefficient,
+        /// Solves for the response of the bodies, for estimates of the mesh's error.
+        linear: Box<dyn LinearStep>,
+    },
+}
+
+impl Method {
+    /// Name, as in the scene and the table.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Method::Newton(linear) => linear.name(),
+            Method::Sweeps { acceleration, .. } => acceleration.name(),
+        }
+    }
+
+    /// What solves linear steps.
+    pub fn linear(&mut self) -> &mut dyn LinearStep {
+        match self {
+            Method::Newton(linear) | Method::Sweeps { linear, .. } => &mut **linear,
+        }
+    }
+}
+
+/// Where a run begins.
+#[derive(Debug, Clone, Default)]
+pub enum Start {
+    /// Rigid bodies on their own surfaces.
+    #[default]
+    Automatic,
+    /// Outer normal displacement of all contact rows (2n, layout of a trace vector).
+    Trace(Vec<f64>),
+    /// Contact pressures (n), from another mesh say, for Newton's method; sweeps begin automatically.
+    Pressure(Vec<f64>),
+    /// A displacement as it is.
+    Resume(Field),
+}
+
+/// What a run needs to know besides the model and the method.
+pub struct Settings {
+    /// When to stop.
+    pub stop: StopRule,
+    /// Whether to find the interval (33) of gamma at the end, which takes some sweeps.
+    pub interval: bool,
+    /// Who knows the error of the discretisation, if the run is to stop where more would change nothing.
+    pub balance: Option<Box<dyn Discretisation>>,
+    /// Where to begin.
+    pub start: Start,
+}
+
+/// Result of a run: the last iterate that made sense, and how it came about.
+pub struct Outcome {
+    /// How it ended.
+    pub status: Status,
+    /// Updates made.
+    pub iterations: usize,
+    /// Sweeps made.
+    pub sweeps: usize,
+    /// Solves of a body that were not needed.
+    pub solves_skipped: usize,
+    /// The last iterate.
+    pub iterate: Field,
+    /// The layers at that iterate.
+    pub layer: Layer,
+    /// History, one row an iterate.
+    pub rows: Vec<Row>,
+    /// Name of the method.
+    pub method: &'static str,
+    /// What was done with all bodies together, besides what bodies count themselves.
+    pub joint: BodyCounts,
+    /// Estimated bounds of the spectrum of G^-1 F1'', if the method saw enough.
+    pub spectrum: Option<(f64, f64)>,
+    /// What it would still need to the residual that is asked for, where that can be told.
+    pub forecast: Option<Forecast>,
+    /// The interval (33) of gamma, if it was asked for and can be told.
+    pub interval: Option<Interval>,
+}
+
+/// Iterations without progress after which Newton's method, and sweeps, may be at the floor of rounding.
+const PATIENCE: [usize; 2] = [2, 20];
+
+/// Runs a method on a model from its start until a rule ends it.
+///
+/// # Errors
+/// Failures of the solver library. Not converging is a [`Status`].
+pub fn solve(
+    model: &mut Model,
+    method: &mut Method,
+    settings: &mut Settings,
+    observer: &mut dyn Observer,
+) -> Result<Outcome> {
+    let began = Instant::now();
+    let rigid = match infeasible(model) {
+        Ok(rigid) => rigid,
+        Err(status) => return Ok(Outcome::early(status, model, method)),
+    };
+    let floats = model.bodies.iter().any(|slot| !slot.motions.is_empty());
+    let begin = std::mem::take(&mut settings.start);
+    let mut trace = rigid.trace.clone();
+    if let Start::Trace(given) = &begin {
+        trace.clone_from(given);
+    }
+    let scale = Scale::new(model, &[&vec![0.0; 2 * model.points()], &trace]);
+    let places = places(model, &begin, &rigid);
+    // an estimate of the discretisation's error needs the iterates whole
+    let origin = if floats && settings.balance.is_none() { Origin::take(model, &rigid) } else { None };
+    let resumed = match begin {
+        Start::Resume(mut field) => {
+            if let Some(origin) = &origin {
+                origin.take_from(model, &mut field);
+            }
+            Some(field)
+        }
+        _ => None,
+    };
+    let mut run = Run {
+        model,
+        stop: &settings.stop,
+        balance: settings.balance.take().map(Balance::new),
+        observer,
+        began,
+        origin,
+        scale,
+        cycle: Cycle::default(),
+        floor: Floor::new(PATIENCE[usize::from(matches!(method, Method::Sweeps { .. }))]),
+        rows: Vec::new(),
+    };
+    let end = match method {
+        Method::Newton(linear) => {
+            let u = resumed.unwrap_or_else(|| Field::rest(run.model));
+            newton::iterate(&mut run, &mut **linear, u, places)?
+        }
+        Method::Sweeps { acceleration, coefficient, linear } => {
+            if let Some(origin) = &run.origin {
+                crate::linalg::axpy(-1.0, origin.trace(), &mut trace);
+            }
+            match resumed.map_or_else(|| extend(run.model, &trace), |field| Ok(Ok(field)))? {
+                Ok(u) => robin::iterate(&mut run, &mut **acceleration, coefficient, &mut **linear, u)?,
+                Err(failure) => End::failed(failure, Field::rest(run.model), places, 0),
+            }
+        }
+    };
+    run.conclude(end, method, settings)
+}
+
+/// Springs omega kappa of the first linear step of Newton's method; none if there is no solution.
+pub fn first_springs(model: &Model, begin: &Start) -> Option<Vec<f64>> {
+    let rigid = infeasible(model).ok()?;
+    Some(resisting(model, places(model, begin, &rigid).springs(model)))
+}
+
+/// Why no method can find a solution: a motion that nothing can hold, or loads that push a body off for ever; else the start.
+fn infeasible(model: &Model) -> std::result::Result<RigidStart, Status> {
+    if let Some(moved) = underconstrained(model, &model.row_stiffness()) {
+        return Err(Status::Underconstrained(moved));
+    }
+    if let Some(mechanism) = &model.mechanism {
+        return Err(Status::Mechanism(mechanism.clone()));
+    }
+    start::find(model, None).map_err(|moving| Status::Unbounded { moving })
+}
+
+/// The places from which Newton's method begins.
+fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
+    match begin {
+        Start::Automatic => rigid.places.clone(),
+        Start::Trace(trace) => match start::find(model, Some(trace)) {
+            Ok(rigid) => rigid.places,
+            Err(_) => start::at(model, trace),
+        },
+        Start::Resume(field) => Layer::at(model, &field.trace),
+        Start::Pressure(pressure) => {
+            let mut compression = Vec::with_capacity(pressure.len());
+            for (i, pair) in model.pairs.iter().enumerate() {
+                compression.extend(model.range(i).map(|q| pair.law.compression(q - model.offset[i], pressure[q])));
+            }
+            Layer::new(model, compression)
+        }
+    }
+}
+
+impl Outcome {
+    /// Of a run that ended before its first iterate.
+    fn early(status: Status, model: &Model, method: &Method) -> Self {
+        let iterate = Field::rest(model);
+        Self {
+            status,
+            iterations: 0,
+            sweeps: 0,
+            solves_skipped: 0,
+            layer: Layer::at(model, &iterate.trace),
+            iterate,
+            rows: Vec::new(),
+            method: method.name(),
+            joint: BodyCounts::default(),
+            spectrum: None,
+            forecast: None,
+            interval: None,
+        }
+    }
+}
+
+impl Run<'_> {
+    /// The result of a loop's end.
+    fn conclude(self, end: End, method: &mut Method, settings: &Settings) -> Result<Outcome> {
+        let Run { model, rows, origin, .. } = self;
+        let End { status, mut iterate, layer, weight, sweeps, skipped } = end;
+        let mut found = None;
+        let (spectrum, factor, updates) = match method {
+            Method::Newton(linear) => (linear.spectrum(), None, rows.len()),
+            Method::Sweeps { acceleration, .. } => {
+                acceleration.conclude(model, &layer, &weight);
+                if let ([first, .., last], true) = (&rows[..], settings.interval && status.is_solved()) {
+                    found = interval(model, &layer, first.energy - last.energy)?;
+                }
+                (acceleration.spectrum(), acceleration.factor(), rows.len().saturating_sub(1))
+            }
+        };
+        if let Some(origin) = origin {
+            origin.give(model, &mut iterate);
+        }
+        Ok(Outcome {
+            status,
+            iterations: updates,
+            sweeps,
+            solves_skipped: skipped,
+            iterate,
+            layer,
+            forecast: settings.stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
+            rows,
+            method: method.name(),
+            joint: method.linear().counts(),
+            spectrum,
+            interval: found,
+        })
+    }
+}

@@ -1,0 +1,250 @@
+//! The linear step by conjugate gradients over the Robin sweep: every iteration solves each body once, independently.
+//!
+//! One iteration tells a body of its neighbours alone, so the rigid motions E that supports leave free are deflated: with the matrix
+//! H of (35) and A = E'HE, a correction z = G^-1 r becomes (I - E A^- E'H) z, what is left of it when whole bodies have moved so that
+//! they are in balance again. As K E = 0, E'H and A are sums over contact points, which every rank knows: no message, no solve.
+
+use super::coefficient::Coefficient;
+use super::field::{Field, add_forces, apply_stiffness, local_dot};
+use super::linear::{Failure, LinearStep, Solution, Solved, System};
+use super::model::Model;
+use super::rigid::{Motions, TOLERANCE};
+use super::sweep::Sweeper;
+use crate::error::Result;
+use crate::linalg::Factor;
+use crate::linalg::{axpy, dot, fit};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// Iterations at most: conjugate gradients lose their directions to rounding long before.
+const MOST: usize = 400;
+
+/// Iterations over which the gain of energy tells the error before them (Hestenes and Stiefel).
+const DELAY: usize = 4;
+
+/// Precision of iterative solves of bodies as preconditioner.
+const ROUGH: f64 = 1e-2;
+
+/// Solves linear steps by sweeps.
+pub struct Sweeps {
+    coefficient: Option<Coefficient>,
+    sweeper: Sweeper,
+    systems: usize,
+    spectrum: Option<(f64, f64)>,
+}
+
+impl Sweeps {
+    /// With this Robin coefficient in the bodies' matrices.
+    pub fn new(coefficient: Coefficient) -> Self {
+        Self { coefficient: Some(coefficient), ..Self::carried() }
+    }
+
+    /// With the Robin term that bodies carry.
+    pub fn carried() -> Self {
+        Self { coefficient: None, sweeper: Sweeper::default(), systems: 0, spectrum: None }
+    }
+}
+
+impl LinearStep for Sweeps {
+    fn name(&self) -> &'static str {
+        "newton-robin"
+    }
+
+    fn solve(&mut self, system: System) -> Result<Solved> {
+        let System { model, places, springs, residual, reduction } = system;
+        model.precision(ROUGH)?;
+        if let Some(coefficient) = &mut self.coefficient {
+            let weight = coefficient.weight(model, places, self.systems);
+            model.robin(&weight)?;
+        }
+        self.systems += 1;
+        let found = gradients(model, &mut self.sweeper, springs, residual, (reduction, MOST))?;
+        Ok(found.map(|found| {
+            self.spectrum = found.spectrum.or(self.spectrum);
+            found.solution
+        }))
+    }
+
+    fn sweeps(&self) -> usize {
+        self.sweeper.sweeps
+    }
+
+    fn spectrum(&self) -> Option<(f64, f64)> {
+        self.spectrum
+    }
+}
+
+/// What conjugate gradients found.
+pub(super) struct Found {
+    pub solution: Solution,
+    /// Bounds of the spectrum of G^-1 H from the Lanczos matrix of the iteration.
+    pub spectrum: Option<(f64, f64)>,
+}
+
+/// Solves (K + B' diag(springs) B) x = r with the Robin term that the model carries, until the error has fallen to `reduction` in
+/// the energy norm, or after `most` iterations.
+///
+/// # Errors
+/// Failures of the solver library.
+pub(super) fn gradients(
+    model: &mut Model,
+    sweeper: &mut Sweeper,
+    springs: &[f64],
+    residual: &[Vec<f64>],
+    (reduction, most): (f64, usize),
+) -> Result<std::result::Result<Found, Failure>> {
+    let coarse = Coarse::new(model, springs);
+    let mut r = residual.to_vec();
+    let mut x = Field::zero(model);
+    let mut lanczos = Lanczos { energy: coarse.start(model, &mut r, &mut x), ..Lanczos::default() };
+    let mut last: Option<(Field, f64, Vec<Vec<f64>>)> = None;
+    let squared = loop {
+        let before = last.as_ref().map_or(&r, |(_, _, r)| r);
+        let sweep = sweeper.precondition(model, r.clone(), before)?;
+        if let Some((body, reason)) = sweep.failed {
+            return Ok(Err(Failure { body: Some(body), reason }));
+        }
+        let rz: f64 = sweep.decrement.iter().sum();
+        let error = lanczos.squared_error(rz);
+        if error <= reduction * reduction * lanczos.energy || lanczos.alphas.len() == most {
+            break error;
+        }
+        let mut p = sweep.correction;
+        coarse.deflate(model, &mut p);
+        // the flexible rule: the preconditioner may be an inexact solve
+        if let Some((mut direction, old, _)) = last.take() {
+            let beta = ((rz - sweep.product) / old).max(0.0);
+            lanczos.betas.push(beta);
+            direction.add_to(beta, &p);
+            p = direction;
+        }
+        let mut image = apply_stiffness(model, &p);
+        let closing = p.closing();
+        let spring: Vec<f64> = springs.iter().zip(&closing).map(|(w, s)| w * s).collect();
+        let mut sums = [local_dot(&image, &p.states)];
+        model.exchange.sum(&mut sums);
+        let curvature = sums[0] + dot(&spring, &closing);
+        // p'Gp is r'z at least: a direction of which deflation leaves nothing but rounding has no curvature beside it
+        if !(rz > 0.0 && curvature > f64::EPSILON * rz) {
+            break 0.0;
+        }
+        add_forces(model, &spring, &mut image);
+        let alpha = rz / curvature;
+        x.add(alpha, &p);
+        lanczos.gain(alpha, alpha * rz);
+        let old = r.clone();
+        r.iter_mut().zip(&image).for_each(|(r, y)| axpy(-alpha, y, r));
+        last = Some((p, rz, old));
+    };
+    let solution = Solution { field: x, energy: lanczos.energy, error: squared.max(0.0).sqrt() };
+    Ok(Ok(Found { solution, spectrum: lanczos.spectrum() }))
+}
+
+/// What the numbers of conjugate gradients tell of the spectrum and of the error.
+#[derive(Default)]
+struct Lanczos {
+    alphas: Vec<f64>,
+    betas: Vec<f64>,
+    /// Squared energy norm that each iteration gained, and that of x.
+    gains: Vec<f64>,
+    energy: f64,
+}
+
+/// Iterations after which the least eigenvalue is known as well as it will be.
+const SETTLED: usize = 64;
+
+impl Lanczos {
+    fn gain(&mut self, alpha: f64, gain: f64) {
+        self.alphas.push(alpha);
+        self.gains.push(gain);
+        self.energy += gain;
+    }
+
+    /// Estimate of the squared energy norm of the error where r'G^-1 r is `rz`: at most that over the least eigenvalue, and about what
+    /// the last iterations gained.
+    fn squared_error(&self, rz: f64) -> f64 {
+        let lately = match self.gains.len() {
+            0 => return if rz > 0.0 { f64::INFINITY } else { 0.0 },
+            n if n > DELAY => self.gains[n - DELAY..].iter().sum(),
+            _ => f64::INFINITY,
+        };
+        let low = if self.alphas.len() <= SETTLED { self.spectrum().map_or(0.0, |(low, _)| low) } else { 0.0 };
+        f64::min(lately, rz.max(0.0) / low)
+    }
+
+    /// Extreme eigenvalues of the Lanczos matrix.
+    fn spectrum(&self) -> Option<(f64, f64)> {
+        let (n, alphas, betas) = (self.alphas.len(), &self.alphas, &self.betas);
+        let mut t = DMatrix::zeros(n, n);
+        for i in 0..n {
+            t[(i, i)] = alphas[i].recip() + if i > 0 { betas[i - 1] / alphas[i - 1] } else { 0.0 };
+            if i + 1 < n {
+                let off = betas.get(i).copied().unwrap_or(0.0).sqrt() / alphas[i];
+                t[(i, i + 1)] = off;
+                t[(i + 1, i)] = off;
+            }
+        }
+        if n == 0 {
+            return None;
+        }
+        let values = SymmetricEigen::new(t).eigenvalues;
+        let (low, high) = (values.min(), values.max());
+        (low > 0.0 && high.is_finite()).then_some((low, high))
+    }
+}
+
+/// E and A^- for springs at the contact points. Motions are numbered through body by body.
+struct Coarse<'a> {
+    springs: &'a [f64],
+    /// For each body that lives here, each of its motions as the end of a state.
+    amounts: Vec<Vec<Vec<f64>>>,
+    inverse: Factor,
+}
+
+impl<'a> Coarse<'a> {
+    fn new(model: &Model, springs: &'a [f64]) -> Self {
+        let amounts = model.bodies.iter().map(|slot| match slot.local.as_ref().and_then(|body| body.matrices()) {
+            Some(matrices) => slot.motions.iter().map(|motion| fit(matrices.traces, &motion.trace)).collect(),
+            None => Vec::new(),
+        });
+        Self { springs, amounts: amounts.collect(), inverse: Motions::of(model).springs(springs).factor(TOLERANCE) }
+    }
+
+    /// x = E A^- E'r and r -= H x; returns the squared energy norm of x. One message.
+    fn start(&self, model: &Model, r: &mut [Vec<f64>], x: &mut Field) -> f64 {
+        let mut load = Vec::new();
+        for (body, slot) in model.bodies.iter().enumerate() {
+            match self.amounts[body].is_empty() {
+                true => load.resize(load.len() + slot.motions.len(), 0.0),
+                false => load.extend(self.amounts[body].iter().map(|a| dot(a, &r[body][r[body].len() - a.len()..]))),
+            }
+        }
+        model.exchange.sum(&mut load);
+        let load = DVector::from_vec(load);
+        let motion = self.inverse.solve(&load);
+        self.add(model, 1.0, &motion, x);
+        let push: Vec<f64> = self.springs.iter().zip(x.closing()).map(|(w, s)| -w * s).collect();
+        add_forces(model, &push, r);
+        motion.dot(&load)
+    }
+
+    /// v += s E `motion`.
+    fn add(&self, model: &Model, s: f64, motion: &DVector<f64>, v: &mut Field) {
+        axpy(s, &Motions::of(model).trace(model, motion), &mut v.trace);
+        let mut first = 0;
+        for (body, slot) in model.bodies.iter().enumerate() {
+            for (amounts, i) in self.amounts[body].iter().zip(first..) {
+                let state = &mut v.states[body];
+                let end = state.len() - amounts.len();
+                axpy(s * motion[i], amounts, &mut state[end..]);
+            }
+            first += slot.motions.len();
+        }
+    }
+
+    /// z <- (I - E A^- E'H) z.
+    fn deflate(&self, model: &Model, z: &mut Field) {
+        let spring: Vec<f64> = self.springs.iter().zip(z.closing()).map(|(w, s)| w * s).collect();
+        let motion = self.inverse.solve(&Motions::of(model).work(&spring));
+        self.add(model, -1.0, &motion, z);
+    }
+}

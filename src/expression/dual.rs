@@ -1,0 +1,219 @@
+//! Exact derivatives of expressions: the same text, evaluated on pairs of a value and its slope.
+//!
+//! The derivatives that `exmex` forms on its own know neither `min`, `max` nor `abs`, and take a comparison for its own derivative.
+
+use super::operators::{and, compare, max, min, not, or, sign};
+use super::{Expression, MOST_VARIABLES, grammar};
+use crate::error::{Place, Result};
+use exmex::{BinOp, Express, FlatEx, MakeOperators, NumberMatcher, Operator};
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+
+/// A value and its derivative.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Dual {
+    value: f64,
+    slope: f64,
+}
+
+impl Dual {
+    /// A function of this one, by its value and its derivative there.
+    fn then(self, value: f64, derivative: f64) -> Self {
+        Dual { value, slope: times(derivative, self.slope) }
+    }
+
+    /// A function of two, by its value and its derivatives.
+    fn join(self, other: Self, value: f64, by_self: f64, by_other: f64) -> Self {
+        Dual { value, slope: times(by_self, self.slope) + times(by_other, other.slope) }
+    }
+
+    /// A truth.
+    fn truth(value: f64) -> Self {
+        Dual { value, slope: 0.0 }
+    }
+}
+
+/// Derivative times slope; what does not change has no slope, however steep the function.
+fn times(derivative: f64, slope: f64) -> f64 {
+    if slope == 0.0 { 0.0 } else { derivative * slope }
+}
+
+impl FromStr for Dual {
+    type Err = <f64 as FromStr>::Err;
+
+    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
+        Ok(Dual { value: text.parse()?, slope: 0.0 })
+    }
+}
+
+type Unary = fn(Dual) -> Dual;
+type Binary = fn(Dual, Dual) -> Dual;
+
+const UNARY: &[(&str, Unary)] = &[
+    ("abs", |a| a.then(a.value.abs(), a.value.signum())),
+    ("acos", |a| a.then(a.value.acos(), -1.0 / (1.0 - a.value * a.value).sqrt())),
+    ("asin", |a| a.then(a.value.asin(), 1.0 / (1.0 - a.value * a.value).sqrt())),
+    ("atan", |a| a.then(a.value.atan(), 1.0 / (1.0 + a.value * a.value))),
+    ("ceil", |a| a.then(a.value.ceil(), 0.0)),
+    ("cos", |a| a.then(a.value.cos(), -a.value.sin())),
+    ("cosh", |a| a.then(a.value.cosh(), a.value.sinh())),
+    ("exp", |a| a.then(a.value.exp(), a.value.exp())),
+    ("floor", |a| a.then(a.value.floor(), 0.0)),
+    ("log", |a| a.then(a.value.ln(), 1.0 / a.value)),
+    ("log10", |a| a.then(a.value.log10(), 1.0 / (a.value * std::f64::consts::LN_10))),
+    ("sign", |a| a.then(sign(a.value), 0.0)),
+    ("sin", |a| a.then(a.value.sin(), a.value.cos())),
+    ("sinh", |a| a.then(a.value.sinh(), a.value.cosh())),
+    ("sqrt", |a| a.then(a.value.sqrt(), 0.5 / a.value.sqrt())),
+    ("tan", |a| a.then(a.value.tan(), 1.0 + a.value.tan().powi(2))),
+    ("tanh", |a| a.then(a.value.tanh(), 1.0 - a.value.tanh().powi(2))),
+    ("!", |a| Dual::truth(not(a.value))),
+];
+
+const BINARY: &[(&str, Binary)] = &[
+    ("atan2", |a, b| {
+        let square = a.value * a.value + b.value * b.value;
+        a.join(b, a.value.atan2(b.value), b.value / square, -a.value / square)
+    }),
+    ("max", |a, b| if max(a.value, b.value) == b.value { b } else { a }),
+    ("min", |a, b| if min(a.value, b.value) == b.value { b } else { a }),
+    ("||", |a, b| Dual::truth(or(a.value, b.value))),
+    ("&&", |a, b| Dual::truth(and(a.value, b.value))),
+    ("==", |a, b| Dual::truth(compare(a.value, b.value, a.value == b.value))),
+    ("!=", |a, b| Dual::truth(compare(a.value, b.value, a.value != b.value))),
+    ("<=", |a, b| Dual::truth(compare(a.value, b.value, a.value <= b.value))),
+    (">=", |a, b| Dual::truth(compare(a.value, b.value, a.value >= b.value))),
+    ("<", |a, b| Dual::truth(compare(a.value, b.value, a.value < b.value))),
+    (">", |a, b| Dual::truth(compare(a.value, b.value, a.value > b.value))),
+    ("+", |a, b| a.join(b, a.value + b.value, 1.0, 1.0)),
+    ("-", |a, b| a.join(b, a.value - b.value, 1.0, -1.0)),
+    ("*", |a, b| a.join(b, a.value * b.value, b.value, a.value)),
+    ("/", |a, b| {
+        let value = a.value / b.value;
+        a.join(b, value, 1.0 / b.value, -value / b.value)
+    }),
+    ("^", |a, b| {
+        let value = a.value.powf(b.value);
+        a.join(b, value, b.value * a.value.powf(b.value - 1.0), value * a.value.ln())
+    }),
+];
+
+/// The operators of expressions on pairs.
+#[derive(Debug, Clone)]
+struct DualOperators;
+
+impl MakeOperators<Dual> for DualOperators {
+    fn make<'a>() -> Vec<Operator<'a, Dual>> {
+        let binary = |apply| BinOp { apply, prio: 0, is_commutative: false };
+        let mut operators: Vec<_> = UNARY.iter().map(|(name, apply)| Operator::make_unary(name, *apply)).collect();
+        operators.extend(BINARY.iter().map(|(symbol, apply)| match *symbol {
+            "-" => Operator::make_bin_unary(symbol, binary(*apply), |a| a.then(-a.value, -1.0)),
+            _ => Operator::make_bin(symbol, binary(*apply)),
+        }));
+        operators
+    }
+}
+
+/// An expression with its derivative by the first of its variables.
+#[derive(Clone)]
+pub struct Differentiable {
+    plain: Expression,
+    dual: Arc<FlatEx<Dual, DualOperators, NumberMatcher>>,
+}
+
+impl Differentiable {
+    /// Parses a text like [`Expression::parse`].
+    ///
+    /// # Errors
+    /// Those of [`Expression::parse`].
+    pub fn parse(text: &str, place: &Place, variables: &[&'static str]) -> Result<Self> {
+        let plain = Expression::parse(text, place, variables)?;
+        let refuse = |slip: super::Slip| slip.into_error(text, place);
+        let explicit = grammar::parse(text, variables).map_err(refuse)?;
+        let dual = FlatEx::parse(&explicit)
+            .map_err(|error| refuse(super::Slip::new(0..text.len(), format!("no derivative: {error}"))))?;
+        Ok(Self { plain, dual: Arc::new(dual) })
+    }
+
+    /// The expression alone.
+    pub fn plain(&self) -> &Expression {
+        &self.plain
+    }
+
+    /// Value, and derivative by the first variable, for the values of the variables in the order of
+    /// [`Differentiable::parse`].
+    pub fn eval(&self, values: &[f64]) -> (f64, f64) {
+        self.eval_by(0, values)
+    }
+
+    /// The same with the derivative by the variable of this number.
+    pub fn eval_by(&self, variable: usize, values: &[f64]) -> (f64, f64) {
+        let mut used = [Dual::default(); MOST_VARIABLES];
+        for (used, &slot) in used.iter_mut().zip(self.plain.slots.iter()) {
+            let value = values.get(slot).copied().unwrap_or(f64::NAN);
+            *used = Dual { value, slope: if slot == variable { 1.0 } else { 0.0 } };
+        }
+        match self.dual.eval(&used[..self.plain.slots.len()]) {
+            Ok(Dual { value, slope }) => (value, slope),
+            Err(_) => (f64::NAN, f64::NAN),
+        }
+    }
+}
+
+impl fmt::Debug for Differentiable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.plain.fmt(f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Source;
+    use crate::expression::operators;
+
+    fn parse(text: &str) -> Differentiable {
+        let source = Source { name: "scene.toml".into(), text: format!("pressure = \"{text}\"\n") };
+        let place = Place { span: 11..13 + text.len(), source: Arc::new(source) };
+        Differentiable::parse(text, &place, &["c", "x"]).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    #[test]
+    fn derivatives_agree_with_differences() {
+        let functions = operators::UNARY.iter().map(|(name, _)| format!("{name}(0.3*c*x) + c"));
+        let others = [
+            "3*c^2.5 + x*c",
+            "2^c/(1 + c^x)",
+            "max(c, x) - min(c, 2*x, 1) + max(-c, -2)",
+            "atan2(c, x) + atan2(x, c)",
+            "c*(c > x) + !(c >= x)*c^2 + (c < x || c != 1 && x <= 2)*c",
+            "-c^2 - -c/x - (c == 3)",
+            "(1 - c)^2",
+        ];
+        for text in functions.chain(others.map(String::from)) {
+            let law = parse(&text);
+            for (c, x) in [(0.7, 1.1), (1.3, 0.6), (1e-3, 0.9)] {
+                let h = 1e-6 * c;
+                let (value, slope) = law.eval(&[c, x]);
+                let [low, high] = [c - h, c + h].map(|c| law.plain().eval(&[c, x]));
+                assert!((value - law.plain().eval(&[c, x])).abs() <= 1e-15 * value.abs(), "{text}");
+                let difference = (high - low) / (2.0 * h);
+                assert!(
+                    (slope - difference).abs() < 1e-7 * (1.0 + slope.abs()) + 1e-9 / c,
+                    "{text} at {c}, {x}: {slope} {difference}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_at_zero_are_those_of_the_formula() {
+        assert_eq!(parse("c^2").eval(&[0.0, 0.0]), (0.0, 0.0));
+        assert_eq!(parse("(x - 2)^2*c").eval(&[0.0, 1.0]).1, 1.0);
+        assert_eq!(parse("(x - 2)^2*c").eval_by(1, &[3.0, 1.0]).1, -6.0);
+        assert_eq!(parse("1e5*c + c^1.5").eval(&[0.0, 0.0]), (0.0, 1e5));
+        assert_eq!(parse("sqrt(c)").eval(&[0.0, 0.0]).1, f64::INFINITY);
+        assert!(parse("log(c)").eval(&[-1.0, 0.0]).0.is_nan());
+    }
+}

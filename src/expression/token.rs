@@ -1,0 +1,67 @@
+//! Words of an expression.
+
+use super::operators::INFIX;
+use super::slip::Slip;
+use std::ops::Range;
+
+/// One word of an expression.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Token<'a> {
+    Number(f64),
+    Name(&'a str),
+    /// A binary operator, or one of `( ) , !`.
+    Symbol(&'static str),
+    End,
+}
+
+/// The word at or after `start`, and where it stands.
+pub(super) fn next(text: &str, start: usize) -> Result<(Token<'_>, Range<usize>), Slip> {
+    let start = text.len() - text[start..].trim_start().len();
+    let rest = &text[start..];
+    let Some(first) = rest.chars().next() else {
+        return Ok((Token::End, start..start));
+    };
+    if first.is_ascii_digit() || first == '.' {
+        let span = start..start + number_length(rest);
+        return match text[span.clone()].parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok((Token::Number(value), span)),
+            Ok(_) => Err(Slip::new(span, "the number is too large")),
+            Err(_) => Err(Slip::new(span, "not a number").help("write numbers like 2, 0.5 or 1e-3")),
+        };
+    }
+    if first.is_alphabetic() || first == '_' {
+        let length = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
+        return Ok((Token::Name(&rest[..length]), start..start + length));
+    }
+    let symbols = INFIX.iter().map(|(symbol, ..)| *symbol).chain(["(", ")", ",", "!"]);
+    match symbols.filter(|symbol| rest.starts_with(symbol)).max_by_key(|symbol| symbol.len()) {
+        Some("*") if rest.starts_with("**") => {
+            Err(Slip::new(start..start + 2, "unknown operator `**`").help("write a power as x^2"))
+        }
+        Some(symbol) => Ok((Token::Symbol(symbol), start..start + symbol.len())),
+        None => {
+            let slip = Slip::new(start..start + first.len_utf8(), format!("unexpected `{first}`"));
+            Err(match first {
+                '=' => slip.help("compare with =="),
+                '&' => slip.help("\"and\" is written &&"),
+                '|' => slip.help("\"or\" is written ||, an absolute value abs(x)"),
+                _ => slip,
+            })
+        }
+    }
+}
+
+/// Length of the number that `rest` starts with: digits, a point, an exponent.
+fn number_length(rest: &str) -> usize {
+    let digits = |from: usize| rest[from..].bytes().take_while(|b| b.is_ascii_digit() || *b == b'.').count();
+    let mantissa = digits(0);
+    let exponent = &rest[mantissa..];
+    if !exponent.starts_with(['e', 'E']) {
+        return mantissa;
+    }
+    let sign = usize::from(exponent[1..].starts_with(['+', '-']));
+    match exponent[1 + sign..].bytes().take_while(u8::is_ascii_digit).count() {
+        0 => mantissa,
+        count => mantissa + 1 + sign + count,
+    }
+}

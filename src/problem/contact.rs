@@ -1,0 +1,46 @@
+//! Pairs of contact surfaces.
+
+use super::layer::LayerSpec;
+use crate::error::Located;
+use crate::expression::Field;
+
+/// A pair of contact surfaces and the layer between them.
+#[derive(Debug, Clone)]
+pub struct ContactSpec {
+    /// The two physical groups.
+    pub between: [Located<String>; 2],
+    /// The scene's own gap d(x), added to the geometric distance; zero if not given.
+    pub gap: Field,
+    /// Law of the layer.
+    pub layer: LayerSpec,
+    /// Whether the surfaces are taken to touch wherever they face each other: only [`ContactSpec::gap`] counts, not the
+    /// distance of the meshes.
+    pub touching: bool,
+    /// What to do about surfaces that overlap before loading.
+    pub overlap: Overlap,
+    /// A known contact pressure to draw and compare with, if any.
+    pub reference: Option<Field>,
+}
+
+/// Contact of all bodies that come near each other, where no [`ContactSpec`] names surfaces of the two.
+#[derive(Debug, Clone)]
+pub struct AutoContact {
+    /// Largest distance of facets that form a pair, > 0.
+    pub distance: f64,
+    /// What holds for each pair; `between` is to be replaced by the names of the bodies.
+    pub contact: ContactSpec,
+}
+
+/// What to do about surfaces that overlap before loading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Overlap {
+    /// The layer takes it as compression, with a warning.
+    Compress,
+    /// The scene is refused.
+    Refuse,
+}
+
+impl Overlap {
+    /// The choices with their names in the scene.
+    pub const ALL: [(&'static str, Overlap); 2] = [("compress", Overlap::Compress), ("error", Overlap::Refuse)];
+}

@@ -1,0 +1,110 @@
+//! Laws of layers: their forms and parameters.
+
+use crate::expression::{Differentiable, Field};
+
+/// Law of a Winkler layer.
+#[derive(Debug, Clone)]
+pub enum LayerSpec {
+    /// A law of a known form; its parameters are numbers or expressions in the coordinates.
+    Form {
+        /// Which one.
+        form: &'static LawForm,
+        /// One value for each of its parameters.
+        values: Vec<Field>,
+    },
+    /// Monotone cubic curve through points (c, p), both increasing from (0, 0), which is not among them.
+    Table(Vec<[f64; 2]>),
+    /// An expression p(c), which may also use the coordinates.
+    Pressure {
+        /// The expression; its first variable is c.
+        law: Differentiable,
+        /// Compression beyond which p goes on linearly, if given.
+        up_to: Option<f64>,
+    },
+}
+
+/// Forms of laws with a few parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LawKind {
+    /// p = stiffness c.
+    Linear,
+    /// p = (c/B)^(1/a).
+    Power,
+    /// p = p0 (e^(c/c0) - 1).
+    Exponential,
+    /// p = k1 c + k3 c^3.
+    Cubic,
+}
+
+/// A form of law: how it is called and what it needs.
+#[derive(Debug, PartialEq, Eq)]
+pub struct LawForm {
+    /// Which one.
+    pub kind: LawKind,
+    /// Key of the scene.
+    pub name: &'static str,
+    /// Its parameters, in the order in which values are kept.
+    pub parameters: &'static [Parameter],
+}
+
+/// A parameter of a law.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Parameter {
+    /// Key of the scene.
+    pub key: &'static str,
+    /// Name in messages.
+    pub what: &'static str,
+    /// Values that make a law.
+    pub bounds: Bounds,
+}
+
+/// Ranges of parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bounds {
+    /// Greater than 0.
+    Positive,
+    /// 0 or more.
+    NotNegative,
+    /// Greater than 0 and at most 1.
+    UpToOne,
+}
+
+impl Bounds {
+    /// What is wrong with a value; `None` if it lies in the range.
+    pub fn breach(self, value: f64) -> Option<&'static str> {
+        match self {
+            Bounds::Positive | Bounds::UpToOne if value <= 0.0 => Some("must be greater than 0"),
+            Bounds::UpToOne if value > 1.0 => Some("must not exceed 1"),
+            Bounds::NotNegative if value < 0.0 => Some("must not be negative"),
+            _ => None,
+        }
+    }
+}
+
+const fn parameter(key: &'static str, what: &'static str, bounds: Bounds) -> Parameter {
+    Parameter { key, what, bounds }
+}
+
+/// Every form.
+pub static FORMS: [LawForm; 4] = [
+    LawForm {
+        kind: LawKind::Power,
+        name: "power",
+        parameters: &[parameter("B", "B", Bounds::Positive), parameter("a", "a", Bounds::UpToOne)],
+    },
+    LawForm {
+        kind: LawKind::Linear,
+        name: "linear",
+        parameters: &[parameter("stiffness", "the stiffness", Bounds::Positive)],
+    },
+    LawForm {
+        kind: LawKind::Exponential,
+        name: "exponential",
+        parameters: &[parameter("p0", "p0", Bounds::Positive), parameter("c0", "c0", Bounds::Positive)],
+    },
+    LawForm {
+        kind: LawKind::Cubic,
+        name: "cubic",
+        parameters: &[parameter("k1", "k1", Bounds::Positive), parameter("k3", "k3", Bounds::NotNegative)],
+    },
+];

@@ -1,0 +1,114 @@
+//! The outer iteration: methods and their settings by name.
+
+use super::robin::{RobinRule, Zone};
+use super::stop::StopRule;
+use crate::expression::Field;
+
+/// The outer iteration.
+#[derive(Debug, Clone)]
+pub struct MethodSpec {
+    /// How steps are made. Without a name it is [`MethodName::Robin`] where psi, gamma, robin or the increment rule are given,
+    /// else [`MethodName::Auto`].
+    pub name: MethodName,
+    /// Robin zone psi.
+    pub psi: Zone,
+    /// Robin coefficient on the zone.
+    pub robin: RobinRule,
+    /// Relaxation of the method `robin`.
+    pub gamma: Gamma,
+    /// Whether `robin` finds the interval (33) of gamma at the end.
+    pub interval: bool,
+    /// Earlier steps that the method `anderson` mixes.
+    pub depth: usize,
+    /// Start of the iteration.
+    pub start: Start,
+    /// Shares of the loads, one after another and 1 at last; none are no steps.
+    pub steps: Vec<f64>,
+    /// When to stop.
+    pub stop: StopRule,
+}
+
+impl Default for MethodSpec {
+    fn default() -> Self {
+        Self {
+            name: MethodName::Auto,
+            psi: Zone::Active,
+            robin: RobinRule::Auto,
+            gamma: Gamma::Stationary(0.6),
+            interval: false,
+            depth: 5,
+            start: Start::Auto,
+            steps: Vec::new(),
+            stop: StopRule::default(),
+        }
+    }
+}
+
+/// Methods by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MethodName {
+    /// The program's choice, and its change when progress stops.
+    Auto,
+    /// The paper's iteration (41)-(42).
+    Robin,
+    /// Nonlinear conjugate gradients over the sweep.
+    Ncg,
+    /// Anderson acceleration of the sweep.
+    Anderson,
+    /// Semismooth Newton (35), its systems by conjugate gradients over the sweep.
+    NewtonRobin,
+    /// Semismooth Newton (35), its systems by one factorisation of all bodies together.
+    Newton,
+}
+
+impl MethodName {
+    /// Every method with its name in the scene.
+    pub const ALL: [(&'static str, MethodName); 6] = [
+        ("auto", MethodName::Auto),
+        ("robin", MethodName::Robin),
+        ("ncg", MethodName::Ncg),
+        ("anderson", MethodName::Anderson),
+        ("newton-robin", MethodName::NewtonRobin),
+        ("newton", MethodName::Newton),
+    ];
+}
+
+/// Relaxation gamma^k.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Gamma {
+    /// The same number > 0 all the way.
+    Stationary(f64),
+    /// Numbers > 0 for k = 0, 1, ...; the last one stays.
+    Schedule(Vec<f64>),
+    /// Exact line search on F1.
+    LineSearch,
+    /// Aitken's rule.
+    Aitken,
+    /// The rule of Barzilai and Borwein.
+    BarzilaiBorwein,
+    /// Best stationary value for the estimated spectrum.
+    Spectral,
+}
+
+impl Gamma {
+    /// Rules with a name in the scene.
+    pub const NAMED: [(&'static str, Gamma); 4] = [
+        ("line-search", Gamma::LineSearch),
+        ("aitken", Gamma::Aitken),
+        ("barzilai-borwein", Gamma::BarzilaiBorwein),
+        ("spectral", Gamma::Spectral),
+    ];
+}
+
+/// Start of the iteration, given on the contact surfaces.
+#[derive(Debug, Clone)]
+pub enum Start {
+    /// Rigid bodies on their own surfaces.
+    Auto,
+    /// Zero normal displacement.
+    Zero,
+    /// The solution on a mesh of elements twice as large.
+    Nested,
+    /// Outer normal displacement on every contact surface.
+    Normal(Field),
+}

@@ -1,0 +1,15 @@
+//! What is to be solved, and how, as plain data: bodies, contacts, layers, and methods and solvers by name.
+//!
+//! What names a group of the mesh, which is read later, keeps
+//! the place where it was written, for a refusal.
+
+pub mod body;
+pub mod contact;
+pub mod elasticity;
+pub mod layer;
+pub mod mesh;
+pub mod method;
+pub mod order;
+pub mod robin;
+pub mod solver;
+pub mod stop;

@@ -1,0 +1,20 @@
+//! Order of finite elements.
+
+/// Polynomial order of the displacements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Order {
+    /// Linear simplices.
+    P1,
+    /// Quadratic simplices.
+    P2,
+}
+
+impl Order {
+    /// Polynomial degree: 1 or 2.
+    pub fn degree(self) -> usize {
+        match self {
+            Order::P1 => 1,
+            Order::P2 => 2,
+        }
+    }
+}
