@@ -52,8 +52,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
         }
         forcing.learn(&gap, &reached, run.stop.residual);
-        let retreated = progress.is_lost(gap.change, measured.f1) && retreat(run.model, &mut u, &c, &x.field)?;
-        places = if retreated { Layer::at(run.model, &u.trace) } else { met };
+        // a step that knew of no contact runs through the other body
+        let astray = progress.is_lost(gap.change, measured.f1) || places.closed == 0;
+        places = if astray && retreat(run.model, &mut u, &x.field)? { Layer::at(run.model, &u.trace) } else { met };
     }
 }
 
@@ -111,14 +112,18 @@ impl Progress {
     }
 }
 
-/// Takes back of a step x to u what raises F1, by exact search. Whether F1 falls on the way back.
-fn retreat(model: &mut Model, u: &mut Field, compression: &[f64], x: &Field) -> Result<bool> {
-    let layer = Layer::new(model, compression.to_vec());
-    let (r, _) = residual(model, u, &layer.force);
-    let mut back = x.zero_like();
-    back.add(-1.0, x);
-    let Ok(way) = Line::new(model, &layer, &r, &back).minimize(1e-2) else { return Ok(false) };
-    u.add(way, &back);
-    u.retrace(model);
-    Ok(way > 0.0)
+/// Takes back of a step x to u what raises F1, by exact search from where it began. Whether there is something to take back.
+fn retreat(model: &mut Model, u: &mut Field, x: &Field) -> Result<bool> {
+    let mut before = u.clone();
+    before.add(-1.0, x);
+    before.retrace(model);
+    let layer = Layer::at(model, &before.trace);
+    let (r, _) = residual(model, &before, &layer.force);
+    let Ok(way) = Line::new(model, &layer, &r, x).minimize(1e-2) else { return Ok(false) };
+    if way > 0.0 && way < 1.0 {
+        before.add(way, x);
+        before.retrace(model);
+        *u = before;
+    }
+    Ok(way > 0.0 && way < 1.0)
 }

@@ -134,7 +134,8 @@ impl Run<'_> {
         let increment = row.increment;
         self.push(row);
         let worst = reached.worst();
-        if let Some(body) = not_finite(self.model, x, worst) {
+        // pressures of compressions that are far away may be beyond the range of numbers: the places are not
+        if let Some(body) = not_finite(self.model, x, if worst.is_nan() { worst } else { 0.0 }) {
             return Ok(Some(Status::NotFinite { body }));
         }
         if self.stop.is_met(worst, increment) {
