@@ -96,6 +96,8 @@ pub struct Answer {
     pub force: Vec<f64>,
     /// Whether the run says that this is the solution.
     pub claims: bool,
+    /// The iterates, one a line: error, closed points, energy.
+    pub history: Vec<String>,
 }
 
 /// Runs a scene file by a method.
@@ -134,6 +136,7 @@ fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Re
         force: (0..model.pairs.len()).map(|i| model.range(i).map(|q| outcome.layer.force[q]).sum()).collect(),
         pressure: outcome.layer.pressure,
         claims: outcome.status.is_solved(),
+        history: outcome.rows.iter().map(|row| format!("{:.1e}/{}", row.residual, row.closed)).collect(),
     })
 }
 
@@ -168,7 +171,7 @@ pub enum Verdict {
 
 /// Judges an answer by the reference.
 pub fn judge(case: &Case, reference: &Answer, answer: &Answer) -> Verdict {
-    let named = ["unheld", "unbounded", "refused"].contains(&answer.status.as_str());
+    let named = ["underconstrained", "unbounded", "refused"].contains(&answer.status.as_str());
     if !answer.claims {
         let may = match case.expect {
             Expect::Solution => floats(case, reference),
@@ -180,7 +183,7 @@ pub fn judge(case: &Case, reference: &Answer, answer: &Answer) -> Verdict {
         return Verdict::Wrong("there is no solution".to_owned());
     }
     // a run that says that rounding stops it makes no promise of accuracy
-    let off_is = |why: String| if answer.status == "attainable" { Verdict::Failed } else { Verdict::Wrong(why) };
+    let off_is = |why: String| if answer.status == "roundoff-limited" { Verdict::Failed } else { Verdict::Wrong(why) };
     if let Some(carried) = case.carried {
         let off = answer.force.iter().map(|force| (force - carried).abs() / carried).fold(0.0, f64::max);
         if carried > 0.0 && off > TOLERANCE {
