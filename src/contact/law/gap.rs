@@ -7,10 +7,9 @@ use super::quadrature::integral_to;
 const SHARE: f64 = 1e-5;
 /// Rounding of a law's value, as a share of it: no quadrature gets below.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
-/// Share of c within which a difference of compressions is too rounded to integrate over: a root is found to a few steps of
-/// double numbers, 1e-3 of this many.
+/// Share of c within which a difference of compressions is too rounded to integrate over: a root is found to a few
+/// steps of double numbers, 1e-3 of this many.
 const CLOSE: f64 = 4096.0 * f64::EPSILON;
-
 /// Relative difference of pressures within which a law is looked upon as straight, if its tangents at both ends say so.
 const NEAR: f64 = 1e-6;
 /// Relative difference of those tangents: two thirds of it are the error of the gap, upwards.
@@ -46,7 +45,7 @@ pub(super) fn by_quadrature<L: LayerLaw + ?Sized>(law: &L, point: usize, c: f64,
         }
         let [here, there] = [c, on_graph].map(|c| law.pressure_and_tangent(point, c).1);
         let least = here.min(there);
-        if short || (here - there).abs() <= STRAIGHT * least {
+        if short || (here - there).abs() < STRAIGHT * least {
             // the way is rounded, the difference of pressures is not; the flatter side gives the larger gap
             return 0.5 * difference * (difference / least);
         }

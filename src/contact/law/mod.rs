@@ -5,9 +5,10 @@
 //! [`layer`](crate::problem::layer) and a line in [`make`].
 //!
 //! With p = 0 for c <= 0 a law is a maximal monotone graph of points (c, p). Its points are found from the compression
-//! ([`LayerLaw::response`]), from the pressure ([`LayerLaw::compression`]) or from a line of slope -rho that meets the graph
-//! ([`LayerLaw::meet`]); [`LayerLaw::duality_gap`] says how far any (c, p) is from the graph. These handle the open layer and
-//! the ends of the range; a law implements the methods named `loaded`, if it has a better way than the common search.
+//! ([`LayerLaw::response`]), from the pressure ([`LayerLaw::compression`]) or from a line of slope -rho that meets the
+//! graph ([`LayerLaw::meet`]); [`LayerLaw::duality_gap`] says how far any (c, p) is from the graph. These handle the
+//! open layer and the ends of the range; a law implements the methods named `loaded`, if it has a better way than the
+//! common search.
 
 mod cubic;
 mod exponential;
@@ -58,7 +59,8 @@ impl Response {
         (pressure - self.pressure) / self.tangent
     }
 
-    /// How far beyond this response, at compression `c`, a straight line meets c + p/rho = s; negative if it does before.
+    /// How far beyond this response, at compression `c`, a straight line meets c + p/rho = s; negative if it does
+    /// before.
     fn straight_meet(self, c: f64, s: f64, rho: f64) -> f64 {
         (s - c - self.pressure / rho) / (1.0 + self.tangent / rho)
     }
@@ -94,8 +96,8 @@ pub trait LayerLaw: std::fmt::Debug {
     /// The compression c of the only point (c, p) of the graph with c + p/rho = s, for a stiffness per area `rho > 0`
     /// (Minty's parametrisation): s itself for `s <= 0` and for an infinite rho; NaN stays NaN.
     ///
-    /// c and p/rho grow with s, and neither by more than s does. The equation holds to the rounding of p(c): a few times
-    /// 1e-16 s times the exponent of the law at c.
+    /// c and p/rho grow with s, and neither by more than s does. The equation holds to the rounding of p(c): a few
+    /// times 1e-16 s times the exponent of the law at c.
     fn meet(&self, point: usize, s: f64, rho: f64) -> f64 {
         // written so that NaN stays
         if s > 0.0 && s < f64::INFINITY && rho < f64::INFINITY { self.meet_loaded(point, s, rho) } else { s }
@@ -106,8 +108,8 @@ pub trait LayerLaw: std::fmt::Debug {
         root::meeting(s, rho, [0.0, s], s, |c| self.pressure_and_tangent(point, c))
     }
 
-    /// The compression at which the layer has this pressure: 0 for `pressure <= 0`, infinity for one that it cannot reach in
-    /// double numbers; NaN stays NaN.
+    /// The compression at which the layer has this pressure: 0 for `pressure <= 0`, infinity for one that it cannot
+    /// reach in double numbers; NaN stays NaN.
     fn compression(&self, point: usize, pressure: f64) -> f64 {
         if pressure > 0.0 && pressure < f64::INFINITY {
             self.compression_loaded(point, pressure)
@@ -123,17 +125,18 @@ pub trait LayerLaw: std::fmt::Debug {
         root::root(pressure, [0.0, f64::MAX], start, |c| self.pressure_and_tangent(point, c)).unwrap_or(f64::INFINITY)
     }
 
-    /// Fenchel's gap P(c) + P*(p) - c p of a compression `c` and a `pressure` that need not be the law's, energy per area, with
-    /// the complementary energy P*(p) = sup_c (p c - P(c)): not negative, zero on the graph, infinite for `pressure < 0` and
-    /// for a pressure that the layer cannot reach; NaN stays NaN.
+    /// Fenchel's gap P(c) + P*(p) - c p of a compression `c` and a `pressure` that need not be the law's, energy per
+    /// area, with the complementary energy P*(p) = sup_c (p c - P(c)): not negative, zero on the graph, infinite for
+    /// `pressure < 0` and for a pressure that the layer cannot reach; NaN stays NaN.
     ///
-    /// It is the area between the graph and the corner (c, p), computed without the difference of large numbers. Near the graph
-    /// it follows the difference p(c) - p, which is exact for the p(c) that [`LayerLaw::pressure`] gives: a relative error below
-    /// 1e-3 as long as |p(c) - p| >= 1e-13 p. Where a kink of the law is between the two, within 1e-12 c, it is only a bound,
-    /// at most the ratio of the tangents too large. Closer to the graph it is of the order of 1e-30 p^2/p'(c) or 0.
+    /// It is the area between the graph and the corner (c, p), computed without the difference of large numbers. Near
+    /// the graph it follows the difference p(c) - p, which is exact for the p(c) that [`LayerLaw::pressure`] gives: a
+    /// relative error below 1e-3 as long as |p(c) - p| >= 1e-13 p. Where a kink of the law is between the two, within
+    /// 1e-12 c, it is only a bound, at most the ratio of the tangents too large. Closer to the graph it is of the order
+    /// of 1e-30 p^2/p'(c) or 0.
     ///
-    /// What p(c) itself has of rounding, 1e-16 p times the exponent of the law, is no error of the gap: it is that of a law with
-    /// parameters as far off as double numbers are.
+    /// What p(c) itself has of rounding, 1e-16 p times the exponent of the law, is no error of the gap: it is that of a
+    /// law with parameters as far off as double numbers are.
     fn duality_gap(&self, point: usize, c: f64, pressure: f64) -> f64 {
         gap::gap(self, point, c, pressure)
     }

@@ -3,7 +3,8 @@
 use super::gap::exp_less_line;
 use super::{LayerLaw, Response};
 
-/// log((c + p/rho)/s) after which the next error, of fourth order, is rounding; for exponents up to 50 even 1e-4 leaves 1e-14.
+/// log((c + p/rho)/s) after which the next error, of fourth order, is rounding; for exponents up to 50 even 1e-4 leaves
+/// 1e-14.
 const SETTLED: f64 = 1e-5;
 /// Steps at most; 3 from the worst start, for exponents of 3 to 50.
 const MOST: usize = 12;
@@ -40,8 +41,8 @@ impl LayerLaw for Power {
         if m == 2.0 {
             return 2.0 * s / (1.0 + (1.0 + 4.0 * (s / self.b) / self.b / rho).sqrt());
         }
-        // Householder's method of fourth order for log(c + p(c)/rho) against log c, whose derivatives cost nothing, from the
-        // smaller of the c that p = 0 and c = 0 would give: the sum is between s and 2 s there
+        // Householder's method of fourth order for log(c + p(c)/rho) against log c, whose derivatives cost nothing,
+        // from the smaller of the c that p = 0 and c = 0 would give: the sum is between s and 2 s there
         let spring = |c: f64| (c / self.b).powf(m) / rho;
         let closed = self.compression_loaded(0, rho * s);
         let (mut c, mut pressed) = if s < closed { (s, spring(s)) } else { (closed, s) };

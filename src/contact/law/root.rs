@@ -2,24 +2,24 @@
 
 /// Relative distance below which two numbers are the same to rounding.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
-/// First factor by which the search goes down from a bound while it knows no lower one; the next is its square. 5 of them span
-/// the 37 decades between a trial state of 1e30 and a layer of 1e-6.
+/// First factor by which the search goes down from a bound while it knows no lower one; the next is its square. 5 of
+/// them span the 37 decades between a trial state of 1e30 and a layer of 1e-6.
 const DOWN: f64 = 1.0 / 16.0;
 /// Largest exponent d log p/d log c that a root can have and pass for one by its step alone.
 const STEEPEST: f64 = 1e6;
 /// Share of the last step beyond which a step of Newton's is slow: at the corner of c + c^50 they fall to 0.53.
 const SLOW: f64 = 0.75;
-/// Evaluations at most. Halving the logarithms of all double numbers down to neighbours takes 63; Newton's steps at most halve
-/// in between.
+/// Evaluations at most. Bisecting the logarithms of all double numbers down to neighbours takes 63, with two slow steps
+/// of Newton's before each at most.
 const MOST: usize = 200;
 
-/// The c in (low, high) where `value`, which gives an increasing function and its derivative, is `target` > 0, searched from
-/// `start`.
+/// The c in (low, high) where `value`, which gives an increasing function and its derivative, is `target` > 0, searched
+/// from `start`.
 ///
-/// Newton's method for log value against log c: powers are straight lines there, and sums of powers convex with slopes between
-/// the least and the largest exponent. Where that is slow (the step does not halve), the function may be closer to an
-/// exponential, and the step is taken for log value against c. Bisection of log c where neither stays in the bracket. NaN
-/// counts as too large.
+/// Newton's method for log value against log c: powers are straight lines there, and sums of powers convex with slopes
+/// between the least and the largest exponent. Where a step is hardly shorter than the last, the function may be closer
+/// to an exponential, and the step is taken for log value against c. Bisection of log c where that happens twice, or
+/// where a step leaves the bracket. NaN counts as too large.
 ///
 /// # Errors
 /// The largest c with a value below `target`, where no larger c was found with a value above.
@@ -68,8 +68,8 @@ pub(super) fn root(
     if reached { Ok(high) } else { Err(low) }
 }
 
-/// The compression c in the bracket with c + p(c)/rho = s, for the pressure and tangent `law`. A law that is not a number any
-/// more from some compression on has a rigid stop there.
+/// The compression c in the bracket with c + p(c)/rho = s, for the pressure and tangent `law`. A law that is not a
+/// number any more from some compression on has a rigid stop there.
 pub(super) fn meeting(s: f64, rho: f64, bracket: [f64; 2], start: f64, law: impl Fn(f64) -> (f64, f64)) -> f64 {
     let sum = |c: f64| {
         let (pressure, tangent) = law(c);

@@ -22,8 +22,8 @@ struct Knot {
 }
 
 impl Table {
-    /// The two knots around the place where `value` of (c, p), which increases along the curve, is `target`; only the last one
-    /// beyond it.
+    /// The two knots around the place where `value` of (c, p), which increases along the curve, is `target`; only the
+    /// last one beyond it.
     fn around(&self, target: f64, value: impl Fn(&Knot) -> f64) -> (&Knot, Option<&Knot>) {
         let above = self.knots.partition_point(|knot| value(knot) < target).max(1);
         (&self.knots[above - 1], self.knots.get(above))
