@@ -132,6 +132,35 @@ fn halves_of_a_ring_slide() {
     lost(&run, "unheld", &["bodies `b2` and `b4`", "together in their translation along y"]);
 }
 
+/// A floating grid of blocks: all of them as one, then every row but one and every column but one slide, and nothing else.
+#[test]
+fn rows_and_columns_of_a_grid_slide() {
+    let (rows, columns) = (6, 5);
+    let number = |row: usize, column: usize| row * columns + column + 1;
+    let mut contacts = Vec::new();
+    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+        let surface = |row, column, side: &str| format!("b{}_{side}", number(row, column));
+        if column + 1 < columns {
+            contacts.push([surface(row, column, "right"), surface(row, column + 1, "left")]);
+        }
+        if row + 1 < rows {
+            contacts.push([surface(row, column, "top"), surface(row + 1, column, "bottom")]);
+        }
+    }
+    let contacts: Vec<[&str; 2]> = contacts.iter().map(|pair| pair.each_ref().map(String::as_str)).collect();
+    let scene = Scene::new(blocks([rows, columns], &vec![""; rows * columns], &contacts));
+    let said = winkler(&["check", &scene.path.display().to_string()]).stdout;
+    let slide = |axis: &str| {
+        said.matches(&format!(": nothing holds them together in their translation along {axis}, no load")).count()
+    };
+    assert_eq!((slide("x"), slide("y")), (rows - 1, columns - 1), "{said}");
+    assert!(
+        said.contains("`b12` and 18 others: nothing holds them together in their translation along x; trans"),
+        "{said}"
+    );
+    assert_eq!(said.matches("nothing holds").count(), rows + columns - 1, "{said}");
+}
+
 #[test]
 fn loads_that_do_not_balance() {
     let pushed = Scene::new(two("10", 11.0));

@@ -20,6 +20,7 @@ pub mod solve;
 pub mod steps;
 pub mod sweep;
 pub mod verdict;
+mod words;
 
 use crate::error::Result;
 use crate::petsc::Session;

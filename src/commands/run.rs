@@ -5,7 +5,7 @@ use super::inner::{Inner, Linear, WHOLE};
 use super::method;
 use super::prepared::Prepared;
 use super::steps;
-use super::verdict::in_words;
+use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::{self, BodySlot, Observer, Outcome, Settings, Status};
 use crate::discretize::{self, Mechanism, Problem};

@@ -1,5 +1,6 @@
 //! How a run ended: the name of its status, and in words what happened and what to try.
 
+use super::words::in_words;
 use crate::ddm::forecast::{best_factor, best_gamma};
 use crate::ddm::{Mechanism, Model, Moved, Outcome, Status};
 use crate::output::{ForecastReport, sci};
@@ -79,15 +80,6 @@ fn measure(outcome: &Outcome) -> &'static str {
         Some(row) if row.is_bound => "error bound",
         _ if outcome.method.starts_with("newton") => "estimated error",
         _ => "residual",
-    }
-}
-
-/// Names of bodies as in a sentence.
-pub fn in_words<'a>(names: impl Iterator<Item = &'a String>) -> String {
-    let mut names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
-    match names.pop() {
-        Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
-        last => last.unwrap_or_default(),
     }
 }
 

@@ -62,6 +62,14 @@ impl<'a, const D: usize> Side<'a, D> {
         area_vector(self.facets.order, &x, &[1.0 / D as f64; D])
     }
 
+    /// Corners of the box around all facets.
+    pub fn extent(&self) -> ([f64; D], [f64; D]) {
+        let join = |(low, high): ([f64; D], [f64; D]), (from, to): ([f64; D], [f64; D])| {
+            (std::array::from_fn(|c| low[c].min(from[c])), std::array::from_fn(|c| high[c].max(to[c])))
+        };
+        (0..self.facets.count()).map(|i| self.bounds(i)).fold(([f64::MAX; D], [f64::MIN; D]), join)
+    }
+
     /// Corners of the box around facet `i`.
     pub fn bounds(&self, i: usize) -> ([f64; D], [f64; D]) {
         let x = self.facets.coordinates(i, self.space);

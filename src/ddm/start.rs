@@ -63,7 +63,8 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
     if let Some(given) = given {
         gap = model.compression(given).into_iter().map(|c| -c).collect();
     }
-    let mut rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope: surface_slopes(model), gap };
+    let mut rigid =
+        Rigid { model, motions: &motions, work: DVector::from_vec(work), slope: surface_slopes(model), gap };
     let mut amounts = DVector::zeros(motions.count());
     if motions.count() > 0 {
         for _ in 0..ROUNDS {

@@ -8,11 +8,13 @@ use crate::contact::side::unit;
 use crate::error::{Error, Result};
 use crate::fem::Facets;
 use crate::problem::contact::AutoContact;
+use std::collections::HashSet;
 
 /// Facets face each other if the cosine between the normal of one and minus that of the other is larger.
 const FACING: f64 = 0.5;
 
-/// The two surfaces of each pair of bodies that come near each other, named after the bodies, but for pairs in `named`.
+/// The two surfaces of each pair of bodies that come near each other, named after the bodies, but for pairs in
+/// `named` (numbers of bodies, the smaller first).
 ///
 /// First all facets that could have a partner are gathered, so that the nodal normals are those of smooth surfaces;
 /// of these the ones stay that share a piece.
@@ -23,7 +25,7 @@ pub fn find<'a, const D: usize>(
     auto: &AutoContact,
     cut: Cut<D>,
     parts: &'a [Part<D>],
-    named: &[[usize; 2]],
+    named: &HashSet<[usize; 2]>,
 ) -> Result<Vec<[Surface<'a, D>; 2]>> {
     let whole: Vec<Side<D>> = parts
         .iter()
@@ -38,12 +40,13 @@ pub fn find<'a, const D: usize>(
         })
         .collect();
     let searches: Vec<Search<D>> = whole.iter().map(Search::new).collect();
+    let bodies = Search::of_boxes(whole.iter().map(Side::extent));
     let mut found = Vec::new();
     for a in 0..parts.len() {
-        for b in a + 1..parts.len() {
-            if named.contains(&[a, b]) || named.contains(&[b, a]) {
-                continue;
-            }
+        let mut others: Vec<usize> = bodies.near_box(whole[a].extent(), auto.distance).collect();
+        others.retain(|&b| b > a && !named.contains(&[a, b]));
+        others.sort_unstable();
+        for b in others {
             let near = candidates(&whole[a], &whole[b], &searches[b], auto.distance);
             if near.iter().any(|facets| facets.count() == 0) {
                 continue;

@@ -5,17 +5,18 @@ use crate::expression::Field;
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::BodySpec;
 
-/// A mesh group by name, of one of the dimensions in order of preference.
+/// A mesh group by name, of one of these dimensions.
 pub fn find_group<'m, const D: usize>(
     mesh: &'m Mesh<D>,
     name: &Located<String>,
     dimensions: &[usize],
     what: &str,
 ) -> Result<&'m Group> {
-    let of = |dimension: usize| mesh.groups.iter().filter(move |group| group.dimension == dimension);
-    if let Some(group) = dimensions.iter().find_map(|&d| of(d).find(|group| group.name == name.value)) {
+    let named = mesh.group(&name.value);
+    if let Some(group) = named.filter(|group| dimensions.contains(&group.dimension)) {
         return Ok(group);
     }
+    let of = |dimension: usize| mesh.groups.iter().filter(move |group| group.dimension == dimension);
     let known: Vec<&str> = dimensions.iter().flat_map(|&d| of(d)).map(|group| group.name.as_str()).collect();
     let kind = |dimension: usize| match (D - dimension, dimension) {
         (0, _) => "region",
@@ -27,7 +28,7 @@ pub fn find_group<'m, const D: usize>(
     let error =
         Error::scene(&name.place, format!("the mesh has no {} `{}` for this {what}", kind(dimensions[0]), name.value))
             .because(format!("mesh {}", mesh.path.display()));
-    if let Some(other) = mesh.groups.iter().find(|group| group.name == name.value) {
+    if let Some(other) = named {
         return Err(error.help(format!("`{}` is a {} there", name.value, kind(other.dimension))));
     }
     Err(match crate::error::nearest(&name.value, known.iter().copied()) {

@@ -39,6 +39,9 @@ impl Mechanism {
     }
 }
 
+/// Most bodies whose motions make the name of a motion of all.
+const SHOWN: usize = 12;
+
 /// What was fixed, and what cannot be.
 pub struct Fixed {
     /// Names of the motions of each body alone that are fixed.
@@ -227,7 +230,11 @@ impl<const D: usize> Search<'_, '_, D> {
                 moving.displacement.push(displacement);
                 each.push(format!("{} of {}", rigid::combine(left, &weights).name, self.parts[body].spec.name.value));
             }
-            moving.name = self.name_as_one(&moving).unwrap_or_else(|| each.join(", "));
+            moving.name = self.name_as_one(&moving).unwrap_or_else(|| {
+                let others = each.len().saturating_sub(SHOWN);
+                let more = if others > 0 { format!(", and motions of {others} others") } else { String::new() };
+                each[..each.len() - others].join(", ") + &more
+            });
             moving
         };
         factor.kernel_entries().iter().map(moving).collect()

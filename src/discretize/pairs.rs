@@ -11,6 +11,7 @@ use crate::fem::Facets;
 use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{ContactSpec, Overlap};
 use crate::scene::Scene;
+use std::collections::{BTreeSet, HashSet};
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {
@@ -36,12 +37,13 @@ pub fn all<const D: usize>(
     fine: bool,
 ) -> Result<Vec<Contact<D>>> {
     let mut contacts = Vec::new();
-    let mut named = Vec::new();
+    let mut named = HashSet::new();
+    let owners = if scene.contacts.is_empty() { Owners::default() } else { Owners::new(parts) };
     for spec in &scene.contacts {
         let surface = |k: usize| {
             let name = &spec.between[k];
             let group = find_group(mesh, name, &[D - 1], "contact surface")?;
-            let (body, facets) = owner_of(name, group, parts)?;
+            let (body, facets) = owners.of(name, group, parts)?;
             Ok(Surface { body, name: &name.value, facets })
         };
         let surfaces = [surface(0)?, surface(1)?];
@@ -53,7 +55,7 @@ pub fn all<const D: usize>(
             )
             .help("contact of a body with itself is out of scope; make two bodies of it"));
         }
-        named.push([a, b]);
+        named.insert([a.min(b), a.max(b)]);
         contacts.push(make_pair(spec.clone(), None, cut, parts, surfaces, fine)?);
     }
     if let Some(auto) = &scene.auto {
@@ -121,30 +123,62 @@ fn refuse(spec: &ContactSpec, fault: Fault) -> Error {
     }
 }
 
-/// The body that a contact surface bounds, with the facets.
-fn owner_of<const D: usize>(name: &Located<String>, group: &Group, parts: &[Part<D>]) -> Result<(usize, Facets<D>)> {
-    let mut found: Vec<(usize, Facets<D>)> = parts
-        .iter()
-        .enumerate()
-        .map(|(body, part)| (body, part.space.facets(group)))
-        .filter(|(_, facets)| facets.count() > 0)
-        .collect();
-    let all = group.connectivity.len() / group.stride;
-    match (found.pop(), found.len()) {
-        (Some((body, facets)), 0) if facets.count() == all => Ok((body, facets)),
-        (Some((body, facets)), 0) => {
-            let body = &parts[body].spec.name.value;
-            let message = format!("only {} of {all} facets of `{}` bound body `{body}`", facets.count(), name.value);
-            Err(Error::scene(&name.place, message)
-                .help("a contact surface must lie on one body as a whole: split the physical group"))
-        }
-        (None, _) => Err(Error::scene(&name.place, format!("surface `{}` bounds no body of the scene", name.value))
-            .help("add the body it belongs to, or name another surface")),
-        (Some((last, _)), _) => {
-            let bodies = [found[0].0, last].map(|body| parts[body].spec.name.value.clone());
-            let message = format!("surface `{}` bounds both `{}` and `{}`", name.value, bodies[0], bodies[1]);
-            Err(Error::scene(&name.place, message)
-                .help("the bodies share mesh nodes there: give each its own curve or surface in the geometry"))
+/// The bodies of every point of the mesh: (point, body), sorted.
+#[derive(Default)]
+struct Owners(Vec<(u32, usize)>);
+
+impl Owners {
+    fn new<const D: usize>(parts: &[Part<D>]) -> Self {
+        let of_body = |(body, part): (usize, &Part<D>)| {
+            part.space.mesh_points().map(move |point| (point, body)).collect::<Vec<_>>()
+        };
+        let mut all: Vec<(u32, usize)> = parts.iter().enumerate().flat_map(of_body).collect();
+        all.sort_unstable();
+        Self(all)
+    }
+
+    /// Bodies with points of a group.
+    fn touching(&self, group: &Group) -> BTreeSet<usize> {
+        let at = |&point: &u32| {
+            let first = self.0.partition_point(|entry| entry.0 < point);
+            self.0[first..].iter().take_while(move |entry| entry.0 == point).map(|entry| entry.1)
+        };
+        group.connectivity.iter().flat_map(at).collect()
+    }
+
+    /// The body that a contact surface bounds, with the facets.
+    fn of<const D: usize>(
+        &self,
+        name: &Located<String>,
+        group: &Group,
+        parts: &[Part<D>],
+    ) -> Result<(usize, Facets<D>)> {
+        let mut found: Vec<(usize, Facets<D>)> = self
+            .touching(group)
+            .into_iter()
+            .map(|body| (body, parts[body].space.facets(group)))
+            .filter(|(_, facets)| facets.count() > 0)
+            .collect();
+        let all = group.connectivity.len() / group.stride;
+        match (found.pop(), found.len()) {
+            (Some((body, facets)), 0) if facets.count() == all => Ok((body, facets)),
+            (Some((body, facets)), 0) => {
+                let body = &parts[body].spec.name.value;
+                let message =
+                    format!("only {} of {all} facets of `{}` bound body `{body}`", facets.count(), name.value);
+                Err(Error::scene(&name.place, message)
+                    .help("a contact surface must lie on one body as a whole: split the physical group"))
+            }
+            (None, _) => {
+                Err(Error::scene(&name.place, format!("surface `{}` bounds no body of the scene", name.value))
+                    .help("add the body it belongs to, or name another surface"))
+            }
+            (Some((last, _)), _) => {
+                let bodies = [found[0].0, last].map(|body| parts[body].spec.name.value.clone());
+                let message = format!("surface `{}` bounds both `{}` and `{}`", name.value, bodies[0], bodies[1]);
+                Err(Error::scene(&name.place, message)
+                    .help("the bodies share mesh nodes there: give each its own curve or surface in the geometry"))
+            }
         }
     }
 }

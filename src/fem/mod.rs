@@ -10,6 +10,7 @@ pub mod element;
 pub mod frame;
 pub mod material;
 pub mod norms;
+mod numbering;
 pub mod quadrature;
 pub mod recovery;
 pub mod rigid;

@@ -1,11 +1,11 @@
 //! The finite element space of one body: its nodes, cells and boundary facets, numbered within the body.
 
+use super::numbering::Numbering;
 use super::{Slope, cross, element, pad};
 use crate::mesh::{Group, Mesh};
 use crate::problem::order::Order;
+use std::cell::OnceCell;
 use std::collections::{HashMap, HashSet};
-
-const ABSENT: u32 = u32::MAX;
 
 /// Share of the largest radius below which a node lies on the axis of a body of revolution.
 pub const ON_AXIS: f64 = 1e-10;
@@ -24,8 +24,10 @@ pub struct Space<const D: usize> {
     pub cells: Vec<u32>,
     /// Whether the body is one of revolution, of which this is the meridian: x is the radius, y runs along the axis.
     pub axisymmetric: bool,
-    /// Body node of each mesh point, or `ABSENT`.
-    from_mesh: Vec<u32>,
+    /// Body node of each mesh point.
+    from_mesh: Numbering,
+    /// Area (volume) of all cells, once it was asked for.
+    measure: OnceCell<f64>,
 }
 
 /// Facets of a body's boundary, oriented so that [`Facets::normal`] points out of the body.
@@ -43,23 +45,22 @@ impl<const D: usize> Space<D> {
     /// The space of `order` on the cells of `group` (of dimension `D`); the mesh is of that order or a higher one.
     pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
         let stride = element::node_count(D + 1, order);
+        let corners = group.connectivity.chunks_exact(group.stride).flat_map(|cell| &cell[..stride]).copied();
         let mut space = Space {
             order,
             nodes: Vec::new(),
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
             axisymmetric: false,
-            from_mesh: vec![ABSENT; mesh.points.len()],
+            from_mesh: Numbering::new(corners.clone()),
+            measure: OnceCell::new(),
         };
-        for cell in group.connectivity.chunks_exact(group.stride) {
-            for &point in &cell[..stride] {
-                let node = &mut space.from_mesh[point as usize];
-                if *node == ABSENT {
-                    *node = space.nodes.len() as u32;
-                    space.nodes.push(mesh.points[point as usize]);
-                }
-                space.cells.push(*node);
+        for point in corners {
+            let (node, is_new) = space.from_mesh.number(point, space.nodes.len() as u32);
+            if is_new {
+                space.nodes.push(mesh.points[point as usize]);
             }
+            space.cells.push(node);
         }
         space
     }
@@ -70,7 +71,16 @@ impl<const D: usize> Space<D> {
         let touching = |index: &usize| cell(*index).iter().any(|&node| marked[node as usize]);
         let kept: Vec<usize> = (0..self.cell_count()).filter(touching).collect();
         let cells = kept.iter().flat_map(|&index| cell(index)).copied().collect();
-        (Space { nodes: self.nodes.clone(), cells, from_mesh: Vec::new(), ..*self }, kept)
+        (
+            Space {
+                nodes: self.nodes.clone(),
+                cells,
+                from_mesh: Numbering::default(),
+                measure: OnceCell::new(),
+                ..*self
+            },
+            kept,
+        )
     }
 
     /// The meridian of a body of revolution. Nodes whose radius is rounding of the largest one get the radius zero.
@@ -124,7 +134,12 @@ impl<const D: usize> Space<D> {
 
     /// Area (volume) of all cells, by their corners; of a body of revolution the area of its meridian.
     pub fn measure(&self) -> f64 {
-        (0..self.cell_count()).map(|i| self.cell_measure(i)).sum()
+        *self.measure.get_or_init(|| (0..self.cell_count()).map(|i| self.cell_measure(i)).sum())
+    }
+
+    /// The points of the mesh that are nodes of the body, in the order of the mesh.
+    pub fn mesh_points(&self) -> impl Iterator<Item = u32> {
+        self.from_mesh.points()
     }
 
     /// What a cell adds to the measure of the body, by its corners: in a body of revolution the volume of a ring.
@@ -201,10 +216,7 @@ impl<const D: usize> Space<D> {
         let wanted = element::node_count(vertices, self.order);
         let mut nodes = Vec::with_capacity(wanted);
         for &point in &points[..wanted] {
-            match self.from_mesh[point as usize] {
-                ABSENT => return None,
-                node => nodes.push(node),
-            }
+            nodes.push(self.from_mesh.get(point)?);
         }
         Some(nodes)
     }

@@ -1,4 +1,7 @@
-//! Named groups of simplices, and their compact numbering: points that no group uses go.
+//! The groups of a mesh by name; and compact numbering: points that no group uses go.
+
+use std::collections::HashMap;
+use std::ops::{Deref, DerefMut};
 
 /// A named group of simplices of one dimension.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,6 +30,41 @@ impl Group {
     /// The simplices, each as its `stride` point numbers.
     pub fn simplices(&self) -> std::slice::ChunksExact<'_, u32> {
         self.connectivity.chunks_exact(self.stride)
+    }
+}
+
+/// The groups of a mesh, in the order of the file, found by their names, which are unique.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Groups {
+    list: Vec<Group>,
+    place: HashMap<String, usize>,
+}
+
+impl Groups {
+    /// The group of a name.
+    pub fn named(&self, name: &str) -> Option<&Group> {
+        self.place.get(name).map(|&place| &self.list[place])
+    }
+}
+
+impl From<Vec<Group>> for Groups {
+    fn from(list: Vec<Group>) -> Self {
+        Self { place: list.iter().zip(0..).map(|(group, place)| (group.name.clone(), place)).collect(), list }
+    }
+}
+
+impl Deref for Groups {
+    type Target = [Group];
+
+    fn deref(&self) -> &[Group] {
+        &self.list
+    }
+}
+
+/// For the simplices; names stay what they are.
+impl DerefMut for Groups {
+    fn deref_mut(&mut self) -> &mut [Group] {
+        &mut self.list
     }
 }
 

@@ -65,7 +65,8 @@ mod tests {
             path: "line.msh".into(),
             points: at.iter().flat_map(|&i| cell(i)).collect(),
             order: Order::P1,
-            groups: vec![Group { name: "body".into(), dimension: 3, stride: 4, connectivity: (0..16).collect() }],
+            groups: vec![Group { name: "body".into(), dimension: 3, stride: 4, connectivity: (0..16).collect() }]
+                .into(),
         };
         mesh.sort_cells();
         let first: Vec<f64> = mesh.groups[0].simplices().map(|cell| mesh.points[cell[0] as usize][0]).collect();

@@ -20,7 +20,7 @@ mod sizes;
 #[cfg(test)]
 mod tests;
 
-pub use groups::Group;
+pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, recall_final};
 pub use msh::read;
 pub use quality::Quality;
@@ -46,13 +46,13 @@ pub struct Mesh<const D: usize> {
     /// Order of all elements (points have none).
     pub order: Order,
     /// Named groups, in the order of the file.
-    pub groups: Vec<Group>,
+    pub groups: Groups,
 }
 
 impl<const D: usize> Mesh<D> {
     /// The group of a name, of whatever dimension.
     pub fn group(&self, name: &str) -> Option<&Group> {
-        self.groups.iter().find(|group| group.name == name)
+        self.groups.named(name)
     }
 
     /// Names of the groups of a dimension, in the order of the file.
@@ -63,7 +63,7 @@ impl<const D: usize> Mesh<D> {
     /// The mesh of the same simplices without mid-edge points; a copy if there are none.
     pub fn lower_order(&self) -> Mesh<D> {
         let mut groups = self.groups.clone();
-        for group in &mut groups {
+        for group in groups.iter_mut() {
             let vertices = group.dimension + 1;
             group.connectivity = group.simplices().flat_map(|simplex| &simplex[..vertices]).copied().collect();
             group.stride = vertices;

@@ -143,5 +143,5 @@ fn finish<const D: usize>(path: &Path, mut groups: Vec<Group>, nodes: Nodes, ord
     let points = groups::compact(&mut groups, nodes.points.len())
         .map(|old| std::array::from_fn(|k| nodes.points[old][k]))
         .collect();
-    Ok(Mesh { path: path.to_owned(), points, order, groups })
+    Ok(Mesh { path: path.to_owned(), points, order, groups: groups.into() })
 }

@@ -4,7 +4,7 @@ use super::Group;
 use super::cursor::Cursor;
 use super::simplex::THINGS;
 use crate::error::Result;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// The groups of a file, and who belongs to them.
 #[derive(Default)]
@@ -37,6 +37,7 @@ impl Physical {
         let start = cursor.position();
         let count = cursor.line()?.parse::<usize>();
         let count = count.map_err(|_| cursor.error_at(start, "the number of names should stand here"))?;
+        let mut names = HashSet::new();
         for _ in 0..count {
             let start = cursor.position();
             let line = cursor.line()?;
@@ -58,7 +59,7 @@ impl Physical {
                 let message = format!("group `{name}` is made of volumes, but the scene has dimension = {space}");
                 return Err(cursor.error_at(start, message).help("set `dimension = 3`, or remove the group"));
             }
-            if self.groups.iter().any(|group| group.name == name) {
+            if !names.insert(name.to_owned()) {
                 let error = cursor.error_at(start, format!("two physical groups are named `{name}`"));
                 return Err(error.help("rename one: a name alone must tell which group is meant"));
             }

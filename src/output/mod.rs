@@ -19,7 +19,8 @@ pub mod vtu;
 /// Prints a line to standard output. A reader that has gone is no reason to stop.
 pub fn say(text: impl std::fmt::Display) {
     use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{text}");
+    // in one piece: standard output would pass each of its lines on by itself
+    let _ = std::io::stdout().write_all(format!("{text}\n").as_bytes());
 }
 
 pub use contact::ContactTable;

@@ -30,7 +30,10 @@ impl Reach {
     }
 }
 
-/// The facets of side b, found by their boxes.
+/// Corners of a box: all least and all largest coordinates.
+pub type Bounds<const D: usize> = ([f64; D], [f64; D]);
+
+/// The facets of side b, or bodies, found by their boxes.
 pub struct Search<const D: usize> {
     tree: RTree<GeomWithData<Rectangle<[f64; D]>, usize>>,
 }
@@ -38,16 +41,22 @@ pub struct Search<const D: usize> {
 impl<const D: usize> Search<D> {
     /// Sorts the facets of a side.
     pub fn new(b: &Side<D>) -> Self {
-        let boxed = |i: usize| {
-            let (low, high) = b.bounds(i);
-            GeomWithData::new(Rectangle::from_corners(low, high), i)
-        };
-        Self { tree: RTree::bulk_load((0..b.facets.count()).map(boxed).collect()) }
+        Self::of_boxes((0..b.facets.count()).map(|i| b.bounds(i)))
+    }
+
+    /// Sorts boxes, numbered in their order.
+    pub fn of_boxes(boxes: impl Iterator<Item = Bounds<D>>) -> Self {
+        let boxed = |((low, high), i): (Bounds<D>, usize)| GeomWithData::new(Rectangle::from_corners(low, high), i);
+        Self { tree: RTree::bulk_load(boxes.zip(0..).map(boxed).collect()) }
     }
 
     /// Facets whose boxes come within `distance` of facet `i` of side a.
     pub fn near(&self, a: &Side<D>, i: usize, distance: f64) -> impl Iterator<Item = usize> + '_ {
-        let (low, high) = a.bounds(i);
+        self.near_box(a.bounds(i), distance)
+    }
+
+    /// What comes within `distance` of a box.
+    pub fn near_box(&self, (low, high): Bounds<D>, distance: f64) -> impl Iterator<Item = usize> + '_ {
         self.meeting(low.map(|x| x - distance), high.map(|x| x + distance))
     }
 

@@ -22,7 +22,7 @@ fn damaged_files_are_meshes_or_errors() {
                 bad[position] = value;
                 let Ok(mesh) = parse::<2>(&bad) else { continue };
                 assert!(mesh.points.iter().flatten().all(|coordinate| coordinate.is_finite()));
-                for group in &mesh.groups {
+                for group in mesh.groups.iter() {
                     assert!(!group.is_empty() && extent(&mesh, group) > 0.0);
                     assert!(group.connectivity.iter().all(|point| (*point as usize) < mesh.points.len()));
                 }

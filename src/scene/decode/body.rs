@@ -7,6 +7,7 @@ use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Sup
 use crate::problem::elasticity::Plane;
 use crate::problem::order::Order;
 use crate::scene::read::{Keys, Node, Value};
+use std::collections::HashSet;
 
 /// Names of components, for supports.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -29,9 +30,10 @@ impl Decoder<'_> {
             return Err(list.refuse("the scene has no body").help("a body starts with the line [[body]]"));
         }
         let mut bodies: Vec<BodySpec> = Vec::new();
+        let mut names = HashSet::new();
         for item in items {
             let body = self.body(item)?;
-            if bodies.iter().any(|other| other.name.value == body.name.value) {
+            if !names.insert(body.name.value.clone()) {
                 let message = format!("two bodies are called `{}`", body.name.value);
                 return Err(Error::scene(&body.name.place, message)
                     .label("taken by an earlier body")

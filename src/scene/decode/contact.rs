@@ -5,6 +5,7 @@ use crate::error::{Error, Located, Result};
 use crate::expression::Field;
 use crate::problem::contact::{AutoContact, ContactSpec, Overlap};
 use crate::scene::read::{Keys, Node, Value};
+use std::collections::HashSet;
 
 impl Decoder<'_> {
     /// The pairs of contact surfaces, and how to find further ones; there may be none.
@@ -14,6 +15,7 @@ impl Decoder<'_> {
         };
         let mut contacts: Vec<ContactSpec> = Vec::new();
         let mut auto: Option<AutoContact> = None;
+        let mut known = HashSet::new();
         for item in list.list().map_err(|error| error.help("a contact starts with the line [[contact]]"))? {
             let (contact, distance) = self.contact(item)?;
             if let Some(distance) = distance {
@@ -24,12 +26,9 @@ impl Decoder<'_> {
                 }
                 continue;
             }
-            let names = |contact: &ContactSpec| {
-                let mut names = contact.between.each_ref().map(|name| name.value.clone());
-                names.sort();
-                names
-            };
-            if contacts.iter().any(|other| names(other) == names(&contact)) {
+            let mut names = contact.between.each_ref().map(|name| name.value.clone());
+            names.sort();
+            if !known.insert(names) {
                 let [a, b] = &contact.between;
                 return Err(Error::scene(&a.place, format!("a second contact of `{}` and `{}`", a.value, b.value))
                     .help("remove one of the two"));

@@ -1,0 +1,87 @@
+//! From points of a mesh to nodes of a body: its size is that of the body, as a mesh may have thousands.
+
+/// No node has this number.
+const ABSENT: u32 = u32::MAX;
+
+/// The node of each point of a body.
+#[derive(Debug, Clone, Default)]
+pub struct Numbering {
+    /// Points of the body, sorted; empty if `node` has an entry for every point from `first` on.
+    points: Vec<u32>,
+    first: u32,
+    node: Vec<u32>,
+}
+
+/// A table with an entry for every point between the first and the last may have this many times more entries than corners of
+/// cells name points. About six cells meet at a node of triangles and 24 at one of tetrahedra, so it is no larger than the cells.
+const SPARSE: usize = 2;
+
+impl Numbering {
+    /// The points that cells name, each as often as they like, none with a node yet.
+    pub fn new(named: impl Iterator<Item = u32> + Clone) -> Self {
+        let (count, first, last) =
+            named.clone().fold((0, u32::MAX, 0), |(count, low, high), p| (count + 1, low.min(p), high.max(p)));
+        if count == 0 {
+            return Self::default();
+        }
+        let wide = (last - first) as usize + 1;
+        if wide <= SPARSE * count {
+            return Self { points: Vec::new(), first, node: vec![ABSENT; wide] };
+        }
+        let mut points: Vec<u32> = named.collect();
+        points.sort_unstable();
+        points.dedup();
+        Self { node: vec![ABSENT; points.len()], points, first }
+    }
+
+    fn place(&self, point: u32) -> Option<usize> {
+        if self.points.is_empty() {
+            return Some(point.checked_sub(self.first)? as usize).filter(|&place| place < self.node.len());
+        }
+        self.points.binary_search(&point).ok()
+    }
+
+    /// The node of a point, if it is one of the body.
+    pub fn get(&self, point: u32) -> Option<u32> {
+        self.place(point).map(|place| self.node[place]).filter(|&node| node != ABSENT)
+    }
+
+    /// The node of a point that cells name; `next` if it has none yet. Whether it had none.
+    pub fn number(&mut self, point: u32, next: u32) -> (u32, bool) {
+        let Some(place) = self.place(point) else { return (ABSENT, false) };
+        let node = &mut self.node[place];
+        let is_new = *node == ABSENT;
+        if is_new {
+            *node = next;
+        }
+        (*node, is_new)
+    }
+
+    /// The points of the body, in the order of the mesh.
+    pub fn points(&self) -> impl Iterator<Item = u32> {
+        let at = |place: usize| self.points.get(place).copied().unwrap_or(self.first + place as u32);
+        (0..self.node.len()).filter(|&place| self.node[place] != ABSENT).map(at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_points_and_far_ones_have_nodes() {
+        for named in [vec![7, 9, 8, 7], vec![1_000_000, 9, 8, 1_000_000]] {
+            let mut numbering = Numbering::new(named.iter().copied());
+            assert_eq!(numbering.get(9), None);
+            let nodes: Vec<(u32, bool)> = (0..).zip(&named).map(|(k, &point)| numbering.number(point, k)).collect();
+            assert_eq!(nodes, [(0, true), (1, true), (2, true), (0, false)]);
+            assert_eq!(named.iter().map(|&point| numbering.get(point)).collect::<Vec<_>>(), [0, 1, 2, 0].map(Some));
+            assert!([0, 6, 10, 999_999, u32::MAX].iter().all(|&point| numbering.get(point).is_none()));
+            assert_eq!(
+                numbering.points().collect::<Vec<_>>(),
+                [8, 9, named[0]].into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect::<Vec<_>>()
+            );
+        }
+        assert!(Numbering::new([].into_iter()).points().next().is_none());
+    }
+}
