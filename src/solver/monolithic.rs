@@ -61,10 +61,11 @@ impl Union {
             rows.push_row(entries);
         }
         let mut stiffness = Csr::new(n);
-        for (&first, part) in offset.iter().zip(&parts) {
+        for ((&first, part), slot) in offset.iter().zip(&parts).zip(&model.bodies) {
             let own = part.stiffness;
+            // of the size that the stiffness had before elimination: what is left of it may be nothing but rounding
             for dof in pins(part.motions) {
-                extra[first + dof].push(((first + dof) as i32, own.diagonal(dof)));
+                extra[first + dof].push(((first + dof) as i32, slot.scale));
             }
             for i in 0..part.len() {
                 let known = (0..own.rows()).contains(&i).then(|| own.row(i)).into_iter().flatten();
