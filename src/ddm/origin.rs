@@ -13,6 +13,9 @@ use crate::linalg::{dot, fit};
 /// Binary digits that an origin's amounts have: products with coordinates of 29 digits are then exact.
 const DIGITS: u32 = 24;
 
+/// Share of an amount that its origin may lack.
+pub(super) const ROUNDING: f64 = 1.0 / (1 << DIGITS) as f64;
+
 /// Rigid motions that were taken out of the displacements, and the gap as it was with them.
 pub struct Origin {
     motion: Field,
