@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use std::cell::RefCell;
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -11,6 +12,10 @@ use std::path::{Path, PathBuf};
 pub struct Folder {
     path: PathBuf,
     files: RefCell<Vec<PathBuf>>,
+    /// The same, to be looked up.
+    known: RefCell<HashSet<PathBuf>>,
+    /// Number of the last file of each stem and extension that [`Folder::unused`] gave.
+    numbers: RefCell<HashMap<(String, String), usize>>,
 }
 
 impl Folder {
@@ -28,7 +33,7 @@ impl Folder {
             Error::file(&path, "write to the folder", &cause)
                 .help("give yourself write permission, or name another folder with `-o FOLDER`")
         })?;
-        Ok(Self { path, files: RefCell::new(Vec::new()) })
+        Ok(Self { path, files: RefCell::default(), known: RefCell::default(), numbers: RefCell::default() })
     }
 
     /// The folder as it was named.
@@ -67,20 +72,21 @@ impl Folder {
 
     /// `stem.extension`, or `stem-2.extension` and so on when this run has already written a file of that name.
     pub fn unused(&self, stem: &str, extension: &str) -> String {
-        let files = self.files.borrow();
-        let mut name = format!("{stem}.{extension}");
-        let mut number = 1;
-        while files.contains(&self.path.join(&name)) {
-            number += 1;
-            name = format!("{stem}-{number}.{extension}");
+        let known = self.known.borrow();
+        let mut numbers = self.numbers.borrow_mut();
+        let number = numbers.entry((stem.to_owned(), extension.to_owned())).or_insert(1);
+        loop {
+            let name = if *number == 1 { format!("{stem}.{extension}") } else { format!("{stem}-{number}.{extension}") };
+            if !known.contains(&self.path.join(&name)) {
+                return name;
+            }
+            *number += 1;
         }
-        name
     }
 
     fn add(&self, path: &Path) {
-        let mut files = self.files.borrow_mut();
-        if !files.iter().any(|file| file == path) {
-            files.push(path.to_owned());
+        if self.known.borrow_mut().insert(path.to_owned()) {
+            self.files.borrow_mut().push(path.to_owned());
         }
     }
 }
