@@ -51,8 +51,13 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
         }
         forcing.learn(&gap, &reached, run.stop.residual);
-        let retreated = progress.is_lost(gap.change, measured.f1) && retreat(run.model, &mut u, &c, &x.field)?;
-        places = if retreated { Layer::at(run.model, &u.trace) } else { met };
+        let lost = progress.is_lost(gap.change, measured.f1);
+        if lost {
+            progress.f1 += search(run.model, &mut u, &x.field)?;
+        } else {
+            progress.f1 = measured.f1;
+        }
+        places = if lost { Layer::at(run.model, &u.trace) } else { met };
     }
 }
 
@@ -88,7 +93,7 @@ impl Forcing {
 /// random scenes did.
 #[derive(Debug)]
 struct Progress {
-    /// Least work that a step changed, steps since, and F1 of the last iterate.
+    /// Least work that a step changed, steps since, and F1 where the last step began.
     best: f64,
     since: usize,
     f1: f64,
@@ -101,23 +106,25 @@ impl Default for Progress {
 }
 
 impl Progress {
-    /// Whether two steps in a row have changed more than an earlier one, and the last one raised F1.
+    /// Whether two steps in a row have changed more than an earlier one, and the last one raised F1. Then no step does until one
+    /// changes less than all before: places are those of traces, along which Newton's steps descend.
     fn is_lost(&mut self, change: f64, f1: f64) -> bool {
-        let rose = f1 > std::mem::replace(&mut self.f1, f1);
         self.since = if change < self.best { 0 } else { self.since + 1 };
         self.best = self.best.min(change);
-        self.since >= 2 && rose && f1.is_finite()
+        self.since >= 2 && f1 > self.f1
     }
 }
 
-/// Takes back of a step x to u what raises F1, by exact search. Whether F1 falls on the way back.
-fn retreat(model: &mut Model, u: &mut Field, compression: &[f64], x: &Field) -> Result<bool> {
-    let layer = Layer::new(model, compression.to_vec());
-    let (r, _) = residual(model, u, &layer.force);
-    let mut back = x.zero_like();
-    back.add(-1.0, x);
-    let Ok(way) = Line::new(model, &layer, &r, &back).minimize(1e-2) else { return Ok(false) };
-    u.add(way, &back);
+/// Replaces a step x that led to u by the exact search on F1 along it. The change of F1 from where the step began.
+fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<f64> {
+    u.add(-1.0, x);
     u.retrace(model);
-    Ok(way > 0.0)
+    let layer = Layer::at(model, &u.trace);
+    let (r, _) = residual(model, u, &layer.force);
+    let line = Line::new(model, &layer, &r, x);
+    let way = line.minimize(1e-2).unwrap_or(0.0);
+    let change = line.change(way);
+    u.add(way, x);
+    u.retrace(model);
+    Ok(change)
 }
