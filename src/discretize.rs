@@ -17,7 +17,7 @@ mod supports;
 mod surface;
 
 use crate::contact::{self, ContactPair};
-use crate::ddm::{self, Body, BodySlot, Exchange, Model, Segment};
+
 use crate::error::Result;
 use crate::fem::{
     ElasticBody,
@@ -25,6 +25,7 @@ use crate::fem::{
 };
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Mesh;
+use crate::model::{Body, BodySlot, Exchange, Model, Segment};
 use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
 use crate::problem::method::Start;
@@ -334,16 +335,16 @@ impl Problem {
     }
 }
 
-/// The scene's start, at a share `factor` of the loads.
+/// The trace (2n) with which the scene begins, at a share `factor` of the loads; none if it is for the program to find.
 ///
 /// # Errors
 /// A start that is not finite at a contact point.
-pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<ddm::Start> {
+pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Option<Vec<f64>>> {
     let model = &problem.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
     match &scene.method.start {
-        Start::Auto | Start::Nested => return Ok(ddm::Start::Automatic),
+        Start::Auto | Start::Nested => return Ok(None),
         Start::Zero => {}
         Start::Normal(field) => {
             let positions = model.pairs.iter().flat_map(|pair| &pair.position);
@@ -358,7 +359,7 @@ pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<ddm::Start
         }
     }
     axpy(-1.0, &problem.carried, &mut trace);
-    Ok(ddm::Start::Trace(trace))
+    Ok(Some(trace))
 }
 
 /// What supports prescribe.

@@ -6,9 +6,10 @@
 
 pub mod sizes;
 
-use crate::ddm::{Discretisation, Field, Layer, LinearStep, Model, linear};
+use crate::ddm::{Discretisation, linear};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
+use crate::model::{Field, Layer, LinearStep, Model};
 use std::rc::Rc;
 
 /// Estimated errors of a discrete solution.

@@ -1,8 +1,8 @@
 //! Frictionless contact of N elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition.
 //!
 //! Data flows one way: scene file -> [`scene::Scene`], made of the types in [`problem`] -> [`mesh::Mesh`] ->
-//! [`fem`] bodies and [`contact`] pairs -> [`ddm::Model`] -> sweeps -> [`ddm::Outcome`] -> [`report`](commands::report). The
-//! loop is [`ddm::iterate`].
+//! [`fem`] bodies and [`contact`] pairs -> [`model::Model`] -> sweeps -> [`ddm::Outcome`] -> [`report`](commands::report). The
+//! loops are those of [`ddm`].
 #![deny(unsafe_code)]
 // indices of tensors, rows and nodes read like the formulas
 #![allow(clippy::needless_range_loop)]
@@ -19,6 +19,7 @@ pub mod expression;
 pub mod fem;
 pub mod linalg;
 pub mod mesh;
+pub mod model;
 pub mod output;
 pub mod parallel;
 #[allow(unsafe_code)]

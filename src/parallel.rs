@@ -1,7 +1,7 @@
 //! Which rank owns which body, and the exchange of traces, over the `mpi` crate.
 
-use crate::ddm::Exchange;
 use crate::error::{Error, Result};
+use crate::model::Exchange;
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;

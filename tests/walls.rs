@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms from the ground up; each may use those below it.
-const ROOMS: [&str; 18] = [
+const ROOMS: [&str; 19] = [
     "error",
     "linalg",
     "petsc",
@@ -19,9 +19,10 @@ const ROOMS: [&str; 18] = [
     "mesh",
     "fem",
     "contact",
-    "ddm",
+    "model",
     "parallel",
     "solver",
+    "ddm",
     "output",
     "scene",
     "discretize",
@@ -32,8 +33,15 @@ const ROOMS: [&str; 18] = [
 ];
 
 /// Rooms that may use less than what lies below them.
-const NARROW: [(&str, &[&str]); 2] =
-    [("ddm", &["error", "linalg", "contact", "problem"]), ("output", &["error", "ddm"])];
+const NARROW: [(&str, &[&str]); 4] = [
+    ("model", &["error", "linalg", "contact"]),
+    ("ddm", &["error", "linalg", "contact", "problem", "model"]),
+    ("output", &["error", "ddm"]),
+    (
+        "discretize",
+        &["error", "linalg", "expression", "problem", "mesh", "fem", "contact", "model", "parallel", "output", "scene"],
+    ),
+];
 
 /// Files that may know the space dimension: those of the first rooms, and the one that picks it.
 const SPATIAL: [&str; 7] = ["scene", "mesh", "fem", "contact", "discretize", "commands/run.rs", "commands/mesh.rs"];
@@ -259,10 +267,7 @@ fn rooms_use_only_lower_rooms() {
 }
 
 /// Circles that are being taken apart elsewhere: their files. An entry whose files are on no circle any more is a breach.
-const ROUND: [&[&str]; 2] = [
-    &["ddm/iterate.rs", "ddm/measure.rs", "ddm/watch.rs"],
-    &["discretize.rs", "discretize/gauge.rs", "discretize/mechanism.rs"],
-];
+const ROUND: [&[&str]; 0] = [];
 
 /// Circles of files, each as `a -> b`, the first file being used by the last.
 fn circles<'a>(files: impl IntoIterator<Item = (&'a str, &'a [(usize, String)])>) -> Vec<Vec<String>> {

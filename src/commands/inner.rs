@@ -3,11 +3,11 @@
 //! Newton's method on one rank joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
 //! bodies then need no solver of their own. Else every body has one, and sweeps solve the linear steps.
 
-use crate::ddm::{Body, BodySlot};
 use crate::discretize::{Assembled, Maker, Outline};
 use crate::error::{Error, Kind, Result};
+use crate::model::{Body, BodySlot};
 use crate::petsc::Session;
-use crate::problem::method::MethodName;
+use crate::problem::method::{Linear, MethodName};
 use crate::problem::solver::Preset;
 use crate::scene::Scene;
 use crate::solver::preset::{self, Size};
@@ -21,19 +21,6 @@ pub const WHOLE: &str = "newton";
 /// Dofs of all condensed bodies up to which their dense matrix is factored: 0.2 s and 250 MB.
 const DENSE: usize = 3000;
 
-/// How the linear steps of Newton's method are solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Linear {
-    /// One dense matrix of condensed bodies.
-    Dense,
-    /// One sparse factorisation of all bodies.
-    Direct,
-    /// Conjugate gradients with multigrid of all bodies.
-    Multigrid,
-    /// Conjugate gradients over the Robin sweep: every body by itself.
-    Sweeps,
-}
-
 /// Chooses and makes the inner solvers of a scene's bodies.
 pub struct Inner<'a> {
     session: &'a Session,
@@ -42,6 +29,8 @@ pub struct Inner<'a> {
     /// Bytes that the solvers so far leave, on the rank that has least.
     memory: usize,
     method: MethodName,
+    /// How the scene wants linear steps to be solved.
+    wanted: Option<Linear>,
     /// How linear steps are solved, from the plan on.
     linear: Linear,
     plans: Vec<Plan>,
@@ -80,6 +69,7 @@ impl<'a> Inner<'a> {
             asked: scene.solver.preset,
             memory: least as usize,
             method: scene.method.name,
+            wanted: scene.method.linear,
             linear: Linear::Sweeps,
             plans: Vec::new(),
             kept,
@@ -116,6 +106,15 @@ impl<'a> Inner<'a> {
                 (Preset::Mumps, why.to_owned())
             }
             Some(preset) => (preset, "the scene asks for it".to_owned()),
+            None if self.wanted == Some(Linear::Dense) && condensable => {
+                (Preset::Condensed, "the scene asks for dense linear steps".to_owned())
+            }
+            None if self.wanted == Some(Linear::Direct) => {
+                (Preset::Mumps, "the scene asks for direct linear steps".to_owned())
+            }
+            None if self.wanted == Some(Linear::Multigrid) => {
+                (Preset::Hypre, "the scene asks for linear steps by multigrid".to_owned())
+            }
             None => match preset::choose(size) {
                 (Preset::Condensed, why) if !condensable || self.session.options().has("-help") => (Preset::Mumps, why),
                 chosen => chosen,
@@ -130,7 +129,7 @@ impl<'a> Inner<'a> {
             return Err(Error::new(Kind::Usage, "method `newton` solves for all bodies together and runs on one rank")
                 .help("choose newton-robin, or start without mpiexec"));
         }
-        if !newton || self.session.size() > 1 {
+        if !newton || self.session.size() > 1 || self.wanted == Some(Linear::Sweeps) {
             return Ok(Linear::Sweeps);
         }
         let asks = |prefix: &str| options::asks_for_ksp(self.session, prefix);
@@ -142,7 +141,7 @@ impl<'a> Inner<'a> {
                 return Ok(Linear::Sweeps);
             }
         }
-        if self.asked.is_none() && !typed {
+        if self.asked.is_none() && self.wanted.is_none() && !typed {
             agree(&mut self.plans);
         }
         let names: Vec<&str> = self.plans.iter().map(|plan| plan.name.as_str()).chain([WHOLE]).collect();
@@ -154,7 +153,9 @@ impl<'a> Inner<'a> {
             Some("hypre") => Linear::Multigrid,
             Some("cholesky" | "lu") => Linear::Direct,
             Some(_) if self.method == MethodName::Auto => Linear::Sweeps,
-            None if all(Preset::Condensed) && dense <= DENSE && !asks(WHOLE)? => Linear::Dense,
+            None if all(Preset::Condensed) && (dense <= DENSE || self.wanted.is_some()) && !asks(WHOLE)? => {
+                Linear::Dense
+            }
             None if all(Preset::Hypre) => Linear::Multigrid,
             None if self.plans.iter().any(|plan| matches!(plan.preset, Preset::Gamg | Preset::Icc))
                 && self.method == MethodName::Auto =>

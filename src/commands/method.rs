@@ -1,13 +1,14 @@
 //! The scene's method -> the method that runs.
 
-use super::inner::{Linear, WHOLE};
+use super::inner::WHOLE;
 use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
-use crate::ddm::{Coefficient, LinearStep, Method, Model, Start, Sweeps, first_springs};
+use crate::ddm::{Coefficient, Method, Start, Sweeps, first_springs};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::Csr;
+use crate::model::{LinearStep, Model};
 use crate::petsc::Session;
-use crate::problem::method::{Gamma, MethodName};
+use crate::problem::method::{Gamma, Linear, MethodName};
 use crate::scene::Scene;
 use crate::solver::{Dense, Krylov, Monolithic, Union};
 

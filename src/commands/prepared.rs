@@ -1,9 +1,10 @@
 //! A problem that is ready to be solved.
 
-use super::inner::Linear;
-use crate::ddm::{BodySlot, Method, Start};
+use crate::ddm::{Method, Start};
 use crate::discretize::Problem;
+use crate::model::BodySlot;
 use crate::output::StepReport;
+use crate::problem::method::Linear;
 
 /// A problem that is ready to be solved, with what the user should know of its making.
 pub struct Prepared {

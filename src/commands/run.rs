@@ -1,19 +1,21 @@
 //! From a scene to a solved problem: mesh, discretisation, inner solvers, options, iteration.
 
 use super::clock::Clock;
-use super::inner::{Inner, Linear, WHOLE};
+use super::inner::{Inner, WHOLE};
 use super::method;
 use super::prepared::Prepared;
 use super::steps;
 use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::{self, BodySlot, Observer, Outcome, Settings, Status};
+use crate::ddm::{self, Observer, Outcome, Settings, Status};
 use crate::discretize::{self, Mechanism, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
+use crate::model::BodySlot;
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::problem::mesh::MeshSource;
+use crate::problem::method::Linear;
 use crate::problem::order::Order;
 use crate::scene::Scene;
 use crate::solver::options;
@@ -180,7 +182,7 @@ fn mechanism_in_words(problem: &Problem, mechanism: &Mechanism) -> String {
 /// Unknown PETSc options, failures of PETSc.
 pub fn set_up(session: &Session, scene: &Scene, prepared: &mut Prepared, clock: &mut Clock) -> Result<()> {
     if prepared.start.is_none() && scene.method.steps.is_empty() {
-        prepared.start = Some(discretize::start(scene, &prepared.problem, 1.0)?);
+        prepared.start = Some(discretize::start(scene, &prepared.problem, 1.0)?.into());
     }
     let start = prepared.start.clone().unwrap_or_default();
     let made = method::make(session, scene, &mut prepared.problem.model, prepared.linear, &start);

@@ -6,9 +6,10 @@
 use super::prepared::{Prepared, sides};
 use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
-use crate::ddm::{self, Field, Method, Model, Observer, Outcome, Row, Settings, Start, Status};
+use crate::ddm::{self, Method, Observer, Outcome, Row, Settings, Start, Status};
 use crate::discretize;
 use crate::error::Result;
+use crate::model::{Field, Model};
 use crate::output::{StepPairReport, StepReport};
 use crate::scene::Scene;
 use std::rc::Rc;
@@ -46,7 +47,7 @@ pub fn iterate(
                     acceleration.restart();
                 }
             }
-            None => settings.start = discretize::start(scene, &prepared.problem, factor)?,
+            None => settings.start = discretize::start(scene, &prepared.problem, factor)?.into(),
         }
         let mut outcome = ddm::solve(&mut prepared.problem.model, method, settings, &mut all)?;
         all.iterations += outcome.iterations;

@@ -2,7 +2,8 @@
 
 use super::words::in_words;
 use crate::ddm::forecast::{best_factor, best_gamma};
-use crate::ddm::{Mechanism, Model, Moved, Outcome, Status};
+use crate::ddm::{Outcome, Status};
+use crate::model::{Mechanism, Model, Moved};
 use crate::output::{ForecastReport, sci};
 
 /// Name of a status in `report.json`.

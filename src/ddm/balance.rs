@@ -1,10 +1,10 @@
 //! Stopping where the error of the iteration is small beside that of the discretisation: more would change nothing.
 
-use super::field::Field;
-use super::layer_state::Layer;
-use super::linear::LinearStep;
-use super::model::Model;
 use crate::error::Result;
+use crate::model::Model;
+use crate::model::field::Field;
+use crate::model::layer::Layer;
+use crate::model::linear::LinearStep;
 
 /// Knows how far the discrete problem is from the continuous one.
 pub trait Discretisation {
@@ -58,7 +58,8 @@ impl Balance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ddm::{Serial, Sweeps};
+    use crate::ddm::Sweeps;
+    use crate::model::Serial;
     use std::cell::Cell;
     use std::rc::Rc;
 

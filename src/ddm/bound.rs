@@ -9,9 +9,9 @@
 //!
 //! each term of which is zero on the graph of the law and positive beside it. No spectrum, no history, no constants.
 
-use super::layer_state::Layer;
-use super::model::Model;
-use super::run::{Measured, Run};
+use super::scale::Scale;
+use crate::model::Model;
+use crate::model::layer::Layer;
 
 /// What an iterate in equilibrium misses.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -70,14 +70,22 @@ pub struct Reached {
 }
 
 impl Reached {
-    /// Of an iterate with the gap `gap` and the pressures p; `linear` is the error of the linear step in the energy norm.
-    pub(super) fn new(run: &Run, measured: &Measured, gap: &Gap, linear: f64, p: &[f64], places: &Layer) -> Self {
+    /// Of an iterate with u'Ku = `strain` and the pressures p, whose layers miss `gap`, and whose linear step misses `linear` in the
+    /// energy norm.
+    pub(super) fn new(
+        model: &Model,
+        scale: &Scale,
+        strain: f64,
+        (gap, linear): (&Gap, f64),
+        p: &[f64],
+        places: &Layer,
+    ) -> Self {
         let absolute = (2.0 * gap.energy).sqrt() + linear;
         Self {
-            error: run.scale.relative(absolute * absolute, measured.strain + places.work),
+            error: scale.relative(absolute * absolute, strain + places.work),
             is_bound: gap.is_bound && linear == 0.0,
-            pressure: if gap.mismatch == 0.0 { 0.0 } else { gap.mismatch / run.scale.peak(&places.pressure) },
-            imbalance: run.scale.imbalance(run.model, &run.model.forces(p)),
+            pressure: if gap.mismatch == 0.0 { 0.0 } else { gap.mismatch / scale.peak(&places.pressure) },
+            imbalance: scale.imbalance(model, &model.forces(p)),
         }
     }
 

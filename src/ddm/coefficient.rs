@@ -3,9 +3,9 @@
 //! Any symmetric positive definite G leads to the same solution; it decides how fast. Weights are kept for each contact row,
 //! in the layout of a trace vector, because the two bodies of a pair may need different ones.
 
-use super::layer_state::Layer;
-use super::model::Model;
-use super::rigid::{self, Moved};
+use crate::model::Model;
+use crate::model::layer::Layer;
+use crate::model::rigid::{self, Moved};
 use crate::problem::robin::{RobinRule, Zone};
 use nalgebra::DMatrix;
 

@@ -4,12 +4,12 @@
 //! of the body among the displacements with that trace: the augmented Lagrangian method with springs much stiffer than
 //! the body, whose error shrinks by their ratio in every step.
 
-use super::body::Solved;
-use super::field::Field;
-use super::linear::Failure;
-use super::model::{BodySlot, Model};
 use crate::error::Result;
 use crate::linalg::axpy;
+use crate::model::body::Solved;
+use crate::model::field::Field;
+use crate::model::linear::Failure;
+use crate::model::{BodySlot, Model};
 
 /// Springs of the constraint B u = t over the stiffness of the nodes under them: half the digits of a number are left to the body.
 const STIFF: f64 = 1e4;

@@ -3,13 +3,13 @@
 //! The theorem asks for constants of F1' over all displacements. A layer has them on bounded ranges only, so they are taken over
 //! the level set {F1 <= F1(u0)} of the start, which an iteration that descends never leaves.
 
-use super::layer_state::Layer;
-use super::model::Model;
-use super::rigid::{Motions, TOLERANCE};
 use super::sweep::Sweeper;
 use super::sweeps::gradients;
 use crate::contact::law::LayerLaw;
 use crate::error::Result;
+use crate::model::Model;
+use crate::model::layer::Layer;
+use crate::model::rigid::{Motions, TOLERANCE};
 
 /// Bounds of F1'' in the norm of the Robin form G over a level set: `lower` G <= F1'' <= `upper` G.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,7 +79,7 @@ fn loads(model: &Model) -> Vec<Vec<f64>> {
     let points = model.points();
     let share = |i: usize| 0.1 + (0.618_033_988_749_895 * (i + 1) as f64).fract();
     let rows: Vec<f64> = (0..2 * points).map(|i| model.weight[i % points] * share(i)).collect();
-    let load = |(index, slot): (usize, &super::BodySlot)| {
+    let load = |(index, slot): (usize, &crate::model::BodySlot)| {
         slot.local.as_ref().map_or(Vec::new(), |body| {
             let mut load = vec![0.0; body.len()];
             body.add_rows(&model.of_body(index, &rows), &mut load);

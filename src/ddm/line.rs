@@ -1,8 +1,8 @@
 //! F1 along a line: exact line search on a convex function.
 
-use super::field::{Field, apply_stiffness, local_dot};
-use super::layer_state::Layer;
-use super::model::Model;
+use crate::model::Model;
+use crate::model::field::{Field, apply_stiffness, local_dot};
+use crate::model::layer::Layer;
 
 /// The derivative of F1(u + t v): linear and quadratic terms of the bodies, laws of the layers at every point.
 pub struct Line<'a> {

@@ -1,93 +1,10 @@
-//! The linear step: (K + B' diag(omega kappa) B) x = r over all bodies (35).
-//!
-//! How it is solved is a choice of inner solver, not a method of its own: one dense matrix of condensed bodies, one sparse
-//! factorisation, conjugate gradients with multigrid of all bodies, or with the Robin sweep ([`super::sweeps`]). A new way is a new
-//! file with the trait [`LinearStep`].
+//! Linear steps of the method: their springs, and the response to small loads.
 
-use super::body::BodyCounts;
-use super::field::Field;
-use super::layer_state::Layer;
-use super::model::Model;
-use super::rigid::{Motions, TOLERANCE};
 use super::start::surface_slopes;
 use crate::error::Result;
-
-/// A system to be solved.
-pub struct System<'a> {
-    /// Bodies with K and B.
-    pub model: &'a mut Model,
-    /// Places of the layers.
-    pub places: &'a Layer,
-    /// omega kappa at the points, n.
-    pub springs: &'a [f64],
-    /// r, a state of each body that lives here.
-    pub residual: &'a [Vec<f64>],
-    /// How far an iterative solver has to reduce the energy norm of the error.
-    pub reduction: f64,
-}
-
-/// A solution of a [`System`].
-pub struct Solution {
-    /// x, with its traces.
-    pub field: Field,
-    /// x'r, the squared energy norm of x.
-    pub energy: f64,
-    /// Estimated energy norm of the error of x; zero for a direct solver.
-    pub error: f64,
-}
-
-/// A solver that gave up, in its own words.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Failure {
-    /// The body whose solver it was; none for one of all bodies together.
-    pub body: Option<usize>,
-    /// Its reason.
-    pub reason: String,
-}
-
-/// What a solver made of a system.
-pub type Solved = std::result::Result<Solution, Failure>;
-
-/// A solver of the linear step.
-pub trait LinearStep {
-    /// Name in the table and the report.
-    fn name(&self) -> &'static str;
-
-    /// Sets its solver up for the first step, with these springs omega kappa at the points, so that a refusal of the solver or of an
-    /// option comes before it.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    fn set_up(&mut self, _springs: &[f64]) -> Result<()> {
-        Ok(())
-    }
-
-    /// Solves a system. Collective.
-    ///
-    /// # Errors
-    /// Failures of the solver library; a solver that does not reach its tolerance is told in [`Solved`].
-    fn solve(&mut self, system: System) -> Result<Solved>;
-
-    /// What was done so far with all bodies together, besides what bodies count themselves.
-    fn counts(&self) -> BodyCounts {
-        BodyCounts::default()
-    }
-
-    /// Sweeps made so far.
-    fn sweeps(&self) -> usize {
-        0
-    }
-
-    /// One line about the solver of all bodies together; empty if each has its own.
-    fn describe(&self) -> String {
-        String::new()
-    }
-
-    /// Estimated bounds of the spectrum of the preconditioned matrix, if it has seen enough.
-    fn spectrum(&self) -> Option<(f64, f64)> {
-        None
-    }
-}
+use crate::model::linear::{Failure, LinearStep, System};
+use crate::model::rigid::{Motions, TOLERANCE};
+use crate::model::{Field, Layer, Model};
 
 /// The response w of the bodies and their layers to small loads: (K + B' diag(omega kappa) B) w = r, with its squared energy norm.
 /// `loads` is r, one entry a dof of each body that lives here.

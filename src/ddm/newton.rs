@@ -11,13 +11,14 @@
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
 use super::bound::{Gap, Reached};
-use super::field::{Field, residual};
-use super::layer_state::{Layer, meeting_slopes};
 use super::line::Line;
-use super::linear::{LinearStep, System, resisting};
-use super::model::Model;
+use super::linear::resisting;
 use super::run::{End, Run};
 use crate::error::Result;
+use crate::model::Model;
+use crate::model::field::{Field, residual};
+use crate::model::layer::{Layer, meeting_slopes};
+use crate::model::linear::{LinearStep, System};
 
 /// Iterates from displacements and places until a rule ends it.
 ///
@@ -46,7 +47,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let gap = Gap::new(run.model, &c, &p, &met, &rho);
         let energy = residual(run.model, &u, &run.model.forces(&p)).1;
         let measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
-        let reached = Reached::new(run, &measured, &gap, x.error, &p, &met);
+        let reached = Reached::new(run.model, &run.scale, measured.strain, (&gap, x.error), &p, &met);
         if let Some(status) = run.end_of_step(&u, &x.field, &measured, &reached, &met, linear)? {
             return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
         }

@@ -5,10 +5,10 @@
 //! start, once, and the iteration works on what is left. They come from the scene alone, not from a method or its start, and have few
 //! digits: every method sees the same gaps.
 
-use super::field::Field;
-use super::model::Model;
 use super::start::RigidStart;
 use crate::linalg::{dot, fit};
+use crate::model::Model;
+use crate::model::field::Field;
 
 /// Binary digits that an origin's amounts have: products with coordinates of 29 digits are then exact.
 const DIGITS: u32 = 24;

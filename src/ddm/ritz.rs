@@ -1,8 +1,8 @@
 //! Bounds of the spectrum of G^-1 F1'' from the directions that a method went along.
 
-use super::field::{Field, apply_stiffness, local_dot};
-use super::layer_state::Layer;
-use super::model::Model;
+use crate::model::Model;
+use crate::model::field::{Field, apply_stiffness, local_dot};
+use crate::model::layer::Layer;
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Directions kept: the oldest ones, which hold the modes that die first, and the newest, which hold the slow ones.

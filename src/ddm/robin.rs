@@ -9,13 +9,13 @@
 
 use super::acceleration::{Acceleration, Here, Step};
 use super::coefficient::{Coefficient, underconstrained};
-use super::field::Field;
-use super::layer_state::Layer;
-use super::linear::LinearStep;
 use super::run::{End, Run, Swept};
 use super::stop::Status;
 use super::sweep::{Sweep, Sweeper};
 use crate::error::Result;
+use crate::model::field::Field;
+use crate::model::layer::Layer;
+use crate::model::linear::LinearStep;
 
 /// The step that led to an iterate.
 pub(super) struct Last {

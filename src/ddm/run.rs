@@ -1,18 +1,18 @@
 //! What both loops share: the history of a run, its scales, when it ends, and who is told of it.
 
 use super::balance::Balance;
-use super::body::Energy;
 use super::bound::Reached;
-use super::field::Field;
 use super::history::{Observer, Row};
-use super::layer_state::Layer;
-use super::linear::{Failure, LinearStep};
-use super::model::Model;
 use super::origin::Origin;
 use super::scale::Scale;
 use super::stop::{Cycle, Floor, Status, relative_increment};
 use super::sweep::Sweep;
 use crate::error::Result;
+use crate::model::Model;
+use crate::model::body::Energy;
+use crate::model::field::Field;
+use crate::model::layer::Layer;
+use crate::model::linear::{Failure, LinearStep};
 use crate::problem::stop::StopRule;
 use std::time::Instant;
 

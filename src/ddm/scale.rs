@@ -4,9 +4,9 @@
 //! that a relative tolerance could refer to vanishes with the error. What remains then is rest, or the start. Its layers may answer
 //! an overlap with any pressure, so the surfaces give way first ([`start::at`]).
 
-use super::model::Model;
 use super::start;
 use crate::linalg::dot;
+use crate::model::Model;
 
 /// A solution this much smaller than rest is measured by rest.
 const VANISHING: f64 = 1e-6;

@@ -2,16 +2,12 @@
 
 use super::acceleration::Acceleration;
 use super::balance::{Balance, Discretisation};
-use super::body::BodyCounts;
 use super::coefficient::{Coefficient, underconstrained};
 use super::extend::extend;
-use super::field::Field;
 use super::forecast::Forecast;
 use super::history::{Observer, Row};
 use super::interval::{Interval, interval};
-use super::layer_state::Layer;
-use super::linear::{LinearStep, resisting};
-use super::model::Model;
+use super::linear::resisting;
 use super::origin::Origin;
 use super::run::{End, Run};
 use super::scale::Scale;
@@ -19,6 +15,11 @@ use super::start::{self, RigidStart};
 use super::stop::{Cycle, Floor, Status};
 use super::{newton, robin};
 use crate::error::Result;
+use crate::model::Model;
+use crate::model::body::BodyCounts;
+use crate::model::field::Field;
+use crate::model::layer::Layer;
+use crate::model::linear::LinearStep;
 use crate::problem::stop::StopRule;
 use std::time::Instant;
 
@@ -66,6 +67,13 @@ pub enum Start {
     Pressure(Vec<f64>),
     /// A displacement as it is.
     Resume(Field),
+}
+
+impl From<Option<Vec<f64>>> for Start {
+    /// A trace, or none.
+    fn from(trace: Option<Vec<f64>>) -> Self {
+        trace.map_or(Start::Automatic, Start::Trace)
+    }
 }
 
 /// What a run needs to know besides the model and the method.

@@ -13,11 +13,11 @@
 //! It has no minimum exactly when loads push bodies away from all that could stop them: a motion a that closes no contact,
 //! B E a <= 0, and gains, w'a > 0 (Farkas). Elastic bodies then have no equilibrium either.
 
-use super::layer_state::Layer;
 use super::line::{self, Unbounded};
-use super::model::{Model, Sprung};
-use super::rigid::{Motions, Moved, TOLERANCE};
 use crate::linalg::{axpy, dot};
+use crate::model::layer::Layer;
+use crate::model::rigid::{Motions, Moved, TOLERANCE};
+use crate::model::{Model, Sprung};
 use nalgebra::DVector;
 
 /// Where a run begins.

@@ -1,8 +1,8 @@
 //! When a run ends, and what that is called.
 
-use super::linear::Failure;
-use super::model::Mechanism;
-use super::rigid::Moved;
+use crate::model::Mechanism;
+use crate::model::linear::Failure;
+use crate::model::rigid::Moved;
 use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
 

@@ -1,11 +1,11 @@
 //! One sweep (41): every body solves its own linear problem, independently.
 
-use super::body::{Energy, Solved};
-use super::field::Field;
-use super::layer_state::Layer;
-use super::model::Model;
 use crate::error::Result;
 use crate::linalg::{axpy, dot};
+use crate::model::Model;
+use crate::model::body::{Energy, Solved};
+use crate::model::field::Field;
+use crate::model::layer::Layer;
 
 /// Numbers that a body adds to the message of a sweep: decrement, strain, potential, failed, skipped,
 /// factorisations, inner iterations, and a product with another residual.

@@ -5,14 +5,14 @@
 //! they are in balance again. As K E = 0, E'H and A are sums over contact points, which every rank knows: no message, no solve.
 
 use super::coefficient::Coefficient;
-use super::field::{Field, add_forces, apply_stiffness, local_dot};
-use super::linear::{Failure, LinearStep, Solution, Solved, System};
-use super::model::Model;
-use super::rigid::{Motions, TOLERANCE};
 use super::sweep::Sweeper;
 use crate::error::Result;
 use crate::linalg::Factor;
 use crate::linalg::{axpy, dot, fit};
+use crate::model::Model;
+use crate::model::field::{Field, add_forces, apply_stiffness, local_dot};
+use crate::model::linear::{Failure, LinearStep, Solution, Solved, System};
+use crate::model::rigid::{Motions, TOLERANCE};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Iterations at most: conjugate gradients lose their directions to rounding long before.

@@ -2,11 +2,11 @@
 
 use super::part::Part;
 use crate::contact::ContactPair;
-use crate::ddm::{Motion, Segment, Sprung, rigid as joint};
 use crate::error::Result;
 use crate::fem::rigid::{self, RigidMotion};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use crate::mesh::Mesh;
+use crate::model::{Motion, Segment, Sprung, rigid as joint};
 use nalgebra::{DMatrix, DVector};
 
 /// Share of the largest possible work below which the work of the loads is rounding.

@@ -7,10 +7,11 @@ use super::draft::{Draft, Loose, NO_WORK, works};
 use super::gauge;
 use super::part::Part;
 use crate::contact::ContactPair;
-use crate::ddm::{self, Motion, Motions, Segment};
 use crate::fem::Space;
 use crate::fem::rigid::{self, RigidMotion};
 use crate::linalg::{Blocks, PART, TOLERANCE, axpy, dot, fit};
+use crate::model;
+use crate::model::{Motion, Motions, Segment};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
 
@@ -34,8 +35,8 @@ pub struct Mechanism {
 
 impl Mechanism {
     /// For a run that cannot begin.
-    pub fn for_model(&self) -> ddm::Mechanism {
-        ddm::Mechanism { bodies: self.bodies.clone(), motion: self.name.clone(), work: self.work }
+    pub fn for_model(&self) -> model::Mechanism {
+        model::Mechanism { bodies: self.bodies.clone(), motion: self.name.clone(), work: self.work }
     }
 }
 

@@ -1,8 +1,8 @@
 //! From the error of each cell to the sizes of the next mesh.
 
 use super::Estimate;
-use crate::ddm::Model;
 use crate::discretize::meshes::Meshes;
+use crate::model::Model;
 
 /// Sizes of elements at the corners of the cells of all bodies.
 pub struct Sizes {

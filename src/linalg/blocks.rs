@@ -1,6 +1,5 @@
 //! Symmetric positive semidefinite matrices of small dense blocks, one row of blocks a body.
 
-use super::factor::{Factor, unit_diagonal};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -85,18 +84,5 @@ impl Blocks {
             }
         }
         y
-    }
-
-    /// Factors the matrix and finds its kernel: see [`Factor`]. `tolerance` is [`TOLERANCE`](super::TOLERANCE) unless there is
-    /// a reason.
-    pub fn factor(&self, tolerance: f64) -> Factor {
-        Factor::new(self, unit_diagonal(self, tolerance), tolerance)
-    }
-
-    /// Basis of the combinations e of a few motions with e'Ae <= `tolerance * full * e'e`, where `full` is the entry of a motion
-    /// that is held in full: a scale that small entries do not have by themselves. Pure motions come out pure, largest part one.
-    pub fn free(gram: &DMatrix<f64>, full: f64, tolerance: f64) -> Vec<DVector<f64>> {
-        let scale = vec![full.sqrt().recip(); gram.nrows()];
-        Factor::new(&Self::single(gram), scale, tolerance).kernel()
     }
 }

@@ -2,7 +2,7 @@
 
 use super::blocks::Blocks;
 use super::degree;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -91,7 +91,7 @@ impl Column {
 
 impl Factor {
     /// Factors a matrix whose unknowns are scaled with `scale`, one entry each.
-    pub(super) fn new(matrix: &Blocks, scale: Vec<f64>, tolerance: f64) -> Self {
+    fn new(matrix: &Blocks, scale: Vec<f64>, tolerance: f64) -> Self {
         let mut factor = Self {
             count: matrix.unknowns(),
             scale,
@@ -121,7 +121,7 @@ impl Factor {
     }
 
     /// Writes the scaled matrix into column k, from its blocks (column, transpose of the block above).
-    fn assemble(&mut self, k: usize, entries: &[(usize, nalgebra::DMatrix<f64>)], work: &mut Work) {
+    fn assemble(&mut self, k: usize, entries: &[(usize, DMatrix<f64>)], work: &mut Work) {
         let mut height = self.columns[k].own.len();
         for (column, range) in &self.columns[k].below {
             work.row[*column] = height;
@@ -299,6 +299,21 @@ impl Factor {
     }
 }
 
+impl Blocks {
+    /// Factors the matrix and finds its kernel: see [`Factor`]. `tolerance` is [`TOLERANCE`] unless there is
+    /// a reason.
+    pub fn factor(&self, tolerance: f64) -> Factor {
+        Factor::new(self, unit_diagonal(self, tolerance), tolerance)
+    }
+
+    /// Basis of the combinations e of a few motions with e'Ae <= `tolerance * full * e'e`, where `full` is the entry of a motion
+    /// that is held in full: a scale that small entries do not have by themselves. Pure motions come out pure, largest part one.
+    pub fn free(gram: &DMatrix<f64>, full: f64, tolerance: f64) -> Vec<DVector<f64>> {
+        let scale = vec![full.sqrt().recip(); gram.nrows()];
+        Factor::new(&Self::single(gram), scale, tolerance).kernel()
+    }
+}
+
 /// What the columns share while they are made.
 struct Work {
     /// A vector over all unknowns, zero between uses.
@@ -309,7 +324,7 @@ struct Work {
 }
 
 /// 1/root of each diagonal entry, zero where it is rounding.
-pub(super) fn unit_diagonal(matrix: &Blocks, tolerance: f64) -> Vec<f64> {
+fn unit_diagonal(matrix: &Blocks, tolerance: f64) -> Vec<f64> {
     let of = |i: usize| {
         let diagonal = matrix.diagonal(i).diagonal();
         let least = tolerance * tolerance * diagonal.iter().copied().fold(0.0, f64::max);

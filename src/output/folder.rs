@@ -76,7 +76,8 @@ impl Folder {
         let mut numbers = self.numbers.borrow_mut();
         let number = numbers.entry((stem.to_owned(), extension.to_owned())).or_insert(1);
         loop {
-            let name = if *number == 1 { format!("{stem}.{extension}") } else { format!("{stem}-{number}.{extension}") };
+            let name =
+                if *number == 1 { format!("{stem}.{extension}") } else { format!("{stem}-{number}.{extension}") };
             if !known.contains(&self.path.join(&name)) {
                 return name;
             }

@@ -20,6 +20,8 @@ pub struct MethodSpec {
     pub interval: bool,
     /// Earlier steps that the method `anderson` mixes.
     pub depth: usize,
+    /// How linear steps of Newton's method are solved, or the program's choice.
+    pub linear: Option<Linear>,
     /// Start of the iteration.
     pub start: Start,
     /// Shares of the loads, one after another and 1 at last; none are no steps.
@@ -37,6 +39,7 @@ impl Default for MethodSpec {
             gamma: Gamma::Stationary(0.6),
             interval: false,
             depth: 5,
+            linear: None,
             start: Start::Auto,
             steps: Vec::new(),
             stop: StopRule::default(),
@@ -71,6 +74,34 @@ impl MethodName {
         ("newton-robin", MethodName::NewtonRobin),
         ("newton", MethodName::Newton),
     ];
+}
+
+/// How the linear steps of Newton's method are solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Linear {
+    /// One dense matrix of condensed bodies.
+    Dense,
+    /// One sparse factorisation of all bodies.
+    Direct,
+    /// Conjugate gradients with multigrid of all bodies.
+    Multigrid,
+    /// Conjugate gradients over the Robin sweep: every body by itself.
+    Sweeps,
+}
+
+impl Linear {
+    /// Every way with its name in the scene.
+    pub const ALL: [(&'static str, Linear); 4] = [
+        ("dense", Linear::Dense),
+        ("direct", Linear::Direct),
+        ("multigrid", Linear::Multigrid),
+        ("sweeps", Linear::Sweeps),
+    ];
+
+    /// Its name in the scene.
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(_, linear)| *linear == self).map_or("", |(name, _)| name)
+    }
 }
 
 /// Relaxation gamma^k.

@@ -220,6 +220,9 @@ fn method(method: &MethodSpec) -> Value {
     if !method.steps.is_empty() {
         map["steps"] = json!(method.steps);
     }
+    if let Some(linear) = method.linear {
+        map["linear"] = json!(linear.name());
+    }
     if method.name == MethodName::Anderson {
         map["depth"] = json!(method.depth);
     }

@@ -6,10 +6,10 @@
 //! energies and all that is printed are the same numbers.
 
 use super::{Dense, Retained, SparseBody, memory};
-use crate::ddm::{Body, BodyCounts, Energy, Matrices, Solved};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, axpy, dot};
+use crate::model::{Body, BodyCounts, Energy, Matrices, Solved};
 use crate::petsc::{Schur, Session};
 use std::cell::RefCell;
 use std::time::Instant;

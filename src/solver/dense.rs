@@ -1,8 +1,8 @@
 //! Dense Cholesky factorisation by the LAPACK that PETSc runs on: for matrices without zeros.
 
 use super::InnerSolver;
-use crate::ddm::Solved;
 use crate::error::Result;
+use crate::model::Solved;
 use crate::petsc::{cholesky, cholesky_solve};
 
 /// G as a dense matrix, factored when it is first needed after a change.

@@ -1,9 +1,9 @@
 //! Any PETSc KSP and PC as inner solver.
 
 use super::{InnerSolver, options};
-use crate::ddm::Solved;
 use crate::error::Result;
 use crate::linalg::Csr;
+use crate::model::Solved;
 use crate::petsc::{Int, Ksp, Matrix, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.

@@ -1,6 +1,6 @@
 //! Inner solvers: how a body solves G z = r.
 //!
-//! [`SparseBody`] owns K, f and B and answers the verbs of [`Body`](crate::ddm::Body); an [`InnerSolver`] owns G. A new
+//! [`SparseBody`] owns K, f and B and answers the verbs of [`Body`](crate::model::Body); an [`InnerSolver`] owns G. A new
 //! way to solve is a new file with that trait. [`CondensedBody`] is such a body whose dofs are those of its contact.
 
 mod condensed;
@@ -22,8 +22,8 @@ pub use retained::Retained;
 pub use sparse::SparseBody;
 pub use split::Split;
 
-use crate::ddm::Solved;
 use crate::error::Result;
+use crate::model::Solved;
 
 /// Owner of the matrix G with a way to solve G z = r.
 pub trait InnerSolver {

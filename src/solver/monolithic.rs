@@ -4,11 +4,11 @@
 //! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. One rank.
 
 use super::{InnerSolver, SparseBody};
-use crate::ddm::linear::{Failure, LinearStep, Solution, Solved, System};
-use crate::ddm::{Body, BodyCounts, Field, Model};
 use crate::error::Result;
 use crate::fem::ElasticBody;
 use crate::linalg::{Csr, axpy, dot};
+use crate::model::linear::{Failure, LinearStep, Solution, Solved, System};
+use crate::model::{Body, BodyCounts, Field, Model};
 
 /// Stiffness matrices side by side and the rows that couple them, on the states of the bodies.
 ///

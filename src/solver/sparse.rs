@@ -1,10 +1,10 @@
 //! A body whose state is all its dofs and its rigid motion, and whose G is a sparse matrix.
 
 use super::{InnerSolver, Split};
-use crate::ddm::{Body, BodyCounts, Energy, Matrices, Solved};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, dot};
+use crate::model::{Body, BodyCounts, Energy, Matrices, Solved};
 use std::time::Instant;
 
 /// A body with assembled K and f, its contact rows B, and a solver for G = K + B' diag(d) B.

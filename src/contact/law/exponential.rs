@@ -58,7 +58,8 @@ impl LayerLaw for Exponential {
 
     fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
         if c > self.end || pressure > self.at_end.pressure {
-            return by_quadrature(self, point, c, pressure);
+            let (law, tangent) = (|c| self.pressure(point, c), |c| self.pressure_and_tangent(point, c).1);
+            return by_quadrature((c, pressure, self.compression(point, pressure)), law, tangent);
         }
         // with c's distance d from the graph, in c0: (p + p0) c0 (e^d - 1 - d)
         let slope = pressure + self.p0;

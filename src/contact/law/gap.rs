@@ -1,6 +1,5 @@
 //! Fenchel's gap: the area between a law's graph and the corner of a compression and a pressure.
 
-use super::LayerLaw;
 use super::quadrature::integral_to;
 
 /// Error of a quadrature, as a share of the gap: it goes into bounds that are a factor above the error they bound.
@@ -15,35 +14,24 @@ const NEAR: f64 = 1e-6;
 /// Relative difference of those tangents: two thirds of it are the error of the gap, upwards.
 const STRAIGHT: f64 = 5e-4;
 
-/// [`LayerLaw::duality_gap`].
-pub(super) fn gap<L: LayerLaw + ?Sized>(law: &L, point: usize, c: f64, pressure: f64) -> f64 {
-    if c.is_nan() || pressure.is_nan() {
-        f64::NAN
-    } else if pressure < 0.0 || pressure == f64::INFINITY || c.is_infinite() {
-        // an open layer without pressure is on the graph at any distance
-        if pressure == 0.0 && c < 0.0 { 0.0 } else { f64::INFINITY }
-    } else if pressure == 0.0 {
-        law.response(point, c).energy
-    } else {
-        // below c = 0 the area is a rectangle and no more
-        law.gap_loaded(point, c.max(0.0), pressure) + pressure * (-c).max(0.0)
-    }
-}
-
-/// [`LayerLaw::gap_loaded`] as the integral of p(.) - p from where the law has the pressure p to c.
-pub(super) fn by_quadrature<L: LayerLaw + ?Sized>(law: &L, point: usize, c: f64, pressure: f64) -> f64 {
-    let on_graph = law.compression(point, pressure);
+/// The gap of a compression c and a `pressure`, as the integral of p(.) - p from c = `on_graph`, where the law has that pressure, to c.
+/// `law` gives p(c), `tangent` p'(c).
+pub(super) fn by_quadrature(
+    (c, pressure, on_graph): (f64, f64, f64),
+    law: impl Fn(f64) -> f64,
+    tangent: impl Fn(f64) -> f64,
+) -> f64 {
     if on_graph == f64::INFINITY {
         return f64::INFINITY;
     }
-    let excess = |c: f64| law.pressure(point, c) - pressure;
+    let excess = |c: f64| law(c) - pressure;
     let (difference, way) = (excess(c), c - on_graph);
     let short = way.abs() <= CLOSE * c;
     if short || difference.abs() <= NEAR * pressure {
         if difference == 0.0 {
             return 0.0;
         }
-        let [here, there] = [c, on_graph].map(|c| law.pressure_and_tangent(point, c).1);
+        let [here, there] = [c, on_graph].map(tangent);
         let least = here.min(there);
         if short || (here - there).abs() < STRAIGHT * least {
             // the way is rounded, the difference of pressures is not; the flatter side gives the larger gap

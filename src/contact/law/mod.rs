@@ -138,12 +138,23 @@ pub trait LayerLaw: std::fmt::Debug {
     /// What p(c) itself has of rounding, 1e-16 p times the exponent of the law, is no error of the gap: it is that of a
     /// law with parameters as far off as double numbers are.
     fn duality_gap(&self, point: usize, c: f64, pressure: f64) -> f64 {
-        gap::gap(self, point, c, pressure)
+        if c.is_nan() || pressure.is_nan() {
+            f64::NAN
+        } else if pressure < 0.0 || pressure == f64::INFINITY || c.is_infinite() {
+            // an open layer without pressure is on the graph at any distance
+            if pressure == 0.0 && c < 0.0 { 0.0 } else { f64::INFINITY }
+        } else if pressure == 0.0 {
+            self.response(point, c).energy
+        } else {
+            // below c = 0 the area is a rectangle and no more
+            self.gap_loaded(point, c.max(0.0), pressure) + pressure * (-c).max(0.0)
+        }
     }
 
     /// [`LayerLaw::duality_gap`] for a finite `c >= 0` and a finite `pressure > 0`.
     fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
-        gap::by_quadrature(self, point, c, pressure)
+        let (law, tangent) = (|c| self.pressure(point, c), |c| self.pressure_and_tangent(point, c).1);
+        gap::by_quadrature((c, pressure, self.compression(point, pressure)), law, tangent)
     }
 }
 

@@ -1,10 +1,11 @@
 //! Anderson acceleration of the sweep, safeguarded by F1.
 
-use super::{Acceleration, Here, Layer, Model, Step};
-use crate::ddm::field::Field;
+use super::{Acceleration, Here, Step};
 use crate::ddm::line::Line;
 use crate::ddm::ritz::Ritz;
 use crate::error::Result;
+use crate::model::field::Field;
+use crate::model::{Layer, Model};
 use nalgebra::{DMatrix, DVector};
 use std::collections::VecDeque;
 

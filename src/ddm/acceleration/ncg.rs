@@ -1,11 +1,12 @@
 //! Nonlinear conjugate gradients, preconditioned by the Robin sweep.
 
-use super::{Acceleration, Here, Layer, Model, Step};
-use crate::ddm::field::{Field, local_dot};
+use super::{Acceleration, Here, Step};
 use crate::ddm::forecast::gradients_factor;
 use crate::ddm::line::Line;
 use crate::ddm::ritz::Ritz;
 use crate::error::Result;
+use crate::model::field::{Field, local_dot};
+use crate::model::{Layer, Model};
 
 /// Polak and Ribière's rule with exact line search on F1, restarted when the contact set changes.
 #[derive(Default)]

@@ -1,9 +1,10 @@
 //! The paper's iteration: u <- u + gamma z.
 
-use super::{Acceleration, Here, Layer, Model, Step};
+use super::{Acceleration, Here, Step};
 use crate::ddm::gamma::GammaRule;
 use crate::ddm::ritz::Ritz;
 use crate::error::Result;
+use crate::model::{Layer, Model};
 
 /// The relaxed Robin-Robin iteration (41)-(42) with any rule for gamma.
 pub struct Relaxed {

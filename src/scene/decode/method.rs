@@ -3,7 +3,7 @@
 use super::{Decoder, choose};
 use crate::error::{Result, nearest};
 use crate::expression::Field;
-use crate::problem::method::{Gamma, MethodName, MethodSpec, Start};
+use crate::problem::method::{Gamma, Linear, MethodName, MethodSpec, Start};
 use crate::problem::robin::{RobinRule, Zone};
 use crate::problem::stop::StopRule;
 use crate::scene::read::{Keys, Node, Value};
@@ -16,7 +16,7 @@ impl Decoder<'_> {
         let keys = Keys::open(
             node,
             "[method]",
-            &["name", "psi", "gamma", "robin", "interval", "depth", "start", "steps", "stop"],
+            &["name", "psi", "gamma", "robin", "interval", "depth", "linear", "start", "steps", "stop"],
         )?;
         let name = match keys.get("name") {
             Some(name) => choose(name, "method", &MethodName::ALL)?,
@@ -41,10 +41,20 @@ impl Decoder<'_> {
             gamma: keys.get("gamma").map_or(Ok(default.gamma), gamma)?,
             interval: self.interval(&keys, name)?,
             depth: keys.get("depth").map_or(Ok(default.depth), depth)?,
+            linear: keys.get("linear").map(|linear| self.linear(linear, name)).transpose()?,
             start,
             steps: steps.map_or(Ok(default.steps), load_steps)?,
             stop: keys.get("stop").map_or(Ok(default.stop), stop)?,
         })
+    }
+
+    fn linear(&self, node: &Node, name: MethodName) -> Result<Linear> {
+        if !matches!(name, MethodName::Auto | MethodName::Newton) {
+            return Err(node
+                .refuse("only Newton's method has linear steps of all bodies")
+                .help("name = \"newton\", or leave `linear` away"));
+        }
+        choose(node, "way to solve linear steps", &Linear::ALL)
     }
 
     fn interval(&self, keys: &Keys, name: MethodName) -> Result<bool> {

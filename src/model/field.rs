@@ -1,7 +1,7 @@
 //! Vectors over all bodies: iterates, corrections, directions.
 
+use super::Model;
 use super::body::Energy;
-use super::model::Model;
 use crate::linalg::{axpy, dot};
 
 /// A displacement of all bodies: states of the bodies that live here, traces of all.

@@ -3,7 +3,7 @@
 //! Motions are numbered through body by body. As K E = 0, what is asked of them here are sums over contact points. Which of their
 //! combinations nothing holds is the kernel of [`Motions::springs`]; [`TOLERANCE`] says what is nothing.
 
-use super::model::{BodySlot, Model, Motion, Segment};
+use super::{BodySlot, Model, Motion, Segment};
 use crate::linalg::{Blocks, axpy, dot};
 pub use crate::linalg::{PART, TOLERANCE};
 use nalgebra::{DMatrix, DVector};

@@ -3,7 +3,7 @@
 //! The law of a point is a curve in the plane of compression c and pressure p: p = 0 for c <= 0, p = p(c) above. Newton's method
 //! keeps a place (c_q, p_q) on it that need not be the compression of the bodies' traces; sweeps take the place that is.
 
-use super::model::Model;
+use super::Model;
 
 /// A place on the law of every contact point, with the law's tangent there.
 #[derive(Debug, Clone, Default)]

@@ -3,7 +3,18 @@
 //! Points of all pairs are numbered through: point q of pair i is `offset[i] + q`. A trace vector has two entries a
 //! point, first all of side a, then all of side b: `trace[side * points + offset[pair] + q]`.
 
-use super::body::Body;
+pub mod body;
+pub mod field;
+pub mod layer;
+pub mod linear;
+pub mod rigid;
+
+pub use body::{Body, BodyCounts, Energy, Matrices, Solved};
+pub use field::Field;
+pub use layer::Layer;
+pub use linear::{LinearStep, Solution};
+pub use rigid::{Motions, Moved};
+
 use crate::contact::ContactPair;
 use crate::error::Result;
 use nalgebra::DMatrix;
