@@ -129,7 +129,7 @@ fn halves_of_a_ring_slide() {
     let mut loads = ring(11.0);
     loads[0] = held;
     let run = solve(Scene::new(blocks([2, 2], &all(&loads), &RING)), &[]);
-    lost(&run, "unheld", &["bodies `b2` and `b4`", "together in their translation along y"]);
+    lost(&run, "underconstrained", &["bodies `b2` and `b4`", "together in their translation along y"]);
 }
 
 /// A floating grid of blocks: all of them as one, then every row but one and every column but one slide, and nothing else.
@@ -166,11 +166,11 @@ fn loads_that_do_not_balance() {
     let pushed = Scene::new(two("10", 11.0));
     for method in METHODS {
         let run = solve(&pushed, &["--method", method]);
-        lost(&run, "unheld", &["bodies `b1` and `b2`", "together in their translation along y", "4.8e-02"]);
+        lost(&run, "underconstrained", &["bodies `b1` and `b2`", "together in their translation along y", "4.8e-02"]);
     }
-    lost(&solve_on(2, &pushed, &[]), "unheld", &["bodies `b1` and `b2`", "translation along y"]);
+    lost(&solve_on(2, &pushed, &[]), "underconstrained", &["bodies `b1` and `b2`", "translation along y"]);
     // the sum of the loads is zero, that of their moments is not
-    lost(&solve(Scene::new(two("20*x", 10.0)), &[]), "unheld", &["bodies `b1` and `b2`", "in their rotation,"]);
+    lost(&solve(Scene::new(two("20*x", 10.0)), &[]), "underconstrained", &["bodies `b1` and `b2`", "in their rotation,"]);
     let said = winkler(&["check", &pushed.path.display().to_string()]).stdout;
     assert!(said.contains("loads work on it: there is no solution"), "{said}");
 }
@@ -218,7 +218,7 @@ fn sizes_that_differ() {
         let named = "`large` and `small`: nothing holds them together in their translation along x; translation along y; rotation";
         assert!(run.warnings().contains(named), "{}", run.warnings());
     }
-    lost(&solve(scene(0.501), &[]), "unheld", &["bodies `large` and `small`", "in their rotation"]);
+    lost(&solve(scene(0.501), &[]), "underconstrained", &["bodies `large` and `small`", "in their rotation"]);
 }
 
 /// The middle block is pushed up, and takes the upper one along: the lowest one stays.

@@ -22,6 +22,8 @@ pub struct Origin {
     gap: Vec<f64>,
     /// What the loads have gained on these motions: to be added to F1.
     pub energy: f64,
+    /// The start itself, seen from here: what it has beyond the digits of the motions.
+    pub rest: Field,
 }
 
 impl Origin {
@@ -30,7 +32,7 @@ impl Origin {
         if start.amounts.iter().all(|&amount| amount == 0.0) {
             return None;
         }
-        let mut motion = Field::rest(model);
+        let (mut motion, mut rest) = (Field::rest(model), Field::rest(model));
         let mut energy = [0.0];
         let mut first = 0;
         for (index, slot) in model.bodies.iter_mut().enumerate() {
@@ -50,7 +52,11 @@ impl Origin {
             slot.motions.iter().zip(own).for_each(|(m, i)| crate::linalg::axpy(start.amounts[i], &m.trace, &mut trace));
             let amounts = fit(matrices.traces, &trace);
             let deformation = state.len() - amounts.len();
-            state[deformation..].iter_mut().zip(amounts).for_each(|(origin, amount)| *origin = short(amount));
+            let beyond = &mut rest.states[index][deformation..];
+            for ((origin, beyond), amount) in state[deformation..].iter_mut().zip(beyond).zip(amounts) {
+                *origin = short(amount);
+                *beyond += amount - *origin;
+            }
             // the residual at rest without contact is the load
             let mut load = vec![0.0; state.len()];
             body.residual(&body.rest(), &vec![0.0; slot.row_stiffness.len()], &mut load);
@@ -58,12 +64,14 @@ impl Origin {
         }
         // one message: the energy, then the traces
         motion.trace_here(model);
-        let mut message = [&energy[..], &motion.trace].concat();
+        rest.trace_here(model);
+        let mut message = [&energy[..], &motion.trace, &rest.trace].concat();
         model.exchange.sum(&mut message);
+        rest.trace = message.split_off(1 + motion.trace.len());
         motion.trace = message.split_off(1);
         let gap = model.gap.clone();
         model.gap.iter_mut().zip(motion.closing()).for_each(|(gap, closing)| *gap -= closing);
-        Some(Self { motion, gap, energy: message[0] })
+        Some(Self { motion, gap, energy: message[0], rest })
     }
 
     /// Traces of the motions.

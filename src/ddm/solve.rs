@@ -167,7 +167,8 @@ pub fn solve(
     };
     let end = match method {
         Method::Newton(linear) => {
-            let u = resumed.unwrap_or_else(|| Field::rest(run.model));
+            let start = |origin: &mut Origin| std::mem::take(&mut origin.rest);
+            let u = resumed.or_else(|| run.origin.as_mut().map(start)).unwrap_or_else(|| Field::rest(run.model));
             newton::iterate(&mut run, &mut **linear, u, places)?
         }
         Method::Sweeps { acceleration, coefficient, linear } => {
