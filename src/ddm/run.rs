@@ -207,8 +207,10 @@ impl Run<'_> {
         }
         let imbalance = self.scale.imbalance(self.model, &layer.force);
         // what is known of the error counts: a small residual of a slow mode is no small error
-        let balanced =
-            self.stop.residual.is_none_or(|tolerance| imbalance <= SPARE * tolerance && !(error > SPARE * tolerance));
+        let balanced = self
+            .stop
+            .residual
+            .is_none_or(|tolerance| imbalance <= SPARE * tolerance && (error.is_nan() || error <= SPARE * tolerance));
         if self.stop.is_met(residual, increment) && balanced {
             return Ok(Some(Status::Converged));
         }
