@@ -52,19 +52,15 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
         }
         forcing.learn(&gap, &reached, run.stop.residual);
-<<<<<<< HEAD
-        let lost = progress.is_lost(gap.change, measured.f1);
+        // a step that knew of no contact runs through the other body
+        let blind = places.closed == 0 && met.closed > 0;
+        let lost = progress.is_lost(gap.change, measured.f1) || blind;
         if lost {
             progress.f1 += search(run.model, &mut u, &x.field)?;
         } else {
             progress.f1 = measured.f1;
         }
         places = if lost { Layer::at(run.model, &u.trace) } else { met };
-=======
-        // a step that knew of no contact runs through the other body
-        let astray = progress.is_lost(gap.change, measured.f1) || places.closed == 0;
-        places = if astray && retreat(run.model, &mut u, &x.field)? { Layer::at(run.model, &u.trace) } else { met };
->>>>>>> triage
     }
 }
 
@@ -122,7 +118,6 @@ impl Progress {
     }
 }
 
-<<<<<<< HEAD
 /// Replaces a step x that led to u by the exact search on F1 along it. The change of F1 from where the step began.
 fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<f64> {
     u.add(-1.0, x);
@@ -135,20 +130,4 @@ fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<f64> {
     u.add(way, x);
     u.retrace(model);
     Ok(change)
-=======
-/// Takes back of a step x to u what raises F1, by exact search from where it began. Whether there is something to take back.
-fn retreat(model: &mut Model, u: &mut Field, x: &Field) -> Result<bool> {
-    let mut before = u.clone();
-    before.add(-1.0, x);
-    before.retrace(model);
-    let layer = Layer::at(model, &before.trace);
-    let (r, _) = residual(model, &before, &layer.force);
-    let Ok(way) = Line::new(model, &layer, &r, x).minimize(1e-2) else { return Ok(false) };
-    if way > 0.0 && way < 1.0 {
-        before.add(way, x);
-        before.retrace(model);
-        *u = before;
-    }
-    Ok(way > 0.0 && way < 1.0)
->>>>>>> triage
 }

@@ -6,9 +6,9 @@
 //! digits: every method sees the same gaps.
 
 use crate::linalg::{dot, fit};
-use nalgebra::DVector;
 use crate::model::Model;
 use crate::model::field::Field;
+use nalgebra::DVector;
 
 /// Binary digits that an origin's amounts have: products with coordinates of 29 digits are then exact.
 const DIGITS: u32 = 24;
