@@ -53,8 +53,13 @@ struct Tally {
     named: usize,
     unsolvable: usize,
     wrong: usize,
+    failed: usize,
+    roundoff: usize,
     seconds: f64,
 }
+
+/// Newton steps beyond which a scene is listed.
+const MANY: usize = 15;
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
@@ -104,13 +109,21 @@ fn run(arguments: &Arguments) -> Result<bool> {
             sound &= !wrong && (name != "auto" || verdict != Verdict::Failed);
             if arguments.only.is_some() {
                 println!(
-                    "{name}: {verdict:?}: {} iterations, {} sweeps; {}",
-                    answer.iterations, answer.sweeps, answer.message
+                    "{name}: {verdict:?}: {} iterations, {} sweeps; {}\n  {}",
+                    answer.iterations,
+                    answer.sweeps,
+                    answer.message,
+                    answer.history.join(" ")
                 );
             }
-            if wrong || verdict == Verdict::Failed {
+            let many = matches!(name.as_str(), "auto" | "newton" | "newton-robin") && answer.iterations > MANY;
+            let roundoff = answer.status == "roundoff-limited";
+            if wrong || verdict == Verdict::Failed || many || roundoff {
                 let why = match &verdict {
                     Verdict::Wrong(why) => format!("WRONG ({why})"),
+                    Verdict::Right if many => format!("{} STEPS", answer.iterations),
+                    Verdict::Failed if solvable => format!("FAILED ({})", answer.status),
+                    Verdict::Failed => format!("NOT NAMED ({})", answer.status),
                     _ => answer.status.clone(),
                 };
                 let (peak, off) = (runs::peak(&reference) / case.pressure, runs::difference(&case, &reference, answer));
@@ -153,6 +166,8 @@ impl Tally {
     fn take(&mut self, answer: &Answer, verdict: &Verdict, solvable: bool) {
         self.seconds += answer.seconds;
         self.wrong += usize::from(matches!(verdict, Verdict::Wrong(_)));
+        self.failed += usize::from(*verdict == Verdict::Failed);
+        self.roundoff += usize::from(answer.status == "roundoff-limited");
         if !solvable {
             self.unsolvable += 1;
             self.named += usize::from(matches!(verdict, Verdict::Named | Verdict::Right));
@@ -170,24 +185,29 @@ impl Tally {
 
 fn print(arguments: &Arguments, tallies: &HashMap<&str, Tally>, failures: &[(usize, String, String, String)]) {
     println!(
-        "| method | converged | sweeps: median | worst | iterations: median | worst | factorizations: median | wrong | rest named | seconds |"
+        "| method | solved | rightly named | wrong | failed | roundoff claimed | steps: 50 %, 90 %, 99 %, worst, sum | sweeps: median, worst | factorizations | seconds |"
     );
-    println!("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- | ---: |");
+    println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     for name in &arguments.methods {
         let Some(tally) = tallies.get(name.as_str()) else { continue };
-        let (sweeps, iterations) = (spread(&tally.sweeps), spread(&tally.iterations));
+        let (steps, sweeps) = (Sorted::new(&tally.iterations), Sorted::new(&tally.sweeps));
         println!(
-            "| {name} | {} of {} | {} | {} | {} | {} | {} | {} | {} of {} | {:.0} |",
+            "| {name} | {} of {} | {} of {} | {} | {} | {} | {}, {}, {}, {}, {} | {}, {} | {} | {:.0} |",
             tally.right,
             tally.solvable,
-            sweeps.0,
-            sweeps.1,
-            iterations.0,
-            iterations.1,
-            spread(&tally.factorizations).0,
-            tally.wrong,
             tally.named,
             tally.unsolvable,
+            tally.wrong,
+            tally.failed,
+            tally.roundoff,
+            steps.share(0.5),
+            steps.share(0.9),
+            steps.share(0.99),
+            steps.share(1.0),
+            tally.iterations.iter().sum::<usize>(),
+            sweeps.share(0.5),
+            sweeps.share(1.0),
+            Sorted::new(&tally.factorizations).share(0.5),
             tally.seconds
         );
     }
@@ -201,9 +221,19 @@ fn print(arguments: &Arguments, tallies: &HashMap<&str, Tally>, failures: &[(usi
     }
 }
 
-/// Median and largest.
-fn spread(values: &[usize]) -> (usize, usize) {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable();
-    (sorted.get(sorted.len() / 2).copied().unwrap_or(0), sorted.last().copied().unwrap_or(0))
+/// Counts in order.
+struct Sorted(Vec<usize>);
+
+impl Sorted {
+    fn new(values: &[usize]) -> Self {
+        let mut sorted = values.to_vec();
+        sorted.sort_unstable();
+        Self(sorted)
+    }
+
+    /// The least count that this share of all does not exceed; 0 without any.
+    fn share(&self, share: f64) -> usize {
+        let place = (share * self.0.len() as f64).ceil() as usize;
+        self.0.get(place.saturating_sub(1)).copied().unwrap_or(0)
+    }
 }

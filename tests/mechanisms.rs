@@ -170,7 +170,11 @@ fn loads_that_do_not_balance() {
     }
     lost(&solve_on(2, &pushed, &[]), "underconstrained", &["bodies `b1` and `b2`", "translation along y"]);
     // the sum of the loads is zero, that of their moments is not
-    lost(&solve(Scene::new(two("20*x", 10.0)), &[]), "underconstrained", &["bodies `b1` and `b2`", "in their rotation,"]);
+    lost(
+        &solve(Scene::new(two("20*x", 10.0)), &[]),
+        "underconstrained",
+        &["bodies `b1` and `b2`", "in their rotation,"],
+    );
     let said = winkler(&["check", &pushed.path.display().to_string()]).stdout;
     assert!(said.contains("loads work on it: there is no solution"), "{said}");
 }

@@ -33,13 +33,34 @@ pub fn respond(
 /// Share of the springs of whole surfaces that resists motions which no closed contact resists: they then go far, but not without end.
 const PROXIMAL: f64 = 1e-3;
 
-/// The springs omega kappa of a linear step, n, with a little everywhere if some rigid motion of the bodies together would else meet no
+/// The springs omega kappa of a linear step, n, with one more for every rigid motion of the bodies together that would else meet no
 /// resistance: a contact that is open now may be what stops it.
+///
+/// It is at the point that the motion closes most, and nowhere else. If forces are in balance on the motion, as where bodies rest
+/// and could turn about the points that are closed, a single spring carries nothing, and the step is exact; several would.
 pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
     let motions = Motions::of(model);
-    if motions.count() > 0 && motions.springs(&springs).factor(TOLERANCE).rank() < motions.count() {
-        let slopes = surface_slopes(model);
-        springs.iter_mut().enumerate().for_each(|(q, spring)| *spring += PROXIMAL * model.weight[q] * slopes[q]);
+    if motions.count() == 0 {
+        return springs;
+    }
+    let mut free = motions.springs(&springs).factor(TOLERANCE).kernel();
+    if free.is_empty() {
+        return springs;
+    }
+    let surfaces: Vec<f64> =
+        surface_slopes(model).iter().zip(&model.weight).map(|(slope, weight)| slope * weight).collect();
+    while let Some(motion) = free.pop() {
+        let closing = motions.closing(&motion);
+        let Some(most) = (0..closing.len()).max_by(|&p, &q| closing[p].abs().total_cmp(&closing[q].abs())) else {
+            break;
+        };
+        let shares = closing.iter().map(|s| (s / closing[most]).powi(2));
+        springs[most] += PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
+        // what the others close at that point is this one's
+        for other in &mut free {
+            let share = motions.closing(other)[most] / closing[most];
+            other.axpy(-share, &motion, 1.0);
+        }
     }
     springs
 }

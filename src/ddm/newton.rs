@@ -53,8 +53,14 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         }
         forcing.learn(&gap, &reached, run.stop.residual);
         // a step that knew of no contact runs through the other body
-        let astray = progress.is_lost(gap.change, measured.f1) || places.closed == 0;
-        places = if astray && retreat(run.model, &mut u, &x.field)? { Layer::at(run.model, &u.trace) } else { met };
+        let blind = places.closed == 0 && met.closed > 0;
+        let lost = progress.is_lost(gap.change, measured.f1) || blind;
+        if lost {
+            progress.f1 += search(run.model, &mut u, &x.field)?;
+        } else {
+            progress.f1 = measured.f1;
+        }
+        places = if lost { Layer::at(run.model, &u.trace) } else { met };
     }
 }
 
@@ -90,7 +96,7 @@ impl Forcing {
 /// random scenes did.
 #[derive(Debug)]
 struct Progress {
-    /// Least work that a step changed, steps since, and F1 of the last iterate.
+    /// Least work that a step changed, steps since, and F1 where the last step began.
     best: f64,
     since: usize,
     f1: f64,
@@ -103,27 +109,25 @@ impl Default for Progress {
 }
 
 impl Progress {
-    /// Whether two steps in a row have changed more than an earlier one, and the last one raised F1.
+    /// Whether two steps in a row have changed more than an earlier one, and the last one raised F1. Then no step does until one
+    /// changes less than all before: places are those of traces, along which Newton's steps descend.
     fn is_lost(&mut self, change: f64, f1: f64) -> bool {
-        let rose = f1 > std::mem::replace(&mut self.f1, f1);
         self.since = if change < self.best { 0 } else { self.since + 1 };
         self.best = self.best.min(change);
-        self.since >= 2 && rose && f1.is_finite()
+        self.since >= 2 && f1 > self.f1
     }
 }
 
-/// Takes back of a step x to u what raises F1, by exact search from where it began. Whether there is something to take back.
-fn retreat(model: &mut Model, u: &mut Field, x: &Field) -> Result<bool> {
-    let mut before = u.clone();
-    before.add(-1.0, x);
-    before.retrace(model);
-    let layer = Layer::at(model, &before.trace);
-    let (r, _) = residual(model, &before, &layer.force);
-    let Ok(way) = Line::new(model, &layer, &r, x).minimize(1e-2) else { return Ok(false) };
-    if way > 0.0 && way < 1.0 {
-        before.add(way, x);
-        before.retrace(model);
-        *u = before;
-    }
-    Ok(way > 0.0 && way < 1.0)
+/// Replaces a step x that led to u by the exact search on F1 along it. The change of F1 from where the step began.
+fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<f64> {
+    u.add(-1.0, x);
+    u.retrace(model);
+    let layer = Layer::at(model, &u.trace);
+    let (r, _) = residual(model, u, &layer.force);
+    let line = Line::new(model, &layer, &r, x);
+    let way = line.minimize(1e-2).unwrap_or(0.0);
+    let change = line.change(way);
+    u.add(way, x);
+    u.retrace(model);
+    Ok(change)
 }

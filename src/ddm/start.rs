@@ -63,8 +63,8 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
     if let Some(given) = given {
         gap = model.compression(given).into_iter().map(|c| -c).collect();
     }
-    let mut rigid =
-        Rigid { model, motions: &motions, work: DVector::from_vec(work), slope: surface_slopes(model), gap };
+    let (slope, bare) = (surface_slopes(model), vec![false; gap.len()]);
+    let mut rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope, gap, bare };
     let mut amounts = DVector::zeros(motions.count());
     if motions.count() > 0 {
         for _ in 0..ROUNDS {
@@ -156,6 +156,8 @@ struct Rigid<'a> {
     slope: Vec<f64>,
     /// d, less what a given start closes of it.
     gap: Vec<f64>,
+    /// Points where surfaces meet without a layer, n.
+    bare: Vec<bool>,
 }
 
 impl Rigid<'_> {
@@ -166,7 +168,17 @@ impl Rigid<'_> {
     }
 
     fn places(&self, amounts: &DVector<f64>) -> Layer {
-        met(self.model, &self.approach(amounts), &self.slope)
+        self.places_at(&self.approach(amounts))
+    }
+
+    fn places_at(&self, approach: &[f64]) -> Layer {
+        let mut layer = met(self.model, approach, &self.slope);
+        for q in (0..approach.len()).filter(|&q| self.bare[q]) {
+            layer.pressure[q] = self.slope[q] * approach[q].max(0.0);
+            layer.force[q] = self.model.weight[q] * layer.pressure[q];
+            layer.tangent[q] = if approach[q] > 0.0 { f64::INFINITY } else { 0.0 };
+        }
+        layer
     }
 
     /// omega Pi'': springs of law and surfaces in series.
@@ -214,11 +226,18 @@ impl Rigid<'_> {
     /// # Errors
     /// A motion along which the energy falls for ever.
     fn minimize(&self) -> Result<DVector<f64>, DVector<f64>> {
-        let model = self.model;
         // drawn together as far as the surfaces let them, contact is found from the closed side
-        let everywhere: Vec<f64> = self.slope.iter().zip(&model.weight).map(|(slope, weight)| slope * weight).collect();
+        let everywhere: Vec<f64> =
+            self.slope.iter().zip(&self.model.weight).map(|(slope, weight)| slope * weight).collect();
         let drawn: Vec<f64> = everywhere.iter().zip(&self.gap).map(|(spring, gap)| spring * gap).collect();
-        let mut amounts = self.solve(&everywhere, &(&self.work + self.motions.work(&drawn)));
+        self.descend(self.solve(&everywhere, &(&self.work + self.motions.work(&drawn))))
+    }
+
+    /// The minimum from `amounts` on.
+    ///
+    /// # Errors
+    /// A motion along which the energy falls for ever.
+    fn descend(&self, mut amounts: DVector<f64>) -> Result<DVector<f64>, DVector<f64>> {
         let largest = self.work.amax();
         for _ in 0..STEPS {
             let places = self.places(&amounts);
@@ -240,7 +259,7 @@ impl Rigid<'_> {
             let held = step.dot(&self.pull(&amounts)) - gain;
             let slope = |t: f64| {
                 let approach = self.approach(&(&amounts + t * &step));
-                let force = met(model, &approach, &self.slope).force;
+                let force = self.places_at(&approach).force;
                 dot(&force, &closing) + held + t * resisted
             };
             let first = dot(&start, &closing) + held;
@@ -254,33 +273,36 @@ impl Rigid<'_> {
         Ok(amounts)
     }
 
-    /// Opens the contacts that an overlap alone presses together, and loads do not, if bodies can move so without closing others.
+    /// Opens the contacts that an overlap alone presses together, and loads do not, if bodies can move so that no such contact is left.
     /// Any part of the overlap that is left would be a pressure that vanishes slowly.
     fn open_idle(&self, amounts: &mut DVector<f64>) {
         let places = self.places(amounts);
         let force = |pair: usize| places.force[self.model.range(pair)].iter().sum::<f64>();
         let most = (0..self.model.pairs.len()).map(force).fold(0.0, f64::max);
         let unloaded = self.work.iter().all(|&work| work == 0.0);
-        let mut idle = vec![false; places.force.len()];
-        for pair in (0..self.model.pairs.len()).filter(|&pair| unloaded || force(pair) <= BALANCED.sqrt() * most) {
-            self.model.range(pair).for_each(|q| idle[q] = places.compression[q] > 0.0);
-        }
-        if !idle.contains(&true) {
-            return;
-        }
-        let mut springs = self.springs(&places);
-        let away: Vec<f64> = (0..idle.len()).map(|q| if idle[q] { -self.model.weight[q] } else { 0.0 }).collect();
-        idle.iter().zip(&mut springs).filter(|(idle, _)| **idle).for_each(|(_, spring)| *spring = 0.0);
-        let motion = self.solve(&springs, &self.motions.work(&away));
-        let closing = self.motions.closing(&motion);
-        if !self.opens(&closing) {
-            return;
-        }
-        // bodies give way by about what they are compressed elsewhere
+        let idle = |pair: &usize| unloaded || force(*pair) <= BALANCED.sqrt() * most;
+        let idle: Vec<usize> =
+            (0..self.model.pairs.len()).filter(idle).flat_map(|pair| self.model.range(pair)).collect();
+        // bodies give way by about what they are compressed elsewhere, and by what an origin's digits leave of their way
         let deepest = places.compression.iter().copied().fold(0.0, f64::max);
         let approach = self.approach(amounts);
-        let needed = (0..idle.len()).filter(|&q| idle[q] && closing[q] < 0.0);
-        let way = needed.map(|q| (approach[q] + deepest) / -closing[q]).fold(0.0, f64::max);
-        *amounts += way * motion;
+        let terms = |q: usize| self.gap[q].abs().max((approach[q] + self.gap[q]).abs());
+        let way = idle.iter().map(|&q| terms(q)).fold(0.0, f64::max);
+        let room = 2.0 * (deepest + 4.0 * super::origin::ROUNDING * way);
+        if idle.iter().all(|&q| approach[q] <= -0.5 * room) {
+            return;
+        }
+        let mut gap = self.gap.clone();
+        let mut bare = vec![false; gap.len()];
+        idle.iter().for_each(|&q| (gap[q], bare[q]) = (gap[q] - room, true));
+        let (work, slope) = (self.work.clone(), self.slope.clone());
+        let wider = Rigid { model: self.model, motions: self.motions, work, slope, gap, bare };
+        // layers that are soft at first would open slowly
+        if let Ok(moved) = wider.descend(amounts.clone()) {
+            let approach = self.approach(&moved);
+            if idle.iter().all(|&q| approach[q] <= -0.5 * room) {
+                *amounts = moved;
+            }
+        }
     }
 }

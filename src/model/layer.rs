@@ -95,12 +95,11 @@ const SLOPE: f64 = 0.1;
 pub fn meeting_slopes(model: &Model) -> Vec<f64> {
     let points = model.points();
     let rows = model.row_stiffness();
-    let largest = (0..2 * points).map(|i| rows[i] / model.weight[i % points]).fold(f64::MIN_POSITIVE, f64::max);
     let slope = |q: usize| {
-        // a row without stiffness has prescribed dofs only: the other side alone gives way
+        // a row without stiffness has prescribed dofs only: the other side alone gives way, and without one the place is at c
         let sides = [rows[q], rows[points + q]].into_iter().filter(|stiffness| *stiffness > 0.0);
         let softer = sides.fold(f64::INFINITY, f64::min) / model.weight[q];
-        SLOPE * if softer.is_finite() { softer } else { largest }
+        SLOPE * softer
     };
     (0..points).map(slope).collect()
 }

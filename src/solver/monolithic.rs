@@ -63,8 +63,8 @@ impl Union {
         let mut stiffness = Csr::new(n);
         for ((&first, part), slot) in offset.iter().zip(&parts).zip(&model.bodies) {
             let own = part.stiffness;
+            // of the size that the stiffness had before elimination: what is left of it may be nothing but rounding
             for dof in pins(part.motions) {
-                // not the entry of K: where rigid motions are all that the retained dofs can do, K is rounding
                 extra[first + dof].push(((first + dof) as i32, slot.scale));
             }
             for i in 0..part.len() {

@@ -96,6 +96,8 @@ pub struct Answer {
     pub force: Vec<f64>,
     /// Whether the run says that this is the solution.
     pub claims: bool,
+    /// The iterates, one a line: error, closed points, energy.
+    pub history: Vec<String>,
 }
 
 /// Runs a scene file by a method.
@@ -134,6 +136,7 @@ fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Re
         force: (0..model.pairs.len()).map(|i| model.range(i).map(|q| outcome.layer.force[q]).sum()).collect(),
         pressure: outcome.layer.pressure,
         claims: outcome.status.is_solved(),
+        history: outcome.rows.iter().map(|row| format!("{:.1e}/{}", row.residual, row.closed)).collect(),
     })
 }
 
