@@ -114,6 +114,11 @@ impl Run<'_> {
         self.rows.push(row);
     }
 
+    /// Whether these errors are as small as was asked for.
+    pub fn is_enough(&self, reached: &Reached) -> bool {
+        self.stop.residual.is_some_and(|tolerance| reached.worst() <= tolerance)
+    }
+
     /// Ends a step of Newton's method along x to u: its row, and the status if the run ends there.
     ///
     /// # Errors
