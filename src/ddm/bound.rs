@@ -12,6 +12,7 @@
 use super::scale::Scale;
 use crate::model::Model;
 use crate::model::layer::Layer;
+use crate::model::linear::Solution;
 
 /// What an iterate in equilibrium misses.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -87,6 +88,14 @@ impl Reached {
             pressure: if gap.mismatch == 0.0 { 0.0 } else { gap.mismatch / scale.peak(&places.pressure) },
             imbalance: scale.imbalance(model, &model.forces(p)),
         }
+    }
+
+    /// Adds what rounding left of the equilibrium of an exact step from `before` to `places`: one `more` step with its matrix.
+    pub(super) fn add_rounding(&mut self, scale: &Scale, strain: f64, more: &Solution, before: &Layer, places: &Layer) {
+        self.error += scale.relative(more.energy, strain + places.work);
+        let closing = more.field.closing();
+        let off = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
+        self.pressure += if off == 0.0 { 0.0 } else { off / scale.peak(&places.pressure) };
     }
 
     /// The largest of the errors.

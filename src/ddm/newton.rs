@@ -45,9 +45,18 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let met = Layer::meet(run.model, &c, &p, &rho);
 
         let gap = Gap::new(run.model, &c, &p, &met, &rho);
-        let energy = residual(run.model, &u, &run.model.forces(&p)).1;
+        let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
         let measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
-        let reached = Reached::new(run.model, &run.scale, measured.strain, (&gap, x.error), &p, &met);
+        let mut reached = Reached::new(run.model, &run.scale, measured.strain, (&gap, x.error), &p, &met);
+        let mut exact = true;
+        if x.error == 0.0 && run.is_enough(&reached) {
+            // an exact step has the rounding of its size, which may be large beside what is left: its matrix tells how large
+            let system = System { model: run.model, places: &places, springs: &springs, residual: &rest, reduction };
+            if let Ok(more) = linear.solve(system)? {
+                reached.add_rounding(&run.scale, measured.strain, &more, &places, &met);
+                exact = run.is_enough(&reached);
+            }
+        }
         if let Some(status) = run.end_of_step(&u, &x.field, &measured, &reached, &met, linear)? {
             return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
         }
@@ -60,7 +69,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         } else {
             progress.f1 = measured.f1;
         }
-        places = if lost { Layer::at(run.model, &u.trace) } else { met };
+        if exact {
+            places = if lost { Layer::at(run.model, &u.trace) } else { met };
+        }
     }
 }
 

@@ -114,6 +114,11 @@ impl Run<'_> {
         self.rows.push(row);
     }
 
+    /// Whether these errors are as small as was asked for.
+    pub fn is_enough(&self, reached: &Reached) -> bool {
+        self.stop.residual.is_some_and(|tolerance| reached.worst() <= tolerance)
+    }
+
     /// Ends a step of Newton's method along x to u: its row, and the status if the run ends there.
     ///
     /// # Errors
@@ -208,8 +213,7 @@ impl Run<'_> {
         }
         let imbalance = self.scale.imbalance(self.model, &layer.force);
         // what is known of the error counts: a small residual of a slow mode is no small error, nor is what it leaves of the pressures
-        let pressure =
-            self.missing(layer, sweep) * if swept.amplification.is_nan() { 1.0 } else { swept.amplification.powi(2) };
+        let pressure = self.missing(layer, sweep) * swept.amplification.max(1.0);
         let balanced = self.stop.residual.is_none_or(|tolerance| {
             imbalance.max(pressure) <= SPARE * tolerance && (error.is_nan() || error <= SPARE * tolerance)
         });
