@@ -52,7 +52,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
         }
         forcing.learn(&gap, &reached, run.stop.residual);
-        let lost = progress.is_lost(gap.change, measured.f1);
+        // a step that knew of no contact runs through the other body
+        let blind = places.closed == 0 && met.closed > 0;
+        let lost = progress.is_lost(gap.change, measured.f1) || blind;
         if lost {
             progress.f1 += search(run.model, &mut u, &x.field)?;
         } else {

@@ -5,10 +5,10 @@
 //! start, once, and the iteration works on what is left. They come from the scene alone, not from a method or its start, and have few
 //! digits: every method sees the same gaps.
 
-use super::start::RigidStart;
 use crate::linalg::{dot, fit};
 use crate::model::Model;
 use crate::model::field::Field;
+use nalgebra::DVector;
 
 /// Binary digits that an origin's amounts have: products with coordinates of 29 digits are then exact.
 const DIGITS: u32 = 24;
@@ -27,9 +27,9 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// Takes the motions of a start into the gap of `model`; none if nothing moves. Collective.
-    pub fn take(model: &mut Model, start: &RigidStart) -> Option<Self> {
-        if start.amounts.iter().all(|&amount| amount == 0.0) {
+    /// Takes the motions of a start, in these `amounts`, into the gap of `model`; none if nothing moves. Collective.
+    pub fn take(model: &mut Model, amounts: &DVector<f64>) -> Option<Self> {
+        if amounts.iter().all(|&amount| amount == 0.0) {
             return None;
         }
         let (mut motion, mut rest) = (Field::rest(model), Field::rest(model));
@@ -49,11 +49,11 @@ impl Origin {
             state.fill(0.0);
             let Some(matrices) = body.matrices() else { continue };
             let mut trace = vec![0.0; slot.row_stiffness.len()];
-            slot.motions.iter().zip(own).for_each(|(m, i)| crate::linalg::axpy(start.amounts[i], &m.trace, &mut trace));
-            let amounts = fit(matrices.traces, &trace);
-            let deformation = state.len() - amounts.len();
+            slot.motions.iter().zip(own).for_each(|(m, i)| crate::linalg::axpy(amounts[i], &m.trace, &mut trace));
+            let own = fit(matrices.traces, &trace);
+            let deformation = state.len() - own.len();
             let beyond = &mut rest.states[index][deformation..];
-            for ((origin, beyond), amount) in state[deformation..].iter_mut().zip(beyond).zip(amounts) {
+            for ((origin, beyond), amount) in state[deformation..].iter_mut().zip(beyond).zip(own) {
                 *origin = short(amount);
                 *beyond += amount - *origin;
             }

@@ -134,7 +134,8 @@ impl Run<'_> {
         let increment = row.increment;
         self.push(row);
         let worst = reached.worst();
-        if let Some(body) = not_finite(self.model, x, worst) {
+        // pressures of compressions that are far away may be beyond the range of numbers: the places are not
+        if let Some(body) = not_finite(self.model, x, if worst.is_nan() { worst } else { 0.0 }) {
             return Ok(Some(Status::NotFinite { body }));
         }
         if self.stop.is_met(worst, increment) {
@@ -206,11 +207,12 @@ impl Run<'_> {
             return Ok(Some(Status::NotFinite { body }));
         }
         let imbalance = self.scale.imbalance(self.model, &layer.force);
-        // what is known of the error counts: a small residual of a slow mode is no small error
-        let balanced = self
-            .stop
-            .residual
-            .is_none_or(|tolerance| imbalance <= SPARE * tolerance && (error.is_nan() || error <= SPARE * tolerance));
+        // what is known of the error counts: a small residual of a slow mode is no small error, nor is what it leaves of the pressures
+        let pressure =
+            self.missing(layer, sweep) * if swept.amplification.is_nan() { 1.0 } else { swept.amplification.powi(2) };
+        let balanced = self.stop.residual.is_none_or(|tolerance| {
+            imbalance.max(pressure) <= SPARE * tolerance && (error.is_nan() || error <= SPARE * tolerance)
+        });
         if self.stop.is_met(residual, increment) && balanced {
             return Ok(Some(Status::Converged));
         }
@@ -227,6 +229,21 @@ impl Run<'_> {
             return Ok(Some(Status::RoundoffLimited));
         }
         Ok((k >= self.stop.iterations).then_some(Status::IterationLimit))
+    }
+}
+
+impl Run<'_> {
+    /// Largest change of a pressure that a sweep's correction would make, relative to the largest pressure.
+    fn missing(&self, layer: &Layer, sweep: &Sweep) -> f64 {
+        let closing = sweep.correction.closing();
+        let mut most = 0.0f64;
+        for (i, pair) in self.model.pairs.iter().enumerate() {
+            for q in self.model.range(i) {
+                let there = pair.law.pressure(q - self.model.offset[i], layer.compression[q] + closing[q]);
+                most = most.max((there - layer.pressure[q]).abs());
+            }
+        }
+        if most == 0.0 { 0.0 } else { most / self.scale.peak(&layer.pressure) }
     }
 }
 

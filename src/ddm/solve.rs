@@ -143,7 +143,7 @@ pub fn solve(
     let scale = Scale::new(model, &[&vec![0.0; 2 * model.points()], &trace]);
     let places = places(model, &begin, &rigid);
     // an estimate of the discretisation's error needs the iterates whole
-    let origin = if floats && settings.balance.is_none() { Origin::take(model, &rigid) } else { None };
+    let origin = if floats && settings.balance.is_none() { Origin::take(model, &rigid.amounts) } else { None };
     let resumed = match begin {
         Start::Resume(mut field) => {
             if let Some(origin) = &origin {

@@ -63,8 +63,8 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
     if let Some(given) = given {
         gap = model.compression(given).into_iter().map(|c| -c).collect();
     }
-    let mut rigid =
-        Rigid { model, motions: &motions, work: DVector::from_vec(work), slope: surface_slopes(model), gap };
+    let (slope, bare) = (surface_slopes(model), vec![false; gap.len()]);
+    let mut rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope, gap, bare };
     let mut amounts = DVector::zeros(motions.count());
     if motions.count() > 0 {
         for _ in 0..ROUNDS {
@@ -156,6 +156,8 @@ struct Rigid<'a> {
     slope: Vec<f64>,
     /// d, less what a given start closes of it.
     gap: Vec<f64>,
+    /// Points where surfaces meet without a layer, n.
+    bare: Vec<bool>,
 }
 
 impl Rigid<'_> {
@@ -166,7 +168,17 @@ impl Rigid<'_> {
     }
 
     fn places(&self, amounts: &DVector<f64>) -> Layer {
-        met(self.model, &self.approach(amounts), &self.slope)
+        self.places_at(&self.approach(amounts))
+    }
+
+    fn places_at(&self, approach: &[f64]) -> Layer {
+        let mut layer = met(self.model, approach, &self.slope);
+        for q in (0..approach.len()).filter(|&q| self.bare[q]) {
+            layer.pressure[q] = self.slope[q] * approach[q].max(0.0);
+            layer.force[q] = self.model.weight[q] * layer.pressure[q];
+            layer.tangent[q] = if approach[q] > 0.0 { f64::INFINITY } else { 0.0 };
+        }
+        layer
     }
 
     /// omega Pi'': springs of law and surfaces in series.
@@ -226,7 +238,6 @@ impl Rigid<'_> {
     /// # Errors
     /// A motion along which the energy falls for ever.
     fn descend(&self, mut amounts: DVector<f64>) -> Result<DVector<f64>, DVector<f64>> {
-        let model = self.model;
         let largest = self.work.amax();
         for _ in 0..STEPS {
             let places = self.places(&amounts);
@@ -248,7 +259,7 @@ impl Rigid<'_> {
             let held = step.dot(&self.pull(&amounts)) - gain;
             let slope = |t: f64| {
                 let approach = self.approach(&(&amounts + t * &step));
-                let force = met(model, &approach, &self.slope).force;
+                let force = self.places_at(&approach).force;
                 dot(&force, &closing) + held + t * resisted
             };
             let first = dot(&start, &closing) + held;
@@ -282,9 +293,11 @@ impl Rigid<'_> {
             return;
         }
         let mut gap = self.gap.clone();
-        idle.iter().for_each(|&q| gap[q] -= room);
-        let wider =
-            Rigid { model: self.model, motions: self.motions, work: self.work.clone(), slope: self.slope.clone(), gap };
+        let mut bare = vec![false; gap.len()];
+        idle.iter().for_each(|&q| (gap[q], bare[q]) = (gap[q] - room, true));
+        let (work, slope) = (self.work.clone(), self.slope.clone());
+        let wider = Rigid { model: self.model, motions: self.motions, work, slope, gap, bare };
+        // layers that are soft at first would open slowly
         if let Ok(moved) = wider.descend(amounts.clone()) {
             let approach = self.approach(&moved);
             if idle.iter().all(|&q| approach[q] <= -0.5 * room) {
