@@ -169,7 +169,11 @@ impl Lanczos {
         // either is too small as long as a slow mode has not come up; a run that ends early has gained all of it lately
         let low = if self.alphas.len() <= SETTLED { self.spectrum().map_or(0.0, |(low, _)| low) } else { 0.0 };
         let by_spectrum = rz.max(0.0) / low;
-        if self.gains.len() <= DELAY || by_spectrum.is_infinite() { by_spectrum.min(lately) } else { by_spectrum.max(lately) }
+        if self.gains.len() <= DELAY || by_spectrum.is_infinite() {
+            by_spectrum.min(lately)
+        } else {
+            by_spectrum.max(lately)
+        }
     }
 
     /// Extreme eigenvalues of the Lanczos matrix.
