@@ -230,7 +230,11 @@ fn sizes_that_differ() {
 fn pushed_off_together() {
     let held = "fix = [{ on = \"b1_bottom\", x = 0, y = 0 }]";
     let run = solve(Scene::new(blocks([3, 1], &[held, "force = [0, 1]", ""], &THREE)), &[]);
-    lost(&run, "unbounded", &["resists translation along y of `b2` and translation along y of `b3`, and the loads push that way"]);
+    lost(
+        &run,
+        "unbounded",
+        &["resists translation along y of `b2` and translation along y of `b3`, and the loads push that way"],
+    );
     assert!(!run.text("message").contains("`b1`"), "{}", run.said());
 }
 
@@ -245,7 +249,9 @@ fn an_overlap_that_no_load_keeps() {
     let scene = Scene::new(format!("{}gap = \"0.5*(1 - cos(4*pi*x))\"\n{}", &text[..at], &text[at..]));
     // what sweeps begin with has the rounding of the overlap, and the layer's answer to that
     let rounding = 10.0 * 1e-5 * f64::EPSILON;
-    for (method, most, peak) in [("auto", 1, 0.0), ("newton-robin", 1, 0.0), ("ncg", 0, rounding), ("anderson", 0, rounding)] {
+    for (method, most, peak) in
+        [("auto", 1, 0.0), ("newton-robin", 1, 0.0), ("ncg", 0, rounding), ("anderson", 0, rounding)]
+    {
         let run = solve(&scene, &["--method", method]).converged();
         assert!(run.count("iterations") <= most, "{}", run.said());
         assert!((0..2).all(|pair| run.number(&format!("pairs/{pair}/peak_pressure")) <= peak), "{}", run.said());

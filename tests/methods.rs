@@ -112,7 +112,9 @@ fn any_power_law_takes_few_steps() {
                     let steps = run.count("iterations");
                     match run.text("status") {
                         "roundoff-limited" if rounded => assert!(run.number("residual") < 1e-6, "{}", run.said()),
-                        status => assert!(status == "converged" && steps <= most, "{scene} B={b} a={a}: {}", run.said()),
+                        status => {
+                            assert!(status == "converged" && steps <= most, "{scene} B={b} a={a}: {}", run.said())
+                        }
                     }
                 }
             }
@@ -171,8 +173,7 @@ fn multigrid_over_all_bodies() {
 #[test]
 fn rigid_bodies_foretell_the_contact() {
     let sets = ["mesh.set={n=14,edge=1}", "body.0.order=1", "body.1.order=1", "solver=hypre", "method={}"];
-    let run =
-        solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged();
+    let run = solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged();
     assert!(run.count("iterations") <= 6, "{}", run.said());
     // the first step finds the contact but for its edge: 200 points
     let closed = run.history().counts("closed");

@@ -98,7 +98,7 @@ impl Forcing {
 
     /// After a step with this gap: the next may miss a share of what this one did, and need not do better than what the run asks for.
     fn learn(&mut self, gap: &Gap, reached: &Reached, target: Option<f64>) {
-        let enough = SHARE * target.unwrap_or(0.0) / reached.error;
+        let enough = SHARE * target.unwrap_or(0.0) / reached.error.max(reached.pressure);
         self.0 = (SHARE * gap.share).max(enough).clamp(f64::EPSILON.sqrt(), FIRST);
     }
 }

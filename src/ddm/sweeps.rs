@@ -164,11 +164,16 @@ impl Lanczos {
     fn squared_error(&self, rz: f64) -> f64 {
         let lately = match self.gains.len() {
             0 => return if rz > 0.0 { f64::INFINITY } else { 0.0 },
-            n if n > DELAY => self.gains[n - DELAY..].iter().sum(),
-            _ => f64::INFINITY,
+            n => self.gains[n - n.min(DELAY)..].iter().sum(),
         };
+        // either is too small as long as a slow mode has not come up; a run that ends early has gained all of it lately
         let low = if self.alphas.len() <= SETTLED { self.spectrum().map_or(0.0, |(low, _)| low) } else { 0.0 };
-        f64::min(lately, rz.max(0.0) / low)
+        let by_spectrum = rz.max(0.0) / low;
+        if self.gains.len() <= DELAY || by_spectrum.is_infinite() {
+            by_spectrum.min(lately)
+        } else {
+            by_spectrum.max(lately)
+        }
     }
 
     /// Extreme eigenvalues of the Lanczos matrix.
