@@ -92,7 +92,7 @@ fn the_default_is_fast() {
     }
     // by sweeps, and with bodies that are too large to condense: one factorisation a step
     let sweeps = solved(&held, &[&hard[..], &["--method", "newton-robin"]].concat());
-    assert!(sweeps.count("sweeps") <= 200, "{}", sweeps.count("sweeps"));
+    assert!(sweeps.count("sweeps") <= 260, "{}", sweeps.count("sweeps"));
     let large = solved(&held, &[&hard[..], &["--set", "solver=mumps"]].concat());
     assert_eq!((large.text("method"), large.count("iterations"), large.count("factorizations")), ("newton", 3, 3));
 }
@@ -241,5 +241,5 @@ fn a_tower_takes_as_long_as_a_wall() {
         run.count("sweeps")
     };
     let sweeps = [tower(4), tower(12)];
-    assert_eq!(sweeps, [14, 15]);
+    assert_eq!(sweeps, [18, 19]);
 }
