@@ -77,7 +77,8 @@ fn layers(model: &Model, c0: &[f64], c: &[f64]) -> f64 {
     let mut sum = 0.0;
     for (i, pair) in model.pairs.iter().enumerate() {
         for q in model.range(i) {
-            let excess = |c: f64| pair.law.pressure(q - model.offset[i], c) - pair.law.pressure(q - model.offset[i], c0[q]);
+            let excess =
+                |c: f64| pair.law.pressure(q - model.offset[i], c) - pair.law.pressure(q - model.offset[i], c0[q]);
             let way = (c[q] - c0[q]) / INTERVALS as f64;
             let simpson = |k: usize| {
                 let [left, right] = [k, k + 1].map(|k| c0[q] + k as f64 * way);

@@ -74,7 +74,7 @@ pub struct Reached {
 
 /// Energy that the pressures give the layers and the surfaces under them, sum omega p^2 (1/kappa + 1/rho0): that of the bodies as a
 /// whole may be much larger, and an error that is small beside it large for the pressures.
-fn contact_energy(model: &Model, places: &Layer) -> f64 {
+pub(super) fn contact_energy(model: &Model, places: &Layer) -> f64 {
     let slopes = surface_slopes(model);
     let at = |q: usize| places.force[q] * places.pressure[q] * (places.tangent[q].recip() + slopes[q].recip());
     (0..slopes.len()).filter(|&q| places.force[q] > 0.0).map(at).sum()

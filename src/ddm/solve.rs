@@ -163,6 +163,8 @@ pub fn solve(
         scale,
         cycle: Cycle::default(),
         floor: Floor::new(PATIENCE[usize::from(matches!(method, Method::Sweeps { .. }))]),
+        steady: Default::default(),
+        before: None,
         rows: Vec::new(),
     };
     let end = match method {
