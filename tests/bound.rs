@@ -94,6 +94,7 @@ fn layers(model: &Model, c0: &[f64], c: &[f64]) -> f64 {
 /// the solution.
 #[derive(Debug)]
 struct Step {
+    #[allow(dead_code)] // for messages
     number: usize,
     is_bound: bool,
     told: f64,
