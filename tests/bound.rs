@@ -95,6 +95,7 @@ fn layers(model: &Model, c0: &[f64], c: &[f64]) -> f64 {
 #[derive(Debug)]
 #[expect(dead_code, reason = "the number is for messages")]
 struct Step {
+    #[allow(dead_code)] // for messages
     number: usize,
     is_bound: bool,
     told: f64,
