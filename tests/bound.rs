@@ -93,7 +93,6 @@ fn layers(model: &Model, c0: &[f64], c: &[f64]) -> f64 {
 /// What a step knows of its error, and what it is: F1(u) - F1(u*) = |u - u*|_K^2/2 + the layers' part. Relative to the energy norm of
 /// the solution.
 #[derive(Debug)]
-#[expect(dead_code, reason = "the number is for messages")]
 struct Step {
     #[allow(dead_code)] // for messages
     number: usize,
