@@ -48,7 +48,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let gap = Gap::new(run.model, &c, &p, &met, &rho);
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
         let mut measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
-        let mut reached = Reached::new(run.model, &run.scale, measured.strain, (&gap, x.error), &p, &met);
+        let mut reached = Reached::new(run.model, &run.scale, measured.strain, &gap, &x, &p, &met);
         let mut exact = true;
         if run.is_enough(&reached) {
             // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
