@@ -161,7 +161,7 @@ pub struct ContactInfo {
 }
 
 /// The discrete problem and what reports need to know of its origin.
-pub struct Problem {
+pub struct Discrete {
     /// What the method works on.
     pub model: Model,
     /// Bodies in the order of the scene.
@@ -196,7 +196,7 @@ pub fn discretize<const D: usize>(
     keep: bool,
     exchange: Box<dyn Exchange>,
     maker: &mut dyn Maker,
-) -> Result<Problem> {
+) -> Result<Discrete> {
     let mut parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
@@ -312,11 +312,17 @@ pub fn discretize<const D: usize>(
     let mut carried = vec![0.0; 2 * model.points()];
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);
-    Ok(Problem { model, bodies: infos, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided })
+    Ok(Discrete { model, bodies: infos, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided })
 }
 
-impl Problem {
-    /// Tells every rank what only the owner of a body knows of it: largest stiffness, and stiffness at the contact rows. Collective, after all ranks have made their problem.
+impl Discrete {
+    /// Sides of pair `i` in the order of the scene.
+    pub fn sides(&self, i: usize) -> [usize; 2] {
+        if self.contacts[i].swapped { [1, 0] } else { [0, 1] }
+    }
+
+    /// Tells every rank what only the owner of a body knows of it: largest stiffness, and stiffness at the contact rows. Collective,
+    /// after all ranks have made their problem.
     pub fn share(&mut self) {
         let count = self.model.bodies.len();
         let mut message = vec![0.0; count + 2 * self.model.points()];
@@ -339,8 +345,8 @@ impl Problem {
 ///
 /// # Errors
 /// A start that is not finite at a contact point.
-pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Option<Vec<f64>>> {
-    let model = &problem.model;
+pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<Vec<f64>>> {
+    let model = &discrete.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
     match &scene.method.start {
@@ -358,7 +364,7 @@ pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Option<Vec
             }
         }
     }
-    axpy(-1.0, &problem.carried, &mut trace);
+    axpy(-1.0, &discrete.carried, &mut trace);
     Ok(Some(trace))
 }
 
