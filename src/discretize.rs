@@ -57,7 +57,7 @@ pub struct Outline<'a> {
 }
 
 /// Gives bodies their inner solvers.
-pub trait Maker {
+pub trait Factory {
     /// Decides on the solvers of all bodies, in the order of the scene: called once, on every rank.
     ///
     /// # Errors
@@ -182,12 +182,12 @@ pub struct Discrete {
 
 /// Turns a scene and its mesh into a model.
 ///
-/// `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `maker` turns each
+/// `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `factory` turns each
 /// body of this rank into one that solves. `keep` tells to keep the meshes, for an estimate of the error.
 ///
 /// # Errors
 /// Refusals of the scene against its mesh: missing groups, surfaces of the wrong body, supports that contradict each
-/// other, surfaces that do not face each other; and failures of `maker`.
+/// other, surfaces that do not face each other; and failures of `factory`.
 pub fn discretize<const D: usize>(
     scene: &Scene,
     mesh: &Mesh<D>,
@@ -195,7 +195,7 @@ pub fn discretize<const D: usize>(
     ranks: (usize, usize),
     keep: bool,
     exchange: Box<dyn Exchange>,
-    maker: &mut dyn Maker,
+    factory: &mut dyn Factory,
 ) -> Result<Discrete> {
     let mut parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
@@ -223,7 +223,7 @@ pub fn discretize<const D: usize>(
         prescribed: &supported.prescribed,
         motions: &draft.free,
     });
-    maker.plan(&outlines.collect::<Vec<_>>())?;
+    factory.plan(&outlines.collect::<Vec<_>>())?;
     let drafts = drafts.into_iter().zip(supported);
     let known = gauged.into_iter().zip(loose);
     for (index, ((part, (draft, supported)), (gauged, loose))) in parts.into_iter().zip(drafts).zip(known).enumerate() {
@@ -256,7 +256,7 @@ pub fn discretize<const D: usize>(
         let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
         (slot.modulus, slot.depth) = (modulus, volume / surface);
         let stiffness = if held && surface > 0.0 { modulus / slot.depth } else { 0.0 };
-        if let Some(before) = maker.kept(&slot.name) {
+        if let Some(before) = factory.kept(&slot.name) {
             slot = BodySlot { local: before.local, scale: before.scale, row_stiffness: before.row_stiffness, ..slot };
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 {
@@ -265,7 +265,7 @@ pub fn discretize<const D: usize>(
             assemblies += 1;
             slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
             slot.row_stiffness = body.row_stiffness(&rows);
-            slot.local = Some(maker.make(Assembled {
+            slot.local = Some(factory.make(Assembled {
                 name: slot.name.clone(),
                 dimension: D,
                 body,

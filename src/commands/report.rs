@@ -15,7 +15,9 @@ use crate::model::BodyCounts;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::vtu::Grid;
 use crate::output::{BodyReport, ContactTable, EstimateReport, InnerTimes, IntervalReport, PairReport, Report};
+use crate::parallel::share;
 use crate::petsc::Session;
+use serde::{Deserialize, Serialize};
 
 /// Exit code of a run that ended like this.
 pub fn exit_code(done: &Done) -> i32 {
@@ -110,7 +112,8 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
     }
 }
 
-/// What only the owner of a body knows: counts over all bodies and the inner solver of each in words. One message.
+/// What only the owner of a body knows: counts over all bodies and the inner solver of each in words.
+#[derive(Default, Serialize, Deserialize)]
 pub struct Shared {
     counts: BodyCounts,
     assemblies: usize,
@@ -127,64 +130,25 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
     }
 }
 
-/// Numbers before the words about the solvers.
-const HEAD: usize = 13;
-
-/// Most bytes of the words about a solver.
-const WORDS: usize = 64;
-
 impl Shared {
     /// Collects it on every rank; collective.
     pub fn gather(discrete: &Discrete) -> Self {
-        let model = &discrete.model;
-        let mut message = vec![0.0; HEAD + WORDS * model.bodies.len()];
-        message[6] = discrete.assemblies as f64;
-        message[10] = discrete.assemblies_avoided as f64;
-        for (index, slot) in model.bodies.iter().enumerate() {
-            let Some(body) = &slot.local else { continue };
-            let counts = body.counts();
-            let mine = [
-                counts.factorizations,
-                counts.symbolic,
-                counts.solves,
-                counts.inner_iterations,
-                counts.robin_updates,
-                counts.robin_skipped,
-            ];
-            message.iter_mut().zip(mine).for_each(|(sum, count)| *sum += count as f64);
-            message[7] += counts.factor_seconds;
-            message[8] += counts.solve_seconds;
-            message[9] += counts.dense_factorizations as f64;
-            message[11] += counts.factorizations_avoided as f64;
-            message[12] += counts.first_seconds;
-            let place = &mut message[HEAD + WORDS * index..];
-            place
-                .iter_mut()
-                .zip(body.describe().bytes().take(WORDS))
-                .for_each(|(place, byte)| *place = f64::from(byte));
+        let (assemblies, assemblies_avoided) = (discrete.assemblies, discrete.assemblies_avoided);
+        let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
+        for slot in &discrete.model.bodies {
+            mine.solvers.push(slot.local.as_ref().map_or(String::new(), |body| body.describe()));
+            mine.counts += slot.local.as_ref().map_or(BodyCounts::default(), |body| body.counts());
         }
-        model.exchange.sum(&mut message);
-        let count = |i: usize| message[i] as usize;
-        let words =
-            |bytes: &[f64]| bytes.iter().take_while(|&&byte| byte != 0.0).map(|&byte| char::from(byte as u8)).collect();
-        Self {
-            counts: BodyCounts {
-                factorizations: count(0),
-                symbolic: count(1),
-                solves: count(2),
-                inner_iterations: count(3),
-                robin_updates: count(4),
-                robin_skipped: count(5),
-                factor_seconds: message[7],
-                solve_seconds: message[8],
-                dense_factorizations: count(9),
-                factorizations_avoided: count(11),
-                first_seconds: message[12],
-            },
-            assemblies: count(6),
-            assemblies_avoided: count(10),
-            solvers: message[HEAD..].chunks_exact(WORDS).map(words).collect(),
-        }
+        share(&*discrete.model.exchange, &mine).into_iter().reduce(Self::with).unwrap_or_default()
+    }
+
+    /// With what another rank knows.
+    fn with(mut self, other: Self) -> Self {
+        self.counts += other.counts;
+        self.assemblies += other.assemblies;
+        self.assemblies_avoided += other.assemblies_avoided;
+        self.solvers.iter_mut().zip(other.solvers).for_each(|(mine, other)| mine.push_str(&other));
+        self
     }
 }
 

@@ -16,12 +16,7 @@ use std::rc::Rc;
 ///
 /// # Errors
 /// Those of [`run::build`].
-pub fn build(
-    session: &Session,
-    scene: Rc<Scene>,
-    before: Option<Done>,
-    clock: &mut Clock,
-) -> Result<Built> {
+pub fn build(session: &Session, scene: Rc<Scene>, before: Option<Done>, clock: &mut Clock) -> Result<Built> {
     let Some(Done { built: mut last, .. }) = before else { return run::build(session, scene, clock) };
     let same = |without: &[&str]| settings(&last.scene, without) == settings(&scene, without);
     let condensed = last.condensed.len() == last.discrete.bodies.len();

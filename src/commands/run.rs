@@ -237,9 +237,9 @@ pub fn iterate(ready: Ready, observer: &mut dyn Observer, clock: &mut Clock) -> 
     let Ready { mut built, mut method, start, warnings } = ready;
     let (stop, interval) = (built.scene.method.stop.clone(), built.scene.method.interval);
     let balance = built.discrete.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _);
-    let settings = Settings { stop, interval, balance, start };
+    let mut settings = Settings { stop, interval, balance, start };
     let (outcome, steps) = match built.scene.method.steps.is_empty() {
-        true => (ddm::solve(&mut built.discrete.model, &mut method, settings, observer)?, Vec::new()),
+        true => (ddm::solve(&mut built.discrete.model, &mut method, &mut settings, observer)?, Vec::new()),
         false => steps::iterate(&mut built, &mut method, settings, observer)?,
     };
     clock.phase("iterate");

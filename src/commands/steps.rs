@@ -46,8 +46,8 @@ pub fn iterate(
             None => discretize::start(scene, discrete, factor)?.into(),
         };
         let balance = if last { balance.take() } else { None };
-        let settings = Settings { stop: stop.clone(), interval: interval && last, balance, start };
-        let mut outcome = ddm::solve(&mut discrete.model, method, settings, &mut all)?;
+        let mut settings = Settings { stop: stop.clone(), interval: interval && last, balance, start };
+        let mut outcome = ddm::solve(&mut discrete.model, method, &mut settings, &mut all)?;
         all.iterations += outcome.iterations;
         all.sweeps += outcome.sweeps;
         all.seconds += outcome.rows.last().map_or(0.0, |row| row.seconds);

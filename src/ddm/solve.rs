@@ -126,16 +126,16 @@ const PATIENCE: [usize; 2] = [2, 20];
 pub fn solve(
     model: &mut Model,
     method: &mut Method,
-    settings: Settings,
+    settings: &mut Settings,
     observer: &mut dyn Observer,
 ) -> Result<Outcome> {
     let began = Instant::now();
-    let Settings { stop, interval, balance, start: begin } = settings;
     let rigid = match infeasible(model) {
         Ok(rigid) => rigid,
         Err(status) => return Ok(Outcome::early(status, model, method)),
     };
     let floats = model.bodies.iter().any(|slot| !slot.motions.is_empty());
+    let begin = std::mem::take(&mut settings.start);
     let mut trace = rigid.trace.clone();
     if let Start::Trace(given) = &begin {
         trace.clone_from(given);
@@ -143,7 +143,7 @@ pub fn solve(
     let scale = Scale::new(model, &[&vec![0.0; 2 * model.points()], &trace]);
     let places = places(model, &begin, &rigid);
     // an estimate of the discretisation's error needs the iterates whole
-    let origin = if floats && balance.is_none() { Origin::take(model, &rigid.amounts) } else { None };
+    let origin = if floats && settings.balance.is_none() { Origin::take(model, &rigid.amounts) } else { None };
     let resumed = match begin {
         Start::Resume(mut field) => {
             if let Some(origin) = &origin {
@@ -155,8 +155,8 @@ pub fn solve(
     };
     let mut run = Run {
         model,
-        stop: &stop,
-        balance: balance.map(Balance::new),
+        stop: &settings.stop,
+        balance: settings.balance.take().map(Balance::new),
         observer,
         began,
         origin,
@@ -183,7 +183,7 @@ pub fn solve(
             }
         }
     };
-    run.conclude(end, method, interval)
+    run.conclude(end, method, settings)
 }
 
 /// Springs omega kappa of the first linear step of Newton's method; none if there is no solution.
@@ -245,15 +245,15 @@ impl Outcome {
 
 impl Run<'_> {
     /// The result of a loop's end.
-    fn conclude(self, end: End, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
-        let Run { model, stop, rows, origin, .. } = self;
+    fn conclude(self, end: End, method: &mut Method, settings: &Settings) -> Result<Outcome> {
+        let Run { model, rows, origin, .. } = self;
         let End { status, mut iterate, layer, weight, sweeps, skipped } = end;
         let mut found = None;
         let (spectrum, factor, updates) = match method {
             Method::Newton(linear) => (linear.spectrum(), None, rows.len()),
             Method::Sweeps { acceleration, .. } => {
                 acceleration.conclude(model, &layer, &weight);
-                if let ([first, .., last], true) = (&rows[..], wants_interval && status.is_solved()) {
+                if let ([first, .., last], true) = (&rows[..], settings.interval && status.is_solved()) {
                     found = interval(model, &layer, first.energy - last.energy)?;
                 }
                 (acceleration.spectrum(), acceleration.factor(), rows.len().saturating_sub(1))
@@ -269,7 +269,7 @@ impl Run<'_> {
             solves_skipped: skipped,
             iterate,
             layer,
-            forecast: stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
+            forecast: settings.stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
             rows,
             method: method.name(),
             joint: method.linear().counts(),
