@@ -54,22 +54,8 @@ pub fn coupling(built: &Built, i: usize) -> Coupling {
     Coupling { pressure, theta, sweeps }
 }
 
-/// p' of the layer (at the pair's first point) where it carries `pressure`.
+/// p' of the layer (at the pair's first point) where it carries `pressure`; 0 for one that it cannot reach.
 fn tangent_at(pair: &ContactPair, pressure: f64) -> f64 {
-    if pressure <= 0.0 {
-        return 0.0;
-    }
-    let (mut low, mut high) = (0.0, f64::MIN_POSITIVE.sqrt());
-    while pair.law.response(0, high).pressure < pressure {
-        low = high;
-        high *= 4.0;
-        if !high.is_finite() {
-            return 0.0;
-        }
-    }
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if pair.law.response(0, middle).pressure < pressure { low = middle } else { high = middle }
-    }
-    pair.law.response(0, high).tangent
+    let compression = pair.law.compression(0, pressure);
+    if compression > 0.0 && compression.is_finite() { pair.law.response(0, compression).tangent } else { 0.0 }
 }

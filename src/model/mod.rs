@@ -7,6 +7,7 @@ pub mod body;
 pub mod field;
 pub mod layer;
 pub mod linear;
+pub mod origin;
 pub mod rigid;
 
 pub use body::{Body, BodyCounts, Energy, Matrices, Solved};

@@ -117,14 +117,14 @@ fn draw_axes(plot: &Plot, area: &Area, room: f64) -> io::Result<(Curves, Frame)>
     let points = || plot.series.iter().flat_map(|series| &series.points).filter(shown);
     let y = Scale::new(points().map(|point| point.1), plot.y.log, TICKS);
     let left = 44.0 + y.widest_label(TICK_SIZE);
-    let width = SIZE.0 - left - 24.0 - room;
+    let width = SIZE.0 - left - 32.0 - room;
     // long numbers get fewer ticks
     let x_scale = |ticks| Scale::new(points().map(|point| point.0), plot.x.log, ticks);
     let fits = |x: &Scale| x.widest_label(TICK_SIZE) + 14.0 < x.spacing() * width;
     let x = [TICKS, 6, 4].map(x_scale).into_iter().find(fits).unwrap_or_else(|| x_scale(2));
 
     let mut builder = ChartBuilder::on(area);
-    builder.margin_top(fine(12.0)).margin_right(fine(24.0 + room));
+    builder.margin_top(fine(12.0)).margin_left(fine(8.0)).margin_right(fine(24.0 + room));
     builder.x_label_area_size(fine(54.0)).y_label_area_size(fine(left));
     if !plot.title.is_empty() {
         let mut style = font(TITLE_SIZE);
@@ -217,9 +217,7 @@ impl Legend {
         let more = self.0.len() - shown;
         let height = self.height(shown + usize::from(more > 0));
         let corners = [(x, y), (x + fine(self.width()), y + fine(height))];
-        for style in [WHITE.filled(), RGBColor(190, 190, 190).stroke_width(fine(0.8) as u32)] {
-            area.draw(&Rectangle::new(corners, style)).map_err(io::Error::other)?;
-        }
+        area.draw(&Rectangle::new(corners, WHITE.filled())).map_err(io::Error::other)?;
         let style = font(LEGEND_SIZE).pos(Pos::new(HPos::Left, VPos::Center)).color(&BLACK);
         let middle = |line: usize| y + fine(PADDING / 2.0 + (line as f64 + 0.5) * LINE);
         let write = |text: &str, line: usize| {
