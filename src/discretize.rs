@@ -235,38 +235,30 @@ pub fn discretize<const D: usize>(
         }
         offsets.push(offset);
         let Loose { left, motions, sprung, unfelt } = loose;
-        let mut slot = BodySlot {
-            name: part.spec.name.value.clone(),
-            local: None,
-            segments,
-            scale: 0.0,
-            modulus: 0.0,
-            depth: 0.0,
-            row_stiffness: Vec::new(),
-            motions,
-            sprung,
-        };
+        let name = part.spec.name.value.clone();
         let mut resultant =
             contact::pad(std::array::from_fn::<f64, D, _>(|c| nodal_load.iter().skip(c).step_by(D).sum()));
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
-        let surface: f64 = slot.segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
+        let surface: f64 = segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
         let elasticity = elastic::of(part.spec, &part.space, mesh, scene.plane)?;
-        let modulus = elastic::modulus(&part.space, &elasticity, share(&slot.segments, &pairs));
-        let held = slot.motions.len() == unfelt.len();
+        let modulus = elastic::modulus(&part.space, &elasticity, share(&segments, &pairs));
+        let held = motions.len() == unfelt.len();
         let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
-        (slot.modulus, slot.depth) = (modulus, volume / surface);
-        let stiffness = if held && surface > 0.0 { modulus / slot.depth } else { 0.0 };
-        if let Some(before) = factory.kept(&slot.name) {
-            slot = BodySlot { local: before.local, scale: before.scale, row_stiffness: before.row_stiffness, ..slot };
+        let depth = volume / surface;
+        let stiffness = if held && surface > 0.0 { modulus / depth } else { 0.0 };
+        // what only the owner knows, until all ranks share it
+        let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
+        if let Some(before) = factory.kept(&name) {
+            (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 {
             let left = rigid::free(&left, &prescribed, &load);
             let body = part.assemble(mesh, &rows, &elasticity, load, prescribed, carried)?;
             assemblies += 1;
-            slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-            slot.row_stiffness = body.row_stiffness(&rows);
-            slot.local = Some(factory.make(Assembled {
-                name: slot.name.clone(),
+            scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
+            row_stiffness = body.row_stiffness(&rows);
+            local = Some(factory.make(Assembled {
+                name: name.clone(),
                 dimension: D,
                 body,
                 rows,
@@ -276,7 +268,7 @@ pub fn discretize<const D: usize>(
         }
         let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
         infos.push(BodyInfo {
-            name: slot.name.clone(),
+            name: name.clone(),
             nodes: space.nodes.len(),
             cells: space.cell_count(),
             dofs: space.dofs(),
@@ -294,17 +286,17 @@ pub fn discretize<const D: usize>(
                 Box::new(move |v| held.frame.displacements(v))
             },
             balance: {
-                let rows = nodal_rows(&slot.segments, &pairs, space.dofs());
+                let rows = nodal_rows(&segments, &pairs, space.dofs());
                 let (springs, supports) = (part.springs, part.spec.fix.len());
                 let (space, held, elasticity) = (space.clone(), held.clone(), elasticity.clone());
                 let forces = Forces { space, elasticity, held, springs, supports, load: nodal_load, rows };
                 Box::new(move |u, force| forces.balance(u, force))
             },
             errors: fields::error_maker(part.spec, &space, &elasticity)?,
-            field: fields::field_maker(slot.name.clone(), space.clone(), elasticity.clone()),
+            field: fields::field_maker(name.clone(), space.clone(), elasticity.clone()),
         });
         shapes.push(Shape { space, elasticity, modulus, held });
-        slots.push(slot);
+        slots.push(BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness });
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
