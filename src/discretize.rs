@@ -25,7 +25,7 @@ use crate::fem::{
 };
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Mesh;
-use crate::model::{Body, BodySlot, Exchange, Model, Segment};
+use crate::model::{Body, BodySlot, Exchange, Mechanism, Model, Segment};
 use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
 use crate::problem::method::Start;
@@ -36,7 +36,6 @@ use draft::{Draft, Loose};
 use fields::{ErrorMaker, FieldMaker};
 use find::{placed, point};
 use mechanism::Fixed;
-pub use mechanism::Mechanism;
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use std::rc::Rc;
@@ -300,7 +299,7 @@ pub fn discretize<const D: usize>(
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
-    model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).map(Mechanism::for_model);
+    model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
     let mut carried = vec![0.0; 2 * model.points()];
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);

@@ -8,10 +8,10 @@ use super::steps;
 use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::{self, Observer, Outcome, Settings, Start, Status};
-use crate::discretize::{self, Discrete, Mechanism};
+use crate::discretize::{self, Discrete};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
-use crate::model::BodySlot;
+use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::problem::mesh::MeshSource;
@@ -165,7 +165,7 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
         None if mechanism.work == 0.0 => "no load works on it: displacements are free up to it".to_owned(),
         None => "and loads work on it: there is no solution".to_owned(),
     };
-    format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.name)
+    format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.motion)
 }
 
 /// Makes the method, factors every body for the start, then refuses options that nobody read. Without a `given` start it is that of

@@ -66,7 +66,7 @@ pub struct Motion {
     pub work: f64,
 }
 
-/// A motion of several bodies together that changes no gap and that nothing holds, although loads do work on it.
+/// A motion of several bodies together that changes no gap and that nothing holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mechanism {
     /// The bodies that it moves.
@@ -75,6 +75,8 @@ pub struct Mechanism {
     pub motion: String,
     /// Work of the loads on it, as a share of what forces of their sizes could do.
     pub work: f64,
+    /// The body that was fixed at one node against it; none if loads do work, or if no node outside the contact could serve.
+    pub fixed: Option<usize>,
 }
 
 /// Rigid motions that springs to the ground resist, beside those that nothing holds: a start moves bodies on soft springs, too.
