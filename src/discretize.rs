@@ -34,7 +34,6 @@ use balance::Forces;
 pub use balance::{Balance, Resultant};
 use draft::{Draft, Loose};
 use fields::{ErrorMaker, FieldMaker};
-use find::{placed, point};
 use mechanism::Fixed;
 pub use mechanism::Mechanism;
 use meshes::{Kept, Meshes, Shape};
@@ -349,10 +348,7 @@ pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Option<Vec
         Start::Normal(field) => {
             let positions = model.pairs.iter().flat_map(|pair| &pair.position);
             for (q, &x) in positions.enumerate() {
-                let value = field.eval(x) / factor;
-                if !value.is_finite() {
-                    return Err(placed(field, format!("the start is {value} at {}", point(x))));
-                }
+                let value = field.eval_finite("the start", x)? / factor;
                 trace[q] = value;
                 trace[points + q] = value;
             }

@@ -9,12 +9,12 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A text that the user wrote: a scene file, or the value of one `--set`.
+/// A text that the user wrote: a scene file, or an option of the command line.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Source {
-    /// File name, or `--set` for an override.
+    /// File name, or the option of the command line (`--set`).
     pub name: String,
-    /// The whole text.
+    /// The whole text; of an option, the option and its value.
     pub text: String,
 }
 
@@ -85,6 +85,7 @@ struct Inner {
     help: Option<String>,
     causes: Vec<String>,
     agreed: bool,
+    common: bool,
 }
 
 /// Result with [`Error`].
@@ -102,6 +103,7 @@ impl Error {
             help: None,
             causes: Vec::new(),
             agreed: false,
+            common: false,
         }))
     }
 
@@ -147,6 +149,17 @@ impl Error {
     /// Whether every rank ends with this error, so that nobody waits for this one.
     pub fn is_agreed(&self) -> bool {
         self.0.agreed
+    }
+
+    /// Marks that every rank has found this error by itself, with the same words.
+    pub fn common(mut self) -> Self {
+        (self.0.agreed, self.0.common) = (true, true);
+        self
+    }
+
+    /// Whether every rank has found this error by itself, so that one of them prints it.
+    pub fn is_common(&self) -> bool {
+        self.0.common
     }
 
     /// Points at a place in the scene.
@@ -206,9 +219,13 @@ impl Error {
             if !inner.label.is_empty() {
                 annotation = annotation.label(inner.label.as_str());
             }
-            group = group.element(
-                Snippet::source(place.source.text.as_str()).path(place.source.name.as_str()).annotation(annotation),
-            );
+            let Source { name, text } = &*place.source;
+            let mut snippet = Snippet::source(text.as_str()).annotation(annotation);
+            // the words of an option say where they stand
+            if !name.starts_with("--") {
+                snippet = snippet.path(name.as_str());
+            }
+            group = group.element(snippet);
         }
         for cause in &inner.causes {
             group = group.element(Level::NOTE.message(cause.as_str()));

@@ -199,9 +199,22 @@ pub fn set_up(session: &Session, scene: &Scene, prepared: &mut Prepared, clock: 
         }
     };
     let unread = options::unread(session, &names, &any)?;
+    let watching = options::watching(session, &names)?;
+    let without = prepared.linear == Linear::Dense || prepared.condensed.len() == prepared.problem.bodies.len();
+    if without && !watching.is_empty() {
+        prepared.warnings.push(format!(
+            "{} {} nothing to show: the bodies are condensed, so that PETSc has no solver here; --set solver=mumps gives each body one",
+            in_words(watching.iter()),
+            if watching.len() == 1 { "has" } else { "have" }
+        ));
+    }
+    if without && session.options().has("-help") {
+        options::show_help(session)?;
+    }
     let mut unknown = None;
     for option in unread {
         match option.kind {
+            options::UnreadKind::NotInUse if without && watching.contains(&option.name) => {}
             options::UnreadKind::NotInUse => {
                 prepared.warnings.push(format!("option {} was not used: no solver of this run reads it", option.name))
             }

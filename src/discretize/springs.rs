@@ -66,7 +66,8 @@ fn stiffness(field: &Field, spring: &SpringSpec, x: [f64; 3]) -> Result<f64> {
     match field.eval_finite("the stiffness of this spring", x)? {
         k if k >= 0.0 => Ok(k),
         k => {
-            let message = format!("the stiffness of the spring on `{}` is {k} at {}", spring.on.value, super::point(x));
+            let message =
+                format!("the stiffness of the spring on `{}` is {k} at {}", spring.on.value, super::find::point(x));
             Err(Error::scene(field.place().unwrap_or(&spring.on.place), message).label("must not be negative"))
         }
     }

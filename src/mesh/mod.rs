@@ -8,6 +8,7 @@ mod cursor;
 mod elements;
 mod gmsh;
 mod groups;
+mod guard;
 mod load;
 mod locality;
 mod msh;
@@ -19,6 +20,8 @@ mod simplex;
 mod sizes;
 #[cfg(test)]
 mod tests;
+mod tokens;
+mod trust;
 
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, recall_final};
