@@ -4,6 +4,7 @@ use crate::commands::{bench, check, mesh, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::petsc::Session;
 use crate::solver::options;
+use clap::error::ContextKind;
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::IsTerminal;
@@ -124,10 +125,10 @@ struct BenchArgs {
     #[arg(long, value_name = "PATH")]
     against: Option<PathBuf>,
     /// Seconds after which a run is ended
-    #[arg(long, value_name = "S", default_value = "3600")]
+    #[arg(long, value_name = "S", default_value = "3600", allow_negative_numbers = true)]
     timeout: f64,
     /// Seconds after which no further run begins
-    #[arg(long, value_name = "S", default_value = "inf")]
+    #[arg(long, value_name = "S", default_value = "inf", allow_negative_numbers = true)]
     budget: f64,
     /// Also measure one linear factor-and-solve of the same bodies
     #[arg(long)]
@@ -181,7 +182,7 @@ struct SceneArgs {
     #[arg(long)]
     estimate: bool,
     /// Adapt the mesh until the estimated error of pressures and displacements is at most this (short for --set adapt.error=E)
-    #[arg(long, value_name = "E")]
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
     tolerance: Option<String>,
     /// Run the mesh's .geo script even if it can start programs or write files
     #[arg(long)]
@@ -239,7 +240,15 @@ pub fn run(words: Vec<OsString>) -> i32 {
     let program = if bare_help { vec!["--help".to_owned()] } else { program };
     let cli = match Cli::try_parse_from(std::iter::once(name).chain(program)) {
         Ok(cli) => cli,
-        Err(refusal) => {
+        Err(mut refusal) => {
+            let word = refusal.get(ContextKind::InvalidArg).map(ToString::to_string).unwrap_or_default();
+            // options of PETSc have underscores, ours have none
+            if let Some(bare) = word.strip_prefix("--").filter(|bare| bare.contains('_')) {
+                let error = Error::new(Kind::Usage, format!("`{word}`: PETSc options take one dash"));
+                return complain(&error.help(format!("did you mean -{bare}?")));
+            }
+            // nothing that the program takes would help behind `--`
+            refusal.remove(ContextKind::Suggested);
             // a closed pipe is no reason to say more
             let _ = refusal.print();
             return refusal.exit_code();

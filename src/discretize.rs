@@ -132,9 +132,16 @@ type NodalMaker = Box<dyn Fn(&[f64]) -> Vec<f64>>;
 type BalanceMaker = Box<dyn Fn(&[f64], &[f64]) -> Balance>;
 
 impl BodyInfo {
-    /// Displacements and recovered stresses for output, from a state of all dofs.
-    pub fn field(&self, v: &[f64]) -> BodyField {
-        (self.field)(&(self.nodal)(v))
+    /// Displacements and recovered stresses for output, from a state of all dofs. `bent` is the same without the rigid motion that
+    /// supports leave: beside a large one the digits of the deformation are few.
+    pub fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
+        let mut field = (self.field)(&(self.nodal)(bent));
+        let u = (self.nodal)(v);
+        let dimension = u.len() / field.points.len().max(1);
+        for (to, u) in field.displacement.iter_mut().zip(u.chunks_exact(dimension.max(1))) {
+            to[..u.len()].copy_from_slice(u);
+        }
+        field
     }
 
     /// Forces on the body in a state of all dofs, under the forces omega p of its contact rows.

@@ -245,6 +245,32 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
+/// A number as people write it: far from one with an exponent, not with three hundred digits.
+pub fn shown(value: f64) -> String {
+    match value.abs() {
+        size if size != 0.0 && size.is_finite() && !(1e-5..1e16).contains(&size) => format!("{value:e}"),
+        _ => value.to_string(),
+    }
+}
+
+/// Names in a row joined by "with", words that they begin with said once: `rotation about x and y`.
+pub fn joined<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+    for name in names {
+        let (kind, last) = name.rsplit_once(' ').unwrap_or((name, ""));
+        match groups.last_mut() {
+            Some((before, list)) if *before == kind && !last.is_empty() => list.push(last),
+            _ => groups.push((kind, vec![last])),
+        }
+    }
+    let group = |(kind, mut list): (&str, Vec<&str>)| {
+        let last = list.pop().unwrap_or_default();
+        let list = if list.is_empty() { last.to_owned() } else { format!("{} and {last}", list.join(", ")) };
+        format!("{kind} {list}").trim_end().to_owned()
+    };
+    groups.into_iter().map(group).collect::<Vec<_>>().join(" with ")
+}
+
 /// The known name nearest to `name`, if one is near enough to be a slip of the keyboard.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
@@ -253,6 +279,20 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .filter(|(distance, _)| *distance <= 1 + name.len() / 4)
         .min_by_key(|(distance, candidate)| (*distance, candidate.to_string()))
         .map(|(_, candidate)| candidate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_numbers_are_short() {
+        let names = ["translation along x", "rotation about x", "rotation about y", "rotation about z"];
+        assert_eq!(joined(names), "translation along x with rotation about x, y and z");
+        assert_eq!(joined(["x", "y"]), "x with y");
+        assert_eq!(joined(["translation along y", "rotation"]), "translation along y with rotation");
+        assert_eq!([1e308, -2.1e5, 0.0, 1e-7, f64::NAN].map(shown), ["1e308", "-210000", "0", "1e-7", "NaN"]);
+    }
 }
 
 /// The text that the caret of a rendered error marks.

@@ -13,6 +13,7 @@ use crate::discretize::Problem;
 use crate::estimate::Estimate;
 use crate::model::BodyCounts;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
+use crate::output::sci;
 use crate::output::vtu::Grid;
 use crate::output::{BodyReport, ContactTable, EstimateReport, InnerTimes, IntervalReport, PairReport, Report};
 use crate::petsc::Session;
@@ -85,8 +86,31 @@ pub fn report(
     results::fill(prepared, recovered, &mut report.bodies);
     let balances = balance::gather(scene, prepared, outcome, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
+    let lacks = |body: &BodyReport| body.balance.force_imbalance;
+    let worst = report.bodies.iter().max_by(|a, b| lacks(a).total_cmp(&lacks(b)));
+    if let Some(worst) =
+        worst.filter(|worst| outcome.status == Status::Converged && lacks(worst) > tolerated(scene, outcome))
+    {
+        let message = format!(
+            "body `{}`: its displacements leave too few digits for the forces on it, which lack {} of balance",
+            worst.name,
+            sci(lacks(worst), 1)
+        );
+        (report.status, report.message) = (status_name(&Status::RoundoffLimited).to_owned(), message);
+    }
     report
 }
+
+/// Share of the forces on a body that a converged run may lack in balance: ten times what the run or its inner solvers were asked for.
+fn tolerated(scene: &Scene, outcome: &Outcome) -> f64 {
+    let stop = &scene.method.stop;
+    let reached = outcome.rows.last().map(|row| row.error).filter(|_| stop.balanced);
+    let asked = [stop.residual, stop.increment, reached].into_iter().flatten();
+    10.0 * asked.fold(INNER, f64::max)
+}
+
+/// Relative tolerance of an inner solver by default.
+const INNER: f64 = 1e-6;
 
 /// The part of the report that is known before the first sweep; `solvers` are the inner solvers in words.
 pub fn headline(session: &Session, scene: &Scene, prepared: &Prepared, solvers: &[String], clock: &Clock) -> Report {

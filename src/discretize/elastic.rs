@@ -2,7 +2,7 @@
 
 use super::find::{find_group, not_on_body, point};
 use crate::contact::pad;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown};
 use crate::fem::Space;
 use crate::fem::elasticity::{Elasticity, Flaw};
 use crate::mesh::Mesh;
@@ -53,7 +53,8 @@ pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw)
     match flaw {
         Flaw::Constant(constant, value, rule) => {
             let own = fields.iter().find(|(name, _)| name == constant).and_then(|(_, field)| field.place());
-            Error::scene(own.unwrap_or(place), format!("body `{name}`: {constant} is {value}{at}")).label(*rule)
+            Error::scene(own.unwrap_or(place), format!("body `{name}`: {constant} is {}{at}", shown(*value)))
+                .label(*rule)
         }
         Flaw::Axes(what) => Error::scene(place, format!("body `{name}`: axes{at}: {what}")),
         Flaw::NotCoercive(eigenvalue) => {

@@ -199,6 +199,10 @@ impl<'a, const D: usize> Part<'a, D> {
             }
             assemble::Defect::Elasticity(number, x, flaw) => elastic::refusal(self.spec, number, Some(x), &flaw),
         })?;
+        if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
+            let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
+            return Err(Error::scene(&self.spec.elasticity.place, message).label("far too large"));
+        }
         self.springs.iter().for_each(|springs| assemble::add_blocks(&graph, springs, &mut stiffness));
         self.held.frame.turn_matrix(&mut stiffness);
         let work = dot(&load, &carried);

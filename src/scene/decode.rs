@@ -7,7 +7,7 @@ mod layer;
 mod method;
 
 use super::read::{Keys, Node, Value};
-use crate::error::{Error, Located, Place, Result, nearest};
+use crate::error::{Error, Located, Place, Result, nearest, shown};
 use crate::expression::{Differentiable, Field};
 use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
@@ -78,7 +78,7 @@ impl Decoder<'_> {
     fn positive_field(&self, node: &Node, what: &str) -> Result<Field> {
         match self.field(node)? {
             Field::Constant(value) if value <= 0.0 => {
-                Err(node.refuse(format!("{what} is {value}")).label("must be greater than 0"))
+                Err(node.refuse(format!("{what} is {}", shown(value))).label("must be greater than 0"))
             }
             field => Ok(field),
         }
