@@ -58,7 +58,9 @@ impl Typed {
                 (false, _) => {
                     "the pressure grows with the compression c from c = 0 on: look for a wrong sign".to_owned()
                 }
-                (_, Some(_)) => format!("set up_to below {c:.1e}, where the law still increases"),
+                (_, Some(_)) => {
+                    format!("take a smaller up_to, such as {:.1e}: the law increases that far", 0.9 * before.0)
+                }
                 (_, None) => format!(
                     "say how far the law goes, as in {{ pressure = \"...\", up_to = {:.1e} }}: it goes on linearly from there",
                     0.9 * before.0
