@@ -8,7 +8,7 @@ use super::results;
 use super::steps;
 use super::verdict::{forecast, message, status_name};
 use crate::contact::ContactPair;
-use crate::ddm::{Outcome, Status};
+use crate::ddm::{self, Outcome, Status};
 use crate::discretize::Problem;
 use crate::estimate::Estimate;
 use crate::model::BodyCounts;
@@ -86,22 +86,31 @@ pub fn report(
     results::fill(prepared, recovered, &mut report.bodies);
     let balances = balance::gather(scene, prepared, outcome, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
-    let lacks = |body: &BodyReport| body.balance.force_imbalance;
-    let worst = report.bodies.iter().max_by(|a, b| lacks(a).total_cmp(&lacks(b)));
-    if let Some(worst) =
-        worst.filter(|worst| outcome.status == Status::Converged && lacks(worst) > tolerated(scene, outcome))
-    {
-        let message = format!(
-            "body `{}`: its displacements leave too few digits for the forces on it, which lack {} of balance",
-            worst.name,
-            sci(lacks(worst), 1)
-        );
+    if let (Status::Converged, Some(message)) = (&outcome.status, lost(scene, prepared, outcome, &report.bodies)) {
         (report.status, report.message) = (status_name(&Status::RoundoffLimited).to_owned(), message);
     }
     report
 }
 
-/// Share of the forces on a body that a converged run may lack in balance: ten times what the run or its inner solvers were asked for.
+/// What displacements that are far larger than the deformations have cost a run that would be converged otherwise, in words.
+fn lost(scene: &Scene, prepared: &Prepared, outcome: &Outcome, bodies: &[BodyReport]) -> Option<String> {
+    const WHY: &str = "the displacements are so large that few digits are left for";
+    let tolerated = tolerated(scene, outcome);
+    let lacks = |body: &BodyReport| body.balance.force_imbalance;
+    let worst = bodies.iter().max_by(|a, b| lacks(a).total_cmp(&lacks(b)))?;
+    let pressure = ddm::lost(&prepared.problem.model, outcome);
+    if lacks(worst) > tolerated {
+        return Some(format!(
+            "{WHY} the forces on body `{}`, which lack {} of balance",
+            worst.name,
+            sci(lacks(worst), 1)
+        ));
+    }
+    (pressure > tolerated)
+        .then(|| format!("{WHY} the pressures, which may be off by {} of their peak", sci(pressure, 1)))
+}
+
+/// Share of the forces on a body, and of a pressure, that a converged run may lack: ten times what the run or its inner solvers were asked for.
 fn tolerated(scene: &Scene, outcome: &Outcome) -> f64 {
     let stop = &scene.method.stop;
     let reached = outcome.rows.last().map(|row| row.error).filter(|_| stop.balanced);

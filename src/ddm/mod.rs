@@ -8,6 +8,7 @@ pub mod acceleration;
 mod balance;
 mod bound;
 mod coefficient;
+mod digits;
 mod extend;
 pub mod forecast;
 pub mod gamma;
@@ -30,6 +31,7 @@ mod sweeps;
 
 pub use balance::{Discretisation, SHARE};
 pub use coefficient::Coefficient;
+pub use digits::lost;
 pub use extend::prepare;
 pub use forecast::Forecast;
 pub use history::{Observer, Row, Silent};

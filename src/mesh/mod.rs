@@ -27,7 +27,8 @@ pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, recall_final};
 pub use msh::read;
 pub use quality::Quality;
-pub use sizes::{follows, view};
+pub use sizes::{follows, unstructured, view};
+pub use trust::{Breach, breach};
 
 use crate::problem::order::Order;
 use std::path::PathBuf;

@@ -47,7 +47,7 @@ pub fn follows(source: &MeshSource) -> bool {
 }
 
 /// The script without the commands that ask for structured meshes, from the word to the semicolon.
-fn unstructured(text: &str) -> String {
+pub fn unstructured(text: &str) -> String {
     let mut kept = String::with_capacity(text.len());
     let mut from = 0;
     for (span, token) in tokens(text) {
