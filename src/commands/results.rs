@@ -10,7 +10,7 @@ use crate::output::vtu::BodyField;
 pub struct Recovered {
     /// All dofs.
     pub state: Vec<f64>,
-    /// The same without the rigid motion that supports leave, which strains nothing.
+    /// The same without the rigid motions that supports leave or carry the body by, which strain nothing.
     pub bent: Vec<f64>,
     /// Displacements and stresses at the nodes.
     pub field: BodyField,
@@ -33,7 +33,8 @@ pub fn recover(done: &Done) -> All {
             still[state.len() - rigid..].fill(0.0);
             let recover = || -> Result<Recovered> {
                 let bent = body.recover(&still)?;
-                let state = if still == *state { bent.clone() } else { body.recover(state)? };
+                let mut state = if still == *state { bent.clone() } else { body.recover(state)? };
+                state.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
                 Ok(Recovered { field: info.field(&state, &bent), state, bent })
             };
             Some(recover())

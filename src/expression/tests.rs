@@ -166,7 +166,8 @@ fn slips_are_pointed_at() {
         ("1e999", "1e999", "too large", ""),
         ("0,5", ",", "`,` outside a function", "decimal point"),
         ("x and y", "and", "expected an operator before `and`", ""),
-        ("3 µ", "µ", "expected an operator before `µ`", ""),
+        ("3 µ", "µ", "`µ` is neither a variable nor an operator", "units that fit"),
+        ("70 GPa", "GPa", "`GPa` is neither", "without their unit"),
     ];
     for (text, caret, message, help) in cases {
         let error = parse(text).expect_err(text);

@@ -122,7 +122,16 @@ mod tests {
     /// The system ends a program with the thread that started it, as it does when the whole process is killed.
     #[test]
     fn a_program_ends_with_its_parent() {
-        let child = std::thread::spawn(|| sleep(None).spawn().expect("a child")).join();
+        let parent = || {
+            let child = sleep(None).spawn().expect("a child");
+            let name = || std::fs::read_to_string(format!("/proc/{}/comm", child.id())).unwrap_or_default();
+            // until then it is one of the tools that start it
+            while name() != "sleep\n" {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            child
+        };
+        let child = std::thread::spawn(parent).join();
         let mut child = child.expect("a child");
         let began = Instant::now();
         assert!(child.wait().is_ok_and(|status| !status.success()));

@@ -62,6 +62,9 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
         let next = all.get(index + 1).map(|(_, token)| *token);
         let what = match *token {
             Token::Text(text) if text.len() > LONGEST => Some("has a text that is too long for Gmsh".to_owned()),
+            Token::Name(name) if name.ends_with("FileName") && follows(&all[..index], "General") => {
+                Some(format!("chooses files that Gmsh writes: `General.{name}`"))
+            }
             // a variable of this name is no command
             Token::Name(_) if matches!(next, Some(Token::Sign('='))) => None,
             Token::Name(name) if RUN.contains(&name) => Some(format!("runs other programs or made-up text: `{name}`")),
@@ -72,9 +75,6 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
                 Some(format!("writes files: `{name}(...) > ...`"))
             }
             Token::Name("Solver") if next == Some(Token::Sign('.')) => Some("sets programs: `Solver`".to_owned()),
-            Token::Name(name) if name.ends_with("FileName") && follows(&all[..index], "General") => {
-                Some(format!("chooses files that Gmsh writes: `General.{name}`"))
-            }
             Token::Name(name) if READ.contains(&name) => reads(name, &all[index + 1..], path, home),
             _ => None,
         };

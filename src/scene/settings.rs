@@ -74,7 +74,11 @@ fn mesh(mesh: &MeshSource) -> Value {
         MeshSource::Geo { file, set, guard, .. } => {
             let set: Map<_, _> = set.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
             let (file, timeout, memory) = (file.value.display().to_string(), guard.seconds, guard.gigabytes);
-            json!({ "geo": file, "set": set, "timeout": timeout, "memory": memory })
+            let mut mesh = json!({ "geo": file, "set": set, "timeout": timeout });
+            if let Some(memory) = memory {
+                mesh["memory"] = json!(memory);
+            }
+            mesh
         }
     }
 }
