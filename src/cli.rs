@@ -4,7 +4,9 @@ use crate::commands::{bench, check, mesh, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::petsc::Session;
 use crate::solver::options;
+use clap::error::ContextKind;
 use clap::{Args, Parser, Subcommand};
+use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
@@ -81,6 +83,16 @@ struct OverriddenScene {
     /// Replace a key of the scene, for example mesh.set.n=64; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
+    /// Run the mesh's .geo script even if it can start programs or write files
+    #[arg(long)]
+    trust_geo: bool,
+}
+
+impl OverriddenScene {
+    /// All overrides.
+    fn overrides(self) -> Vec<String> {
+        self.overrides.into_iter().chain(self.trust_geo.then(|| "--trust-geo".to_owned())).collect()
+    }
 }
 
 #[derive(Args)]
@@ -113,10 +125,10 @@ struct BenchArgs {
     #[arg(long, value_name = "PATH")]
     against: Option<PathBuf>,
     /// Seconds after which a run is ended
-    #[arg(long, value_name = "S", default_value = "3600")]
+    #[arg(long, value_name = "S", default_value = "3600", allow_negative_numbers = true)]
     timeout: f64,
     /// Seconds after which no further run begins
-    #[arg(long, value_name = "S", default_value = "inf")]
+    #[arg(long, value_name = "S", default_value = "inf", allow_negative_numbers = true)]
     budget: f64,
     /// Also measure one linear factor-and-solve of the same bodies
     #[arg(long)]
@@ -127,10 +139,14 @@ struct BenchArgs {
     /// Replace a key of the scene in all runs; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
+    /// Run the meshes' .geo scripts even if they can start programs or write files
+    #[arg(long)]
+    trust_geo: bool,
 }
 
 impl BenchArgs {
-    fn request(self, petsc: Vec<String>) -> bench::Request {
+    fn request(mut self, petsc: Vec<String>) -> bench::Request {
+        self.overrides.extend(self.trust_geo.then(|| "trust_geo=true".to_owned()));
         bench::Request {
             scenes: self.scenes,
             folder: self.output,
@@ -166,8 +182,11 @@ struct SceneArgs {
     #[arg(long)]
     estimate: bool,
     /// Adapt the mesh until the estimated error of pressures and displacements is at most this (short for --set adapt.error=E)
-    #[arg(long, value_name = "E")]
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
     tolerance: Option<String>,
+    /// Run the mesh's .geo script even if it can start programs or write files
+    #[arg(long)]
+    trust_geo: bool,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
@@ -176,15 +195,17 @@ struct SceneArgs {
 impl SceneArgs {
     /// All overrides, those with names of their own last.
     fn overrides(&self) -> Vec<String> {
-        let method = self.method.iter().map(|name| format!("method.name={name}"));
-        let estimate = self.estimate.then(|| "estimate=true".to_owned());
-        let tolerance = self.tolerance.iter().map(|error| format!("adapt.error={error}"));
-        self.overrides.iter().cloned().chain(method).chain(estimate).chain(tolerance).collect()
+        let method = self.method.iter().map(|name| format!("--method {name}"));
+        let tolerance = self.tolerance.iter().map(|error| format!("--tolerance {error}"));
+        let flags = [(self.estimate, "--estimate"), (self.trust_geo, "--trust-geo")];
+        let flags = flags.into_iter().filter_map(|(given, flag)| given.then(|| flag.to_owned()));
+        self.overrides.iter().cloned().chain(method).chain(tolerance).chain(flags).collect()
     }
 }
 
 /// Flags of the program that begin with two dashes: with one they look like PETSc's.
-const TWO_DASHES: [&str; 12] = [
+const TWO_DASHES: [&str; 13] = [
+    "-trust-geo",
     "-set",
     "-json",
     "-method",
@@ -200,9 +221,16 @@ const TWO_DASHES: [&str; 12] = [
 ];
 
 /// Runs the program with the words of its command line, the name first; returns the exit code.
-pub fn run(words: Vec<String>) -> i32 {
+pub fn run(words: Vec<OsString>) -> i32 {
     let mut words = words.into_iter();
-    let name = words.next().unwrap_or_else(|| "winkler".to_owned());
+    let name = words.next().map_or("winkler".into(), |name| name.to_string_lossy().into_owned());
+    let words = match words.map(OsString::into_string).collect::<std::result::Result<Vec<String>, _>>() {
+        Ok(words) => words.into_iter(),
+        Err(word) => {
+            let error = Error::new(Kind::Usage, format!("this word is not UTF-8 text: `{}`", word.display()));
+            return complain(&error.help("type it in UTF-8, or rename the file"));
+        }
+    };
     let (program, petsc) = options::split(words);
     if let Some(flag) = TWO_DASHES.iter().find(|flag| petsc.iter().any(|word| word == *flag)) {
         let error = Error::new(Kind::Usage, format!("PETSc knows no option {flag}"));
@@ -212,7 +240,15 @@ pub fn run(words: Vec<String>) -> i32 {
     let program = if bare_help { vec!["--help".to_owned()] } else { program };
     let cli = match Cli::try_parse_from(std::iter::once(name).chain(program)) {
         Ok(cli) => cli,
-        Err(refusal) => {
+        Err(mut refusal) => {
+            let word = refusal.get(ContextKind::InvalidArg).map(ToString::to_string).unwrap_or_default();
+            // options of PETSc have underscores, ours have none
+            if let Some(bare) = word.strip_prefix("--").filter(|bare| bare.contains('_')) {
+                let error = Error::new(Kind::Usage, format!("`{word}`: PETSc options take one dash"));
+                return complain(&error.help(format!("did you mean -{bare}?")));
+            }
+            // nothing that the program takes would help behind `--`
+            refusal.remove(ContextKind::Suggested);
             // a closed pipe is no reason to say more
             let _ = refusal.print();
             return refusal.exit_code();
@@ -221,8 +257,8 @@ pub fn run(words: Vec<String>) -> i32 {
     // these start other programs and need neither MPI nor PETSc
     let alone = match cli.command {
         Command::Bench(arguments) => bench::bench(&arguments.request(petsc)),
-        Command::Mesh { scene: OverriddenScene { scene, overrides }, output, json } => {
-            mesh::mesh(&mesh::Request { scene, overrides, output, json })
+        Command::Mesh { scene, output, json } => {
+            mesh::mesh(&mesh::Request { scene: scene.scene.clone(), overrides: scene.overrides(), output, json })
         }
         Command::Solving(command) => return with_session(&petsc, command),
     };
@@ -238,6 +274,7 @@ fn with_session(petsc: &[String], command: Solving) -> i32 {
     match dispatch(&session, command) {
         Ok(code) => code,
         Err(error) if error.is_silent() => error.kind().exit_code(),
+        Err(error) if error.is_common() && session.rank() > 0 => error.kind().exit_code(),
         Err(error) => {
             let code = complain(&error);
             // the other ranks may be waiting for this one unless all agreed to end
@@ -253,7 +290,7 @@ fn dispatch(session: &Session, command: Solving) -> Result<i32> {
     match command {
         Solving::Solve { scene, output, vtu } => {
             let mut overrides = scene.overrides();
-            overrides.extend(vtu.then(|| "output.vtu=true".to_owned()));
+            overrides.extend(vtu.then(|| "--vtu".to_owned()));
             solve::solve(session, solve::Request { scene: scene.scene, folder: output, overrides, json: scene.json })
         }
         Solving::Check { scene } => {

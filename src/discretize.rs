@@ -34,7 +34,6 @@ use balance::Forces;
 pub use balance::{Balance, Resultant};
 use draft::{Draft, Loose};
 use fields::{ErrorMaker, FieldMaker};
-use find::{placed, point};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
@@ -132,9 +131,16 @@ type NodalMaker = Box<dyn Fn(&[f64]) -> Vec<f64>>;
 type BalanceMaker = Box<dyn Fn(&[f64], &[f64]) -> Balance>;
 
 impl BodyInfo {
-    /// Displacements and recovered stresses for output, from a state of all dofs.
-    pub fn field(&self, v: &[f64]) -> BodyField {
-        (self.field)(&(self.nodal)(v))
+    /// Displacements and recovered stresses for output, from a state of all dofs. `bent` is the same without the rigid motion that
+    /// supports leave: beside a large one the digits of the deformation are few.
+    pub fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
+        let mut field = (self.field)(&(self.nodal)(bent));
+        let u = (self.nodal)(v);
+        let dimension = u.len() / field.points.len().max(1);
+        for (to, u) in field.displacement.iter_mut().zip(u.chunks_exact(dimension.max(1))) {
+            to[..u.len()].copy_from_slice(u);
+        }
+        field
     }
 
     /// Forces on the body in a state of all dofs, under the forces omega p of its contact rows.
@@ -346,10 +352,7 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
         Start::Normal(field) => {
             let positions = model.pairs.iter().flat_map(|pair| &pair.position);
             for (q, &x) in positions.enumerate() {
-                let value = field.eval(x) / factor;
-                if !value.is_finite() {
-                    return Err(placed(field, format!("the start is {value} at {}", point(x))));
-                }
+                let value = field.eval_finite("the start", x)? / factor;
                 trace[q] = value;
                 trace[points + q] = value;
             }

@@ -54,7 +54,12 @@ pub fn estimate(
     let count = model.bodies.len();
     let mut displacements = Vec::new();
     for (index, state) in iterate.states.iter().enumerate() {
-        let all = model.bodies[index].local.as_ref().map(|body| body.recover(state)).transpose()?;
+        let mut all = None;
+        if let Some(body) = &model.bodies[index].local {
+            let mut u = body.recover(state)?;
+            u.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
+            all = Some(u);
+        }
         displacements.push(all.map(|all| meshes.displacements(index, &all)));
     }
     let recovered: Vec<_> =

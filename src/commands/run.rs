@@ -185,7 +185,18 @@ pub fn set_up(session: &Session, mut built: Built, given: Option<Start>, clock: 
     if matches!(built.linear, Linear::Direct | Linear::Multigrid) {
         names.push(WHOLE);
     }
-    let mut warnings = agree_on_unread(session, &names)?;
+    let watching = if built.is_without_petsc() { options::watching(session, &names)? } else { Vec::new() };
+    let mut warnings = agree_on_unread(session, &names, &watching)?;
+    if !watching.is_empty() {
+        warnings.push(format!(
+            "{} {} nothing to show: the bodies are condensed, so that PETSc has no solver here; --set solver=mumps gives each body one",
+            in_words(watching.iter()),
+            if watching.len() == 1 { "has" } else { "have" }
+        ));
+    }
+    if built.is_without_petsc() && session.options().has("-help") {
+        options::show_help(session)?;
+    }
     for name in &names {
         let in_force = |option: &str| session.options().get(&format!("-{name}_{option}")).unwrap_or_default();
         if in_force("ksp_type") == "preonly" && !matches!(in_force("pc_type").as_str(), "cholesky" | "lu") {
@@ -199,11 +210,11 @@ pub fn set_up(session: &Session, mut built: Built, given: Option<Start>, clock: 
     Ok(Ready { built, method, start, warnings })
 }
 
-/// Warnings of options that no solver with one of these `names` has read.
+/// Warnings of options that no solver with one of these `names` has read, but for those that are `known`.
 ///
 /// # Errors
 /// Options that PETSc does not know.
-fn agree_on_unread(session: &Session, names: &[&str]) -> Result<Vec<String>> {
+fn agree_on_unread(session: &Session, names: &[&str], known: &[String]) -> Result<Vec<String>> {
     let any = |flags: &mut [u8]| {
         if session.size() > 1 && !flags.is_empty() {
             let mine = flags.to_vec();
@@ -213,6 +224,7 @@ fn agree_on_unread(session: &Session, names: &[&str]) -> Result<Vec<String>> {
     let (mut warnings, mut unknown) = (Vec::new(), Ok(()));
     for option in options::unread(session, names, &any)? {
         match option.kind {
+            options::UnreadKind::NotInUse if known.contains(&option.name) => {}
             options::UnreadKind::NotInUse => {
                 warnings.push(format!("option {} was not used: no solver of this run reads it", option.name));
             }

@@ -48,7 +48,7 @@ pub(super) fn iterate(
     };
     for k in 0.. {
         let layer = Layer::at(run.model, &u.trace);
-        let weight = coefficient.weight(run.model, &layer, k);
+        let weight = coefficient.weight(run.model, &layer, k)?;
         if let Some(moved) = underconstrained(run.model, &weight) {
             return end(Status::Underconstrained(moved), u, layer, weight, &sweeper);
         }

@@ -53,7 +53,7 @@ impl LinearStep for Sweeps {
         let System { model, places, springs, residual, reduction, most } = system;
         model.precision(ROUGH)?;
         if let Some(coefficient) = &mut self.coefficient {
-            let weight = coefficient.weight(model, places, self.systems);
+            let weight = coefficient.weight(model, places, self.systems)?;
             model.robin(&weight)?;
         }
         self.systems += 1;

@@ -1,7 +1,7 @@
 //! Contacts of the scene on the mesh: which body each surface bounds, which side carries the points.
 
 use super::auto;
-use super::find::{find_group, placed, point};
+use super::find::{find_group, point};
 use super::part::Part;
 use super::surface::{ContactSurface, Surface};
 use crate::contact::pieces::{Cut, Reach};
@@ -103,6 +103,9 @@ fn make_pair<const D: usize>(
         return Err(Error::scene(&spec.between[0].place, message)
             .help("move a body, give a larger gap, or let the layer take it: overlap = \"compress\""));
     }
+    if let Some(field) = &spec.reference {
+        pair.position.iter().try_for_each(|&x| field.eval_finite("the reference", x).map(drop))?;
+    }
     let surface = ContactSurface::new(&a, &pair);
     let fine = fine.then(|| Fine::new(&a, &b, &shared, &pair, &gap));
     Ok(Contact { spec, pair, fine, swapped, surface })
@@ -119,7 +122,10 @@ fn refuse(spec: &ContactSpec, fault: Fault) -> Error {
             )
             .help("a pair needs surfaces whose outer normals point at each other; look at the mesh with `gmsh`")
         }
-        Fault::Gap(x) => placed(&spec.gap, format!("the gap is not finite at {}", point(x))),
+        Fault::Gap(x) => spec.gap.eval_finite("the gap", x).err().unwrap_or_else(|| {
+            let message = format!("the gap is beyond the range of numbers at {}", point(x));
+            Error::scene(&spec.between[0].place, message)
+        }),
     }
 }
 

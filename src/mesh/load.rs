@@ -1,11 +1,11 @@
 //! From what the scene names to a mesh: Gmsh, or the cache, or a file.
 
 use super::cache::{Key, Workshop, folders};
-use super::gmsh::Gmsh;
+use super::gmsh::{Gmsh, Task};
 use super::script::Script;
 use super::{Mesh, msh};
 use crate::error::{Error, Located, Result};
-use crate::problem::mesh::{MeshSource, Sizing};
+use crate::problem::mesh::{Guard, MeshSource, Sizing};
 use crate::problem::order::Order;
 use std::path::{Path, PathBuf};
 
@@ -41,12 +41,12 @@ pub enum Origin {
 /// of named simplices in `D` dimensions (see [`read`](super::read)), or of too low an order.
 pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<D>> {
     let mut loaded = match source {
-        MeshSource::Geo { file, set, places, sizes } => {
+        MeshSource::Geo { file, set, places, sizes, guard } => {
             let script = Script::read(&file.value).map_err(|error| error.at(&file.place))?;
             for ((name, _), place) in set.iter().zip(places) {
                 script.check(name, &Located::new(file.value.clone(), place.clone()))?;
             }
-            from_script(file, set, sizes.as_ref(), order, &folders())?
+            from_script(file, set, sizes.as_ref(), order, guard, &folders())?
         }
         MeshSource::Msh { file } => from_file(file, order)?,
     };
@@ -81,10 +81,14 @@ pub(super) fn from_script<const D: usize>(
     set: &[(String, f64)],
     sizes: Option<&Sizing>,
     order: Order,
+    guard: &Guard,
     folders: &[PathBuf],
 ) -> Result<Loaded<D>> {
     let path = &file.value;
     let script = Script::read(path).map_err(|error| error.at(&file.place))?;
+    if !guard.trusted {
+        script.judge(file)?;
+    }
     for (name, _) in set {
         script.check(name, file)?;
     }
@@ -106,7 +110,9 @@ pub(super) fn from_script<const D: usize>(
         Some(Sizing::Times(times)) => (None, *times),
         None => (None, 1.0),
     };
-    gmsh.run(sized.as_deref().unwrap_or(path), set, times, (D, order), &made, workshop.path())?;
+    let script = sized.as_deref().unwrap_or(path);
+    let task = Task { script, shown: path, set, times, dimension: D, order, guard };
+    gmsh.run(&task, &made, workshop.path())?;
     let bytes = std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause))?;
     let mesh = checked(path, &bytes, order)?;
     Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })

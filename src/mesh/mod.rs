@@ -8,6 +8,7 @@ mod cursor;
 mod elements;
 mod gmsh;
 mod groups;
+mod guard;
 mod load;
 mod locality;
 mod msh;
@@ -19,12 +20,15 @@ mod simplex;
 mod sizes;
 #[cfg(test)]
 mod tests;
+mod tokens;
+mod trust;
 
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, recall_final};
 pub use msh::read;
 pub use quality::Quality;
-pub use sizes::{follows, view};
+pub use sizes::{follows, unstructured, view};
+pub use trust::{Breach, breach};
 
 use crate::problem::order::Order;
 use std::path::PathBuf;

@@ -71,9 +71,14 @@ fn vector(components: &[Field; 3], dimension: usize) -> Value {
 fn mesh(mesh: &MeshSource) -> Value {
     match mesh {
         MeshSource::Msh { file } => json!({ "msh": file.value.display().to_string() }),
-        MeshSource::Geo { file, set, .. } => {
+        MeshSource::Geo { file, set, guard, .. } => {
             let set: Map<_, _> = set.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
-            json!({ "geo": file.value.display().to_string(), "set": set })
+            let (file, timeout, memory) = (file.value.display().to_string(), guard.seconds, guard.gigabytes);
+            let mut mesh = json!({ "geo": file, "set": set, "timeout": timeout });
+            if let Some(memory) = memory {
+                mesh["memory"] = json!(memory);
+            }
+            mesh
         }
     }
 }
