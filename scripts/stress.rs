@@ -1,16 +1,22 @@
 //! Random scenes of the box V9 by every method, as a Markdown table with every failure below. `scripts/stress --help`.
 
+#[path = "../tests/stress/draft.rs"]
+mod draft;
+#[path = "../tests/stress/laws.rs"]
+mod laws;
 #[path = "../tests/stress/random.rs"]
 mod random;
 #[path = "../tests/stress/runs.rs"]
 mod runs;
 #[path = "../tests/stress/scenes.rs"]
 mod scenes;
+#[path = "../tests/stress/wide.rs"]
+mod wide;
 
 use clap::Parser;
 use runs::{Answer, NAMES, Recipe, Verdict};
 use scenes::{Case, Expect};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use winkler::error::{Error, Kind, Result};
@@ -73,7 +79,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let scratch = tempfile::tempdir().map_err(|cause| Error::file(&std::env::temp_dir(), "write", &cause))?;
     let folder = arguments.keep.as_deref().unwrap_or(scratch.path());
     std::fs::create_dir_all(folder).map_err(|cause| Error::file(folder, "create", &cause))?;
@@ -91,9 +97,10 @@ fn run(arguments: &Arguments) -> Result<bool> {
     };
     let mut tallies: HashMap<&str, Tally> = HashMap::new();
     let mut failures = Vec::new();
+    let mut statuses: BTreeMap<String, usize> = BTreeMap::new();
     let mut sound = true;
     for index in indices {
-        let case = scenes::scene(arguments.seed, index, &meshes);
+        let case = scenes::scene(arguments.seed, index, root);
         let path = folder.join(format!("scene-{}-{index}.toml", arguments.seed));
         let text = format!("# {}\n{}", case.line, case.text);
         std::fs::write(&path, text).map_err(|cause| Error::file(&path, "write", &cause))?;
@@ -106,6 +113,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
             let solvable = case.expect == Expect::Solution && verdict != Verdict::Named;
             tallies.entry(name).or_default().take(answer, &verdict, solvable);
             let wrong = matches!(verdict, Verdict::Wrong(_));
+            *statuses.entry(format!("{name}, {:?}: {}", case.expect, answer.status)).or_default() += 1;
             sound &= !wrong && (name != "auto" || verdict != Verdict::Failed);
             if arguments.only.is_some() {
                 println!(
@@ -143,6 +151,8 @@ fn run(arguments: &Arguments) -> Result<bool> {
         }
     }
     print(arguments, &tallies, &failures);
+    println!();
+    statuses.iter().for_each(|(status, count)| println!("{status} {count}"));
     Ok(sound)
 }
 

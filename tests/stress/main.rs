@@ -1,8 +1,11 @@
 //! A small part of `scripts/stress`: the default method and Newton's on random scenes, in one process.
 
+mod draft;
+mod laws;
 mod random;
 mod runs;
 mod scenes;
+mod wide;
 
 use runs::{Answer, Recipe, Verdict};
 use scenes::Expect;
@@ -30,7 +33,7 @@ impl Bench {
 
     /// What methods make of a scene, and the scene in words.
     fn run(&self, seed: u64, index: usize, methods: &[&str]) -> (Vec<(Verdict, Answer)>, String) {
-        let case = scenes::scene(seed, index, &Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes"));
+        let case = scenes::scene(seed, index, Path::new(env!("CARGO_MANIFEST_DIR")));
         let path = self.folder.path().join(format!("{seed}-{index}.toml"));
         std::fs::write(&path, &case.text).expect("a scene can be written");
         let reference = runs::reference(&self.session, &path, &case).expect("a session that lives");
@@ -115,7 +118,7 @@ fn numbers(text: &str, word: &str) -> Vec<f64> {
 /// The box is that of V9: its ends are nearly reached, nothing lies outside, and every kind of scene comes up.
 #[test]
 fn scenes_fill_the_box() {
-    let cases: Vec<_> = (0..3000).map(|index| scenes::scene(2, index, Path::new("meshes"))).collect();
+    let cases: Vec<_> = (0..3000).map(|index| scenes::scene(2, index, Path::new(""))).collect();
     let spread = |values: &mut dyn Iterator<Item = f64>| {
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
     };
