@@ -194,7 +194,7 @@ fn one_rigid_motion() {
     assert!(warnings.contains("translation along y"), "{warnings}");
     assert!(!warnings.contains("rotation") && !warnings.contains("along x"), "{warnings}");
     let lost = solve(&Tube::new(material, "load = [{ on = \"top\", pressure = 1 }]").scene, &[]);
-    assert_eq!(lost.text("status"), "unheld");
+    assert_eq!(lost.text("status"), "underconstrained");
     assert!(lost.said().contains("translation along y"), "{}", lost.said());
 }
 

@@ -230,22 +230,30 @@ fn a_sweep_keeps_condensed_bodies() {
     assert_eq!(counts(&sweep(&["method.gamma=0.5,0.6"], &["--set", "solver=mumps"])[1])[0], 2);
 }
 
-/// The set-up before the first sweep serves the sweeps: one preconditioner a body, and those of the Newton matrix. The first
-/// step, whose start has no energy to compare with, is as rough as the next.
+/// Bodies that Newton's method joins have no preconditioner of their own, that of all is made before the first step and serves while
+/// it is good, and the first step is as rough as the next.
 #[test]
-fn a_joint_method_over_multigrid_makes_one_preconditioner_a_body() {
+fn newton_over_multigrid_makes_one_preconditioner_of_all_bodies() {
     let run = coarse("groove", &["--set", "solver=hypre", "--set", "method={}"]);
     assert_eq!(run.text("method"), "newton");
-    let history = run.history();
-    // two bodies in the first row
-    assert_eq!(history.counts("factorizations")[0], 2);
-    let joint = run.count("factorizations") - 2;
-    assert!((1..=run.count("iterations")).contains(&joint), "{joint}");
-    let its = history.counts("inner_iterations");
+    assert_eq!(counts(&run, ["iterations", "factorizations", "symbolic_factorizations"]), [6, 1, 1]);
+    assert_eq!(counts(&run, ["body_solves", "sweeps", "robin_updates", "dense_factorizations"]), [0; 4]);
+    let its = run.history().counts("inner_iterations");
     assert_eq!(its.last(), Some(&run.count("inner_iterations")));
-    let steps: Vec<usize> = its.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let steps: Vec<usize> = (0..its.len()).map(|k| its[k] - if k > 0 { its[k - 1] } else { 0 }).collect();
     assert!(steps.iter().all(|&step| step < 60), "{steps:?}");
     assert!(2 * steps[0] < its[its.len() - 1] / 2, "{steps:?}");
+}
+
+/// One factor of all bodies a step with one pattern, none of a body.
+#[test]
+fn newton_by_factorisation_factors_all_bodies_once_a_step() {
+    let run = coarse("groove-held", &["--set", "method={}"]);
+    let steps = run.count("iterations");
+    assert_eq!(counts(&run, ["factorizations", "symbolic_factorizations", "assemblies"]), [steps, 1, 2]);
+    assert_eq!(counts(&run, ["body_solves", "sweeps", "robin_updates", "inner_iterations"]), [0; 4]);
+    assert_eq!(run.history().counts("factorizations"), (1..=steps).collect::<Vec<_>>());
+    assert_eq!(run.history().counts("iteration"), (1..=steps).collect::<Vec<_>>());
 }
 
 #[test]

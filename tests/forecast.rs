@@ -73,22 +73,26 @@ fn methods_with_an_estimate_stop_by_balance() {
 
 const LAYER: &str = "{power={B=2.5e-5,a=0.5}}";
 
-/// A run that ends at its limit says how many iterations are missing: compared with those that really are.
+/// A run that ends at its limit says how many iterations are missing: compared with those that really are. What is told of an
+/// exact line search is its worst case: how much better it does depends on the start.
 #[test]
 fn the_forecast_is_what_comes() {
-    for (method, limit, slack) in [
-        ("name=\"robin\", gamma=0.6", 12, 0.05),
-        ("name=\"robin\", gamma=[0.3, 0.9]", 15, 0.05),
-        ("name=\"robin\", gamma=\"spectral\"", 12, 0.05),
-        ("name=\"robin\", gamma=\"line-search\"", 12, 0.05),
-        ("name=\"ncg\"", 10, 0.35),
-        ("name=\"anderson\"", 12, 0.35),
+    for (method, limit, [less, more]) in [
+        ("name=\"robin\", gamma=0.6", 12, [0.05; 2]),
+        ("name=\"robin\", gamma=[0.3, 0.9]", 15, [0.05; 2]),
+        ("name=\"robin\", gamma=\"spectral\"", 12, [0.05; 2]),
+        ("name=\"robin\", gamma=\"line-search\"", 12, [0.0, 0.1]),
+        ("name=\"ncg\"", 10, [0.35; 2]),
+        ("name=\"anderson\"", 12, [0.35; 2]),
     ] {
         let all = run(LAYER, &format!("{{{method}, stop={{residual=1e-8}}}}")).converged();
         let cut = run(LAYER, &format!("{{{method}, stop={{residual=1e-8, iterations={limit}}}}}"));
         assert_eq!(cut.text("status"), "iteration-limit");
         let (told, came) = (cut.count("forecast/iterations"), all.count("iterations") - limit);
-        assert!((told as f64 - came as f64).abs() <= slack * came as f64 + 1.0, "{method}: {told} told, {came} came");
+        let share = (told as f64 - came as f64) / came as f64;
+        let one = 1.0 / came as f64;
+        let within = -less - one <= share && share <= more + one;
+        assert!(within, "{method}: {told} told, {came} came");
         let line = format!("about {told} more at this rate");
         assert!(cut.text("message").contains(&line), "{}", cut.text("message"));
         assert_eq!(all.count("forecast/iterations"), 0);
@@ -102,14 +106,15 @@ fn a_fixed_gamma_is_told_the_best_one() {
         let residual = run.history()["residual"].to_vec();
         residual[residual.len() - 1] / residual[residual.len() - 2]
     };
-    let slow = run(LAYER, "{gamma=0.6}").converged();
+    // a start with all modes, the fastest of which dies in a step of 0.6: the rigid start has too little of it to tell
+    let slow = run(LAYER, "{gamma=0.6, start={normal=1e-4}}").converged();
     assert!((slow.number("forecast/factor") - last_factor(&slow)).abs() < 1e-3);
     let (gamma, factor) = (slow.number("forecast/best_gamma"), slow.number("forecast/best_factor"));
-    let best = run(LAYER, &format!("{{gamma={gamma}}}")).converged();
+    let best = run(LAYER, &format!("{{gamma={gamma}, start={{normal=1e-4}}}}")).converged();
     assert!((last_factor(&best) - factor).abs() < 0.01, "{factor} told, {} came", last_factor(&best));
     for other in [gamma - 0.1, gamma + 0.1] {
-        let other = run(LAYER, &format!("{{gamma={other}, stop={{iterations=500}}}}"));
-        assert!(other.code == 1 || other.count("iterations") > best.count("iterations"));
+        let other = run(LAYER, &format!("{{gamma={other}, start={{normal=1e-4}}, stop={{iterations=500}}}}"));
+        assert!(other.code == 1 || last_factor(&other) > last_factor(&best) + 0.01, "{}", last_factor(&other));
     }
     // a gamma beyond 2/lambda_max leads nowhere
     let wild = run(LAYER, "{gamma=1.2, stop={residual=1e-8, iterations=12}}");

@@ -111,12 +111,12 @@ fn pressed_together_by_opposite_loads() {
     }
 }
 
-/// Besides the ring as a whole its upper half and its right half slide. Newton's matrix is regular: no sweep but those that measure.
+/// Besides the ring as a whole its upper half and its right half slide. Newton's matrix is regular: one step, without a sweep.
 #[test]
 fn halves_of_a_ring_slide() {
     let loads = ring(10.0);
     let run = solve(Scene::new(blocks([2, 2], &all(&loads), &RING)), &["--method", "newton"]).converged();
-    assert!(run.count("iterations") <= 2 && run.count("sweeps") == run.count("iterations") + 1, "{}", run.said());
+    assert_eq!([run.count("iterations"), run.count("sweeps")], [1, 0], "{}", run.said());
     [10.0, 10.0, 5.0, 5.0].iter().enumerate().for_each(|(pair, &p)| uniform(&run, pair, p));
     for named in [
         "bodies `b3` and `b4`: nothing holds them together in their translation along x,",
@@ -129,7 +129,7 @@ fn halves_of_a_ring_slide() {
     let mut loads = ring(11.0);
     loads[0] = held;
     let run = solve(Scene::new(blocks([2, 2], &all(&loads), &RING)), &[]);
-    lost(&run, "unheld", &["bodies `b2` and `b4`", "together in their translation along y"]);
+    lost(&run, "underconstrained", &["bodies `b2` and `b4`", "together in their translation along y"]);
 }
 
 /// A floating grid of blocks: all of them as one, then every row but one and every column but one slide, and nothing else.
@@ -166,11 +166,15 @@ fn loads_that_do_not_balance() {
     let pushed = Scene::new(two("10", 11.0));
     for method in METHODS {
         let run = solve(&pushed, &["--method", method]);
-        lost(&run, "unheld", &["bodies `b1` and `b2`", "together in their translation along y", "4.8e-02"]);
+        lost(&run, "underconstrained", &["bodies `b1` and `b2`", "together in their translation along y", "4.8e-02"]);
     }
-    lost(&solve_on(2, &pushed, &[]), "unheld", &["bodies `b1` and `b2`", "translation along y"]);
+    lost(&solve_on(2, &pushed, &[]), "underconstrained", &["bodies `b1` and `b2`", "translation along y"]);
     // the sum of the loads is zero, that of their moments is not
-    lost(&solve(Scene::new(two("20*x", 10.0)), &[]), "unheld", &["bodies `b1` and `b2`", "in their rotation,"]);
+    lost(
+        &solve(Scene::new(two("20*x", 10.0)), &[]),
+        "underconstrained",
+        &["bodies `b1` and `b2`", "in their rotation,"],
+    );
     let said = winkler(&["check", &pushed.path.display().to_string()]).stdout;
     assert!(said.contains("loads work on it: there is no solution"), "{said}");
 }
@@ -218,7 +222,7 @@ fn sizes_that_differ() {
         let named = "`large` and `small`: nothing holds them together in their translation along x; translation along y; rotation";
         assert!(run.warnings().contains(named), "{}", run.warnings());
     }
-    lost(&solve(scene(0.501), &[]), "unheld", &["bodies `large` and `small`", "in their rotation"]);
+    lost(&solve(scene(0.501), &[]), "underconstrained", &["bodies `large` and `small`", "in their rotation"]);
 }
 
 /// The middle block is pushed up, and takes the upper one along: the lowest one stays.
@@ -226,7 +230,11 @@ fn sizes_that_differ() {
 fn pushed_off_together() {
     let held = "fix = [{ on = \"b1_bottom\", x = 0, y = 0 }]";
     let run = solve(Scene::new(blocks([3, 1], &[held, "force = [0, 1]", ""], &THREE)), &[]);
-    lost(&run, "unbounded", &["the loads push `b2` (translation along y), `b3` (translation along y) away"]);
+    lost(
+        &run,
+        "unbounded",
+        &["resists translation along y of `b2` and translation along y of `b3`, and the loads push that way"],
+    );
     assert!(!run.text("message").contains("`b1`"), "{}", run.said());
 }
 
@@ -239,9 +247,13 @@ fn an_overlap_that_no_load_keeps() {
     let text = text.replacen("layer", "gap = -1e-5\nlayer", 1);
     let at = text.rfind("layer").expect("two layers");
     let scene = Scene::new(format!("{}gap = \"0.5*(1 - cos(4*pi*x))\"\n{}", &text[..at], &text[at..]));
-    for method in ["auto", "newton-robin", "ncg", "anderson"] {
+    // what sweeps begin with has the rounding of the overlap, and the layer's answer to that
+    let rounding = 10.0 * 1e-5 * f64::EPSILON;
+    for (method, most, peak) in
+        [("auto", 1, 0.0), ("newton-robin", 1, 0.0), ("ncg", 0, rounding), ("anderson", 0, rounding)]
+    {
         let run = solve(&scene, &["--method", method]).converged();
-        assert!(run.count("iterations") <= 1, "{}", run.said());
-        assert!((0..2).all(|pair| run.number(&format!("pairs/{pair}/peak_pressure")) == 0.0), "{}", run.said());
+        assert!(run.count("iterations") <= most, "{}", run.said());
+        assert!((0..2).all(|pair| run.number(&format!("pairs/{pair}/peak_pressure")) <= peak), "{}", run.said());
     }
 }

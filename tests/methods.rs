@@ -68,43 +68,77 @@ fn zones_give_one_pressure() {
     assert!(none.count("dense_factorizations") == 4, "S is factored once a body, and the start");
 }
 
+/// A case without its method: default settings.
+fn plain(scene: &str) -> Scene {
+    Scene::new(text_of(scene).split("[method]").next().unwrap_or_default())
+}
+
 /// What issue and guide promise of the default on the paper's mesh.
 #[test]
 fn the_default_is_fast() {
-    let plain = |scene: &str| text_of(scene).split("[method]").next().unwrap_or_default().to_owned();
-    let groove = solve(Scene::new(plain("groove")), &[]).converged();
-    assert!(groove.number("residual") <= 1e-8 && groove.count("sweeps") <= 8, "{}", groove.count("sweeps"));
-    let held = Scene::new(plain("groove-held"));
-    let easy = solve(&held, &[]).converged();
-    assert!(easy.count("sweeps") <= 7, "{}", easy.count("sweeps"));
+    let solved = |scene: &Scene, more: &[&str]| {
+        let run = solve(scene, more).converged();
+        assert!(run.number("residual") <= 1e-8, "{}", run.said());
+        run
+    };
+    let held = plain("groove-held");
     let hard = ["--set", "contact.0.layer.power={B=1e-6, a=0.1}"];
-    let stiff = solve(&held, &hard).converged();
-    assert!(stiff.number("residual") <= 1e-8 && stiff.count("sweeps") <= 16, "{}", stiff.count("sweeps"));
-    assert_eq!((stiff.text("method"), stiff.count("factorizations")), ("newton", 2));
-    // without a condensed body on one rank to join
-    let sweeps = solve(&held, &[&hard[..], &["--method", "newton-robin"]].concat()).converged();
-    assert!(sweeps.number("residual") <= 1e-8 && sweeps.count("sweeps") <= 400, "{}", sweeps.count("sweeps"));
-    let large = solve(&held, &[&hard[..], &["--set", "solver=mumps"]].concat()).converged();
-    assert_eq!(large.text("method"), "newton-robin");
+    for (scene, more, steps) in [(&plain("groove"), &[][..], 6), (&held, &[], 4), (&held, &hard, 3)] {
+        let run = solved(scene, more);
+        assert_eq!((run.text("method"), run.count("iterations"), run.count("sweeps")), ("newton", steps, 0));
+        // K is eliminated once a body, the joint matrix is factored once a step, and no body is solved for
+        let work = ["factorizations", "dense_factorizations", "body_solves"].map(|name| run.count(name));
+        assert_eq!(work, [2, steps, 0]);
+    }
+    // by sweeps, and with bodies that are too large to condense: one factorisation a step
+    let sweeps = solved(&held, &[&hard[..], &["--method", "newton-robin"]].concat());
+    assert!(sweeps.count("sweeps") <= 200, "{}", sweeps.count("sweeps"));
+    let large = solved(&held, &[&hard[..], &["--set", "solver=mumps"]].concat());
+    assert_eq!((large.text("method"), large.count("iterations"), large.count("factorizations")), ("newton", 3, 3));
+}
+
+/// Layers from far stiffer than the blocks to far softer, linear to a = 0.02, from both starts: few steps, and of those that
+/// cannot be had to 1e-8 it is said so.
+#[test]
+fn any_power_law_takes_few_steps() {
+    for (scene, most) in [("groove-held", 5), ("groove", 10)] {
+        for start in ["\"auto\"", "{normal=1e-4}"] {
+            for b in ["1e-12", "1e-7", "1e-5", "2e-4", "1e-2"] {
+                for a in ["0.02", "0.1", "0.3", "1"] {
+                    let sets = [&format!("contact.0.layer.power={{B={b}, a={a}}}"), &format!("method.start={start}")];
+                    let run = solve(plain(scene), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>());
+                    // p'(c) times the rounding of c is 1e-8 of p
+                    let rounded = b == "1e-12" && ["0.02", "0.1"].contains(&a);
+                    let steps = run.count("iterations");
+                    match run.text("status") {
+                        "roundoff-limited" if rounded => assert!(run.number("residual") < 1e-6, "{}", run.said()),
+                        status => {
+                            assert!(status == "converged" && steps <= most, "{scene} B={b} a={a}: {}", run.said())
+                        }
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// Newton's method with condensed bodies joins their Schur complements: the sparse matrix of whole bodies has the same steps.
 #[test]
 fn newton_on_condensed_bodies() {
-    for (scene, sets) in [("groove-held", "mesh.set.n=16"), ("stack", "mesh.set.n1=6"), ("patch-3d", "mesh.set.nl=4")] {
+    for (scene, sets, steps) in
+        [("groove-held", "mesh.set.n=16", 4), ("stack", "mesh.set.n1=6", 3), ("patch-3d", "mesh.set.nl=4", 1)]
+    {
         let run = |solver: &str| {
             let solver = format!("solver={solver}");
-            let plain = Scene::new(text_of(scene).split("[method]").next().unwrap_or_default());
-            solve(plain, &["--method", "newton", "--set", &solver, "--set", sets]).converged()
+            solve(plain(scene), &["--method", "newton", "--set", &solver, "--set", sets]).converged()
         };
         let (small, whole) = (run("condensed"), run("mumps"));
-        // the interior of whole bodies is not in equilibrium at the start, which can cost a step
-        let more = whole.count("iterations").checked_sub(small.count("iterations"));
-        assert!(more.is_some_and(|more| more <= 1), "{scene}");
         assert_eq!((small.text("method"), whole.text("method")), ("newton", "newton"));
+        assert_eq!([small.count("iterations"), whole.count("iterations")], [steps; 2], "{scene}");
         let bodies = small.solvers().len();
         assert_eq!(small.count("factorizations"), bodies, "{scene}: one elimination a body, no other sparse factor");
-        assert!(whole.count("factorizations") > 2 * bodies);
+        assert_eq!([small.count("dense_factorizations"), whole.count("dense_factorizations")], [steps, 0]);
+        assert_eq!(whole.count("factorizations"), steps, "{scene}: one factor a step, none of a body");
         for pair in 0..bodies - 1 {
             let (ours, theirs) = (small.contact_of(pair), whole.contact_of(pair));
             assert!(distance(&ours["pressure"], &theirs["pressure"]) < 1e-9, "{scene}");
@@ -112,7 +146,7 @@ fn newton_on_condensed_bodies() {
     }
 }
 
-/// Bodies with multigrid: the Newton matrix has one multigrid for all, and the bodies' own only measure.
+/// Bodies with multigrid: the Newton matrix has one multigrid for all, and bodies have none of their own.
 #[test]
 fn multigrid_over_all_bodies() {
     let run = |solver: &str| {
@@ -123,35 +157,28 @@ fn multigrid_over_all_bodies() {
     let (multigrid, condensed) = (run("hypre"), run("condensed"));
     assert_eq!((multigrid.text("method"), condensed.text("method")), ("newton", "newton"));
     assert!(distance(&multigrid.contact()["pressure"], &condensed.contact()["pressure"]) < 1e-7);
-    // one set-up a step at most; of each body's own for options, for the start and for the end
-    let (steps, set_ups) = (multigrid.count("iterations"), multigrid.count("factorizations"));
-    assert!(steps <= condensed.count("iterations") + 4 && set_ups <= steps + 8, "{steps} steps, {set_ups} set-ups");
-    // a start that is a rigid motion takes no solve: sweeps are all that bodies solve for
-    assert_eq!(multigrid.count("body_solves"), 2 * multigrid.count("sweeps"));
+    // inexact steps cost one more; one set-up a step at most
+    let steps = multigrid.count("iterations");
+    assert_eq!([steps, condensed.count("iterations")], [4, 3]);
+    assert!((1..=steps).contains(&multigrid.count("factorizations")), "{}", multigrid.count("factorizations"));
+    assert_eq!([multigrid.count("body_solves"), multigrid.count("sweeps")], [0, 0]);
+    // what is typed for one body reaches it: then bodies have multigrid of their own
     let sweeps = run("{preset=\"hypre\",options=\"-lower_ksp_rtol 1e-8\"}");
+    assert_eq!(sweeps.text("method"), "newton-robin");
     assert!(sweeps.count("inner_iterations") > multigrid.count("inner_iterations"));
+    assert_eq!(sweeps.count("body_solves"), 2 * sweeps.count("sweeps"));
 }
 
-/// A large curved contact begins with the pressures of a coarser mesh, and Newton's steps need not grow it from within.
+/// Rigid bodies foretell a large curved contact, and Newton's steps need not grow it from within.
 #[test]
-fn a_coarser_mesh_foretells_the_contact() {
-    let run = |start: &str| {
-        let start = format!("method={{start=\"{start}\"}}");
-        let sets = ["mesh.set={n=14,edge=1}", "body.0.order=1", "body.1.order=1", "solver=hypre", &start];
-        solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
-    };
-    let (auto, rigid) = (run("auto"), run("rigid"));
-    assert!(rigid.report["coarser"].is_null() && !rigid.stdout.contains("coarser"), "{}", rigid.said());
-    assert!(auto.stdout.contains("start: pressures of a mesh of elements 3 times larger"), "{}", auto.said());
-    let (coarse, points) = (auto.count("coarser/dofs"), auto.count("coarser/points"));
-    assert!(10 * coarse < auto.count("dofs") && (20..100).contains(&points), "{coarse} dofs, {points} points");
-    let (few, many) = (auto.count("iterations"), rigid.count("iterations"));
-    assert!(2 * few <= many, "{few} and {many} iterations");
+fn rigid_bodies_foretell_the_contact() {
+    let sets = ["mesh.set={n=14,edge=1}", "body.0.order=1", "body.1.order=1", "solver=hypre", "method={}"];
+    let run = solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged();
+    assert!(run.count("iterations") <= 6, "{}", run.said());
     // the first step finds the contact but for its edge: 200 points
-    let closed = auto.history().counts("closed");
-    assert!(closed[0] < 20 && closed[1].abs_diff(closed[few]) <= 10, "{closed:?}");
-    let apart = distance(&auto.contact()["pressure"], &rigid.contact()["pressure"]);
-    assert!(apart < 1e-7, "{apart:e}");
+    let closed = run.history().counts("closed");
+    let last = closed[closed.len() - 1];
+    assert!(last > 100 && closed[0].abs_diff(last) <= 40, "{closed:?}");
 }
 
 /// The estimated spectrum of G^-1 F1'' lies around one: 1 - theta and 1 + theta.
@@ -189,7 +216,7 @@ fn newton_on_two_ranks() {
 }
 
 /// A tower of blocks that only contact holds, under a load that leans: each joint carries the whole of it. Rigid motions are deflated, so
-/// its height does not matter: without that the sweeps are 27 and 53.
+/// its height hardly matters: without that the sweeps are 27 and 53.
 #[test]
 fn a_tower_takes_as_long_as_a_wall() {
     let geo = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/stack/stack.geo");
@@ -214,5 +241,5 @@ fn a_tower_takes_as_long_as_a_wall() {
         run.count("sweeps")
     };
     let sweeps = [tower(4), tower(12)];
-    assert!(sweeps[0] <= 20 && sweeps[1] == sweeps[0], "{sweeps:?}");
+    assert_eq!(sweeps, [14, 15]);
 }

@@ -269,10 +269,10 @@ fn a_body_that_slides_freely_without_load() {
 #[test]
 fn a_body_that_nothing_holds() {
     let run = solve(pushed_aside(), &[]);
-    failed(&run, &["unheld"], &["`upper`", "translation along x", "iteration 0", "support"]);
+    failed(&run, &["underconstrained"], &["`upper`", "translation along x", "iteration 0", "support"]);
     // not even contact, at first
     let apart = Scene::edited("patch", "start = { normal = 1e-4 }", "start = \"zero\"");
-    failed(&solve(&apart, &[]), &["unheld"], &["`upper`", "iteration 0", "method.start"]);
+    failed(&solve(&apart, &[]), &["underconstrained"], &["`upper`", "iteration 0", "method.start"]);
 }
 
 const COARSE: [&str; 2] = ["--set", "mesh.set.n=8"];
@@ -409,7 +409,7 @@ fn an_option_refused_on_one_of_two_ranks() {
 fn not_converging_on_two_ranks() {
     let run = solve_on(2, case("groove"), &[&COARSE[..], &["--set", "method.stop.iterations=3"]].concat());
     failed(&run, &["iteration-limit"], &["3 iterations"]);
-    failed(&solve_on(2, pushed_aside(), &[]), &["unheld"], &["`upper`", "translation along x"]);
+    failed(&solve_on(2, pushed_aside(), &[]), &["underconstrained"], &["`upper`", "translation along x"]);
 }
 
 #[test]

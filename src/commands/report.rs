@@ -63,7 +63,7 @@ pub fn report(
             first: counts.first_seconds,
             solve: counts.solve_seconds + joint.solve_seconds,
         },
-        symbolic_factorizations: counts.symbolic,
+        symbolic_factorizations: counts.symbolic + joint.symbolic,
         body_solves: counts.solves,
         inner_iterations: counts.inner_iterations + joint.inner_iterations,
         robin_updates: counts.robin_updates,

@@ -10,6 +10,7 @@
 //! each term of which is zero on the graph of the law and positive beside it. No spectrum, no history, no constants.
 
 use super::scale::Scale;
+use super::start::surface_slopes;
 use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::linear::Solution;
@@ -64,10 +65,19 @@ pub struct Reached {
     pub error: f64,
     /// Whether that is a bound: no pressure is negative, and the linear step is exact to rounding.
     pub is_bound: bool,
-    /// Largest difference of a pressure from its law, relative to the largest pressure.
+    /// Error of the pressures: the largest difference from the law, relative to the largest pressure, or what an inexact linear step
+    /// misses, relative to the energy of the contact alone.
     pub pressure: f64,
     /// Share of its contact forces that a body lacks in balance, the most over all.
     pub imbalance: f64,
+}
+
+/// Energy that the pressures give the layers and the surfaces under them, sum omega p^2 (1/kappa + 1/rho0): that of the bodies as a
+/// whole may be much larger, and an error that is small beside it large for the pressures.
+pub(super) fn contact_energy(model: &Model, places: &Layer) -> f64 {
+    let slopes = surface_slopes(model);
+    let at = |q: usize| places.force[q] * places.pressure[q] * (places.tangent[q].recip() + slopes[q].recip());
+    (0..slopes.len()).filter(|&q| places.force[q] > 0.0).map(at).sum()
 }
 
 impl Reached {
@@ -82,10 +92,13 @@ impl Reached {
         places: &Layer,
     ) -> Self {
         let absolute = (2.0 * gap.energy).sqrt() + linear;
+        let contact = if linear > 0.0 { contact_energy(model, places) } else { 0.0 };
+        let missed = if linear > 0.0 { scale.relative(linear * linear, contact) } else { 0.0 };
+        let mismatch = if gap.mismatch == 0.0 { 0.0 } else { gap.mismatch / scale.peak(&places.pressure) };
         Self {
             error: scale.relative(absolute * absolute, strain + places.work),
             is_bound: gap.is_bound && linear == 0.0,
-            pressure: if gap.mismatch == 0.0 { 0.0 } else { gap.mismatch / scale.peak(&places.pressure) },
+            pressure: mismatch.max(missed),
             imbalance: scale.imbalance(model, &model.forces(p)),
         }
     }

@@ -26,7 +26,7 @@ pub fn respond(
         });
     }
     let springs = resisting(model, places.springs(model));
-    let system = System { model, places, springs: &springs, residual: &residual, reduction };
+    let system = System { model, places, springs: &springs, residual: &residual, reduction, most: f64::INFINITY };
     Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy)))
 }
 

@@ -23,6 +23,7 @@ mod run;
 mod scale;
 pub mod solve;
 pub mod start;
+mod steady;
 pub mod stop;
 pub mod sweep;
 mod sweeps;

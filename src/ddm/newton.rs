@@ -10,7 +10,7 @@
 //!
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
-use super::bound::{Gap, Reached};
+use super::bound::{Gap, Reached, contact_energy};
 use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
@@ -32,7 +32,8 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
         let (r, _) = residual(run.model, &u, &force);
         let reduction = forcing.reduction();
-        let system = System { model: run.model, places: &places, springs: &springs, residual: &r, reduction };
+        let most = forcing.most(contact_energy(run.model, &places));
+        let system = System { model: run.model, places: &places, springs: &springs, residual: &r, reduction, most };
         let x = match linear.solve(system)? {
             Ok(solution) => solution,
             Err(failure) => return Ok(End::failed(failure, u, places, linear.sweeps())),
@@ -49,9 +50,10 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
         let mut reached = Reached::new(run.model, &run.scale, measured.strain, (&gap, x.error), &p, &met);
         let mut exact = true;
-        if x.error == 0.0 && run.is_enough(&reached) {
-            // an exact step has the rounding of its size, which may be large beside what is left: its matrix tells how large
-            let system = System { model: run.model, places: &places, springs: &springs, residual: &rest, reduction };
+        if run.is_enough(&reached) {
+            // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
+            let (residual, reduction) = (&rest[..], SHARE);
+            let system = System { model: run.model, places: &places, springs: &springs, residual, reduction, most };
             if let Ok(more) = linear.solve(system)? {
                 reached.add_rounding(&run.scale, measured.strain, &more, &places, &met);
                 exact = run.is_enough(&reached);
@@ -61,7 +63,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
         }
         forcing.learn(&gap, &reached, run.stop.residual);
-        let lost = progress.is_lost(gap.change, measured.f1);
+        // a step that knew of no contact runs through the other body
+        let blind = places.closed == 0 && met.closed > 0;
+        let lost = progress.is_lost(gap.change, measured.f1) || blind;
         if lost {
             progress.f1 += search(run.model, &mut u, &x.field)?;
         } else {
@@ -94,9 +98,15 @@ impl Forcing {
         self.0
     }
 
+    /// The error of a step in the energy norm that leaves the pressures of a contact with this energy a digit: else stiff layers answer
+    /// errors of compressions with any pressure.
+    fn most(&self, contact: f64) -> f64 {
+        if contact > 0.0 { SHARE * contact.sqrt() } else { f64::INFINITY }
+    }
+
     /// After a step with this gap: the next may miss a share of what this one did, and need not do better than what the run asks for.
     fn learn(&mut self, gap: &Gap, reached: &Reached, target: Option<f64>) {
-        let enough = SHARE * target.unwrap_or(0.0) / reached.error;
+        let enough = SHARE * target.unwrap_or(0.0) / reached.error.max(reached.pressure);
         self.0 = (SHARE * gap.share).max(enough).clamp(f64::EPSILON.sqrt(), FIRST);
     }
 }

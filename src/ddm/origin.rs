@@ -5,10 +5,10 @@
 //! start, once, and the iteration works on what is left. They come from the scene alone, not from a method or its start, and have few
 //! digits: every method sees the same gaps.
 
-use super::start::RigidStart;
 use crate::linalg::{dot, fit};
 use crate::model::Model;
 use crate::model::field::Field;
+use nalgebra::DVector;
 
 /// Binary digits that an origin's amounts have: products with coordinates of 29 digits are then exact.
 const DIGITS: u32 = 24;
@@ -22,15 +22,17 @@ pub struct Origin {
     gap: Vec<f64>,
     /// What the loads have gained on these motions: to be added to F1.
     pub energy: f64,
+    /// The start itself, seen from here: what it has beyond the digits of the motions.
+    pub rest: Field,
 }
 
 impl Origin {
-    /// Takes the motions of a start into the gap of `model`; none if nothing moves. Collective.
-    pub fn take(model: &mut Model, start: &RigidStart) -> Option<Self> {
-        if start.amounts.iter().all(|&amount| amount == 0.0) {
+    /// Takes the motions of a start, in these `amounts`, into the gap of `model`; none if nothing moves. Collective.
+    pub fn take(model: &mut Model, amounts: &DVector<f64>) -> Option<Self> {
+        if amounts.iter().all(|&amount| amount == 0.0) {
             return None;
         }
-        let mut motion = Field::rest(model);
+        let (mut motion, mut rest) = (Field::rest(model), Field::rest(model));
         let mut energy = [0.0];
         let mut first = 0;
         for (index, slot) in model.bodies.iter_mut().enumerate() {
@@ -47,10 +49,14 @@ impl Origin {
             state.fill(0.0);
             let Some(matrices) = body.matrices() else { continue };
             let mut trace = vec![0.0; slot.row_stiffness.len()];
-            slot.motions.iter().zip(own).for_each(|(m, i)| crate::linalg::axpy(start.amounts[i], &m.trace, &mut trace));
-            let amounts = fit(matrices.traces, &trace);
-            let deformation = state.len() - amounts.len();
-            state[deformation..].iter_mut().zip(amounts).for_each(|(origin, amount)| *origin = short(amount));
+            slot.motions.iter().zip(own).for_each(|(m, i)| crate::linalg::axpy(amounts[i], &m.trace, &mut trace));
+            let own = fit(matrices.traces, &trace);
+            let deformation = state.len() - own.len();
+            let beyond = &mut rest.states[index][deformation..];
+            for ((origin, beyond), amount) in state[deformation..].iter_mut().zip(beyond).zip(own) {
+                *origin = short(amount);
+                *beyond += amount - *origin;
+            }
             // the residual at rest without contact is the load
             let mut load = vec![0.0; state.len()];
             body.residual(&body.rest(), &vec![0.0; slot.row_stiffness.len()], &mut load);
@@ -58,12 +64,14 @@ impl Origin {
         }
         // one message: the energy, then the traces
         motion.trace_here(model);
-        let mut message = [&energy[..], &motion.trace].concat();
+        rest.trace_here(model);
+        let mut message = [&energy[..], &motion.trace, &rest.trace].concat();
         model.exchange.sum(&mut message);
+        rest.trace = message.split_off(1 + motion.trace.len());
         motion.trace = message.split_off(1);
         let gap = model.gap.clone();
         model.gap.iter_mut().zip(motion.closing()).for_each(|(gap, closing)| *gap -= closing);
-        Some(Self { motion, gap, energy: message[0] })
+        Some(Self { motion, gap, energy: message[0], rest })
     }
 
     /// Traces of the motions.

@@ -5,6 +5,7 @@ use super::bound::Reached;
 use super::history::{Observer, Row};
 use super::origin::Origin;
 use super::scale::Scale;
+use super::steady::{Steady, most_apart};
 use super::stop::{Cycle, Floor, Status, relative_increment};
 use super::sweep::Sweep;
 use crate::error::Result;
@@ -27,6 +28,9 @@ pub(super) struct Run<'a> {
     pub scale: Scale,
     pub cycle: Cycle,
     pub floor: Floor,
+    /// Pressures of earlier sweeps, and of the last.
+    pub steady: Steady,
+    pub before: Option<Vec<f64>>,
     pub rows: Vec<Row>,
 }
 
@@ -139,7 +143,8 @@ impl Run<'_> {
         let increment = row.increment;
         self.push(row);
         let worst = reached.worst();
-        if let Some(body) = not_finite(self.model, x, worst) {
+        // pressures of compressions that are far away may be beyond the range of numbers: the places are not
+        if let Some(body) = not_finite(self.model, x, if worst.is_nan() { worst } else { 0.0 }) {
             return Ok(Some(Status::NotFinite { body }));
         }
         if self.stop.is_met(worst, increment) {
@@ -211,12 +216,18 @@ impl Run<'_> {
             return Ok(Some(Status::NotFinite { body }));
         }
         let imbalance = self.scale.imbalance(self.model, &layer.force);
-        // what is known of the error counts: a small residual of a slow mode is no small error
-        let balanced =
-            self.stop.residual.is_none_or(|tolerance| imbalance <= SPARE * tolerance && !(error > SPARE * tolerance));
-        if self.stop.is_met(residual, increment) && balanced {
+        // a small residual of a slow mode is no small error: the pressures stand still, too
+        let steady = self.stop.residual.is_none_or(|tolerance| {
+            let before = self.before.replace(layer.pressure.clone());
+            let moved = before.map_or(0.0, |before| most_apart(&before, &layer.pressure));
+            let peak = self.scale.peak(&layer.pressure);
+            let missing = self.steady.missing(residual, &layer.pressure, peak);
+            moved <= MOVED * tolerance * peak && missing <= tolerance * peak && imbalance <= SPARE * tolerance
+        });
+        if self.stop.is_met(residual, increment) && steady {
             return Ok(Some(Status::Converged));
         }
+        self.steady.note(residual, &layer.pressure);
         if let Some(balance) = &mut self.balance
             && balance.is_met(self.model, linear, u, layer, error)?
         {
@@ -233,7 +244,10 @@ impl Run<'_> {
     }
 }
 
-/// Factor on the tolerance of the residual for what is estimated besides it: error and balance.
+/// How far the last step may have moved a pressure, relative to the largest, in units of the residual that is asked for.
+const MOVED: f64 = 3.0;
+
+/// Factor on the tolerance of the residual for the balance of forces, which is measured by motions and not by energy.
 const SPARE: f64 = 10.0;
 
 /// A body in which a number is not finite, if the error is none.

@@ -143,7 +143,7 @@ pub fn solve(
     let scale = Scale::new(model, &[&vec![0.0; 2 * model.points()], &trace]);
     let places = places(model, &begin, &rigid);
     // an estimate of the discretisation's error needs the iterates whole
-    let origin = if floats && settings.balance.is_none() { Origin::take(model, &rigid) } else { None };
+    let origin = if floats && settings.balance.is_none() { Origin::take(model, &rigid.amounts) } else { None };
     let resumed = match begin {
         Start::Resume(mut field) => {
             if let Some(origin) = &origin {
@@ -163,11 +163,14 @@ pub fn solve(
         scale,
         cycle: Cycle::default(),
         floor: Floor::new(PATIENCE[usize::from(matches!(method, Method::Sweeps { .. }))]),
+        steady: Default::default(),
+        before: None,
         rows: Vec::new(),
     };
     let end = match method {
         Method::Newton(linear) => {
-            let u = resumed.unwrap_or_else(|| Field::rest(run.model));
+            let start = |origin: &mut Origin| std::mem::take(&mut origin.rest);
+            let u = resumed.or_else(|| run.origin.as_mut().map(start)).unwrap_or_else(|| Field::rest(run.model));
             newton::iterate(&mut run, &mut **linear, u, places)?
         }
         Method::Sweeps { acceleration, coefficient, linear } => {

@@ -251,7 +251,8 @@ impl Rigid<'_> {
             let step = self.solve(&self.springs(&places), &lacking);
             let closing = self.motions.closing(&step);
             let (gain, resisted) = (step.dot(&self.work), step.dot(&self.pull(&step)));
-            if resisted <= CLOSES * gain && gain > BALANCED * step.amax() * largest && self.opens(&closing) {
+            let gains = gain > BALANCED * step.amax() * largest;
+            if gains && resisted <= CLOSES * gain && self.opens(&closing) {
                 return Err(step);
             }
             let start = places.force;
@@ -264,7 +265,9 @@ impl Rigid<'_> {
             let first = dot(&start, &closing) + held;
             match line::zero(slope, first, 1e-3) {
                 Ok(t) => amounts += t * &step,
-                Err(Unbounded) => return Err(step),
+                Err(Unbounded) if gains => return Err(step),
+                // layers push ever less, and no load works on the way: their energy is bounded below by zero
+                Err(Unbounded) => break,
             }
         }
         Ok(amounts)

@@ -175,6 +175,6 @@ mod tests {
     fn stalling_is_suspected_only_after_a_while() {
         let mut floor = Floor::new(20);
         assert!((0..200).all(|k| !floor.is_reached(0.95f64.powi(k))));
-        assert!((0..20).any(|_| floor.is_reached(1e-5)));
+        assert!((0..=20).any(|_| floor.is_reached(1e-5)));
     }
 }

@@ -50,14 +50,14 @@ impl LinearStep for Sweeps {
     }
 
     fn solve(&mut self, system: System) -> Result<Solved> {
-        let System { model, places, springs, residual, reduction } = system;
+        let System { model, places, springs, residual, reduction, most } = system;
         model.precision(ROUGH)?;
         if let Some(coefficient) = &mut self.coefficient {
             let weight = coefficient.weight(model, places, self.systems);
             model.robin(&weight)?;
         }
         self.systems += 1;
-        let found = gradients(model, &mut self.sweeper, springs, residual, (reduction, MOST))?;
+        let found = gradients(model, &mut self.sweeper, springs, residual, (reduction, most, MOST))?;
         Ok(found.map(|found| {
             self.spectrum = found.spectrum.or(self.spectrum);
             found.solution
@@ -81,7 +81,7 @@ pub(super) struct Found {
 }
 
 /// Solves (K + B' diag(springs) B) x = r with the Robin term that the model carries, until the error has fallen to `reduction` in
-/// the energy norm, or after `most` iterations.
+/// the energy norm and to `wanted`, or after `most` iterations.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -90,7 +90,7 @@ pub(super) fn gradients(
     sweeper: &mut Sweeper,
     springs: &[f64],
     residual: &[Vec<f64>],
-    (reduction, most): (f64, usize),
+    (reduction, wanted, most): (f64, f64, usize),
 ) -> Result<std::result::Result<Found, Failure>> {
     let coarse = Coarse::new(model, springs);
     let mut r = residual.to_vec();
@@ -105,7 +105,8 @@ pub(super) fn gradients(
         }
         let rz: f64 = sweep.decrement.iter().sum();
         let error = lanczos.squared_error(rz);
-        if error <= reduction * reduction * lanczos.energy || lanczos.alphas.len() == most {
+        let enough = (reduction * reduction * lanczos.energy).min(wanted * wanted);
+        if error <= enough || lanczos.alphas.len() == most {
             break error;
         }
         let mut p = sweep.correction;
@@ -125,7 +126,7 @@ pub(super) fn gradients(
         let curvature = sums[0] + dot(&spring, &closing);
         // p'Gp is r'z at least: a direction of which deflation leaves nothing but rounding has no curvature beside it
         if !(rz > 0.0 && curvature > f64::EPSILON * rz) {
-            break 0.0;
+            break if error.is_finite() { error } else { 0.0 };
         }
         add_forces(model, &spring, &mut image);
         let alpha = rz / curvature;
@@ -164,11 +165,16 @@ impl Lanczos {
     fn squared_error(&self, rz: f64) -> f64 {
         let lately = match self.gains.len() {
             0 => return if rz > 0.0 { f64::INFINITY } else { 0.0 },
-            n if n > DELAY => self.gains[n - DELAY..].iter().sum(),
-            _ => f64::INFINITY,
+            n => self.gains[n - n.min(DELAY)..].iter().sum(),
         };
+        // either is too small as long as a slow mode has not come up; a run that ends early has gained all of it lately
         let low = if self.alphas.len() <= SETTLED { self.spectrum().map_or(0.0, |(low, _)| low) } else { 0.0 };
-        f64::min(lately, rz.max(0.0) / low)
+        let by_spectrum = rz.max(0.0) / low;
+        if self.gains.len() <= DELAY || by_spectrum.is_infinite() {
+            by_spectrum.min(lately)
+        } else {
+            by_spectrum.max(lately)
+        }
     }
 
     /// Extreme eigenvalues of the Lanczos matrix.

@@ -22,6 +22,8 @@ pub struct System<'a> {
     pub residual: &'a [Vec<f64>],
     /// How far an iterative solver has to reduce the energy norm of the error.
     pub reduction: f64,
+    /// Energy norm of the error that is wanted at most, for solvers that know it.
+    pub most: f64,
 }
 
 /// A solution of a [`System`].

@@ -98,6 +98,7 @@ mod tests {
             iteration: 1,
             residual: 1e-9,
             error: 2e-9,
+            is_bound: true,
             increment: 0.5,
             increments: vec![0.5, 1.0 / 3.0],
             gamma: 0.25,
