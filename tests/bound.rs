@@ -35,8 +35,8 @@ const MOST: usize = 40;
 /// Errors, relative to the energy norm of the solution, below which rounding is all that is left of them.
 const ROUNDING: f64 = 1e-11;
 
-/// Factor by which a bound may be above the true error.
-const MOST_ABOVE: f64 = 10.0;
+/// Factor by which a bound may be above the true error: 3.4 is the most of 160 steps.
+const MOST_ABOVE: f64 = 4.0;
 
 /// A run that ended anyhow.
 struct Ended {
@@ -94,6 +94,7 @@ fn layers(model: &Model, c0: &[f64], c: &[f64]) -> f64 {
 /// the solution.
 #[derive(Debug)]
 struct Step {
+    #[allow(dead_code)] // for messages
     number: usize,
     is_bound: bool,
     told: f64,
@@ -140,11 +141,10 @@ fn bounds_hold_and_are_sharp() {
         let mut known = 0;
         for (case, more) in all {
             for step in steps(&session, case, more, law) {
-                eprintln!("{case} {law:?} {step:?}");
                 // one without a number says nothing: pressures beyond the range of numbers
                 if step.is_bound && step.truth > ROUNDING && step.told.is_finite() {
                     let ratio = step.told / step.truth;
-                    assert!((1.0 - 1e-2..MOST_ABOVE).contains(&ratio), "{case} {law:?}: {ratio} in {step:?}");
+                    assert!((1.0 - 1e-3..MOST_ABOVE).contains(&ratio), "{case} {law:?}: {ratio} in {step:?}");
                     assert!(step.told >= step.distance, "{case} {law:?}: {step:?}");
                     known += 1;
                 }

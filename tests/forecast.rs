@@ -117,7 +117,7 @@ fn a_fixed_gamma_is_told_the_best_one() {
         assert!(other.code == 1 || last_factor(&other) > last_factor(&best) + 0.01, "{}", last_factor(&other));
     }
     // a gamma beyond 2/lambda_max leads nowhere
-    let wild = run(LAYER, "{gamma=1.2, stop={residual=1e-8, iterations=12}}");
+    let wild = run(LAYER, "{gamma=1.2, robin=\"auto\", start={normal=1e-4}, stop={residual=1e-8, iterations=12}}");
     assert!(wild.report["forecast"]["iterations"].is_null() && wild.number("forecast/factor") > 1.0);
     let words = wild.text("message");
     assert!(words.contains("no number is enough") && words.contains("method.gamma is 1.00"), "{words}");

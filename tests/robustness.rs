@@ -91,6 +91,27 @@ fn an_overlap_that_comes_to_nothing() {
     }
 }
 
+/// Blocks that touch and that nothing presses stay at rest, by every method and in no more than one step.
+#[test]
+fn blocks_without_a_load() {
+    let upper = r#"fix = [{ on = "b2_left", x = 0 }]
+load = [{ on = "b2_top", pressure = 0 }]"#;
+    for gap in ["0", "1e-6*x"] {
+        for layer in ["linear = { stiffness = 1e4 }", "power = { B = 3e-6, a = 0.3 }"] {
+            for method in ["auto", "newton-robin", "robin", "ncg", "anderson"] {
+                let scene = blocks([1e3, 1e5], [4, 4], upper, gap, layer);
+                let run = solve(scene, &["--method", method, "--set", "method.robin=auto"]).converged();
+                assert!(run.count("iterations") <= 1, "{method}: {}", run.said());
+                assert!(
+                    run.number("pairs/0/peak_pressure") == 0.0 && run.number("F1") == 0.0,
+                    "{method}: {}",
+                    run.said()
+                );
+            }
+        }
+    }
+}
+
 /// The upper block pressed down by a support of its top.
 fn pressed(depth: f64) -> String {
     format!(r#"fix = [{{ on = "b2_left", x = 0 }}, {{ on = "b2_top", y = -{depth:e} }}]"#)

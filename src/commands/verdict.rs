@@ -77,11 +77,7 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
 
 /// What the number is by which a run ends.
 fn measure(outcome: &Outcome) -> &'static str {
-    match outcome.rows.last() {
-        Some(row) if row.is_bound => "error bound",
-        _ if outcome.method.starts_with("newton") => "estimated error",
-        _ => "residual",
-    }
+    if outcome.method.starts_with("newton") { "largest relative error" } else { "residual" }
 }
 
 /// What more iterations would bring, for the report.

@@ -81,23 +81,24 @@ pub(super) fn contact_energy(model: &Model, places: &Layer) -> f64 {
 }
 
 impl Reached {
-    /// Of an iterate with u'Ku = `strain` and the pressures p, whose layers miss `gap`, and whose linear step misses `linear` in the
-    /// energy norm.
+    /// Of an iterate with u'Ku = `strain` and the pressures p, whose layers miss `gap`, after the linear step `step`.
     pub(super) fn new(
         model: &Model,
         scale: &Scale,
         strain: f64,
-        (gap, linear): (&Gap, f64),
+        gap: &Gap,
+        step: &Solution,
         p: &[f64],
         places: &Layer,
     ) -> Self {
+        let linear = step.error;
         let absolute = (2.0 * gap.energy).sqrt() + linear;
         let contact = if linear > 0.0 { contact_energy(model, places) } else { 0.0 };
         let missed = if linear > 0.0 { scale.relative(linear * linear, contact) } else { 0.0 };
         let mismatch = if gap.mismatch == 0.0 { 0.0 } else { gap.mismatch / scale.peak(&places.pressure) };
         Self {
             error: scale.relative(absolute * absolute, strain + places.work),
-            is_bound: gap.is_bound && linear == 0.0,
+            is_bound: gap.is_bound && step.is_exact,
             pressure: mismatch.max(missed),
             imbalance: scale.imbalance(model, &model.forces(p)),
         }

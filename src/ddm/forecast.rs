@@ -22,7 +22,14 @@ impl Forecast {
             let before = rows.len().checked_sub(RECENT + 1)?;
             Some((last / rows[before].residual).powf(1.0 / RECENT as f64))
         };
-        let factor = factor.or_else(seen).filter(|factor| factor.is_finite())?;
+        let factor = match (factor, seen()) {
+            // a mode that grows from little is seen before the spectrum knows it
+            (Some(own), Some(seen)) if seen >= 1.0 => own.max(seen),
+            (own, seen) => own.or(seen)?,
+        };
+        if !factor.is_finite() {
+            return None;
+        }
         let gain = target / last;
         let iterations = match factor {
             _ if gain >= 1.0 => 0.0,
@@ -81,6 +88,9 @@ mod tests {
         assert_eq!(left(Some(0.1)).map(|f| f.iterations), Some(5.0));
         assert_eq!(left(Some(0.01)).map(|f| f.iterations), Some(3.0));
         assert_eq!(left(Some(1.2)).map(|f| f.iterations), Some(f64::INFINITY));
+        // a residual that rises will not fall, whatever the spectrum says
+        let risen = Forecast::new(&rows(1.1, 12), 1e-8, Some(0.8)).expect("a forecast");
+        assert!((risen.factor - 1.1).abs() < 1e-12 && risen.iterations == f64::INFINITY, "{risen:?}");
         // too short a history tells nothing, a longer one its mean
         assert_eq!(left(None), None);
         let seen = Forecast::new(&rows(0.5, 20), 0.5f64.powi(24), None).expect("a forecast");

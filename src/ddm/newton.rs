@@ -47,14 +47,18 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
 
         let gap = Gap::new(run.model, &c, &p, &met, &rho);
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
-        let measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
-        let mut reached = Reached::new(run.model, &run.scale, measured.strain, (&gap, x.error), &p, &met);
+        let mut measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
+        let mut reached = Reached::new(run.model, &run.scale, measured.strain, &gap, &x, &p, &met);
         let mut exact = true;
         if run.is_enough(&reached) {
             // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
             let (residual, reduction) = (&rest[..], SHARE);
             let system = System { model: run.model, places: &places, springs: &springs, residual, reduction, most };
-            if let Ok(more) = linear.solve(system)? {
+            let before = linear.counts();
+            let more = linear.solve(system)?;
+            measured.inner_iterations += linear.counts().inner_iterations - before.inner_iterations;
+            measured.factorizations += linear.counts().factorizations - before.factorizations;
+            if let Ok(more) = more {
                 reached.add_rounding(&run.scale, measured.strain, &more, &places, &met);
                 exact = run.is_enough(&reached);
             }

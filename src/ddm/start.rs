@@ -66,7 +66,9 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
     let (slope, bare) = (surface_slopes(model), vec![false; gap.len()]);
     let mut rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope, gap, bare };
     let mut amounts = DVector::zeros(motions.count());
-    if motions.count() > 0 {
+    // bodies that neither loads nor contacts push stay where they are: all else would be rounding
+    let at_rest = motions.count() == 0 || rigid.work == amounts && rigid.approach(&amounts).iter().all(|&s| s <= 0.0);
+    if !at_rest {
         for _ in 0..ROUNDS {
             amounts = rigid.minimize().map_err(|motion| motions.names(&motion))?;
             let approach = rigid.approach(&amounts);

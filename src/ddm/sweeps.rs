@@ -126,7 +126,7 @@ pub(super) fn gradients(
         let curvature = sums[0] + dot(&spring, &closing);
         // p'Gp is r'z at least: a direction of which deflation leaves nothing but rounding has no curvature beside it
         if !(rz > 0.0 && curvature > f64::EPSILON * rz) {
-            break if error.is_finite() { error } else { 0.0 };
+            break if error.is_finite() { error } else { rz.max(0.0) };
         }
         add_forces(model, &spring, &mut image);
         let alpha = rz / curvature;
@@ -136,7 +136,7 @@ pub(super) fn gradients(
         r.iter_mut().zip(&image).for_each(|(r, y)| axpy(-alpha, y, r));
         last = Some((p, rz, old));
     };
-    let solution = Solution { field: x, energy: lanczos.energy, error: squared.max(0.0).sqrt() };
+    let solution = Solution { field: x, energy: lanczos.energy, error: squared.max(0.0).sqrt(), is_exact: false };
     Ok(Ok(Found { solution, spectrum: lanczos.spectrum() }))
 }
 

@@ -34,6 +34,8 @@ pub struct Solution {
     pub energy: f64,
     /// Estimated energy norm of the error of x; zero for a direct solver.
     pub error: f64,
+    /// Whether it is exact to rounding, as that of a direct solver.
+    pub is_exact: bool,
 }
 
 /// A solver that gave up, in its own words.

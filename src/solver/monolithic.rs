@@ -152,7 +152,8 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
         let energy: f64 = states.iter().zip(residual).map(|(x, r)| dot(x, r)).sum();
         let mut field = Field { states, trace: vec![0.0; 2 * model.points()] };
         field.retrace(model);
-        Ok(Ok(Solution { field, energy, error: self.whole.accuracy() * energy.max(0.0).sqrt() }))
+        let accuracy = self.whole.accuracy();
+        Ok(Ok(Solution { field, energy, error: accuracy * energy.max(0.0).sqrt(), is_exact: accuracy == 0.0 }))
     }
 
     fn counts(&self) -> BodyCounts {
