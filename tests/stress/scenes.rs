@@ -138,14 +138,8 @@ const HOLDS: [Hold; 20] = [
     Hold::Lifted,
 ];
 
-/// Series from this seed on are of the wider box.
-pub const WIDE: u64 = 100;
-
 /// Scene `index` of the series `seed`; `root` is the folder of the program.
 pub fn scene(seed: u64, index: usize, root: &Path) -> Case {
-    if seed >= WIDE {
-        return crate::wide::scene(seed, index, root);
-    }
     let mut random = Random::new(seed, index);
     let shape = random.pick(&SHAPES);
     // an end that holds a tall block keeps the load away from the contact
