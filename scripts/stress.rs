@@ -25,7 +25,7 @@ use winkler::petsc::Session;
 /// Runs random scenes by every method and compares the pressures with those of Newton's method.
 ///
 /// Scenes are two or three blocks on each other or a ring of four, in the plane, with linear and power laws. With --wide they are up
-/// to nine bodies in the plane, of revolution or in space: blocks, cylinders, spheres, lenses, small bodies, walls of bricks; with
+/// to seventeen bodies in the plane, of revolution or in space: blocks, cylinders, spheres, lenses, small bodies, walls of bricks; with
 /// laws of every form in one scene, springs to the ground, own weight, and given starts. A seed stands for other scenes then.
 ///
 /// Exits with 1 if the default method fails on a scene that has a solution, or if any method is wrong.

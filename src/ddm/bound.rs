@@ -106,7 +106,7 @@ impl Reached {
 
     /// Adds what rounding left of the equilibrium of an exact step from `before` to `places`: one `more` step with its matrix.
     pub(super) fn add_rounding(&mut self, scale: &Scale, strain: f64, more: &Solution, before: &Layer, places: &Layer) {
-        self.error += scale.relative(more.energy, strain + places.work);
+        self.error += scale.relative(more.energy + more.error * more.error, strain + places.work);
         let closing = more.field.closing();
         let off = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
         self.pressure += if off == 0.0 { 0.0 } else { off / scale.peak(&places.pressure) };

@@ -68,9 +68,9 @@ impl Draft {
         Self { random, text, line, young, poisson, order, dimension, load, level, pressure: level, compliance: 0.0 }
     }
 
-    /// The softest body's modulus.
-    pub fn softest(&self) -> f64 {
-        self.young.iter().copied().fold(f64::INFINITY, f64::min)
+    /// A spring of a body, numbered from 0, with this ratio of stiffness to its modulus.
+    pub fn spring(&self, key: &str, body: usize, ratio: f64) -> String {
+        format!("{key} = {:e}", ratio * self.young[body])
     }
 
     /// The mesh, a script with numbers set in it.

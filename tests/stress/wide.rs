@@ -138,9 +138,10 @@ fn on(body: usize, place: &str, what: &str) -> String {
     format!("{{ on = \"b{}_{place}\", {what} }}", body + 1)
 }
 
-/// Springs, for one scene in four that they keep what it is to be.
+/// Springs, for one scene in four that they keep what it is to be, and their stiffness over the modulus of the body that they are on. In
+/// the body's matrix double precision leaves 1e-16 of its modulus: a spring of 1e-6 keeps ten digits.
 fn springs(draft: &mut Draft, hold: Hold) -> (Springs, f64) {
-    let stiffness = draft.softest() * draft.random.power_of_ten(-9.0, 0.0);
+    let stiffness = draft.random.power_of_ten(-6.0, 0.0);
     let may = matches!(hold, Hold::Roller | Hold::Pinned | Hold::Pulled) && draft.random.chance(0.25);
     let springs = match (may, hold) {
         (false, _) => Springs::None,
@@ -148,7 +149,7 @@ fn springs(draft: &mut Draft, hold: Hold) -> (Springs, f64) {
         _ => draft.random.pick(&[Springs::Below, Springs::All]),
     };
     if springs != Springs::None {
-        draft.line += &format!(" springs {springs:?} {:.1e}", stiffness / draft.softest());
+        draft.line += &format!(" springs {springs:?} {stiffness:.1e}");
     }
     (springs, stiffness)
 }
@@ -207,7 +208,7 @@ fn grid(mut random: Random, kind: Kind, root: &Path) -> Made {
     draft.mesh(&script, &set);
     let lean = if draft.random.chance(0.3) { draft.random.uniform(-0.8, 0.8) } else { 0.0 };
     let weight = weight(&mut draft) / height / rows as f64;
-    let (springs, stiffness) = springs(&mut draft, hold);
+    let (springs, ratio) = springs(&mut draft, hold);
     let sign = if hold == Hold::Pulled { -1.0 } else { 1.0 };
     for row in 0..rows {
         for column in 0..columns {
@@ -215,7 +216,7 @@ fn grid(mut random: Random, kind: Kind, root: &Path) -> Made {
             let mut holds = Holds { weight, ..Holds::default() };
             if row == 0 {
                 match springs {
-                    Springs::Below => holds.spring.push(on(body, "bottom", &format!("normal = {stiffness:e}"))),
+                    Springs::Below => holds.spring.push(on(body, "bottom", &draft.spring("normal", body, ratio))),
                     _ => holds.fix.push(on(body, "bottom", "y = 0")),
                 }
             }
@@ -231,7 +232,7 @@ fn grid(mut random: Random, kind: Kind, root: &Path) -> Made {
                 holds.fix.push(on(body, "spin", "z = 0"));
             }
             if springs == Springs::All && (row > 0 || column > 0) {
-                holds.spring.push(on(body, "right", &format!("stiffness = {stiffness:e}")));
+                holds.spring.push(on(body, "right", &draft.spring("stiffness", body, ratio)));
             }
             if row + 1 == rows && (rows > 1 || columns == 1) {
                 let pressure = format!("{:e} * (1 + {lean}*(2*x/{} - 1))", sign * draft.load, width * columns as f64);
@@ -296,14 +297,14 @@ fn round(mut random: Random, kind: Kind, scripts: &Path) -> Made {
     }
     draft.mesh(&scripts.join("round.geo"), &set);
     let weight = weight(&mut draft);
-    let (springs, stiffness) = springs(&mut draft, hold);
+    let (springs, ratio) = springs(&mut draft, hold);
     let sign = if hold == Hold::Pulled { -1.0 } else { 1.0 };
     for body in 0..bodies {
         let mut holds = Holds { weight, ..Holds::default() };
         match (body, springs) {
-            (0, Springs::Below) => holds.spring.push(on(body, "bottom", &format!("normal = {stiffness:e}"))),
+            (0, Springs::Below) => holds.spring.push(on(body, "bottom", &draft.spring("normal", body, ratio))),
             (0, _) => holds.fix.push(on(body, "bottom", "y = 0")),
-            (_, Springs::All) => holds.spring.push(on(body, "right", &format!("stiffness = {stiffness:e}"))),
+            (_, Springs::All) => holds.spring.push(on(body, "right", &draft.spring("stiffness", body, ratio))),
             _ => {}
         }
         let free = body == 1 && hold == Hold::Loose;
@@ -334,17 +335,17 @@ fn ball(mut random: Random, scripts: &Path) -> Made {
     let hold = if random.chance(0.1) { Hold::Pulled } else { Hold::Roller };
     let mut draft = Draft::new(random, &format!("Ball {hold:?}"), 3, 2);
     draft.mesh(&scripts.join("ball.geo"), &format!("R = {radius}, {}", numbered(&n)));
-    let (springs, stiffness) = springs(&mut draft, hold);
+    let (springs, ratio) = springs(&mut draft, hold);
     let sign = if hold == Hold::Pulled { -1.0 } else { 1.0 };
     let sides = |body: usize| vec![on(body, "left", "x = 0"), on(body, "front", "y = 0")];
     let mut lower = Holds { fix: sides(0), ..Holds::default() };
     match springs {
-        Springs::Below => lower.spring.push(on(0, "bottom", &format!("normal = {stiffness:e}"))),
+        Springs::Below => lower.spring.push(on(0, "bottom", &draft.spring("normal", 0, ratio))),
         _ => lower.fix.push(on(0, "bottom", "z = 0")),
     }
     let mut upper = Holds { fix: sides(1), ..Holds::default() };
     if springs == Springs::All {
-        upper.spring.push(on(1, "left", &format!("stiffness = {stiffness:e}")));
+        upper.spring.push(on(1, "left", &draft.spring("stiffness", 1, ratio)));
     }
     upper.load.push(on(1, "top", &format!("pressure = {:e}", sign * draft.load)));
     draft.body(0, &lower);
@@ -366,15 +367,15 @@ fn small(mut random: Random, scripts: &Path) -> Made {
     let bodies = if three { 3 } else { 2 };
     let mut draft = Draft::new(random, &format!("Small {hold:?}"), 2, bodies);
     draft.mesh(&scripts.join("small.geo"), &format!("size = {size:e}, three = {}, n = {n}", usize::from(three)));
-    let (springs, stiffness) = springs(&mut draft, hold);
+    let (springs, ratio) = springs(&mut draft, hold);
     // the pressure on the small body is that of the layers
     let load = if hold == Hold::Pulled { -draft.load } else { draft.load } * if three { size } else { 1.0 };
     for body in 0..bodies {
         let mut holds = Holds::default();
         match (body, springs) {
-            (0, Springs::Below) => holds.spring.push(on(body, "bottom", &format!("normal = {stiffness:e}"))),
+            (0, Springs::Below) => holds.spring.push(on(body, "bottom", &draft.spring("normal", body, ratio))),
             (0, _) => holds.fix.push(on(body, "bottom", "y = 0")),
-            (_, Springs::All) => holds.spring.push(on(body, "right", &format!("stiffness = {stiffness:e}"))),
+            (_, Springs::All) => holds.spring.push(on(body, "right", &draft.spring("stiffness", body, ratio))),
             _ => {}
         }
         let turns = body == 1 && hold == Hold::Pinned;
