@@ -56,7 +56,7 @@ fn root(law: &dyn LayerLaw, point: usize, (s, rho, mu): (f64, f64, f64)) -> f64 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::Linear;
+    use crate::contact::law::Linear;
 
     /// Of a linear law the pressure is known on both sides of the corner, with a barrier and almost without.
     #[test]
