@@ -10,7 +10,7 @@
 //!
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
-use super::bound::{Gap, Reached, contact_energy};
+use super::bound::{Gap, Reached, change, contact_energy};
 use super::linear::resisting;
 use super::run::{End, Run};
 use super::{barrier, start};
@@ -52,7 +52,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let mut exact = true;
         if run.is_enough(&reached) {
             // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
-            let (residual, reduction) = (&rest[..], SHARE);
+            let (residual, reduction) = (&rest[..], 0.5);
             let system = System { model: run.model, places: &places, springs: &springs, residual, reduction, most };
             let before = linear.counts();
             let more = linear.solve(system)?;
@@ -67,9 +67,10 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
         }
         forcing.learn(&gap, &reached, run.stop.residual);
-        let barrier = progress.barrier(gap.change, run.model);
+        let path = |barrier| barrier::meet(run.model, &c, &p, &rho, barrier);
+        let barrier = progress.barrier(gap.change, run.model, |barrier| change(run.model, &p, &path(barrier), &rho));
         if exact {
-            places = if barrier > 0.0 { barrier::meet(run.model, &c, &p, &rho, barrier) } else { met };
+            places = if barrier > 0.0 { path(barrier) } else { met };
         }
     }
 }
@@ -130,14 +131,17 @@ impl Default for Progress {
 
 impl Progress {
     /// The barrier after a step that changed this work, sum omega (p - p_q)(c_q - c): on a law with a barrier mu, p times the gap is mu
-    /// where the layer is open, so it begins at the mean over the area, and each step takes it a digit down.
-    fn barrier(&mut self, change: f64, model: &Model) -> f64 {
+    /// where the layer is open, so it begins at the mean over the area. A step that is as near to the laws with the barrier as these are
+    /// to the laws takes it a digit down: `missed` is the work that it changes there.
+    fn barrier(&mut self, change: f64, model: &Model, missed: impl Fn(f64) -> f64) -> f64 {
+        let area: f64 = model.weight.iter().sum();
         self.since = if change < 0.5 * self.best { 0 } else { self.since + 1 };
         self.best = self.best.min(change);
         self.barrier = match self.since {
             0 => 0.0,
+            _ if self.barrier > 0.0 && missed(self.barrier) > self.barrier * area => self.barrier,
             _ if self.barrier > 0.0 => SHARE * self.barrier,
-            since if since >= PATIENCE => change / model.weight.iter().sum::<f64>(),
+            since if since >= PATIENCE => change / area,
             _ => 0.0,
         };
         self.barrier
