@@ -10,7 +10,7 @@
 //!
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
-use super::bound::{Gap, Reached, change, contact_energy};
+use super::bound::{Gap, Reached, contact_energy};
 use super::linear::resisting;
 use super::run::{End, Run};
 use super::{barrier, start};
@@ -68,7 +68,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         }
         forcing.learn(&gap, &reached, run.stop.residual);
         let path = |barrier| barrier::meet(run.model, &c, &p, &rho, barrier);
-        let barrier = progress.barrier(gap.change, run.model, |barrier| change(run.model, &p, &path(barrier), &rho));
+        let barrier = progress.barrier(gap.change, run.model);
         if exact {
             places = if barrier > 0.0 { path(barrier) } else { met };
         }
@@ -109,15 +109,18 @@ impl Forcing {
     }
 }
 
-/// Recognises contact sets that follow each other in a circle, or one point at a time: then the laws have a barrier for some steps, until
-/// one changes less than all before. Of 4879 random scenes of stiff layers on few quadratic elements two came into a cycle.
+/// Recognises contact sets that follow each other in a circle, or one point at a time: of 4879 random scenes of stiff layers on few
+/// quadratic elements two came into a cycle. Then the laws have a barrier, until a step changes less than half of all before.
 #[derive(Debug)]
 struct Progress {
     /// Least work that a step changed, and the steps since one has halved it.
     best: f64,
     since: usize,
-    /// Energy per area.
+    /// Energy per area, now and where it began.
     barrier: f64,
+    first: f64,
+    /// What it falls to in a step.
+    rate: f64,
 }
 
 /// Steps in a row without progress before there is a barrier: contact that has just been found may take one.
@@ -125,25 +128,28 @@ const PATIENCE: usize = 2;
 
 impl Default for Progress {
     fn default() -> Self {
-        Self { best: f64::INFINITY, since: 0, barrier: 0.0 }
+        Self { best: f64::INFINITY, since: 0, barrier: 0.0, first: 0.0, rate: SHARE }
     }
 }
 
 impl Progress {
     /// The barrier after a step that changed this work, sum omega (p - p_q)(c_q - c): on a law with a barrier mu, p times the gap is mu
-    /// where the layer is open, so it begins at the mean over the area. A step that is as near to the laws with the barrier as these are
-    /// to the laws takes it a digit down: `missed` is the work that it changes there.
-    fn barrier(&mut self, change: f64, model: &Model, missed: impl Fn(f64) -> f64) -> f64 {
-        let area: f64 = model.weight.iter().sum();
+    /// where the layer is open, so it begins at the mean over the area, and falls with each step. Where that ends without progress, it
+    /// begins again and falls slower: close enough to the path of the solutions over mu, Newton's method follows it.
+    fn barrier(&mut self, change: f64, model: &Model) -> f64 {
         self.since = if change < 0.5 * self.best { 0 } else { self.since + 1 };
         self.best = self.best.min(change);
-        self.barrier = match self.since {
-            0 => 0.0,
-            _ if self.barrier > 0.0 && missed(self.barrier) > self.barrier * area => self.barrier,
-            _ if self.barrier > 0.0 => SHARE * self.barrier,
-            since if since >= PATIENCE => change / area,
-            _ => 0.0,
-        };
+        if self.since == 0 {
+            self.barrier = 0.0;
+        } else if self.barrier > f64::EPSILON.sqrt() * self.first {
+            self.barrier *= self.rate;
+        } else if self.since >= PATIENCE {
+            if self.barrier > 0.0 {
+                self.rate = self.rate.sqrt();
+            }
+            self.first = change / model.weight.iter().sum::<f64>();
+            self.barrier = self.first;
+        }
         self.barrier
     }
 }
