@@ -6,6 +6,7 @@
 
 pub mod acceleration;
 mod balance;
+mod barrier;
 mod bound;
 mod coefficient;
 mod digits;

@@ -11,9 +11,9 @@
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
 use super::bound::{Gap, Reached, contact_energy};
-use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
+use super::{barrier, start};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
@@ -43,7 +43,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
 
         let c = run.model.compression(&u.trace);
         let p = places.linear(&c);
-        let met = Layer::meet(run.model, &c, &p, &rho);
+        let met = start::meet(run.model, &c, &p, &rho);
 
         let gap = Gap::new(run.model, &c, &p, &met, &rho);
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
@@ -67,16 +67,10 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
         }
         forcing.learn(&gap, &reached, run.stop.residual);
-        // a step that knew of no contact runs through the other body
-        let blind = places.tangent.iter().all(|&k| k == 0.0) && met.closed > 0;
-        let lost = progress.is_lost(gap.change, measured.f1) || blind;
-        if lost {
-            progress.f1 += search(run.model, &mut u, &x.field)?;
-        } else {
-            progress.f1 = measured.f1;
-        }
+        let path = |barrier| barrier::meet(run.model, &c, &p, &rho, barrier);
+        let barrier = progress.barrier(gap.change, run.model);
         if exact {
-            places = if lost { Layer::at(run.model, &u.trace) } else { met };
+            places = if barrier > 0.0 { path(barrier) } else { met };
         }
     }
 }
@@ -115,42 +109,47 @@ impl Forcing {
     }
 }
 
-/// Recognises steps that lead nowhere: stiff linear layers on few quadratic elements can come into a cycle of places, two of 4879
-/// random scenes did.
+/// Recognises contact sets that follow each other in a circle, or one point at a time: of 4879 random scenes of stiff layers on few
+/// quadratic elements two came into a cycle. Then the laws have a barrier, until a step changes less than half of all before.
 #[derive(Debug)]
 struct Progress {
-    /// Least work that a step changed, steps since, and F1 where the last step began.
+    /// Least work that a step changed, and the steps since one has halved it.
     best: f64,
     since: usize,
-    f1: f64,
+    /// Energy per area, now and where it began.
+    barrier: f64,
+    first: f64,
+    /// What it falls to in a step.
+    rate: f64,
 }
+
+/// Steps in a row without progress before there is a barrier: contact that has just been found may take one.
+const PATIENCE: usize = 2;
 
 impl Default for Progress {
     fn default() -> Self {
-        Self { best: f64::INFINITY, since: 0, f1: f64::INFINITY }
+        Self { best: f64::INFINITY, since: 0, barrier: 0.0, first: 0.0, rate: SHARE }
     }
 }
 
 impl Progress {
-    /// Whether two steps in a row have changed more than an earlier one, and the last one raised F1. Then no step does until one
-    /// changes less than all before: places are those of traces, along which Newton's steps descend.
-    fn is_lost(&mut self, change: f64, f1: f64) -> bool {
-        self.since = if change < self.best { 0 } else { self.since + 1 };
+    /// The barrier after a step that changed this work, sum omega (p - p_q)(c_q - c): on a law with a barrier mu, p times the gap is mu
+    /// where the layer is open, so it begins at the mean over the area, and falls with each step. Where that ends without progress, it
+    /// begins again and falls slower: close enough to the path of the solutions over mu, Newton's method follows it.
+    fn barrier(&mut self, change: f64, model: &Model) -> f64 {
+        self.since = if change < 0.5 * self.best { 0 } else { self.since + 1 };
         self.best = self.best.min(change);
-        self.since >= 2 && f1 > self.f1
+        if self.since == 0 {
+            self.barrier = 0.0;
+        } else if self.barrier > f64::EPSILON.sqrt() * self.first {
+            self.barrier *= self.rate;
+        } else if self.since >= PATIENCE {
+            if self.barrier > 0.0 {
+                self.rate = self.rate.sqrt();
+            }
+            self.first = change / model.weight.iter().sum::<f64>();
+            self.barrier = self.first;
+        }
+        self.barrier
     }
-}
-
-/// Replaces a step x that led to u by the exact search on F1 along it. The change of F1 from where the step began.
-fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<f64> {
-    u.add(-1.0, x);
-    u.retrace(model);
-    let layer = Layer::at(model, &u.trace);
-    let (r, _) = residual(model, u, &layer.force);
-    let line = Line::new(model, &layer, &r, x);
-    let way = line.minimize(1e-2).unwrap_or(0.0);
-    let change = line.change(way);
-    u.add(way, x);
-    u.retrace(model);
-    Ok(change)
 }
