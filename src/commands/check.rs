@@ -4,6 +4,7 @@ use super::clock::Clock;
 use super::prepared::Prepared;
 use super::run;
 use super::{load, preflight, report};
+use crate::contact::Left;
 use crate::error::Result;
 use crate::output::{say, sci};
 use crate::petsc::Session;
@@ -54,6 +55,9 @@ fn pairs(scene: &Scene, prepared: &Prepared) -> serde_json::Value {
             "length": pair.weight.iter().sum::<f64>(),
             "gap": [low, high],
             "facets_uncovered": pair.uncovered(),
+            "facets_steep": pair.left(Left::Steep),
+            "facets_far": pair.left(Left::Far),
+            "facets_averaged": pair.averaged(),
             "mean_pressure": coupling.pressure,
             "theta": coupling.theta,
             "expected_sweeps": coupling.sweeps.iter().map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),

@@ -7,7 +7,7 @@ use super::prepared::{Prepared, sides};
 use super::results;
 use super::steps;
 use super::verdict::{forecast, message, status_name};
-use crate::contact::ContactPair;
+use crate::contact::{ContactPair, Left};
 use crate::ddm::{Outcome, Status};
 use crate::discretize::Problem;
 use crate::estimate::Estimate;
@@ -227,6 +227,9 @@ fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) 
         carrier: pair.surfaces[0].clone(),
         theta: sides.map(|side| coupling.theta[side]),
         facets_uncovered: pair.uncovered(),
+        facets_steep: pair.left(Left::Steep),
+        facets_far: pair.left(Left::Far),
+        facets_averaged: pair.averaged(),
         layer_energy: layer.energy[i],
         force: sides.map(|side| sum(&pair.resultant[side])),
         moment: sides.map(|side| sum(&pair.moment[side])),

@@ -7,8 +7,9 @@ use super::prepared::Prepared;
 use super::steps;
 use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
+use crate::contact::{ContactPair, Left};
 use crate::ddm::{self, Observer, Outcome, Settings, Status};
-use crate::discretize::{self, Mechanism, Problem};
+use crate::discretize::{self, ContactInfo, Mechanism, Problem};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
 use crate::model::BodySlot;
@@ -148,11 +149,7 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
     warnings.extend(problem.mechanisms.iter().map(|mechanism| mechanism_in_words(problem, mechanism)));
     warnings.extend(problem.bodies.iter().filter_map(|body| body.warning.clone()));
     for (pair, contact) in problem.model.pairs.iter().zip(&problem.contacts) {
-        let (without, all) = (pair.uncovered(), pair.carriers.len());
-        if without > 0 {
-            let names = contact.spec.between.each_ref().map(|name| &name.value);
-            warnings.push(format!("{} - {}: {without} of {all} facets have no partner", names[0], names[1]));
-        }
+        warnings.extend(left_out(pair, contact));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         if overlap < 0.0 {
             warnings.push(format!(
@@ -162,6 +159,26 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// Facets that a pair leaves out as a warning.
+fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
+    let (without, all) = (pair.uncovered(), pair.cover.len());
+    let [steep, far] = [Left::Steep, Left::Far].map(|reason| pair.left(reason));
+    if without + steep + far == 0 {
+        return None;
+    }
+    let names = contact.spec.between.each_ref().map(|name| &name.value);
+    let mut text = format!("{} - {}: {without} of {all} facets have no partner", names[0], names[1]);
+    for (count, why) in [
+        (steep, format!("stand at more than {} degrees to the other side (key `angle`)", contact.spec.angle)),
+        (far, "are farther away than the surfaces are large".to_owned()),
+    ] {
+        if count > 0 {
+            text += &format!("; {count} of `{}`, or parts of them, {why}", pair.surfaces[0]);
+        }
+    }
+    Some(text)
 }
 
 /// A free motion of several bodies as a warning.

@@ -1,34 +1,9 @@
 //! Which facets of side b may face a facet of side a.
 
+use super::reach::Reach;
 use crate::contact::side::{Side, length};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
-
-/// How far apart two surfaces may be and still face each other.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reach {
-    /// Largest distance along the normal.
-    pub gap: f64,
-    /// Largest overlap.
-    pub overlap: f64,
-}
-
-impl Reach {
-    /// What is sensible for two surfaces: no gap larger than the smaller surface, and no overlap larger than a body is
-    /// thick behind its surface (volume over area): beyond that one would look at the far side of a thin body.
-    pub fn between<const D: usize>(a: &Side<D>, b: &Side<D>) -> Self {
-        let area = |side: &Side<D>| side.mean_measure() * side.facets.count() as f64;
-        let extent = |side: &Side<D>| area(side).powf(1.0 / (D - 1) as f64);
-        let thickness = |side: &Side<D>| side.space.measure() / area(side);
-        let gap = extent(a).min(extent(b));
-        Self { gap, overlap: gap.min(thickness(a)).min(thickness(b)) }
-    }
-
-    /// Whether a signed distance is within reach.
-    pub fn holds(&self, gap: f64) -> bool {
-        gap <= self.gap && -gap <= self.overlap
-    }
-}
 
 /// Corners of a box: all least and all largest coordinates.
 pub type Bounds<const D: usize> = ([f64; D], [f64; D]);
