@@ -88,7 +88,8 @@ fn make_pair<const D: usize>(
     let equal = (fine_a - fine_b).abs() <= 1e-6 * fine_a;
     let swapped = if equal { first.1.name >= second.1.name } else { fine_a >= fine_b };
     let ((body_a, a), (body_b, b)) = if swapped { (second, first) } else { (first, second) };
-    let reach = distance.map_or_else(|| Reach::between(&a, &b, spec.angle), |distance| auto::within(&a, &b, distance, spec.angle));
+    let reach = distance
+        .map_or_else(|| Reach::between(&a, &b, spec.angle), |distance| auto::within(&a, &b, distance, spec.angle));
     let mut common = cut(&a, &b, &reach);
     if spec.touching {
         common.points.iter_mut().for_each(|point| point.gap = 0.0);

@@ -111,10 +111,7 @@ impl ContactSurface {
                 .iter()
                 .map(|(name, components, values)| ((*name).to_owned(), *components as u32, spread(*components, values)))
                 .collect(),
-            at_cells: vec![
-                ("cover".to_owned(), 1, self.cover.clone()),
-                ("left_out".to_owned(), 1, self.left.clone()),
-            ],
+            at_cells: vec![("cover".to_owned(), 1, self.cover.clone()), ("left_out".to_owned(), 1, self.left.clone())],
         }
     }
 }

@@ -45,7 +45,7 @@ Plane Surface(1) = {1};
 
 Point(11) = {0, 0, 0, 1/m};
 If (shape <= 2)
-  Point(12) = {width + 1, 0, 0, 1/m};
+  Point(12) = {width + 3, 0, 0, 1/m};
   Point(13) = {depth, 0, 0, 4*size};
   Point(14) = {depth, -depth, 0, 4*size};
   Point(15) = {0, -depth, 0, 4*size};

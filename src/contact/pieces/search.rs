@@ -39,15 +39,16 @@ impl<const D: usize> Search<D> {
         self.tree.locate_in_envelope_intersecting(AABB::from_corners(low, high)).map(|candidate| candidate.data)
     }
 
-    /// Facets near the prism of facet `i` of side a along its normals. The prism is somewhat more than twice as high as the
-    /// nearest facet is away, so that tilted surfaces are met too, and no higher than `reach`. Empty if nothing is there.
+    /// Facets near the prism of facet `i` of side a along its normals. The prism is more than twice as high as the nearest facet
+    /// is away, so that tilted surfaces are met too, and no higher than `reach`. Empty if nothing is there.
     pub fn around(&self, a: &Side<D>, i: usize, reach: &Reach) -> Vec<usize> {
         let (low, high) = a.bounds(i);
         let middle: [f64; D] = std::array::from_fn(|c| 0.5 * (low[c] + high[c]));
         let size = length(std::array::from_fn::<f64, D, _>(|c| high[c] - low[c]));
         let Some(nearest) = self.tree.nearest_neighbor(middle) else { return Vec::new() };
         let (from, to) = (nearest.geom().lower(), nearest.geom().upper());
-        let away: [f64; D] = std::array::from_fn(|c| (from[c] - middle[c]).max(middle[c] - to[c]).max(0.0));
+        // the facet lies somewhere in its box
+        let away: [f64; D] = std::array::from_fn(|c| (from[c] - middle[c]).abs().max((middle[c] - to[c]).abs()));
         let height = 2.0 * length(away) + size;
         let found = self.within(a, i, reach.overlap.min(height) + size, reach.gap.min(height) + size);
         // something that does not face the facet may be nearer than what does
