@@ -163,19 +163,19 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
 
 /// Facets that a pair leaves out as a warning.
 fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
-    let (without, all) = (pair.uncovered(), pair.cover.len());
-    let [steep, far] = [Left::Steep, Left::Far].map(|reason| pair.left(reason));
-    if without + steep + far == 0 {
+    let without: Vec<Left> =
+        pair.cover.iter().filter(|cover| cover.carriers.is_none()).map(|cover| cover.left).collect();
+    if without.is_empty() {
         return None;
     }
     let names = contact.spec.between.each_ref().map(|name| &name.value);
-    let mut text = format!("{} - {}: {without} of {all} facets have no partner", names[0], names[1]);
-    for (count, why) in [
-        (steep, format!("stand at more than {} degrees to the other side (key `angle`)", contact.spec.angle)),
-        (far, "are farther away than the surfaces are large".to_owned()),
-    ] {
+    let all = pair.cover.len();
+    let mut text = format!("{} - {}: {} of {all} facets have no partner", names[0], names[1], without.len());
+    let steep = format!("stand at more than {} degrees to the other side (key `angle`)", contact.spec.angle);
+    for (reason, why) in [(Left::Steep, steep), (Left::Far, "are too far away from it".to_owned())] {
+        let count = without.iter().filter(|&&left| left == reason).count();
         if count > 0 {
-            text += &format!("; {count} of `{}`, or parts of them, {why}", pair.surfaces[0]);
+            text += &format!("; {count} of `{}` {why}", pair.surfaces[0]);
         }
     }
     Some(text)
