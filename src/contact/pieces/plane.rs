@@ -117,14 +117,6 @@ impl Curve {
         (0..2).map(|c| (here[c] - x[c]) * n[c]).sum::<f64>() / length(n)
     }
 
-    /// Whether neighbouring normals around `s` have not crossed before they reach this distance.
-    fn spreads(&self, s: f64, distance: f64) -> bool {
-        let (along, n) = (self.tangent(s), self.normal(s));
-        let turn: [f64; 2] = std::array::from_fn(|c| self.normals[1][c] - self.normals[0][c]);
-        let t = distance / length(n);
-        cross([0, 1].map(|c| along[c] + t * turn[c]), n) * cross(along, n) > 0.0
-    }
-
     /// Parameter whose normal passes through `x`: cross(x - x(s), n(s)) = 0.
     fn foot(&self, x: [f64; 2]) -> Option<f64> {
         let turn: [f64; 2] = std::array::from_fn(|c| self.normals[1][c] - self.normals[0][c]);
@@ -179,8 +171,7 @@ impl Piece {
         let meets = |low: f64, high: f64| {
             let middle = 0.5 * (low + high);
             let (from, normal) = (a.at(middle), a.normal(middle));
-            // the line may meet the far side of a strongly curved facet, or meet it where normals have crossed
-            b.hit(from, normal).map(|t| b.distance(t, from, normal)).filter(|&gap| a.spreads(middle, gap))
+            b.hit(from, normal).map(|t| b.distance(t, from, normal))
         };
         let within = places.windows(2).filter(|ends| ends[1] - ends[0] > SNAP);
         let mut met = within.filter(|ends| meets(ends[0], ends[1]).is_some());
