@@ -51,8 +51,8 @@ pub(super) enum PressureBasis {
 /// Largest int |mu| / int mu. A facet on which a function has more, since only a part of it is covered, takes hats, which have
 /// one. Chords of side b, whose facets are at least as long, miss a surface of curvature k by k h^2/8; a mean may make of that no
 /// more than the k h^2/2 by which the surface bends along a facet, four times as much. Whole facets have 5/3 to 2.4, beside an axis
-/// up to four as well; a tenth more is for curved ones.
-pub const STEADY: f64 = 4.4;
+/// up to four as well; one more is for curved ones and for sums of |mu| over few points.
+pub const STEADY: f64 = 5.0;
 
 impl PressureBasis {
     /// The basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes, of which `chunk` covers what side b faces.
