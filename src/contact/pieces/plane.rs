@@ -176,7 +176,7 @@ impl Piece {
         let within = places.windows(2).filter(|ends| ends[1] - ends[0] > SNAP);
         let mut met = within.filter(|ends| meets(ends[0], ends[1]).is_some());
         let first = met.next()?;
-        let range = (first[0], met.last().unwrap_or(first)[1]);
+        let range = (first[0], met.next_back().unwrap_or(first)[1]);
         let gap = meets(range.0, range.1)?;
         Some(Self { range, index, other: b, gap })
     }
