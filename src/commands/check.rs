@@ -4,6 +4,7 @@ use super::clock::Clock;
 use super::run;
 use super::stages::Built;
 use super::{load, preflight, report};
+use crate::contact::Left;
 use crate::error::Result;
 use crate::output::{say, sci};
 use crate::petsc::Session;
@@ -53,6 +54,9 @@ fn pairs(built: &Built) -> serde_json::Value {
             "length": pair.weight.iter().sum::<f64>(),
             "gap": [low, high],
             "facets_uncovered": pair.uncovered(),
+            "facets_steep": pair.left(Left::Steep),
+            "facets_far": pair.left(Left::Far),
+            "facets_averaged": pair.averaged(),
             "mean_pressure": Some(coupling.pressure).filter(|&pressure| pressure > 0.0),
             "theta": coupling.theta,
             "expected_sweeps": coupling.sweeps.iter().filter(|_| coupling.pressure > 0.0).map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),

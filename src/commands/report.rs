@@ -7,7 +7,7 @@ use super::results;
 use super::stages::{Built, Done};
 use super::steps;
 use super::verdict::{forecast, message, status_name};
-use crate::contact::ContactPair;
+use crate::contact::{ContactPair, Left};
 use crate::ddm::{self, Outcome, Status};
 use crate::discretize::Discrete;
 use crate::estimate::Estimate;
@@ -216,6 +216,9 @@ fn pair_report(done: &Done, i: usize) -> PairReport {
         carrier: pair.surfaces[0].clone(),
         theta: sides.map(|side| coupling.theta[side]),
         facets_uncovered: pair.uncovered(),
+        facets_steep: pair.left(Left::Steep),
+        facets_far: pair.left(Left::Far),
+        facets_averaged: pair.averaged(),
         layer_energy: layer.energy[i],
         force: sides.map(|side| sum(&pair.resultant[side])),
         moment: sides.map(|side| sum(&pair.moment[side])),

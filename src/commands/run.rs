@@ -7,8 +7,9 @@ use super::stages::{Built, Done, Ready};
 use super::steps;
 use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
+use crate::contact::{ContactPair, Left};
 use crate::ddm::{self, Observer, Outcome, Settings, Start, Status};
-use crate::discretize::{self, Discrete};
+use crate::discretize::{self, ContactInfo, Discrete};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
 use crate::model::{BodySlot, Mechanism};
@@ -140,11 +141,7 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
     for (pair, contact) in discrete.model.pairs.iter().zip(&discrete.contacts) {
-        let (without, all) = (pair.uncovered(), pair.carriers.len());
-        if without > 0 {
-            let names = contact.spec.between.each_ref().map(|name| &name.value);
-            warnings.push(format!("{} - {}: {without} of {all} facets have no partner", names[0], names[1]));
-        }
+        warnings.extend(left_out(pair, contact));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         if overlap < 0.0 {
             warnings.push(format!(
@@ -154,6 +151,26 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// Facets that a pair leaves out as a warning.
+fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
+    let without: Vec<Left> =
+        pair.cover.iter().filter(|cover| cover.carriers.is_none()).map(|cover| cover.left).collect();
+    if without.is_empty() {
+        return None;
+    }
+    let names = contact.spec.between.each_ref().map(|name| &name.value);
+    let all = pair.cover.len();
+    let mut text = format!("{} - {}: {} of {all} facets have no partner", names[0], names[1], without.len());
+    let steep = format!("stand at more than {} degrees to the other side (key `angle`)", contact.spec.angle);
+    for (reason, why) in [(Left::Steep, steep), (Left::Far, "are too far away from it".to_owned())] {
+        let count = without.iter().filter(|&&left| left == reason).count();
+        if count > 0 {
+            text += &format!("; {count} of `{}` {why}", pair.surfaces[0]);
+        }
+    }
+    Some(text)
 }
 
 /// A free motion of several bodies as a warning.

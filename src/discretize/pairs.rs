@@ -88,13 +88,14 @@ fn make_pair<const D: usize>(
     let equal = (fine_a - fine_b).abs() <= 1e-6 * fine_a;
     let swapped = if equal { first.1.name >= second.1.name } else { fine_a >= fine_b };
     let ((body_a, a), (body_b, b)) = if swapped { (second, first) } else { (first, second) };
-    let reach = distance.map_or_else(|| Reach::between(&a, &b), |distance| auto::within(&a, &b, distance));
-    let mut shared = cut(&a, &b, &reach);
+    let reach = distance
+        .map_or_else(|| Reach::between(&a, &b, spec.angle), |distance| auto::within(&a, &b, distance, spec.angle));
+    let mut common = cut(&a, &b, &reach);
     if spec.touching {
-        shared.iter_mut().for_each(|point| point.gap = 0.0);
+        common.points.iter_mut().for_each(|point| point.gap = 0.0);
     }
     let gap = |x| spec.gap.eval(x);
-    let pair = contact::assemble(&a, &b, [body_a, body_b], &shared, &gap, &spec.layer)
+    let pair = contact::assemble(&a, &b, [body_a, body_b], &common, &gap, &spec.layer)
         .map_err(|fault| refuse(&spec, fault))?;
     let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
     if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
@@ -107,7 +108,7 @@ fn make_pair<const D: usize>(
         pair.position.iter().try_for_each(|&x| field.eval_finite("the reference", x).map(drop))?;
     }
     let surface = ContactSurface::new(&a, &pair);
-    let fine = fine.then(|| Fine::new(&a, &b, &shared, &pair, &gap));
+    let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap));
     Ok(Contact { spec, pair, fine, swapped, surface })
 }
 

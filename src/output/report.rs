@@ -269,6 +269,12 @@ pub struct PairReport {
     pub theta: [f64; 2],
     /// Facets of the carrier without a partner.
     pub facets_uncovered: usize,
+    /// Facets of the carrier that are left out, as a whole or in part, since they stand too steeply to the other side.
+    pub facets_steep: usize,
+    /// The same for facets that are too far away from it.
+    pub facets_far: usize,
+    /// Facets of the carrier that are covered in part and take plain means.
+    pub facets_averaged: usize,
     /// Energy of the layer, J.
     pub layer_energy: f64,
     /// Contact force on each side (x, y, z).

@@ -176,6 +176,7 @@ fn contact(contact: &ContactSpec) -> Value {
     map.insert("touching".into(), json!(contact.touching));
     let overlap = Overlap::ALL.iter().find(|(_, named)| *named == contact.overlap).map(|(name, _)| name);
     map.insert("overlap".into(), json!(overlap));
+    map.insert("angle".into(), json!(contact.angle));
     map.insert("layer".into(), layer);
     insert(&mut map, "reference", contact.reference.as_ref().map(field));
     map.into()
