@@ -15,6 +15,7 @@ mod part;
 mod springs;
 mod supports;
 mod surface;
+mod verify;
 
 use crate::contact::{self, ContactPair};
 
@@ -24,7 +25,7 @@ use crate::fem::{
     rigid::{self, FreeMotion, RigidMotion},
 };
 use crate::linalg::{Csr, axpy};
-use crate::mesh::Mesh;
+use crate::mesh::{Checked, Mesh};
 use crate::model::{Body, BodySlot, Exchange, Model, Segment};
 use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
@@ -41,6 +42,7 @@ use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use std::rc::Rc;
 pub use surface::ContactSurface;
+pub use verify::verify;
 
 /// What every rank knows of a body before its owner assembles it.
 pub struct Outline<'a> {
@@ -91,6 +93,23 @@ pub struct Assembled {
     pub left: Vec<FreeMotion>,
 }
 
+/// What the check of the mesh of a body counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct FacetCounts {
+    /// Facets between two cells.
+    pub inner: usize,
+    /// Facets of the boundary.
+    pub outer: usize,
+    /// Parts that no facet joins.
+    pub parts: usize,
+}
+
+impl FacetCounts {
+    fn of(checked: &Checked) -> Self {
+        Self { inner: checked.inner, outer: checked.outer, parts: checked.parts.count }
+    }
+}
+
 /// What is known of a body besides its matrices.
 pub struct BodyInfo {
     /// Name in the scene.
@@ -99,6 +118,8 @@ pub struct BodyInfo {
     pub nodes: usize,
     /// Cells.
     pub cells: usize,
+    /// What the check of its mesh counted.
+    pub facets: FacetCounts,
     /// Degrees of freedom, supported ones included.
     pub dofs: usize,
     /// Supported degrees of freedom.
@@ -182,7 +203,7 @@ pub struct Problem {
 
 /// Turns a scene and its mesh into a model.
 ///
-/// `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `maker` turns each
+/// `checked` is what [`verify`] found of the mesh; `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `maker` turns each
 /// body of this rank into one that solves. `keep` tells to keep the meshes, for an estimate of the error.
 ///
 /// # Errors
@@ -191,6 +212,7 @@ pub struct Problem {
 pub fn discretize<const D: usize>(
     scene: &Scene,
     mesh: &Mesh<D>,
+    checked: &[Checked],
     cut: contact::pieces::Cut<D>,
     ranks: (usize, usize),
     keep: bool,
@@ -198,6 +220,7 @@ pub fn discretize<const D: usize>(
     maker: &mut dyn Maker,
 ) -> Result<Problem> {
     let mut parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
+    parts.iter().zip(checked).try_for_each(|(part, checked)| verify::held(part, &checked.parts, mesh))?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
     for found in pairs::all(scene, mesh, cut, &parts, keep)? {
@@ -279,6 +302,7 @@ pub fn discretize<const D: usize>(
             name: slot.name.clone(),
             nodes: space.nodes.len(),
             cells: space.cell_count(),
+            facets: FacetCounts::of(&checked[index]),
             dofs: space.dofs(),
             supported: held.supported(),
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),

@@ -57,6 +57,7 @@ fn build<const D: usize>(
     clock: &mut Clock,
 ) -> Result<Prepared> {
     let mesh = mesh::<D>(session, scene)?;
+    let checked = agree(session, discretize::verify(scene, &mesh))?;
     clock.phase("mesh");
     let largest = mesh.points.len() * D;
     // small fronts and several ranks lose by BLAS threads, large factorisations gain
@@ -67,7 +68,7 @@ fn build<const D: usize>(
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
     let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
-    let problem = discretize::discretize(scene, &mesh, cut, ranks, keep, exchange, &mut inner);
+    let problem = discretize::discretize(scene, &mesh, &checked, cut, ranks, keep, exchange, &mut inner);
     let mut problem = agree(session, problem)?;
     problem.share();
     clock.phase("discretize");

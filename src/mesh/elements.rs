@@ -55,8 +55,8 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
             let message = format!("group `{name}` is of another order than the elements before it");
             return Err(cursor.error_at(head, message).help("save all elements with one order: gmsh -order 1 or 2"));
         }
-        let connectivity = Block { kind, count, name }.read::<D>(cursor, nodes)?;
-        physical.extend(dimension, tag, stride, &connectivity);
+        let (connectivity, tags) = Block { kind, count, name }.read::<D>(cursor, nodes)?;
+        physical.extend(dimension, tag, stride, &connectivity, &tags);
     }
     if seen != total {
         let message = format!("$Elements announces {total} elements and holds {seen}");
@@ -77,16 +77,18 @@ struct Block<'a> {
 }
 
 impl Block<'_> {
-    /// Reads the elements: our point numbers in our order, cells turned to positive volume.
-    fn read<const D: usize>(&self, cursor: &mut Cursor, nodes: &Nodes) -> Result<Vec<u32>> {
+    /// Reads the elements: our point numbers in our order, cells turned to positive volume; and their tags.
+    fn read<const D: usize>(&self, cursor: &mut Cursor, nodes: &Nodes) -> Result<(Vec<u32>, Vec<u64>)> {
         let Kind { dimension, stride, .. } = self.kind;
         let mut connectivity = vec![0; self.count * stride];
+        let mut tags = Vec::with_capacity(self.count);
         let mut vertices = [[0.0; 3]; 4];
         let vertices = &mut vertices[..dimension + 1];
         for points in connectivity.chunks_exact_mut(stride) {
             cursor.begin();
             let start = cursor.position();
             let tag = cursor.size()?;
+            tags.push(tag);
             for point in &mut *points {
                 let node = cursor.size()?;
                 *point = nodes.number(node).ok_or_else(|| {
@@ -113,7 +115,7 @@ impl Block<'_> {
                 simplex::mirror(points);
             }
         }
-        Ok(connectivity)
+        Ok((connectivity, tags))
     }
 
     fn check_plane(&self, cursor: &mut Cursor, nodes: &Nodes, points: &[u32]) -> Result<()> {

@@ -4,6 +4,7 @@
 //! text or binary) is read as it is. Everything downstream sees a [`Mesh`] only.
 
 mod cache;
+mod check;
 mod cursor;
 mod elements;
 mod gmsh;
@@ -20,9 +21,10 @@ mod sizes;
 #[cfg(test)]
 mod tests;
 
+pub use check::{Asked, Checked, Duty, Parts};
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, recall_final};
-pub use msh::read;
+pub use msh::{parse, read};
 pub use quality::Quality;
 pub use sizes::{follows, view};
 

@@ -23,12 +23,13 @@ impl Physical {
         self.entities.get(&(dimension, tag)).map(Vec::as_slice)
     }
 
-    /// Adds simplices of `stride` points each to all groups of an entity.
-    pub fn extend(&mut self, dimension: usize, tag: i32, stride: usize, connectivity: &[u32]) {
+    /// Adds simplices of `stride` points each, with their tags, to all groups of an entity.
+    pub fn extend(&mut self, dimension: usize, tag: i32, stride: usize, connectivity: &[u32], tags: &[u64]) {
         for member in self.entities.get(&(dimension, tag)).into_iter().flatten() {
             let group = &mut self.groups[*member];
             group.stride = stride;
             group.connectivity.extend_from_slice(connectivity);
+            group.tags.extend_from_slice(tags);
         }
     }
 
@@ -73,6 +74,7 @@ impl Physical {
                 dimension,
                 stride: dimension + 1,
                 connectivity: Vec::new(),
+                tags: Vec::new(),
             });
         }
         Ok(())

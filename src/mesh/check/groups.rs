@@ -1,0 +1,119 @@
+//! Groups that serve bodies: whether they lie on them.
+
+use super::cells::{Cells, NONE};
+use super::faces::Faces;
+use crate::error::{Error, Result};
+use crate::mesh::{Group, Mesh};
+use std::collections::HashSet;
+
+/// What a group does for a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Duty {
+    /// Load, spring, contact: acts on the boundary of the bodies that it serves.
+    Acts,
+    /// Support: holds nodes of bodies, inside them, too.
+    Holds,
+}
+
+/// A group in use, and what is known of its simplices so far.
+pub struct InUse<'a> {
+    group: &'a Group,
+    duty: Duty,
+    /// For each simplex, what it is to the bodies.
+    found: Vec<Found>,
+}
+
+/// What a simplex is to the bodies looked at.
+#[derive(Clone, Copy, Default)]
+struct Found {
+    /// It is where the duty asks for it.
+    serves: bool,
+    /// Its nodes are nodes of a body that it serves.
+    touches: bool,
+}
+
+impl<'a> InUse<'a> {
+    /// A group that serves.
+    pub fn new(group: &'a Group, duty: Duty) -> Self {
+        Self { group, duty, found: vec![Found::default(); group.len()] }
+    }
+
+    /// Compares the group with a body that it serves, or, for `other`, with another one of the scene: supports may hold a
+    /// group in part. `node` has the nodes of the body.
+    pub fn compare<const D: usize>(&mut self, cells: &Cells<D>, faces: &Faces<D>, node: &[u32], other: bool) {
+        let dimension = self.group.dimension;
+        if dimension == D || (other && self.duty == Duty::Acts) {
+            return;
+        }
+        let corners = dimension + 1;
+        let wanted = if cells.is_quadratic() { self.group.stride } else { corners };
+        let edges = if dimension + 2 == D && dimension == 1 { self.edges(cells, node) } else { HashSet::new() };
+        for (simplex, found) in self.group.simplices().zip(&mut self.found) {
+            let mut own = [NONE; 6];
+            own.iter_mut().zip(&simplex[..wanted]).for_each(|(own, &point)| *own = node[point as usize]);
+            let own = &own[..wanted];
+            if own.contains(&NONE) {
+                continue;
+            }
+            found.touches |= !other;
+            found.serves |= match (dimension, self.duty) {
+                (0, _) => true,
+                (1, _) if D == 3 => edges.contains(&[own[0].min(own[1]), own[0].max(own[1])]),
+                (_, Duty::Acts) => faces.cells_at(cells, own) == 1,
+                (_, Duty::Holds) => faces.cells_at(cells, own) > 0,
+            };
+        }
+    }
+
+    /// Those edges of the body between nodes of the group, for groups of edges in space.
+    fn edges<const D: usize>(&self, cells: &Cells<D>, node: &[u32]) -> HashSet<[u32; 2]> {
+        let mut on_group = vec![false; cells.points.len()];
+        let nodes = self.group.connectivity.iter().map(|&point| node[point as usize]);
+        nodes.filter(|&node| node != NONE).for_each(|node| on_group[node as usize] = true);
+        let mut edges = HashSet::new();
+        for cell in 0..cells.count() {
+            let corners = &cells.cell(cell)[..=D];
+            let marked = corners.iter().copied().filter(|&node| on_group[node as usize]).collect::<Vec<_>>();
+            for (k, &a) in marked.iter().enumerate() {
+                edges.extend(marked[..k].iter().map(|&b| [a.min(b), a.max(b)]));
+            }
+        }
+        edges
+    }
+
+    /// Refuses a group that serves in part only, or whose simplices lie across its bodies. One that touches none is left to
+    /// the line of the scene that names it. Gives the number of its simplices.
+    pub fn judge<const D: usize>(&self, mesh: &Mesh<D>) -> Result<usize> {
+        if self.group.dimension == D {
+            return Ok(0);
+        }
+        let any = self.found.iter().any(|found| found.serves);
+        let Some(bad) = self.found.iter().position(|found| !found.serves && (any || found.touches)) else {
+            return Ok(self.found.len());
+        };
+        let points = &self.group.connectivity[bad * self.group.stride..][..=self.group.dimension];
+        let mean = |c: usize| points.iter().map(|&p| mesh.points[p as usize][c]).sum::<f64>() / points.len() as f64;
+        let place = (0..D).map(|c| mean(c).to_string()).collect::<Vec<_>>().join(", ");
+        let thing = match D - self.group.dimension {
+            1 => "facet",
+            _ if self.group.dimension == 0 => "point",
+            _ => "edge",
+        };
+        let name = &self.group.name;
+        let (what, help) = match self.duty {
+            Duty::Acts => (
+                format!("a {thing} of group `{name}` bounds no body that it serves, at ({place})"),
+                "loads, springs and contacts act on boundaries: let the group have those of its own bodies alone",
+            ),
+            Duty::Holds => (
+                format!("a {thing} of group `{name}` belongs to no body of the scene, at ({place})"),
+                "supports hold nodes of bodies: let the group have those of bodies alone",
+            ),
+        };
+        let error = Error::mesh(&mesh.path, None, what).help(help);
+        Err(match self.group.tags.get(bad) {
+            Some(tag) => error.because(format!("it is element {tag} of the mesh file")),
+            None => error,
+        })
+    }
+}
