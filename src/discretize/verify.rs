@@ -54,10 +54,10 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Re
     let is_free = |motions: &Vec<RigidMotion>| !part.left(&part.in_dofs(motions.clone())).is_empty();
     let at = pad(space.nodes[nodes[motions.iter().position(is_free).unwrap_or(0)][0] as usize]);
     let (name, count) = (&part.spec.name.value, parts.count);
-    let message = format!("body `{name}` is in {count} parts that share no facet, and nothing holds that at {}", point(at));
-    Err(Error::mesh(&mesh.path, None, message).help(
-        "make a body of each part, support each of them, or let them share facets (in the script: `Coherence;`)",
-    ))
+    let message =
+        format!("body `{name}` is in {count} parts that share no facet, and nothing holds that at {}", point(at));
+    Err(Error::mesh(&mesh.path, None, message)
+        .help("make a body of each part, support each of them, or let them share facets (in the script: `Coherence;`)"))
 }
 
 /// The rigid motions of some nodes of a body; the others stay at rest.

@@ -6,6 +6,7 @@ use super::physical::Physical;
 use super::simplex::{self, Kind, THINGS};
 use crate::error::Result;
 use crate::problem::order::Order;
+use std::collections::HashSet;
 
 /// Reads the section's contents into the groups; gives the order of the elements, if there is one but points.
 ///
@@ -22,6 +23,7 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
     cursor.end()?;
     let mut seen: usize = 0;
     let mut common_order = None;
+    let (mut heads, mut again) = (HashSet::new(), None);
     for _ in 0..blocks {
         cursor.begin();
         let head = cursor.position();
@@ -42,6 +44,9 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
             let message = format!("elements of {thing} {tag}, which $Entities does not list");
             return Err(cursor.error_at(head, message).help("save the mesh again with Gmsh"));
         };
+        if !heads.insert((dimension, tag, number)) {
+            again = Some((head, dimension, tag));
+        }
         let Some(first) = members.first() else {
             cursor.skip_records(count, 8 * (1 + stride))?;
             continue;
@@ -61,6 +66,15 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
     if seen != total {
         let message = format!("$Elements announces {total} elements and holds {seen}");
         return Err(cursor.error_at(start, message));
+    }
+    // Either alone is allowed. Both are a block with the number of another entity.
+    let with: HashSet<_> = heads.into_iter().map(|(dimension, tag, _)| (dimension, tag)).collect();
+    if let Some((head, dimension, tag)) = again
+        && let Some(without) = physical.without(dimension, |entity| with.contains(&entity))
+    {
+        let thing = THINGS[dimension].to_lowercase();
+        let message = format!("elements of {thing} {tag} stand in two blocks, and those of {thing} {without} in none");
+        return Err(cursor.error_at(head, message).help("the file is damaged: save the mesh again with Gmsh"));
     }
     Ok(common_order)
 }

@@ -71,7 +71,8 @@ impl<'a, const D: usize> Cells<'a, D> {
     pub fn refuse(&self, what: &str, cells: &[usize], at: [f64; 3]) -> Error {
         let place = &at[..D].iter().map(|x| x.to_string()).collect::<Vec<_>>().join(", ");
         let error = Error::mesh(&self.mesh.path, None, format!("body `{}`: {what} at ({place})", self.group.name));
-        let tags: Vec<String> = cells.iter().filter_map(|&cell| self.group.tags.get(cell)).map(u64::to_string).collect();
+        let tags: Vec<String> =
+            cells.iter().filter_map(|&cell| self.group.tags.get(cell)).map(u64::to_string).collect();
         match &tags[..] {
             [] => error,
             [one] => error.because(format!("it is element {one} of the mesh file")),

@@ -35,7 +35,8 @@ pub fn from_segment(x: Point, [a, b]: [Point; 2]) -> f64 {
 
 /// Whether two segments come within a distance.
 pub fn segments([a, b]: [Point; 2], [c, d]: [Point; 2], within: f64) -> bool {
-    let ends = from_segment(a, [c, d]).min(from_segment(b, [c, d])).min(from_segment(c, [a, b])).min(from_segment(d, [a, b]));
+    let ends =
+        from_segment(a, [c, d]).min(from_segment(b, [c, d])).min(from_segment(c, [a, b])).min(from_segment(d, [a, b]));
     if ends <= within {
         return true;
     }

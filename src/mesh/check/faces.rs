@@ -4,8 +4,7 @@ use super::cells::Cells;
 use crate::error::Result;
 
 /// Corners of a cell on the face opposite each of its corners, in an order that turns the normal outwards.
-const OUTWARD: [&[[usize; 3]]; 2] =
-    [&[[1, 2, 0], [2, 0, 0], [0, 1, 0]], &[[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]];
+const OUTWARD: [&[[usize; 3]]; 2] = [&[[1, 2, 0], [2, 0, 0], [0, 1, 0]], &[[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]];
 
 /// A face of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -4,20 +4,20 @@
 //!
 //! 1. Cells have positive volume: straight ones since they were read, curved ones by [`curved`].
 //! 2. Two cells at most share a facet, from its two sides ([`faces`]).
-//! 3. Cells join through facets, not by an edge or a corner alone ([`parts`]).
-//! 4. Facets of the boundary, those of one cell alone, meet in common corners and edges only ([`surface`]).
-//! 5. Behind each closed surface of the boundary there is one cell ([`nesting`]).
+//! 3. Facets of the boundary, those of one cell alone, meet in common corners and edges only ([`surface`]).
+//! 4. Behind each closed surface of the boundary there is one cell ([`nesting`]).
+//! 5. Cells join through facets, not by an edge or a corner alone ([`parts`]).
 //! 6. Bodies have nodes of their own, and the facets of groups in use bound the bodies that they serve ([`groups`]).
 //!
-//! Then every point is covered once. By 1 and 2 the cells are a chain, whose boundary is that of 4 with its outer
+//! Then every point is covered once. By 1 and 2 the cells are a chain, whose boundary is that of 3 with its outer
 //! normals. The number of cells at a point off the boundary is therefore how often the boundary goes around it (the degree
-//! of the map from cells to space): it changes by one across each facet, and nowhere else. By 4 the boundary divides space
-//! into regions with a closed surface between any two neighbours, and by 5 the number is one inside and zero outside of
-//! each. No angle inside need be looked at: folded cells show at the boundary. By 4, too, there is no crack: a hanging node and
+//! of the map from cells to space): it changes by one across each facet, and nowhere else. By 3 the boundary divides space
+//! into regions with a closed surface between any two neighbours, and by 4 the number is one inside and zero outside of
+//! each. No angle inside need be looked at: folded cells show at the boundary. By 3, too, there is no crack: a hanging node and
 //! a facet with two sets of nodes are places where the boundary touches itself.
 //!
-//! Not proven: for quadratic elements 4 and 5 see the boundary with flat pieces between its nodes, eight to an edge where
-//! facets without common nodes seem to meet. 4 takes for touching what is nearer than 1e-9 of a facet. Whether a point of the
+//! Not proven: for quadratic elements 3 and 4 see the boundary with flat pieces between its nodes, eight to an edge where
+//! facets without common nodes seem to meet. 3 takes for touching what is nearer than 1e-9 of a facet. Whether a point of the
 //! boundary is where the user wants it nobody can tell: a mesh with a node moved a little is another mesh. A body may be pinched at a
 //! point, if its cells join through facets elsewhere. All costs are linear in the number of cells, but for the search tree of the
 //! boundary.
@@ -104,12 +104,13 @@ impl<const D: usize> Mesh<D> {
             curved::check(&cells)?;
             let faces = Faces::new(&cells);
             faces.check(&cells)?;
-            let parts = parts::parts(&cells, &faces)?;
             let surface = Surface::new(&cells, &faces);
             surface.check()?;
             nesting::check(&cells, &surface)?;
+            let parts = parts::parts(&cells, &faces)?;
             for ((name, duty), group) in &mut in_use {
-                let served = body.groups.contains(&(*name, *duty)) || contacts().any(|contact| contact == (*name, *duty));
+                let served =
+                    body.groups.contains(&(*name, *duty)) || contacts().any(|contact| contact == (*name, *duty));
                 group.compare(&cells, &faces, &node, !served);
             }
             checked.push(Checked { inner: faces.inner().count(), outer: surface.faces.len(), parts });

@@ -34,7 +34,8 @@ pub fn check<const D: usize>(cells: &Cells<D>, surface: &Surface<D>) -> Result<(
         let inside = |weights: &[f64; 4]| -> Point {
             let sum: f64 = weights[..=D].iter().sum();
             let corners = cells.cell(cell)[..=D].iter().zip(weights);
-            corners.fold([0.0; 3], |x, (&node, weight)| std::array::from_fn(|c| x[c] + weight / sum * cells.at(node)[c]))
+            corners
+                .fold([0.0; 3], |x, (&node, weight)| std::array::from_fn(|c| x[c] + weight / sum * cells.at(node)[c]))
         };
         // a line that meets an edge tells nothing; so does, in a thin curved cell, a point beside its chords
         let counts: Vec<i32> = INSIDE.iter().filter_map(|weights| covers(surface, inside(weights))).collect();
@@ -54,7 +55,8 @@ fn covers<const D: usize>(surface: &Surface<D>, from: Point) -> Option<i32> {
     far[0] = f64::MAX;
     let mut count = 0;
     for piece in surface.near(from, far).flat_map(|i| surface.flat(i)) {
-        count += if D == 2 { line(from, piece[0], piece[1]) } else { triangle(from, [piece[0], piece[1], piece[2 % D]])? };
+        count +=
+            if D == 2 { line(from, piece[0], piece[1]) } else { triangle(from, [piece[0], piece[1], piece[2 % D]])? };
     }
     Some(count)
 }

@@ -153,9 +153,10 @@ impl<'a, const D: usize> Surface<'a, D> {
         let hanging = pair().find_map(|(i, j)| own(i, j).find(|&node| on(node, j)));
         if let Some(node) = hanging {
             let what = "a node hangs on a facet of another cell, which leaves a crack";
-            return self.cells.refuse(what, &cells, self.cells.at(node)).help(
-                "cells must share whole facets: mesh the body in one piece (in the script: `Coherence;`)",
-            );
+            return self
+                .cells
+                .refuse(what, &cells, self.cells.at(node))
+                .help("cells must share whole facets: mesh the body in one piece (in the script: `Coherence;`)");
         }
         let what = "the boundary of the body crosses itself, so that cells overlap";
         self.cells.refuse(what, &cells, self.cells.at(self.facet(i)[0])).help("mend the geometry, or mesh it again")

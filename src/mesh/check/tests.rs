@@ -233,13 +233,15 @@ fn chords_that_meet_are_looked_at_closely() {
         for cell in group.simplices() {
             for (k, [i, j]) in [[0, 1], [1, 2], [0, 2]].into_iter().enumerate() {
                 let radius = |node: u32| curved.points[node as usize][0].hypot(curved.points[node as usize][1]);
-                let (a, b, middle) = (straight.points[cell[i] as usize], straight.points[cell[j] as usize], cell[3 + k]);
+                let (a, b, middle) =
+                    (straight.points[cell[i] as usize], straight.points[cell[j] as usize], cell[3 + k]);
                 let r = 0.5 * (a[0].hypot(a[1]) + b[0].hypot(b[1]));
                 let scale = r / radius(middle);
                 // places are read from the straight mesh, written to the curved one
                 let x = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
                 let scale = if (radius(middle) - x[0].hypot(x[1])).abs() < 1e-12 { scale } else { 1.0 };
-                curved.points[middle as usize] = [curved.points[middle as usize][0] * scale, curved.points[middle as usize][1] * scale];
+                curved.points[middle as usize] =
+                    [curved.points[middle as usize][0] * scale, curved.points[middle as usize][1] * scale];
             }
         }
     }
