@@ -41,20 +41,16 @@ fn refused(run: &Run, words: &[&str]) {
     }
 }
 
-/// The patch with two elements along each side, its sides named, and more.
-fn script(more: &str) -> String {
+/// The patch with two elements along each side, its sides named.
+fn script() -> String {
     let path = root().join("meshes/patch/patch.geo");
     let text = std::fs::read_to_string(path).expect("a script").replace("{4, Name", "{2, Name");
-    text + "Physical Curve(\"lower_sides\") = {2, 4};\nPhysical Curve(\"upper_sides\") = {12, 14};\n" + more
+    text + "Physical Curve(\"lower_sides\") = {2, 4};\nPhysical Curve(\"upper_sides\") = {12, 14};\n"
 }
-
-/// A third block for the group of the upper one, far from it.
-const APART: &str = "Delete Physical Surface(\"upper\");\nTranslate{5, 0, 0}{ Duplicata{ Surface{2}; } }\n\
-                     new = newreg;\nPhysical Surface(\"upper\") = Surface{:};\n";
 
 #[test]
 fn what_is_checked_is_counted() {
-    let run = on_mesh(&gmsh(&script(""), &[]), "", "").converged();
+    let run = on_mesh(&gmsh(&script(), &[]), "", "").converged();
     for body in [0, 1] {
         let count = |what: &str| run.count(&format!("bodies/{body}/{what}"));
         // two triangles in each of 2 x 2 squares
@@ -66,10 +62,16 @@ fn what_is_checked_is_counted() {
 fn element(text: &str, dimension: usize, entity: usize, which: usize, nodes: impl Fn(&[u64]) -> Vec<u64>) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     let elements = lines.iter().position(|line| line == "$Elements").expect("elements");
-    let head = format!("{dimension} {entity} ");
-    let block = elements + 2 + lines[elements + 2..].iter().position(|line| line.starts_with(&head)).expect("a block");
-    let words: Vec<u64> =
-        lines[block + 1 + which].split_whitespace().map(|word| word.parse().expect("a tag")).collect();
+    let numbers = |line: &str| line.split_whitespace().map(|word| word.parse().expect("a tag")).collect::<Vec<u64>>();
+    let mut block = elements + 2;
+    loop {
+        let head = numbers(&lines[block]);
+        if head[..2] == [dimension as u64, entity as u64] {
+            break;
+        }
+        block += 1 + head[3] as usize;
+    }
+    let words = numbers(&lines[block + 1 + which]);
     let changed = nodes(&words[1..]);
     lines[block + 1 + which] =
         format!("{} {}", words[0], changed.iter().map(u64::to_string).collect::<Vec<_>>().join(" "));
@@ -78,7 +80,7 @@ fn element(text: &str, dimension: usize, entity: usize, which: usize, nodes: imp
 
 #[test]
 fn wrong_elements_are_named() {
-    let text = String::from_utf8(gmsh(&script(""), &[])).expect("a text");
+    let text = String::from_utf8(gmsh(&script(), &[])).expect("a text");
     let first = |dimension: usize, entity: usize, which: usize| {
         let found = std::cell::RefCell::new(Vec::new());
         element(&text, dimension, entity, which, |nodes| {
@@ -107,7 +109,9 @@ fn wrong_elements_are_named() {
 
 #[test]
 fn bodies_in_parts() {
-    let mesh = gmsh(&script(APART), &[]);
+    // a third block for the group of the upper one, far from it
+    let apart = "far() = Translate{5, 0, 0}{ Duplicata{ Surface{2}; } };\nPhysical Surface(\"upper\") = {2, far(0)};";
+    let mesh = gmsh(&script().replace("Physical Surface(\"upper\") = {2};", apart), &[]);
     let run = on_mesh(&mesh, "", "");
     refused(&run, &["body `upper` is in 2 parts", "nothing holds that at (5", "make a body of each part"]);
     // each part held as a whole
@@ -117,7 +121,7 @@ fn bodies_in_parts() {
 
 #[test]
 fn bodies_that_share_nodes() {
-    let joined = script("").replace("Physical Surface(\"lower\")", "Coherence;\nPhysical Surface(\"lower\")");
+    let joined = script().replace("Physical Surface(\"lower\")", "Coherence;\nPhysical Surface(\"lower\")");
     let joined = joined.replace("{13}", "{3}");
     refused(&on_mesh(&gmsh(&joined, &[]), "", ""), &["shares a node with body `lower`", "between = \"auto\""]);
 }
@@ -205,7 +209,7 @@ fn kind(bytes: &[u8], good: &Mesh<2>, known: &Used) -> Kind {
 #[test]
 fn one_bit_changes() {
     for arguments in [&[][..], &["-bin"], &["-bin", "-order", "2"]] {
-        let bytes = gmsh(&script(""), arguments);
+        let bytes = gmsh(&script(), arguments);
         let good = parse::<2>(Path::new("a.msh"), &bytes, false).expect("a mesh");
         assert_eq!(good.order == Order::P2, arguments.len() == 3);
         let known = used(&good);

@@ -36,6 +36,12 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
                 .error_at(head, format!("elements of Gmsh's type {number} cannot be used"))
                 .help(SIMPLICES));
         };
+        // also where nobody needs them: the block may be one of another dimension whose head is damaged
+        if simplex::dimension(shape) != dimension {
+            let thing = THINGS[dimension].to_lowercase();
+            let error = cursor.error_at(head, format!("{shape} elements cannot be those of {thing} {tag}"));
+            return Err(error.help("the file is damaged: save the mesh again with Gmsh"));
+        }
         let count = cursor.count(1 + stride, 8 * (1 + stride))?;
         cursor.end()?;
         seen = seen.saturating_add(count);
