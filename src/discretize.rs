@@ -42,7 +42,7 @@ use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use std::rc::Rc;
 pub use surface::ContactSurface;
-pub use verify::verify;
+pub use verify::{Verified, verify};
 
 /// What every rank knows of a body before its owner assembles it.
 pub struct Outline<'a> {
@@ -59,7 +59,7 @@ pub struct Outline<'a> {
 }
 
 /// Gives bodies their inner solvers.
-pub trait Maker {
+pub trait Factory {
     /// Decides on the solvers of all bodies, in the order of the scene: called once, on every rank.
     ///
     /// # Errors
@@ -182,7 +182,7 @@ pub struct ContactInfo {
 }
 
 /// The discrete problem and what reports need to know of its origin.
-pub struct Problem {
+pub struct Discrete {
     /// What the method works on.
     pub model: Model,
     /// Bodies in the order of the scene.
@@ -203,22 +203,22 @@ pub struct Problem {
 
 /// Turns a scene and its mesh into a model.
 ///
-/// `checked` is what [`verify`] found of the mesh; `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `maker` turns each
+/// `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `factory` turns each
 /// body of this rank into one that solves. `keep` tells to keep the meshes, for an estimate of the error.
 ///
 /// # Errors
 /// Refusals of the scene against its mesh: missing groups, surfaces of the wrong body, supports that contradict each
-/// other, surfaces that do not face each other; and failures of `maker`.
+/// other, surfaces that do not face each other; and failures of `factory`.
 pub fn discretize<const D: usize>(
     scene: &Scene,
-    mesh: &Mesh<D>,
-    checked: &[Checked],
+    verified: &Verified<D>,
     cut: contact::pieces::Cut<D>,
     ranks: (usize, usize),
     keep: bool,
     exchange: Box<dyn Exchange>,
-    maker: &mut dyn Maker,
-) -> Result<Problem> {
+    factory: &mut dyn Factory,
+) -> Result<Discrete> {
+    let Verified { mesh, checked } = verified;
     let mut parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
     parts.iter().zip(checked).try_for_each(|(part, checked)| verify::held(part, &checked.parts, mesh))?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
@@ -246,7 +246,7 @@ pub fn discretize<const D: usize>(
         prescribed: &supported.prescribed,
         motions: &draft.free,
     });
-    maker.plan(&outlines.collect::<Vec<_>>())?;
+    factory.plan(&outlines.collect::<Vec<_>>())?;
     let drafts = drafts.into_iter().zip(supported);
     let known = gauged.into_iter().zip(loose);
     for (index, ((part, (draft, supported)), (gauged, loose))) in parts.into_iter().zip(drafts).zip(known).enumerate() {
@@ -258,38 +258,30 @@ pub fn discretize<const D: usize>(
         }
         offsets.push(offset);
         let Loose { left, motions, sprung, unfelt } = loose;
-        let mut slot = BodySlot {
-            name: part.spec.name.value.clone(),
-            local: None,
-            segments,
-            scale: 0.0,
-            modulus: 0.0,
-            depth: 0.0,
-            row_stiffness: Vec::new(),
-            motions,
-            sprung,
-        };
+        let name = part.spec.name.value.clone();
         let mut resultant =
             contact::pad(std::array::from_fn::<f64, D, _>(|c| nodal_load.iter().skip(c).step_by(D).sum()));
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
-        let surface: f64 = slot.segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
+        let surface: f64 = segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
         let elasticity = elastic::of(part.spec, &part.space, mesh, scene.plane)?;
-        let modulus = elastic::modulus(&part.space, &elasticity, share(&slot.segments, &pairs));
-        let held = slot.motions.len() == unfelt.len();
+        let modulus = elastic::modulus(&part.space, &elasticity, share(&segments, &pairs));
+        let held = motions.len() == unfelt.len();
         let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
-        (slot.modulus, slot.depth) = (modulus, volume / surface);
-        let stiffness = if held && surface > 0.0 { modulus / slot.depth } else { 0.0 };
-        if let Some(before) = maker.kept(&slot.name) {
-            slot = BodySlot { local: before.local, scale: before.scale, row_stiffness: before.row_stiffness, ..slot };
+        let depth = volume / surface;
+        let stiffness = if held && surface > 0.0 { modulus / depth } else { 0.0 };
+        // what only the owner knows, until all ranks share it
+        let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
+        if let Some(before) = factory.kept(&name) {
+            (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 {
             let left = rigid::free(&left, &prescribed, &load);
             let body = part.assemble(mesh, &rows, &elasticity, load, prescribed, carried)?;
             assemblies += 1;
-            slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-            slot.row_stiffness = body.row_stiffness(&rows);
-            slot.local = Some(maker.make(Assembled {
-                name: slot.name.clone(),
+            scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
+            row_stiffness = body.row_stiffness(&rows);
+            local = Some(factory.make(Assembled {
+                name: name.clone(),
                 dimension: D,
                 body,
                 rows,
@@ -299,7 +291,7 @@ pub fn discretize<const D: usize>(
         }
         let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
         infos.push(BodyInfo {
-            name: slot.name.clone(),
+            name: name.clone(),
             nodes: space.nodes.len(),
             cells: space.cell_count(),
             facets: FacetCounts::of(&checked[index]),
@@ -318,17 +310,17 @@ pub fn discretize<const D: usize>(
                 Box::new(move |v| held.frame.displacements(v))
             },
             balance: {
-                let rows = nodal_rows(&slot.segments, &pairs, space.dofs());
+                let rows = nodal_rows(&segments, &pairs, space.dofs());
                 let (springs, supports) = (part.springs, part.spec.fix.len());
                 let (space, held, elasticity) = (space.clone(), held.clone(), elasticity.clone());
                 let forces = Forces { space, elasticity, held, springs, supports, load: nodal_load, rows };
                 Box::new(move |u, force| forces.balance(u, force))
             },
             errors: fields::error_maker(part.spec, &space, &elasticity)?,
-            field: fields::field_maker(slot.name.clone(), space.clone(), elasticity.clone()),
+            field: fields::field_maker(name.clone(), space.clone(), elasticity.clone()),
         });
         shapes.push(Shape { space, elasticity, modulus, held });
-        slots.push(slot);
+        slots.push(BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness });
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
@@ -336,11 +328,17 @@ pub fn discretize<const D: usize>(
     let mut carried = vec![0.0; 2 * model.points()];
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);
-    Ok(Problem { model, bodies: infos, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided })
+    Ok(Discrete { model, bodies: infos, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided })
 }
 
-impl Problem {
-    /// Tells every rank what only the owner of a body knows of it: largest stiffness, and stiffness at the contact rows. Collective, after all ranks have made their problem.
+impl Discrete {
+    /// Sides of pair `i` in the order of the scene.
+    pub fn sides(&self, i: usize) -> [usize; 2] {
+        if self.contacts[i].swapped { [1, 0] } else { [0, 1] }
+    }
+
+    /// Tells every rank what only the owner of a body knows of it: largest stiffness, and stiffness at the contact rows. Collective,
+    /// after all ranks have made their problem.
     pub fn share(&mut self) {
         let count = self.model.bodies.len();
         let mut message = vec![0.0; count + 2 * self.model.points()];
@@ -363,8 +361,8 @@ impl Problem {
 ///
 /// # Errors
 /// A start that is not finite at a contact point.
-pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Option<Vec<f64>>> {
-    let model = &problem.model;
+pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<Vec<f64>>> {
+    let model = &discrete.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
     match &scene.method.start {
@@ -382,7 +380,7 @@ pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Option<Vec
             }
         }
     }
-    axpy(-1.0, &problem.carried, &mut trace);
+    axpy(-1.0, &discrete.carried, &mut trace);
     Ok(Some(trace))
 }
 

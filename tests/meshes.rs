@@ -110,8 +110,10 @@ fn wrong_elements_are_named() {
 #[test]
 fn bodies_in_parts() {
     // a third block for the group of the upper one, far from it
-    let apart = "far() = Translate{5, 0, 0}{ Duplicata{ Surface{2}; } };\nPhysical Surface(\"upper\") = {2, far(0)};";
-    let mesh = gmsh(&script().replace("Physical Surface(\"upper\") = {2};", apart), &[]);
+    let far = "Point(21) = {5, 1, 0};\nPoint(22) = {6, 1, 0};\nPoint(23) = {5, 2, 0};\nLine(21) = {21, 22};\n\
+               Line(22) = {22, 23};\nLine(23) = {23, 21};\nTransfinite Curve {21, 22, 23} = 2;\n\
+               Curve Loop(3) = {21, 22, 23};\nPlane Surface(3) = {3};\nPhysical Surface(\"upper\") = {2, 3};\n";
+    let mesh = gmsh(&script().replace("Physical Surface(\"upper\") = {2};", far), &[]);
     let run = on_mesh(&mesh, "", "");
     refused(&run, &["body `upper` is in 2 parts", "nothing holds that at (5", "make a body of each part"]);
     // each part held as a whole

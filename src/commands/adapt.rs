@@ -1,10 +1,10 @@
 //! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
 
 use super::clock::Clock;
-use super::prepared::Prepared;
 use super::run;
+use super::stages::{Built, Done};
 use super::{carry, report};
-use crate::ddm::{Outcome, Start};
+use crate::ddm::Start;
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Sizes};
@@ -16,6 +16,7 @@ use crate::problem::mesh::{MeshSource, Sizing};
 use crate::problem::method::{self, MethodName};
 use crate::scene::{AdaptSpec, Scene};
 use crate::solver::options;
+use std::rc::Rc;
 
 /// Cells of a body's first mesh.
 const FIRST: usize = 150;
@@ -29,14 +30,14 @@ const LEAST: f64 = 0.1;
 /// What remains to be done of a run of several meshes.
 pub struct Plan {
     /// The scene of this round.
-    pub scene: Scene,
+    pub scene: Rc<Scene>,
     /// Meshes so far.
     pub rounds: Vec<RoundReport>,
     /// Why the meshes end before the error is reached, in words.
     pub limit: Option<String>,
     goal: Option<AdaptSpec>,
     /// The scene that follows a coarse one.
-    finer: Option<Scene>,
+    finer: Option<Rc<Scene>>,
     purpose: String,
     carried: Vec<ContactTable>,
     seconds: f64,
@@ -46,8 +47,8 @@ impl Plan {
     /// The first round of a scene: its own mesh, a coarse one, or the one that an earlier run ended with.
     ///
     /// # Errors
-    /// A scene whose mesh cannot follow sizes; what [`run::prepare`] refuses.
-    pub fn new(session: &Session, scene: Scene, clock: &mut Clock) -> Result<Self> {
+    /// A scene whose mesh cannot follow sizes; what [`run::build`] refuses.
+    pub fn new(session: &Session, scene: Rc<Scene>, clock: &mut Clock) -> Result<Self> {
         let goal = scene.adapt.clone();
         let nested = matches!(scene.method.start, method::Start::Nested);
         let mut settings = scene.settings();
@@ -68,26 +69,27 @@ impl Plan {
         agree(session, plan.refuse_finished_mesh())?;
         let bodies = plan.scene.bodies.len();
         if plan.goal.is_none() {
-            let mut coarse = plan.scene.clone();
+            let mut coarse = Scene::clone(&plan.scene);
             coarse.estimate = true;
-            let prepared = run::prepare(session, &coarse, clock)?;
-            let sizes = prepared.problem.meshes.as_ref().map(|meshes| sizes::scaled(&**meshes, bodies, 2.0));
+            let built = run::build(session, coarse.clone(), clock)?;
+            let sizes = built.discrete.meshes.as_ref().map(|meshes| sizes::scaled(&**meshes, bodies, 2.0));
             options::withdraw(session)?;
             coarse.method.stop.balanced = true;
             follow(&mut coarse, sizes.map(view));
-            plan.finer = Some(std::mem::replace(&mut plan.scene, coarse));
+            plan.finer = Some(std::mem::replace(&mut plan.scene, Rc::new(coarse)));
             return Ok(plan);
         }
-        plan.scene.estimate = true;
-        plan.scene.method.stop.balanced = true;
+        let scene = Rc::make_mut(&mut plan.scene);
+        scene.estimate = true;
+        scene.method.stop.balanced = true;
         let mut view_of_first = mesh::recall_final(&plan.purpose);
         if view_of_first.is_none() {
-            let prepared = run::prepare(session, &plan.scene, clock)?;
-            let sizes = prepared.problem.meshes.as_ref().map(|m| sizes::uniform(&**m, bodies, FIRST * bodies));
+            let built = run::build(session, plan.scene.clone(), clock)?;
+            let sizes = built.discrete.meshes.as_ref().map(|m| sizes::uniform(&**m, bodies, FIRST * bodies));
             options::withdraw(session)?;
             view_of_first = sizes.map(view);
         }
-        follow(&mut plan.scene, view_of_first);
+        follow(Rc::make_mut(&mut plan.scene), view_of_first);
         Ok(plan)
     }
 
@@ -100,11 +102,12 @@ impl Plan {
     }
 
     /// The start of this round, if an earlier one gives it.
-    pub fn start(&self, scene: &Scene, prepared: &Prepared) -> Option<Start> {
+    pub fn start(&self, built: &Built) -> Option<Start> {
+        let Built { scene, discrete, .. } = built;
         let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
         (!self.carried.is_empty()).then(|| match newton {
-            true => Start::Pressure(carry::pressure(&self.carried, prepared)),
-            false => Start::Trace(carry::trace(&self.carried, prepared)),
+            true => Start::Pressure(carry::pressure(&self.carried, discrete)),
+            false => Start::Trace(carry::trace(&self.carried, discrete)),
         })
     }
 
@@ -115,33 +118,33 @@ impl Plan {
     pub fn goes_on(
         &mut self,
         session: &Session,
-        prepared: &Prepared,
-        outcome: &Outcome,
+        done: &Done,
         estimate: Option<&Estimate>,
         clock: &mut Clock,
     ) -> Result<bool> {
-        let good = outcome.status.is_solved();
-        let pairs = prepared.problem.model.pairs.len();
+        let good = done.outcome.status.is_solved();
+        let (discrete, model) = (&done.built.discrete, done.model());
+        let tables = || (0..model.pairs.len()).map(|i| report::contact_table(done, None, i)).collect();
         if let Some(finer) = self.finer.take() {
             if good {
-                self.carried = (0..pairs).map(|i| report::contact_table(prepared, outcome, None, i)).collect();
+                self.carried = tables();
             }
             self.scene = finer;
             options::withdraw(session)?;
             return Ok(true);
         }
-        let (Some(goal), Some(estimate), Some(meshes)) = (&self.goal, estimate, &prepared.problem.meshes) else {
+        let (Some(goal), Some(estimate), Some(meshes)) = (&self.goal, estimate, &discrete.meshes) else {
             return Ok(false);
         };
         let total = clock.total();
         let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
         self.rounds.push(RoundReport {
-            cells: prepared.problem.bodies.iter().map(|body| body.cells).sum(),
-            dofs: prepared.problem.bodies.iter().map(|body| body.dofs).sum(),
+            cells: discrete.bodies.iter().map(|body| body.cells).sum(),
+            dofs: discrete.bodies.iter().map(|body| body.dofs).sum(),
             pressure: estimate.pressure.iter().copied().fold(0.0, f64::max),
             displacement: estimate.displacement,
             energy: estimate.energy,
-            iterations: outcome.iterations,
+            iterations: done.outcome.iterations,
             seconds: total - self.seconds,
         });
         self.seconds = total;
@@ -159,7 +162,6 @@ impl Plan {
             self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
             return Ok(false);
         }
-        let model = &prepared.problem.model;
         let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
         let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
         let wanted = sizes::wanted(&**meshes, model, estimate, share, goal.cells);
@@ -168,8 +170,8 @@ impl Plan {
             self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
             return Ok(false);
         }
-        self.carried = (0..pairs).map(|i| report::contact_table(prepared, outcome, None, i)).collect();
-        follow(&mut self.scene, Some(view(wanted)));
+        self.carried = tables();
+        follow(Rc::make_mut(&mut self.scene), Some(view(wanted)));
         options::withdraw(session)?;
         Ok(true)
     }

@@ -1,13 +1,12 @@
 //! `winkler check`: builds everything, solves nothing, says what is there.
 
 use super::clock::Clock;
-use super::prepared::Prepared;
 use super::run;
+use super::stages::Built;
 use super::{load, preflight, report};
 use crate::error::Result;
 use crate::output::{say, sci};
 use crate::petsc::Session;
-use crate::scene::Scene;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -19,34 +18,34 @@ use std::path::PathBuf;
 pub fn check(session: &Session, path: PathBuf, overrides: Vec<String>, as_json: bool) -> Result<i32> {
     let mut clock = Clock::default();
     let scene = load(session, &path, &overrides)?;
-    let prepared = run::prepare(session, &scene, &mut clock)?;
+    let built = run::build(session, scene, &mut clock)?;
     clock.total();
-    let shared = report::Shared::gather(&prepared);
+    let shared = report::Shared::gather(&built.discrete);
     if session.rank() != 0 {
         return Ok(0);
     }
     if as_json {
-        let mut value = json!(report::headline(session, &scene, &prepared, &shared.solvers, &clock));
+        let mut value = json!(report::headline(session, &built, &shared.solvers, &clock));
         value["status"] = json!("checked");
-        value["message"] = json!(prepared.choice);
-        for (info, body) in prepared.problem.bodies.iter().zip(0..) {
+        value["message"] = json!(built.choice);
+        for (info, body) in built.discrete.bodies.iter().zip(0..) {
             value["bodies"][body]["supported"] = json!(info.supported);
             value["bodies"][body]["rigid_motions"] = json!(info.left_by_supports);
-            value["bodies"][body]["rigid_motions_unheld"] = json!(info.left_by_all);
+            value["bodies"][body]["rigid_motions_unconstrained"] = json!(info.left_by_all);
         }
-        value["pairs"] = pairs(&scene, &prepared);
+        value["pairs"] = pairs(&built);
         say(format_args!("{value:#}"));
     } else {
-        print(&scene, &prepared, &report::solvers_in_words(&shared.solvers));
+        print(&built, &report::solvers_in_words(&shared.solvers));
     }
     Ok(0)
 }
 
-fn pairs(scene: &Scene, prepared: &Prepared) -> serde_json::Value {
+fn pairs(built: &Built) -> serde_json::Value {
     let describe = |i: usize| {
-        let pair = &prepared.problem.model.pairs[i];
+        let pair = &built.discrete.model.pairs[i];
         let (low, high) = gap_range(&pair.gap);
-        let coupling = preflight::coupling(scene, prepared, i);
+        let coupling = preflight::coupling(built, i);
         json!({
             "surfaces": pair.surfaces,
             "carrier": pair.surfaces[0],
@@ -59,16 +58,16 @@ fn pairs(scene: &Scene, prepared: &Prepared) -> serde_json::Value {
             "expected_sweeps": coupling.sweeps.iter().map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
         })
     };
-    (0..prepared.problem.model.pairs.len()).map(describe).collect()
+    (0..built.discrete.model.pairs.len()).map(describe).collect()
 }
 
 fn gap_range(gap: &[f64]) -> (f64, f64) {
     (gap.iter().copied().fold(f64::INFINITY, f64::min), gap.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
-fn print(scene: &Scene, prepared: &Prepared, solvers: &str) {
-    say(&scene.title);
-    for info in &prepared.problem.bodies {
+fn print(built: &Built, solvers: &str) {
+    say(&built.scene.title);
+    for info in &built.discrete.bodies {
         say(format_args!(
             "  body {}: {} cells, {} nodes, {} dofs, {} of them supported",
             info.name, info.cells, info.nodes, info.dofs, info.supported
@@ -80,7 +79,7 @@ fn print(scene: &Scene, prepared: &Prepared, solvers: &str) {
             say(format_args!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")));
         }
     }
-    for (i, pair) in prepared.problem.model.pairs.iter().enumerate() {
+    for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
         let (low, high) = gap_range(&pair.gap);
         say(format_args!(
             "  contact {} - {}: {} points on {}, {} {:.6}, gap {} to {}",
@@ -93,7 +92,7 @@ fn print(scene: &Scene, prepared: &Prepared, solvers: &str) {
             sci(low, 3),
             sci(high, 3)
         ));
-        let coupling = preflight::coupling(scene, prepared, i);
+        let coupling = preflight::coupling(built, i);
         say(format_args!(
             "    mean pressure {}, theta {:.3} and {:.3}; sweeps to expect for a residual of 1e-8: {}",
             sci(coupling.pressure, 3),
@@ -102,8 +101,8 @@ fn print(scene: &Scene, prepared: &Prepared, solvers: &str) {
             coupling.sweeps.iter().map(|(method, count)| format!("{method} {count:.0}")).collect::<Vec<_>>().join(", ")
         ));
     }
-    say(format_args!("  inner solver: {} ({})", solvers, prepared.choice));
-    for warning in &prepared.warnings {
+    say(format_args!("  inner solver: {} ({})", solvers, built.choice));
+    for warning in &built.warnings {
         say(format_args!("  warning: {warning}"));
     }
 }

@@ -55,7 +55,7 @@ fn show<const D: usize>(scene: &Scene, request: &Request) -> Result<i32> {
 /// All that is said about a mesh.
 fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Result<Value> {
     let mesh = &loaded.mesh;
-    let mut checked = crate::discretize::verify(scene, mesh)?.into_iter();
+    let mut checked = crate::discretize::verify(scene, mesh)?.checked.into_iter();
     let mut bodies = Vec::new();
     for body in &scene.bodies {
         let name = &body.name.value;

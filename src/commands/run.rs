@@ -1,14 +1,14 @@
-//! From a scene to a solved problem: mesh, discretisation, inner solvers, options, iteration.
+//! From a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options, iteration.
 
 use super::clock::Clock;
 use super::inner::{Inner, WHOLE};
 use super::method;
-use super::prepared::Prepared;
+use super::stages::{Built, Done, Ready};
 use super::steps;
 use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::{self, Observer, Outcome, Settings, Status};
-use crate::discretize::{self, Mechanism, Problem};
+use crate::ddm::{self, Observer, Outcome, Settings, Start, Status};
+use crate::discretize::{self, Discrete, Mechanism};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate, Nodal};
 use crate::model::BodySlot;
@@ -21,6 +21,7 @@ use crate::scene::Scene;
 use crate::solver::options;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
+use std::rc::Rc;
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
 const LARGE_FRONTS: usize = 30_000;
@@ -29,61 +30,52 @@ const LARGE_FRONTS: usize = 30_000;
 ///
 /// # Errors
 /// Refusals of scene and mesh, printed on one rank; failures of PETSc.
-pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Prepared> {
-    prepare_with(session, scene, Vec::new(), clock)
+pub fn build(session: &Session, scene: impl Into<Rc<Scene>>, clock: &mut Clock) -> Result<Built> {
+    build_with(session, scene.into(), Vec::new(), clock)
 }
 
 /// The same, with the bodies `kept` from an earlier scene.
 ///
 /// # Errors
-/// Those of [`prepare`].
-pub fn prepare_with(session: &Session, scene: &Scene, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared> {
-    agree(session, refuse(scene))?;
-    agree(session, scene_options(session, scene))?;
+/// Those of [`build`].
+pub fn build_with(session: &Session, scene: Rc<Scene>, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
+    agree(session, refuse(&scene))?;
+    agree(session, scene_options(session, &scene))?;
     let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
     options::distribute(session, &names)?;
     match scene.dimension.value {
-        2 => build::<2>(session, scene, pieces::plane, kept, clock),
-        _ => build::<3>(session, scene, pieces::space, kept, clock),
+        2 => build_in::<2>(session, scene, pieces::plane, kept, clock),
+        _ => build_in::<3>(session, scene, pieces::space, kept, clock),
     }
 }
 
-/// What [`prepare`] does where the dimension matters.
-fn build<const D: usize>(
+/// What [`build`] does where the dimension matters.
+fn build_in<const D: usize>(
     session: &Session,
-    scene: &Scene,
+    scene: Rc<Scene>,
     cut: Cut<D>,
     kept: Vec<BodySlot>,
     clock: &mut Clock,
-) -> Result<Prepared> {
-    let mesh = mesh::<D>(session, scene)?;
-    let checked = agree(session, discretize::verify(scene, &mesh))?;
+) -> Result<Built> {
+    let mesh = mesh::<D>(session, &scene)?;
+    let mesh = agree(session, discretize::verify(&scene, &mesh))?;
     clock.phase("mesh");
-    let largest = mesh.points.len() * D;
+    let largest = mesh.mesh.points.len() * D;
     // small fronts and several ranks lose by BLAS threads, large factorisations gain
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
     let threads = if D == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
     session.set_blas_threads(threads);
-    let mut inner = Inner::new(session, scene, kept);
+    let mut inner = Inner::new(session, &scene, kept);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
     let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
-    let problem = discretize::discretize(scene, &mesh, &checked, cut, ranks, keep, exchange, &mut inner);
-    let mut problem = agree(session, problem)?;
-    problem.share();
+    let discrete = discretize::discretize(&scene, &mesh, cut, ranks, keep, exchange, &mut inner);
+    let mut discrete = agree(session, discrete)?;
+    discrete.share();
     clock.phase("discretize");
-    let warnings = warnings(session, &problem);
-    let condensed = inner.condensed();
-    Ok(Prepared {
-        problem,
-        start: None,
-        linear: inner.linear(),
-        method: None,
-        steps: Vec::new(),
-        choice: inner.reason(),
-        warnings,
-        condensed,
-    })
+    let warnings = warnings(session, &discrete);
+    let (linear, choice, condensed) = (inner.linear(), inner.reason(), inner.condensed());
+    Ok(Built { scene, discrete, linear, choice, condensed, warnings })
 }
 
 /// What the decoder of the scene cannot know.
@@ -126,7 +118,7 @@ fn mesh<const D: usize>(session: &Session, scene: &Scene) -> Result<crate::mesh:
     agree(session, load())
 }
 
-fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
+fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
     let mut warnings = Vec::new();
     if session.blas_name() == "reference BLAS" {
         warnings.push(
@@ -134,21 +126,21 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if session.size() > problem.bodies.len() {
+    if session.size() > discrete.bodies.len() {
         warnings.push(format!(
             "{} of {} ranks have no body to solve",
-            session.size() - problem.bodies.len(),
+            session.size() - discrete.bodies.len(),
             session.size()
         ));
     }
-    for body in problem.bodies.iter().filter(|body| !body.gauged.is_empty()) {
+    for body in discrete.bodies.iter().filter(|body| !body.gauged.is_empty()) {
         let motions = body.gauged.join("; ");
         warnings
             .push(format!("body {}: nothing holds its {motions}, no load works on it: fixed at one node", body.name));
     }
-    warnings.extend(problem.mechanisms.iter().map(|mechanism| mechanism_in_words(problem, mechanism)));
-    warnings.extend(problem.bodies.iter().filter_map(|body| body.warning.clone()));
-    for (pair, contact) in problem.model.pairs.iter().zip(&problem.contacts) {
+    warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
+    warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
+    for (pair, contact) in discrete.model.pairs.iter().zip(&discrete.contacts) {
         let (without, all) = (pair.uncovered(), pair.carriers.len());
         if without > 0 {
             let names = contact.spec.between.each_ref().map(|name| &name.value);
@@ -166,8 +158,8 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
 }
 
 /// A free motion of several bodies as a warning.
-fn mechanism_in_words(problem: &Problem, mechanism: &Mechanism) -> String {
-    let name = |&body: &usize| &problem.bodies[body].name;
+fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
+    let name = |&body: &usize| &discrete.bodies[body].name;
     let bodies = in_words(mechanism.bodies.iter().map(name));
     let end = match mechanism.fixed.as_ref().map(name) {
         Some(body) => format!("no load works on it: fixed at nodes of `{body}`"),
@@ -177,98 +169,94 @@ fn mechanism_in_words(problem: &Problem, mechanism: &Mechanism) -> String {
     format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.name)
 }
 
-/// Factors every body for the start, then refuses options that nobody read.
+/// Makes the method, factors every body for the start, then refuses options that nobody read. Without a `given` start it is that of
+/// the scene.
 ///
 /// # Errors
-/// Unknown PETSc options, failures of PETSc.
-pub fn set_up(session: &Session, scene: &Scene, prepared: &mut Prepared, clock: &mut Clock) -> Result<()> {
-    if prepared.start.is_none() && scene.method.steps.is_empty() {
-        prepared.start = Some(discretize::start(scene, &prepared.problem, 1.0)?.into());
-    }
-    let start = prepared.start.clone().unwrap_or_default();
-    let made = method::make(session, scene, &mut prepared.problem.model, prepared.linear, &start);
-    prepared.method = Some(agree(session, made)?);
-    let names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();
-    let mut names: Vec<&str> = names.iter().map(String::as_str).collect();
-    if matches!(prepared.linear, Linear::Direct | Linear::Multigrid) {
+/// Unknown PETSc options, a start that is not finite, failures of PETSc.
+pub fn set_up(session: &Session, mut built: Built, given: Option<Start>, clock: &mut Clock) -> Result<Ready> {
+    let scene = built.scene.clone();
+    let start = match given {
+        Some(start) => start,
+        None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete, 1.0)?.into(),
+        None => Start::Automatic,
+    };
+    let method = agree(session, method::make(session, &scene, &mut built.discrete.model, built.linear, &start))?;
+    let mut names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
+    if matches!(built.linear, Linear::Direct | Linear::Multigrid) {
         names.push(WHOLE);
     }
-    let any = |flags: &mut [u8]| {
-        if session.size() > 1 && !flags.is_empty() {
-            let mine = flags.to_vec();
-            session.world().all_reduce_into(&mine[..], flags, SystemOperation::max());
-        }
-    };
-    let unread = options::unread(session, &names, &any)?;
-    let mut unknown = None;
-    for option in unread {
-        match option.kind {
-            options::UnreadKind::NotInUse => {
-                prepared.warnings.push(format!("option {} was not used: no solver of this run reads it", option.name))
-            }
-            options::UnreadKind::Unknown => {
-                let error = Error::new(Kind::Solver, format!("PETSc knows no option {}", option.name));
-                unknown.get_or_insert(match option.nearest {
-                    Some(near) => error.help(format!("did you mean {near}?")),
-                    None => error.help("`-help` lists the options of this run"),
-                });
-            }
-        }
-    }
-    agree(session, unknown.map_or(Ok(()), Err))?;
+    let mut warnings = agree_on_unread(session, &names)?;
     for name in &names {
         let in_force = |option: &str| session.options().get(&format!("-{name}_{option}")).unwrap_or_default();
         if in_force("ksp_type") == "preonly" && !matches!(in_force("pc_type").as_str(), "cholesky" | "lu") {
-            prepared.warnings.push(format!(
+            warnings.push(format!(
                 "body {name}: preonly applies {} once instead of solving; the residual is measured by it",
                 in_force("pc_type")
             ));
         }
     }
     clock.phase("set-up");
-    Ok(())
+    Ok(Ready { built, method, start, warnings })
+}
+
+/// Warnings of options that no solver with one of these `names` has read.
+///
+/// # Errors
+/// Options that PETSc does not know.
+fn agree_on_unread(session: &Session, names: &[&str]) -> Result<Vec<String>> {
+    let any = |flags: &mut [u8]| {
+        if session.size() > 1 && !flags.is_empty() {
+            let mine = flags.to_vec();
+            session.world().all_reduce_into(&mine[..], flags, SystemOperation::max());
+        }
+    };
+    let (mut warnings, mut unknown) = (Vec::new(), Ok(()));
+    for option in options::unread(session, names, &any)? {
+        match option.kind {
+            options::UnreadKind::NotInUse => {
+                warnings.push(format!("option {} was not used: no solver of this run reads it", option.name));
+            }
+            options::UnreadKind::Unknown => {
+                let error = Error::new(Kind::Solver, format!("PETSc knows no option {}", option.name));
+                unknown = unknown.and(Err(match option.nearest {
+                    Some(near) => error.help(format!("did you mean {near}?")),
+                    None => error.help("`-help` lists the options of this run"),
+                }));
+            }
+        }
+    }
+    agree(session, unknown)?;
+    Ok(warnings)
 }
 
 /// Iterates.
 ///
 /// # Errors
 /// Failures of PETSc; not converging is a status of the outcome.
-pub fn iterate(
-    scene: &Scene,
-    prepared: &mut Prepared,
-    observer: &mut dyn Observer,
-    clock: &mut Clock,
-) -> Result<Outcome> {
-    let stop = &scene.method.stop;
-    prepared.steps.clear();
-    let mut settings = Settings {
-        stop: stop.clone(),
-        interval: scene.method.interval,
-        balance: prepared.problem.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _),
-        start: prepared.start.take().unwrap_or_default(),
+pub fn iterate(ready: Ready, observer: &mut dyn Observer, clock: &mut Clock) -> Result<Done> {
+    let Ready { mut built, mut method, start, warnings } = ready;
+    let (stop, interval) = (built.scene.method.stop.clone(), built.scene.method.interval);
+    let balance = built.discrete.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _);
+    let mut settings = Settings { stop, interval, balance, start };
+    let (outcome, steps) = match built.scene.method.steps.is_empty() {
+        true => (ddm::solve(&mut built.discrete.model, &mut method, &mut settings, observer)?, Vec::new()),
+        false => steps::iterate(&mut built, &mut method, settings, observer)?,
     };
-    let Some(mut method) = prepared.method.take() else {
-        return Err(Error::new(Kind::Solver, "a run was begun before its method was made"));
-    };
-    let outcome = match scene.method.steps.is_empty() {
-        true => ddm::solve(&mut prepared.problem.model, &mut method, &mut settings, observer)?,
-        false => steps::iterate(scene, prepared, &mut method, &mut settings, observer)?,
-    };
-    prepared.method = Some(method);
     clock.phase("iterate");
-    Ok(outcome)
+    Ok(Done { built, method, outcome, steps, warnings })
 }
 
 /// Estimates the error of what a run found, if the scene asks for it.
 ///
 /// # Errors
 /// Failures of PETSc.
-pub fn estimate(prepared: &mut Prepared, outcome: &Outcome, clock: &mut Clock) -> Result<Option<Estimate>> {
-    let good = outcome.status.is_solved() || outcome.status == Status::IterationLimit;
-    let Some(meshes) = prepared.problem.meshes.clone().filter(|_| good) else { return Ok(None) };
-    let Some(method) = &mut prepared.method else { return Ok(None) };
-    let Outcome { iterate, layer, .. } = outcome;
-    let estimate = estimate::estimate(&*meshes, &mut prepared.problem.model, method.linear(), iterate, layer)?;
+pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> {
+    let Outcome { status, iterate, layer, .. } = &done.outcome;
+    let good = status.is_solved() || *status == Status::IterationLimit;
+    let discrete = &mut done.built.discrete;
+    let Some(meshes) = discrete.meshes.clone().filter(|_| good) else { return Ok(None) };
+    let estimate = estimate::estimate(&*meshes, &mut discrete.model, done.method.linear(), iterate, layer)?;
     clock.phase("estimate");
     Ok(Some(estimate))
 }

@@ -2,11 +2,11 @@
 
 use super::adapt::Plan;
 use super::clock::Clock;
-use super::prepared::Prepared;
 use super::results::Recovered;
 use super::run;
+use super::stages::Done;
 use super::{folder_of, load, report, results};
-use crate::ddm::{Observer, Outcome, Row};
+use crate::ddm::{Observer, Row};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::output::{Folder, HistoryWriter, IterationTable, Plot, Report, Verbosity, say, vtu};
@@ -38,10 +38,10 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
     let folder = agree(session, Folder::create(folder_of(&scene, request.folder)))?;
     let first = session.rank() == 0;
     let mut plan = Plan::new(session, scene, &mut clock)?;
-    let (prepared, outcome, estimate, failed) = loop {
-        let mut prepared = run::prepare(session, &plan.scene, &mut clock)?;
-        prepared.start = plan.start(&plan.scene, &prepared);
-        run::set_up(session, &plan.scene, &mut prepared, &mut clock)?;
+    let (done, estimate, failed) = loop {
+        let built = run::build(session, plan.scene.clone(), &mut clock)?;
+        let start = plan.start(&built);
+        let ready = run::set_up(session, built, start, &mut clock)?;
         let all = session.options().all()?;
         let monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
         let verbosity = if request.json || monitored || !first { Verbosity::Quiet } else { Verbosity::Table };
@@ -49,21 +49,20 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
             table: IterationTable::new(verbosity, &run::targets(&plan.scene)),
             history: if first { Some(history(&folder, &plan.scene)?) } else { None },
         };
-        let outcome = run::iterate(&plan.scene, &mut prepared, &mut watchers, &mut clock)?;
-        let estimate = run::estimate(&mut prepared, &outcome, &mut clock)?;
+        let mut done = run::iterate(ready, &mut watchers, &mut clock)?;
+        let estimate = run::estimate(&mut done, &mut clock)?;
         watchers.table.finish();
         let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
-        let more = plan.goes_on(session, &prepared, &outcome, estimate.as_ref(), &mut clock)?;
+        let more = plan.goes_on(session, &done, estimate.as_ref(), &mut clock)?;
         if !more {
-            break (prepared, outcome, estimate, failed);
+            break (done, estimate, failed);
         }
     };
-    let scene = &plan.scene;
-    let recovered = results::recover(&prepared, &outcome);
-    let written = failed.and(write(session, scene, &prepared, &outcome, &recovered, estimate.as_ref(), &folder));
+    let recovered = results::recover(&done);
+    let written = failed.and(write(session, &done, &recovered, estimate.as_ref(), &folder));
     clock.phase("output");
     clock.total();
-    let mut report = report::report(session, scene, &prepared, &outcome, &recovered, &clock);
+    let mut report = report::report(session, &done, &recovered, &clock);
     report.discretization_error = estimate.as_ref().map(report::discretization_error);
     report.rounds = plan.rounds;
     if let Some(limit) = &plan.limit {
@@ -71,7 +70,7 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
         report.message = format!("the error asked for is not reached: {limit}");
     }
     if first {
-        report.files = names(&folder, scene, &prepared);
+        report.files = names(&folder, &done);
         let json = to_json(&report)?;
         folder.write("report.json", |out| out.write_all(json.as_bytes()))?;
         if request.json {
@@ -82,14 +81,14 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
                 "{}\n  inner solver: {} ({})\n  results in {}",
                 report.summary(),
                 report::solvers_in_words(&solvers),
-                prepared.choice,
+                done.built.choice,
                 folder.path().display()
             ));
         }
     }
     written?;
     recovered.into_iter().flatten().collect::<Result<Vec<_>>>()?;
-    Ok(if plan.limit.is_some() { 1 } else { report::exit_code(&prepared, &outcome) })
+    Ok(if plan.limit.is_some() { 1 } else { report::exit_code(&done) })
 }
 
 /// A report as JSON text, ended by a newline.
@@ -129,25 +128,23 @@ impl Observer for Watchers {
 /// Writes fields (each rank its bodies), contact tables and plots (the first rank).
 fn write(
     session: &Session,
-    scene: &Scene,
-    prepared: &Prepared,
-    outcome: &Outcome,
+    done: &Done,
     recovered: &results::All,
     estimate: Option<&Estimate>,
     folder: &Folder,
 ) -> Result<()> {
-    let model = &prepared.problem.model;
+    let (scene, discrete, model) = (&done.built.scene, &done.built.discrete, done.model());
     let first = session.rank() == 0;
     if scene.output.vtu {
         for Recovered { field, .. } in recovered.iter().flatten().flatten() {
             folder.write(&field.file_name(), |out| field.clone().write(out))?;
         }
         if first {
-            let mut names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();
+            let mut names: Vec<String> = discrete.bodies.iter().map(|body| body.name.clone()).collect();
             for i in 0..model.pairs.len() {
-                let file = folder.unused(&report::contact_table(prepared, outcome, None, i).stem(), "vtu");
+                let file = folder.unused(&report::contact_table(done, None, i).stem(), "vtu");
                 let name = file.trim_end_matches(".vtu").to_owned();
-                folder.write(&file, |out| report::contact_surface(&name, prepared, outcome, i).write(out))?;
+                folder.write(&file, |out| report::contact_surface(&name, done, i).write(out))?;
                 names.push(name);
             }
             folder.write(&vtu::pvd_name("bodies"), |out| vtu::write_pvd(&names, out))?;
@@ -157,15 +154,15 @@ fn write(
         return Ok(());
     }
     for i in 0..model.pairs.len() {
-        report::contact_table(prepared, outcome, estimate, i).save(folder)?;
+        report::contact_table(done, estimate, i).save(folder)?;
     }
     if scene.output.plots {
-        let convergence = Plot::convergence(&scene.title, &[report::convergence("", outcome)]);
+        let convergence = Plot::convergence(&scene.title, &[report::convergence("", &done.outcome)]);
         folder.write("convergence.svg", |out| convergence.write(out))?;
         // only along curves: points of a surface over one coordinate would be a cloud
         for i in (0..model.pairs.len()).filter(|&i| model.pairs[i].along_curve) {
-            let mut curves = vec![report::pressure("pressure", prepared, outcome, i)];
-            curves.extend(report::reference(&prepared.problem, i));
+            let mut curves = vec![report::pressure("pressure", done, i)];
+            curves.extend(report::reference(discrete, i));
             let (_, axis) = report::main_axis(&model.pairs[i]);
             let plot = Plot::pressure(&scene.title, axis, &curves);
             folder.write(&folder.unused("pressure", "svg"), |out| plot.write(out))?;
@@ -175,12 +172,12 @@ fn write(
 }
 
 /// Names of the files of a run, those of other ranks included.
-fn names(folder: &Folder, scene: &Scene, prepared: &Prepared) -> Vec<String> {
+fn names(folder: &Folder, done: &Done) -> Vec<String> {
     let own = folder.files();
     let mut names: Vec<String> =
         own.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned()).collect();
-    if scene.output.vtu {
-        names.extend(prepared.problem.bodies.iter().map(|body| format!("{}.vtu", body.name)));
+    if done.built.scene.output.vtu {
+        names.extend(done.built.discrete.bodies.iter().map(|body| format!("{}.vtu", body.name)));
     }
     names.push("report.json".to_owned());
     names.sort();

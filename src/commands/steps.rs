@@ -3,63 +3,60 @@
 //! At a share s of all loads and prescribed displacements, u/s solves the problem of the full loads with the gap d/s and the layer
 //! p(s c)/s. So a step changes gaps and laws alone: no body is assembled, reduced or factored anew.
 
-use super::prepared::{Prepared, sides};
+use super::stages::Built;
 use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
 use crate::ddm::{self, Method, Observer, Outcome, Row, Settings, Start, Status};
-use crate::discretize;
+use crate::discretize::{self, Discrete};
 use crate::error::Result;
 use crate::model::{Field, Model};
 use crate::output::{StepPairReport, StepReport};
-use crate::scene::Scene;
 use std::rc::Rc;
 
-/// Runs the steps of a scene, the last of which is its full load, and notes each in `prepared`. The outcome is that of the last
-/// one with the counts and the history of all. A step that ends badly leaves its start to the next one.
+/// Runs the steps of a scene, the last of which is its full load, and reports each. The outcome is that of the last one with the
+/// counts and the history of all. A step that ends badly leaves its start to the next one.
 ///
 /// # Errors
 /// Failures of the solver library.
 pub fn iterate(
-    scene: &Scene,
-    prepared: &mut Prepared,
+    built: &mut Built,
     method: &mut Method,
-    settings: &mut Settings,
+    settings: Settings,
     observer: &mut dyn Observer,
-) -> Result<Outcome> {
+) -> Result<(Outcome, Vec<StepReport>)> {
+    let Built { scene, discrete, .. } = built;
     let factors = &scene.method.steps;
-    let laws: Vec<Rc<dyn LayerLaw>> = prepared.problem.model.pairs.iter().map(|pair| pair.law.clone()).collect();
-    let (mut balance, interval) = (settings.balance.take(), std::mem::take(&mut settings.interval));
+    let laws: Vec<Rc<dyn LayerLaw>> = discrete.model.pairs.iter().map(|pair| pair.law.clone()).collect();
+    let Settings { stop, interval, mut balance, .. } = settings;
     let mut all = Steps { observer, rows: Vec::new(), factor: 1.0, step: 0, iterations: 0, sweeps: 0, seconds: 0.0 };
-    let mut skipped = 0;
+    let (mut reports, mut skipped) = (Vec::new(), 0);
     let mut before: Option<(Field, f64)> = None;
     loop {
         let factor = factors[all.step];
         (all.step, all.factor) = (all.step + 1, factor);
         let last = all.step == factors.len();
-        load(&mut prepared.problem.model, &laws, factor);
-        if last {
-            (settings.balance, settings.interval) = (balance.take(), interval);
-        }
-        match before.take() {
+        load(&mut discrete.model, &laws, factor);
+        let start = match before.take() {
             Some((field, share)) => {
-                settings.start = Start::Resume(rescaled(&prepared.problem.model, field, share / factor));
                 if let Method::Sweeps { acceleration, .. } = method {
                     acceleration.restart();
                 }
+                Start::Resume(rescaled(&discrete.model, field, share / factor))
             }
-            None => settings.start = discretize::start(scene, &prepared.problem, factor)?.into(),
-        }
-        let mut outcome = ddm::solve(&mut prepared.problem.model, method, settings, &mut all)?;
+            None => discretize::start(scene, discrete, factor)?.into(),
+        };
+        let balance = if last { balance.take() } else { None };
+        let mut settings = Settings { stop: stop.clone(), interval: interval && last, balance, start };
+        let mut outcome = ddm::solve(&mut discrete.model, method, &mut settings, &mut all)?;
         all.iterations += outcome.iterations;
         all.sweeps += outcome.sweeps;
         all.seconds += outcome.rows.last().map_or(0.0, |row| row.seconds);
         skipped += outcome.solves_skipped;
-        let entry = entry(prepared, &outcome, factor);
-        prepared.steps.push(entry);
+        reports.push(report(discrete, &outcome, factor));
         if last {
             (outcome.iterations, outcome.sweeps, outcome.solves_skipped) = (all.iterations, all.sweeps, skipped);
             outcome.rows = all.rows;
-            return Ok(outcome);
+            return Ok((outcome, reports));
         }
         if outcome.status.is_solved() || outcome.status == Status::IterationLimit {
             before = Some((outcome.iterate, factor));
@@ -85,11 +82,11 @@ fn rescaled(model: &Model, mut field: Field, ratio: f64) -> Field {
 }
 
 /// What the report says of a step.
-fn entry(prepared: &Prepared, outcome: &Outcome, factor: f64) -> StepReport {
-    let model = &prepared.problem.model;
+fn report(discrete: &Discrete, outcome: &Outcome, factor: f64) -> StepReport {
+    let model = &discrete.model;
     let pair = |i: usize| {
         let range = model.range(i);
-        let (layer, resultant) = (&outcome.layer, &model.pairs[i].resultant[sides(prepared, i)[0]]);
+        let (layer, resultant) = (&outcome.layer, &model.pairs[i].resultant[discrete.sides(i)[0]]);
         StepPairReport {
             force: std::array::from_fn(|k| {
                 range.clone().zip(resultant).fold(0.0, |sum, (q, row)| sum - factor * layer.force[q] * row[k])

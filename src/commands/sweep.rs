@@ -10,6 +10,7 @@ use crate::output::{Folder, Plot, Report, say, sci};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use std::path::PathBuf;
+use std::rc::Rc;
 
 /// What the user typed.
 pub struct Request {
@@ -36,7 +37,7 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
     let load = |values: &[String]| {
         let mut overrides = request.overrides.clone();
         overrides.extend(values.iter().zip(&axes).map(|(value, (key, _))| format!("{key}={value}")));
-        crate::scene::load(&request.scene, &overrides)
+        crate::scene::load(&request.scene, &overrides).map(Rc::new)
     };
     let scenes = agree(session, runs.iter().map(|values| load(values)).collect::<Result<Vec<_>>>())?;
     let folder = agree(session, Folder::create(folder_of(&scenes[0], request.folder.clone())))?;
@@ -47,16 +48,16 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
     let mut before = None;
     for (scene, values) in scenes.iter().zip(&runs) {
         let mut clock = Clock::default();
-        let mut prepared = reuse::prepare(session, scene, before.take(), &mut clock)?;
-        run::set_up(session, scene, &mut prepared, &mut clock)?;
-        let outcome = run::iterate(scene, &mut prepared, &mut Silent, &mut clock)?;
+        let built = reuse::build(session, scene.clone(), before.take(), &mut clock)?;
+        let ready = run::set_up(session, built, None, &mut clock)?;
+        let done = run::iterate(ready, &mut Silent, &mut clock)?;
         clock.total();
         // the table has nothing from inside the bodies
-        let recovered = if request.json { results::recover(&prepared, &outcome) } else { results::skipped(&prepared) };
-        let report = report::report(session, scene, &prepared, &outcome, &recovered, &clock);
-        exit = exit.max(report::exit_code(&prepared, &outcome));
+        let recovered = if request.json { results::recover(&done) } else { results::skipped(&done) };
+        let report = report::report(session, &done, &recovered, &clock);
+        exit = exit.max(report::exit_code(&done));
         if !first {
-            before = Some((scene, prepared));
+            before = Some(done);
             continue;
         }
         let label = label(&axes, values);
@@ -72,16 +73,16 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
                 sci(report.residual.unwrap_or(f64::NAN), 2)
             ));
         }
-        histories.push(report::convergence(&label, &outcome));
-        let pairs = &prepared.problem.model.pairs;
+        histories.push(report::convergence(&label, &done.outcome));
+        let pairs = &done.model().pairs;
         for i in (0..pairs.len()).filter(|&i| pairs[i].along_curve) {
-            pressures.push((i, report::main_axis(&pairs[i]).1, report::pressure(&label, &prepared, &outcome, i)));
-            if let Some(curve) = report::reference(&prepared.problem, i) {
+            pressures.push((i, report::main_axis(&pairs[i]).1, report::pressure(&label, &done, i)));
+            if let Some(curve) = report::reference(&done.built.discrete, i) {
                 reference.get_or_insert((i, curve));
             }
         }
         reports.push(report);
-        before = Some((scene, prepared));
+        before = Some(done);
     }
     if first {
         if scenes[0].output.plots {

@@ -16,7 +16,6 @@ pub mod interval;
 pub mod line;
 pub mod linear;
 mod newton;
-mod origin;
 pub mod ritz;
 mod robin;
 mod run;
@@ -28,6 +27,7 @@ pub mod stop;
 pub mod sweep;
 mod sweeps;
 
+use crate::model::origin;
 pub use balance::{Discretisation, SHARE};
 pub use coefficient::Coefficient;
 pub use extend::prepare;

@@ -10,14 +10,24 @@ use crate::mesh::{Asked, Checked, Duty, Mesh, Parts};
 use crate::problem::body::BodySpec;
 use crate::scene::Scene;
 
-/// Checks the mesh of a scene once: see [`Mesh::check`]. One entry a body that the mesh has.
+/// A mesh that holds what bodies must be.
+#[derive(Debug)]
+pub struct Verified<'a, const D: usize> {
+    /// The mesh.
+    pub mesh: &'a Mesh<D>,
+    /// What was found of each body, in the order of the scene; bodies that the mesh does not have are missing.
+    pub checked: Vec<Checked>,
+}
+
+/// Checks the mesh of a scene once: see [`Mesh::check`].
 ///
 /// # Errors
 /// What is no mesh of a body, with body, place and elements.
-pub fn verify<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Vec<Checked>> {
+pub fn verify<'a, const D: usize>(scene: &Scene, mesh: &'a Mesh<D>) -> Result<Verified<'a, D>> {
     let bodies: Vec<Asked> = scene.bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
-    mesh.check(&bodies, &contacts.collect::<Vec<_>>(), scene.auto.is_some())
+    let checked = mesh.check(&bodies, &contacts.collect::<Vec<_>>(), scene.auto.is_some())?;
+    Ok(Verified { mesh, checked })
 }
 
 /// A body with the groups that serve it.

@@ -118,13 +118,13 @@ pub fn solve(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> 
 fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Result<Answer> {
     let mut clock = Clock::default();
     let scene = scene::load(path, &[format!("method={}", recipe.value(residual))])?;
-    let mut prepared = run::prepare(session, &scene, &mut clock)?;
-    run::set_up(session, &scene, &mut prepared, &mut clock)?;
-    let outcome = run::iterate(&scene, &mut prepared, &mut Silent, &mut clock)?;
+    let built = run::build(session, scene, &mut clock)?;
+    let ready = run::set_up(session, built, None, &mut clock)?;
+    let done = run::iterate(ready, &mut Silent, &mut clock)?;
     let seconds = clock.total();
-    let recovered = results::recover(&prepared, &outcome);
-    let report = report::report(session, &scene, &prepared, &outcome, &recovered, &clock);
-    let model = &prepared.problem.model;
+    let recovered = results::recover(&done);
+    let report = report::report(session, &done, &recovered, &clock);
+    let (model, outcome) = (&done.built.discrete.model, done.outcome);
     Ok(Answer {
         status: report.status,
         message: report.message,

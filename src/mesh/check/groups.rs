@@ -81,39 +81,63 @@ impl<'a> InUse<'a> {
         edges
     }
 
-    /// Refuses a group that serves in part only, or whose simplices lie across its bodies. One that touches none is left to
-    /// the line of the scene that names it. Gives the number of its simplices.
-    pub fn judge<const D: usize>(&self, mesh: &Mesh<D>) -> Result<usize> {
+    /// Refuses a group that has a simplex twice, serves in part only, or whose simplices lie across its bodies. One that touches none is left to
+    /// the line of the scene that names it.
+    pub fn judge<const D: usize>(&self, mesh: &Mesh<D>) -> Result<()> {
         if self.group.dimension == D {
-            return Ok(0);
+            return Ok(());
+        }
+        if let Some(twice) = self.twice() {
+            return Err(self.refuse(mesh, twice, "stands twice in it", "mesh the geometry again"));
         }
         let any = self.found.iter().any(|found| found.serves);
         let Some(bad) = self.found.iter().position(|found| !found.serves && (any || found.touches)) else {
-            return Ok(self.found.len());
+            return Ok(());
         };
-        let points = &self.group.connectivity[bad * self.group.stride..][..=self.group.dimension];
-        let mean = |c: usize| points.iter().map(|&p| mesh.points[p as usize][c]).sum::<f64>() / points.len() as f64;
-        let place = (0..D).map(|c| mean(c).to_string()).collect::<Vec<_>>().join(", ");
-        let thing = match D - self.group.dimension {
-            1 => "facet",
-            _ if self.group.dimension == 0 => "point",
-            _ => "edge",
-        };
-        let name = &self.group.name;
-        let (what, help) = match self.duty {
-            Duty::Acts => (
-                format!("a {thing} of group `{name}` bounds no body that it serves, at ({place})"),
+        Err(match self.duty {
+            Duty::Acts => self.refuse(
+                mesh,
+                bad,
+                "bounds no body that it serves",
                 "loads, springs and contacts act on boundaries: let the group have those of its own bodies alone",
             ),
-            Duty::Holds => (
-                format!("a {thing} of group `{name}` belongs to no body of the scene, at ({place})"),
+            Duty::Holds => self.refuse(
+                mesh,
+                bad,
+                "belongs to no body of the scene",
                 "supports hold nodes of bodies: let the group have those of bodies alone",
             ),
+        })
+    }
+
+    /// A simplex that has the corners of an earlier one.
+    fn twice(&self) -> Option<usize> {
+        let corners = |index: usize| {
+            let mut corners = [NONE; 3];
+            let simplex = &self.group.connectivity[index * self.group.stride..][..=self.group.dimension];
+            corners.iter_mut().zip(simplex).for_each(|(corner, &point)| *corner = point);
+            corners.sort_unstable();
+            corners
         };
-        let error = Error::mesh(&mesh.path, None, what).help(help);
-        Err(match self.group.tags.get(bad) {
+        let mut seen = HashSet::with_capacity(self.group.len());
+        (0..self.group.len()).find(|&index| !seen.insert(corners(index)))
+    }
+
+    /// The refusal of a simplex of the group.
+    fn refuse<const D: usize>(&self, mesh: &Mesh<D>, index: usize, what: &str, help: &str) -> Error {
+        let points = &self.group.connectivity[index * self.group.stride..][..=self.group.dimension];
+        let mean = |c: usize| points.iter().map(|&p| mesh.points[p as usize][c]).sum::<f64>() / points.len() as f64;
+        let place = (0..D).map(|c| mean(c).to_string()).collect::<Vec<_>>().join(", ");
+        let thing = match (self.group.dimension, D) {
+            (0, _) => "point",
+            (1, 3) => "edge",
+            _ => "facet",
+        };
+        let message = format!("a {thing} of group `{}` {what}, at ({place})", self.group.name);
+        let error = Error::mesh(&mesh.path, None, message).help(help);
+        match self.group.tags.get(index) {
             Some(tag) => error.because(format!("it is element {tag} of the mesh file")),
             None => error,
-        })
+        }
     }
 }

@@ -118,7 +118,7 @@ impl<const D: usize> Mesh<D> {
         }
         let mut all: Vec<_> = in_use.into_iter().collect();
         all.sort_unstable_by_key(|((name, _), _)| *name);
-        all.iter().try_for_each(|(_, group)| group.judge(self).map(|_| ()))?;
+        all.iter().try_for_each(|(_, group)| group.judge(self))?;
         Ok(checked)
     }
 }

@@ -267,6 +267,8 @@ fn groups_lie_on_their_bodies() {
         let message = check(mesh, &[("bottom", duty)]).unwrap_err();
         assert!(message.contains(words) && message.contains("element 91"), "{message}");
     }
+    let message = check(&with_group(plane(), "bottom", 1, vec![0, 1, 1, 0]), &[("bottom", Duty::Acts)]).unwrap_err();
+    assert!(message.contains("stands twice in it") && message.contains("element 91"), "{message}");
     // the wrong mid-edge node
     let mut wrong = quadratic(&bottom);
     wrong.groups[1].connectivity.swap(2, 5);
