@@ -25,7 +25,7 @@ use crate::fem::{
     rigid::{self, FreeMotion, RigidMotion},
 };
 use crate::linalg::{Csr, axpy};
-use crate::mesh::{Checked, Mesh};
+use crate::mesh::Checked;
 use crate::model::{Body, BodySlot, Exchange, Model, Segment};
 use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
