@@ -15,6 +15,7 @@ mod part;
 mod springs;
 mod supports;
 mod surface;
+mod verify;
 
 use crate::contact::{self, ContactPair};
 
@@ -24,7 +25,7 @@ use crate::fem::{
     rigid::{self, FreeMotion, RigidMotion},
 };
 use crate::linalg::{Csr, axpy};
-use crate::mesh::Mesh;
+use crate::mesh::Checked;
 use crate::model::{Body, BodySlot, Exchange, Mechanism, Model, Segment};
 use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
@@ -39,6 +40,7 @@ use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use std::rc::Rc;
 pub use surface::ContactSurface;
+pub use verify::{Verified, verify};
 
 /// What every rank knows of a body before its owner assembles it.
 pub struct Outline<'a> {
@@ -89,6 +91,23 @@ pub struct Assembled {
     pub left: Vec<FreeMotion>,
 }
 
+/// What the check of the mesh of a body counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct FacetCounts {
+    /// Facets between two cells.
+    pub inner: usize,
+    /// Facets of the boundary.
+    pub outer: usize,
+    /// Parts that no facet joins.
+    pub parts: usize,
+}
+
+impl FacetCounts {
+    fn of(checked: &Checked) -> Self {
+        Self { inner: checked.inner, outer: checked.outer, parts: checked.parts.count }
+    }
+}
+
 /// What is known of a body besides its matrices.
 pub struct BodyInfo {
     /// Name in the scene.
@@ -97,6 +116,8 @@ pub struct BodyInfo {
     pub nodes: usize,
     /// Cells.
     pub cells: usize,
+    /// What the check of its mesh counted.
+    pub facets: FacetCounts,
     /// Degrees of freedom, supported ones included.
     pub dofs: usize,
     /// Supported degrees of freedom.
@@ -195,14 +216,16 @@ pub struct Discrete {
 /// other, surfaces that do not face each other; and failures of `factory`.
 pub fn discretize<const D: usize>(
     scene: &Scene,
-    mesh: &Mesh<D>,
+    verified: &Verified<D>,
     cut: contact::pieces::Cut<D>,
     ranks: (usize, usize),
     keep: bool,
     exchange: Box<dyn Exchange>,
     factory: &mut dyn Factory,
 ) -> Result<Discrete> {
+    let Verified { mesh, checked } = verified;
     let mut parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
+    parts.iter().zip(checked).try_for_each(|(part, checked)| verify::held(part, &checked.parts, mesh))?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
     for found in pairs::all(scene, mesh, cut, &parts, keep)? {
@@ -276,6 +299,7 @@ pub fn discretize<const D: usize>(
             name: name.clone(),
             nodes: space.nodes.len(),
             cells: space.cell_count(),
+            facets: FacetCounts::of(&checked[index]),
             dofs: space.dofs(),
             supported: held.supported(),
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),

@@ -114,6 +114,7 @@ impl Surface {
             name: name.to_owned(),
             dimension,
             stride: simplices[0].len(),
+            tags: Vec::new(),
             connectivity: simplices.concat(),
         };
         let groups = vec![group("body", D, cells), group("face", D - 1, facets)].into();

@@ -59,8 +59,9 @@ fn build_in<const D: usize>(
     clock: &mut Clock,
 ) -> Result<Built> {
     let mesh = mesh::<D>(session, &scene)?;
+    let mesh = agree(session, discretize::verify(&scene, &mesh))?;
     clock.phase("mesh");
-    let largest = mesh.points.len() * D;
+    let largest = mesh.mesh.points.len() * D;
     // small fronts and several ranks lose by BLAS threads, large factorisations gain
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
     let threads = if D == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };

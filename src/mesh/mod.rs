@@ -4,6 +4,7 @@
 //! text or binary) is read as it is. Everything downstream sees a [`Mesh`] only.
 
 mod cache;
+mod check;
 mod cursor;
 mod elements;
 mod gmsh;
@@ -23,9 +24,10 @@ mod tests;
 mod tokens;
 mod trust;
 
+pub use check::{Asked, Checked, Duty, Parts};
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, recall_final};
-pub use msh::read;
+pub use msh::{parse, read};
 pub use quality::Quality;
 pub use sizes::{follows, unstructured, view};
 pub use trust::{Breach, breach};

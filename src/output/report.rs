@@ -202,6 +202,12 @@ pub struct BodyReport {
     pub nodes: usize,
     /// Cells.
     pub cells: usize,
+    /// Facets between two cells, each found on opposite sides of it.
+    pub inner_facets: usize,
+    /// Facets of its boundary, which does not meet itself.
+    pub boundary_facets: usize,
+    /// Parts that no facet joins; one but for bodies in pieces.
+    pub parts: usize,
     /// Degrees of freedom.
     pub dofs: usize,
     /// Inner solver in words; empty if nothing was solved.
