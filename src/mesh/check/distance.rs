@@ -1,5 +1,7 @@
 //! Whether segments and triangles in space come nearer to each other than a distance.
 
+use robust::Coord3D;
+
 /// A point.
 pub type Point = [f64; 3];
 
@@ -59,6 +61,23 @@ pub fn from_triangle(x: Point, [a, b, c]: [Point; 3]) -> f64 {
     from_segment(x, [a, b]).min(from_segment(x, [b, c])).min(from_segment(x, [c, a]))
 }
 
+/// Which side of the plane through three points a fourth lies on: a sign without error of rounding, zero in the plane.
+fn side([a, b, c]: [Point; 3], x: Point) -> f64 {
+    let [a, b, c, x] = [a, b, c, x].map(|[x, y, z]| Coord3D { x, y, z });
+    robust::orient3d(a, b, c, x)
+}
+
+/// Whether a segment has a point of a triangle between its ends. In a flat boundary all determinants are zero but for rounding, and
+/// the sign of a rounded one tells nothing: hence exact signs.
+fn pierces([p, q]: [Point; 2], [a, b, c]: [Point; 3]) -> bool {
+    let ends = [p, q].map(|x| side([a, b, c], x));
+    if !(ends[0] < 0.0 && ends[1] > 0.0 || ends[0] > 0.0 && ends[1] < 0.0) {
+        return false;
+    }
+    let sides = [[a, b], [b, c], [c, a]].map(|[u, v]| side([p, q, u], v));
+    sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0)
+}
+
 /// Whether a segment and a triangle come within a distance.
 pub fn segment_triangle([p, q]: [Point; 2], [a, b, c]: [Point; 3], within: f64) -> bool {
     let normal = cross(minus(b, a), minus(c, a));
@@ -67,13 +86,7 @@ pub fn segment_triangle([p, q]: [Point; 2], [a, b, c]: [Point; 3], within: f64) 
     if from.min(to) > within * size || from.max(to) < -within * size {
         return false;
     }
-    let pierces = from * to < 0.0 && {
-        let direction = minus(q, p);
-        let side = |u: Point, v: Point| dot(cross(minus(u, p), minus(v, p)), direction);
-        let sides = [side(a, b), side(b, c), side(c, a)];
-        sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0)
-    };
-    pierces
+    pierces([p, q], [a, b, c])
         || from_triangle(p, [a, b, c]) <= within
         || from_triangle(q, [a, b, c]) <= within
         || [[a, b], [b, c], [c, a]].into_iter().any(|edge| segments([p, q], edge, within))
@@ -119,6 +132,25 @@ mod tests {
         assert!(!meets([0.2, 0.2, 1e-3], [0.2, 0.2, 1.0]));
         assert!(!meets([0.8, 0.8, -1.0], [0.8, 0.8, 1.0]));
         assert!(!meets([-1.0, 1.5, 0.0], [2.0, 1.5, 0.0]));
+    }
+
+    /// Triangles of a plane, turned so that no coordinate is exact, meet where their corners say so and nowhere else.
+    #[test]
+    fn triangles_of_a_turned_plane() {
+        let (u, v) = ([0.6, 0.37, -0.709_295_425_052_062_4], [0.1, 0.83, 0.517_559_123_1]);
+        let point = |s: f64, t: f64| -> Point { std::array::from_fn(|c| 0.123 + s * u[c] + t * v[c]) };
+        let mut meeting = [0; 2];
+        for k in 0..40_000 {
+            // a segment at s + t > 1, and in every second case one that enters the triangle
+            let [i, j, m] = [k % 37, k / 37 % 37, k / 1369].map(|i| f64::from(i) / 37.0);
+            let enters = k % 2 == 0;
+            let ends =
+                [point(1.0 + i, 0.1 + j), if enters { point(0.3 * m, 0.3 * j) } else { point(0.1 + m, 1.0 + i) }];
+            let found = segment_triangle(ends, [point(0.0, 0.0), point(1.0, 0.0), point(0.0, 1.0)], 1e-9);
+            assert_eq!(found, enters, "{k}");
+            meeting[usize::from(found)] += 1;
+        }
+        assert!(meeting.iter().all(|&count| count > 1000), "{meeting:?}");
     }
 
     #[test]
