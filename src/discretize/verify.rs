@@ -61,11 +61,13 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Re
     if part.left(&part.in_dofs(motions.concat())).len() <= whole {
         return Ok(());
     }
-    let is_free = |motions: &Vec<RigidMotion>| !part.left(&part.in_dofs(motions.clone())).is_empty();
-    let at = pad(space.nodes[nodes[motions.iter().position(is_free).unwrap_or(0)][0] as usize]);
+    // contact may hold a part that supports leave free in part: the one most free is the one that is meant
+    let free = |part_of: usize| part.left(&part.in_dofs(motions[part_of].clone())).len();
+    let most = (0..parts.count).min_by_key(|&part_of| std::cmp::Reverse(free(part_of))).unwrap_or(0);
+    let at = pad(space.nodes[nodes[most][0] as usize]);
     let (name, count) = (&part.spec.name.value, parts.count);
     let message =
-        format!("body `{name}` is in {count} parts that share no facet, and nothing holds that at {}", point(at));
+        format!("body `{name}` is in {count} parts that share no facet, and the one at {} is not held", point(at));
     Err(Error::mesh(&mesh.path, None, message)
         .help("make a body of each part, support each of them, or let them share facets (in the script: `Coherence;`)"))
 }
