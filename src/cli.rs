@@ -2,6 +2,7 @@
 
 use crate::commands::{bench, check, mesh, solve, sweep};
 use crate::error::{Error, Kind, Result};
+use crate::interrupt::Interrupt;
 use crate::petsc::Session;
 use crate::solver::options;
 use clap::{Args, Parser, Subcommand};
@@ -20,7 +21,7 @@ struct Cli {
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 converged, 1 not converged (results are written), 2 command line, 3 scene, 4 mesh, \
-5 solver or PETSc option, 6 file system.";
+5 solver or PETSc option, 6 file system, 130, 143 or 129 ended by SIGINT, SIGTERM or SIGHUP (results are written).";
 
 #[derive(Subcommand)]
 enum Command {
@@ -54,6 +55,12 @@ enum Solving {
         /// Write displacements and stresses of the bodies for ParaView (short for --set output.vtu=true)
         #[arg(long)]
         vtu: bool,
+        /// Minutes between checkpoints (short for --set output.checkpoint=T)
+        #[arg(long, value_name = "T")]
+        checkpoint: Option<String>,
+        /// Go on from the checkpoint in a folder of results
+        #[arg(long, value_name = "DIR")]
+        restart: Option<PathBuf>,
     },
     /// Build a scene's problem, solve nothing, and say what is there
     Check {
@@ -184,13 +191,15 @@ impl SceneArgs {
 }
 
 /// Flags of the program that begin with two dashes: with one they look like PETSc's.
-const TWO_DASHES: [&str; 12] = [
+const TWO_DASHES: [&str; 14] = [
     "-set",
     "-json",
     "-method",
     "-estimate",
     "-tolerance",
     "-vtu",
+    "-checkpoint",
+    "-restart",
     "-over",
     "-solver",
     "-order",
@@ -219,23 +228,27 @@ pub fn run(words: Vec<String>) -> i32 {
         }
     };
     // these start other programs and need neither MPI nor PETSc
+    let interrupt = match Interrupt::watch() {
+        Ok(interrupt) => interrupt,
+        Err(error) => return complain(&error),
+    };
     let alone = match cli.command {
-        Command::Bench(arguments) => bench::bench(&arguments.request(petsc)),
+        Command::Bench(arguments) => bench::bench(&interrupt, &arguments.request(petsc)),
         Command::Mesh { scene: OverriddenScene { scene, overrides }, output, json } => {
-            mesh::mesh(&mesh::Request { scene, overrides, output, json })
+            mesh::mesh(&interrupt, &mesh::Request { scene, overrides, output, json })
         }
-        Command::Solving(command) => return with_session(&petsc, command),
+        Command::Solving(command) => return with_session(&petsc, &interrupt, command),
     };
     alone.unwrap_or_else(|error| complain(&error))
 }
 
 /// Runs a command that solves.
-fn with_session(petsc: &[String], command: Solving) -> i32 {
+fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
     let session = match Session::start(petsc) {
         Ok(session) => session,
         Err(error) => return complain(&error),
     };
-    match dispatch(&session, command) {
+    match dispatch(&session, interrupt, command) {
         Ok(code) => code,
         Err(error) if error.is_silent() => error.kind().exit_code(),
         Err(error) => {
@@ -249,21 +262,24 @@ fn with_session(petsc: &[String], command: Solving) -> i32 {
     }
 }
 
-fn dispatch(session: &Session, command: Solving) -> Result<i32> {
+fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Result<i32> {
     match command {
-        Solving::Solve { scene, output, vtu } => {
+        Solving::Solve { scene, output, vtu, checkpoint, restart } => {
             let mut overrides = scene.overrides();
             overrides.extend(vtu.then(|| "output.vtu=true".to_owned()));
-            solve::solve(session, solve::Request { scene: scene.scene, folder: output, overrides, json: scene.json })
+            overrides.extend(checkpoint.map(|minutes| format!("output.checkpoint={minutes}")));
+            let request = solve::Request { scene: scene.scene, folder: output, restart, overrides, json: scene.json };
+            solve::solve(session, interrupt, request)
         }
         Solving::Check { scene } => {
             let overrides = scene.overrides();
-            check::check(session, scene.scene, overrides, scene.json)
+            check::check(session, interrupt, scene.scene, overrides, scene.json)
         }
         Solving::Sweep { scene, output, over } => {
             let overrides = scene.overrides();
             sweep::sweep(
                 session,
+                interrupt,
                 sweep::Request { scene: scene.scene, folder: output, overrides, over, json: scene.json },
             )
         }

@@ -56,7 +56,12 @@ pub enum Kind {
     Solver,
     /// The file system: exit code 6.
     File,
+    /// A signal with this number ended the program before it had results: exit code 128 and the number, as a shell has it.
+    Stopped(i32),
 }
+
+/// What a shell adds to the number of the signal that ended a program.
+const SIGNALLED: i32 = 128;
 
 impl Kind {
     /// Exit code of the process for this kind of error.
@@ -67,6 +72,7 @@ impl Kind {
             Kind::Mesh => 4,
             Kind::Solver => 5,
             Kind::File => 6,
+            Kind::Stopped(signal) => SIGNALLED + signal,
         }
     }
 }
@@ -129,7 +135,8 @@ impl Error {
     /// The end of a rank whose fellow has the words: not printed, same exit code.
     pub fn silent(exit_code: i32) -> Self {
         let kinds = [Kind::Usage, Kind::Scene, Kind::Mesh, Kind::Solver, Kind::File];
-        let kind = kinds.into_iter().find(|kind| kind.exit_code() == exit_code).unwrap_or(Kind::Solver);
+        let stopped = (exit_code > SIGNALLED).then(|| Kind::Stopped(exit_code - SIGNALLED));
+        let kind = kinds.into_iter().find(|kind| kind.exit_code() == exit_code).or(stopped).unwrap_or(Kind::Solver);
         Self::new(kind, String::new())
     }
 

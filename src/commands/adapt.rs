@@ -1,13 +1,15 @@
 //! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
 
+use super::checkpoint::{Checkpoint, Head, settings_digest};
 use super::clock::Clock;
 use super::prepared::Prepared;
 use super::run;
 use super::{carry, report};
-use crate::ddm::{Outcome, Start};
+use crate::ddm::{Outcome, Start, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Sizes};
+use crate::interrupt::Interrupt;
 use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::agree;
@@ -37,25 +39,36 @@ pub struct Plan {
     goal: Option<AdaptSpec>,
     /// The scene that follows a coarse one.
     finer: Option<Scene>,
+    /// Where the first round goes on.
+    resumed: Option<Checkpoint>,
+    settings: String,
     purpose: String,
     carried: Vec<ContactTable>,
     seconds: f64,
 }
 
 impl Plan {
-    /// The first round of a scene: its own mesh, a coarse one, or the one that an earlier run ended with.
+    /// The first round of a scene: its own mesh, a coarse one, the one that an earlier run ended with, or that of a checkpoint.
     ///
     /// # Errors
     /// A scene whose mesh cannot follow sizes; what [`run::prepare`] refuses.
-    pub fn new(session: &Session, scene: Scene, clock: &mut Clock) -> Result<Self> {
+    pub fn new(
+        session: &Session,
+        scene: Scene,
+        resumed: Option<Checkpoint>,
+        interrupt: &Interrupt,
+        clock: &mut Clock,
+    ) -> Result<Self> {
         let goal = scene.adapt.clone();
         let nested = matches!(scene.method.start, method::Start::Nested);
         let mut settings = scene.settings();
         ["output", "solver", "method"].iter().for_each(|key| settings[*key] = serde_json::Value::Null);
         let mut plan = Self {
             purpose: settings.to_string(),
+            settings: settings_digest(&scene),
             scene,
-            rounds: Vec::new(),
+            rounds: resumed.as_ref().map_or(Vec::new(), |checkpoint| checkpoint.head.rounds.clone()),
+            resumed,
             limit: None,
             goal,
             finer: None,
@@ -67,10 +80,18 @@ impl Plan {
         }
         agree(session, plan.refuse_finished_mesh())?;
         let bodies = plan.scene.bodies.len();
+        let adapts = plan.goal.is_some();
+        plan.scene.estimate |= adapts;
+        plan.scene.method.stop.balanced |= adapts;
+        if let Some(checkpoint) = &plan.resumed {
+            let sizes = checkpoint.head.sizes.clone();
+            follow(&mut plan.scene, sizes);
+            return Ok(plan);
+        }
         if plan.goal.is_none() {
             let mut coarse = plan.scene.clone();
             coarse.estimate = true;
-            let prepared = run::prepare(session, &coarse, clock)?;
+            let prepared = run::prepare(session, &coarse, interrupt, clock)?;
             let sizes = prepared.problem.meshes.as_ref().map(|meshes| sizes::scaled(&**meshes, bodies, 2.0));
             options::withdraw(session)?;
             coarse.method.stop.balanced = true;
@@ -78,17 +99,20 @@ impl Plan {
             plan.finer = Some(std::mem::replace(&mut plan.scene, coarse));
             return Ok(plan);
         }
-        plan.scene.estimate = true;
-        plan.scene.method.stop.balanced = true;
         let mut view_of_first = mesh::recall_final(&plan.purpose);
         if view_of_first.is_none() {
-            let prepared = run::prepare(session, &plan.scene, clock)?;
+            let prepared = run::prepare(session, &plan.scene, interrupt, clock)?;
             let sizes = prepared.problem.meshes.as_ref().map(|m| sizes::uniform(&**m, bodies, FIRST * bodies));
             options::withdraw(session)?;
             view_of_first = sizes.map(view);
         }
         follow(&mut plan.scene, view_of_first);
         Ok(plan)
+    }
+
+    /// Whether meshes are adapted to an error.
+    pub fn goal_is_open(&self) -> bool {
+        self.goal.is_some()
     }
 
     /// A mesh that is a file cannot follow sizes.
@@ -99,8 +123,30 @@ impl Plan {
             .help("let the scene name a Gmsh script: mesh = \"file.geo\""))
     }
 
+    /// Lets this round begin where a checkpoint or an earlier round ended.
+    ///
+    /// # Errors
+    /// The checkpoint is of another mesh.
+    pub fn begin(&mut self, prepared: &mut Prepared) -> Result<()> {
+        if let Some(checkpoint) = self.resumed.take() {
+            return checkpoint.resume(prepared);
+        }
+        prepared.start = self.start(&self.scene, prepared);
+        Ok(())
+    }
+
+    /// What a checkpoint of this round says of it; none of a coarse mesh that only gives the start.
+    pub fn head(&self, mesh: String) -> Option<Head> {
+        let sizes = match &self.scene.mesh {
+            MeshSource::Geo { sizes: Some(Sizing::View(view)), .. } => Some(view.to_string()),
+            _ => None,
+        };
+        let (settings, rounds) = (self.settings.clone(), self.rounds.clone());
+        self.finer.is_none().then(|| Head { settings, mesh, rounds, sizes, ..Head::default() })
+    }
+
     /// The start of this round, if an earlier one gives it.
-    pub fn start(&self, scene: &Scene, prepared: &Prepared) -> Option<Start> {
+    fn start(&self, scene: &Scene, prepared: &Prepared) -> Option<Start> {
         let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
         (!self.carried.is_empty()).then(|| match newton {
             true => Start::Pressure(carry::pressure(&self.carried, prepared)),
@@ -120,6 +166,9 @@ impl Plan {
         estimate: Option<&Estimate>,
         clock: &mut Clock,
     ) -> Result<bool> {
+        if matches!(outcome.status, Status::Paused { .. }) {
+            return Ok(false);
+        }
         let good = outcome.status.is_solved();
         let pairs = prepared.problem.model.pairs.len();
         if let Some(finer) = self.finer.take() {

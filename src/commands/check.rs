@@ -5,6 +5,7 @@ use super::prepared::Prepared;
 use super::run;
 use super::{load, preflight, report};
 use crate::error::Result;
+use crate::interrupt::Interrupt;
 use crate::output::{say, sci};
 use crate::petsc::Session;
 use crate::scene::Scene;
@@ -16,10 +17,16 @@ use std::path::PathBuf;
 ///
 /// # Errors
 /// Refusals of scene and mesh.
-pub fn check(session: &Session, path: PathBuf, overrides: Vec<String>, as_json: bool) -> Result<i32> {
+pub fn check(
+    session: &Session,
+    interrupt: &Interrupt,
+    path: PathBuf,
+    overrides: Vec<String>,
+    as_json: bool,
+) -> Result<i32> {
     let mut clock = Clock::default();
     let scene = load(session, &path, &overrides)?;
-    let prepared = run::prepare(session, &scene, &mut clock)?;
+    let prepared = run::prepare(session, &scene, interrupt, &mut clock)?;
     clock.total();
     let shared = report::Shared::gather(&prepared);
     if session.rank() != 0 {
@@ -35,9 +42,9 @@ pub fn check(session: &Session, path: PathBuf, overrides: Vec<String>, as_json: 
             value["bodies"][body]["rigid_motions_unheld"] = json!(info.left_by_all);
         }
         value["pairs"] = pairs(&scene, &prepared);
-        say(format_args!("{value:#}"));
+        say(format_args!("{value:#}"))?;
     } else {
-        print(&scene, &prepared, &report::solvers_in_words(&shared.solvers));
+        print(&scene, &prepared, &report::solvers_in_words(&shared.solvers))?;
     }
     Ok(0)
 }
@@ -66,18 +73,18 @@ fn gap_range(gap: &[f64]) -> (f64, f64) {
     (gap.iter().copied().fold(f64::INFINITY, f64::min), gap.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
-fn print(scene: &Scene, prepared: &Prepared, solvers: &str) {
-    say(&scene.title);
+fn print(scene: &Scene, prepared: &Prepared, solvers: &str) -> Result<()> {
+    say(&scene.title)?;
     for info in &prepared.problem.bodies {
         say(format_args!(
             "  body {}: {} cells, {} nodes, {} dofs, {} of them supported",
             info.name, info.cells, info.nodes, info.dofs, info.supported
-        ));
+        ))?;
         if !info.left_by_supports.is_empty() {
-            say(format_args!("    rigid motions left to contact: {}", info.left_by_supports.join("; ")));
+            say(format_args!("    rigid motions left to contact: {}", info.left_by_supports.join("; ")))?;
         }
         if !info.left_by_all.is_empty() {
-            say(format_args!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")));
+            say(format_args!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")))?;
         }
     }
     for (i, pair) in prepared.problem.model.pairs.iter().enumerate() {
@@ -92,7 +99,7 @@ fn print(scene: &Scene, prepared: &Prepared, solvers: &str) {
             pair.weight.iter().sum::<f64>(),
             sci(low, 3),
             sci(high, 3)
-        ));
+        ))?;
         let coupling = preflight::coupling(scene, prepared, i);
         say(format_args!(
             "    mean pressure {}, theta {:.3} and {:.3}; sweeps to expect for a residual of 1e-8: {}",
@@ -100,10 +107,11 @@ fn print(scene: &Scene, prepared: &Prepared, solvers: &str) {
             coupling.theta[0],
             coupling.theta[1],
             coupling.sweeps.iter().map(|(method, count)| format!("{method} {count:.0}")).collect::<Vec<_>>().join(", ")
-        ));
+        ))?;
     }
-    say(format_args!("  inner solver: {} ({})", solvers, prepared.choice));
+    say(format_args!("  inner solver: {} ({})", solvers, prepared.choice))?;
     for warning in &prepared.warnings {
-        say(format_args!("  warning: {warning}"));
+        say(format_args!("  warning: {warning}"))?;
     }
+    Ok(())
 }

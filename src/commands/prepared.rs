@@ -1,10 +1,12 @@
 //! A problem that is ready to be solved.
 
-use crate::ddm::{Method, Start};
+use crate::ddm::{Discretisation, Method, Row, Start};
 use crate::discretize::Problem;
+use crate::estimate::Nodal;
 use crate::model::BodySlot;
 use crate::output::StepReport;
 use crate::problem::method::Linear;
+use crate::scene::Scene;
 
 /// A problem that is ready to be solved, with what the user should know of its making.
 pub struct Prepared {
@@ -20,6 +22,8 @@ pub struct Prepared {
     pub choice: String,
     /// Load steps so far.
     pub steps: Vec<StepReport>,
+    /// Rows of load steps that another process made.
+    pub earlier: Vec<Row>,
     /// Warnings.
     pub warnings: Vec<String>,
     /// Names of the condensed bodies, with which another run can go on.
@@ -27,6 +31,11 @@ pub struct Prepared {
 }
 
 impl Prepared {
+    /// Who knows the error of the discretisation, if the scene lets the run end by it.
+    pub fn balance(&self, scene: &Scene) -> Option<Box<dyn Discretisation>> {
+        self.problem.meshes.clone().filter(|_| scene.method.stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _)
+    }
+
     /// Takes the condensed bodies out, their counts begun anew, for another scene with the same bodies.
     pub fn take_condensed(&mut self) -> Vec<BodySlot> {
         let mut slots = std::mem::take(&mut self.problem.model.bodies);

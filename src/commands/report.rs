@@ -1,5 +1,6 @@
 //! Outcome -> report, contact tables and plots.
 
+use super::asking;
 use super::balance;
 use super::clock::Clock;
 use super::preflight;
@@ -10,6 +11,7 @@ use super::verdict::{forecast, message, status_name};
 use crate::contact::ContactPair;
 use crate::ddm::{Outcome, Status};
 use crate::discretize::Problem;
+use crate::error::Kind;
 use crate::estimate::Estimate;
 use crate::model::BodyCounts;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
@@ -22,6 +24,7 @@ use crate::scene::Scene;
 pub fn exit_code(prepared: &Prepared, outcome: &Outcome) -> i32 {
     match outcome.status {
         Status::Converged | Status::RoundoffLimited if steps::warnings(&prepared.steps).is_empty() => 0,
+        Status::Paused { asked } => asking::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
 }

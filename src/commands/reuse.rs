@@ -5,6 +5,7 @@ use super::clock::Clock;
 use super::prepared::Prepared;
 use super::run;
 use crate::error::Result;
+use crate::interrupt::Interrupt;
 use crate::parallel::Ranks;
 use crate::petsc::Session;
 use crate::scene::Scene;
@@ -19,9 +20,10 @@ pub fn prepare(
     session: &Session,
     scene: &Scene,
     before: Option<(&Scene, Prepared)>,
+    interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Prepared> {
-    let Some((last, mut prepared)) = before else { return run::prepare(session, scene, clock) };
+    let Some((last, mut prepared)) = before else { return run::prepare(session, scene, interrupt, clock) };
     let same = |without: &[&str]| settings(last, without) == settings(scene, without);
     let condensed = prepared.condensed.len() == prepared.problem.bodies.len();
     // an estimate of the error needs the meshes, which are kept only for it
@@ -37,7 +39,7 @@ pub fn prepare(
     let kept = if same(&["gap", "layer", "reference"]) { prepared.take_condensed() } else { Vec::new() };
     drop(prepared);
     options::withdraw(session)?;
-    run::prepare_with(session, scene, kept, clock)
+    run::prepare_with(session, scene, kept, interrupt, clock)
 }
 
 /// A scene without what no body depends on, and without some keys of its contacts.

@@ -1,16 +1,19 @@
 //! From a scene to a solved problem: mesh, discretisation, inner solvers, options, iteration.
 
+use super::asking;
 use super::clock::Clock;
 use super::inner::{Inner, WHOLE};
+use super::keep::Keep;
 use super::method;
 use super::prepared::Prepared;
 use super::steps;
 use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::{self, Observer, Outcome, Settings, Status};
+use crate::ddm::{self, Method, Observer, Outcome, Settings, Start, Status};
 use crate::discretize::{self, Mechanism, Problem};
 use crate::error::{Error, Kind, Result};
-use crate::estimate::{self, Estimate, Nodal};
+use crate::estimate::{self, Estimate};
+use crate::interrupt::Interrupt;
 use crate::model::BodySlot;
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
@@ -29,22 +32,28 @@ const LARGE_FRONTS: usize = 30_000;
 ///
 /// # Errors
 /// Refusals of scene and mesh, printed on one rank; failures of PETSc.
-pub fn prepare(session: &Session, scene: &Scene, clock: &mut Clock) -> Result<Prepared> {
-    prepare_with(session, scene, Vec::new(), clock)
+pub fn prepare(session: &Session, scene: &Scene, interrupt: &Interrupt, clock: &mut Clock) -> Result<Prepared> {
+    prepare_with(session, scene, Vec::new(), interrupt, clock)
 }
 
 /// The same, with the bodies `kept` from an earlier scene.
 ///
 /// # Errors
 /// Those of [`prepare`].
-pub fn prepare_with(session: &Session, scene: &Scene, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared> {
+pub fn prepare_with(
+    session: &Session,
+    scene: &Scene,
+    kept: Vec<BodySlot>,
+    interrupt: &Interrupt,
+    clock: &mut Clock,
+) -> Result<Prepared> {
     agree(session, refuse(scene))?;
     agree(session, scene_options(session, scene))?;
     let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
     options::distribute(session, &names)?;
     match scene.dimension.value {
-        2 => build::<2>(session, scene, pieces::plane, kept, clock),
-        _ => build::<3>(session, scene, pieces::space, kept, clock),
+        2 => build::<2>(session, scene, pieces::plane, kept, interrupt, clock),
+        _ => build::<3>(session, scene, pieces::space, kept, interrupt, clock),
     }
 }
 
@@ -54,9 +63,12 @@ fn build<const D: usize>(
     scene: &Scene,
     cut: Cut<D>,
     kept: Vec<BodySlot>,
+    interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Prepared> {
-    let mesh = mesh::<D>(session, scene)?;
+    interrupt.hold();
+    let mesh = mesh::<D>(session, scene, interrupt)?;
+    interrupt.release()?;
     clock.phase("mesh");
     let largest = mesh.points.len() * D;
     // small fronts and several ranks lose by BLAS threads, large factorisations gain
@@ -79,6 +91,7 @@ fn build<const D: usize>(
         linear: inner.linear(),
         method: None,
         steps: Vec::new(),
+        earlier: Vec::new(),
         choice: inner.reason(),
         warnings,
         condensed,
@@ -113,9 +126,9 @@ fn scene_options(session: &Session, scene: &Scene) -> Result<()> {
 }
 
 /// The mesh: one rank lets Gmsh work, then every rank reads.
-fn mesh<const D: usize>(session: &Session, scene: &Scene) -> Result<crate::mesh::Mesh<D>> {
+fn mesh<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<crate::mesh::Mesh<D>> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let load = || crate::mesh::load::<D>(&scene.mesh, order).map(|loaded| loaded.mesh);
+    let load = || crate::mesh::load_unless::<D>(&scene.mesh, order, interrupt).map(|loaded| loaded.mesh);
     if session.size() == 1 {
         return load();
     }
@@ -228,34 +241,63 @@ pub fn set_up(session: &Session, scene: &Scene, prepared: &mut Prepared, clock: 
     Ok(())
 }
 
-/// Iterates.
+/// Iterates. From here on a signal ends the run after its step, and lets its results be written.
 ///
 /// # Errors
 /// Failures of PETSc; not converging is a status of the outcome.
 pub fn iterate(
     scene: &Scene,
     prepared: &mut Prepared,
+    interrupt: &Interrupt,
     observer: &mut dyn Observer,
+    keep: &mut dyn Keep,
     clock: &mut Clock,
 ) -> Result<Outcome> {
-    let stop = &scene.method.stop;
-    prepared.steps.clear();
-    let mut settings = Settings {
-        stop: stop.clone(),
-        interval: scene.method.interval,
-        balance: prepared.problem.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _),
-        start: prepared.start.take().unwrap_or_default(),
-    };
+    interrupt.hold();
+    let start = prepared.start.take().unwrap_or_default();
+    if !matches!(start, Start::Continue(_)) {
+        prepared.steps.clear();
+        prepared.earlier.clear();
+    }
+    let mut settings =
+        Settings { stop: scene.method.stop.clone(), interval: scene.method.interval, balance: None, start };
     let Some(mut method) = prepared.method.take() else {
         return Err(Error::new(Kind::Solver, "a run was begun before its method was made"));
     };
     let outcome = match scene.method.steps.is_empty() {
-        true => ddm::solve(&mut prepared.problem.model, &mut method, &mut settings, observer)?,
-        false => steps::iterate(scene, prepared, &mut method, &mut settings, observer)?,
+        true => at_once(scene, prepared, &mut method, &mut settings, observer, keep)?,
+        false => steps::iterate(scene, prepared, &mut method, &mut settings, observer, keep)?,
     };
     prepared.method = Some(method);
     clock.phase("iterate");
     Ok(outcome)
+}
+
+/// Runs the full load until a rule or a signal ends it.
+fn at_once(
+    scene: &Scene,
+    prepared: &mut Prepared,
+    method: &mut Method,
+    settings: &mut Settings,
+    observer: &mut dyn Observer,
+    keep: &mut dyn Keep,
+) -> Result<Outcome> {
+    if let Start::Continue(state) = &settings.start {
+        state.rows.iter().for_each(|row| observer.row(row));
+    }
+    loop {
+        settings.balance = prepared.balance(scene);
+        let outcome = ddm::solve(&mut prepared.problem.model, method, settings, observer)?;
+        let Status::Paused { asked } = outcome.status else { return Ok(outcome) };
+        keep.state(prepared, &outcome, &[]);
+        if asking::signal(asked).is_some() {
+            return Ok(outcome);
+        }
+        if asking::is_snapshot(asked) {
+            keep.results(prepared, &outcome);
+        }
+        settings.start = Start::Continue(outcome.into_state());
+    }
 }
 
 /// Estimates the error of what a run found, if the scene asks for it.

@@ -3,19 +3,22 @@
 //! At a share s of all loads and prescribed displacements, u/s solves the problem of the full loads with the gap d/s and the layer
 //! p(s c)/s. So a step changes gaps and laws alone: no body is assembled, reduced or factored anew.
 
+use super::asking;
+use super::keep::Keep;
 use super::prepared::{Prepared, sides};
 use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
 use crate::ddm::{self, Method, Observer, Outcome, Row, Settings, Start, Status};
 use crate::discretize;
 use crate::error::Result;
-use crate::model::{Field, Model};
+use crate::model::{Field, Layer, Model};
 use crate::output::{StepPairReport, StepReport};
 use crate::scene::Scene;
 use std::rc::Rc;
 
 /// Runs the steps of a scene, the last of which is its full load, and notes each in `prepared`. The outcome is that of the last
-/// one with the counts and the history of all. A step that ends badly leaves its start to the next one.
+/// one with the counts and the history of all. A step that ends badly leaves its start to the next one; one that a signal ends is the
+/// last.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -25,21 +28,20 @@ pub fn iterate(
     method: &mut Method,
     settings: &mut Settings,
     observer: &mut dyn Observer,
+    keep: &mut dyn Keep,
 ) -> Result<Outcome> {
     let factors = &scene.method.steps;
     let laws: Vec<Rc<dyn LayerLaw>> = prepared.problem.model.pairs.iter().map(|pair| pair.law.clone()).collect();
-    let (mut balance, interval) = (settings.balance.take(), std::mem::take(&mut settings.interval));
-    let mut all = Steps { observer, rows: Vec::new(), factor: 1.0, step: 0, iterations: 0, sweeps: 0, seconds: 0.0 };
+    let interval = std::mem::take(&mut settings.interval);
+    let mut all = Steps::new(observer, prepared);
     let mut skipped = 0;
     let mut before: Option<(Field, f64)> = None;
     loop {
         let factor = factors[all.step];
-        (all.step, all.factor) = (all.step + 1, factor);
+        (all.step, all.factor, all.first) = (all.step + 1, factor, all.rows.len());
         let last = all.step == factors.len();
         load(&mut prepared.problem.model, &laws, factor);
-        if last {
-            (settings.balance, settings.interval) = (balance.take(), interval);
-        }
+        settings.interval = interval && last;
         match before.take() {
             Some((field, share)) => {
                 settings.start = Start::Resume(rescaled(&prepared.problem.model, field, share / factor));
@@ -47,16 +49,49 @@ pub fn iterate(
                     acceleration.restart();
                 }
             }
-            None => settings.start = discretize::start(scene, &prepared.problem, factor)?.into(),
+            None => match &settings.start {
+                Start::Continue(state) => state.rows.iter().for_each(|row| all.row(row)),
+                _ => settings.start = discretize::start(scene, &prepared.problem, factor)?.into(),
+            },
         }
-        let mut outcome = ddm::solve(&mut prepared.problem.model, method, settings, &mut all)?;
+        let mut outcome = loop {
+            settings.balance = if last { prepared.balance(scene) } else { None };
+            let outcome = ddm::solve(&mut prepared.problem.model, method, settings, &mut all)?;
+            let Status::Paused { asked } = outcome.status else { break outcome };
+            keep.state(prepared, &outcome, &all.rows[..all.first]);
+            if asking::signal(asked).is_some() {
+                break outcome;
+            }
+            if asking::is_snapshot(asked) {
+                let entry = entry(prepared, &outcome, factor);
+                prepared.steps.push(entry);
+                let mut shown = outcome.clone();
+                whole(&mut prepared.problem.model, &laws, &mut shown, factor);
+                shown.rows.clone_from(&all.rows);
+                shown.iterations += all.iterations;
+                shown.sweeps += all.sweeps;
+                keep.results(prepared, &shown);
+                prepared.steps.pop();
+                load(&mut prepared.problem.model, &laws, factor);
+            }
+            settings.start = Start::Continue(outcome.into_state());
+        };
         all.iterations += outcome.iterations;
         all.sweeps += outcome.sweeps;
         all.seconds += outcome.rows.last().map_or(0.0, |row| row.seconds);
         skipped += outcome.solves_skipped;
         let entry = entry(prepared, &outcome, factor);
         prepared.steps.push(entry);
-        if last {
+        let interrupted = matches!(outcome.status, Status::Paused { .. });
+        if interrupted && !last {
+            prepared.warnings.push(format!(
+                "interrupted in load step {} of {}: pressures and displacements are those of {factor} of the loads",
+                all.step,
+                factors.len()
+            ));
+        }
+        if last || interrupted {
+            whole(&mut prepared.problem.model, &laws, &mut outcome, factor);
             (outcome.iterations, outcome.sweeps, outcome.solves_skipped) = (all.iterations, all.sweeps, skipped);
             outcome.rows = all.rows;
             return Ok(outcome);
@@ -74,6 +109,18 @@ fn load(model: &mut Model, laws: &[Rc<dyn LayerLaw>], factor: f64) {
         // the full load is the scene itself, to the last digit
         pair.law = if factor == 1.0 { law.clone() } else { Rc::new(Scaled { law: law.clone(), factor }) };
     }
+}
+
+/// Brings an outcome at a share of the loads, and the model, to the units of the scene. Displacements that supports prescribe are in
+/// the states of bodies, or are added to them in full where those are condensed.
+fn whole(model: &mut Model, laws: &[Rc<dyn LayerLaw>], outcome: &mut Outcome, factor: f64) {
+    if factor == 1.0 {
+        return;
+    }
+    load(model, laws, 1.0);
+    let zero = outcome.iterate.zero_like();
+    outcome.iterate.add_to(factor, &zero);
+    outcome.layer = Layer::new(model, outcome.layer.compression.iter().map(|c| factor * c).collect());
 }
 
 /// The same displacements in other shares: what supports prescribe is a part of a state that stays.
@@ -123,9 +170,22 @@ struct Steps<'a> {
     factor: f64,
     /// Steps begun.
     step: usize,
+    /// Rows of the steps before.
+    first: usize,
     iterations: usize,
     sweeps: usize,
     seconds: f64,
+}
+
+impl<'a> Steps<'a> {
+    /// After the steps that another process made.
+    fn new(observer: &'a mut dyn Observer, prepared: &mut Prepared) -> Self {
+        let rows = std::mem::take(&mut prepared.earlier);
+        rows.iter().for_each(|row| observer.row(row));
+        let (sweeps, seconds) = rows.last().map_or((0, 0.0), |row| (row.sweeps, row.seconds));
+        let iterations = prepared.steps.iter().map(|step| step.iterations).sum();
+        Self { observer, factor: 1.0, step: prepared.steps.len(), first: rows.len(), rows, iterations, sweeps, seconds }
+    }
 }
 
 impl Observer for Steps<'_> {
@@ -138,6 +198,10 @@ impl Observer for Steps<'_> {
         row.energy *= self.factor * self.factor;
         self.observer.row(&row);
         self.rows.push(row);
+    }
+
+    fn asked(&self) -> u8 {
+        self.observer.asked()
     }
 
     fn note(&mut self, text: &str) {

@@ -5,18 +5,22 @@
 //! PETSc.
 
 pub mod acceleration;
+mod asks;
 mod balance;
 mod bound;
 mod coefficient;
 mod extend;
+mod forcing;
 pub mod forecast;
 pub mod gamma;
 pub mod history;
 pub mod interval;
 pub mod line;
 pub mod linear;
+mod memory;
 mod newton;
 mod origin;
+mod progress;
 pub mod ritz;
 mod robin;
 mod run;
@@ -28,13 +32,14 @@ pub mod stop;
 pub mod sweep;
 mod sweeps;
 
+pub use asks::ASKS;
 pub use balance::{Discretisation, SHARE};
 pub use coefficient::Coefficient;
 pub use extend::prepare;
 pub use forecast::Forecast;
 pub use history::{Observer, Row, Silent};
 pub use interval::Interval;
-pub use solve::{Method, Outcome, Settings, Start, first_springs, solve};
+pub use solve::{Method, Outcome, Settings, Start, State, first_springs, solve};
 pub use stop::Status;
 pub use sweep::Sweep;
 pub use sweeps::Sweeps;

@@ -11,9 +11,11 @@
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
 use super::bound::{Gap, Reached, contact_energy};
+use super::forcing::SHARE;
 use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
+use super::stop::Status;
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
@@ -26,17 +28,16 @@ use crate::model::linear::{LinearStep, System};
 /// Failures of the solver library. Not converging is a status.
 pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
     let rho = meeting_slopes(run.model);
-    let (mut forcing, mut progress) = (Forcing::default(), Progress::default());
     loop {
         let springs = resisting(run.model, places.springs(run.model));
         let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
         let (r, _) = residual(run.model, &u, &force);
-        let reduction = forcing.reduction();
-        let most = forcing.most(contact_energy(run.model, &places));
+        let reduction = run.memory.forcing.reduction();
+        let most = run.memory.forcing.most(contact_energy(run.model, &places));
         let system = System { model: run.model, places: &places, springs: &springs, residual: &r, reduction, most };
         let x = match linear.solve(system)? {
             Ok(solution) => solution,
-            Err(failure) => return Ok(End::failed(failure, u, places, linear.sweeps())),
+            Err(failure) => return Ok(run.end(Status::InnerSolver(failure), u, places, linear)),
         };
         u.add(1.0, &x.field);
         u.retrace(run.model);
@@ -64,80 +65,23 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             }
         }
         if let Some(status) = run.end_of_step(&u, &x.field, &measured, &reached, &met, linear)? {
-            return Ok(End { status, iterate: u, layer: met, weight: Vec::new(), sweeps: linear.sweeps(), skipped: 0 });
+            return Ok(run.end(status, u, met, linear));
         }
-        forcing.learn(&gap, &reached, run.stop.residual);
+        run.memory.forcing.learn(&gap, &reached, run.stop.residual);
         // a step that knew of no contact runs through the other body
         let blind = places.closed == 0 && met.closed > 0;
-        let lost = progress.is_lost(gap.change, measured.f1) || blind;
+        let lost = run.memory.progress.is_lost(gap.change, measured.f1) || blind;
         if lost {
-            progress.f1 += search(run.model, &mut u, &x.field)?;
+            run.memory.progress.f1 += search(run.model, &mut u, &x.field)?;
         } else {
-            progress.f1 = measured.f1;
+            run.memory.progress.f1 = measured.f1;
         }
         if exact {
             places = if lost { Layer::at(run.model, &u.trace) } else { met };
         }
-    }
-}
-
-/// How far inexact linear steps are solved.
-#[derive(Debug)]
-struct Forcing(f64);
-
-/// Error of the first linear step of an inexact solver, as a share of it: its places are a guess of the start.
-const FIRST: f64 = 1e-2;
-
-/// Share of what the places missed last that an inexact step may miss, too.
-const SHARE: f64 = 0.1;
-
-impl Default for Forcing {
-    fn default() -> Self {
-        Self(FIRST)
-    }
-}
-
-impl Forcing {
-    fn reduction(&self) -> f64 {
-        self.0
-    }
-
-    /// The error of a step in the energy norm that leaves the pressures of a contact with this energy a digit: else stiff layers answer
-    /// errors of compressions with any pressure.
-    fn most(&self, contact: f64) -> f64 {
-        if contact > 0.0 { SHARE * contact.sqrt() } else { f64::INFINITY }
-    }
-
-    /// After a step with this gap: the next may miss a share of what this one did, and need not do better than what the run asks for.
-    fn learn(&mut self, gap: &Gap, reached: &Reached, target: Option<f64>) {
-        let enough = SHARE * target.unwrap_or(0.0) / reached.error.max(reached.pressure);
-        self.0 = (SHARE * gap.share).max(enough).clamp(f64::EPSILON.sqrt(), FIRST);
-    }
-}
-
-/// Recognises steps that lead nowhere: stiff linear layers on few quadratic elements can come into a cycle of places, two of 4879
-/// random scenes did.
-#[derive(Debug)]
-struct Progress {
-    /// Least work that a step changed, steps since, and F1 where the last step began.
-    best: f64,
-    since: usize,
-    f1: f64,
-}
-
-impl Default for Progress {
-    fn default() -> Self {
-        Self { best: f64::INFINITY, since: 0, f1: f64::INFINITY }
-    }
-}
-
-impl Progress {
-    /// Whether two steps in a row have changed more than an earlier one, and the last one raised F1. Then no step does until one
-    /// changes less than all before: places are those of traces, along which Newton's steps descend.
-    fn is_lost(&mut self, change: f64, f1: f64) -> bool {
-        self.since = if change < self.best { 0 } else { self.since + 1 };
-        self.best = self.best.min(change);
-        self.since >= 2 && f1 > self.f1
+        if measured.asked != 0 {
+            return Ok(run.end(Status::Paused { asked: measured.asked }, u, places, linear));
+        }
     }
 }
 

@@ -1,10 +1,17 @@
 //! Calls the program Gmsh.
 
 use crate::error::{Error, Kind, Result};
+use crate::interrupt::{self, Interrupt};
 use crate::problem::order::Order;
+use signal_hook::consts::SIGXFSZ;
+use std::fs::File;
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::UNIX_EPOCH;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, UNIX_EPOCH};
+
+/// Time between looks at a Gmsh at work.
+const LOOK: Duration = Duration::from_millis(5);
 
 /// The installed Gmsh.
 pub struct Gmsh {
@@ -39,15 +46,15 @@ impl Gmsh {
     /// they would change meshes without changing the key in the cache.
     ///
     /// # Errors
-    /// Gmsh fails; its own messages are the causes.
+    /// Gmsh fails; its own messages are the causes. A signal, or a limit on the size of files, ends it.
     pub fn run(
         &self,
         script: &Path,
         set: &[(String, f64)],
         times: f64,
         (dimension, order): (usize, Order),
-        output: &Path,
-        home: &Path,
+        (output, home): (&Path, &Path),
+        interrupt: &Interrupt,
     ) -> Result<()> {
         let mut command = Command::new(&self.program);
         command.arg(format!("-{dimension}"));
@@ -69,18 +76,45 @@ impl Gmsh {
                 command.env_remove(&name);
             }
         }
-        let result = command.output().map_err(|cause| Error::file(&self.program, "run", &cause))?;
-        if result.status.success() && output.is_file() {
+        // a file, unlike a pipe, takes all it says without anybody reading
+        let said = home.join("said");
+        let file = File::create(&said).map_err(|cause| Error::file(&said, "write", &cause))?;
+        let both = file.try_clone().map_err(|cause| Error::file(&said, "write", &cause))?;
+        command.stdout(file).stderr(both);
+        let failed = |cause: std::io::Error| Error::file(&self.program, "run", &cause);
+        let status = wait(command.spawn().map_err(failed)?, interrupt)?;
+        if status.success() && output.is_file() {
             return Ok(());
         }
-        let said = [result.stdout, result.stderr].concat();
-        let mut error = Error::mesh(script, None, format!("Gmsh cannot mesh this script ({})", result.status));
+        if status.signal() == Some(SIGXFSZ) {
+            return Err(Error::file(output, "write", &std::io::ErrorKind::FileTooLarge.into())
+                .help("there is a limit on the size of files (ulimit -f)"));
+        }
+        let said = std::fs::read(&said).unwrap_or_default();
+        let mut error = Error::mesh(script, None, format!("Gmsh cannot mesh this script ({status})"));
         let causes = complaints(&String::from_utf8_lossy(&said));
         for cause in &causes {
             error = error.because(cause);
         }
         let again = format!("gmsh -{dimension} {}", script.display());
         Err(if causes.is_empty() { error.help(format!("see what it says: {again}")) } else { error })
+    }
+}
+
+/// Waits for a child, which a signal ends.
+fn wait(mut child: Child, interrupt: &Interrupt) -> Result<ExitStatus> {
+    let failed = |cause: std::io::Error| Error::new(Kind::Mesh, "Gmsh cannot be waited for").because(cause.to_string());
+    loop {
+        if let Some(status) = child.try_wait().map_err(failed)? {
+            return Ok(status);
+        }
+        if let Some(signal) = interrupt.asked() {
+            // one that has just ended needs no end
+            let _ = child.kill();
+            child.wait().map_err(failed)?;
+            return Err(interrupt::ended(signal));
+        }
+        std::thread::sleep(LOOK);
     }
 }
 

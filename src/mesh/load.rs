@@ -5,6 +5,7 @@ use super::gmsh::Gmsh;
 use super::script::Script;
 use super::{Mesh, msh};
 use crate::error::{Error, Located, Result};
+use crate::interrupt::Interrupt;
 use crate::problem::mesh::{MeshSource, Sizing};
 use crate::problem::order::Order;
 use std::path::{Path, PathBuf};
@@ -40,13 +41,21 @@ pub enum Origin {
 /// A file that cannot be read, a number that the script does not take, Gmsh missing or failing, a mesh that is not one
 /// of named simplices in `D` dimensions (see [`read`](super::read)), or of too low an order.
 pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<D>> {
+    load_unless(source, order, &Interrupt::default())
+}
+
+/// [`load`], unless a signal ends it.
+///
+/// # Errors
+/// Those of [`load`], and the signal.
+pub fn load_unless<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes } => {
             let script = Script::read(&file.value).map_err(|error| error.at(&file.place))?;
             for ((name, _), place) in set.iter().zip(places) {
                 script.check(name, &Located::new(file.value.clone(), place.clone()))?;
             }
-            from_script(file, set, sizes.as_ref(), order, &folders())?
+            from_script(file, set, sizes.as_ref(), order, &folders(), interrupt)?
         }
         MeshSource::Msh { file } => from_file(file, order)?,
     };
@@ -58,7 +67,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<
 
 fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order) -> Result<Loaded<D>> {
     let path = &file.value;
-    let bytes = std::fs::read(path).map_err(|cause| Error::file(path, "read", &cause).at(&file.place))?;
+    let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
     let mesh = msh::parse(path, &bytes, false)?;
     let mesh = match (mesh.order, order) {
         (Order::P2, Order::P1) => mesh.lower_order(),
@@ -82,6 +91,7 @@ pub(super) fn from_script<const D: usize>(
     sizes: Option<&Sizing>,
     order: Order,
     folders: &[PathBuf],
+    interrupt: &Interrupt,
 ) -> Result<Loaded<D>> {
     let path = &file.value;
     let script = Script::read(path).map_err(|error| error.at(&file.place))?;
@@ -106,9 +116,10 @@ pub(super) fn from_script<const D: usize>(
         Some(Sizing::Times(times)) => (None, *times),
         None => (None, 1.0),
     };
-    gmsh.run(sized.as_deref().unwrap_or(path), set, times, (D, order), &made, workshop.path())?;
-    let bytes = std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause))?;
-    let mesh = checked(path, &bytes, order)?;
+    let ran = gmsh.run(sized.as_deref().unwrap_or(path), set, times, (D, order), (&made, workshop.path()), interrupt);
+    let read = ran.and_then(|()| std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause)));
+    // half a file is no fault of the script
+    let mesh = read.and_then(|bytes| checked(path, &bytes, order)).map_err(|error| workshop.blame(error))?;
     Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })
 }
 

@@ -21,7 +21,7 @@ mod sizes;
 mod tests;
 
 pub use groups::{Group, Groups};
-pub use load::{Loaded, Origin, keep_final, load, recall_final};
+pub use load::{Loaded, Origin, keep_final, load, load_unless, recall_final};
 pub use msh::read;
 pub use quality::Quality;
 pub use sizes::{follows, view};

@@ -97,7 +97,7 @@ fn the_groove_is_read() {
         StopRule { residual: None, increment: Some(1e-3), balanced: false, iterations: 2000 }
     );
     assert_eq!(scene.solver, SolverSpec { preset: None, options: vec![] });
-    assert_eq!(scene.output, OutputSpec { dir: None, vtu: false, plots: true });
+    assert_eq!(scene.output, OutputSpec::default());
 }
 
 #[test]

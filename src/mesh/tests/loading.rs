@@ -1,6 +1,7 @@
 //! From scripts and files to meshes, with the cache.
 
 use super::*;
+use crate::interrupt::Interrupt;
 use crate::mesh::load::from_script;
 use crate::mesh::{Origin, follows, load};
 use crate::problem::mesh::{MeshSource, Sizing};
@@ -13,7 +14,9 @@ fn scripts_are_meshed_once_for_each_key() {
     let part = folder.path().join("part.geo");
     std::fs::write(&geo, "Include \"part.geo\";\n").unwrap();
     std::fs::write(&part, SQUARE).unwrap();
-    let run = |n: f64, order| from_script::<2>(&located(geo.clone()), &[("n".into(), n)], None, order, &cache).unwrap();
+    let run = |n: f64, order| {
+        from_script::<2>(&located(geo.clone()), &[("n".into(), n)], None, order, &cache, &Interrupt::default()).unwrap()
+    };
 
     let first = run(4.0, Order::P1);
     assert_eq!(first.origin, Origin::Gmsh);
@@ -49,7 +52,8 @@ fn larger_elements() {
     let cache = [folder.path().join("cache")];
     let geo = folder.path().join("free.geo");
     let run = |sizes: Option<&Sizing>| {
-        let loaded = from_script::<2>(&located(geo.clone()), &[], sizes, Order::P1, &cache).unwrap();
+        let loaded =
+            from_script::<2>(&located(geo.clone()), &[], sizes, Order::P1, &cache, &Interrupt::default()).unwrap();
         let follows =
             follows(&MeshSource::Geo { file: located(geo.clone()), set: vec![], places: vec![], sizes: None });
         (loaded.origin, loaded.mesh.group("left").unwrap().len(), follows)
@@ -71,7 +75,7 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
     let refuse = |script: &str, set: &[(String, f64)], order| {
         let geo = folder.path().join("a.geo");
         std::fs::write(&geo, script).unwrap();
-        from_script::<2>(&located(geo), set, None, order, &cache).unwrap_err().to_string()
+        from_script::<2>(&located(geo), set, None, order, &cache, &Interrupt::default()).unwrap_err().to_string()
     };
     let message = refuse("Line(1) = {1, 7};", &[], Order::P1);
     assert!(message.contains("a.geo: Gmsh cannot mesh this script"), "{message}");
@@ -111,7 +115,7 @@ fn loads_at_the_same_time_do_not_meet() {
     let cache = [folder.path().join("cache")];
     let geo = folder.path().join("a.geo");
     std::fs::write(&geo, SQUARE).unwrap();
-    let load = || from_script::<2>(&located(geo.clone()), &[], None, Order::P1, &cache).unwrap();
+    let load = || from_script::<2>(&located(geo.clone()), &[], None, Order::P1, &cache, &Interrupt::default()).unwrap();
     std::thread::scope(|scope| {
         let threads = [(); 4].map(|()| scope.spawn(load));
         for thread in threads {
