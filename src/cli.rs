@@ -3,11 +3,12 @@
 use crate::commands::{bench, check, mesh, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
+use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::solver::options;
 use clap::{Args, Parser, Subcommand};
-use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::io::{ErrorKind, IsTerminal};
+use std::path::{Path, PathBuf};
 
 /// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition on PETSc.
 ///
@@ -222,9 +223,13 @@ pub fn run(words: Vec<String>) -> i32 {
     let cli = match Cli::try_parse_from(std::iter::once(name).chain(program)) {
         Ok(cli) => cli,
         Err(refusal) => {
-            // a closed pipe is no reason to say more
-            let _ = refusal.print();
-            return refusal.exit_code();
+            return match refusal.print() {
+                // a closed pipe is no reason to say more
+                Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {
+                    complain(&Error::file(Path::new("standard output"), "write", &cause))
+                }
+                _ => refusal.exit_code(),
+            };
         }
     };
     // these start other programs and need neither MPI nor PETSc
@@ -244,12 +249,16 @@ pub fn run(words: Vec<String>) -> i32 {
 
 /// Runs a command that solves.
 fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
-    let session = match Session::start(petsc) {
+    let session = match options::refuse_words(petsc).and_then(|()| Session::start(petsc)) {
         Ok(session) => session,
         Err(error) => return complain(&error),
     };
-    match dispatch(&session, interrupt, command) {
-        Ok(code) => code,
+    let ended = agree(&session, options::refuse_traps(&session)).and_then(|()| dispatch(&session, interrupt, command));
+    match ended {
+        Ok(code) => match session.finish() {
+            Err(error) if code == 0 => complain(&error),
+            _ => code,
+        },
         Err(error) if error.is_silent() => error.kind().exit_code(),
         Err(error) => {
             let code = complain(&error);

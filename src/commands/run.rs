@@ -47,7 +47,7 @@ pub fn prepare_with(
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Prepared> {
-    agree(session, refuse(scene))?;
+    agree(session, refuse(scene).and_then(|()| options::refuse_log(session)))?;
     agree(session, scene_options(session, scene))?;
     let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
     options::distribute(session, &names)?;

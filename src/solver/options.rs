@@ -11,9 +11,11 @@
 
 mod global;
 mod probe;
+mod refused;
 mod split;
 mod unread;
 
+pub use refused::{refuse_log, refuse_traps, refuse_words};
 pub use split::split;
 pub use unread::{Unread, UnreadKind, unread};
 
