@@ -81,7 +81,7 @@ impl Interrupt {
 /// The end by a signal before there was anything to write.
 pub fn ended(signal: i32) -> Error {
     Error::new(Kind::Stopped(signal), format!("ended by {} before the iteration began", name(signal)))
-        .help("there are no results of it")
+        .help("all that was computed before is written")
 }
 
 /// Name of a signal that ends a run.

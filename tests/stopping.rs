@@ -262,6 +262,12 @@ fn an_interrupted_run_goes_on_with_other_ranks() {
         assert_eq!([again.count("iterations"), again.count("ranks")], [done + 20, then]);
         numbered(&again, 0);
         assert_eq!(again.contact()["pressure"], whole.contact()["pressure"]);
+        // bodies that are not condensed have other states: their traces are extended
+        let other = [&args[..], &["-ksp_type", "preonly", "-pc_type", "cholesky"]].concat();
+        let again = restart(&scratch, 1, &scene, &other);
+        assert!(again.solvers().iter().all(|solver| solver.contains("cholesky")), "{}", again.said());
+        assert_eq!(again.count("iterations"), done + 20);
+        assert!(distance(&again.contact()["pressure"], &whole.contact()["pressure"]) < 1e-9);
     }
 }
 

@@ -111,7 +111,7 @@ impl Plan {
     }
 
     /// Whether meshes are adapted to an error.
-    pub fn goal_is_open(&self) -> bool {
+    pub fn adapts(&self) -> bool {
         self.goal.is_some()
     }
 

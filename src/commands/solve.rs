@@ -71,7 +71,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         if !more {
             break (prepared, outcome, estimate, failed);
         }
-        if plan.goal_is_open() {
+        if plan.adapts() {
             // whatever comes of the next mesh, this one's results are there
             let (prepared, outcome, estimate) = (&prepared, &outcome, estimate.as_ref());
             let writing = Writing { session, path, plan: &plan, prepared, outcome, estimate, fields: false };
@@ -157,10 +157,10 @@ struct Keeper<'a> {
 }
 
 impl Keeper<'_> {
-    /// Notes a failure once: a disk that is full now may have room at the end of the run.
+    /// Notes a failure once: a disk that is full now may have room later.
     fn note(&mut self, what: &str, written: Result<()>) {
         if let Err(error) = written {
-            let text = format!("{what} was not written: {error}");
+            let text = format!("{what} was not written: {}", error.message());
             if !self.failed.contains(&text) {
                 self.failed.push(text);
             }

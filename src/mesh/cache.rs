@@ -158,6 +158,13 @@ mod tests {
         let file = workshop.path().join("a");
         std::fs::write(&file, "a").unwrap();
         assert_eq!(workshop.publish(&file, "b.msh").unwrap(), good.join("b.msh"));
+        let blamed = |error: Error| workshop.blame(error).message().to_owned();
+        assert_eq!(blamed(Error::new(Kind::Mesh, "no mesh")), "no mesh");
+        assert_eq!(std::fs::read_dir(workshop.path()).unwrap().count(), 0);
+        // a folder that takes nothing any more is at fault, if the mesh is
+        std::fs::remove_dir(workshop.path()).unwrap();
+        assert_eq!(blamed(Error::new(Kind::Solver, "no memory")), "no memory");
+        assert_eq!(blamed(Error::new(Kind::Mesh, "no mesh")), format!("cannot write the mesh to {}", good.display()));
         drop(workshop);
         assert_eq!(std::fs::read_dir(&good).unwrap().count(), 1);
         let error = Workshop::open(&[blocked]).err().unwrap().to_string();
