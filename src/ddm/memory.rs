@@ -36,13 +36,14 @@ pub struct Memory {
     pub(super) sweeper: Sweeper,
     pub(super) last: Option<Last>,
     pub(super) sweep: Option<Sweep>,
-    /// Sweeps that another process made.
+    /// Sweeps of this run that another process made, and those that the solver of linear steps had made before it began.
     pub(super) earlier: usize,
+    pub(super) foreign: usize,
 }
 
 impl Memory {
     /// Of a run with these rows behind it and nothing else, at the floor of rounding after `patience` iterations without progress.
-    pub(super) fn new(patience: usize, rows: &[Row]) -> Self {
+    pub(super) fn new(patience: usize, rows: &[Row], foreign: usize) -> Self {
         let earlier = rows.last().map_or(0, |row| row.sweeps);
         Self {
             cycle: Cycle::default(),
@@ -55,6 +56,7 @@ impl Memory {
             last: None,
             sweep: None,
             earlier,
+            foreign,
         }
     }
 }

@@ -121,8 +121,12 @@ impl Run<'_> {
 
     /// The end of Newton's method at an iterate with its layers.
     pub fn end(&self, status: Status, iterate: Field, layer: Layer, linear: &dyn LinearStep) -> End {
-        let sweeps = self.memory.earlier + linear.sweeps();
-        End { status, iterate, layer, weight: Vec::new(), sweeps, skipped: 0 }
+        End { status, iterate, layer, weight: Vec::new(), sweeps: self.sweeps(linear), skipped: 0 }
+    }
+
+    /// Sweeps that the linear steps of this run have made.
+    fn sweeps(&self, linear: &dyn LinearStep) -> usize {
+        self.memory.earlier + linear.sweeps() - self.memory.foreign
     }
 
     /// Whether these errors are as small as was asked for.
@@ -146,7 +150,7 @@ impl Run<'_> {
         let k = self.rows.len() + 1;
         let mut row = self.row(k, u, Some(&x.trace), measured, places.closed);
         (row.residual, row.error, row.is_bound) = (reached.worst(), reached.error, reached.is_bound);
-        (row.gamma, row.sweeps) = (1.0, self.memory.earlier + linear.sweeps());
+        (row.gamma, row.sweeps) = (1.0, self.sweeps(linear));
         let increment = row.increment;
         self.push(row);
         let worst = reached.worst();

@@ -179,6 +179,7 @@ pub fn solve(
         field
     };
     let resumed = resumed.map(relative);
+    let foreign = method.linear().sweeps();
     let mut run = Run {
         model,
         stop: &settings.stop,
@@ -188,7 +189,7 @@ pub fn solve(
         earlier: rows.last().map_or(0.0, |row: &Row| row.seconds),
         origin,
         scale,
-        memory: memory.unwrap_or_else(|| Memory::new(patience, &rows)),
+        memory: memory.unwrap_or_else(|| Memory::new(patience, &rows, foreign)),
         rows,
     };
     let end = match method {

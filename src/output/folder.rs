@@ -201,8 +201,9 @@ mod tests {
         let base = tempfile::tempdir().unwrap();
         let own = format!(".x.txt.{}.part", std::process::id());
         // no process has this number: it is above the largest that the kernel gives
-        [".x.txt.4194305.part", ".notes.part", "x.4194305.part", &own]
-            .map(|name| fs::write(base.path().join(name), "").unwrap());
+        for name in [".x.txt.4194305.part", ".notes.part", "x.4194305.part", &own] {
+            fs::write(base.path().join(name), "").unwrap();
+        }
         Folder::create(base.path()).unwrap();
         let mut left = [own.as_str(), ".notes.part", "x.4194305.part"];
         left.sort_unstable();
