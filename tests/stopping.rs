@@ -19,8 +19,19 @@ const SHORT: [&str; 6] =
 
 /// The program at work in a folder of its own.
 struct Working {
-    child: Child,
+    child: Guard,
     scratch: TempDir,
+}
+
+/// A process that does not outlive its test.
+struct Guard(Child);
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        // one that has ended needs no end
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }
 
 impl Working {
@@ -40,7 +51,7 @@ impl Working {
         command.envs(variables.iter().copied()).env("OMPI_MCA_orte_tmpdir_base", scratch.path());
         let file = |name: &str| Stdio::from(File::create(scratch.path().join(name)).expect("a file"));
         command.stdin(Stdio::null()).stdout(file("out")).stderr(file("err"));
-        let child = command.spawn().expect("the program");
+        let child = Guard(command.spawn().expect("the program"));
         Self { child, scratch }
     }
 
@@ -52,7 +63,7 @@ impl Working {
     fn until(&mut self, what: &str, is_there: impl Fn(&Path) -> bool) {
         let began = Instant::now();
         while !is_there(self.scratch.path()) {
-            let ended = self.child.try_wait().expect("a child").map(|status| format!("ended with {status}"));
+            let ended = self.child.0.try_wait().expect("a child").map(|status| format!("ended with {status}"));
             let late = (began.elapsed() > Duration::from_secs(60)).then(|| "takes too long".to_owned());
             if let Some(why) = ended.or(late) {
                 panic!("before {what} the program {why}\n{}", self.said());
@@ -68,7 +79,7 @@ impl Working {
 
     /// The processes that this one started, by their numbers.
     fn children(&self) -> Vec<u32> {
-        let id = self.child.id();
+        let id = self.child.0.id();
         let path = format!("/proc/{id}/task/{id}/children");
         fs::read_to_string(path)
             .unwrap_or_default()
@@ -78,7 +89,7 @@ impl Working {
     }
 
     fn signal(&self, name: &str) {
-        signal(self.child.id(), name);
+        signal(self.child.0.id(), name);
     }
 
     fn said(&self) -> String {
@@ -89,12 +100,12 @@ impl Working {
     fn end(mut self) -> (ExitStatus, TempDir, String) {
         let began = Instant::now();
         loop {
-            if let Some(status) = self.child.try_wait().expect("a child") {
+            if let Some(status) = self.child.0.try_wait().expect("a child") {
                 let said = self.said();
                 return (status, self.scratch, said);
             }
             if began.elapsed() > Duration::from_secs(60) {
-                let _ = self.child.kill();
+                let _ = self.child.0.kill();
                 panic!("it does not end\n{}", self.said());
             }
             std::thread::sleep(Duration::from_millis(2));
@@ -194,7 +205,7 @@ fn a_second_signal_ends_at_once() {
     std::thread::sleep(Duration::from_millis(300));
     run.signal("INT");
     std::thread::sleep(Duration::from_millis(300));
-    assert!(run.child.try_wait().expect("a child").is_none(), "the first signal waits for the step\n{}", run.said());
+    assert!(run.child.0.try_wait().expect("a child").is_none(), "the first signal waits for the step\n{}", run.said());
     run.signal("TERM");
     let (status, scratch, said) = run.end();
     assert_eq!(status.code(), Some(143), "{said}");
@@ -216,7 +227,7 @@ fn a_killed_run_goes_on_to_the_same_end() {
         let mut run = Working::start(&words(scene, &[args, &["--checkpoint", "1e-9"]].concat()), 1);
         run.until_rows(rows / 2);
         // it may have come to its end meanwhile, and has no checkpoint then
-        let _ = run.child.kill();
+        let _ = run.child.0.kill();
         let (_, scratch, _) = run.end();
         if !scratch.path().join("results/checkpoint").exists() {
             assert_eq!(report(&scratch.path().join("results"))["status"], "converged");
@@ -245,7 +256,7 @@ fn an_interrupted_run_goes_on_with_other_ranks() {
         let mut run = Working::start(&words(&scene, &slow), ranks);
         run.until_rows(5);
         // any rank may hear it
-        let heard = if ranks > 1 { *run.children().last().expect("a rank") } else { run.child.id() };
+        let heard = if ranks > 1 { *run.children().last().expect("a rank") } else { run.child.0.id() };
         signal(heard, "TERM");
         let (status, scratch, said) = run.end();
         assert_eq!(status.code(), Some(143), "{said}");
