@@ -25,7 +25,7 @@ use crate::fem::{
 };
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Mesh;
-use crate::model::{Body, BodySlot, Exchange, Model, Segment};
+use crate::model::{Body, BodySlot, Exchange, Mechanism, Model, Segment};
 use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
 use crate::problem::method::Start;
@@ -36,7 +36,6 @@ use draft::{Draft, Loose};
 use fields::{ErrorMaker, FieldMaker};
 use find::{placed, point};
 use mechanism::Fixed;
-pub use mechanism::Mechanism;
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use std::rc::Rc;
@@ -57,7 +56,7 @@ pub struct Outline<'a> {
 }
 
 /// Gives bodies their inner solvers.
-pub trait Maker {
+pub trait Factory {
     /// Decides on the solvers of all bodies, in the order of the scene: called once, on every rank.
     ///
     /// # Errors
@@ -161,7 +160,7 @@ pub struct ContactInfo {
 }
 
 /// The discrete problem and what reports need to know of its origin.
-pub struct Problem {
+pub struct Discrete {
     /// What the method works on.
     pub model: Model,
     /// Bodies in the order of the scene.
@@ -182,12 +181,12 @@ pub struct Problem {
 
 /// Turns a scene and its mesh into a model.
 ///
-/// `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `maker` turns each
+/// `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `factory` turns each
 /// body of this rank into one that solves. `keep` tells to keep the meshes, for an estimate of the error.
 ///
 /// # Errors
 /// Refusals of the scene against its mesh: missing groups, surfaces of the wrong body, supports that contradict each
-/// other, surfaces that do not face each other; and failures of `maker`.
+/// other, surfaces that do not face each other; and failures of `factory`.
 pub fn discretize<const D: usize>(
     scene: &Scene,
     mesh: &Mesh<D>,
@@ -195,8 +194,8 @@ pub fn discretize<const D: usize>(
     ranks: (usize, usize),
     keep: bool,
     exchange: Box<dyn Exchange>,
-    maker: &mut dyn Maker,
-) -> Result<Problem> {
+    factory: &mut dyn Factory,
+) -> Result<Discrete> {
     let mut parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
@@ -223,7 +222,7 @@ pub fn discretize<const D: usize>(
         prescribed: &supported.prescribed,
         motions: &draft.free,
     });
-    maker.plan(&outlines.collect::<Vec<_>>())?;
+    factory.plan(&outlines.collect::<Vec<_>>())?;
     let drafts = drafts.into_iter().zip(supported);
     let known = gauged.into_iter().zip(loose);
     for (index, ((part, (draft, supported)), (gauged, loose))) in parts.into_iter().zip(drafts).zip(known).enumerate() {
@@ -235,38 +234,30 @@ pub fn discretize<const D: usize>(
         }
         offsets.push(offset);
         let Loose { left, motions, sprung, unfelt } = loose;
-        let mut slot = BodySlot {
-            name: part.spec.name.value.clone(),
-            local: None,
-            segments,
-            scale: 0.0,
-            modulus: 0.0,
-            depth: 0.0,
-            row_stiffness: Vec::new(),
-            motions,
-            sprung,
-        };
+        let name = part.spec.name.value.clone();
         let mut resultant =
             contact::pad(std::array::from_fn::<f64, D, _>(|c| nodal_load.iter().skip(c).step_by(D).sum()));
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
-        let surface: f64 = slot.segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
+        let surface: f64 = segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
         let elasticity = elastic::of(part.spec, &part.space, mesh, scene.plane)?;
-        let modulus = elastic::modulus(&part.space, &elasticity, share(&slot.segments, &pairs));
-        let held = slot.motions.len() == unfelt.len();
+        let modulus = elastic::modulus(&part.space, &elasticity, share(&segments, &pairs));
+        let held = motions.len() == unfelt.len();
         let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
-        (slot.modulus, slot.depth) = (modulus, volume / surface);
-        let stiffness = if held && surface > 0.0 { modulus / slot.depth } else { 0.0 };
-        if let Some(before) = maker.kept(&slot.name) {
-            slot = BodySlot { local: before.local, scale: before.scale, row_stiffness: before.row_stiffness, ..slot };
+        let depth = volume / surface;
+        let stiffness = if held && surface > 0.0 { modulus / depth } else { 0.0 };
+        // what only the owner knows, until all ranks share it
+        let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
+        if let Some(before) = factory.kept(&name) {
+            (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 {
             let left = rigid::free(&left, &prescribed, &load);
             let body = part.assemble(mesh, &rows, &elasticity, load, prescribed, carried)?;
             assemblies += 1;
-            slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-            slot.row_stiffness = body.row_stiffness(&rows);
-            slot.local = Some(maker.make(Assembled {
-                name: slot.name.clone(),
+            scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
+            row_stiffness = body.row_stiffness(&rows);
+            local = Some(factory.make(Assembled {
+                name: name.clone(),
                 dimension: D,
                 body,
                 rows,
@@ -276,7 +267,7 @@ pub fn discretize<const D: usize>(
         }
         let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
         infos.push(BodyInfo {
-            name: slot.name.clone(),
+            name: name.clone(),
             nodes: space.nodes.len(),
             cells: space.cell_count(),
             dofs: space.dofs(),
@@ -294,29 +285,35 @@ pub fn discretize<const D: usize>(
                 Box::new(move |v| held.frame.displacements(v))
             },
             balance: {
-                let rows = nodal_rows(&slot.segments, &pairs, space.dofs());
+                let rows = nodal_rows(&segments, &pairs, space.dofs());
                 let (springs, supports) = (part.springs, part.spec.fix.len());
                 let (space, held, elasticity) = (space.clone(), held.clone(), elasticity.clone());
                 let forces = Forces { space, elasticity, held, springs, supports, load: nodal_load, rows };
                 Box::new(move |u, force| forces.balance(u, force))
             },
             errors: fields::error_maker(part.spec, &space, &elasticity)?,
-            field: fields::field_maker(slot.name.clone(), space.clone(), elasticity.clone()),
+            field: fields::field_maker(name.clone(), space.clone(), elasticity.clone()),
         });
         shapes.push(Shape { space, elasticity, modulus, held });
-        slots.push(slot);
+        slots.push(BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness });
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
-    model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).map(Mechanism::for_model);
+    model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
     let mut carried = vec![0.0; 2 * model.points()];
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);
-    Ok(Problem { model, bodies: infos, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided })
+    Ok(Discrete { model, bodies: infos, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided })
 }
 
-impl Problem {
-    /// Tells every rank what only the owner of a body knows of it: largest stiffness, and stiffness at the contact rows. Collective, after all ranks have made their problem.
+impl Discrete {
+    /// Sides of pair `i` in the order of the scene.
+    pub fn sides(&self, i: usize) -> [usize; 2] {
+        if self.contacts[i].swapped { [1, 0] } else { [0, 1] }
+    }
+
+    /// Tells every rank what only the owner of a body knows of it: largest stiffness, and stiffness at the contact rows. Collective,
+    /// after all ranks have made their problem.
     pub fn share(&mut self) {
         let count = self.model.bodies.len();
         let mut message = vec![0.0; count + 2 * self.model.points()];
@@ -339,8 +336,8 @@ impl Problem {
 ///
 /// # Errors
 /// A start that is not finite at a contact point.
-pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Option<Vec<f64>>> {
-    let model = &problem.model;
+pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<Vec<f64>>> {
+    let model = &discrete.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
     match &scene.method.start {
@@ -358,7 +355,7 @@ pub fn start(scene: &Scene, problem: &Problem, factor: f64) -> Result<Option<Vec
             }
         }
     }
-    axpy(-1.0, &problem.carried, &mut trace);
+    axpy(-1.0, &discrete.carried, &mut trace);
     Ok(Some(trace))
 }
 

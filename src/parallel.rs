@@ -1,10 +1,13 @@
-//! Which rank owns which body, and the exchange of traces, over the `mpi` crate.
+//! Which rank owns which body, and what ranks tell each other, over the `mpi` crate.
 
 use crate::error::{Error, Result};
 use crate::model::Exchange;
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
+use mpi::datatype::PartitionMut;
 use mpi::traits::CommunicatorCollectives;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::cell::Cell;
 
 /// The ranks of a run.
@@ -29,9 +32,35 @@ impl Exchange for Ranks {
         }
     }
 
+    fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
+        if self.session.size() == 1 {
+            return vec![mine];
+        }
+        self.messages.set(self.messages.get() + 1);
+        let world = self.session.world();
+        let mut counts = vec![0; self.session.size()];
+        world.all_gather_into(&(mine.len() as i32), &mut counts[..]);
+        let ends = counts.iter().scan(0, |end, count| {
+            *end += count;
+            Some(*end)
+        });
+        let ends: Vec<i32> = ends.collect();
+        let starts: Vec<i32> = ends.iter().zip(&counts).map(|(end, count)| end - count).collect();
+        let mut all = vec![0; ends.last().map_or(0, |&end| end as usize)];
+        world.all_gather_varcount_into(&mine[..], &mut PartitionMut::new(&mut all[..], &counts[..], &starts[..]));
+        starts.iter().zip(ends).map(|(&start, end)| all[start as usize..end as usize].to_vec()).collect()
+    }
+
     fn messages(&self) -> usize {
         self.messages.get()
     }
+}
+
+/// What each rank knows, in their order; collective. Numbers go as text: those that must keep their last digit go by
+/// [`Exchange::sum`].
+pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: &T) -> Vec<T> {
+    let bytes = serde_json::to_vec(mine).unwrap_or_default();
+    exchange.share(bytes).iter().filter_map(|bytes| serde_json::from_slice(bytes).ok()).collect()
 }
 
 /// Owner of each body: whole bodies, largest first, each to the rank with the least load so far.

@@ -47,11 +47,11 @@ struct Ended {
 fn solve(session: &Session, path: &Path, sets: &[String]) -> Result<Ended> {
     let mut clock = Clock::default();
     let scene = scene::load(path, sets)?;
-    let mut prepared = run::prepare(session, &scene, &mut clock)?;
-    run::set_up(session, &scene, &mut prepared, &mut clock)?;
-    let outcome = run::iterate(&scene, &mut prepared, &mut Silent, &mut clock)?;
+    let built = run::build(session, scene, &mut clock)?;
+    let ready = run::set_up(session, built, None, &mut clock)?;
+    let done = run::iterate(ready, &mut Silent, &mut clock)?;
     options::withdraw(session)?;
-    Ok(Ended { model: prepared.problem.model, outcome })
+    Ok(Ended { model: done.built.discrete.model, outcome: done.outcome })
 }
 
 /// A scene with a law, by `newton` on condensed bodies, to an error or for a number of steps.

@@ -2,10 +2,10 @@
 
 use super::checkpoint::{Checkpoint, Head, settings_digest};
 use super::clock::Clock;
-use super::prepared::Prepared;
 use super::run;
+use super::stages::{Begin, Built, Done};
 use super::{carry, report};
-use crate::ddm::{Outcome, Start, Status};
+use crate::ddm::{Start, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Sizes};
@@ -18,6 +18,7 @@ use crate::problem::mesh::{MeshSource, Sizing};
 use crate::problem::method::{self, MethodName};
 use crate::scene::{AdaptSpec, Scene};
 use crate::solver::options;
+use std::rc::Rc;
 
 /// Cells of a body's first mesh.
 const FIRST: usize = 150;
@@ -31,14 +32,14 @@ const LEAST: f64 = 0.1;
 /// What remains to be done of a run of several meshes.
 pub struct Plan {
     /// The scene of this round.
-    pub scene: Scene,
+    pub scene: Rc<Scene>,
     /// Meshes so far.
     pub rounds: Vec<RoundReport>,
     /// Why the meshes end before the error is reached, in words.
     pub limit: Option<String>,
     goal: Option<AdaptSpec>,
     /// The scene that follows a coarse one.
-    finer: Option<Scene>,
+    finer: Option<Rc<Scene>>,
     /// Where the first round goes on.
     resumed: Option<Checkpoint>,
     settings: String,
@@ -51,10 +52,10 @@ impl Plan {
     /// The first round of a scene: its own mesh, a coarse one, the one that an earlier run ended with, or that of a checkpoint.
     ///
     /// # Errors
-    /// A scene whose mesh cannot follow sizes; what [`run::prepare`] refuses.
+    /// A scene whose mesh cannot follow sizes; what [`run::build`] refuses.
     pub fn new(
         session: &Session,
-        scene: Scene,
+        scene: Rc<Scene>,
         resumed: Option<Checkpoint>,
         interrupt: &Interrupt,
         clock: &mut Clock,
@@ -80,33 +81,34 @@ impl Plan {
         }
         agree(session, plan.refuse_finished_mesh())?;
         let bodies = plan.scene.bodies.len();
-        let adapts = plan.goal.is_some();
-        plan.scene.estimate |= adapts;
-        plan.scene.method.stop.balanced |= adapts;
+        if plan.adapts() {
+            let scene = Rc::make_mut(&mut plan.scene);
+            scene.estimate = true;
+            scene.method.stop.balanced = true;
+        }
         if let Some(checkpoint) = &plan.resumed {
-            let sizes = checkpoint.head.sizes.clone();
-            follow(&mut plan.scene, sizes);
+            follow(Rc::make_mut(&mut plan.scene), checkpoint.head.sizes.clone());
             return Ok(plan);
         }
         if plan.goal.is_none() {
-            let mut coarse = plan.scene.clone();
+            let mut coarse = Scene::clone(&plan.scene);
             coarse.estimate = true;
-            let prepared = run::prepare(session, &coarse, interrupt, clock)?;
-            let sizes = prepared.problem.meshes.as_ref().map(|meshes| sizes::scaled(&**meshes, bodies, 2.0));
+            let built = run::build(session, coarse.clone(), interrupt, clock)?;
+            let sizes = built.discrete.meshes.as_ref().map(|meshes| sizes::scaled(&**meshes, bodies, 2.0));
             options::withdraw(session)?;
             coarse.method.stop.balanced = true;
             follow(&mut coarse, sizes.map(view));
-            plan.finer = Some(std::mem::replace(&mut plan.scene, coarse));
+            plan.finer = Some(std::mem::replace(&mut plan.scene, Rc::new(coarse)));
             return Ok(plan);
         }
         let mut view_of_first = mesh::recall_final(&plan.purpose);
         if view_of_first.is_none() {
-            let prepared = run::prepare(session, &plan.scene, interrupt, clock)?;
-            let sizes = prepared.problem.meshes.as_ref().map(|m| sizes::uniform(&**m, bodies, FIRST * bodies));
+            let built = run::build(session, plan.scene.clone(), interrupt, clock)?;
+            let sizes = built.discrete.meshes.as_ref().map(|m| sizes::uniform(&**m, bodies, FIRST * bodies));
             options::withdraw(session)?;
             view_of_first = sizes.map(view);
         }
-        follow(&mut plan.scene, view_of_first);
+        follow(Rc::make_mut(&mut plan.scene), view_of_first);
         Ok(plan)
     }
 
@@ -123,34 +125,34 @@ impl Plan {
             .help("let the scene name a Gmsh script: mesh = \"file.geo\""))
     }
 
-    /// Lets this round begin where a checkpoint or an earlier round ended.
+    /// Where this round begins: where a checkpoint or an earlier round ended.
     ///
     /// # Errors
     /// The checkpoint is of another mesh.
-    pub fn begin(&mut self, prepared: &mut Prepared) -> Result<()> {
-        if let Some(checkpoint) = self.resumed.take() {
-            return checkpoint.resume(prepared);
+    pub fn begin(&mut self, built: &Built) -> Result<Begin> {
+        match self.resumed.take() {
+            Some(checkpoint) => checkpoint.resume(&built.discrete),
+            None => Ok(Begin { start: self.start(built), ..Begin::default() }),
         }
-        prepared.start = self.start(&self.scene, prepared);
-        Ok(())
     }
 
     /// What a checkpoint of this round says of it; none of a coarse mesh that only gives the start.
-    pub fn head(&self, mesh: String) -> Option<Head> {
+    pub fn head(&self) -> Option<Head> {
         let sizes = match &self.scene.mesh {
             MeshSource::Geo { sizes: Some(Sizing::View(view)), .. } => Some(view.to_string()),
             _ => None,
         };
         let (settings, rounds) = (self.settings.clone(), self.rounds.clone());
-        self.finer.is_none().then(|| Head { settings, mesh, rounds, sizes, ..Head::default() })
+        self.finer.is_none().then(|| Head { settings, rounds, sizes, ..Head::default() })
     }
 
     /// The start of this round, if an earlier one gives it.
-    fn start(&self, scene: &Scene, prepared: &Prepared) -> Option<Start> {
+    fn start(&self, built: &Built) -> Option<Start> {
+        let Built { scene, discrete, .. } = built;
         let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
         (!self.carried.is_empty()).then(|| match newton {
-            true => Start::Pressure(carry::pressure(&self.carried, prepared)),
-            false => Start::Trace(carry::trace(&self.carried, prepared)),
+            true => Start::Pressure(carry::pressure(&self.carried, discrete)),
+            false => Start::Trace(carry::trace(&self.carried, discrete)),
         })
     }
 
@@ -161,36 +163,36 @@ impl Plan {
     pub fn goes_on(
         &mut self,
         session: &Session,
-        prepared: &Prepared,
-        outcome: &Outcome,
+        done: &Done,
         estimate: Option<&Estimate>,
         clock: &mut Clock,
     ) -> Result<bool> {
-        if matches!(outcome.status, Status::Paused { .. }) {
+        if matches!(done.outcome.status, Status::Paused { .. }) {
             return Ok(false);
         }
-        let good = outcome.status.is_solved();
-        let pairs = prepared.problem.model.pairs.len();
+        let good = done.outcome.status.is_solved();
+        let (discrete, model) = (&done.built.discrete, done.model());
+        let tables = || (0..model.pairs.len()).map(|i| report::contact_table(done, None, i)).collect();
         if let Some(finer) = self.finer.take() {
             if good {
-                self.carried = (0..pairs).map(|i| report::contact_table(prepared, outcome, None, i)).collect();
+                self.carried = tables();
             }
             self.scene = finer;
             options::withdraw(session)?;
             return Ok(true);
         }
-        let (Some(goal), Some(estimate), Some(meshes)) = (&self.goal, estimate, &prepared.problem.meshes) else {
+        let (Some(goal), Some(estimate), Some(meshes)) = (&self.goal, estimate, &discrete.meshes) else {
             return Ok(false);
         };
         let total = clock.total();
         let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
         self.rounds.push(RoundReport {
-            cells: prepared.problem.bodies.iter().map(|body| body.cells).sum(),
-            dofs: prepared.problem.bodies.iter().map(|body| body.dofs).sum(),
+            cells: discrete.bodies.iter().map(|body| body.cells).sum(),
+            dofs: discrete.bodies.iter().map(|body| body.dofs).sum(),
             pressure: estimate.pressure.iter().copied().fold(0.0, f64::max),
             displacement: estimate.displacement,
             energy: estimate.energy,
-            iterations: outcome.iterations,
+            iterations: done.outcome.iterations,
             seconds: total - self.seconds,
         });
         self.seconds = total;
@@ -208,7 +210,6 @@ impl Plan {
             self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
             return Ok(false);
         }
-        let model = &prepared.problem.model;
         let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
         let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
         let wanted = sizes::wanted(&**meshes, model, estimate, share, goal.cells);
@@ -217,8 +218,8 @@ impl Plan {
             self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
             return Ok(false);
         }
-        self.carried = (0..pairs).map(|i| report::contact_table(prepared, outcome, None, i)).collect();
-        follow(&mut self.scene, Some(view(wanted)));
+        self.carried = tables();
+        follow(Rc::make_mut(&mut self.scene), Some(view(wanted)));
         options::withdraw(session)?;
         Ok(true)
     }

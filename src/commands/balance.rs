@@ -1,20 +1,19 @@
 //! Forces on every body, from the ranks that own them to the report.
 
-use super::prepared::Prepared;
-use super::results::{self, Recovered};
-use crate::ddm::Outcome;
+use super::results::{All, Recovered};
+use super::stages::{Built, Done};
 use crate::discretize::Balance;
 use crate::output::{BalanceReport, ForceReport};
-use crate::scene::Scene;
 
 /// Numbers of a resultant.
 const WIDTH: usize = 6;
 
 /// The forces on every body in the result; collective.
-pub fn gather(scene: &Scene, prepared: &Prepared, outcome: &Outcome, recovered: &results::All) -> Vec<BalanceReport> {
-    let model = &prepared.problem.model;
+pub fn gather(done: &Done, recovered: &All) -> Vec<BalanceReport> {
+    let Built { scene, discrete, .. } = &done.built;
+    let model = &discrete.model;
     let mut reports = Vec::new();
-    for (index, info) in prepared.problem.bodies.iter().enumerate() {
+    for (index, info) in discrete.bodies.iter().enumerate() {
         let spec = &scene.bodies[index];
         let mut names = vec!["loads".to_owned(), "contacts".to_owned()];
         names.extend(spec.fix.iter().map(|support| support.on.value.clone()));
@@ -26,7 +25,7 @@ pub fn gather(scene: &Scene, prepared: &Prepared, outcome: &Outcome, recovered: 
             // a solver that fails here leaves the forces unknown; the run itself is over
             Some(Err(_)) => message.fill(f64::NAN),
             Some(Ok(Recovered { state, .. })) => {
-                let Balance { parts, size } = info.balance(state, &model.at_rows(index, &outcome.layer.force));
+                let Balance { parts, size } = info.balance(state, &model.at_rows(index, &done.outcome.layer.force));
                 let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
                 message.iter_mut().zip(numbers).for_each(|(place, number)| *place = number);
             }

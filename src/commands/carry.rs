@@ -1,21 +1,21 @@
 //! A solution carried from one mesh to another: its displacements or its pressures on the contact surfaces start the next
 //! iteration.
 
-use super::prepared::Prepared;
 use crate::contact::ContactPair;
+use crate::discretize::Discrete;
 use crate::output::ContactTable;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 /// The trace on a new mesh (layout of a trace vector) that a solution, given by its contact tables, has there.
-pub fn trace(tables: &[ContactTable], prepared: &Prepared) -> Vec<f64> {
-    let model = &prepared.problem.model;
+pub fn trace(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
+    let model = &discrete.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
     for (i, (pair, table)) in model.pairs.iter().zip(tables).enumerate() {
         for (q, shares) in neighbours(pair, table).enumerate() {
             for (of_scene, column) in table.displacement.iter().enumerate() {
-                let side = if prepared.problem.contacts[i].swapped { 1 - of_scene } else { of_scene };
+                let side = discrete.sides(i)[of_scene];
                 trace[side * points + model.offset[i] + q] = mean(&shares, column) - pair.prescribed[side][q];
             }
         }
@@ -24,9 +24,9 @@ pub fn trace(tables: &[ContactTable], prepared: &Prepared) -> Vec<f64> {
 }
 
 /// The pressures at the points of a new mesh. Where most of what is around a point is open, it is open.
-pub fn pressure(tables: &[ContactTable], prepared: &Prepared) -> Vec<f64> {
+pub fn pressure(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
     let mut pressure = Vec::new();
-    for (pair, table) in prepared.problem.model.pairs.iter().zip(tables) {
+    for (pair, table) in discrete.model.pairs.iter().zip(tables) {
         let closed: Vec<f64> = table.pressure.iter().map(|&p| f64::from(p > 0.0)).collect();
         let at = |shares: Vec<_>| if mean(&shares, &closed) < 0.5 { 0.0 } else { mean(&shares, &table.pressure) };
         pressure.extend(neighbours(pair, table).map(at));

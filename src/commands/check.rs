@@ -1,14 +1,13 @@
 //! `winkler check`: builds everything, solves nothing, says what is there.
 
 use super::clock::Clock;
-use super::prepared::Prepared;
 use super::run;
+use super::stages::Built;
 use super::{load, preflight, report};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::output::{say, sci};
 use crate::petsc::Session;
-use crate::scene::Scene;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -26,34 +25,34 @@ pub fn check(
 ) -> Result<i32> {
     let mut clock = Clock::default();
     let scene = load(session, &path, &overrides)?;
-    let prepared = run::prepare(session, &scene, interrupt, &mut clock)?;
+    let built = run::build(session, scene, interrupt, &mut clock)?;
     clock.total();
-    let shared = report::Shared::gather(&prepared);
+    let shared = report::Shared::gather(&built.discrete);
     if session.rank() != 0 {
         return Ok(0);
     }
     if as_json {
-        let mut value = json!(report::headline(session, &scene, &prepared, &shared.solvers, &clock));
+        let mut value = json!(report::headline(session, &built, &shared.solvers, &clock));
         value["status"] = json!("checked");
-        value["message"] = json!(prepared.choice);
-        for (info, body) in prepared.problem.bodies.iter().zip(0..) {
+        value["message"] = json!(built.choice);
+        for (info, body) in built.discrete.bodies.iter().zip(0..) {
             value["bodies"][body]["supported"] = json!(info.supported);
             value["bodies"][body]["rigid_motions"] = json!(info.left_by_supports);
-            value["bodies"][body]["rigid_motions_unheld"] = json!(info.left_by_all);
+            value["bodies"][body]["rigid_motions_unconstrained"] = json!(info.left_by_all);
         }
-        value["pairs"] = pairs(&scene, &prepared);
+        value["pairs"] = pairs(&built);
         say(format_args!("{value:#}"))?;
     } else {
-        print(&scene, &prepared, &report::solvers_in_words(&shared.solvers))?;
+        print(&built, &report::solvers_in_words(&shared.solvers))?;
     }
     Ok(0)
 }
 
-fn pairs(scene: &Scene, prepared: &Prepared) -> serde_json::Value {
+fn pairs(built: &Built) -> serde_json::Value {
     let describe = |i: usize| {
-        let pair = &prepared.problem.model.pairs[i];
+        let pair = &built.discrete.model.pairs[i];
         let (low, high) = gap_range(&pair.gap);
-        let coupling = preflight::coupling(scene, prepared, i);
+        let coupling = preflight::coupling(built, i);
         json!({
             "surfaces": pair.surfaces,
             "carrier": pair.surfaces[0],
@@ -66,16 +65,16 @@ fn pairs(scene: &Scene, prepared: &Prepared) -> serde_json::Value {
             "expected_sweeps": coupling.sweeps.iter().map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
         })
     };
-    (0..prepared.problem.model.pairs.len()).map(describe).collect()
+    (0..built.discrete.model.pairs.len()).map(describe).collect()
 }
 
 fn gap_range(gap: &[f64]) -> (f64, f64) {
     (gap.iter().copied().fold(f64::INFINITY, f64::min), gap.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
-fn print(scene: &Scene, prepared: &Prepared, solvers: &str) -> Result<()> {
-    say(&scene.title)?;
-    for info in &prepared.problem.bodies {
+fn print(built: &Built, solvers: &str) -> Result<()> {
+    say(&built.scene.title)?;
+    for info in &built.discrete.bodies {
         say(format_args!(
             "  body {}: {} cells, {} nodes, {} dofs, {} of them supported",
             info.name, info.cells, info.nodes, info.dofs, info.supported
@@ -87,7 +86,7 @@ fn print(scene: &Scene, prepared: &Prepared, solvers: &str) -> Result<()> {
             say(format_args!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")))?;
         }
     }
-    for (i, pair) in prepared.problem.model.pairs.iter().enumerate() {
+    for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
         let (low, high) = gap_range(&pair.gap);
         say(format_args!(
             "  contact {} - {}: {} points on {}, {} {:.6}, gap {} to {}",
@@ -100,7 +99,7 @@ fn print(scene: &Scene, prepared: &Prepared, solvers: &str) -> Result<()> {
             sci(low, 3),
             sci(high, 3)
         ))?;
-        let coupling = preflight::coupling(scene, prepared, i);
+        let coupling = preflight::coupling(built, i);
         say(format_args!(
             "    mean pressure {}, theta {:.3} and {:.3}; sweeps to expect for a residual of 1e-8: {}",
             sci(coupling.pressure, 3),
@@ -109,8 +108,8 @@ fn print(scene: &Scene, prepared: &Prepared, solvers: &str) -> Result<()> {
             coupling.sweeps.iter().map(|(method, count)| format!("{method} {count:.0}")).collect::<Vec<_>>().join(", ")
         ))?;
     }
-    say(format_args!("  inner solver: {} ({})", solvers, prepared.choice))?;
-    for warning in &prepared.warnings {
+    say(format_args!("  inner solver: {} ({})", solvers, built.choice))?;
+    for warning in &built.warnings {
         say(format_args!("  warning: {warning}"))?;
     }
     Ok(())

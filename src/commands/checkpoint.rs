@@ -3,8 +3,9 @@
 //! The file `checkpoint` has a line that names its format, a line of JSON, numbers (little-endian f64), and the SHA-256 of all that.
 //! It is replaced as a whole, so that there is always a good one.
 
-use super::prepared::Prepared;
-use crate::ddm::{Outcome, Row, Start, State};
+use super::stages::{Begin, Done};
+use crate::ddm::{Row, Start, State};
+use crate::discretize::Discrete;
 use crate::error::{Error, Kind, Result};
 use crate::model::{Field, Model};
 use crate::output::{RoundReport, StepReport, write_whole};
@@ -58,21 +59,15 @@ impl Checkpoint {
     ///
     /// # Errors
     /// The file cannot be written, on the rank that writes it.
-    pub fn write(
-        folder: &Path,
-        head: Head,
-        prepared: &Prepared,
-        outcome: &Outcome,
-        earlier: &[Row],
-        writes: bool,
-    ) -> Result<()> {
-        let model = &prepared.problem.model;
+    pub fn write(folder: &Path, head: Head, done: &Done, writes: bool) -> Result<()> {
+        let (model, Done { built, outcome, steps, earlier, .. }) = (done.model(), done);
         let (states, all) = gather(model, &outcome.iterate);
         if !writes {
             return Ok(());
         }
         let rows = [earlier.len(), outcome.rows.len()];
-        let head = Head { steps: prepared.steps.clone(), rows, points: model.points(), states, ..head };
+        let (mesh, steps) = (mesh_digest(&built.discrete), steps.clone());
+        let head = Head { mesh, steps, rows, points: model.points(), states, ..head };
         let json = serde_json::to_string(&head).map_err(|cause| {
             Error::new(Kind::File, "the checkpoint cannot be written as JSON").because(cause.to_string())
         })?;
@@ -105,21 +100,18 @@ impl Checkpoint {
         }
     }
 
-    /// Lets a problem go on from here; `prepared` has the rank's own bodies.
+    /// Where a problem goes on; it has the rank's own bodies.
     ///
     /// # Errors
     /// It has another mesh.
-    pub fn resume(self, prepared: &mut Prepared) -> Result<()> {
-        if self.head.mesh != mesh_digest(prepared) {
+    pub fn resume(self, discrete: &Discrete) -> Result<Begin> {
+        if self.head.mesh != mesh_digest(discrete) {
             return Err(self.other("mesh"));
         }
         let Self { head, earlier, mut state, .. } = self;
-        let here = prepared.problem.model.bodies.iter().map(|slot| slot.local.is_some());
+        let here = discrete.model.bodies.iter().map(|slot| slot.local.is_some());
         state.field.states.iter_mut().zip(here).filter(|(_, here)| !here).for_each(|(state, _)| state.clear());
-        prepared.steps = head.steps;
-        prepared.earlier = earlier;
-        prepared.start = Some(Start::Continue(Box::new(state)));
-        Ok(())
+        Ok(Begin { start: Some(Start::Continue(Box::new(state))), steps: head.steps, earlier })
     }
 
     fn other(&self, what: &str) -> Error {
@@ -216,13 +208,13 @@ pub fn settings_digest(scene: &Scene) -> String {
 }
 
 /// Digest of the bodies' sizes and of all contact points.
-pub fn mesh_digest(prepared: &Prepared) -> String {
+fn mesh_digest(discrete: &Discrete) -> String {
     let mut digest = Sha256::new();
-    for body in &prepared.problem.bodies {
+    for body in &discrete.bodies {
         digest.update(&body.name);
         [body.nodes, body.cells, body.dofs].iter().for_each(|count| digest.update(count.to_le_bytes()));
     }
-    for pair in &prepared.problem.model.pairs {
+    for pair in &discrete.model.pairs {
         let numbers = pair.position.as_flattened().iter().chain(&pair.weight).chain(&pair.gap);
         numbers.for_each(|number| digest.update(number.to_le_bytes()));
     }

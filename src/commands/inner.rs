@@ -3,7 +3,7 @@
 //! Newton's method on one rank joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
 //! bodies then need no solver of their own. Else every body has one, and sweeps solve the linear steps.
 
-use crate::discretize::{Assembled, Maker, Outline};
+use crate::discretize::{Assembled, Factory, Outline};
 use crate::error::{Error, Kind, Result};
 use crate::model::{Body, BodySlot};
 use crate::petsc::Session;
@@ -186,7 +186,7 @@ fn agree(plans: &mut [Plan]) {
     }
 }
 
-impl Maker for Inner<'_> {
+impl Factory for Inner<'_> {
     fn plan(&mut self, outlines: &[Outline]) -> Result<()> {
         for &Outline { name, dimension, rows, prescribed, motions } in outlines {
             let retained = Retained::new(dimension, rows, prescribed, motions);

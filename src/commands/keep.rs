@@ -1,21 +1,44 @@
-//! What becomes of a run that pauses.
+//! Runs that pause: who watches them and keeps what they have, and how they go on.
 
-use super::prepared::Prepared;
-use crate::ddm::{Outcome, Row};
+use super::asking;
+use super::stages::{Done, Ready};
+use crate::ddm::{self, Observer, Settings, Silent, Start, Status};
+use crate::error::Result;
 
-/// Keeps what a run has. All calls are collective; what cannot be written is no reason to end the run.
-pub trait Keep {
-    /// The state of a run, or of its load step, from which it can go on; `earlier` are the rows of the load steps before.
-    fn state(&mut self, prepared: &Prepared, outcome: &Outcome, earlier: &[Row]);
+/// An observer that keeps what a run has. All calls are collective; what cannot be written is no reason to end the run.
+pub trait Keep: Observer {
+    /// Keeps the state of a run, or of its load step, from which it can go on.
+    fn state(&mut self, _done: &Done) {}
 
-    /// The results so far, in the units of the scene.
-    fn results(&mut self, prepared: &Prepared, outcome: &Outcome);
+    /// Keeps the results so far, and leaves the run as it is.
+    fn results(&mut self, _done: &mut Done) {}
 }
 
-/// Keeps nothing.
-pub struct Nothing;
+impl Keep for Silent {}
 
-impl Keep for Nothing {
-    fn state(&mut self, _prepared: &Prepared, _outcome: &Outcome, _earlier: &[Row]) {}
-    fn results(&mut self, _prepared: &Prepared, _outcome: &Outcome) {}
+/// Solves through all pauses until a rule or a signal ends the run. At the full load it may end at the error of the discretisation,
+/// and the interval of gamma is found if the scene asks for it.
+///
+/// # Errors
+/// Failures of the solver library.
+pub fn solve(mut ready: Ready, full: bool, keep: &mut dyn Keep) -> Result<Done> {
+    if let Start::Continue(state) = &ready.start {
+        state.rows.iter().for_each(|row| keep.row(row));
+    }
+    loop {
+        let Ready { mut built, mut method, start, steps, earlier, warnings } = ready;
+        let (stop, interval) = (built.scene.method.stop.clone(), built.scene.method.interval && full);
+        let mut settings = Settings { stop, interval, balance: built.balance().filter(|_| full), start };
+        let outcome = ddm::solve(&mut built.discrete.model, &mut method, &mut settings, keep)?;
+        let mut done = Done { built, method, outcome, steps, earlier, warnings };
+        let Status::Paused { asked } = done.outcome.status else { return Ok(done) };
+        keep.state(&done);
+        if asking::signal(asked).is_some() {
+            return Ok(done);
+        }
+        if asking::is_snapshot(asked) {
+            keep.results(&mut done);
+        }
+        ready = done.go_on(|outcome| Start::Continue(outcome.into_state()));
+    }
 }

@@ -1,5 +1,5 @@
 //! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`], [`bench`], [`mesh`]. What those
-//! that solve share is in [`run`].
+//! that solve share is in [`run`], the [`stages`] of a run, and the report of its end.
 
 pub mod adapt;
 pub mod asking;
@@ -14,12 +14,12 @@ pub mod keep;
 pub mod mesh;
 pub mod method;
 pub mod preflight;
-pub mod prepared;
 pub mod report;
 pub mod results;
 mod reuse;
 pub mod run;
 pub mod solve;
+pub mod stages;
 pub mod steps;
 pub mod sweep;
 pub mod verdict;
@@ -31,6 +31,7 @@ use crate::petsc::Session;
 use crate::scene::Scene;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 /// Folder of results: `-o`, else what the scene says, else `results/<case>`.
 pub fn folder_of(scene: &Scene, typed: Option<PathBuf>) -> PathBuf {
@@ -50,6 +51,6 @@ fn case_of(path: &Path) -> &OsStr {
 ///
 /// # Errors
 /// Refusals of the scene.
-pub fn load(session: &Session, path: &Path, overrides: &[String]) -> Result<Scene> {
-    crate::parallel::agree(session, crate::scene::load(path, overrides))
+pub fn load(session: &Session, path: &Path, overrides: &[String]) -> Result<Rc<Scene>> {
+    crate::parallel::agree(session, crate::scene::load(path, overrides).map(Rc::new))
 }

@@ -5,10 +5,9 @@
 //! the same sweep the condition (1 + theta)/(1 - theta). The estimate takes the stiffest single mode that is known without a
 //! solve, uniform pressure, at the pressure that the loads would give if they were spread evenly: an order of magnitude.
 
-use super::prepared::Prepared;
+use super::stages::Built;
 use crate::contact::ContactPair;
 use crate::problem::method::Gamma;
-use crate::scene::Scene;
 
 /// Estimates for a pair.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,11 +24,12 @@ pub struct Coupling {
 const DIGITS: f64 = 18.42;
 
 /// The coupling of pair `i`.
-pub fn coupling(scene: &Scene, prepared: &Prepared, i: usize) -> Coupling {
-    let pair = &prepared.problem.model.pairs[i];
+pub fn coupling(built: &Built, i: usize) -> Coupling {
+    let Built { scene, discrete, .. } = built;
+    let pair = &discrete.model.pairs[i];
     let length: f64 = pair.weight.iter().sum();
     let pushed = |body: usize| {
-        let load = prepared.problem.bodies[body].load;
+        let load = discrete.bodies[body].load;
         let normal: [f64; 3] =
             std::array::from_fn(|c| (0..pair.len()).map(|q| pair.weight[q] * pair.normal[q][c]).sum());
         let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
@@ -38,7 +38,7 @@ pub fn coupling(scene: &Scene, prepared: &Prepared, i: usize) -> Coupling {
     let pressure = pair.bodies.map(pushed).into_iter().fold(0.0, f64::max) / length;
     let tangent = tangent_at(pair, pressure);
     let theta = pair.bodies.map(|body| {
-        let stiffness = prepared.problem.bodies[body].stiffness;
+        let stiffness = discrete.bodies[body].stiffness;
         if tangent == 0.0 { 0.0 } else { tangent / (stiffness + tangent) }
     });
     let both = (theta[0] * theta[1]).sqrt();
@@ -54,22 +54,8 @@ pub fn coupling(scene: &Scene, prepared: &Prepared, i: usize) -> Coupling {
     Coupling { pressure, theta, sweeps }
 }
 
-/// p' of the layer (at the pair's first point) where it carries `pressure`.
+/// p' of the layer (at the pair's first point) where it carries `pressure`; 0 for one that it cannot reach.
 fn tangent_at(pair: &ContactPair, pressure: f64) -> f64 {
-    if pressure <= 0.0 {
-        return 0.0;
-    }
-    let (mut low, mut high) = (0.0, f64::MIN_POSITIVE.sqrt());
-    while pair.law.response(0, high).pressure < pressure {
-        low = high;
-        high *= 4.0;
-        if !high.is_finite() {
-            return 0.0;
-        }
-    }
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if pair.law.response(0, middle).pressure < pressure { low = middle } else { high = middle }
-    }
-    pair.law.response(0, high).tangent
+    let compression = pair.law.compression(0, pressure);
+    if compression > 0.0 && compression.is_finite() { pair.law.response(0, compression).tangent } else { 0.0 }
 }

@@ -4,42 +4,36 @@ use super::asking;
 use super::balance;
 use super::clock::Clock;
 use super::preflight;
-use super::prepared::{Prepared, sides};
 use super::results;
+use super::stages::{Built, Done};
 use super::steps;
 use super::verdict::{forecast, message, status_name};
 use crate::contact::ContactPair;
 use crate::ddm::{Outcome, Status};
-use crate::discretize::Problem;
+use crate::discretize::Discrete;
 use crate::error::Kind;
 use crate::estimate::Estimate;
 use crate::model::BodyCounts;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::vtu::Grid;
 use crate::output::{BodyReport, ContactTable, EstimateReport, InnerTimes, IntervalReport, PairReport, Report};
+use crate::parallel::share;
 use crate::petsc::Session;
-use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
 
 /// Exit code of a run that ended like this.
-pub fn exit_code(prepared: &Prepared, outcome: &Outcome) -> i32 {
-    match outcome.status {
-        Status::Converged | Status::RoundoffLimited if steps::warnings(&prepared.steps).is_empty() => 0,
+pub fn exit_code(done: &Done) -> i32 {
+    match done.outcome.status {
+        Status::Converged | Status::RoundoffLimited if steps::warnings(&done.steps).is_empty() => 0,
         Status::Paused { asked } => asking::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
 }
 
 /// Fills the report of a run.
-pub fn report(
-    session: &Session,
-    scene: &Scene,
-    prepared: &Prepared,
-    outcome: &Outcome,
-    recovered: &results::All,
-    clock: &Clock,
-) -> Report {
-    let model = &prepared.problem.model;
-    let shared = Shared::gather(prepared);
+pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &Clock) -> Report {
+    let (discrete, model, outcome) = (&done.built.discrete, done.model(), &done.outcome);
+    let shared = Shared::gather(discrete);
     let counts = &shared.counts;
     let joint = &outcome.joint;
     let last = outcome.rows.last();
@@ -77,23 +71,23 @@ pub fn report(
         factorizations_avoided: counts.factorizations_avoided,
         body_solves_skipped: outcome.solves_skipped,
         messages: model.exchange.messages(),
-        steps: prepared.steps.clone(),
+        steps: done.steps.clone(),
         residual: finite(last.map(|row| row.residual)),
         increment: finite(last.map(|row| row.increment)),
         f1: finite(last.map(|row| row.energy)),
-        pairs: (0..model.pairs.len()).map(|i| pair_report(scene, prepared, outcome, i)).collect(),
-        ..headline(session, scene, prepared, &shared.solvers, clock)
+        pairs: (0..model.pairs.len()).map(|i| pair_report(done, i)).collect(),
+        ..headline(session, &done.built, &shared.solvers, clock)
     };
-    report.warnings.extend(steps::warnings(&prepared.steps));
-    results::fill(prepared, recovered, &mut report.bodies);
-    let balances = balance::gather(scene, prepared, outcome, recovered);
+    report.warnings.extend(done.warnings.iter().cloned().chain(steps::warnings(&done.steps)));
+    results::fill(discrete, recovered, &mut report.bodies);
+    let balances = balance::gather(done, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
     report
 }
 
 /// The part of the report that is known before the first sweep; `solvers` are the inner solvers in words.
-pub fn headline(session: &Session, scene: &Scene, prepared: &Prepared, solvers: &[String], clock: &Clock) -> Report {
-    let bodies = &prepared.problem.bodies;
+pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Clock) -> Report {
+    let Built { scene, discrete: Discrete { bodies, .. }, .. } = built;
     Report {
         winkler: env!("CARGO_PKG_VERSION").to_owned(),
         petsc: session.petsc_version(),
@@ -115,13 +109,14 @@ pub fn headline(session: &Session, scene: &Scene, prepared: &Prepared, solvers: 
             })
             .collect(),
         times: clock.times.clone(),
-        warnings: prepared.warnings.clone(),
+        warnings: built.warnings.clone(),
         settings: scene.settings(),
         ..Report::default()
     }
 }
 
-/// What only the owner of a body knows: counts over all bodies and the inner solver of each in words. One message.
+/// What only the owner of a body knows: counts over all bodies and the inner solver of each in words.
+#[derive(Default, Serialize, Deserialize)]
 pub struct Shared {
     counts: BodyCounts,
     assemblies: usize,
@@ -138,64 +133,25 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
     }
 }
 
-/// Numbers before the words about the solvers.
-const HEAD: usize = 13;
-
-/// Most bytes of the words about a solver.
-const WORDS: usize = 64;
-
 impl Shared {
     /// Collects it on every rank; collective.
-    pub fn gather(prepared: &Prepared) -> Self {
-        let model = &prepared.problem.model;
-        let mut message = vec![0.0; HEAD + WORDS * model.bodies.len()];
-        message[6] = prepared.problem.assemblies as f64;
-        message[10] = prepared.problem.assemblies_avoided as f64;
-        for (index, slot) in model.bodies.iter().enumerate() {
-            let Some(body) = &slot.local else { continue };
-            let counts = body.counts();
-            let mine = [
-                counts.factorizations,
-                counts.symbolic,
-                counts.solves,
-                counts.inner_iterations,
-                counts.robin_updates,
-                counts.robin_skipped,
-            ];
-            message.iter_mut().zip(mine).for_each(|(sum, count)| *sum += count as f64);
-            message[7] += counts.factor_seconds;
-            message[8] += counts.solve_seconds;
-            message[9] += counts.dense_factorizations as f64;
-            message[11] += counts.factorizations_avoided as f64;
-            message[12] += counts.first_seconds;
-            let place = &mut message[HEAD + WORDS * index..];
-            place
-                .iter_mut()
-                .zip(body.describe().bytes().take(WORDS))
-                .for_each(|(place, byte)| *place = f64::from(byte));
+    pub fn gather(discrete: &Discrete) -> Self {
+        let (assemblies, assemblies_avoided) = (discrete.assemblies, discrete.assemblies_avoided);
+        let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
+        for slot in &discrete.model.bodies {
+            mine.solvers.push(slot.local.as_ref().map_or(String::new(), |body| body.describe()));
+            mine.counts += slot.local.as_ref().map_or(BodyCounts::default(), |body| body.counts());
         }
-        model.exchange.sum(&mut message);
-        let count = |i: usize| message[i] as usize;
-        let words =
-            |bytes: &[f64]| bytes.iter().take_while(|&&byte| byte != 0.0).map(|&byte| char::from(byte as u8)).collect();
-        Self {
-            counts: BodyCounts {
-                factorizations: count(0),
-                symbolic: count(1),
-                solves: count(2),
-                inner_iterations: count(3),
-                robin_updates: count(4),
-                robin_skipped: count(5),
-                factor_seconds: message[7],
-                solve_seconds: message[8],
-                dense_factorizations: count(9),
-                factorizations_avoided: count(11),
-                first_seconds: message[12],
-            },
-            assemblies: count(6),
-            assemblies_avoided: count(10),
-            solvers: message[HEAD..].chunks_exact(WORDS).map(words).collect(),
-        }
+        share(&*discrete.model.exchange, &mine).into_iter().reduce(Self::with).unwrap_or_default()
+    }
+
+    /// With what another rank knows.
+    fn with(mut self, other: Self) -> Self {
+        self.counts += other.counts;
+        self.assemblies += other.assemblies;
+        self.assemblies_avoided += other.assemblies_avoided;
+        self.solvers.iter_mut().zip(other.solvers).for_each(|(mine, other)| mine.push_str(&other));
+        self
     }
 }
 
@@ -212,19 +168,19 @@ pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
     }
 }
 
-fn pair_report(scene: &Scene, prepared: &Prepared, outcome: &Outcome, i: usize) -> PairReport {
-    let model = &prepared.problem.model;
-    let (pair, layer, range) = (&model.pairs[i], &outcome.layer, model.range(i));
+fn pair_report(done: &Done, i: usize) -> PairReport {
+    let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
+    let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
     let length = |is: fn(f64) -> bool| (0..pair.len()).filter(|&q| is(c[q])).fold(0.0, |sum, q| sum + pair.weight[q]);
     let sum = |rows: &[[f64; 3]]| -> [f64; 3] {
         std::array::from_fn(|k| (0..pair.len()).fold(0.0, |sum, q| sum - force[q] * rows[q][k]))
     };
-    let sides = sides(prepared, i);
-    let coupling = preflight::coupling(scene, prepared, i);
+    let sides = discrete.sides(i);
+    let coupling = preflight::coupling(&done.built, i);
     let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
     PairReport {
-        surfaces: prepared.problem.contacts[i].spec.between.each_ref().map(|name| name.value.clone()),
+        surfaces: discrete.contacts[i].spec.between.each_ref().map(|name| name.value.clone()),
         bodies: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
         points: pair.len(),
         carrier: pair.surfaces[0].clone(),
@@ -254,10 +210,10 @@ fn ends(pair: &ContactPair, c: &[f64]) -> Vec<[f64; 3]> {
 }
 
 /// The contact table of pair `i`, sides in the order of the scene.
-pub fn contact_table(prepared: &Prepared, outcome: &Outcome, estimate: Option<&Estimate>, i: usize) -> ContactTable {
-    let model = &prepared.problem.model;
+pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> ContactTable {
+    let (model, outcome) = (done.model(), &done.outcome);
     let (pair, range, points) = (&model.pairs[i], model.range(i), model.points());
-    let sides = sides(prepared, i);
+    let sides = done.built.discrete.sides(i);
     let displacement = |side: usize| -> Vec<f64> {
         let trace = &outcome.iterate.trace[side * points + range.start..side * points + range.end];
         trace.iter().zip(&pair.prescribed[side]).map(|(free, known)| free + known).collect()
@@ -275,15 +231,15 @@ pub fn contact_table(prepared: &Prepared, outcome: &Outcome, estimate: Option<&E
 }
 
 /// Pair `i` on its surface: gap, compression, pressure, normal (from side a to side b) and area (length) of the points.
-pub fn contact_surface(name: &str, prepared: &Prepared, outcome: &Outcome, i: usize) -> Grid {
-    let model = &prepared.problem.model;
+pub fn contact_surface(name: &str, done: &Done, i: usize) -> Grid {
+    let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
-    prepared.problem.contacts[i].surface.grid(
+    done.built.discrete.contacts[i].surface.grid(
         name.to_owned(),
         &[
             ("gap", 1, pair.gap.clone()),
-            ("compression", 1, outcome.layer.compression[range.clone()].to_vec()),
-            ("pressure", 1, outcome.layer.pressure[range].to_vec()),
+            ("compression", 1, layer.compression[range.clone()].to_vec()),
+            ("pressure", 1, layer.pressure[range].to_vec()),
             ("normal", 3, pair.normal.as_flattened().to_vec()),
             (pair.measure, 1, pair.weight.clone()),
         ],
@@ -297,22 +253,22 @@ pub fn convergence(label: &str, outcome: &Outcome) -> ConvergenceSeries {
 }
 
 /// Pressure of pair `i` along its surface (the coordinate that varies most), and the scene's reference for it.
-pub fn pressure(label: &str, prepared: &Prepared, outcome: &Outcome, i: usize) -> PressureSeries {
-    let model = &prepared.problem.model;
+pub fn pressure(label: &str, done: &Done, i: usize) -> PressureSeries {
+    let model = done.model();
     let (axis, _) = main_axis(&model.pairs[i]);
     PressureSeries {
         label: label.to_owned(),
         s: model.pairs[i].position.iter().map(|x| x[axis]).collect(),
-        p: outcome.layer.pressure[model.range(i)].to_vec(),
+        p: done.outcome.layer.pressure[model.range(i)].to_vec(),
         dashed: false,
     }
 }
 
 /// The scene's reference pressure of pair `i`, drawn dashed.
-pub fn reference(problem: &Problem, i: usize) -> Option<PressureSeries> {
-    let field = problem.contacts[i].spec.reference.as_ref()?;
-    let (axis, _) = main_axis(&problem.model.pairs[i]);
-    let position = &problem.model.pairs[i].position;
+pub fn reference(discrete: &Discrete, i: usize) -> Option<PressureSeries> {
+    let field = discrete.contacts[i].spec.reference.as_ref()?;
+    let (axis, _) = main_axis(&discrete.model.pairs[i]);
+    let position = &discrete.model.pairs[i].position;
     Some(PressureSeries {
         label: "reference".to_owned(),
         s: position.iter().map(|x| x[axis]).collect(),

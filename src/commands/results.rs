@@ -1,7 +1,7 @@
 //! What the displacements of a body say: fields for output, largest stresses with their places, errors against a known answer.
 
-use super::prepared::Prepared;
-use crate::ddm::Outcome;
+use super::stages::Done;
+use crate::discretize::Discrete;
 use crate::error::Result;
 use crate::output::BodyReport;
 use crate::output::vtu::BodyField;
@@ -19,10 +19,10 @@ pub struct Recovered {
 pub type All = Vec<Option<Result<Recovered>>>;
 
 /// Recovers the bodies of this rank.
-pub fn recover(prepared: &Prepared, outcome: &Outcome) -> All {
-    let bodies = prepared.problem.bodies.iter().zip(&prepared.problem.model.bodies);
+pub fn recover(done: &Done) -> All {
+    let bodies = done.built.discrete.bodies.iter().zip(&done.model().bodies);
     bodies
-        .zip(&outcome.iterate.states)
+        .zip(&done.outcome.iterate.states)
         .map(|((info, slot), state)| {
             let body = slot.local.as_ref()?;
             Some(body.recover(state).map(|state| Recovered { field: info.field(&state), state }))
@@ -31,17 +31,17 @@ pub fn recover(prepared: &Prepared, outcome: &Outcome) -> All {
 }
 
 /// The bodies left as they are, for a report of which nobody reads what is inside them.
-pub fn skipped(prepared: &Prepared) -> All {
-    prepared.problem.bodies.iter().map(|_| None).collect()
+pub fn skipped(done: &Done) -> All {
+    done.model().bodies.iter().map(|_| None).collect()
 }
 
 /// Numbers of a body in the message.
 const NUMBERS: usize = 9;
 
 /// Puts largest stresses and errors of all bodies into their reports; null where there is none. Collective.
-pub fn fill(prepared: &Prepared, recovered: &All, reports: &mut [BodyReport]) {
+pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) {
     let mut message = vec![0.0; NUMBERS * reports.len()];
-    let bodies = prepared.problem.bodies.iter().zip(recovered);
+    let bodies = discrete.bodies.iter().zip(recovered);
     for (mine, (info, recovered)) in message.chunks_exact_mut(NUMBERS).zip(bodies) {
         match recovered {
             None => {}
@@ -57,7 +57,7 @@ pub fn fill(prepared: &Prepared, recovered: &All, reports: &mut [BodyReport]) {
             }
         }
     }
-    prepared.problem.model.exchange.sum(&mut message);
+    discrete.model.exchange.sum(&mut message);
     let finite = |value: f64| value.is_finite().then_some(value);
     for (report, numbers) in reports.iter_mut().zip(message.chunks_exact(NUMBERS)) {
         let stressed = numbers[0].is_finite();

@@ -2,8 +2,8 @@
 //! condensed body is kept as it is, and where only the method changes the whole problem.
 
 use super::clock::Clock;
-use super::prepared::Prepared;
 use super::run;
+use super::stages::{Built, Done};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::parallel::Ranks;
@@ -11,35 +11,35 @@ use crate::petsc::Session;
 use crate::scene::Scene;
 use crate::solver::options;
 use serde_json::Value;
+use std::rc::Rc;
 
-/// Prepares `scene` after another scene of the sweep was solved, with what that one has left.
+/// Builds `scene` after another scene of the sweep was solved, with what that one has left.
 ///
 /// # Errors
-/// Those of [`run::prepare`].
-pub fn prepare(
+/// Those of [`run::build`].
+pub fn build(
     session: &Session,
-    scene: &Scene,
-    before: Option<(&Scene, Prepared)>,
+    scene: Rc<Scene>,
+    before: Option<Done>,
     interrupt: &Interrupt,
     clock: &mut Clock,
-) -> Result<Prepared> {
-    let Some((last, mut prepared)) = before else { return run::prepare(session, scene, interrupt, clock) };
-    let same = |without: &[&str]| settings(last, without) == settings(scene, without);
-    let condensed = prepared.condensed.len() == prepared.problem.bodies.len();
+) -> Result<Built> {
+    let Some(Done { built: mut last, .. }) = before else { return run::build(session, scene, interrupt, clock) };
+    let same = |without: &[&str]| settings(&last.scene, without) == settings(&scene, without);
+    let condensed = last.condensed.len() == last.discrete.bodies.len();
     // an estimate of the error needs the meshes, which are kept only for it
     let meshes = |scene: &Scene| scene.estimate || scene.method.stop.balanced;
-    if condensed && meshes(last) == meshes(scene) && same(&[]) {
-        let model = &mut prepared.problem.model;
-        model.exchange = Box::new(Ranks::new(session));
-        let bodies = model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
-        prepared.problem.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
-        prepared.problem.assemblies = 0;
-        return Ok(prepared);
+    if condensed && meshes(&last.scene) == meshes(&scene) && same(&[]) {
+        let discrete = &mut last.discrete;
+        discrete.model.exchange = Box::new(Ranks::new(session));
+        let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
+        discrete.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
+        discrete.assemblies = 0;
+        return Ok(Built { scene, ..last });
     }
-    let kept = if same(&["gap", "layer", "reference"]) { prepared.take_condensed() } else { Vec::new() };
-    drop(prepared);
+    let kept = if same(&["gap", "layer", "reference"]) { last.into_condensed() } else { Vec::new() };
     options::withdraw(session)?;
-    run::prepare_with(session, scene, kept, interrupt, clock)
+    run::build_with(session, scene, kept, interrupt, clock)
 }
 
 /// A scene without what no body depends on, and without some keys of its contacts.

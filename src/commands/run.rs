@@ -1,20 +1,19 @@
-//! From a scene to a solved problem: mesh, discretisation, inner solvers, options, iteration.
+//! From a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options, iteration.
 
-use super::asking;
 use super::clock::Clock;
 use super::inner::{Inner, WHOLE};
-use super::keep::Keep;
+use super::keep::{self, Keep};
 use super::method;
-use super::prepared::Prepared;
+use super::stages::{Begin, Built, Done, Ready};
 use super::steps;
 use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::{self, Method, Observer, Outcome, Settings, Start, Status};
-use crate::discretize::{self, Mechanism, Problem};
+use crate::ddm::{self, Outcome, Start, Status};
+use crate::discretize::{self, Discrete};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
-use crate::model::BodySlot;
+use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::problem::mesh::MeshSource;
@@ -24,6 +23,7 @@ use crate::scene::Scene;
 use crate::solver::options;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
+use std::rc::Rc;
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
 const LARGE_FRONTS: usize = 30_000;
@@ -32,42 +32,47 @@ const LARGE_FRONTS: usize = 30_000;
 ///
 /// # Errors
 /// Refusals of scene and mesh, printed on one rank; failures of PETSc.
-pub fn prepare(session: &Session, scene: &Scene, interrupt: &Interrupt, clock: &mut Clock) -> Result<Prepared> {
-    prepare_with(session, scene, Vec::new(), interrupt, clock)
+pub fn build(
+    session: &Session,
+    scene: impl Into<Rc<Scene>>,
+    interrupt: &Interrupt,
+    clock: &mut Clock,
+) -> Result<Built> {
+    build_with(session, scene.into(), Vec::new(), interrupt, clock)
 }
 
 /// The same, with the bodies `kept` from an earlier scene.
 ///
 /// # Errors
-/// Those of [`prepare`].
-pub fn prepare_with(
+/// Those of [`build`].
+pub fn build_with(
     session: &Session,
-    scene: &Scene,
+    scene: Rc<Scene>,
     kept: Vec<BodySlot>,
     interrupt: &Interrupt,
     clock: &mut Clock,
-) -> Result<Prepared> {
-    agree(session, refuse(scene).and_then(|()| options::refuse_log(session)))?;
-    agree(session, scene_options(session, scene))?;
+) -> Result<Built> {
+    agree(session, refuse(&scene).and_then(|()| options::refuse_log(session)))?;
+    agree(session, scene_options(session, &scene))?;
     let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
     options::distribute(session, &names)?;
     match scene.dimension.value {
-        2 => build::<2>(session, scene, pieces::plane, kept, interrupt, clock),
-        _ => build::<3>(session, scene, pieces::space, kept, interrupt, clock),
+        2 => build_in::<2>(session, scene, pieces::plane, kept, interrupt, clock),
+        _ => build_in::<3>(session, scene, pieces::space, kept, interrupt, clock),
     }
 }
 
-/// What [`prepare`] does where the dimension matters.
-fn build<const D: usize>(
+/// What [`build`] does where the dimension matters.
+fn build_in<const D: usize>(
     session: &Session,
-    scene: &Scene,
+    scene: Rc<Scene>,
     cut: Cut<D>,
     kept: Vec<BodySlot>,
     interrupt: &Interrupt,
     clock: &mut Clock,
-) -> Result<Prepared> {
+) -> Result<Built> {
     interrupt.hold();
-    let mesh = mesh::<D>(session, scene, interrupt)?;
+    let mesh = mesh::<D>(session, &scene, interrupt)?;
     interrupt.release()?;
     clock.phase("mesh");
     let largest = mesh.points.len() * D;
@@ -75,27 +80,17 @@ fn build<const D: usize>(
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
     let threads = if D == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
     session.set_blas_threads(threads);
-    let mut inner = Inner::new(session, scene, kept);
+    let mut inner = Inner::new(session, &scene, kept);
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
     let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
-    let problem = discretize::discretize(scene, &mesh, cut, ranks, keep, exchange, &mut inner);
-    let mut problem = agree(session, problem)?;
-    problem.share();
+    let discrete = discretize::discretize(&scene, &mesh, cut, ranks, keep, exchange, &mut inner);
+    let mut discrete = agree(session, discrete)?;
+    discrete.share();
     clock.phase("discretize");
-    let warnings = warnings(session, &problem);
-    let condensed = inner.condensed();
-    Ok(Prepared {
-        problem,
-        start: None,
-        linear: inner.linear(),
-        method: None,
-        steps: Vec::new(),
-        earlier: Vec::new(),
-        choice: inner.reason(),
-        warnings,
-        condensed,
-    })
+    let warnings = warnings(session, &discrete);
+    let (linear, choice, condensed) = (inner.linear(), inner.reason(), inner.condensed());
+    Ok(Built { scene, discrete, linear, choice, condensed, warnings })
 }
 
 /// What the decoder of the scene cannot know.
@@ -138,7 +133,7 @@ fn mesh<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt)
     agree(session, load())
 }
 
-fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
+fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
     let mut warnings = Vec::new();
     if session.blas_name() == "reference BLAS" {
         warnings.push(
@@ -146,21 +141,21 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if session.size() > problem.bodies.len() {
+    if session.size() > discrete.bodies.len() {
         warnings.push(format!(
             "{} of {} ranks have no body to solve",
-            session.size() - problem.bodies.len(),
+            session.size() - discrete.bodies.len(),
             session.size()
         ));
     }
-    for body in problem.bodies.iter().filter(|body| !body.gauged.is_empty()) {
+    for body in discrete.bodies.iter().filter(|body| !body.gauged.is_empty()) {
         let motions = body.gauged.join("; ");
         warnings
             .push(format!("body {}: nothing holds its {motions}, no load works on it: fixed at one node", body.name));
     }
-    warnings.extend(problem.mechanisms.iter().map(|mechanism| mechanism_in_words(problem, mechanism)));
-    warnings.extend(problem.bodies.iter().filter_map(|body| body.warning.clone()));
-    for (pair, contact) in problem.model.pairs.iter().zip(&problem.contacts) {
+    warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
+    warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
+    for (pair, contact) in discrete.model.pairs.iter().zip(&discrete.contacts) {
         let (without, all) = (pair.uncovered(), pair.carriers.len());
         if without > 0 {
             let names = contact.spec.between.each_ref().map(|name| &name.value);
@@ -178,138 +173,102 @@ fn warnings(session: &Session, problem: &Problem) -> Vec<String> {
 }
 
 /// A free motion of several bodies as a warning.
-fn mechanism_in_words(problem: &Problem, mechanism: &Mechanism) -> String {
-    let name = |&body: &usize| &problem.bodies[body].name;
+fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
+    let name = |&body: &usize| &discrete.bodies[body].name;
     let bodies = in_words(mechanism.bodies.iter().map(name));
     let end = match mechanism.fixed.as_ref().map(name) {
         Some(body) => format!("no load works on it: fixed at nodes of `{body}`"),
         None if mechanism.work == 0.0 => "no load works on it: displacements are free up to it".to_owned(),
         None => "and loads work on it: there is no solution".to_owned(),
     };
-    format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.name)
+    format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.motion)
 }
 
-/// Factors every body for the start, then refuses options that nobody read.
+/// Makes the method, factors every body for the start, then refuses options that nobody read.
 ///
 /// # Errors
-/// Unknown PETSc options, failures of PETSc.
-pub fn set_up(session: &Session, scene: &Scene, prepared: &mut Prepared, clock: &mut Clock) -> Result<()> {
-    if prepared.start.is_none() && scene.method.steps.is_empty() {
-        prepared.start = Some(discretize::start(scene, &prepared.problem, 1.0)?.into());
-    }
-    let start = prepared.start.clone().unwrap_or_default();
-    let made = method::make(session, scene, &mut prepared.problem.model, prepared.linear, &start);
-    prepared.method = Some(agree(session, made)?);
-    let names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();
-    let mut names: Vec<&str> = names.iter().map(String::as_str).collect();
-    if matches!(prepared.linear, Linear::Direct | Linear::Multigrid) {
+/// Unknown PETSc options, a start that is not finite, failures of PETSc.
+pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clock) -> Result<Ready> {
+    let scene = built.scene.clone();
+    let Begin { start, steps, earlier } = begin;
+    let start = match start {
+        Some(start) => start,
+        None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete, 1.0)?.into(),
+        None => Start::Automatic,
+    };
+    let method = agree(session, method::make(session, &scene, &mut built.discrete.model, built.linear, &start))?;
+    let mut names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
+    if matches!(built.linear, Linear::Direct | Linear::Multigrid) {
         names.push(WHOLE);
     }
-    let any = |flags: &mut [u8]| {
-        if session.size() > 1 && !flags.is_empty() {
-            let mine = flags.to_vec();
-            session.world().all_reduce_into(&mine[..], flags, SystemOperation::max());
-        }
-    };
-    let unread = options::unread(session, &names, &any)?;
-    let mut unknown = None;
-    for option in unread {
-        match option.kind {
-            options::UnreadKind::NotInUse => {
-                prepared.warnings.push(format!("option {} was not used: no solver of this run reads it", option.name))
-            }
-            options::UnreadKind::Unknown => {
-                let error = Error::new(Kind::Solver, format!("PETSc knows no option {}", option.name));
-                unknown.get_or_insert(match option.nearest {
-                    Some(near) => error.help(format!("did you mean {near}?")),
-                    None => error.help("`-help` lists the options of this run"),
-                });
-            }
-        }
-    }
-    agree(session, unknown.map_or(Ok(()), Err))?;
+    let mut warnings = agree_on_unread(session, &names)?;
     for name in &names {
         let in_force = |option: &str| session.options().get(&format!("-{name}_{option}")).unwrap_or_default();
         if in_force("ksp_type") == "preonly" && !matches!(in_force("pc_type").as_str(), "cholesky" | "lu") {
-            prepared.warnings.push(format!(
+            warnings.push(format!(
                 "body {name}: preonly applies {} once instead of solving; the residual is measured by it",
                 in_force("pc_type")
             ));
         }
     }
     clock.phase("set-up");
-    Ok(())
+    Ok(Ready { built, method, start, steps, earlier, warnings })
+}
+
+/// Warnings of options that no solver with one of these `names` has read.
+///
+/// # Errors
+/// Options that PETSc does not know.
+fn agree_on_unread(session: &Session, names: &[&str]) -> Result<Vec<String>> {
+    let any = |flags: &mut [u8]| {
+        if session.size() > 1 && !flags.is_empty() {
+            let mine = flags.to_vec();
+            session.world().all_reduce_into(&mine[..], flags, SystemOperation::max());
+        }
+    };
+    let (mut warnings, mut unknown) = (Vec::new(), Ok(()));
+    for option in options::unread(session, names, &any)? {
+        match option.kind {
+            options::UnreadKind::NotInUse => {
+                warnings.push(format!("option {} was not used: no solver of this run reads it", option.name));
+            }
+            options::UnreadKind::Unknown => {
+                let error = Error::new(Kind::Solver, format!("PETSc knows no option {}", option.name));
+                unknown = unknown.and(Err(match option.nearest {
+                    Some(near) => error.help(format!("did you mean {near}?")),
+                    None => error.help("`-help` lists the options of this run"),
+                }));
+            }
+        }
+    }
+    agree(session, unknown)?;
+    Ok(warnings)
 }
 
 /// Iterates. From here on a signal ends the run after its step, and lets its results be written.
 ///
 /// # Errors
 /// Failures of PETSc; not converging is a status of the outcome.
-pub fn iterate(
-    scene: &Scene,
-    prepared: &mut Prepared,
-    interrupt: &Interrupt,
-    observer: &mut dyn Observer,
-    keep: &mut dyn Keep,
-    clock: &mut Clock,
-) -> Result<Outcome> {
+pub fn iterate(ready: Ready, interrupt: &Interrupt, keep: &mut dyn Keep, clock: &mut Clock) -> Result<Done> {
     interrupt.hold();
-    let start = prepared.start.take().unwrap_or_default();
-    if !matches!(start, Start::Continue(_)) {
-        prepared.steps.clear();
-        prepared.earlier.clear();
-    }
-    let mut settings =
-        Settings { stop: scene.method.stop.clone(), interval: scene.method.interval, balance: None, start };
-    let Some(mut method) = prepared.method.take() else {
-        return Err(Error::new(Kind::Solver, "a run was begun before its method was made"));
+    let done = match ready.built.scene.method.steps.is_empty() {
+        true => keep::solve(ready, true, keep)?,
+        false => steps::iterate(ready, keep)?,
     };
-    let outcome = match scene.method.steps.is_empty() {
-        true => at_once(scene, prepared, &mut method, &mut settings, observer, keep)?,
-        false => steps::iterate(scene, prepared, &mut method, &mut settings, observer, keep)?,
-    };
-    prepared.method = Some(method);
     clock.phase("iterate");
-    Ok(outcome)
-}
-
-/// Runs the full load until a rule or a signal ends it.
-fn at_once(
-    scene: &Scene,
-    prepared: &mut Prepared,
-    method: &mut Method,
-    settings: &mut Settings,
-    observer: &mut dyn Observer,
-    keep: &mut dyn Keep,
-) -> Result<Outcome> {
-    if let Start::Continue(state) = &settings.start {
-        state.rows.iter().for_each(|row| observer.row(row));
-    }
-    loop {
-        settings.balance = prepared.balance(scene);
-        let outcome = ddm::solve(&mut prepared.problem.model, method, settings, observer)?;
-        let Status::Paused { asked } = outcome.status else { return Ok(outcome) };
-        keep.state(prepared, &outcome, &[]);
-        if asking::signal(asked).is_some() {
-            return Ok(outcome);
-        }
-        if asking::is_snapshot(asked) {
-            keep.results(prepared, &outcome);
-        }
-        settings.start = Start::Continue(outcome.into_state());
-    }
+    Ok(done)
 }
 
 /// Estimates the error of what a run found, if the scene asks for it.
 ///
 /// # Errors
 /// Failures of PETSc.
-pub fn estimate(prepared: &mut Prepared, outcome: &Outcome, clock: &mut Clock) -> Result<Option<Estimate>> {
-    let good = outcome.status.is_solved() || outcome.status == Status::IterationLimit;
-    let Some(meshes) = prepared.problem.meshes.clone().filter(|_| good) else { return Ok(None) };
-    let Some(method) = &mut prepared.method else { return Ok(None) };
-    let Outcome { iterate, layer, .. } = outcome;
-    let estimate = estimate::estimate(&*meshes, &mut prepared.problem.model, method.linear(), iterate, layer)?;
+pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> {
+    let Outcome { status, iterate, layer, .. } = &done.outcome;
+    let good = status.is_solved() || *status == Status::IterationLimit;
+    let discrete = &mut done.built.discrete;
+    let Some(meshes) = discrete.meshes.clone().filter(|_| good) else { return Ok(None) };
+    let estimate = estimate::estimate(&*meshes, &mut discrete.model, done.method.linear(), iterate, layer)?;
     clock.phase("estimate");
     Ok(Some(estimate))
 }

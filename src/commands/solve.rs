@@ -1,14 +1,14 @@
 //! `winkler solve`: one scene, one run, all its results.
 
 use super::adapt::Plan;
-use super::asking::{Asking, signal};
-use super::checkpoint::{self, Checkpoint, mesh_digest};
+use super::asking::{Asking, is_snapshot, signal};
+use super::checkpoint::{self, Checkpoint};
 use super::clock::Clock;
 use super::keep::Keep;
-use super::prepared::Prepared;
+use super::stages::Done;
 use super::write::{Writing, to_json};
 use super::{folder_of, load, report, run};
-use crate::ddm::{Observer, Outcome, Row, Status};
+use crate::ddm::{Observer, Row, Status};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::output::{Folder, HistoryWriter, IterationTable, Verbosity, say};
@@ -48,10 +48,10 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     // one rank has the clock
     let asking = Asking::new(interrupt, plan.scene.output.checkpoint.filter(|_| first));
     let mut saved = request.restart.is_some_and(|from| from.canonicalize().ok() == path.canonicalize().ok());
-    let (prepared, outcome, estimate, failed) = loop {
-        let mut prepared = run::prepare(session, &plan.scene, interrupt, &mut clock)?;
-        agree(session, plan.begin(&mut prepared))?;
-        run::set_up(session, &plan.scene, &mut prepared, &mut clock)?;
+    let (done, estimate, failed) = loop {
+        let built = run::build(session, plan.scene.clone(), interrupt, &mut clock)?;
+        let begin = agree(session, plan.begin(&built))?;
+        let ready = run::set_up(session, built, begin, &mut clock)?;
         let all = session.options().all()?;
         let monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
         let verbosity = if request.json || monitored || !first { Verbosity::Quiet } else { Verbosity::Table };
@@ -59,22 +59,27 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
             table: IterationTable::new(verbosity, &run::targets(&plan.scene)),
             history: if first { Some(history(&folder, &plan.scene)?) } else { None },
             asking: &asking,
+            session,
+            path,
+            plan: &plan,
+            clock: clock.clone(),
+            saved,
+            failed: Vec::new(),
         };
-        let mut keeper = Keeper { session, path, plan: &plan, clock: clock.clone(), saved, failed: Vec::new() };
-        let outcome = run::iterate(&plan.scene, &mut prepared, interrupt, &mut watchers, &mut keeper, &mut clock)?;
-        prepared.warnings.append(&mut keeper.failed);
-        saved = keeper.saved;
-        let estimate = run::estimate(&mut prepared, &outcome, &mut clock)?;
+        let mut done = run::iterate(ready, interrupt, &mut watchers, &mut clock)?;
+        done.warnings.append(&mut watchers.failed);
+        saved = watchers.saved;
+        let estimate = run::estimate(&mut done, &mut clock)?;
         watchers.table.finish();
         let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
-        let more = plan.goes_on(session, &prepared, &outcome, estimate.as_ref(), &mut clock)?;
+        let more = plan.goes_on(session, &done, estimate.as_ref(), &mut clock)?;
         if !more {
-            break (prepared, outcome, estimate, failed);
+            break (done, estimate, failed);
         }
         if plan.adapts() {
             // whatever comes of the next mesh, this one's results are there
-            let (prepared, outcome, estimate) = (&prepared, &outcome, estimate.as_ref());
-            let writing = Writing { session, path, plan: &plan, prepared, outcome, estimate, fields: false };
+            let estimate = estimate.as_ref();
+            let writing = Writing { session, path, plan: &plan, done: &done, estimate, fields: false };
             let ended = "ended while the next mesh was at work: the error asked for is not reached";
             let (_, written) = writing.all(&mut clock, |report| {
                 (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
@@ -82,15 +87,14 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
             agree(session, failed.and(written))?;
         }
     };
-    let (prepared, outcome, estimate) = (&prepared, &outcome, estimate.as_ref());
-    let writing = Writing { session, path, plan: &plan, prepared, outcome, estimate, fields: true };
+    let writing = Writing { session, path, plan: &plan, done: &done, estimate: estimate.as_ref(), fields: true };
     let (report, written) = writing.all(&mut clock, |report| {
         if let Some(limit) = &plan.limit {
             report.status = "mesh-limit".to_owned();
             report.message = format!("the error asked for is not reached: {limit}");
         }
     });
-    let code = if plan.limit.is_some() { 1 } else { report::exit_code(prepared, outcome) };
+    let code = if plan.limit.is_some() { 1 } else { report::exit_code(&done) };
     if first {
         let file = path.join(checkpoint::FILE);
         if saved && code == 0 {
@@ -106,7 +110,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
                 "{}\n  inner solver: {} ({})\n  results in {}{again}",
                 report.summary(),
                 report::solvers_in_words(&solvers),
-                prepared.choice,
+                done.built.choice,
                 path.display()
             ))?;
         }
@@ -120,11 +124,19 @@ fn history(folder: &Folder, scene: &Scene) -> Result<HistoryWriter> {
     HistoryWriter::create(folder, &names, !scene.method.steps.is_empty())
 }
 
-/// Table and file of the iterations, and what is asked meanwhile.
+/// Table and file of the iterations of a round, what is asked meanwhile, and its checkpoints and snapshots.
 struct Watchers<'a> {
     table: IterationTable,
     history: Option<HistoryWriter>,
     asking: &'a Asking,
+    session: &'a Session,
+    path: &'a Path,
+    plan: &'a Plan,
+    clock: Clock,
+    /// Whether the folder has a checkpoint of this run.
+    saved: bool,
+    /// What could not be written, in words.
+    failed: Vec<String>,
 }
 
 impl Observer for Watchers<'_> {
@@ -144,21 +156,9 @@ impl Observer for Watchers<'_> {
     }
 }
 
-/// Writes checkpoints and snapshots of a round.
-struct Keeper<'a> {
-    session: &'a Session,
-    path: &'a Path,
-    plan: &'a Plan,
-    clock: Clock,
-    /// Whether the folder has a checkpoint of this run.
-    saved: bool,
-    /// What could not be written, in words.
-    failed: Vec<String>,
-}
-
-impl Keeper<'_> {
+impl Watchers<'_> {
     /// Notes a failure once: a disk that is full now may have room later.
-    fn note(&mut self, what: &str, written: Result<()>) {
+    fn note_failure(&mut self, what: &str, written: Result<()>) {
         if let Err(error) = written {
             let text = format!("{what} was not written: {}", error.message());
             if !self.failed.contains(&text) {
@@ -168,20 +168,20 @@ impl Keeper<'_> {
     }
 }
 
-impl Keep for Keeper<'_> {
-    fn state(&mut self, prepared: &Prepared, outcome: &Outcome, earlier: &[Row]) {
-        let is_due = !matches!(outcome.status, Status::Paused { asked } if super::asking::is_snapshot(asked) && signal(asked).is_none());
-        let Some(head) = self.plan.head(mesh_digest(prepared)).filter(|_| is_due) else { return };
-        let writes = self.session.rank() == 0;
-        let written = Checkpoint::write(self.path, head, prepared, outcome, earlier, writes);
+impl Keep for Watchers<'_> {
+    fn state(&mut self, done: &Done) {
+        let Status::Paused { asked } = done.outcome.status else { return };
+        let is_due = signal(asked).is_some() || !is_snapshot(asked);
+        let Some(head) = self.plan.head().filter(|_| is_due) else { return };
+        let written = Checkpoint::write(self.path, head, done, self.session.rank() == 0);
         self.saved |= written.is_ok();
-        self.note("a checkpoint", written);
+        self.note_failure("a checkpoint", written);
     }
 
-    fn results(&mut self, prepared: &Prepared, outcome: &Outcome) {
+    fn results(&mut self, done: &mut Done) {
         let Self { session, path, plan, .. } = *self;
-        let writing = Writing { session, path, plan, prepared, outcome, estimate: None, fields: true };
+        let writing = Writing { session, path, plan, done, estimate: None, fields: true };
         let (_, written) = writing.all(&mut self.clock.clone(), |_| {});
-        self.note("a snapshot", written);
+        self.note_failure("a snapshot", written);
     }
 }

@@ -2,8 +2,9 @@
 
 use super::asking::Asking;
 use super::clock::Clock;
-use super::keep::Nothing;
+use super::keep::Keep;
 use super::run;
+use super::stages::Begin;
 use super::{folder_of, report, results, reuse};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
@@ -13,6 +14,7 @@ use crate::output::{Folder, Plot, Report, say, sci};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use std::path::PathBuf;
+use std::rc::Rc;
 
 /// What the user typed.
 pub struct Request {
@@ -39,7 +41,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     let load = |values: &[String]| {
         let mut overrides = request.overrides.clone();
         overrides.extend(values.iter().zip(&axes).map(|(value, (key, _))| format!("{key}={value}")));
-        crate::scene::load(&request.scene, &overrides)
+        crate::scene::load(&request.scene, &overrides).map(Rc::new)
     };
     let scenes = agree(session, runs.iter().map(|values| load(values)).collect::<Result<Vec<_>>>())?;
     let folder = agree(session, Folder::create(folder_of(&scenes[0], request.folder.clone())))?;
@@ -51,20 +53,20 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     let mut watched = Watched(Asking::new(interrupt, None));
     for (scene, values) in scenes.iter().zip(&runs) {
         let mut clock = Clock::default();
-        let mut prepared = reuse::prepare(session, scene, before.take(), interrupt, &mut clock)?;
-        run::set_up(session, scene, &mut prepared, &mut clock)?;
-        let outcome = run::iterate(scene, &mut prepared, interrupt, &mut watched, &mut Nothing, &mut clock)?;
+        let built = reuse::build(session, scene.clone(), before.take(), interrupt, &mut clock)?;
+        let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
+        let done = run::iterate(ready, interrupt, &mut watched, &mut clock)?;
         clock.total();
         // the table has nothing from inside the bodies
-        let recovered = if request.json { results::recover(&prepared, &outcome) } else { results::skipped(&prepared) };
-        let report = report::report(session, scene, &prepared, &outcome, &recovered, &clock);
-        exit = exit.max(report::exit_code(&prepared, &outcome));
-        let interrupted = matches!(outcome.status, Status::Paused { .. });
+        let recovered = if request.json { results::recover(&done) } else { results::skipped(&done) };
+        let report = report::report(session, &done, &recovered, &clock);
+        exit = exit.max(report::exit_code(&done));
+        let interrupted = matches!(done.outcome.status, Status::Paused { .. });
         if !first {
             if interrupted {
                 break;
             }
-            before = Some((scene, prepared));
+            before = Some(done);
             continue;
         }
         let label = label(&axes, values);
@@ -80,11 +82,11 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
                 sci(report.residual.unwrap_or(f64::NAN), 2)
             ))?;
         }
-        histories.push(report::convergence(&label, &outcome));
-        let pairs = &prepared.problem.model.pairs;
+        histories.push(report::convergence(&label, &done.outcome));
+        let pairs = &done.model().pairs;
         for i in (0..pairs.len()).filter(|&i| pairs[i].along_curve) {
-            pressures.push((i, report::main_axis(&pairs[i]).1, report::pressure(&label, &prepared, &outcome, i)));
-            if let Some(curve) = report::reference(&prepared.problem, i) {
+            pressures.push((i, report::main_axis(&pairs[i]).1, report::pressure(&label, &done, i)));
+            if let Some(curve) = report::reference(&done.built.discrete, i) {
                 reference.get_or_insert((i, curve));
             }
         }
@@ -92,7 +94,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         if interrupted {
             break;
         }
-        before = Some((scene, prepared));
+        before = Some(done);
     }
     if first {
         if scenes[0].output.plots {
@@ -120,6 +122,8 @@ impl Observer for Watched {
         self.0.bits()
     }
 }
+
+impl Keep for Watched {}
 
 /// One `--over`: key and values. Commas inside brackets, braces, parentheses or quotes do not separate.
 pub(super) fn axis(text: &str) -> Result<(String, Vec<String>)> {

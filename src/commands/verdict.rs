@@ -59,7 +59,7 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
              or a start that closes the contact (method.start)",
             name(body)
         ),
-        Status::Mechanism(Mechanism { bodies, motion, work }) => format!(
+        Status::Mechanism(Mechanism { bodies, motion, work, .. }) => format!(
             "bodies {}: nothing holds them together in their {motion}, which changes no gap, and loads work on it ({} of what \
              forces of their sizes could): add a support, or balance the loads",
             in_words(bodies.iter().map(name)),

@@ -1,15 +1,13 @@
 //! All files of a run: what is small comes first, so that a full disk takes fields and not results.
 
 use super::clock::Clock;
-use super::prepared::Prepared;
 use super::results::{self, Recovered};
+use super::stages::Done;
 use super::{adapt::Plan, report};
-use crate::ddm::Outcome;
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::output::{Folder, Plot, Report, vtu};
 use crate::petsc::Session;
-use crate::scene::Scene;
 use std::path::Path;
 
 /// What is to be written, and where.
@@ -18,12 +16,10 @@ pub struct Writing<'a> {
     pub session: &'a Session,
     /// Folder of results.
     pub path: &'a Path,
-    /// Scene and meshes before.
+    /// Meshes before.
     pub plan: &'a Plan,
-    /// The problem.
-    pub prepared: &'a Prepared,
     /// What was found.
-    pub outcome: &'a Outcome,
+    pub done: &'a Done,
     /// And how good it is.
     pub estimate: Option<&'a Estimate>,
     /// Whether fields may be written, if the scene wants them.
@@ -34,17 +30,16 @@ impl Writing<'_> {
     /// Writes tables, report, plots and fields in this order, and the report again with all of their names; what cannot be written
     /// keeps nothing else from it. The report, and the first failure. Collective.
     pub fn all(&self, clock: &mut Clock, change: impl Fn(&mut Report)) -> (Report, Result<()>) {
-        let Self { session, path, plan, prepared, outcome, estimate, .. } = *self;
-        let scene = &plan.scene;
-        let recovered = results::recover(prepared, outcome);
+        let Self { session, path, plan, done, estimate, .. } = *self;
+        let recovered = results::recover(done);
         let make = |clock: &Clock| {
-            let mut report = report::report(session, scene, prepared, outcome, &recovered, clock);
+            let mut report = report::report(session, done, &recovered, clock);
             report.discretization_error = estimate.map(report::discretization_error);
             report.rounds.clone_from(&plan.rounds);
             change(&mut report);
             report
         };
-        let fields = self.fields && scene.output.vtu;
+        let fields = self.fields && done.built.scene.output.vtu;
         let first = session.rank() == 0;
         // names of a snapshot are no reason for others
         let folder = match Folder::create(path) {
@@ -55,7 +50,7 @@ impl Writing<'_> {
         let mut written = Ok(());
         if first {
             let early = self.small(&folder).and(self.report(&folder, &mut report, false));
-            written = early.and(plots(scene, prepared, outcome, &folder));
+            written = early.and(plots(done, &folder));
         }
         if fields {
             written = written.and(self.fields(&recovered, &folder));
@@ -72,8 +67,8 @@ impl Writing<'_> {
 
     /// Contact tables.
     fn small(&self, folder: &Folder) -> Result<()> {
-        let pairs = 0..self.prepared.problem.model.pairs.len();
-        let save = |i| report::contact_table(self.prepared, self.outcome, self.estimate, i).save(folder).map(|_| ());
+        let pairs = 0..self.done.model().pairs.len();
+        let save = |i| report::contact_table(self.done, self.estimate, i).save(folder).map(|_| ());
         pairs.map(save).fold(Ok(()), Result::and)
     }
 
@@ -85,18 +80,18 @@ impl Writing<'_> {
 
     /// Fields: each rank its bodies; the first one the contact surfaces.
     fn fields(&self, recovered: &results::All, folder: &Folder) -> Result<()> {
-        let Self { prepared, outcome, .. } = *self;
+        let done = self.done;
         for Recovered { field, .. } in recovered.iter().flatten().flatten() {
             folder.write(&field.file_name(), |out| field.clone().write(out))?;
         }
         if self.session.rank() != 0 {
             return Ok(());
         }
-        let mut names: Vec<String> = prepared.problem.bodies.iter().map(|body| body.name.clone()).collect();
-        for i in 0..prepared.problem.model.pairs.len() {
-            let file = folder.unused(&report::contact_table(prepared, outcome, None, i).stem(), "vtu");
+        let mut names: Vec<String> = done.built.discrete.bodies.iter().map(|body| body.name.clone()).collect();
+        for i in 0..done.model().pairs.len() {
+            let file = folder.unused(&report::contact_table(done, None, i).stem(), "vtu");
             let name = file.trim_end_matches(".vtu").to_owned();
-            folder.write(&file, |out| report::contact_surface(&name, prepared, outcome, i).write(out))?;
+            folder.write(&file, |out| report::contact_surface(&name, done, i).write(out))?;
             names.push(name);
         }
         folder.write(&vtu::pvd_name("bodies"), |out| vtu::write_pvd(&names, out)).map(|_| ())
@@ -108,7 +103,7 @@ impl Writing<'_> {
         let mut names: Vec<String> =
             own.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned()).collect();
         if fields {
-            names.extend(self.prepared.problem.bodies.iter().map(|body| format!("{}.vtu", body.name)));
+            names.extend(self.done.built.discrete.bodies.iter().map(|body| format!("{}.vtu", body.name)));
         }
         names.extend(["history.csv", "report.json"].map(str::to_owned));
         names.sort();
@@ -127,17 +122,17 @@ pub fn to_json(report: &Report) -> Result<String> {
         .map_err(|cause| Error::new(Kind::File, "the report cannot be written as JSON").because(cause.to_string()))
 }
 
-fn plots(scene: &Scene, prepared: &Prepared, outcome: &Outcome, folder: &Folder) -> Result<()> {
+fn plots(done: &Done, folder: &Folder) -> Result<()> {
+    let (scene, model) = (&done.built.scene, done.model());
     if !scene.output.plots {
         return Ok(());
     }
-    let model = &prepared.problem.model;
-    let convergence = Plot::convergence(&scene.title, &[report::convergence("", outcome)]);
+    let convergence = Plot::convergence(&scene.title, &[report::convergence("", &done.outcome)]);
     folder.write("convergence.svg", |out| convergence.write(out))?;
     // only along curves: points of a surface over one coordinate would be a cloud
     for i in (0..model.pairs.len()).filter(|&i| model.pairs[i].along_curve) {
-        let mut curves = vec![report::pressure("pressure", prepared, outcome, i)];
-        curves.extend(report::reference(&prepared.problem, i));
+        let mut curves = vec![report::pressure("pressure", done, i)];
+        curves.extend(report::reference(&done.built.discrete, i));
         let (_, axis) = report::main_axis(&model.pairs[i]);
         let plot = Plot::pressure(&scene.title, axis, &curves);
         folder.write(&folder.unused("pressure", "svg"), |out| plot.write(out))?;

@@ -3,9 +3,10 @@
 //! Any symmetric positive definite G leads to the same solution; it decides how fast. Weights are kept for each contact row,
 //! in the layout of a trace vector, because the two bodies of a pair may need different ones.
 
+use crate::linalg::Blocks;
 use crate::model::Model;
 use crate::model::layer::Layer;
-use crate::model::rigid::{self, Moved};
+use crate::model::rigid::{Moved, TOLERANCE, combined};
 use crate::problem::robin::{RobinRule, Zone};
 use nalgebra::DMatrix;
 
@@ -62,16 +63,14 @@ fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Vec<f64> {
 }
 
 /// The first body that nothing holds under the Robin term `weight` (omega psi kappa of the contact rows), and its motion: springs
-/// below [`rigid::TOLERANCE`] of the largest stiffness in the body drown in its rounding.
+/// below [`TOLERANCE`] of the largest stiffness in the body drown in its rounding.
 pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<Moved> {
     (0..model.bodies.len()).find_map(|body| {
         let slot = &model.bodies[body];
         let springs = springs(model, body, &model.of_body(body, weight));
-        let free = crate::linalg::kernel(&springs, slot.scale, rigid::TOLERANCE);
-        Some(Moved {
-            body,
-            name: rigid::combined(slot.motions.iter().map(|motion| &motion.name[..]), free.first()?.iter().copied()),
-        })
+        let free = Blocks::free(&springs, slot.scale, TOLERANCE);
+        let names = slot.motions.iter().map(|motion| &motion.name[..]);
+        Some(Moved { body, name: combined(names, free.first()?.iter().copied()) })
     })
 }
 
@@ -89,7 +88,7 @@ fn constrained(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
         let mut safe = springs(model, body, &model.of_body(body, &weight)) - WEAK * &natural;
         // of a motion that is felt nowhere nothing is asked
         let felt = natural.diagonal().max();
-        (0..safe.nrows()).for_each(|i| safe[(i, i)] += crate::linalg::TOLERANCE * felt);
+        (0..safe.nrows()).for_each(|i| safe[(i, i)] += TOLERANCE * felt);
         if safe.cholesky().is_some() {
             continue;
         }

@@ -19,7 +19,6 @@ pub mod line;
 pub mod linear;
 mod memory;
 mod newton;
-mod origin;
 mod progress;
 pub mod ritz;
 mod robin;
@@ -32,6 +31,7 @@ pub mod stop;
 pub mod sweep;
 mod sweeps;
 
+use crate::model::origin;
 pub use asks::ASKS;
 pub use balance::{Discretisation, SHARE};
 pub use coefficient::Coefficient;

@@ -11,7 +11,6 @@
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
 use super::bound::{Gap, Reached, contact_energy};
-use super::forcing::SHARE;
 use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
@@ -53,7 +52,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let mut exact = true;
         if run.is_enough(&reached) {
             // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
-            let (residual, reduction) = (&rest[..], SHARE);
+            let (residual, reduction) = (&rest[..], 0.5);
             let system = System { model: run.model, places: &places, springs: &springs, residual, reduction, most };
             let before = linear.counts();
             let more = linear.solve(system)?;
@@ -69,7 +68,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         }
         run.memory.forcing.learn(&gap, &reached, run.stop.residual);
         // a step that knew of no contact runs through the other body
-        let blind = places.closed == 0 && met.closed > 0;
+        let blind = places.tangent.iter().all(|&k| k == 0.0) && met.closed > 0;
         let lost = run.memory.progress.is_lost(gap.change, measured.f1) || blind;
         if lost {
             run.memory.progress.f1 += search(run.model, &mut u, &x.field)?;

@@ -2,17 +2,16 @@
 //!
 //! Bodies that nothing presses together but an initial overlap, and that nothing holds, move apart until no pressure is left: all
 //! that a relative tolerance could refer to vanishes with the error. What remains then is rest, or the start. Its layers may answer
-//! an overlap with any pressure, so the surfaces give way first ([`start::at`]).
+//! an overlap with any pressure, so the surfaces give way first ([`start::at`]). A solution below [`PART`] of these is measured by that share.
 
 use super::start;
 use crate::linalg::dot;
 use crate::model::Model;
-
-/// A solution this much smaller than rest is measured by rest.
-const VANISHING: f64 = 1e-6;
+use crate::model::rigid::PART;
 
 /// Forces on a body that do less than this share of what work they could on a motion are measured by that share: they may go through
-/// the point about which it turns, and their work be rounding.
+/// the point about which it turns, and their work be rounding. A tolerance of 1e-8 then asks for 1e-11 of what the forces could do, which is
+/// above the rounding of their sum.
 const LEAST_WORK: f64 = 1e-3;
 
 /// Least scales of a run.
@@ -33,9 +32,9 @@ impl Scale {
         for trace in traces {
             let layer = start::at(model, trace);
             let approach = model.compression(trace);
-            scale.energy = scale.energy.max(VANISHING * VANISHING * dot(&layer.force, &approach));
-            scale.pressure = scale.pressure.max(VANISHING * layer.peak());
-            scale.force = scale.force.max(VANISHING * layer.force.iter().sum::<f64>());
+            scale.energy = scale.energy.max(PART * PART * dot(&layer.force, &approach));
+            scale.pressure = scale.pressure.max(PART * layer.peak());
+            scale.force = scale.force.max(PART * layer.force.iter().sum::<f64>());
         }
         scale
     }

@@ -12,11 +12,15 @@
 //!
 //! It has no minimum exactly when loads push bodies away from all that could stop them: a motion a that closes no contact,
 //! B E a <= 0, and gains, w'a > 0 (Farkas). Elastic bodies then have no equilibrium either.
+//!
+//! What is less than [`PART`] of what it could be counts as zero here: forces out of balance, as the start needs no more digits than the
+//! elastic bodies leave of it; and what a motion closes, by rounding and [`PROXIMAL`] springs. One that is felt at a meshed circle of
+//! 1000 edges closes 1e-5 of itself.
 
 use super::line::{self, Unbounded};
 use crate::linalg::{axpy, dot};
 use crate::model::layer::Layer;
-use crate::model::rigid::{Motions, Moved, TOLERANCE};
+use crate::model::rigid::{Motions, Moved, PART, TOLERANCE};
 use crate::model::{Model, Sprung};
 use nalgebra::DVector;
 
@@ -34,13 +38,6 @@ pub struct RigidStart {
 /// Share of the springs rho0 that resists every motion: of one that no closed contact resists, a step goes as far as the line
 /// search finds contact. A step then closes pressed contacts by this share of what it opens others.
 const PROXIMAL: f64 = 1e-9;
-
-/// Share of a motion that may close contacts by rounding and [`PROXIMAL`]. A motion that is felt at a meshed circle of 1000 edges
-/// closes 1e-5 of itself.
-const CLOSES: f64 = 1e-6;
-
-/// Share of the forces on a motion that may be out of balance: the start needs no more digits than the elastic bodies leave of it.
-const BALANCED: f64 = 1e-6;
 
 /// Newton steps at most; random scenes and walls of 4096 bricks take 2 to 20.
 const STEPS: usize = 200;
@@ -220,7 +217,7 @@ impl Rigid<'_> {
     /// Whether a motion opens contacts only.
     fn opens(&self, closing: &[f64]) -> bool {
         let most = closing.iter().fold(0.0f64, |most, s| most.max(s.abs()));
-        closing.iter().all(|&s| s <= CLOSES * most)
+        closing.iter().all(|&s| s <= PART * most)
     }
 
     /// The minimum, by Newton's method with line search.
@@ -246,15 +243,15 @@ impl Rigid<'_> {
             let push = self.motions.work(&places.force);
             let acting = self.motions.sizes(&places.force);
             let lacking = &self.work - &push - self.pull(&amounts);
-            let small = |i: usize| BALANCED * (acting[i].max(self.work[i].abs()).max(BALANCED * largest));
+            let small = |i: usize| PART * (acting[i].max(self.work[i].abs()).max(PART * largest));
             if (0..lacking.len()).all(|i| lacking[i].abs() <= small(i)) {
                 break;
             }
             let step = self.solve(&self.springs(&places), &lacking);
             let closing = self.motions.closing(&step);
             let (gain, resisted) = (step.dot(&self.work), step.dot(&self.pull(&step)));
-            let gains = gain > BALANCED * step.amax() * largest;
-            if gains && resisted <= CLOSES * gain && self.opens(&closing) {
+            let gains = gain > PART * step.amax() * largest;
+            if gains && resisted <= PART * gain && self.opens(&closing) {
                 return Err(step);
             }
             let start = places.force;
@@ -282,7 +279,7 @@ impl Rigid<'_> {
         let force = |pair: usize| places.force[self.model.range(pair)].iter().sum::<f64>();
         let most = (0..self.model.pairs.len()).map(force).fold(0.0, f64::max);
         let unloaded = self.work.iter().all(|&work| work == 0.0);
-        let idle = |pair: &usize| unloaded || force(*pair) <= BALANCED.sqrt() * most;
+        let idle = |pair: &usize| unloaded || force(*pair) <= PART.sqrt() * most;
         let idle: Vec<usize> =
             (0..self.model.pairs.len()).filter(idle).flat_map(|pair| self.model.range(pair)).collect();
         // bodies give way by about what they are compressed elsewhere, and by what an origin's digits leave of their way

@@ -68,6 +68,8 @@ pub struct Floor {
 impl Floor {
     /// Largest error that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
     const BELIEVABLE: f64 = 1e-4;
+    /// Share of the best error that an iterate must reach to be progress.
+    const FALLS: f64 = 0.9;
 
     /// Of a method that reduces the error to nine tenths at least in so many iterations.
     pub fn new(patience: usize) -> Self {
@@ -76,7 +78,7 @@ impl Floor {
 
     /// Notes an error; true when it is time to compare it with the rounding errors.
     pub fn is_reached(&mut self, error: f64) -> bool {
-        if error < 0.9 * self.best {
+        if error < Self::FALLS * self.best {
             self.best = error;
             self.since = 0;
         } else {
@@ -85,6 +87,7 @@ impl Floor {
         self.since > 0 && self.since.is_multiple_of(self.patience) && error <= Self::BELIEVABLE
     }
 }
+
 /// Recognises an iteration that runs in a circle: the same traces again, or the same contact sets again and again without
 /// progress.
 #[derive(Debug, Default, Clone)]
@@ -98,8 +101,12 @@ pub struct Cycle {
 impl Cycle {
     /// Longest period looked for.
     const LONGEST: usize = 8;
-    /// Iterates whose contact sets must repeat.
+    /// Iterates whose contact sets must repeat: eight of the longest periods.
     const WATCHED: usize = 64;
+    /// Share of the traces that a step must move to be one, and by which those of a period may differ: half of the digits,
+    /// and all but the rounding of sums.
+    const MOVES: f64 = 1e-7;
+    const SAME: f64 = 1e-12;
 
     /// The period, if `trace` equals one seen 2 to 8 updates ago while the last update moved it, or if the contact sets
     /// `closed` of the last 64 iterates repeat with that period and neither the residual nor F1 has fallen meanwhile.
@@ -116,9 +123,9 @@ impl Cycle {
     fn period_of_traces(&mut self, trace: &[f64]) -> Option<usize> {
         let size = crate::linalg::dot(trace, trace).sqrt();
         let apart = |other: &[f64]| trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt() / size;
-        let moved = self.recent.back().is_some_and(|last| apart(last) > 1e-7);
-        let found =
-            (2..=self.recent.len()).find(|&period| moved && apart(&self.recent[self.recent.len() - period]) < 1e-12);
+        let moved = self.recent.back().is_some_and(|last| apart(last) > Self::MOVES);
+        let found = (2..=self.recent.len())
+            .find(|&period| moved && apart(&self.recent[self.recent.len() - period]) < Self::SAME);
         if self.recent.len() == Self::LONGEST {
             self.recent.pop_front();
         }

@@ -10,8 +10,7 @@ use crate::contact::ContactPair;
 use crate::fem::Space;
 use crate::fem::rigid::{self, RigidMotion};
 use crate::linalg::{Blocks, PART, TOLERANCE, axpy, dot, fit};
-use crate::model;
-use crate::model::{Motion, Motions, Segment};
+use crate::model::{Mechanism, Motion, Motions, Segment};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
 
@@ -19,26 +18,6 @@ use std::collections::HashMap;
 /// of rounding: chords of the arc between neighbouring nodes leave it by 1/8 of their angle squared, and two meshes turn against
 /// each other by that much: 0.03 are chords of 28 degrees.
 const FLAWED: f64 = 0.03;
-
-/// A free motion of several bodies together.
-#[derive(Debug, Clone)]
-pub struct Mechanism {
-    /// The bodies that it moves.
-    pub bodies: Vec<usize>,
-    /// Its name.
-    pub name: String,
-    /// Work of the loads on it, as a share of what forces of their sizes could do.
-    pub work: f64,
-    /// The body that was fixed at one node against it; none if loads do work, or if no node outside the contact could serve.
-    pub fixed: Option<usize>,
-}
-
-impl Mechanism {
-    /// For a run that cannot begin.
-    pub fn for_model(&self) -> model::Mechanism {
-        model::Mechanism { bodies: self.bodies.clone(), motion: self.name.clone(), work: self.work }
-    }
-}
 
 /// Most bodies whose motions make the name of a motion of all.
 const SHOWN: usize = 12;
@@ -285,7 +264,7 @@ impl<const D: usize> Search<'_, '_, D> {
         let most = (0..works.len()).max_by(|&i, &j| works[i].total_cmp(&works[j])).filter(|&i| works[i] > 0.0);
         self.found.extend(most.map(|i| Mechanism {
             bodies: all[i].bodies.clone(),
-            name: all[i].name.clone(),
+            motion: all[i].name.clone(),
             work: works[i],
             fixed: None,
         }));
@@ -296,7 +275,7 @@ impl<const D: usize> Search<'_, '_, D> {
     fn fix(&mut self, all: Vec<Moving>, again: impl Fn(&Self) -> Vec<Moving>) -> bool {
         let Some(bodies) = all.first().map(|moving| moving.bodies.clone()) else { return false };
         let names: Vec<&str> = all.iter().map(|moving| moving.name.as_str()).collect();
-        let mut mechanism = Mechanism { name: names.join("; "), bodies, work: 0.0, fixed: None };
+        let mut mechanism = Mechanism { motion: names.join("; "), bodies, work: 0.0, fixed: None };
         let count = all.len();
         let mut left = all;
         // a motion that is left when others are fixed is another one: it turns about their nodes

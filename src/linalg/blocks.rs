@@ -54,14 +54,6 @@ impl Blocks {
         }
     }
 
-    /// Adds to the diagonal, one entry an unknown.
-    pub fn add_diagonal(&mut self, diagonal: &DVector<f64>) {
-        for i in 0..self.rows() {
-            let range = self.range(i);
-            self.add(i, i, &DMatrix::from_diagonal(&diagonal.rows(range.start, range.len())));
-        }
-    }
-
     /// The block (i, i).
     pub fn diagonal(&self, i: usize) -> DMatrix<f64> {
         let size = self.range(i).len();

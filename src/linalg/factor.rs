@@ -24,7 +24,7 @@ use std::ops::Range;
 pub const TOLERANCE: f64 = 1e-13;
 
 /// Parts of a free motion below this share of its largest are rounding: it is known to the root of [`TOLERANCE`], 3e-7, and to
-/// less than that where springs differ much.
+/// less than that where springs differ much. The share below which anything else counts as zero that is not merely rounded once.
 pub const PART: f64 = 1e-6;
 
 /// LDL' of a symmetric positive semidefinite matrix, unknowns scaled to ones on the diagonal, bodies in an order of minimum

@@ -12,7 +12,7 @@ mod factor;
 pub use blocks::Blocks;
 pub use factor::{Factor, PART, TOLERANCE};
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 /// A sparse matrix in compressed rows: row `i` holds columns `col[ptr[i]..ptr[i+1]]`, sorted.
 #[derive(Debug, Clone, Default)]
@@ -142,33 +142,6 @@ pub fn fit<V: AsRef<[f64]>>(vectors: &[V], to: &[f64]) -> Vec<f64> {
         Ok(amounts) => amounts.as_slice().to_vec(),
         Err(_) => vec![0.0; count],
     }
-}
-
-/// Basis of the kernel of a small symmetric positive semidefinite matrix: eigenvectors of eigenvalues at most
-/// `tolerance * scale`. The basis is reduced so that pure motions come out pure where the kernel allows it.
-pub fn kernel(gram: &DMatrix<f64>, scale: f64, tolerance: f64) -> Vec<DVector<f64>> {
-    if gram.is_empty() {
-        return Vec::new();
-    }
-    let eigen = SymmetricEigen::new(gram.clone());
-    let mut basis: Vec<DVector<f64>> = (0..gram.nrows())
-        .filter(|&i| eigen.eigenvalues[i] <= tolerance * scale)
-        .map(|i| eigen.eigenvectors.column(i).into_owned())
-        .collect();
-    // Gauss-Jordan over the basis vectors, with row pivoting
-    for k in 0..basis.len() {
-        let pivot = basis[k].icamax();
-        let head = basis[k][pivot];
-        basis[k] /= head;
-        for other in 0..basis.len() {
-            if other != k {
-                let factor = basis[other][pivot];
-                let update = factor * &basis[k];
-                basis[other] -= update;
-            }
-        }
-    }
-    basis
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::linalg::Csr;
+use serde::{Deserialize, Serialize};
 
 /// Quadratic terms of F1 (25) of one body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -22,7 +23,7 @@ pub struct Solved {
 }
 
 /// What a body did so far.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct BodyCounts {
     /// Numeric factorisations or preconditioner set-ups.
     pub factorizations: usize,
@@ -46,6 +47,22 @@ pub struct BodyCounts {
     pub first_seconds: f64,
     /// Wall seconds in solves, set-ups apart.
     pub solve_seconds: f64,
+}
+
+impl std::ops::AddAssign for BodyCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.factorizations += other.factorizations;
+        self.dense_factorizations += other.dense_factorizations;
+        self.symbolic += other.symbolic;
+        self.factorizations_avoided += other.factorizations_avoided;
+        self.solves += other.solves;
+        self.inner_iterations += other.inner_iterations;
+        self.robin_updates += other.robin_updates;
+        self.robin_skipped += other.robin_skipped;
+        self.factor_seconds += other.factor_seconds;
+        self.first_seconds += other.first_seconds;
+        self.solve_seconds += other.solve_seconds;
+    }
 }
 
 /// Matrices of a body whose states are (v, a): the displacement v + R a, with rigid motions R that its supports leave.

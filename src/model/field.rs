@@ -65,14 +65,6 @@ impl Field {
         self.trace = trace;
     }
 
-    /// The zero of the same shape.
-    pub fn zero_like(&self) -> Field {
-        Field {
-            states: self.states.iter().map(|state| vec![0.0; state.len()]).collect(),
-            trace: vec![0.0; self.trace.len()],
-        }
-    }
-
     /// Change of compression at each point: B_a v_a + B_b v_b.
     pub fn closing(&self) -> Vec<f64> {
         let points = self.trace.len() / 2;

@@ -7,6 +7,7 @@ pub mod body;
 pub mod field;
 pub mod layer;
 pub mod linear;
+pub mod origin;
 pub mod rigid;
 
 pub use body::{Body, BodyCounts, Energy, Matrices, Solved};
@@ -20,12 +21,14 @@ use crate::error::Result;
 use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// Sums over the ranks of a parallel run. Every entry is non-zero on one rank only, so sums are exact and every rank
-/// gets the serial numbers.
+/// What the ranks of a parallel run tell each other; every call is collective.
 pub trait Exchange {
-    /// Replaces `values` on every rank by the sum over the ranks.
+    /// Replaces `values` on every rank by the sum over the ranks. Every entry is non-zero on one rank only, so sums are exact and every
+    /// rank gets the serial numbers.
     fn sum(&self, values: &mut [f64]);
-    /// Collective calls made so far.
+    /// The bytes of each rank, in their order.
+    fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>>;
+    /// Sums and shares so far between several ranks.
     fn messages(&self) -> usize;
 }
 
@@ -35,6 +38,9 @@ pub struct Serial;
 
 impl Exchange for Serial {
     fn sum(&self, _values: &mut [f64]) {}
+    fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
+        vec![mine]
+    }
     fn messages(&self) -> usize {
         0
     }
@@ -60,7 +66,7 @@ pub struct Motion {
     pub work: f64,
 }
 
-/// A motion of several bodies together that changes no gap and that nothing holds, although loads do work on it.
+/// A motion of several bodies together that changes no gap and that nothing holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mechanism {
     /// The bodies that it moves.
@@ -69,6 +75,8 @@ pub struct Mechanism {
     pub motion: String,
     /// Work of the loads on it, as a share of what forces of their sizes could do.
     pub work: f64,
+    /// The body that was fixed at one node against it; none if loads do work, or if no node outside the contact could serve.
+    pub fixed: Option<usize>,
 }
 
 /// Rigid motions that springs to the ground resist, beside those that nothing holds: a start moves bodies on soft springs, too.

@@ -1,9 +1,20 @@
 //! Colours, lines and marks of the series of a plot.
 
-use super::canvas::{Canvas, Mark, Pixel};
 use super::plot::{Color, Series, Style};
-use plotters::style::{Color as _, RGBAColor, RGBColor};
+use plotters::coord::Shift;
+use plotters::element::{DashedPathElement, PathElement, Polygon};
+use plotters::prelude::{DrawingArea, SVGBackend};
+use plotters::style::{Color as _, RGBColor, WHITE};
 use std::io;
+
+/// A picture in the making.
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// A place on it, in plotters' units.
+pub(super) type Place = (i32, i32);
+
+/// plotters rounds to whole units: drawn 20 times larger and shown smaller, curves stay smooth.
+pub(super) const FINE: f64 = 20.0;
 
 /// Colours of Okabe and Ito that stand out on white: colour-blind readers can tell them apart.
 const PALETTE: [RGBColor; 7] = [
@@ -15,16 +26,26 @@ const PALETTE: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
     RGBColor(0, 0, 0),
 ];
-const MARKS: [Mark; 4] = [Mark::Circle, Mark::Square, Mark::Triangle, Mark::Diamond];
 /// Colour of references and remarks.
 pub(super) const GREY: RGBColor = RGBColor(90, 90, 90);
+
+/// Length of a line in the legend, in pixels.
+pub(super) const SAMPLE: f64 = 30.0;
+
+/// Corners of the marks, a radius from their middle about.
+const MARKS: [&[(f64, f64)]; 4] = [
+    &[(-0.4, -0.92), (0.4, -0.92), (0.92, -0.4), (0.92, 0.4), (0.4, 0.92), (-0.4, 0.92), (-0.92, 0.4), (-0.92, -0.4)],
+    &[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)],
+    &[(0.0, -1.25), (1.15, 0.85), (-1.15, 0.85)],
+    &[(0.0, -1.3), (1.1, 0.0), (0.0, 1.3), (-1.1, 0.0)],
+];
 
 /// How a series is drawn, with its colour and mark chosen.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Look {
     style: Style,
     color: RGBColor,
-    mark: Mark,
+    mark: &'static [(f64, f64)],
 }
 
 /// Colours and marks of all series.
@@ -46,37 +67,52 @@ pub(super) fn looks(series: &[Series]) -> Vec<Look> {
 
 impl Look {
     /// Draws one unbroken piece of a series; a point on its own becomes a mark.
-    pub fn draw(&self, canvas: &Canvas, points: &[Pixel]) -> io::Result<()> {
-        let color: RGBAColor = self.color.to_rgba();
+    pub fn draw(&self, area: &Area, points: &[Place]) -> io::Result<()> {
         match self.style {
-            Style::Line | Style::LineMarkers => canvas.line(points, 1.9, color)?,
-            Style::Dashed => canvas.dashes(points, 1.6, color)?,
+            Style::Line | Style::LineMarkers => {
+                let line = PathElement::new(points, self.color.stroke_width(fine(1.9) as u32));
+                area.draw(&line).map_err(io::Error::other)?;
+            }
+            Style::Dashed => {
+                let style = self.color.stroke_width(fine(1.6) as u32);
+                let line = DashedPathElement::new(points.iter().copied(), fine(6.4), fine(4.2), style);
+                area.draw(&line).map_err(io::Error::other)?;
+            }
             Style::Markers => {}
         }
         let marked = matches!(self.style, Style::Markers | Style::LineMarkers);
-        let (radius, mark) = if marked { (4.0, self.mark) } else { (2.2, Mark::Circle) };
-        if marked || points.len() == 1 {
-            for &point in points {
-                canvas.mark(point, radius, mark, self.color)?;
-            }
+        let (radius, mark) = if marked { (4.0, self.mark) } else { (2.2, MARKS[0]) };
+        for &at in points.iter().filter(|_| marked || points.len() == 1) {
+            draw_mark(area, at, radius, mark, self.color)?;
         }
         Ok(())
     }
 
-    /// Draws a sample for the legend: a line of some length, its mark in the middle.
-    pub fn sample(&self, canvas: &Canvas, (x, y): Pixel, length: f64) -> io::Result<()> {
-        let line = match self.style {
-            Style::LineMarkers => Style::Line,
-            other => other,
-        };
+    /// Draws a sample for the legend: a line to the right, its mark in the middle.
+    pub fn sample(&self, area: &Area, (x, y): Place) -> io::Result<()> {
+        let line = if self.style == Style::LineMarkers { Style::Line } else { self.style };
         if line != Style::Markers {
-            Look { style: line, ..*self }.draw(canvas, &[(x, y), (x + length, y)])?;
+            Look { style: line, ..*self }.draw(area, &[(x, y), (x + fine(SAMPLE), y)])?;
         }
         if matches!(self.style, Style::Markers | Style::LineMarkers) {
-            Look { style: Style::Markers, ..*self }.draw(canvas, &[(x + length / 2.0, y)])?;
+            draw_mark(area, (x + fine(SAMPLE / 2.0), y), 4.0, self.mark, self.color)?;
         }
         Ok(())
     }
+}
+
+/// A mark with a white rim, so that overlapping marks stay apart; `radius` in pixels.
+fn draw_mark(area: &Area, (x, y): Place, radius: f64, mark: &[(f64, f64)], color: RGBColor) -> io::Result<()> {
+    for (radius, color) in [(radius + 0.8, WHITE), (radius, color)] {
+        let corners: Vec<Place> = mark.iter().map(|(u, v)| (x + fine(u * radius), y + fine(v * radius))).collect();
+        area.draw(&Polygon::new(corners, color.filled())).map_err(io::Error::other)?;
+    }
+    Ok(())
+}
+
+/// A length in pixels in plotters' units.
+pub(super) fn fine(length: f64) -> i32 {
+    (length * FINE).round() as i32
 }
 
 /// Entry of the palette; every second round of it is darker.

@@ -2,13 +2,11 @@
 //!
 //! Nothing here knows the space dimension: points and vectors have three components, z = 0 in the plane.
 
-mod canvas;
 mod chart;
 pub mod contact;
 pub mod folder;
 mod format;
 pub mod history;
-mod legend;
 mod look;
 pub mod plot;
 pub mod report;

@@ -1,7 +1,8 @@
 //! Range, ticks and labels of an axis.
 
-use super::canvas::text_width;
-use super::format::superscript;
+use super::format::{superscript, text_width};
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use std::ops::Range;
 
 /// Numbers and ranges below it count as zero.
 const TINY: f64 = 1e-290;
@@ -135,6 +136,31 @@ impl Scale {
             }
         }
         Self { log: true, low: from, high: to, major, minor, power: 0 }
+    }
+}
+
+/// Values are positions, those of [`Scale::at`].
+impl Ranged for Scale {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, at: &f64, (from, to): (i32, i32)) -> i32 {
+        from + (self.fraction(*at) * f64::from(to - from)).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        let minor = self.minor.iter().filter(|_| hint.weight().allow_light_points());
+        self.major.iter().map(|(at, _)| at).chain(minor).copied().collect()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.low..self.high
+    }
+}
+
+impl ValueFormatter<f64> for Scale {
+    fn format_ext(&self, position: &f64) -> String {
+        self.major.iter().find(|(at, _)| at == position).map_or(String::new(), |(_, label)| label.clone())
     }
 }
 

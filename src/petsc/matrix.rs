@@ -2,7 +2,6 @@
 
 use super::arrays::{Arrays, attach, check, free};
 use super::library::petsc;
-use super::table::text;
 use super::vector::Vector;
 use super::{Int, Session, ffi};
 use crate::error::{Error, Kind, Result};
@@ -161,16 +160,6 @@ impl Matrix {
         let set = petsc!(MatSetNearNullSpace(self.mat, space));
         petsc!(MatNullSpaceDestroy(&mut space))?;
         set
-    }
-
-    /// Sets the prefix of its options, such as `upper_`, and reads the one option that a matrix has: `-mat_view`.
-    ///
-    /// # Errors
-    /// When `-mat_view` has a value that PETSc does not understand.
-    pub fn set_prefix(&mut self, prefix: &str) -> Result<()> {
-        let prefix = text(prefix)?;
-        petsc!(MatSetOptionsPrefix(self.mat, prefix.as_ptr()))?;
-        petsc!(MatViewFromOptions(self.mat, null_mut(), c"-mat_view".as_ptr()))
     }
 
     /// `y = A x`.

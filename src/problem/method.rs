@@ -50,7 +50,7 @@ impl Default for MethodSpec {
 /// Methods by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MethodName {
-    /// The program's choice, and its change when progress stops.
+    /// Newton's method with the linear step that suits bodies, memory and ranks.
     Auto,
     /// The paper's iteration (41)-(42).
     Robin,
@@ -58,9 +58,9 @@ pub enum MethodName {
     Ncg,
     /// Anderson acceleration of the sweep.
     Anderson,
-    /// Semismooth Newton (35), its systems by conjugate gradients over the sweep.
+    /// Newton's method, linear steps by conjugate gradients over the sweep.
     NewtonRobin,
-    /// Semismooth Newton (35), its systems by one factorisation of all bodies together.
+    /// Newton's method, all bodies in one matrix: dense, factored, or solved by multigrid.
     Newton,
 }
 

@@ -3,7 +3,8 @@
 /// Rules of a run. At least one of `residual` and `increment` is given; the first rule met stops.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StopRule {
-    /// Relative residual (docs/theory.md); default 1e-8 when `increment` is not given.
+    /// Relative residual of sweeps, largest relative error of Newton's method (docs/theory.md); default 1e-8 when `increment` is not
+    /// given.
     pub residual: Option<f64>,
     /// The paper's rule on the increment of normal displacements, for every body.
     pub increment: Option<f64>,
@@ -20,8 +21,7 @@ impl Default for StopRule {
 }
 
 impl StopRule {
-    /// Whether an iterate with this residual, reached by this increment (NaN before the first update), is good
-    /// enough.
+    /// Whether an iterate with this number, reached by this increment (NaN before the first update), is good enough.
     pub fn is_met(&self, residual: f64, increment: f64) -> bool {
         self.residual.is_some_and(|tolerance| residual <= tolerance)
             || self.increment.is_some_and(|tolerance| increment <= tolerance)

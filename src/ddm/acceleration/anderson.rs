@@ -5,7 +5,6 @@ use crate::ddm::line::Line;
 use crate::ddm::ritz::Ritz;
 use crate::error::Result;
 use crate::model::field::Field;
-use crate::model::{Layer, Model};
 use nalgebra::{DMatrix, DVector};
 use std::collections::VecDeque;
 
@@ -88,16 +87,8 @@ impl Acceleration for Anderson {
         Ok(Step::Along(direction, length))
     }
 
-    fn amplification(&self) -> f64 {
-        self.ritz.known().map_or(f64::NAN, |(low, _)| low.recip().max(1.0))
-    }
-
-    fn spectrum(&self) -> Option<(f64, f64)> {
-        self.ritz.known()
-    }
-
-    fn conclude(&mut self, model: &Model, layer: &Layer, weight: &[f64]) {
-        self.ritz.bounds(model, layer, weight);
+    fn ritz(&mut self) -> &mut Ritz {
+        &mut self.ritz
     }
 
     fn restart(&mut self) {

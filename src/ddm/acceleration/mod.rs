@@ -10,6 +10,7 @@ pub use anderson::Anderson;
 pub use ncg::Conjugate;
 pub use relaxation::Relaxed;
 
+use super::ritz::Ritz;
 use super::sweep::Sweep;
 use crate::error::Result;
 use crate::model::Model;
@@ -60,20 +61,29 @@ pub trait Acceleration {
     /// Failures of the solver library.
     fn step(&mut self, here: &mut Here) -> Result<Step>;
 
+    /// What its directions tell of the spectrum of G^-1 F1''.
+    fn ritz(&mut self) -> &mut Ritz;
+
     /// Estimate of 1/(smallest eigenvalue of G^-1 F1''): the squared energy error is at most about this times r'G^-1 r.
     /// NaN while nothing is known.
-    fn amplification(&self) -> f64;
+    fn amplification(&mut self) -> f64 {
+        self.ritz().known().map_or(f64::NAN, |(low, _)| low.recip().max(1.0))
+    }
 
     /// Estimated bounds of the spectrum of G^-1 F1'', if it has seen enough.
-    fn spectrum(&self) -> Option<(f64, f64)>;
+    fn spectrum(&mut self) -> Option<(f64, f64)> {
+        self.ritz().known()
+    }
 
     /// Factor by which an iteration reduces the residual in the long run, if it has one of its own.
-    fn factor(&self) -> Option<f64> {
+    fn factor(&mut self) -> Option<f64> {
         None
     }
 
     /// Last look at the iterate with which a run ends, with the Robin term `weight` that the model carries. Collective.
-    fn conclude(&mut self, model: &Model, layer: &Layer, weight: &[f64]);
+    fn conclude(&mut self, model: &Model, layer: &Layer, weight: &[f64]) {
+        self.ritz().bounds(model, layer, weight);
+    }
 
     /// Forgets what earlier iterations told: the problem changes.
     fn restart(&mut self);

@@ -6,7 +6,6 @@ use crate::ddm::line::Line;
 use crate::ddm::ritz::Ritz;
 use crate::error::Result;
 use crate::model::field::{Field, local_dot};
-use crate::model::{Layer, Model};
 
 /// Polak and Ribière's rule with exact line search on F1, restarted when the contact set changes.
 #[derive(Default)]
@@ -51,20 +50,12 @@ impl Acceleration for Conjugate {
         Ok(Step::Along(direction, length))
     }
 
-    fn amplification(&self) -> f64 {
-        self.spectrum().map_or(f64::NAN, |(low, _)| low.recip().max(1.0))
+    fn ritz(&mut self) -> &mut Ritz {
+        &mut self.ritz
     }
 
-    fn spectrum(&self) -> Option<(f64, f64)> {
-        self.ritz.known()
-    }
-
-    fn factor(&self) -> Option<f64> {
+    fn factor(&mut self) -> Option<f64> {
         self.spectrum().map(gradients_factor)
-    }
-
-    fn conclude(&mut self, model: &Model, layer: &Layer, weight: &[f64]) {
-        self.ritz.bounds(model, layer, weight);
     }
 
     fn restart(&mut self) {

@@ -4,7 +4,6 @@ use super::{Acceleration, Here, Step};
 use crate::ddm::gamma::GammaRule;
 use crate::ddm::ritz::Ritz;
 use crate::error::Result;
-use crate::model::{Layer, Model};
 
 /// The relaxed Robin-Robin iteration (41)-(42) with any rule for gamma.
 pub struct Relaxed {
@@ -47,20 +46,16 @@ impl Acceleration for Relaxed {
         })
     }
 
-    fn amplification(&self) -> f64 {
+    fn ritz(&mut self) -> &mut Ritz {
+        &mut self.ritz
+    }
+
+    fn amplification(&mut self) -> f64 {
         self.ritz.known().map_or(self.amplification, |(low, _)| low.recip().max(1.0))
     }
 
-    fn spectrum(&self) -> Option<(f64, f64)> {
-        self.ritz.known()
-    }
-
-    fn factor(&self) -> Option<f64> {
+    fn factor(&mut self) -> Option<f64> {
         self.rule.factor(self.ritz.known()?)
-    }
-
-    fn conclude(&mut self, model: &Model, layer: &Layer, weight: &[f64]) {
-        self.ritz.bounds(model, layer, weight);
     }
 
     fn restart(&mut self) {

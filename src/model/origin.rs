@@ -5,16 +5,15 @@
 //! start, once, and the iteration works on what is left. They come from the scene alone, not from a method or its start, and have few
 //! digits: every method sees the same gaps.
 
+use super::{Field, Model};
 use crate::linalg::{dot, fit};
-use crate::model::Model;
-use crate::model::field::Field;
 use nalgebra::DVector;
 
 /// Binary digits that an origin's amounts have: products with coordinates of 29 digits are then exact.
 const DIGITS: u32 = 24;
 
 /// Share of an amount that its origin may lack.
-pub(super) const ROUNDING: f64 = 1.0 / (1 << DIGITS) as f64;
+pub const ROUNDING: f64 = 1.0 / (1 << DIGITS) as f64;
 
 /// Rigid motions that were taken out of the displacements, and the gap as it was with them.
 pub struct Origin {
