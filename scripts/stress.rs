@@ -1,11 +1,17 @@
-//! Random scenes of the box V9 by every method, as a Markdown table with every failure below. `scripts/stress --help`.
+//! Random scenes by every method, as a Markdown table with every failure below. `scripts/stress --help`.
 
+#[path = "../tests/stress/draft.rs"]
+mod draft;
+#[path = "../tests/stress/laws.rs"]
+mod laws;
 #[path = "../tests/stress/random.rs"]
 mod random;
 #[path = "../tests/stress/runs.rs"]
 mod runs;
 #[path = "../tests/stress/scenes.rs"]
 mod scenes;
+#[path = "../tests/stress/wide.rs"]
+mod wide;
 
 use clap::Parser;
 use runs::{Answer, NAMES, Recipe, Verdict};
@@ -18,6 +24,10 @@ use winkler::petsc::Session;
 
 /// Runs random scenes by every method and compares the pressures with those of Newton's method.
 ///
+/// Scenes are two or three blocks on each other or a ring of four, in the plane, with linear and power laws. With --wide they are up
+/// to seventeen bodies in the plane, of revolution or in space: blocks, cylinders, spheres, lenses, small bodies, walls of bricks; with
+/// laws of every form in one scene, springs to the ground, own weight, and given starts. A seed stands for other scenes then.
+///
 /// Exits with 1 if the default method fails on a scene that has a solution, or if any method is wrong.
 #[derive(Parser)]
 #[command(name = "scripts/stress")]
@@ -28,6 +38,9 @@ struct Arguments {
     /// First scene of the series
     #[arg(long, default_value_t = 0)]
     first: usize,
+    /// Draws from the wider box
+    #[arg(long)]
+    wide: bool,
     /// Seed of the series
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -73,7 +86,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let scratch = tempfile::tempdir().map_err(|cause| Error::file(&std::env::temp_dir(), "write", &cause))?;
     let folder = arguments.keep.as_deref().unwrap_or(scratch.path());
     std::fs::create_dir_all(folder).map_err(|cause| Error::file(folder, "create", &cause))?;
@@ -93,7 +106,8 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let mut failures = Vec::new();
     let mut sound = true;
     for index in indices {
-        let case = scenes::scene(arguments.seed, index, &meshes);
+        let draw = if arguments.wide { wide::scene } else { scenes::scene };
+        let case = draw(arguments.seed, index, root);
         let path = folder.join(format!("scene-{}-{index}.toml", arguments.seed));
         let text = format!("# {}\n{}", case.line, case.text);
         std::fs::write(&path, text).map_err(|cause| Error::file(&path, "write", &cause))?;
@@ -214,7 +228,8 @@ fn print(arguments: &Arguments, tallies: &HashMap<&str, Tally>, failures: &[(usi
     let mut last = usize::MAX;
     for (index, _, line, scene) in failures {
         if *index != last {
-            println!("\n`scripts/stress --seed {} --only {index} --keep`: {scene}\n", arguments.seed);
+            let wide = if arguments.wide { " --wide" } else { "" };
+            println!("\n`scripts/stress{wide} --seed {} --only {index} --keep`: {scene}\n", arguments.seed);
             last = *index;
         }
         println!("- {line}");

@@ -6,7 +6,9 @@ use crate::interrupt::Interrupt;
 use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::solver::options;
+use clap::error::ContextKind;
 use clap::{Args, Parser, Subcommand};
+use std::ffi::OsString;
 use std::io::{ErrorKind, IsTerminal};
 use std::path::{Path, PathBuf};
 
@@ -57,7 +59,7 @@ enum Solving {
         #[arg(long)]
         vtu: bool,
         /// Minutes between checkpoints (short for --set output.checkpoint=T)
-        #[arg(long, value_name = "T")]
+        #[arg(long, value_name = "T", allow_hyphen_values = true)]
         checkpoint: Option<String>,
         /// Go on from the checkpoint in a folder of results
         #[arg(long, value_name = "DIR")]
@@ -89,6 +91,16 @@ struct OverriddenScene {
     /// Replace a key of the scene, for example mesh.set.n=64; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
+    /// Run the mesh's .geo script even if it can start programs or write files
+    #[arg(long)]
+    trust_geo: bool,
+}
+
+impl OverriddenScene {
+    /// All overrides.
+    fn overrides(self) -> Vec<String> {
+        self.overrides.into_iter().chain(self.trust_geo.then(|| "--trust-geo".to_owned())).collect()
+    }
 }
 
 #[derive(Args)]
@@ -121,10 +133,10 @@ struct BenchArgs {
     #[arg(long, value_name = "PATH")]
     against: Option<PathBuf>,
     /// Seconds after which a run is ended
-    #[arg(long, value_name = "S", default_value = "3600")]
+    #[arg(long, value_name = "S", default_value = "3600", allow_negative_numbers = true)]
     timeout: f64,
     /// Seconds after which no further run begins
-    #[arg(long, value_name = "S", default_value = "inf")]
+    #[arg(long, value_name = "S", default_value = "inf", allow_negative_numbers = true)]
     budget: f64,
     /// Also measure one linear factor-and-solve of the same bodies
     #[arg(long)]
@@ -135,10 +147,14 @@ struct BenchArgs {
     /// Replace a key of the scene in all runs; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
+    /// Run the meshes' .geo scripts even if they can start programs or write files
+    #[arg(long)]
+    trust_geo: bool,
 }
 
 impl BenchArgs {
-    fn request(self, petsc: Vec<String>) -> bench::Request {
+    fn request(mut self, petsc: Vec<String>) -> bench::Request {
+        self.overrides.extend(self.trust_geo.then(|| "trust_geo=true".to_owned()));
         bench::Request {
             scenes: self.scenes,
             folder: self.output,
@@ -174,8 +190,11 @@ struct SceneArgs {
     #[arg(long)]
     estimate: bool,
     /// Adapt the mesh until the estimated error of pressures and displacements is at most this (short for --set adapt.error=E)
-    #[arg(long, value_name = "E")]
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
     tolerance: Option<String>,
+    /// Run the mesh's .geo script even if it can start programs or write files
+    #[arg(long)]
+    trust_geo: bool,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
@@ -184,15 +203,17 @@ struct SceneArgs {
 impl SceneArgs {
     /// All overrides, those with names of their own last.
     fn overrides(&self) -> Vec<String> {
-        let method = self.method.iter().map(|name| format!("method.name={name}"));
-        let estimate = self.estimate.then(|| "estimate=true".to_owned());
-        let tolerance = self.tolerance.iter().map(|error| format!("adapt.error={error}"));
-        self.overrides.iter().cloned().chain(method).chain(estimate).chain(tolerance).collect()
+        let method = self.method.iter().map(|name| format!("--method {name}"));
+        let tolerance = self.tolerance.iter().map(|error| format!("--tolerance {error}"));
+        let flags = [(self.estimate, "--estimate"), (self.trust_geo, "--trust-geo")];
+        let flags = flags.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.to_owned());
+        self.overrides.iter().cloned().chain(method).chain(tolerance).chain(flags).collect()
     }
 }
 
 /// Flags of the program that begin with two dashes: with one they look like PETSc's.
-const TWO_DASHES: [&str; 14] = [
+const TWO_DASHES: [&str; 15] = [
+    "-trust-geo",
     "-set",
     "-json",
     "-method",
@@ -210,9 +231,16 @@ const TWO_DASHES: [&str; 14] = [
 ];
 
 /// Runs the program with the words of its command line, the name first; returns the exit code.
-pub fn run(words: Vec<String>) -> i32 {
+pub fn run(words: Vec<OsString>) -> i32 {
     let mut words = words.into_iter();
-    let name = words.next().unwrap_or_else(|| "winkler".to_owned());
+    let name = words.next().map_or("winkler".into(), |name| name.to_string_lossy().into_owned());
+    let words = match words.map(OsString::into_string).collect::<std::result::Result<Vec<String>, _>>() {
+        Ok(words) => words.into_iter(),
+        Err(word) => {
+            let error = Error::new(Kind::Usage, format!("this word is not UTF-8 text: `{}`", word.display()));
+            return complain(&error.help("type it in UTF-8, or rename the file"));
+        }
+    };
     let (program, petsc) = options::split(words);
     if let Some(flag) = TWO_DASHES.iter().find(|flag| petsc.iter().any(|word| word == *flag)) {
         let error = Error::new(Kind::Usage, format!("PETSc knows no option {flag}"));
@@ -222,7 +250,15 @@ pub fn run(words: Vec<String>) -> i32 {
     let program = if bare_help { vec!["--help".to_owned()] } else { program };
     let cli = match Cli::try_parse_from(std::iter::once(name).chain(program)) {
         Ok(cli) => cli,
-        Err(refusal) => {
+        Err(mut refusal) => {
+            let word = refusal.get(ContextKind::InvalidArg).map(ToString::to_string).unwrap_or_default();
+            // options of PETSc have underscores, ours have none
+            if let Some(bare) = word.strip_prefix("--").filter(|bare| bare.contains('_')) {
+                let error = Error::new(Kind::Usage, format!("`{word}`: PETSc options take one dash"));
+                return complain(&error.help(format!("did you mean -{bare}?")));
+            }
+            // nothing that the program takes would help behind `--`
+            refusal.remove(ContextKind::Suggested);
             return match refusal.print() {
                 // a closed pipe is no reason to say more
                 Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {
@@ -239,7 +275,8 @@ pub fn run(words: Vec<String>) -> i32 {
     };
     let alone = match cli.command {
         Command::Bench(arguments) => bench::bench(&interrupt, &arguments.request(petsc)),
-        Command::Mesh { scene: OverriddenScene { scene, overrides }, output, json } => {
+        Command::Mesh { scene, output, json } => {
+            let (scene, overrides) = (scene.scene.clone(), scene.overrides());
             mesh::mesh(&interrupt, &mesh::Request { scene, overrides, output, json })
         }
         Command::Solving(command) => return with_session(&petsc, &interrupt, command),
@@ -260,6 +297,7 @@ fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i3
             _ => code,
         },
         Err(error) if error.is_silent() => error.kind().exit_code(),
+        Err(error) if error.is_common() && session.rank() > 0 => error.kind().exit_code(),
         Err(error) => {
             let code = complain(&error);
             // the other ranks may be waiting for this one unless all agreed to end
@@ -275,8 +313,8 @@ fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Resul
     match command {
         Solving::Solve { scene, output, vtu, checkpoint, restart } => {
             let mut overrides = scene.overrides();
-            overrides.extend(vtu.then(|| "output.vtu=true".to_owned()));
-            overrides.extend(checkpoint.map(|minutes| format!("output.checkpoint={minutes}")));
+            overrides.extend(vtu.then(|| "--vtu".to_owned()));
+            overrides.extend(checkpoint.map(|minutes| format!("--checkpoint {minutes}")));
             let request = solve::Request { scene: scene.scene, folder: output, restart, overrides, json: scene.json };
             solve::solve(session, interrupt, request)
         }

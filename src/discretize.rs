@@ -15,6 +15,7 @@ mod part;
 mod springs;
 mod supports;
 mod surface;
+mod verify;
 
 use crate::contact::{self, ContactPair};
 
@@ -24,7 +25,7 @@ use crate::fem::{
     rigid::{self, FreeMotion, RigidMotion},
 };
 use crate::linalg::{Csr, axpy};
-use crate::mesh::Mesh;
+use crate::mesh::Checked;
 use crate::model::{Body, BodySlot, Exchange, Mechanism, Model, Segment};
 use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
@@ -34,12 +35,12 @@ use balance::Forces;
 pub use balance::{Balance, Resultant};
 use draft::{Draft, Loose};
 use fields::{ErrorMaker, FieldMaker};
-use find::{placed, point};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use std::rc::Rc;
 pub use surface::ContactSurface;
+pub use verify::{Verified, verify};
 
 /// What every rank knows of a body before its owner assembles it.
 pub struct Outline<'a> {
@@ -90,6 +91,23 @@ pub struct Assembled {
     pub left: Vec<FreeMotion>,
 }
 
+/// What the check of the mesh of a body counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct FacetCounts {
+    /// Facets between two cells.
+    pub inner: usize,
+    /// Facets of the boundary.
+    pub outer: usize,
+    /// Parts that no facet joins.
+    pub parts: usize,
+}
+
+impl FacetCounts {
+    fn of(checked: &Checked) -> Self {
+        Self { inner: checked.inner, outer: checked.outer, parts: checked.parts.count }
+    }
+}
+
 /// What is known of a body besides its matrices.
 pub struct BodyInfo {
     /// Name in the scene.
@@ -98,6 +116,8 @@ pub struct BodyInfo {
     pub nodes: usize,
     /// Cells.
     pub cells: usize,
+    /// What the check of its mesh counted.
+    pub facets: FacetCounts,
     /// Degrees of freedom, supported ones included.
     pub dofs: usize,
     /// Supported degrees of freedom.
@@ -132,9 +152,16 @@ type NodalMaker = Box<dyn Fn(&[f64]) -> Vec<f64>>;
 type BalanceMaker = Box<dyn Fn(&[f64], &[f64]) -> Balance>;
 
 impl BodyInfo {
-    /// Displacements and recovered stresses for output, from a state of all dofs.
-    pub fn field(&self, v: &[f64]) -> BodyField {
-        (self.field)(&(self.nodal)(v))
+    /// Displacements and recovered stresses for output, from a state of all dofs. `bent` is the same without the rigid motion that
+    /// supports leave: beside a large one the digits of the deformation are few.
+    pub fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
+        let mut field = (self.field)(&(self.nodal)(bent));
+        let u = (self.nodal)(v);
+        let dimension = u.len() / field.points.len().max(1);
+        for (to, u) in field.displacement.iter_mut().zip(u.chunks_exact(dimension.max(1))) {
+            to[..u.len()].copy_from_slice(u);
+        }
+        field
     }
 
     /// Forces on the body in a state of all dofs, under the forces omega p of its contact rows.
@@ -189,14 +216,16 @@ pub struct Discrete {
 /// other, surfaces that do not face each other; and failures of `factory`.
 pub fn discretize<const D: usize>(
     scene: &Scene,
-    mesh: &Mesh<D>,
+    verified: &Verified<D>,
     cut: contact::pieces::Cut<D>,
     ranks: (usize, usize),
     keep: bool,
     exchange: Box<dyn Exchange>,
     factory: &mut dyn Factory,
 ) -> Result<Discrete> {
+    let Verified { mesh, checked } = verified;
     let mut parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
+    parts.iter().zip(checked).try_for_each(|(part, checked)| verify::held(part, &checked.parts, mesh))?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
     for found in pairs::all(scene, mesh, cut, &parts, keep)? {
@@ -270,6 +299,7 @@ pub fn discretize<const D: usize>(
             name: name.clone(),
             nodes: space.nodes.len(),
             cells: space.cell_count(),
+            facets: FacetCounts::of(&checked[index]),
             dofs: space.dofs(),
             supported: held.supported(),
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),
@@ -346,10 +376,7 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
         Start::Normal(field) => {
             let positions = model.pairs.iter().flat_map(|pair| &pair.position);
             for (q, &x) in positions.enumerate() {
-                let value = field.eval(x) / factor;
-                if !value.is_finite() {
-                    return Err(placed(field, format!("the start is {value} at {}", point(x))));
-                }
+                let value = field.eval_finite("the start", x)? / factor;
                 trace[q] = value;
                 trace[points + q] = value;
             }

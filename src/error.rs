@@ -9,12 +9,12 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A text that the user wrote: a scene file, or the value of one `--set`.
+/// A text that the user wrote: a scene file, or an option of the command line.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Source {
-    /// File name, or `--set` for an override.
+    /// File name, or the option of the command line (`--set`).
     pub name: String,
-    /// The whole text.
+    /// The whole text; of an option, the option and its value.
     pub text: String,
 }
 
@@ -91,6 +91,7 @@ struct Inner {
     help: Option<String>,
     causes: Vec<String>,
     agreed: bool,
+    common: bool,
 }
 
 /// Result with [`Error`].
@@ -108,6 +109,7 @@ impl Error {
             help: None,
             causes: Vec::new(),
             agreed: false,
+            common: false,
         }))
     }
 
@@ -154,6 +156,17 @@ impl Error {
     /// Whether every rank ends with this error, so that nobody waits for this one.
     pub fn is_agreed(&self) -> bool {
         self.0.agreed
+    }
+
+    /// Marks that every rank has found this error by itself, with the same words.
+    pub fn common(mut self) -> Self {
+        (self.0.agreed, self.0.common) = (true, true);
+        self
+    }
+
+    /// Whether every rank has found this error by itself, so that one of them prints it.
+    pub fn is_common(&self) -> bool {
+        self.0.common
     }
 
     /// Points at a place in the scene.
@@ -213,9 +226,13 @@ impl Error {
             if !inner.label.is_empty() {
                 annotation = annotation.label(inner.label.as_str());
             }
-            group = group.element(
-                Snippet::source(place.source.text.as_str()).path(place.source.name.as_str()).annotation(annotation),
-            );
+            let Source { name, text } = &*place.source;
+            let mut snippet = Snippet::source(text.as_str()).annotation(annotation);
+            // the words of an option say where they stand
+            if !name.starts_with("--") {
+                snippet = snippet.path(name.as_str());
+            }
+            group = group.element(snippet);
         }
         for cause in &inner.causes {
             group = group.element(Level::NOTE.message(cause.as_str()));
@@ -234,6 +251,32 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+/// A number as people write it: far from one with an exponent, not with three hundred digits.
+pub fn shown(value: f64) -> String {
+    match value.abs() {
+        size if size != 0.0 && size.is_finite() && !(1e-5..1e16).contains(&size) => format!("{value:e}"),
+        _ => value.to_string(),
+    }
+}
+
+/// Names in a row joined by "with", words that they begin with said once: `rotation about x and y`.
+pub fn joined<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+    for name in names {
+        let (kind, last) = name.rsplit_once(' ').unwrap_or((name, ""));
+        match groups.last_mut() {
+            Some((before, list)) if *before == kind && !last.is_empty() => list.push(last),
+            _ => groups.push((kind, vec![last])),
+        }
+    }
+    let group = |(kind, mut list): (&str, Vec<&str>)| {
+        let last = list.pop().unwrap_or_default();
+        let list = if list.is_empty() { last.to_owned() } else { format!("{} and {last}", list.join(", ")) };
+        format!("{kind} {list}").trim_end().to_owned()
+    };
+    groups.into_iter().map(group).collect::<Vec<_>>().join(" with ")
+}
 
 /// The known name nearest to `name`, if one is near enough to be a slip of the keyboard.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -257,4 +300,18 @@ pub(crate) fn caret(error: &Error) -> String {
     let start = lines[marks].chars().position(|c| c == '^').unwrap_or(0);
     let length = lines[marks].chars().skip(start).take_while(|c| *c == '^').count();
     lines[marks - 1].chars().skip(start).take(length).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_numbers_are_short() {
+        let names = ["translation along x", "rotation about x", "rotation about y", "rotation about z"];
+        assert_eq!(joined(names), "translation along x with rotation about x, y and z");
+        assert_eq!(joined(["x", "y"]), "x with y");
+        assert_eq!(joined(["translation along y", "rotation"]), "translation along y with rotation");
+        assert_eq!([1e308, -2.1e5, 0.0, 1e-7, f64::NAN].map(shown), ["1e308", "-210000", "0", "1e-7", "NaN"]);
+    }
 }

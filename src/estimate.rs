@@ -9,6 +9,7 @@ pub mod sizes;
 use crate::ddm::{Discretisation, linear};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
+use crate::linalg::Csr;
 use crate::model::{Field, Layer, LinearStep, Model};
 use std::rc::Rc;
 
@@ -54,7 +55,12 @@ pub fn estimate(
     let count = model.bodies.len();
     let mut displacements = Vec::new();
     for (index, state) in iterate.states.iter().enumerate() {
-        let all = model.bodies[index].local.as_ref().map(|body| body.recover(state)).transpose()?;
+        let mut all = None;
+        if let Some(body) = &model.bodies[index].local {
+            let mut u = body.recover(state)?;
+            u.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
+            all = Some(u);
+        }
         displacements.push(all.map(|all| meshes.displacements(index, &all)));
     }
     let recovered: Vec<_> =
@@ -83,8 +89,7 @@ pub fn estimate(
         }
         model.exchange.sum(&mut compression);
         let range = model.range(index);
-        let mut between = vec![0.0; points.weight.len()];
-        points.interpolation.multiply(&layer.compression[range.clone()], &mut between);
+        let between = between(points.interpolation, &layer.compression[range.clone()]);
         let mut force = vec![0.0; points.weight.len()];
         for g in 0..force.len() {
             let at = |c: f64| pair.law.response(points.nearest[g], c).pressure;
@@ -137,6 +142,20 @@ pub fn estimate(
         bodies,
         layers,
     })
+}
+
+/// Compressions between the contact points, from those at the points. Where some of these are open, a curve through all of them
+/// may rise above all of them, more so the faster the gap grows: no pressure is made of that.
+fn between(interpolation: &Csr, compression: &[f64]) -> Vec<f64> {
+    let mut between = vec![0.0; interpolation.rows()];
+    interpolation.multiply(compression, &mut between);
+    for (g, value) in between.iter_mut().enumerate() {
+        let of_points = || interpolation.row(g).map(|(q, _)| compression[q]);
+        if of_points().any(|c| c < 0.0) {
+            *value = value.min(of_points().fold(f64::NEG_INFINITY, f64::max));
+        }
+    }
+    between
 }
 
 /// What the pressures lack where the compression lacks what the nodal errors close.

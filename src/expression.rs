@@ -153,13 +153,9 @@ impl Field {
         if value.is_finite() { Ok(value) } else { Err(self.refuse(what, &x, value)) }
     }
 
-    /// Whether it holds at a point in iteration `k`: true, or a number > 0. Where it is not defined it is false.
-    pub fn is_true_at(&self, x: [f64; 3], k: usize) -> bool {
-        self.eval_at(x, k) > 0.0
-    }
-
-    /// Like [`Field::is_true_at`], but refuses a place where it is not defined.
-    pub fn check_true_at(&self, what: &str, x: [f64; 3], k: usize) -> Result<bool> {
+    /// Whether it holds at a point in iteration `k`: true, or a number > 0. Refused where it is not defined; `what` names it in
+    /// the message ("psi").
+    pub fn is_true_at(&self, what: &str, x: [f64; 3], k: usize) -> Result<bool> {
         let value = self.eval_at(x, k);
         if value.is_nan() { Err(self.refuse(what, &[x[0], x[1], x[2], k as f64], value)) } else { Ok(value > 0.0) }
     }

@@ -1,5 +1,5 @@
 //! The `winkler` program.
 
 fn main() {
-    std::process::exit(winkler::cli::run(std::env::args().collect()));
+    std::process::exit(winkler::cli::run(std::env::args_os().collect()));
 }

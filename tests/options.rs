@@ -159,7 +159,7 @@ fn petsc_prints_what_it_is_asked_for() {
     let one = groove("-ksp_type cg -upper_ksp_monitor").converged();
     let count = |run: &Run| run.stdout.matches("KSP Residual norm").count();
     assert!(count(&one) > 0 && 2 * count(&one) <= count(&monitor) + 4, "{}", one.stdout);
-    let view = groove("-ksp_view").converged();
+    let view = groove("-ksp_view -ksp_type preonly").converged();
     assert!(view.stdout.contains("KSP Object: (upper_)") && view.stdout.contains("mumps"), "{}", view.stdout);
     let log = groove("-log_view").converged();
     assert!(log.stdout.contains("Performance Summary") || log.stdout.contains("MatCholFctrNum"), "{}", log.stdout);
@@ -167,9 +167,36 @@ fn petsc_prints_what_it_is_asked_for() {
     assert!(reason.stdout.contains("Linear upper_ solve converged"), "{}", reason.stdout);
     let help = groove("-help");
     assert_eq!(help.code, 0, "{}", help.stderr);
-    assert!(help.stdout.contains("-upper_ksp_type") && help.stdout.contains("-log_view"), "{}", help.stdout);
+    assert!(help.stdout.contains("-ksp_type") && help.stdout.contains("-log_view"), "{}", help.stdout);
     for run in [monitor, one, view, log, reason, help] {
         assert_eq!(run.stderr, "");
+    }
+}
+
+/// Options that look at a run leave it as it is, bit by bit, and say so where there is nothing to look at.
+#[test]
+fn options_that_look_change_nothing() {
+    let counts = ["iterations", "sweeps", "factorizations", "dense_factorizations"];
+    let of = |run: &Run| {
+        (counts.map(|key| run.count(key)), run.number("residual"), run.report["bodies"][0]["solver"].clone())
+    };
+    for method in ["robin", "newton"] {
+        let plain = groove(&format!("--method {method}")).converged();
+        for options in
+            ["-ksp_view", "-upper_ksp_monitor -ksp_converged_reason", "-mat_view ::ascii_info", "-log_view", "-help"]
+        {
+            let run = groove(&format!("--method {method} {options}")).converged();
+            assert_eq!(of(&run), of(&plain), "{method} {options}");
+            for name in options.split_whitespace().filter(|word| word.starts_with("-ksp") || word.starts_with("-upper"))
+            {
+                let told = format!("{name} ");
+                assert!(
+                    run.warnings().contains(told.trim()) && run.warnings().contains("nothing to show"),
+                    "{}",
+                    run.warnings()
+                );
+            }
+        }
     }
 }
 

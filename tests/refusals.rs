@@ -97,7 +97,12 @@ fn supports_and_loads() {
     let meeting = "{ on = \"lower_face\", x = 1 }, { on = \"lower_end\"";
     groove_refused("{ on = \"lower_end\"", meeting, "lower_end", &["body `lower`", "two values", "x displacement"]);
     let root = "on = \"lower_face\", pressure = \"sqrt(x - 2)\"";
-    groove_refused("on = \"lower_face\", pressure = 10", root, "sqrt", &["body `lower`", "not finite"]);
+    groove_refused(
+        "on = \"lower_face\", pressure = 10",
+        root,
+        "sqrt",
+        &["this load is not a finite number at x = ", "gives NaN"],
+    );
 }
 
 #[test]
@@ -109,21 +114,22 @@ fn contacts() {
     groove_refused(between, itself, "between =", &["both surfaces belong to body `lower`"]);
     groove_refused(between, "[\"lower_top\", \"lower_top\"]", "between =", &["`lower_top` and itself"]);
     let gap = "5e-4 * max(0, 1 - (x - 4)^2)^1.5";
-    groove_refused(gap, "sqrt(x - 1)", "gap =", &["the gap is not finite at (0, "]);
-    groove_refused(gap, "1e-3 / x", "gap =", &["the gap is not finite at (0, "]);
-    groove_refused("normal = 1e-4", "normal = \"log(x - 1)\"", "log", &["the start is", "at (0, "]);
+    groove_refused(gap, "sqrt(x - 1)", "gap =", &["the gap is not a finite number at x = 0, ", "gives NaN"]);
+    groove_refused(gap, "1e-3 / x", "gap =", &["the gap is not a finite number at x = 0, ", "gives inf"]);
+    groove_refused("normal = 1e-4", "normal = \"log(x - 1)\"", "log", &["the start is not", "at x = 0, "]);
 }
 
 #[test]
 fn layers() {
     let law = "power = { B = 2.5e-5, a = 0.5 }";
     let varying = "power = { B = \"1e-5*(1.45 - x)\", a = 0.5 }";
-    groove_refused(law, varying, "layer =", &["B is -0.00000", "at (1.4", "must be greater than 0"]);
+    groove_refused(law, varying, "layer =", &["B is -", "at (1.4", "must be greater than 0"]);
     let missing = "power = { B = \"sqrt(x - 1)\", a = 0.5 }";
     groove_refused(law, missing, "layer =", &["B is not a finite number at x = 0"]);
     groove_refused(law, "pressure = \"1e5*c + x\"", "layer =", &["no law of a layer", "p(0) is 0.03"]);
     groove_refused(law, "pressure = \"1e5*c^0.5\"", "layer =", &["no law of a layer", "p'(0) = infinity"]);
-    groove_refused(law, "pressure = \"1e5*c - 1e7*c^2\"", "layer =", &["does not increase at c =", "up_to = 1e-3"]);
+    groove_refused(law, "pressure = \"1e5*c - 1e7*c^2\"", "layer =", &["does not increase at c =", "up_to = "]);
+    groove_refused(law, "pressure = \"-1e5*c\"", "layer =", &["does not increase at c =", "a wrong sign"]);
 }
 
 #[test]
@@ -131,13 +137,66 @@ fn overrides() {
     let set = |text: &str, code: i32, words: &[&str]| {
         refused(&solve(case("groove"), &["--set", text]), code, &[&["--set"], words].concat());
     };
-    set("method.gama=1", SCENE, &["--set:1:8", "`gama`", "did you mean `gamma`?"]);
-    set("contact.5.gap=1", SCENE, &["--set:1:9", "no number 5"]);
-    set("method.gamma=abc", SCENE, &["--set:1:14", "unknown rule for gamma"]);
-    set("body.0.fix.0.on=nothing", SCENE, &["--set:1:17", "`nothing`"]);
+    set("method.gama=1", SCENE, &["--set method.gama=1\n", "`gama`", "did you mean `gamma`?"]);
+    set("contact.5.gap=1", SCENE, &["--set contact.5.gap=1\n", "no number 5"]);
+    set("method.gamma=abc", SCENE, &["--set method.gamma=abc\n", "unknown rule for gamma"]);
+    set("body.0.fix.0.on=nothing", SCENE, &["--set body.0.fix.0.on=nothing\n", "`nothing`"]);
     set("method.gamma", 2, &["without `=`"]);
     // the place is where the user wrote the name
-    set("mesh.set.m=3", SCENE, &["--set:1:10", "`m`", "did you mean `n`?"]);
+    set("mesh.set.m=3", SCENE, &["--set mesh.set.m=3\n", "`m`", "did you mean `n`?"]);
+}
+
+/// What an expression lacks is named with the expression, the place and the value, wherever it stands.
+#[test]
+fn expressions_without_a_value() {
+    for (set, words) in [
+        ("method.psi=sqrt(x-2)", &["psi is not a finite number at x = 0, ", "k = 0", "gives NaN"][..]),
+        ("body.0.load.0.pressure=log(x-3)", &["this load is not", "at x = ", "gives NaN"]),
+        ("body.0.load.0.pressure=1/(x-x)", &["this load is not", "at x = ", "gives inf"]),
+        ("body.1.load.0={on=\"upper_face\", traction=[\"sqrt(x-3)\", 0]}", &["this load is not", "gives NaN"]),
+        ("body.0.force=[\"asin(x)\", 0]", &["this body force is not", "gives NaN"]),
+        ("body.0.young=2e5*sqrt(x-1)", &["young is not", "at x = ", "gives NaN"]),
+        ("contact.0.gap=sqrt(x-2)", &["the gap is not", "at x = ", "gives NaN"]),
+        ("contact.0.reference=sqrt(x-2)", &["the reference is not", "at x = ", "gives NaN"]),
+        ("contact.0.layer.power.B=1e-5*sqrt(x-2)", &["B is not", "at x = ", "gives NaN"]),
+        ("method.start.normal=sqrt(x-2)", &["the start is not", "at x = ", "gives NaN"]),
+    ] {
+        let run = solve(case("groove"), &["--set", "mesh.set.n=8", "--set", set]);
+        refused(&run, SCENE, &[words, &[&format!("| --set {set}"), "^"]].concat());
+    }
+    // the caret stands under the constant that is wrong, not under the first
+    let scene =
+        text_of("groove").replacen("young = 2.1e5\npoisson = 0.3", "young = \"2e5*(1+x)\"\npoisson = \"0.2*x\"", 1);
+    let scene = Scene::new(scene);
+    let run = solve(&scene, &["--set", "mesh.set.n=8"]);
+    refused(&run, SCENE, &["poisson is 0.5", &format!(":{}:", scene.line_of("poisson = \"0.2"))]);
+    // a zone that loses its value later loses what was computed before no less
+    let run = solve(case("groove"), &["--set", "mesh.set.n=8", "--set", "method.psi=sqrt(3-k) >= 0"]);
+    assert!(run.code == SCENE && run.stderr.contains("k = 4"), "{}", run.said());
+    assert_eq!(run.history().rows(), 4);
+}
+
+/// Ranks find the same and one of them says it.
+#[test]
+fn one_message_from_several_ranks() {
+    let run = solve_on(2, case("groove"), &["--set", "mesh.set.n=8", "--set", "method.psi=sqrt(x-2)"]);
+    assert!(run.code == SCENE && run.stderr.matches("psi is not a finite number").count() == 1, "{}", run.said());
+}
+
+#[test]
+fn words_of_the_command_line() {
+    let scene = case("groove");
+    let scene = scene.to_str().expect("a path");
+    refused(&winkler(&["check", scene, "--ksp_type", "cg"]), 2, &["PETSc options take one dash", "-ksp_type?"]);
+    refused(&winkler(&["check", scene, "--tolerance", "-1"]), SCENE, &["| --tolerance -1\n", "the error is -1"]);
+    let stray = winkler(&["check", scene, "-1"]);
+    refused(&stray, 2, &["unexpected argument '-1'"]);
+    assert!(!stray.stderr.contains("-- -1"), "{}", stray.said());
+    use std::os::unix::ffi::OsStrExt;
+    let mut command = Command::new(common::WINKLER);
+    command.arg("check").arg(std::ffi::OsStr::from_bytes(b"caf\xe9.toml"));
+    let (status, _, said) = output(command, Duration::from_secs(60));
+    assert!(status.code() == Some(2) && said.contains("not UTF-8 text: `caf\u{fffd}.toml`"), "{said}");
 }
 
 /// The patch with another mesh.
@@ -200,6 +259,83 @@ fn a_script_that_gmsh_refuses() {
     let line = 1 + wrong.lines().position(|line| line.contains("{3, 4;")).expect("the line");
     let run = solve(patch_with(&file), &[]);
     refused(&run, MESH, &["wrong.geo", &format!("line {line}"), "syntax error"]);
+}
+
+/// The patch with a script of its own, which stands beside it.
+fn patch_with_script(text: &str) -> (tempfile::TempDir, Scene) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("own.geo");
+    std::fs::write(&file, text).expect("a script");
+    (folder, patch_with(&file))
+}
+
+#[test]
+fn scripts_that_do_more_than_draw() {
+    let script = std::fs::read_to_string(root().join("meshes/patch/patch.geo")).expect("a script");
+    for (command, word) in [
+        ("SystemCall \"touch it\";", "`SystemCall`"),
+        ("Printf(\"x\") > \"it\";", "`Printf(...) > ...`"),
+        ("Save \"it.msh\";", "`Save`"),
+        ("Include \"/etc/hostname\";", "outside its own folder"),
+    ] {
+        let (folder, scene) = patch_with_script(&format!("{script}\n{command}\n"));
+        let line = format!("own.geo:{}:", script.lines().count() + 2);
+        refused(&solve(&scene, &[]), MESH, &[&line, word, "--trust-geo"]);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "{command} was run");
+    }
+    let (folder, scene) = patch_with_script(&format!("{script}\nCreateDir \"it\";\n"));
+    solve(&scene, &["--trust-geo"]).converged();
+    assert!(folder.path().join("it").is_dir());
+}
+
+#[test]
+fn scripts_that_take_too_much() {
+    let limited = |scene: &Scene, more: &str| {
+        let file = scene.text.lines().find_map(|line| line.strip_prefix("mesh = ")).expect("a mesh").to_owned();
+        solve(scene, &["--set", &format!("mesh={{geo={file}, {more}}}")])
+    };
+    let (_folder, endless) = patch_with_script("For i In {0:1e15}\nx = i;\nEndFor\n");
+    refused(&limited(&endless, "timeout=1"), MESH, &["own.geo", "has not finished", "`timeout`"]);
+    let square = "SetFactory(\"OpenCASCADE\"); Rectangle(1) = {0, 0, 0, 1, 1}; Transfinite Curve{1:4} = 1e9;\n";
+    let (_folder, huge) = patch_with_script(square);
+    refused(&limited(&huge, "timeout=60, memory=2"), MESH, &["own.geo", "more memory", "2.0 GB", "`memory`"]);
+}
+
+/// A killed run leaves no Gmsh behind, and the next one removes its folder.
+#[test]
+fn gmsh_ends_with_a_killed_run() {
+    let (folder, scene) = patch_with_script("For i In {0:1e15}\nx = i;\nEndFor\n");
+    let cache = folder.path().join("cache");
+    let mut command = Command::new(common::WINKLER);
+    common::environment(&mut command);
+    command.arg("mesh").arg(&scene.path).env("WINKLER_CACHE", &cache);
+    let mut run = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("a run");
+    let wait = |what: &dyn Fn() -> bool| {
+        let began = std::time::Instant::now();
+        while !what() {
+            assert!(began.elapsed() < Duration::from_secs(30), "it never comes");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    };
+    let child = || std::fs::read_to_string(format!("/proc/{0}/task/{0}/children", run.id())).unwrap_or_default();
+    let name = |pid: &str| std::fs::read_to_string(format!("/proc/{}/comm", pid.trim())).unwrap_or_default();
+    wait(&|| name(&child()).starts_with("gmsh"));
+    let gmsh = child();
+    run.kill().expect("a signal");
+    run.wait().expect("an end");
+    wait(&|| !name(&gmsh).starts_with("gmsh"));
+    let left = || {
+        std::fs::read_dir(&cache)
+            .expect("a cache")
+            .filter(|entry| entry.as_ref().is_ok_and(|e| e.path().is_dir()))
+            .count()
+    };
+    assert_eq!(left(), 1);
+    let mut command = Command::new(common::WINKLER);
+    common::environment(&mut command);
+    command.arg("mesh").arg(case("patch")).env("WINKLER_CACHE", &cache);
+    assert!(output(command, Duration::from_secs(60)).0.success());
+    assert_eq!(left(), 0);
 }
 
 #[test]
@@ -370,7 +506,7 @@ fn a_scene_refused_on_two_ranks() {
     let scene = Scene::edited("groove", "on = \"lower_axis\"", "on = \"upper_axis\"");
     refused(&solve_on(2, &scene, &[]), SCENE, &["`upper_axis` does not touch body `lower`"]);
     let wrong = ["--set", "contact.0.gap=sqrt(x-1)"];
-    refused(&solve_on(2, case("groove"), &wrong), SCENE, &["the gap is not finite"]);
+    refused(&solve_on(2, case("groove"), &wrong), SCENE, &["the gap is not a finite number"]);
 }
 
 /// Only the owner of a body looks at its loads.
@@ -379,7 +515,8 @@ fn a_load_refused_on_one_of_two_ranks() {
     for body in ["lower", "upper"] {
         let load = format!("on = \"{body}_face\", pressure = ");
         let scene = Scene::edited("groove", &format!("{load}10"), &format!("{load}\"sqrt(x - 2)\""));
-        refused(&solve_on(2, &scene, &[]), SCENE, &[&format!("body `{body}`"), "not finite"]);
+        let line = format!(":{}:", scene.line_of("sqrt"));
+        refused(&solve_on(2, &scene, &[]), SCENE, &[&line, "this load is not a finite number"]);
     }
 }
 

@@ -182,3 +182,30 @@ load = [{ on = "b2_top", pressure = 0.5 }]"#;
     assert_pressure(&parallel, 0.5, 1e-12);
     assert!(parallel.warnings().contains("3 of 5 ranks have no body"), "{}", parallel.warnings());
 }
+
+/// A fall of 10^9 leaves the displacements few digits of what strains the body, and none for the forces that hold it at its side:
+/// they are found without the fall.
+#[test]
+fn forces_are_in_balance_after_any_fall() {
+    let held = "fix = [{ on = \"b2_left\", x = 0 }]\nload = [{ on = \"b2_top\", pressure = \"1 + x\" }]";
+    for gap in ["1e3", "1e9"] {
+        let run = solve(blocks([2.1e5; 2], [3, 2], held, gap, "power = { B = 2.5e-5, a = 0.5 }"), &[]);
+        assert_eq!((run.code, run.text("status")), (0, if gap == "1e3" { "converged" } else { "roundoff-limited" }));
+        for body in 0..2 {
+            let imbalance = run.number(&format!("bodies/{body}/balance/force_imbalance"));
+            assert!(imbalance < 1e-7, "gap {gap}, body {body}: {imbalance:e}\n{}", run.said());
+        }
+        let side = run.number("bodies/1/balance/supports/0/force/0");
+        assert!(side.abs() < 1e-6, "{side:e}");
+        assert!(run.number("bodies/1/max_von_mises") < 3.0, "{}", run.said());
+    }
+}
+
+/// A support that moves a body far as one strains nothing, but its digits are lost: the status says so.
+#[test]
+fn lost_digits_have_their_status() {
+    let moved = "fix = [{ on = \"b2_left\", x = 1e9 }, { on = \"b2_top\", y = \"-1e-6 * (1 + x)\" }]";
+    let run = solve(blocks([2.1e5; 2], [3, 2], moved, "0", "linear = { stiffness = 1e6 }"), &[]);
+    let worst = (0..2).map(|body| run.number(&format!("bodies/{body}/balance/force_imbalance"))).fold(0.0, f64::max);
+    assert_eq!(run.text("status") == "converged", worst < 1e-5, "{worst:e}\n{}", run.said());
+}

@@ -102,7 +102,7 @@ fn pair_on<const D: usize>(
         Side::new(groups[k], &spaces[k], facets, &free, &frame)
     };
     let (a, b) = (side(0), side(1));
-    let shared = cut(&a, &b, &Reach::between(&a, &b));
+    let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0));
     let layer = scene::load(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
     let pair = assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &layer).expect("a pair");
     (pair, spaces)
@@ -209,8 +209,9 @@ fn points_of_quadratic_triangles() {
         let groups = bodies.map(|body| format!("{body}_face"));
         let groups = groups.each_ref().map(String::as_str);
         let (pair, spaces) = pair_on(&mesh, [Order::P2; 2], pieces::space, bodies, groups);
-        assert!(kinds.iter().all(|kind| pair.carriers.contains(kind)), "{bodies:?}: {:?}", pair.carriers);
-        assert!(pair.carriers.iter().all(|kind| kinds.contains(kind)), "{bodies:?}: {:?}", pair.carriers);
+        let carriers: Vec<_> = pair.cover.iter().map(|cover| cover.carriers).collect();
+        assert!(kinds.iter().all(|kind| carriers.contains(kind)), "{bodies:?}: {carriers:?}");
+        assert!(carriers.iter().all(|kind| kinds.contains(kind)), "{bodies:?}: {carriers:?}");
         assert!(pair.weight.iter().all(|&weight| weight > 0.0), "{bodies:?}: {:?}", pair.weight);
         let sums = sums(&mesh, [Order::P2; 2], pieces::space, bodies, groups);
         assert!((sums.measure - 0.5 * 0.55).abs() < 1e-13, "{bodies:?}: {}", sums.measure);

@@ -24,8 +24,8 @@ pub fn gather(done: &Done, recovered: &All) -> Vec<BalanceReport> {
             None => {}
             // a solver that fails here leaves the forces unknown; the run itself is over
             Some(Err(_)) => message.fill(f64::NAN),
-            Some(Ok(Recovered { state, .. })) => {
-                let Balance { parts, size } = info.balance(state, &model.at_rows(index, &done.outcome.layer.force));
+            Some(Ok(Recovered { bent, .. })) => {
+                let Balance { parts, size } = info.balance(bent, &model.at_rows(index, &done.outcome.layer.force));
                 let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
                 message.iter_mut().zip(numbers).for_each(|(place, number)| *place = number);
             }

@@ -4,6 +4,7 @@ use super::clock::Clock;
 use super::run;
 use super::stages::Built;
 use super::{load, preflight, report};
+use crate::contact::Left;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::output::{say, sci};
@@ -60,9 +61,12 @@ fn pairs(built: &Built) -> serde_json::Value {
             "length": pair.weight.iter().sum::<f64>(),
             "gap": [low, high],
             "facets_uncovered": pair.uncovered(),
-            "mean_pressure": coupling.pressure,
+            "facets_steep": pair.left(Left::Steep),
+            "facets_far": pair.left(Left::Far),
+            "facets_averaged": pair.averaged(),
+            "mean_pressure": Some(coupling.pressure).filter(|&pressure| pressure > 0.0),
             "theta": coupling.theta,
-            "expected_sweeps": coupling.sweeps.iter().map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
+            "expected_sweeps": coupling.sweeps.iter().filter(|_| coupling.pressure > 0.0).map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
         })
     };
     (0..built.discrete.model.pairs.len()).map(describe).collect()
@@ -100,12 +104,20 @@ fn print(built: &Built, solvers: &str) -> Result<()> {
             sci(high, 3)
         ))?;
         let coupling = preflight::coupling(built, i);
+        if coupling.pressure == 0.0 {
+            say("    the loads push no body as a whole: pressure and sweeps cannot be estimated from them")?;
+            continue;
+        }
+        let sweeps = coupling.sweeps.iter().map(|(method, count)| match count.is_finite() {
+            true => format!("{method} {count:.0}"),
+            false => format!("{method} no end in sight"),
+        });
         say(format_args!(
             "    mean pressure {}, theta {:.3} and {:.3}; sweeps to expect for a residual of 1e-8: {}",
             sci(coupling.pressure, 3),
             coupling.theta[0],
             coupling.theta[1],
-            coupling.sweeps.iter().map(|(method, count)| format!("{method} {count:.0}")).collect::<Vec<_>>().join(", ")
+            sweeps.collect::<Vec<_>>().join(", ")
         ))?;
     }
     say(format_args!("  inner solver: {} ({})", solvers, built.choice))?;

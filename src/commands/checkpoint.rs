@@ -193,16 +193,14 @@ fn from_numbers(numbers: &[f64]) -> Option<Row> {
     })
 }
 
-/// Digest of what a scene asks for, without what changes neither problem nor method: where its files are, what is written, when it
-/// ends.
+/// Digest of what a scene asks for, without what changes neither problem nor method: where its files are, what Gmsh may take, what is written,
+/// when it ends.
 pub fn settings_digest(scene: &Scene) -> String {
     let mut settings = scene.settings();
     ["scene", "title", "output"].iter().for_each(|key| settings[*key] = Value::Null);
     settings["method"]["stop"] = Value::Null;
-    for kind in ["geo", "msh"] {
-        if let Some(file) = settings["mesh"].get_mut(kind) {
-            *file = Value::Null;
-        }
+    if let Some(mesh) = settings["mesh"].as_object_mut() {
+        ["geo", "msh", "timeout", "memory"].iter().for_each(|key| drop(mesh.remove(*key)));
     }
     hex(Sha256::new().chain_update(settings.to_string()))
 }

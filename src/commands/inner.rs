@@ -116,7 +116,7 @@ impl<'a> Inner<'a> {
                 (Preset::Hypre, "the scene asks for linear steps by multigrid".to_owned())
             }
             None => match preset::choose(size) {
-                (Preset::Condensed, why) if !condensable || self.session.options().has("-help") => (Preset::Mumps, why),
+                (Preset::Condensed, why) if !condensable => (Preset::Mumps, why),
                 chosen => chosen,
             },
         })

@@ -57,6 +57,7 @@ fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request)
 /// All that is said about a mesh.
 fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Result<Value> {
     let mesh = &loaded.mesh;
+    let mut checked = crate::discretize::verify(scene, mesh)?.checked.into_iter();
     let mut bodies = Vec::new();
     for body in &scene.bodies {
         let name = &body.name.value;
@@ -67,8 +68,10 @@ fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Res
         };
         let space = Space::new(mesh, group, body.order);
         let quality = mesh.quality(group);
+        let facets = checked.next().map(|found| [found.inner, found.outer, found.parts.count]).unwrap_or_default();
         bodies.push(json!({
             "name": name, "cells": group.len(), "nodes": space.nodes.len(), "dofs": space.dofs(),
+            "inner_facets": facets[0], "boundary_facets": facets[1], "parts": facets[2],
             "quality": { "least": quality.least, "mean": quality.mean },
         }));
     }

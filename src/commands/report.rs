@@ -8,13 +8,14 @@ use super::results;
 use super::stages::{Built, Done};
 use super::steps;
 use super::verdict::{forecast, message, status_name};
-use crate::contact::ContactPair;
-use crate::ddm::{Outcome, Status};
+use crate::contact::{ContactPair, Left};
+use crate::ddm::{self, Outcome, Status};
 use crate::discretize::Discrete;
 use crate::error::Kind;
 use crate::estimate::Estimate;
 use crate::model::BodyCounts;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
+use crate::output::sci;
 use crate::output::vtu::Grid;
 use crate::output::{BodyReport, ContactTable, EstimateReport, InnerTimes, IntervalReport, PairReport, Report};
 use crate::parallel::share;
@@ -82,8 +83,40 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
     results::fill(discrete, recovered, &mut report.bodies);
     let balances = balance::gather(done, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
+    if let (Status::Converged, Some(message)) = (&outcome.status, lost(done, &report.bodies)) {
+        (report.status, report.message) = (status_name(&Status::RoundoffLimited).to_owned(), message);
+    }
     report
 }
+
+/// What displacements that are far larger than the deformations have cost a run that would be converged otherwise, in words.
+fn lost(done: &Done, bodies: &[BodyReport]) -> Option<String> {
+    const WHY: &str = "the displacements are so large that few digits are left for";
+    let tolerated = tolerated(done);
+    let lacks = |body: &BodyReport| body.balance.force_imbalance;
+    let worst = bodies.iter().max_by(|a, b| lacks(a).total_cmp(&lacks(b)))?;
+    let pressure = ddm::lost(done.model(), &done.outcome);
+    if lacks(worst) > tolerated {
+        return Some(format!(
+            "{WHY} the forces on body `{}`, which lack {} of balance",
+            worst.name,
+            sci(lacks(worst), 1)
+        ));
+    }
+    (pressure > tolerated)
+        .then(|| format!("{WHY} the pressures, which may be off by {} of their peak", sci(pressure, 1)))
+}
+
+/// Share of the forces on a body, and of a pressure, that a converged run may lack: ten times what the run or its inner solvers were asked for.
+fn tolerated(done: &Done) -> f64 {
+    let stop = &done.built.scene.method.stop;
+    let reached = done.outcome.rows.last().map(|row| row.error).filter(|_| stop.balanced);
+    let asked = [stop.residual, stop.increment, reached].into_iter().flatten();
+    10.0 * asked.fold(INNER, f64::max)
+}
+
+/// Relative tolerance of an inner solver by default.
+const INNER: f64 = 1e-6;
 
 /// The part of the report that is known before the first sweep; `solvers` are the inner solvers in words.
 pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Clock) -> Report {
@@ -102,6 +135,9 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
                 name: info.name.clone(),
                 nodes: info.nodes,
                 cells: info.cells,
+                inner_facets: info.facets.inner,
+                boundary_facets: info.facets.outer,
+                parts: info.facets.parts,
                 dofs: info.dofs,
                 solver: solver.clone(),
                 rank: info.rank,
@@ -186,6 +222,9 @@ fn pair_report(done: &Done, i: usize) -> PairReport {
         carrier: pair.surfaces[0].clone(),
         theta: sides.map(|side| coupling.theta[side]),
         facets_uncovered: pair.uncovered(),
+        facets_steep: pair.left(Left::Steep),
+        facets_far: pair.left(Left::Far),
+        facets_averaged: pair.averaged(),
         layer_energy: layer.energy[i],
         force: sides.map(|side| sum(&pair.resultant[side])),
         moment: sides.map(|side| sum(&pair.moment[side])),

@@ -10,6 +10,8 @@ use crate::output::vtu::BodyField;
 pub struct Recovered {
     /// All dofs.
     pub state: Vec<f64>,
+    /// The same without the rigid motions that supports leave or carry the body by, which strain nothing.
+    pub bent: Vec<f64>,
     /// Displacements and stresses at the nodes.
     pub field: BodyField,
 }
@@ -25,7 +27,17 @@ pub fn recover(done: &Done) -> All {
         .zip(&done.outcome.iterate.states)
         .map(|((info, slot), state)| {
             let body = slot.local.as_ref()?;
-            Some(body.recover(state).map(|state| Recovered { field: info.field(&state), state }))
+            // what springs hold is strain, too
+            let rigid = if slot.sprung.is_some() { 0 } else { body.rigid() };
+            let mut still = state.clone();
+            still[state.len() - rigid..].fill(0.0);
+            let recover = || -> Result<Recovered> {
+                let bent = body.recover(&still)?;
+                let mut state = if still == *state { bent.clone() } else { body.recover(state)? };
+                state.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
+                Ok(Recovered { field: info.field(&state, &bent), state, bent })
+            };
+            Some(recover())
         })
         .collect()
 }
@@ -46,7 +58,7 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) {
         match recovered {
             None => {}
             Some(Err(_)) => mine.fill(f64::NAN),
-            Some(Ok(Recovered { state, field })) => {
+            Some(Ok(Recovered { state, field, .. })) => {
                 let von_mises = &field.von_mises;
                 let largest = (0..von_mises.len()).max_by(|&i, &j| von_mises[i].total_cmp(&von_mises[j])).unwrap_or(0);
                 mine[0] = von_mises[largest];

@@ -8,8 +8,9 @@ use super::stages::{Begin, Built, Done, Ready};
 use super::steps;
 use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
+use crate::contact::{ContactPair, Left};
 use crate::ddm::{self, Outcome, Start, Status};
-use crate::discretize::{self, Discrete};
+use crate::discretize::{self, ContactInfo, Discrete};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
@@ -73,9 +74,9 @@ fn build_in<const D: usize>(
 ) -> Result<Built> {
     interrupt.hold();
     let mesh = mesh::<D>(session, &scene, interrupt)?;
-    interrupt.release()?;
+    let mesh = agree(session, interrupt.release().and_then(|()| discretize::verify(&scene, &mesh)))?;
     clock.phase("mesh");
-    let largest = mesh.points.len() * D;
+    let largest = mesh.mesh.points.len() * D;
     // small fronts and several ranks lose by BLAS threads, large factorisations gain
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
     let threads = if D == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
@@ -156,11 +157,7 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
     for (pair, contact) in discrete.model.pairs.iter().zip(&discrete.contacts) {
-        let (without, all) = (pair.uncovered(), pair.carriers.len());
-        if without > 0 {
-            let names = contact.spec.between.each_ref().map(|name| &name.value);
-            warnings.push(format!("{} - {}: {without} of {all} facets have no partner", names[0], names[1]));
-        }
+        warnings.extend(left_out(pair, contact));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         if overlap < 0.0 {
             warnings.push(format!(
@@ -170,6 +167,26 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// Facets that a pair leaves out as a warning.
+fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
+    let without: Vec<Left> =
+        pair.cover.iter().filter(|cover| cover.carriers.is_none()).map(|cover| cover.left).collect();
+    if without.is_empty() {
+        return None;
+    }
+    let names = contact.spec.between.each_ref().map(|name| &name.value);
+    let all = pair.cover.len();
+    let mut text = format!("{} - {}: {} of {all} facets have no partner", names[0], names[1], without.len());
+    let steep = format!("stand at more than {} degrees to the other side (key `angle`)", contact.spec.angle);
+    for (reason, why) in [(Left::Steep, steep), (Left::Far, "are too far away from it".to_owned())] {
+        let count = without.iter().filter(|&&left| left == reason).count();
+        if count > 0 {
+            text += &format!("; {count} of `{}` {why}", pair.surfaces[0]);
+        }
+    }
+    Some(text)
 }
 
 /// A free motion of several bodies as a warning.
@@ -201,7 +218,18 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     if matches!(built.linear, Linear::Direct | Linear::Multigrid) {
         names.push(WHOLE);
     }
-    let mut warnings = agree_on_unread(session, &names)?;
+    let watching = if built.is_without_petsc() { options::watching(session, &names)? } else { Vec::new() };
+    let mut warnings = agree_on_unread(session, &names, &watching)?;
+    if !watching.is_empty() {
+        warnings.push(format!(
+            "{} {} nothing to show: the bodies are condensed, so that PETSc has no solver here; --set solver=mumps gives each body one",
+            in_words(watching.iter()),
+            if watching.len() == 1 { "has" } else { "have" }
+        ));
+    }
+    if built.is_without_petsc() && session.options().has("-help") {
+        options::show_help(session)?;
+    }
     for name in &names {
         let in_force = |option: &str| session.options().get(&format!("-{name}_{option}")).unwrap_or_default();
         if in_force("ksp_type") == "preonly" && !matches!(in_force("pc_type").as_str(), "cholesky" | "lu") {
@@ -215,11 +243,11 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     Ok(Ready { built, method, start, steps, earlier, warnings })
 }
 
-/// Warnings of options that no solver with one of these `names` has read.
+/// Warnings of options that no solver with one of these `names` has read, but for those that are `known`.
 ///
 /// # Errors
 /// Options that PETSc does not know.
-fn agree_on_unread(session: &Session, names: &[&str]) -> Result<Vec<String>> {
+fn agree_on_unread(session: &Session, names: &[&str], known: &[String]) -> Result<Vec<String>> {
     let any = |flags: &mut [u8]| {
         if session.size() > 1 && !flags.is_empty() {
             let mine = flags.to_vec();
@@ -229,6 +257,7 @@ fn agree_on_unread(session: &Session, names: &[&str]) -> Result<Vec<String>> {
     let (mut warnings, mut unknown) = (Vec::new(), Ok(()));
     for option in options::unread(session, names, &any)? {
         match option.kind {
+            options::UnreadKind::NotInUse if known.contains(&option.name) => {}
             options::UnreadKind::NotInUse => {
                 warnings.push(format!("option {} was not used: no solver of this run reads it", option.name));
             }

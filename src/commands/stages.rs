@@ -75,6 +75,11 @@ impl Built {
         meshes.map(|meshes| Box::new(Nodal(meshes)) as _)
     }
 
+    /// Whether PETSc has no solver in it: all bodies are condensed, and what joins them is dense.
+    pub fn is_without_petsc(&self) -> bool {
+        self.linear == Linear::Dense || self.condensed.len() == self.discrete.bodies.len()
+    }
+
     /// The condensed bodies, their counts begun anew, for another scene with the same bodies.
     pub fn into_condensed(self) -> Vec<BodySlot> {
         let mut slots = self.discrete.model.bodies;

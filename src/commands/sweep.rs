@@ -40,7 +40,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     let runs = combinations(&axes);
     let load = |values: &[String]| {
         let mut overrides = request.overrides.clone();
-        overrides.extend(values.iter().zip(&axes).map(|(value, (key, _))| format!("{key}={value}")));
+        overrides.extend(values.iter().zip(&axes).map(|(value, (key, _))| format!("--over {key}={value}")));
         crate::scene::load(&request.scene, &overrides).map(Rc::new)
     };
     let scenes = agree(session, runs.iter().map(|values| load(values)).collect::<Result<Vec<_>>>())?;

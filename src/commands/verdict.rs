@@ -47,6 +47,11 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
             outlook(outcome),
             advice(outcome).unwrap_or_else(|| other.to_owned())
         ),
+        Status::NotFinite { body } if k == 0 => format!(
+            "body `{}`: a number is not finite before the first iteration: look for a far too large one among its constants, \
+             its loads, the layers, and in method.start",
+            name(body)
+        ),
         Status::NotFinite { body } => format!(
             "body `{}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}",
             name(body)

@@ -4,6 +4,7 @@ use super::pieces::Shared;
 use crate::fem::element::{self, EDGES};
 use crate::problem::order::Order;
 use nalgebra::DMatrix;
+use std::ops::Range;
 
 /// The nodes of a facet that carry a pressure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,9 +48,11 @@ pub(super) enum PressureBasis {
     MidEdges,
 }
 
-/// A quadratic triangle has points at its mid-edges if each gets this share of what is covered; of the whole triangle it is a
-/// third.
-const LEAST_SHARE: f64 = 0.2;
+/// Largest int |mu| / int mu. A facet on which a function has more, since only a part of it is covered, takes hats, which have
+/// one. Chords of side b, whose facets are at least as long, miss a surface of curvature k by k h^2/8; a mean may make of that no
+/// more than the k h^2/2 by which the surface bends along a facet, four times as much. Whole facets have 5/3 to 2.4, beside an axis
+/// up to four as well; one more is for curved ones and for sums of |mu| over few points.
+pub const STEADY: f64 = 5.0;
 
 impl PressureBasis {
     /// The basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes, of which `chunk` covers what side b faces.
@@ -68,30 +71,32 @@ impl PressureBasis {
                 }
             }
         }
-        let total: f64 = integral.iter().sum();
-        if integral.iter().any(|&w| w <= 1e-6 * total) {
-            return Self::Hats;
+        let Some(factor) = mass.cholesky() else { return Self::Hats };
+        let mut dual = factor.inverse();
+        for (i, mut row) in dual.row_iter_mut().enumerate() {
+            row *= integral[i];
         }
-        match mass.cholesky() {
-            Some(factor) => {
-                let mut dual = factor.inverse();
-                for (i, mut row) in dual.row_iter_mut().enumerate() {
-                    row *= integral[i];
-                }
-                Self::Dual(dual)
-            }
-            None => Self::Hats,
-        }
+        Self::Dual(dual).or_hats(order, 0..count, chunk)
     }
 
     fn on_quadratic_triangle<const D: usize>(chunk: &[Shared<D>]) -> Self {
-        let (mut shares, mut covered) = ([0.0; 3], 0.0);
+        Self::MidEdges.or_hats(Order::P2, D..2 * D, chunk)
+    }
+
+    /// This basis, if the means of the functions of these nodes are steady on the covered part; else the hats.
+    fn or_hats<const D: usize>(self, order: Order, nodes: Range<usize>, chunk: &[Shared<D>]) -> Self {
+        let (mut integral, mut size) = ([0.0; element::MOST], [0.0; element::MOST]);
         for point in chunk {
-            let phi = element::values(Order::P2, &point.at_a);
-            (0..3).for_each(|edge| shares[edge] += point.weight * at_mid_edge(edge, &phi));
-            covered += point.weight;
+            let phi = element::values(order, &point.at_a);
+            for i in nodes.clone() {
+                let mu = point.weight * self.value(i, &phi, &point.at_a);
+                integral[i] += mu;
+                size[i] += mu.abs();
+            }
         }
-        if shares.iter().all(|&share| share >= LEAST_SHARE * covered) { Self::MidEdges } else { Self::Hats }
+        let rounding = 1e-6 * chunk.iter().map(|point| point.weight).sum::<f64>();
+        let steady = |i: usize| integral[i] > rounding && size[i] <= STEADY * integral[i];
+        if nodes.into_iter().all(steady) { self } else { Self::Hats }
     }
 
     /// mu of local node `i` at barycentric point `l` with shape functions `phi`.

@@ -2,7 +2,7 @@
 //! are those of the points themselves, not means around the nodes.
 
 use super::pair::ContactPair;
-use super::pieces::Shared;
+use super::pieces::{Common, Shared};
 use super::side::{Side, length, unit};
 use crate::fem::{Facets, element};
 use crate::linalg::Csr;
@@ -39,14 +39,15 @@ pub struct FineSide<const D: usize> {
 }
 
 impl<const D: usize> Fine<D> {
-    /// The points of `pair`, made of these sides and shared points; `gap(x)` is the scene's own gap.
+    /// The points of `pair`, made of these sides and common pieces; `gap(x)` is the scene's own gap.
     pub fn new(
         a: &Side<D>,
         b: &Side<D>,
-        shared: &[Shared<D>],
+        common: &Common<D>,
         pair: &ContactPair,
         gap: &dyn Fn([f64; 3]) -> f64,
     ) -> Self {
+        let shared = &common.points;
         let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
         let side = |side: &Side<D>, facet: fn(&Shared<D>) -> usize, at: fn(&Shared<D>) -> [f64; D]| FineSide {
             facets: side.facets.clone(),
@@ -73,7 +74,7 @@ impl<const D: usize> Fine<D> {
             fine.gap.push(distance + gap(super::pad(from)));
             fine.size.push(length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
             fine.normal.push(normal);
-            let carriers = pair.carriers[point.facet_a];
+            let carriers = pair.cover[point.facet_a].carriers;
             let shape = carriers.map(|c| c.interpolation(a.facets.order, &point.at_a)).unwrap_or_default();
             let of_point = |(node, shape): (&u32, f64)| point_of.get(node).map(|&q| (q, shape));
             let mut row: Vec<(usize, f64)> =

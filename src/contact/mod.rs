@@ -4,6 +4,7 @@
 //! (weights, rows B_a and B_b, gaps), which knows no dimension. Layer laws live in [`law`].
 
 mod basis;
+mod cover;
 pub mod fine;
 pub mod law;
 pub mod order;
@@ -12,7 +13,8 @@ pub mod pieces;
 pub mod side;
 
 pub use crate::fem::{cross, pad};
-pub use basis::Carriers;
+pub use basis::{Carriers, STEADY};
+pub use cover::{Cover, Left};
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
 pub use pair::{ContactPair, Fault, add, assemble};

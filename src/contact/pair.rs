@@ -1,8 +1,9 @@
 //! The arrays of a contact pair: all that the method knows of two surfaces.
 
 use super::basis::{Carriers, PressureBasis};
+use super::cover::{Cover, Left};
 use super::law::{self, LayerLaw};
-use super::pieces::Shared;
+use super::pieces::Common;
 use super::side::Side;
 use crate::error::Error;
 use crate::fem::{element, pad};
@@ -50,8 +51,8 @@ pub struct ContactPair {
     pub measure: &'static str,
     /// Law of the layer.
     pub law: Rc<dyn LayerLaw>,
-    /// Which nodes of each facet of side a carry points; `None` where it has no partner.
-    pub carriers: Vec<Option<Carriers>>,
+    /// What the pair takes of each facet of side a.
+    pub cover: Vec<Cover>,
 }
 
 /// Why a pair could not be made.
@@ -65,12 +66,12 @@ pub enum Fault {
     Law(Error),
 }
 
-/// Makes the arrays of a pair from shared integration points.
+/// Makes the arrays of a pair from the common pieces of its surfaces.
 ///
 /// `bodies` are the numbers of the bodies of side a and b, `gap(x)` the scene's own gap, added to the geometric one.
 /// Points: the nodes of side a with the dual basis diag(int phi) M^-1 phi of each facet's covered part, of quadratic triangles
-/// the mid-edges with that of the whole triangle; a facet on which that gives a weight that is not safely positive (quadratic,
-/// partly covered) takes the hats of its vertices.
+/// the mid-edges with that of the whole triangle; a facet on which that gives means that are not steady (partly covered) takes
+/// the hats of its vertices.
 ///
 /// # Errors
 /// [`Fault`] if nothing is covered, the gap is not finite, or the law is none.
@@ -78,13 +79,13 @@ pub fn assemble<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
     bodies: [usize; 2],
-    shared: &[Shared<D>],
+    common: &Common<D>,
     gap: &dyn Fn([f64; 3]) -> f64,
     law: &LayerSpec,
 ) -> Result<ContactPair, Fault> {
     let mut points: HashMap<u32, Accumulator> = HashMap::new();
     let mut carriers = vec![None; a.facets.count()];
-    let group = shared.chunk_by(|p, q| p.facet_a == q.facet_a);
+    let group = common.points.chunk_by(|p, q| p.facet_a == q.facet_a);
     for chunk in group {
         let facet = chunk[0].facet_a;
         let nodes = a.facets.facet(facet);
@@ -135,7 +136,7 @@ pub fn assemble<const D: usize>(
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
         law: law.into(),
-        carriers,
+        cover: Cover::of(a, common, &carriers),
     };
     for q in 0..pair.nodes.len() {
         let node = pair.nodes[q];
@@ -214,7 +215,18 @@ impl ContactPair {
 
     /// Facets of side a without a partner.
     pub fn uncovered(&self) -> usize {
-        self.carriers.iter().filter(|carriers| carriers.is_none()).count()
+        self.cover.iter().filter(|cover| cover.carriers.is_none()).count()
+    }
+
+    /// Facets of side a that are not paired as a whole for this reason.
+    pub fn left(&self, reason: Left) -> usize {
+        self.cover.iter().filter(|cover| cover.left == reason).count()
+    }
+
+    /// Facets of side a that are covered in part and take the hats of their vertices.
+    pub fn averaged(&self) -> usize {
+        let averaged = |cover: &&Cover| cover.carriers == Some(Carriers::Vertices) && cover.left != Left::Nothing;
+        self.cover.iter().filter(averaged).count()
     }
 
     /// Whether the pair has no points; [`assemble`] makes none such.

@@ -24,7 +24,7 @@ pub struct Gap {
     pub is_bound: bool,
     /// Largest |p - p(c)|.
     pub mismatch: f64,
-    /// sum omega (p - p_q)^2/rho with the pressures p_q of the new places: what a step changes, work.
+    /// [`change`] to the new places.
     pub change: f64,
     /// sum omega |p - p_q| over sum omega p_q.
     pub share: f64,
@@ -33,20 +33,18 @@ pub struct Gap {
 impl Gap {
     /// Of compressions c and equilibrium pressures p, n each, with the places that lines of slope `rho` lead to.
     pub fn new(model: &Model, compression: &[f64], pressure: &[f64], places: &Layer, rho: &[f64]) -> Self {
-        let mut gap = Self { is_bound: true, ..Self::default() };
+        let mut gap = Self { is_bound: true, change: change(model, pressure, places, rho), ..Self::default() };
         let mut apart = 0.0;
         for (i, pair) in model.pairs.iter().enumerate() {
             for q in model.range(i) {
                 let (point, weight) = (q - model.offset[i], model.weight[q]);
                 let (c, p) = (compression[q], pressure[q]);
                 let moved = p - places.pressure[q];
-                let change = weight * moved * moved / rho[q];
-                gap.change += change;
                 apart += weight * moved.abs();
                 gap.mismatch = gap.mismatch.max((p - pair.law.pressure(point, c)).abs());
                 if p < 0.0 {
                     gap.is_bound = false;
-                    gap.energy += change;
+                    gap.energy += weight * moved * moved / rho[q];
                 } else {
                     gap.energy += weight * pair.law.duality_gap(point, c, p);
                 }
@@ -56,6 +54,12 @@ impl Gap {
         gap.share = if apart == 0.0 { 0.0 } else { apart / all };
         gap
     }
+}
+
+/// sum omega (p - p_q)^2/rho of pressures p to the places p_q, n each: the work of what a step changes.
+pub(super) fn change(model: &Model, pressure: &[f64], places: &Layer, rho: &[f64]) -> f64 {
+    let at = |q: usize| model.weight[q] * (pressure[q] - places.pressure[q]).powi(2) / rho[q];
+    (0..rho.len()).map(at).sum()
 }
 
 /// The relative errors by which a run of Newton's method ends.
@@ -106,7 +110,7 @@ impl Reached {
 
     /// Adds what rounding left of the equilibrium of an exact step from `before` to `places`: one `more` step with its matrix.
     pub(super) fn add_rounding(&mut self, scale: &Scale, strain: f64, more: &Solution, before: &Layer, places: &Layer) {
-        self.error += scale.relative(more.energy, strain + places.work);
+        self.error += scale.relative(more.energy + more.error * more.error, strain + places.work);
         let closing = more.field.closing();
         let off = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
         self.pressure += if off == 0.0 { 0.0 } else { off / scale.peak(&places.pressure) };

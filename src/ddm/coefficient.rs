@@ -3,6 +3,7 @@
 //! Any symmetric positive definite G leads to the same solution; it decides how fast. Weights are kept for each contact row,
 //! in the layout of a trace vector, because the two bodies of a pair may need different ones.
 
+use crate::error::{Error, Result};
 use crate::linalg::Blocks;
 use crate::model::Model;
 use crate::model::layer::Layer;
@@ -24,42 +25,45 @@ impl Coefficient {
     }
 
     /// omega psi kappa of every contact row (2n, layout of a trace vector) for layers at these places in iteration `k`.
-    pub fn weight(&mut self, model: &Model, layer: &Layer, k: usize) -> Vec<f64> {
-        let tangent = || {
-            let points = tangents(&self.zone, model, layer, k);
-            [&points[..], &points[..]].concat()
-        };
-        match &self.rule {
-            RobinRule::Tangent => tangent(),
-            RobinRule::Frozen => {
-                let now = self.frozen.take().unwrap_or_else(|| constrained(model, tangent()));
-                self.frozen.insert(now).clone()
-            }
+    ///
+    /// # Errors
+    /// A condition of the zone that has no value at a contact point; all ranks find it.
+    pub fn weight(&mut self, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f64>> {
+        if let Some(frozen) = &self.frozen {
+            return Ok(frozen.clone());
+        }
+        let points = tangents(&self.zone, model, layer, k).map_err(Error::common)?;
+        let tangent = [&points[..], &points[..]].concat();
+        Ok(match &self.rule {
+            RobinRule::Tangent => tangent,
+            RobinRule::Frozen => self.frozen.insert(constrained(model, tangent)).clone(),
             RobinRule::Floor(floor) => {
                 let points = model.points();
-                tangent().into_iter().enumerate().map(|(i, w)| w.max(floor * model.weight[i % points])).collect()
+                tangent.into_iter().enumerate().map(|(i, w)| w.max(floor * model.weight[i % points])).collect()
             }
-            RobinRule::Auto => constrained(model, tangent()),
-        }
+            RobinRule::Auto => constrained(model, tangent),
+        })
     }
 }
 
 /// omega psi kappa at every point in iteration `k`.
-fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Vec<f64> {
-    let inside = |pair: usize, q: usize| match zone {
-        Zone::None => false,
-        Zone::Full => true,
-        Zone::Active => layer.compression[q] > 0.0,
-        Zone::Subset(holds) => holds.is_true_at(model.pairs[pair].position[q - model.offset[pair]], k),
-    };
+fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f64>> {
     let mut weight = vec![0.0; model.points()];
-    for pair in 0..model.pairs.len() {
-        for q in model.range(pair).filter(|&q| inside(pair, q)) {
-            let law = &model.pairs[pair].law;
-            weight[q] = model.weight[q] * law.robin_tangent(q - model.offset[pair], layer.compression[q]);
+    for (pair, contact) in model.pairs.iter().enumerate() {
+        for q in model.range(pair) {
+            let point = q - model.offset[pair];
+            let inside = match zone {
+                Zone::None => false,
+                Zone::Full => true,
+                Zone::Active => layer.compression[q] > 0.0,
+                Zone::Subset(holds) => holds.is_true_at("psi", contact.position[point], k)?,
+            };
+            if inside {
+                weight[q] = model.weight[q] * contact.law.robin_tangent(point, layer.compression[q]);
+            }
         }
     }
-    weight
+    Ok(weight)
 }
 
 /// The first body that nothing holds under the Robin term `weight` (omega psi kappa of the contact rows), and its motion: springs

@@ -7,6 +7,7 @@ use super::progress::Progress;
 use super::steady::Steady;
 use super::stop::{Cycle, Floor};
 use super::sweep::{Sweep, Sweeper};
+use crate::model::layer::Layer;
 
 /// The step of a sweep that led to an iterate.
 #[derive(Debug, Clone)]
@@ -32,6 +33,8 @@ pub struct Memory {
     /// Of Newton's method.
     pub(super) forcing: Forcing,
     pub(super) progress: Progress,
+    /// Places of the next step where a run paused: not on the laws if they have a barrier.
+    pub(super) places: Option<Layer>,
     /// Of sweeps: what was done, the last step, and the sweep at the iterate where a run paused.
     pub(super) sweeper: Sweeper,
     pub(super) last: Option<Last>,
@@ -52,6 +55,7 @@ impl Memory {
             before: None,
             forcing: Forcing::default(),
             progress: Progress::default(),
+            places: None,
             sweeper: Sweeper { sweeps: earlier, solves_skipped: 0 },
             last: None,
             sweep: None,

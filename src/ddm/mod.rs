@@ -7,8 +7,10 @@
 pub mod acceleration;
 mod asks;
 mod balance;
+mod barrier;
 mod bound;
 mod coefficient;
+mod digits;
 mod extend;
 mod forcing;
 pub mod forecast;
@@ -35,6 +37,7 @@ use crate::model::origin;
 pub use asks::ASKS;
 pub use balance::{Discretisation, SHARE};
 pub use coefficient::Coefficient;
+pub use digits::lost;
 pub use extend::prepare;
 pub use forecast::Forecast;
 pub use history::{Observer, Row, Silent};

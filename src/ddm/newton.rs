@@ -11,12 +11,11 @@
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
 use super::bound::{Gap, Reached, contact_energy};
-use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
 use super::stop::Status;
+use super::{barrier, start};
 use crate::error::Result;
-use crate::model::Model;
 use crate::model::field::{Field, residual};
 use crate::model::layer::{Layer, meeting_slopes};
 use crate::model::linear::{LinearStep, System};
@@ -43,7 +42,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
 
         let c = run.model.compression(&u.trace);
         let p = places.linear(&c);
-        let met = Layer::meet(run.model, &c, &p, &rho);
+        let met = start::meet(run.model, &c, &p, &rho);
 
         let gap = Gap::new(run.model, &c, &p, &met, &rho);
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
@@ -67,33 +66,14 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             return Ok(run.end(status, u, met, linear));
         }
         run.memory.forcing.learn(&gap, &reached, run.stop.residual);
-        // a step that knew of no contact runs through the other body
-        let blind = places.tangent.iter().all(|&k| k == 0.0) && met.closed > 0;
-        let lost = run.memory.progress.is_lost(gap.change, measured.f1) || blind;
-        if lost {
-            run.memory.progress.f1 += search(run.model, &mut u, &x.field)?;
-        } else {
-            run.memory.progress.f1 = measured.f1;
-        }
+        let path = |barrier| barrier::meet(run.model, &c, &p, &rho, barrier);
+        let barrier = run.memory.progress.barrier(gap.change, run.model);
         if exact {
-            places = if lost { Layer::at(run.model, &u.trace) } else { met };
+            places = if barrier > 0.0 { path(barrier) } else { met.clone() };
         }
         if measured.asked != 0 {
-            return Ok(run.end(Status::Paused { asked: measured.asked }, u, places, linear));
+            run.memory.places = Some(places);
+            return Ok(run.end(Status::Paused { asked: measured.asked }, u, met, linear));
         }
     }
-}
-
-/// Replaces a step x that led to u by the exact search on F1 along it. The change of F1 from where the step began.
-fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<f64> {
-    u.add(-1.0, x);
-    u.retrace(model);
-    let layer = Layer::at(model, &u.trace);
-    let (r, _) = residual(model, u, &layer.force);
-    let line = Line::new(model, &layer, &r, x);
-    let way = line.minimize(1e-2).unwrap_or(0.0);
-    let change = line.change(way);
-    u.add(way, x);
-    u.retrace(model);
-    Ok(change)
 }

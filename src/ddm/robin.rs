@@ -36,7 +36,7 @@ pub(super) fn iterate(
     };
     for k in run.rows.len().saturating_sub(1).. {
         let layer = Layer::at(run.model, &u.trace);
-        let weight = coefficient.weight(run.model, &layer, k);
+        let weight = coefficient.weight(run.model, &layer, k)?;
         if let Some(moved) = underconstrained(run.model, &weight) {
             return end(Status::Underconstrained(moved), u, layer, weight, run);
         }

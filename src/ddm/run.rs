@@ -236,6 +236,7 @@ impl Run<'_> {
             let missing = self.memory.steady.missing(residual, &layer.pressure, peak);
             moved <= MOVED * tolerance * peak && missing <= tolerance * peak && imbalance <= SPARE * tolerance
         });
+        let steady = steady && self.stop.increment.is_none_or(|tolerance| imbalance <= SPARE * tolerance);
         if self.stop.is_met(residual, increment) && steady {
             return Ok(Some(Status::Converged));
         }

@@ -252,7 +252,10 @@ fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
             Err(_) => start::at(model, trace),
         },
         Start::Resume(field) => Layer::at(model, &field.trace),
-        Start::Continue(state) => Layer::new(model, state.compression.clone()),
+        Start::Continue(state) => {
+            let paused = state.memory.as_ref().and_then(|memory| memory.places.clone());
+            paused.unwrap_or_else(|| Layer::new(model, state.compression.clone()))
+        }
         Start::Pressure(pressure) => {
             let mut compression = Vec::with_capacity(pressure.len());
             for (i, pair) in model.pairs.iter().enumerate() {

@@ -61,7 +61,7 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
         gap = model.compression(given).into_iter().map(|c| -c).collect();
     }
     let (slope, bare) = (surface_slopes(model), vec![false; gap.len()]);
-    let mut rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope, gap, bare };
+    let mut rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope, gap, bare, grounded: true };
     let mut amounts = DVector::zeros(motions.count());
     // bodies that neither loads nor contacts push stay where they are: all else would be rounding
     let at_rest = motions.count() == 0 || rigid.work == amounts && rigid.approach(&amounts).iter().all(|&s| s <= 0.0);
@@ -100,6 +100,22 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
 /// The places of surfaces that approach each other by B u - d without giving way, for a trace of rigid surfaces.
 pub fn at(model: &Model, trace: &[f64]) -> Layer {
     met(model, &model.compression(trace), &surface_slopes(model))
+}
+
+/// The places of [`Layer::meet`], with the bodies moved rigidly until the pressures there balance the loads, if a motion of the bodies
+/// would else meet no resistance: a linear step from there would know nothing of the contact that stops it.
+pub fn meet(model: &Model, compression: &[f64], pressure: &[f64], rho: &[f64]) -> Layer {
+    let places = Layer::meet(model, compression, pressure, rho);
+    let motions = Motions::of(model);
+    if motions.count() == 0 || motions.springs(&places.springs(model)).factor(TOLERANCE).kernel().is_empty() {
+        return places;
+    }
+    let work: Vec<f64> = motions.bodies().iter().copied().flatten().map(|motion| motion.work).collect();
+    let gap: Vec<f64> = (0..rho.len()).map(|q| -compression[q] - pressure[q] / rho[q]).collect();
+    let (work, slope, bare) = (DVector::from_vec(work), rho.to_vec(), vec![false; gap.len()]);
+    let rigid = Rigid { model, motions: &motions, work, slope, gap, bare, grounded: false };
+    // where nothing stops the motion, the linear step says so
+    rigid.descend(DVector::zeros(motions.count())).map_or(places, |amounts| rigid.places(&amounts))
 }
 
 fn met(model: &Model, approach: &[f64], slope: &[f64]) -> Layer {
@@ -157,6 +173,8 @@ struct Rigid<'a> {
     gap: Vec<f64>,
     /// Points where surfaces meet without a layer, n.
     bare: Vec<bool>,
+    /// Whether the motions are also those that springs to the ground resist.
+    grounded: bool,
 }
 
 impl Rigid<'_> {
@@ -184,7 +202,11 @@ impl Rigid<'_> {
     fn springs(&self, places: &Layer) -> Vec<f64> {
         let series = |q: usize| {
             let (law, surface) = (places.tangent[q], self.slope[q]);
-            let slope = if law.is_finite() { law * surface / (law + surface) } else { surface };
+            let slope = match (law.is_finite(), surface.is_finite()) {
+                (true, true) => law * surface / (law + surface),
+                (true, false) => law,
+                _ => surface,
+            };
             self.model.weight[q] * slope
         };
         (0..self.slope.len()).map(series).collect()
@@ -193,7 +215,11 @@ impl Rigid<'_> {
     /// A solution of springs x = load, with [`PROXIMAL`] springs everywhere.
     fn solve(&self, springs: &[f64], load: &DVector<f64>) -> DVector<f64> {
         let all = springs.iter().zip(&self.slope).zip(&self.model.weight);
-        let all: Vec<f64> = all.map(|((spring, slope), weight)| spring + PROXIMAL * slope * weight).collect();
+        let resisted = |((spring, slope), weight): ((&f64, &f64), &f64)| match slope.is_finite() {
+            true => spring + PROXIMAL * slope * weight,
+            false => *spring,
+        };
+        let all: Vec<f64> = all.map(resisted).collect();
         let mut stiffness = self.motions.springs(&all);
         self.grounded().for_each(|(body, sprung)| stiffness.add(body, body, &sprung.stiffness));
         stiffness.factor(TOLERANCE).solve(load)
@@ -201,7 +227,8 @@ impl Rigid<'_> {
 
     /// Bodies on springs.
     fn grounded(&self) -> impl Iterator<Item = (usize, &Sprung)> {
-        self.model.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)))
+        let bodies = self.model.bodies.iter().enumerate().filter(|_| self.grounded);
+        bodies.filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)))
     }
 
     /// Forces of the springs to the ground on each motion.
@@ -251,7 +278,8 @@ impl Rigid<'_> {
             let closing = self.motions.closing(&step);
             let (gain, resisted) = (step.dot(&self.work), step.dot(&self.pull(&step)));
             let gains = gain > PART * step.amax() * largest;
-            if gains && resisted <= PART * gain && self.opens(&closing) {
+            // near rest the step and what resists it are small
+            if gains && resisted <= PART * step.dot(&lacking) && self.opens(&closing) {
                 return Err(step);
             }
             let start = places.force;
@@ -295,7 +323,7 @@ impl Rigid<'_> {
         let mut bare = vec![false; gap.len()];
         idle.iter().for_each(|&q| (gap[q], bare[q]) = (gap[q] - room, true));
         let (work, slope) = (self.work.clone(), self.slope.clone());
-        let wider = Rigid { model: self.model, motions: self.motions, work, slope, gap, bare };
+        let wider = Rigid { model: self.model, motions: self.motions, work, slope, gap, bare, grounded: true };
         // layers that are soft at first would open slowly
         if let Ok(moved) = wider.descend(amounts.clone()) {
             let approach = self.approach(&moved);

@@ -18,6 +18,10 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// Iterations at most: conjugate gradients lose their directions to rounding long before.
 const MOST: usize = 400;
 
+/// Error of a linear step, as a share of it, above which the step is not solved after [`MOST`] iterations. Newton's method converges with
+/// any share below one, and the worse the larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).
+const LEAST: f64 = 0.1;
+
 /// Iterations over which the gain of energy tells the error before them (Hestenes and Stiefel).
 const DELAY: usize = 4;
 
@@ -53,14 +57,23 @@ impl LinearStep for Sweeps {
         let System { model, places, springs, residual, reduction, most } = system;
         model.precision(ROUGH)?;
         if let Some(coefficient) = &mut self.coefficient {
-            let weight = coefficient.weight(model, places, self.systems);
+            let weight = coefficient.weight(model, places, self.systems)?;
             model.robin(&weight)?;
         }
         self.systems += 1;
+        let before = self.sweeper.sweeps;
         let found = gradients(model, &mut self.sweeper, springs, residual, (reduction, most, MOST))?;
-        Ok(found.map(|found| {
+        Ok(found.and_then(|found| {
             self.spectrum = found.spectrum.or(self.spectrum);
-            found.solution
+            let Solution { energy, error, .. } = found.solution;
+            match self.sweeper.sweeps - before > MOST && error * error > LEAST * LEAST * energy {
+                true => {
+                    let share = error / energy.sqrt();
+                    let reason = format!("{MOST} sweeps leave an error of {share:.0e} of the linear step");
+                    Err(Failure { body: None, reason })
+                }
+                false => Ok(found.solution),
+            }
         }))
     }
 
@@ -121,17 +134,19 @@ pub(super) fn gradients(
         let mut image = apply_stiffness(model, &p);
         let closing = p.closing();
         let spring: Vec<f64> = springs.iter().zip(&closing).map(|(w, s)| w * s).collect();
-        let mut sums = [local_dot(&image, &p.states)];
+        let mut sums = [local_dot(&image, &p.states), local_dot(&r, &p.states)];
         model.exchange.sum(&mut sums);
         let curvature = sums[0] + dot(&spring, &closing);
+        // r'z but for what rounding left of rigid motions in r, which p has not: the least energy along p is where r'p says
+        let slope = sums[1];
         // p'Gp is r'z at least: a direction of which deflation leaves nothing but rounding has no curvature beside it
-        if !(rz > 0.0 && curvature > f64::EPSILON * rz) {
+        if !(slope > 0.0 && curvature > f64::EPSILON * rz) {
             break if error.is_finite() { error } else { rz.max(0.0) };
         }
         add_forces(model, &spring, &mut image);
-        let alpha = rz / curvature;
+        let alpha = slope / curvature;
         x.add(alpha, &p);
-        lanczos.gain(alpha, alpha * rz);
+        lanczos.gain(alpha, alpha * slope);
         let old = r.clone();
         r.iter_mut().zip(&image).for_each(|(r, y)| axpy(-alpha, y, r));
         last = Some((p, rz, old));

@@ -10,9 +10,6 @@ use crate::fem::Facets;
 use crate::problem::contact::AutoContact;
 use std::collections::HashSet;
 
-/// Facets face each other if the cosine between the normal of one and minus that of the other is larger.
-const FACING: f64 = 0.5;
-
 /// The two surfaces of each pair of bodies that come near each other, named after the bodies, but for pairs in
 /// `named` (numbers of bodies, the smaller first).
 ///
@@ -47,7 +44,8 @@ pub fn find<'a, const D: usize>(
         others.retain(|&b| b > a && !named.contains(&[a, b]));
         others.sort_unstable();
         for b in others {
-            let near = candidates(&whole[a], &whole[b], &searches[b], auto.distance);
+            let reach = within(&whole[a], &whole[b], auto.distance, auto.contact.angle);
+            let near = candidates(&whole[a], &whole[b], &searches[b], &reach);
             if near.iter().any(|facets| facets.count() == 0) {
                 continue;
             }
@@ -62,7 +60,8 @@ pub fn find<'a, const D: usize>(
             };
             let (side_a, side_b) = (side(a, &near[0]), side(b, &near[1]));
             let mut used = [vec![false; near[0].count()], vec![false; near[1].count()]];
-            for point in cut(&side_a, &side_b, &within(&side_a, &side_b, auto.distance)) {
+            let reach = within(&side_a, &side_b, auto.distance, auto.contact.angle);
+            for point in cut(&side_a, &side_b, &reach).points {
                 used[0][point.facet_a] = true;
                 used[1][point.facet_b] = true;
             }
@@ -84,19 +83,19 @@ pub fn find<'a, const D: usize>(
     Ok(found)
 }
 
-/// How far the surfaces of a found pair may be apart.
-pub fn within<const D: usize>(a: &Side<D>, b: &Side<D>, distance: f64) -> Reach {
-    Reach { gap: distance, overlap: distance.min(Reach::between(a, b).overlap) }
+/// How far the surfaces of a found pair may be apart, and how inclined in degrees.
+pub fn within<const D: usize>(a: &Side<D>, b: &Side<D>, distance: f64, angle: f64) -> Reach {
+    let reach = Reach::between(a, b, angle);
+    Reach { gap: distance, overlap: distance.min(reach.overlap), ..reach }
 }
 
 /// Facets of two bodies with opposed normals and boxes within the distance.
-fn candidates<const D: usize>(a: &Side<D>, b: &Side<D>, search: &Search<D>, distance: f64) -> [Facets<D>; 2] {
+fn candidates<const D: usize>(a: &Side<D>, b: &Side<D>, search: &Search<D>, reach: &Reach) -> [Facets<D>; 2] {
     let mut keep = [vec![false; a.facets.count()], vec![false; b.facets.count()]];
     for i in 0..a.facets.count() {
         let normal = unit(a.area(i));
-        for j in search.near(a, i, distance) {
-            let other = unit(b.area(j));
-            if (0..D).map(|c| normal[c] * other[c]).sum::<f64>() < -FACING {
+        for j in search.near(a, i, reach.gap) {
+            if reach.faces(normal, unit(b.area(j))) {
                 keep[0][i] = true;
                 keep[1][j] = true;
             }

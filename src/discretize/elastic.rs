@@ -2,7 +2,7 @@
 
 use super::find::{find_group, not_on_body, point};
 use crate::contact::pad;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown};
 use crate::fem::Space;
 use crate::fem::elasticity::{Elasticity, Flaw};
 use crate::mesh::Mesh;
@@ -41,12 +41,20 @@ fn specs(spec: &BodySpec) -> impl Iterator<Item = &ElasticitySpec> {
 
 /// The refusal of the constants of a body (`number` 0) or its regions, at a point if they depend on it.
 pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> Error {
-    let place = &specs(spec).nth(number).unwrap_or(&spec.elasticity).place;
+    let elasticity = specs(spec).nth(number).unwrap_or(&spec.elasticity);
+    let place = &elasticity.place;
+    let fields = elasticity.fields();
+    // a value that does not exist makes every other complaint
+    if let Some(error) = x.and_then(|x| fields.iter().find_map(|(name, field)| field.eval_finite(name, x).err())) {
+        return error;
+    }
     let at = x.map(|x| format!(" at {}", point(x))).unwrap_or_default();
     let name = &spec.name.value;
     match flaw {
         Flaw::Constant(constant, value, rule) => {
-            Error::scene(place, format!("body `{name}`: {constant} is {value}{at}")).label(*rule)
+            let own = fields.iter().find(|(name, _)| name == constant).and_then(|(_, field)| field.place());
+            Error::scene(own.unwrap_or(place), format!("body `{name}`: {constant} is {}{at}", shown(*value)))
+                .label(*rule)
         }
         Flaw::Axes(what) => Error::scene(place, format!("body `{name}`: axes{at}: {what}")),
         Flaw::NotCoercive(eigenvalue) => {

@@ -1,9 +1,11 @@
 //! Mesh groups by name, and refusals that point into the scene.
 
-use crate::error::{Error, Kind, Located, Result};
+use crate::contact;
+use crate::error::{Error, Located, Result};
 use crate::expression::Field;
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::BodySpec;
+use std::cell::RefCell;
 
 /// A mesh group by name, of one of these dimensions.
 pub fn find_group<'m, const D: usize>(
@@ -55,13 +57,30 @@ pub fn earlier(on: &Located<String>) -> String {
     format!("the earlier one is on `{}`, line {} of {}", on.value, 1 + text.matches('\n').count(), on.place.source.name)
 }
 
-/// A refusal that points at an expression of the scene.
-pub fn placed(field: &Field, message: String) -> Error {
-    let error =
-        Error::new(Kind::Scene, message).help("mind roots of negative numbers and divisions by zero in the expression");
-    match field.place() {
-        Some(place) => error.at(place),
-        None => error,
+/// Values of fields at many points, of which the first that does not exist is refused afterwards.
+pub struct Values {
+    what: &'static str,
+    refused: RefCell<Option<Error>>,
+}
+
+impl Values {
+    /// Of the quantity `what`, in words.
+    pub fn of(what: &'static str) -> Self {
+        Self { what, refused: RefCell::new(None) }
+    }
+
+    /// The value at a point; zero where there is none.
+    pub fn at<const D: usize>(&self, field: &Field, x: [f64; D]) -> f64 {
+        field.eval_finite(self.what, contact::pad(x)).unwrap_or_else(|error| {
+            self.refused.borrow_mut().get_or_insert(error);
+            0.0
+        })
+    }
+
+    /// # Errors
+    /// The first value that did not exist, with its expression and the point.
+    pub fn refused(self) -> Result<()> {
+        self.refused.into_inner().map_or(Ok(()), Err)
     }
 }
 

@@ -2,9 +2,12 @@
 
 use super::supports::Held;
 use crate::contact::Fine;
+use crate::contact::side::length;
+use crate::fem::element::EDGES;
 use crate::fem::recovery::Recovery;
 use crate::fem::{Elasticity, Space, element, pad};
 use crate::linalg::Csr;
+use crate::problem::order::Order;
 use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
@@ -30,7 +33,7 @@ pub trait Meshes {
 
 /// The cells of a body by their corners.
 pub struct Cells {
-    /// Coordinates of the nodes.
+    /// Coordinates of the nodes, on boundaries that bow outwards so far out that the straight cells cover the body.
     pub nodes: Vec<[f64; 3]>,
     /// Corners of a cell.
     pub stride: usize,
@@ -117,7 +120,7 @@ impl<const D: usize> Meshes for Kept<D> {
         let regular = if D == 2 { 3f64.sqrt() / 4.0 } else { 2f64.sqrt() / 12.0 };
         let size = |index| (space.cell_measure(index) / regular).powf(1.0 / D as f64);
         Cells {
-            nodes: space.nodes.iter().map(|&x| pad(x)).collect(),
+            nodes: covering(space),
             stride: D + 1,
             corners: space.cells.chunks_exact(space.stride).flat_map(|cell| &cell[..=D]).copied().collect(),
             sizes: (0..space.cell_count()).map(size).collect(),
@@ -127,6 +130,34 @@ impl<const D: usize> Meshes for Kept<D> {
     fn degree(&self, body: usize) -> usize {
         self.shapes[body].space.order as usize + 1
     }
+}
+
+/// The nodes of a space, moved out along curved quadratic edges by twice the rise of the edge: its tangents meet there. The
+/// mesher looks for sizes on the curved boundary, and finds none where no straight cell is.
+fn covering<const D: usize>(space: &Space<D>) -> Vec<[f64; 3]> {
+    let mut rise = vec![[0.0; D]; if space.order == Order::P2 { space.nodes.len() } else { 0 }];
+    for (index, cell) in space.cells.chunks_exact(space.stride).enumerate().filter(|_| space.order == Order::P2) {
+        let centre = space.centroid(index);
+        for (&(i, j), &between) in EDGES.iter().zip(&cell[D + 1..]) {
+            let (x, y) = (space.nodes[cell[i] as usize], space.nodes[cell[j] as usize]);
+            let middle: [f64; D] = std::array::from_fn(|c| 0.5 * (x[c] + y[c]));
+            let up: [f64; D] = std::array::from_fn(|c| space.nodes[between as usize][c] - middle[c]);
+            let outwards: f64 = (0..D).map(|c| up[c] * (middle[c] - centre[c])).sum();
+            // a straight edge rises by rounding
+            if outwards <= 0.0 || length(up) < 1e-9 * length(std::array::from_fn::<f64, D, _>(|c| y[c] - x[c])) {
+                continue;
+            }
+            for node in [cell[i], cell[j]].map(|node| node as usize) {
+                if length(up) > length(rise[node]) {
+                    rise[node] = up;
+                }
+            }
+        }
+    }
+    let moved = |(node, &x): (usize, &[f64; D])| {
+        pad(rise.get(node).map_or(x, |rise| std::array::from_fn(|c| x[c] + 2.0 * rise[c])))
+    };
+    space.nodes.iter().enumerate().map(moved).collect()
 }
 
 struct OnBody<'a, const D: usize> {

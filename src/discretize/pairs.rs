@@ -1,7 +1,7 @@
 //! Contacts of the scene on the mesh: which body each surface bounds, which side carries the points.
 
 use super::auto;
-use super::find::{find_group, placed, point};
+use super::find::{find_group, point};
 use super::part::Part;
 use super::surface::{ContactSurface, Surface};
 use crate::contact::pieces::{Cut, Reach};
@@ -88,13 +88,14 @@ fn make_pair<const D: usize>(
     let equal = (fine_a - fine_b).abs() <= 1e-6 * fine_a;
     let swapped = if equal { first.1.name >= second.1.name } else { fine_a >= fine_b };
     let ((body_a, a), (body_b, b)) = if swapped { (second, first) } else { (first, second) };
-    let reach = distance.map_or_else(|| Reach::between(&a, &b), |distance| auto::within(&a, &b, distance));
-    let mut shared = cut(&a, &b, &reach);
+    let reach = distance
+        .map_or_else(|| Reach::between(&a, &b, spec.angle), |distance| auto::within(&a, &b, distance, spec.angle));
+    let mut common = cut(&a, &b, &reach);
     if spec.touching {
-        shared.iter_mut().for_each(|point| point.gap = 0.0);
+        common.points.iter_mut().for_each(|point| point.gap = 0.0);
     }
     let gap = |x| spec.gap.eval(x);
-    let pair = contact::assemble(&a, &b, [body_a, body_b], &shared, &gap, &spec.layer)
+    let pair = contact::assemble(&a, &b, [body_a, body_b], &common, &gap, &spec.layer)
         .map_err(|fault| refuse(&spec, fault))?;
     let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
     if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
@@ -103,8 +104,11 @@ fn make_pair<const D: usize>(
         return Err(Error::scene(&spec.between[0].place, message)
             .help("move a body, give a larger gap, or let the layer take it: overlap = \"compress\""));
     }
+    if let Some(field) = &spec.reference {
+        pair.position.iter().try_for_each(|&x| field.eval_finite("the reference", x).map(drop))?;
+    }
     let surface = ContactSurface::new(&a, &pair);
-    let fine = fine.then(|| Fine::new(&a, &b, &shared, &pair, &gap));
+    let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap));
     Ok(Contact { spec, pair, fine, swapped, surface })
 }
 
@@ -119,7 +123,10 @@ fn refuse(spec: &ContactSpec, fault: Fault) -> Error {
             )
             .help("a pair needs surfaces whose outer normals point at each other; look at the mesh with `gmsh`")
         }
-        Fault::Gap(x) => placed(&spec.gap, format!("the gap is not finite at {}", point(x))),
+        Fault::Gap(x) => spec.gap.eval_finite("the gap", x).err().unwrap_or_else(|| {
+            let message = format!("the gap is beyond the range of numbers at {}", point(x));
+            Error::scene(&spec.between[0].place, message)
+        }),
     }
 }
 

@@ -1,7 +1,7 @@
 //! One body of the scene on its mesh: space, supports, loads, stiffness.
 
 use super::elastic;
-use super::find::{find_group, not_on_body, point, without_area};
+use super::find::{Values, find_group, not_on_body, point, without_area};
 use super::springs;
 use super::supports::Held;
 use crate::contact;
@@ -120,37 +120,35 @@ impl<'a, const D: usize> Part<'a, D> {
             if area == 0.0 {
                 return Err(without_area(&spec.on, self.spec));
             }
+            let values = Values::of("this load");
             surface::surface_load(
                 &self.space,
                 &facets,
                 &|x, n| match &spec.kind {
                     LoadKind::Pressure(field) => {
-                        let pressure = field.eval(contact::pad(x));
+                        let pressure = values.at(field, x);
                         n.map(|n| -pressure * n)
                     }
-                    LoadKind::Traction(fields) => std::array::from_fn(|c| fields[c].eval(contact::pad(x))),
+                    LoadKind::Traction(fields) => std::array::from_fn(|c| values.at(&fields[c], x)),
                     LoadKind::Force { rigid: true, .. } => [0.0; D],
                     LoadKind::Force { total, .. } => std::array::from_fn(|c| total[c] / area),
                 },
                 &mut load,
             );
+            values.refused()?;
             if load.iter().any(|f| !f.is_finite()) {
-                return Err(Error::scene(
-                    &spec.on.place,
-                    format!("body `{}`: this load is not finite everywhere on its surface", name.value),
-                )
-                .help("mind roots of negative numbers and divisions by zero in the expression"));
+                return Err(Error::scene(&spec.on.place, format!("body `{}`: the load is too large", name.value))
+                    .label("its forces are beyond the range of numbers"));
             }
         }
         if let Some(fields) = &self.spec.force {
-            let density = |x: [f64; D]| std::array::from_fn(|c| fields[c].eval(contact::pad(x)));
+            let values = Values::of("this body force");
+            let density = |x: [f64; D]| std::array::from_fn(|c| values.at(&fields[c], x));
             assemble::body_force(&self.space, &density, &mut load);
+            values.refused()?;
             if load.iter().any(|f| !f.is_finite()) {
-                return Err(Error::scene(
-                    &name.place,
-                    format!("body `{}`: its body force is not finite everywhere", name.value),
-                )
-                .help("mind roots of negative numbers and divisions by zero in the expression"));
+                return Err(Error::scene(&name.place, format!("body `{}`: the body force is too large", name.value))
+                    .label("its forces are beyond the range of numbers"));
             }
         }
         Ok(load)
@@ -201,6 +199,10 @@ impl<'a, const D: usize> Part<'a, D> {
             }
             assemble::Defect::Elasticity(number, x, flaw) => elastic::refusal(self.spec, number, Some(x), &flaw),
         })?;
+        if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
+            let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
+            return Err(Error::scene(&self.spec.elasticity.place, message).label("far too large"));
+        }
         self.springs.iter().for_each(|springs| assemble::add_blocks(&graph, springs, &mut stiffness));
         self.held.frame.turn_matrix(&mut stiffness);
         let work = dot(&load, &carried);

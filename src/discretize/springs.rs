@@ -2,7 +2,7 @@
 
 use super::find::{find_group, not_on_body, without_area};
 use crate::contact::pad;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown};
 use crate::expression::Field;
 use crate::fem::assemble::NodalBlock;
 use crate::fem::{Space, surface};
@@ -66,7 +66,12 @@ fn stiffness(field: &Field, spring: &SpringSpec, x: [f64; 3]) -> Result<f64> {
     match field.eval_finite("the stiffness of this spring", x)? {
         k if k >= 0.0 => Ok(k),
         k => {
-            let message = format!("the stiffness of the spring on `{}` is {k} at {}", spring.on.value, super::point(x));
+            let message = format!(
+                "the stiffness of the spring on `{}` is {} at {}",
+                spring.on.value,
+                shown(k),
+                super::find::point(x)
+            );
             Err(Error::scene(field.place().unwrap_or(&spring.on.place), message).label("must not be negative"))
         }
     }

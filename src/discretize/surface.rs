@@ -1,4 +1,4 @@
-//! A contact surface of a pair; its mesh for output: the covered facets of side a, and where their values come from.
+//! A contact surface of a pair; its mesh for output: the facets of side a, and where their values come from.
 
 use crate::contact::{ContactPair, Side, pad};
 use crate::fem::{Facets, element};
@@ -16,7 +16,7 @@ pub struct Surface<'a, const D: usize> {
     pub facets: Facets<D>,
 }
 
-/// The covered facets of the side that carries the points.
+/// The facets of the side that carries the points.
 pub struct ContactSurface {
     points: Vec<[f64; 3]>,
     cell: CellKind,
@@ -24,10 +24,14 @@ pub struct ContactSurface {
     /// For each point of the mesh the contact points that its values come from, with their shares; none where nothing is
     /// known.
     sources: Vec<Vec<(usize, f64)>>,
+    /// Share of each facet that is paired.
+    cover: Vec<f64>,
+    /// Why it is not paired as a whole: the number of the reason.
+    left: Vec<f64>,
 }
 
 impl ContactSurface {
-    /// The facets of side a that have a partner on side b.
+    /// The facets of side a; those without a partner have no values.
     pub fn new<const D: usize>(a: &Side<D>, pair: &ContactPair) -> Self {
         let of_node: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
         let order = a.facets.order;
@@ -42,12 +46,15 @@ impl ContactSurface {
             },
             connectivity: Vec::new(),
             sources: Vec::new(),
+            cover: Vec::new(),
+            left: Vec::new(),
         };
         let mut number: HashMap<u32, u32> = HashMap::new();
         let mut sums: Vec<(f64, BTreeMap<usize, f64>)> = Vec::new();
-        let covered = pair.carriers.iter().enumerate().filter_map(|(facet, carriers)| Some((facet, (*carriers)?)));
-        for (facet, carriers) in covered {
+        for (facet, cover) in pair.cover.iter().enumerate() {
             let nodes = a.facets.facet(facet);
+            surface.cover.push(cover.share);
+            surface.left.push(cover.left as u8 as f64);
             for (place, node) in places.iter().zip(nodes) {
                 let at = *number.entry(*node).or_insert(surface.points.len() as u32);
                 surface.connectivity.push(at);
@@ -55,6 +62,7 @@ impl ContactSurface {
                     surface.points.push(pad(a.space.nodes[*node as usize]));
                     sums.push((0.0, BTreeMap::new()));
                 }
+                let Some(carriers) = cover.carriers else { continue };
                 let (facets, sum) = &mut sums[at as usize];
                 *facets += 1.0;
                 for (shape, of) in carriers.interpolation(order, place).iter().zip(nodes) {
@@ -103,7 +111,7 @@ impl ContactSurface {
                 .iter()
                 .map(|(name, components, values)| ((*name).to_owned(), *components as u32, spread(*components, values)))
                 .collect(),
-            at_cells: Vec::new(),
+            at_cells: vec![("cover".to_owned(), 1, self.cover.clone()), ("left_out".to_owned(), 1, self.left.clone())],
         }
     }
 }

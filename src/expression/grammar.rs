@@ -186,6 +186,16 @@ impl<'a> Parser<'a> {
 
     fn missing_operator(&self) -> Slip {
         let found = &self.text[self.span.clone()];
+        let after_number = self.text[..self.span.start].trim_end().ends_with(|c: char| c.is_ascii_digit() || c == '.');
+        let unit = found.starts_with(char::is_alphabetic)
+            && !self.variables.contains(&found)
+            && found != "pi"
+            && !functions().any(|known| known == found);
+        if after_number && unit {
+            return Slip::new(self.span.clone(), format!("`{found}` is neither a variable nor an operator")).help(
+                "numbers stand without their unit: choose units that fit each other, and give every value in them",
+            );
+        }
         Slip::new(self.span.clone(), format!("expected an operator before `{found}`")).help("write `*` to multiply")
     }
 

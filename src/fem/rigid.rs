@@ -127,7 +127,7 @@ pub fn combine(motions: &[RigidMotion], weights: &DVector<f64>) -> RigidMotion {
         }
         crate::linalg::axpy(weight / largest, &motion.displacement, &mut displacement);
     }
-    RigidMotion { name: name.join(" with "), displacement }
+    RigidMotion { name: crate::error::joined(name), displacement }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 /// What a mesh was made from, digested piece by piece.
 pub struct Key(Sha256);
@@ -56,11 +57,19 @@ fn choose(variable: impl Fn(&str) -> Option<PathBuf>) -> Vec<PathBuf> {
 const ROOM: usize = 1 << 16;
 
 /// A folder of one process inside the cache, gone with its last use: files are finished there and then moved, so that
-/// nobody ever reads half a file.
+/// nobody ever reads half a file. What a killed process left is removed by the next one.
 pub struct Workshop {
     cache: PathBuf,
     folder: PathBuf,
+    /// Locked as long as the process lives: the sign that the folder is in use.
+    _lock: Option<File>,
 }
+
+/// How names of workshops begin.
+const PREFIX: &str = "tmp-";
+
+/// Age from which a workshop without a lock belongs to nobody; where the file system knows no locks, all are without.
+const OLD: Duration = Duration::from_secs(24 * 3600);
 
 impl Workshop {
     /// Opens one in the first of the folders where that is possible.
@@ -69,13 +78,14 @@ impl Workshop {
     /// No folder can be written.
     pub fn open(folders: &[PathBuf]) -> Result<Workshop> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
-        let name = format!("tmp-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let name = format!("{PREFIX}{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let mut failure = None;
         for cache in folders {
             let folder = cache.join(&name);
             match std::fs::create_dir_all(&folder) {
                 Ok(()) => {
-                    return Ok(Workshop { cache: cache.clone(), folder });
+                    remove_left(cache);
+                    return Ok(Workshop { cache: cache.clone(), _lock: lock(&folder), folder });
                 }
                 Err(cause) => failure = Some(failure.unwrap_or(Error::file(&folder, "create", &cause))),
             }
@@ -113,6 +123,34 @@ impl Workshop {
         let to = self.cache.join(name);
         std::fs::rename(file, &to).map_err(|cause| Error::file(&to, "create", &cause))?;
         Ok(to)
+    }
+}
+
+/// Locks a workshop. The file takes its name when it is locked, so that nobody finds it unlocked before.
+fn lock(folder: &Path) -> Option<File> {
+    let new = folder.join("new-lock");
+    let file = File::create(&new).ok()?;
+    file.try_lock().ok()?;
+    std::fs::rename(&new, folder.join("lock")).ok().map(|()| file)
+}
+
+/// Removes the workshops in a cache that nobody uses any more. What cannot be removed stays.
+fn remove_left(cache: &Path) {
+    for entry in std::fs::read_dir(cache).into_iter().flatten().flatten() {
+        let folder = entry.path();
+        if !entry.file_name().to_string_lossy().starts_with(PREFIX) || !folder.is_dir() {
+            continue;
+        }
+        let unused = match File::open(folder.join("lock")) {
+            Ok(lock) => lock.try_lock().is_ok(),
+            Err(_) => {
+                let changed = entry.metadata().and_then(|data| data.modified()).ok();
+                changed.and_then(|time| time.elapsed().ok()).is_some_and(|age| age > OLD)
+            }
+        };
+        if unused {
+            let _ = std::fs::remove_dir_all(&folder);
+        }
     }
 }
 
@@ -169,5 +207,36 @@ mod tests {
         assert_eq!(std::fs::read_dir(&good).unwrap().count(), 1);
         let error = Workshop::open(&[blocked]).err().unwrap().to_string();
         assert!(error.contains("$WINKLER_CACHE"), "{error}");
+    }
+
+    #[test]
+    fn what_a_killed_process_left_is_removed_and_nothing_else() {
+        let cache = tempfile::tempdir().unwrap();
+        let make = |name: &str, lock: bool, age: u64| {
+            let folder = cache.path().join(name);
+            std::fs::create_dir(&folder).unwrap();
+            std::fs::write(folder.join("half.msh"), "").unwrap();
+            if lock {
+                File::create(folder.join("lock")).unwrap();
+            }
+            let time = std::time::SystemTime::now() - Duration::from_secs(age);
+            File::open(&folder).unwrap().set_modified(time).unwrap();
+        };
+        make("tmp-1-0", true, 0);
+        make("tmp-2-0", false, 90_000);
+        make("tmp-3-0", false, 80_000);
+        make("results", true, 90_000);
+        let first = Workshop::open(&[cache.path().to_owned()]).unwrap();
+        let second = Workshop::open(&[cache.path().to_owned()]).unwrap();
+        assert!(first.path().is_dir() && second.path().is_dir());
+        let own = |workshop: &Workshop| workshop.path().file_name().unwrap().to_string_lossy().into_owned();
+        let mut expected = [own(&first), own(&second), "results".to_owned(), "tmp-3-0".to_owned()];
+        expected.sort();
+        let mut found: Vec<String> = std::fs::read_dir(cache.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
+        found.sort();
+        assert_eq!(found, expected);
     }
 }

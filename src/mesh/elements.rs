@@ -6,6 +6,7 @@ use super::physical::Physical;
 use super::simplex::{self, Kind, THINGS};
 use crate::error::Result;
 use crate::problem::order::Order;
+use std::collections::HashSet;
 
 /// Reads the section's contents into the groups; gives the order of the elements, if there is one but points.
 ///
@@ -22,6 +23,7 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
     cursor.end()?;
     let mut seen: usize = 0;
     let mut common_order = None;
+    let (mut heads, mut again) = (HashSet::new(), None);
     for _ in 0..blocks {
         cursor.begin();
         let head = cursor.position();
@@ -34,6 +36,12 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
                 .error_at(head, format!("elements of Gmsh's type {number} cannot be used"))
                 .help(SIMPLICES));
         };
+        // also where nobody needs them: the block may be one of another dimension whose head is damaged
+        if simplex::dimension(shape) != dimension {
+            let thing = THINGS[dimension].to_lowercase();
+            let error = cursor.error_at(head, format!("{shape} elements cannot be those of {thing} {tag}"));
+            return Err(error.help("the file is damaged: save the mesh again with Gmsh"));
+        }
         let count = cursor.count(1 + stride, 8 * (1 + stride))?;
         cursor.end()?;
         seen = seen.saturating_add(count);
@@ -42,6 +50,9 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
             let message = format!("elements of {thing} {tag}, which $Entities does not list");
             return Err(cursor.error_at(head, message).help("save the mesh again with Gmsh"));
         };
+        if !heads.insert((dimension, tag, number)) {
+            again = Some((head, dimension, tag));
+        }
         let Some(first) = members.first() else {
             cursor.skip_records(count, 8 * (1 + stride))?;
             continue;
@@ -55,12 +66,21 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
             let message = format!("group `{name}` is of another order than the elements before it");
             return Err(cursor.error_at(head, message).help("save all elements with one order: gmsh -order 1 or 2"));
         }
-        let connectivity = Block { kind, count, name }.read::<D>(cursor, nodes)?;
-        physical.extend(dimension, tag, stride, &connectivity);
+        let (connectivity, tags) = Block { kind, count, name }.read::<D>(cursor, nodes)?;
+        physical.extend(dimension, tag, stride, &connectivity, &tags);
     }
     if seen != total {
         let message = format!("$Elements announces {total} elements and holds {seen}");
         return Err(cursor.error_at(start, message));
+    }
+    // Either alone is allowed. Both are a block with the number of another entity.
+    let with: HashSet<_> = heads.into_iter().map(|(dimension, tag, _)| (dimension, tag)).collect();
+    if let Some((head, dimension, tag)) = again
+        && let Some(without) = physical.without(dimension, |entity| with.contains(&entity))
+    {
+        let thing = THINGS[dimension].to_lowercase();
+        let message = format!("elements of {thing} {tag} stand in two blocks, and those of {thing} {without} in none");
+        return Err(cursor.error_at(head, message).help("the file is damaged: save the mesh again with Gmsh"));
     }
     Ok(common_order)
 }
@@ -77,16 +97,18 @@ struct Block<'a> {
 }
 
 impl Block<'_> {
-    /// Reads the elements: our point numbers in our order, cells turned to positive volume.
-    fn read<const D: usize>(&self, cursor: &mut Cursor, nodes: &Nodes) -> Result<Vec<u32>> {
+    /// Reads the elements: our point numbers in our order, cells turned to positive volume; and their tags.
+    fn read<const D: usize>(&self, cursor: &mut Cursor, nodes: &Nodes) -> Result<(Vec<u32>, Vec<u64>)> {
         let Kind { dimension, stride, .. } = self.kind;
         let mut connectivity = vec![0; self.count * stride];
+        let mut tags = Vec::with_capacity(self.count);
         let mut vertices = [[0.0; 3]; 4];
         let vertices = &mut vertices[..dimension + 1];
         for points in connectivity.chunks_exact_mut(stride) {
             cursor.begin();
             let start = cursor.position();
             let tag = cursor.size()?;
+            tags.push(tag);
             for point in &mut *points {
                 let node = cursor.size()?;
                 *point = nodes.number(node).ok_or_else(|| {
@@ -113,7 +135,7 @@ impl Block<'_> {
                 simplex::mirror(points);
             }
         }
-        Ok(connectivity)
+        Ok((connectivity, tags))
     }
 
     fn check_plane(&self, cursor: &mut Cursor, nodes: &Nodes, points: &[u32]) -> Result<()> {

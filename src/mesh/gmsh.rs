@@ -1,21 +1,40 @@
 //! Calls the program Gmsh.
 
+use super::guard::{self, End};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::{self, Interrupt};
+use crate::problem::mesh::Guard;
 use crate::problem::order::Order;
 use signal_hook::consts::SIGXFSZ;
 use std::fs::File;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::time::{Duration, UNIX_EPOCH};
-
-/// Time between looks at a Gmsh at work.
-const LOOK: Duration = Duration::from_millis(5);
+use std::process::{ExitStatus, Stdio};
+use std::time::UNIX_EPOCH;
 
 /// The installed Gmsh.
 pub struct Gmsh {
     program: PathBuf,
+}
+
+/// What Gmsh is to mesh.
+pub struct Task<'a> {
+    /// The script.
+    pub script: &'a Path,
+    /// The script that the user wrote.
+    pub shown: &'a Path,
+    /// Numbers to set in it.
+    pub set: &'a [(String, f64)],
+    /// How many times as large elements are to be as the script asks for.
+    pub times: f64,
+    /// Dimension of the cells.
+    pub dimension: usize,
+    /// Order of the elements.
+    pub order: Order,
+    /// What it may take.
+    pub guard: &'a Guard,
+    /// What may end it.
+    pub interrupt: &'a Interrupt,
 }
 
 impl Gmsh {
@@ -24,9 +43,7 @@ impl Gmsh {
     /// # Errors
     /// It is not there.
     pub fn find() -> Result<Gmsh> {
-        let path = std::env::var_os("PATH").unwrap_or_default();
-        let program = std::env::split_paths(&path).map(|folder| folder.join("gmsh")).find(|program| program.is_file());
-        program.map(|program| Gmsh { program }).ok_or_else(|| {
+        guard::find("gmsh").map(|program| Gmsh { program }).ok_or_else(|| {
             Error::new(Kind::Mesh, "Gmsh is not installed: there is no `gmsh` in $PATH")
                 .help("run scripts/setup, or `apt-get install gmsh`")
         })
@@ -42,32 +59,37 @@ impl Gmsh {
         format!("{} {size} {}", self.program.display(), time.unwrap_or_default().as_nanos())
     }
 
-    /// Meshes a script into the file `output`, with elements `times` as large as it asks for. `home` is an empty folder, read instead of the user's own Gmsh options:
-    /// they would change meshes without changing the key in the cache.
+    /// Meshes a script into the file `output`. `home` is an empty folder, read instead of the user's own Gmsh options: they would
+    /// change meshes without changing the key in the cache. What Gmsh says goes to a file there.
     ///
     /// # Errors
-    /// Gmsh fails; its own messages are the causes. A signal, or a limit on the size of files, ends it.
-    pub fn run(
-        &self,
-        script: &Path,
-        set: &[(String, f64)],
-        times: f64,
-        (dimension, order): (usize, Order),
-        (output, home): (&Path, &Path),
-        interrupt: &Interrupt,
-    ) -> Result<()> {
-        let mut command = Command::new(&self.program);
-        command.arg(format!("-{dimension}"));
-        command.args(["-order", if order == Order::P1 { "1" } else { "2" }, "-format", "msh41", "-bin", "-v", "2"]);
-        if times != 1.0 {
-            command.args(["-clscale", &times.to_string()]);
+    /// Gmsh fails; its own messages are the causes. It takes more time or memory than it may. A signal, or a limit on the size of files, ends it.
+    pub fn run(&self, task: &Task, output: &Path, home: &Path) -> Result<()> {
+        let bytes = guard::bytes(task.guard);
+        let mut command = guard::command(&self.program, bytes);
+        command.arg(format!("-{}", task.dimension));
+        command.args([
+            "-order",
+            if task.order == Order::P1 { "1" } else { "2" },
+            "-format",
+            "msh41",
+            "-bin",
+            "-v",
+            "2",
+        ]);
+        if task.times != 1.0 {
+            command.args(["-clscale", &task.times.to_string()]);
         }
-        for (name, value) in set {
+        for (name, value) in task.set {
             command.args(["-setnumber", name, &value.to_string()]);
         }
         // An absolute path cannot be taken for an option.
-        let script_path = std::path::absolute(script).map_err(|cause| Error::file(script, "find", &cause))?;
-        command.arg("-o").arg(output).arg(script_path);
+        let script = std::path::absolute(task.script).map_err(|cause| Error::file(task.script, "find", &cause))?;
+        command.arg("-o").arg(output).arg(script);
+        let said = home.join("said");
+        let file = |cause| Error::file(&said, "write", &cause);
+        let out = File::create(&said).map_err(file)?;
+        command.stderr(out.try_clone().map_err(file)?).stdout(out);
         command.env("GMSH_HOME", home).stdin(Stdio::null());
         // A Gmsh built with MPI must not think that it is one of our ranks.
         for (name, _) in std::env::vars_os() {
@@ -76,46 +98,46 @@ impl Gmsh {
                 command.env_remove(&name);
             }
         }
-        // a file, unlike a pipe, takes all it says without anybody reading
-        let said = home.join("said");
-        let file = File::create(&said).map_err(|cause| Error::file(&said, "write", &cause))?;
-        let both = file.try_clone().map_err(|cause| Error::file(&said, "write", &cause))?;
-        command.stdout(file).stderr(both);
-        let failed = |cause: std::io::Error| Error::file(&self.program, "run", &cause);
-        let status = wait(command.spawn().map_err(failed)?, interrupt)?;
-        if status.success() && output.is_file() {
-            return Ok(());
+        let end = guard::run(&mut command, task.guard.seconds, task.interrupt, "Gmsh is meshing")
+            .map_err(|cause| Error::file(&self.program, "run", &cause))?;
+        let refuse = |message: String| Error::mesh(task.shown, None, message);
+        let status = match end {
+            End::TimedOut => {
+                return Err(refuse(format!("Gmsh has not finished this script after {} s", task.guard.seconds)).help(
+                    "a number in it may be far too large, or not a number; to wait longer set `timeout` in `mesh`",
+                ));
+            }
+            End::Asked(signal) => return Err(interrupt::ended(signal)),
+            End::Itself(status) if status.signal() == Some(SIGXFSZ) => {
+                return Err(Error::file(output, "write", &std::io::ErrorKind::FileTooLarge.into())
+                    .help("there is a limit on the size of files (ulimit -f)"));
+            }
+            End::Itself(status) if status.success() && output.is_file() => return Ok(()),
+            End::Itself(status) => status,
+        };
+        let said = String::from_utf8_lossy(&std::fs::read(&said).unwrap_or_default()).into_owned();
+        if is_out_of_memory(status, &said) {
+            let most = bytes.map_or(String::new(), |bytes| format!(" of {:.1} GB", bytes as f64 / 1e9));
+            return Err(refuse(format!("Gmsh needs more memory for this script than it may take{most}"))
+                .help("ask for fewer elements; to give it more set `memory`, in GB, in `mesh`"));
         }
-        if status.signal() == Some(SIGXFSZ) {
-            return Err(Error::file(output, "write", &std::io::ErrorKind::FileTooLarge.into())
-                .help("there is a limit on the size of files (ulimit -f)"));
-        }
-        let said = std::fs::read(&said).unwrap_or_default();
-        let mut error = Error::mesh(script, None, format!("Gmsh cannot mesh this script ({status})"));
-        let causes = complaints(&String::from_utf8_lossy(&said));
+        let mut error = refuse(match status.success() {
+            true => "Gmsh ran this script to its end but wrote no mesh".to_owned(),
+            false => format!("Gmsh cannot mesh this script ({status})"),
+        });
+        let causes = complaints(&said);
         for cause in &causes {
             error = error.because(cause);
         }
-        let again = format!("gmsh -{dimension} {}", script.display());
+        let again = format!("gmsh -{} {}", task.dimension, task.shown.display());
         Err(if causes.is_empty() { error.help(format!("see what it says: {again}")) } else { error })
     }
 }
 
-/// Waits for a child, which a signal ends.
-fn wait(mut child: Child, interrupt: &Interrupt) -> Result<ExitStatus> {
-    let failed = |cause: std::io::Error| Error::new(Kind::Mesh, "Gmsh cannot be waited for").because(cause.to_string());
-    loop {
-        if let Some(status) = child.try_wait().map_err(failed)? {
-            return Ok(status);
-        }
-        if let Some(signal) = interrupt.asked() {
-            // one that has just ended needs no end
-            let _ = child.kill();
-            child.wait().map_err(failed)?;
-            return Err(interrupt::ended(signal));
-        }
-        std::thread::sleep(LOOK);
-    }
+/// Whether a program ended for want of memory: the C++ library gave up, the loader did, or the system.
+fn is_out_of_memory(status: ExitStatus, said: &str) -> bool {
+    const WORDS: [&str; 4] = ["bad_alloc", "failed to map segment", "annot allocate memory", "ut of memory"];
+    !status.success() && (status.signal() == Some(9) || WORDS.iter().any(|words| said.contains(words)))
 }
 
 /// Gmsh's errors, each once, without its summary.

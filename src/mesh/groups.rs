@@ -14,6 +14,8 @@ pub struct Group {
     pub stride: usize,
     /// Point numbers, `stride` per simplex. Only cells have an orientation that means something.
     pub connectivity: Vec<u32>,
+    /// Numbers of the simplices in the file, for messages; empty if they have none.
+    pub tags: Vec<u64>,
 }
 
 impl Group {

@@ -1,12 +1,12 @@
 //! From what the scene names to a mesh: Gmsh, or the cache, or a file.
 
 use super::cache::{Key, Workshop, folders};
-use super::gmsh::Gmsh;
+use super::gmsh::{Gmsh, Task};
 use super::script::Script;
 use super::{Mesh, msh};
 use crate::error::{Error, Located, Result};
 use crate::interrupt::Interrupt;
-use crate::problem::mesh::{MeshSource, Sizing};
+use crate::problem::mesh::{Guard, MeshSource, Sizing};
 use crate::problem::order::Order;
 use std::path::{Path, PathBuf};
 
@@ -50,12 +50,12 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<
 /// Those of [`load`], and the signal.
 pub fn load_unless<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let mut loaded = match source {
-        MeshSource::Geo { file, set, places, sizes } => {
+        MeshSource::Geo { file, set, places, sizes, guard } => {
             let script = Script::read(&file.value).map_err(|error| error.at(&file.place))?;
             for ((name, _), place) in set.iter().zip(places) {
                 script.check(name, &Located::new(file.value.clone(), place.clone()))?;
             }
-            from_script(file, set, sizes.as_ref(), order, &folders(), interrupt)?
+            from_script(file, set, sizes.as_ref(), order, (guard, interrupt), &folders())?
         }
         MeshSource::Msh { file } => from_file(file, order)?,
     };
@@ -90,11 +90,14 @@ pub(super) fn from_script<const D: usize>(
     set: &[(String, f64)],
     sizes: Option<&Sizing>,
     order: Order,
+    (guard, interrupt): (&Guard, &Interrupt),
     folders: &[PathBuf],
-    interrupt: &Interrupt,
 ) -> Result<Loaded<D>> {
     let path = &file.value;
     let script = Script::read(path).map_err(|error| error.at(&file.place))?;
+    if !guard.trusted {
+        script.judge(file)?;
+    }
     for (name, _) in set {
         script.check(name, file)?;
     }
@@ -116,7 +119,9 @@ pub(super) fn from_script<const D: usize>(
         Some(Sizing::Times(times)) => (None, *times),
         None => (None, 1.0),
     };
-    let ran = gmsh.run(sized.as_deref().unwrap_or(path), set, times, (D, order), (&made, workshop.path()), interrupt);
+    let script = sized.as_deref().unwrap_or(path);
+    let task = Task { script, shown: path, set, times, dimension: D, order, guard, interrupt };
+    let ran = gmsh.run(&task, &made, workshop.path());
     let read = ran.and_then(|()| std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause)));
     // half a file is no fault of the script
     let mesh = read.and_then(|bytes| checked(path, &bytes, order)).map_err(|error| workshop.blame(error))?;

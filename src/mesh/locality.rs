@@ -36,6 +36,9 @@ fn sort(group: &mut Group, key: impl Fn(&[u32]) -> u64) {
     let old = std::mem::take(&mut group.connectivity);
     group.connectivity =
         order.iter().flat_map(|&(_, i)| &old[i as usize * group.stride..][..group.stride]).copied().collect();
+    if !group.tags.is_empty() {
+        group.tags = order.iter().map(|&(_, i)| group.tags[i as usize]).collect();
+    }
 }
 
 /// The bits of a number with two zeros before each.
@@ -65,12 +68,19 @@ mod tests {
             path: "line.msh".into(),
             points: at.iter().flat_map(|&i| cell(i)).collect(),
             order: Order::P1,
-            groups: vec![Group { name: "body".into(), dimension: 3, stride: 4, connectivity: (0..16).collect() }]
-                .into(),
+            groups: vec![Group {
+                name: "body".into(),
+                dimension: 3,
+                stride: 4,
+                connectivity: (0..16).collect(),
+                tags: vec![7, 8, 9, 10],
+            }]
+            .into(),
         };
         mesh.sort_cells();
         let first: Vec<f64> = mesh.groups[0].simplices().map(|cell| mesh.points[cell[0] as usize][0]).collect();
         assert_eq!(first, [0.0, 1.0, 2.0, 3.0]);
+        assert_eq!(mesh.groups[0].tags, [8, 10, 9, 7]);
         assert!(mesh.groups[0].simplices().all(|cell| cell[1] == cell[0] + 1 && cell[3] == cell[0] + 3));
     }
 }

@@ -4,10 +4,12 @@
 //! text or binary) is read as it is. Everything downstream sees a [`Mesh`] only.
 
 mod cache;
+mod check;
 mod cursor;
 mod elements;
 mod gmsh;
 mod groups;
+mod guard;
 mod load;
 mod locality;
 mod msh;
@@ -19,12 +21,16 @@ mod simplex;
 mod sizes;
 #[cfg(test)]
 mod tests;
+mod tokens;
+mod trust;
 
+pub use check::{Asked, Checked, Duty, Parts};
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, load_unless, recall_final};
-pub use msh::read;
+pub use msh::{parse, read};
 pub use quality::Quality;
-pub use sizes::{follows, view};
+pub use sizes::{follows, unstructured, view};
+pub use trust::{Breach, breach};
 
 use crate::problem::order::Order;
 use std::path::PathBuf;

@@ -91,7 +91,10 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
             }
             _ => {
                 let message = "this is not a mesh file of Gmsh: it does not begin with $MeshFormat";
-                return Err(save_again(cursor.error_at(start, message), cursor.path));
+                return Err(cursor.error_at(start, message).help(
+                    "winkler reads scripts (.geo) and Gmsh's meshes (.msh, format 4.1): turn others into one of these first, \
+                     by Gmsh if it can open the file, or by a converter such as meshio",
+                ));
             }
         }
     }

@@ -23,12 +23,19 @@ impl Physical {
         self.entities.get(&(dimension, tag)).map(Vec::as_slice)
     }
 
-    /// Adds simplices of `stride` points each to all groups of an entity.
-    pub fn extend(&mut self, dimension: usize, tag: i32, stride: usize, connectivity: &[u32]) {
+    /// The first entity of a dimension in a group of which `has` says that it has no elements.
+    pub fn without(&self, dimension: usize, has: impl Fn((usize, i32)) -> bool) -> Option<i32> {
+        let of = self.entities.iter().filter(|(entity, groups)| entity.0 == dimension && !groups.is_empty());
+        of.map(|(entity, _)| *entity).filter(|entity| !has(*entity)).map(|(_, tag)| tag).min()
+    }
+
+    /// Adds simplices of `stride` points each, with their tags, to all groups of an entity.
+    pub fn extend(&mut self, dimension: usize, tag: i32, stride: usize, connectivity: &[u32], tags: &[u64]) {
         for member in self.entities.get(&(dimension, tag)).into_iter().flatten() {
             let group = &mut self.groups[*member];
             group.stride = stride;
             group.connectivity.extend_from_slice(connectivity);
+            group.tags.extend_from_slice(tags);
         }
     }
 
@@ -73,6 +80,7 @@ impl Physical {
                 dimension,
                 stride: dimension + 1,
                 connectivity: Vec::new(),
+                tags: Vec::new(),
             });
         }
         Ok(())

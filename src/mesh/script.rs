@@ -3,6 +3,8 @@
 //!
 //! This is a search through its text, not an interpreter: a file whose name the script computes is not seen.
 
+use super::tokens::{Token, tokens};
+use super::trust;
 use crate::error::{Error, Located, Result, nearest};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -20,13 +22,8 @@ pub struct Script {
     assigned: BTreeSet<String>,
     /// All names.
     mentioned: BTreeSet<String>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Token<'a> {
-    Name(&'a str),
-    Text(&'a str),
-    Sign(char),
+    /// What its user must trust it for, and the file.
+    breach: Option<(PathBuf, trust::Breach)>,
 }
 
 impl Script {
@@ -41,9 +38,11 @@ impl Script {
             aliases: Vec::new(),
             assigned: BTreeSet::new(),
             mentioned: BTreeSet::new(),
+            breach: None,
         };
         // Canonical paths, since scripts may include each other along ever longer ones.
         let canonical = path.canonicalize().map_err(|cause| Error::file(path, "read", &cause))?;
+        let home = canonical.parent().unwrap_or(Path::new("")).to_owned();
         let mut found: Vec<PathBuf> = vec![canonical];
         let mut next = 0;
         while let Some(path) = found.get(next).cloned() {
@@ -53,7 +52,7 @@ impl Script {
             // `Merge "part.step"` and the like need no list of commands.
             let folder = path.parent().unwrap_or(Path::new(""));
             let text = String::from_utf8_lossy(&bytes);
-            let tokens = tokens(&text);
+            let tokens: Vec<Token> = tokens(&text).into_iter().map(|(_, token)| token).collect();
             for token in &tokens {
                 let Token::Text(name) = token else { continue };
                 let Ok(file) = folder.join(name).canonicalize() else {
@@ -64,6 +63,9 @@ impl Script {
                 }
             }
             script.note(&tokens);
+            if script.breach.is_none() {
+                script.breach = trust::breach(&path, &bytes, &home).map(|breach| (path, breach));
+            }
             script.files.push(bytes);
         }
         Ok(script)
@@ -115,6 +117,18 @@ impl Script {
         }
     }
 
+    /// Checks that the script does nothing to the machine but describe bodies.
+    ///
+    /// # Errors
+    /// What it does, with the line.
+    pub fn judge(&self, file: &Located<PathBuf>) -> Result<()> {
+        let Some((path, breach)) = &self.breach else { return Ok(()) };
+        let shown = if path.file_name() == file.value.file_name() { &file.value } else { path };
+        Err(Error::mesh(shown, Some(breach.line), format!("this script {}", breach.what))
+            .at(&file.place)
+            .help("Gmsh runs a script as a program: read it, and if you trust it give --trust-geo"))
+    }
+
     /// Checks that a number set from outside arrives.
     ///
     /// # Errors
@@ -148,38 +162,6 @@ impl Script {
             }
         })
     }
-}
-
-/// The names, quoted texts and other signs of a script; comments and numbers are left out.
-fn tokens(text: &str) -> Vec<Token<'_>> {
-    let mut tokens = Vec::new();
-    let mut rest = text;
-    while let Some(first) = rest.chars().next() {
-        let length = if rest.starts_with("//") {
-            rest.find('\n').unwrap_or(rest.len())
-        } else if let Some(comment) = rest.strip_prefix("/*") {
-            comment.find("*/").map_or(rest.len(), |end| end + 4)
-        } else if first == '"' || first == '\'' {
-            let body = &rest[1..];
-            let end = body.find(first).unwrap_or(body.len());
-            tokens.push(Token::Text(&body[..end]));
-            rest.len().min(end + 2)
-        } else if first.is_ascii_alphabetic() || first == '_' {
-            let end = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len());
-            tokens.push(Token::Name(&rest[..end]));
-            end
-        } else if first.is_ascii_digit() {
-            // With the exponent, whose `e` is not a name.
-            rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '.')).unwrap_or(rest.len())
-        } else {
-            if !first.is_whitespace() {
-                tokens.push(Token::Sign(first));
-            }
-            first.len_utf8()
-        };
-        rest = &rest[length..];
-    }
-    tokens
 }
 
 #[cfg(test)]

@@ -51,6 +51,16 @@ pub fn type_name(number: i32) -> Option<(&'static str, usize)> {
     Some((name, nodes))
 }
 
+/// Dimension of elements that [`type_name`] calls so.
+pub fn dimension(name: &str) -> usize {
+    match name {
+        "point" => 0,
+        "line" => 1,
+        "triangle" | "quadrangle" => 2,
+        _ => 3,
+    }
+}
+
 /// Puts the points of a simplex from Gmsh's order into ours; they differ in the quadratic tetrahedron only, where
 /// Gmsh has mid-edge 23 before 13.
 pub fn from_gmsh_order(simplex: &mut [u32]) {

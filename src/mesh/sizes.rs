@@ -1,6 +1,7 @@
 //! Meshes of wanted sizes: a script of the user's and a field of sizes, which Gmsh follows instead of the script's own.
 
 use super::script::Script;
+use super::tokens::{Token, tokens};
 use crate::error::{Error, Located, Result};
 use crate::problem::mesh::MeshSource;
 use std::path::{Path, PathBuf};
@@ -46,28 +47,17 @@ pub fn follows(source: &MeshSource) -> bool {
 }
 
 /// The script without the commands that ask for structured meshes, from the word to the semicolon.
-fn unstructured(text: &str) -> String {
+pub fn unstructured(text: &str) -> String {
     let mut kept = String::with_capacity(text.len());
-    let mut rest = text;
-    while !rest.is_empty() {
-        let word = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len());
-        let until = |sign: &str| rest.find(sign).map_or(rest.len(), |at| at + sign.len());
-        let quoted = |sign: char| rest[1..].find(sign).map_or(rest.len(), |at| at + 2);
-        let length = match rest.chars().next() {
-            _ if rest.starts_with("//") => until("\n"),
-            _ if rest.starts_with("/*") => until("*/"),
-            Some(quote @ ('"' | '\'')) => quoted(quote),
-            _ if word > 0 && matches!(&rest[..word], "Transfinite" | "TransfQuadTri" | "Recombine") => {
-                rest = &rest[until(";")..];
-                continue;
-            }
-            _ if word > 0 => word,
-            first => first.map_or(1, char::len_utf8),
-        };
-        kept.push_str(&rest[..length]);
-        rest = &rest[length..];
+    let mut from = 0;
+    for (span, token) in tokens(text) {
+        let structured = matches!(token, Token::Name("Transfinite" | "TransfQuadTri" | "Recombine"));
+        if structured && span.start >= from {
+            kept.push_str(&text[from..span.start]);
+            from = text[span.end..].find(';').map_or(text.len(), |end| span.end + end + 1);
+        }
     }
-    kept
+    kept + &text[from..]
 }
 
 /// A field of sizes on simplices as a view of Gmsh: corners of all simplices, `stride` of them each, and the size at each

@@ -6,6 +6,7 @@ mod loading;
 
 use super::{Group, Mesh, msh, simplex};
 use crate::error::{Located, Place, Source};
+use crate::problem::mesh::Guard;
 use crate::problem::order::Order;
 use std::path::{Path, PathBuf};
 use std::process::Command;

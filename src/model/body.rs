@@ -197,7 +197,12 @@ pub trait Body {
     /// Gives a state that was made from [`Body::matrices`] the body's own shares of deformation and rigid motion.
     fn separate(&self, _state: &mut [f64]) {}
 
-    /// Displacements of all nodes for a state.
+    /// The rigid motion by which supports carry the body, one entry a dof; empty for none. It is no part of states.
+    fn carried(&self) -> &[f64] {
+        &[]
+    }
+
+    /// Displacements of all nodes for a state, without the motion of [`Body::carried`].
     ///
     /// # Errors
     /// Failures of the solver library.

@@ -191,7 +191,7 @@ impl<'a> Motions<'a> {
 pub fn combined<'n>(names: impl Iterator<Item = &'n str>, amounts: impl Iterator<Item = f64> + Clone) -> String {
     let least = PART * amounts.clone().fold(0.0, |most: f64, amount| most.max(amount.abs()));
     let parts = names.zip(amounts).filter(|(_, amount)| amount.abs() > least);
-    parts.map(|(name, _)| name).collect::<Vec<_>>().join(" with ")
+    crate::error::joined(parts.map(|(name, _)| name))
 }
 
 #[cfg(test)]

@@ -202,6 +202,12 @@ pub struct BodyReport {
     pub nodes: usize,
     /// Cells.
     pub cells: usize,
+    /// Facets between two cells, each found on opposite sides of it.
+    pub inner_facets: usize,
+    /// Facets of its boundary, which does not meet itself.
+    pub boundary_facets: usize,
+    /// Parts that no facet joins; one but for bodies in pieces.
+    pub parts: usize,
     /// Degrees of freedom.
     pub dofs: usize,
     /// Inner solver in words; empty if nothing was solved.
@@ -269,6 +275,12 @@ pub struct PairReport {
     pub theta: [f64; 2],
     /// Facets of the carrier without a partner.
     pub facets_uncovered: usize,
+    /// Facets of the carrier that are left out, as a whole or in part, since they stand too steeply to the other side.
+    pub facets_steep: usize,
+    /// The same for facets that are too far away from it.
+    pub facets_far: usize,
+    /// Facets of the carrier that are covered in part and take plain means.
+    pub facets_averaged: usize,
     /// Energy of the layer, J.
     pub layer_energy: f64,
     /// Contact force on each side (x, y, z).

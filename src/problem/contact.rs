@@ -4,6 +4,11 @@ use super::layer::LayerSpec;
 use crate::error::Located;
 use crate::expression::Field;
 
+/// Largest angle between the normals of facets that face each other, in degrees, unless a scene says otherwise. A normal then meets
+/// the other surface at most twice as far away as that is, and covers at most twice its own area there; beyond, both run to
+/// infinity.
+pub const ANGLE: f64 = 60.0;
+
 /// A pair of contact surfaces and the layer between them.
 #[derive(Debug, Clone)]
 pub struct ContactSpec {
@@ -11,6 +16,8 @@ pub struct ContactSpec {
     pub between: [Located<String>; 2],
     /// The scene's own gap d(x), added to the geometric distance; zero if not given.
     pub gap: Field,
+    /// Largest angle between the normal of one facet and minus that of the other, in degrees, > 0 and at most 90.
+    pub angle: f64,
     /// Law of the layer.
     pub layer: LayerSpec,
     /// Whether the surfaces are taken to touch wherever they face each other: only [`ContactSpec::gap`] counts, not the

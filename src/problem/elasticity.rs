@@ -61,32 +61,33 @@ pub struct RegionSpec {
 impl Constants {
     /// Names of the orthotropic constants.
     pub const ORTHOTROPIC: [&'static str; 9] = ["E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23"];
-
-    fn fields(&self) -> Vec<&Field> {
-        match self {
-            Constants::Isotropic { young, poisson } => vec![young, poisson],
-            Constants::Orthotropic(fields) => fields.iter().collect(),
-            Constants::Anisotropic(fields) => fields.iter().collect(),
-        }
-    }
 }
 
 impl ElasticitySpec {
-    /// Whether nothing depends on the place.
-    pub fn is_constant(&self) -> bool {
-        let mut fields = self.constants.fields();
+    /// All constants and directions by name.
+    pub fn fields(&self) -> Vec<(&'static str, &Field)> {
+        let mut fields: Vec<(&str, &Field)> = match &self.constants {
+            Constants::Isotropic { young, poisson } => vec![("young", young), ("poisson", poisson)],
+            Constants::Orthotropic(fields) => Constants::ORTHOTROPIC.into_iter().zip(fields.iter()).collect(),
+            Constants::Anisotropic(fields) => fields.iter().map(|field| ("an elastic constant", field)).collect(),
+        };
         match &self.axes {
             Some(AxesSpec::Directions { first, second }) => {
-                fields.extend(first);
-                fields.extend(second.iter().flatten());
+                fields.extend(first.iter().map(|field| ("`first`", field)));
+                fields.extend(second.iter().flatten().map(|field| ("`second`", field)));
             }
             Some(AxesSpec::Angle { angle, axis }) => {
-                fields.push(angle);
-                fields.extend(axis);
+                fields.push(("angle", angle));
+                fields.extend(axis.iter().map(|field| ("`axis`", field)));
             }
             None => {}
         }
-        fields.iter().all(|field| matches!(field, Field::Constant(_)))
+        fields
+    }
+
+    /// Whether nothing depends on the place.
+    pub fn is_constant(&self) -> bool {
+        self.fields().iter().all(|(_, field)| field.is_constant())
     }
 }
 

@@ -13,6 +13,24 @@ pub enum Sizing {
     Times(f64),
 }
 
+/// What a Gmsh script may take and do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Guard {
+    /// Seconds after which Gmsh is ended.
+    pub seconds: f64,
+    /// Gigabytes that it may take; what is free when it starts if `None`.
+    pub gigabytes: Option<f64>,
+    /// Whether the user trusts the script as a program.
+    pub trusted: bool,
+}
+
+impl Default for Guard {
+    /// A script that nobody trusts, and ten times what Gmsh takes for a million tetrahedra.
+    fn default() -> Self {
+        Self { seconds: 1000.0, gigabytes: None, trusted: false }
+    }
+}
+
 /// Where the mesh comes from; paths are relative to the scene file's folder and already joined with it.
 #[derive(Debug, Clone)]
 pub enum MeshSource {
@@ -26,6 +44,8 @@ pub enum MeshSource {
         places: Vec<Place>,
         /// Sizes of elements instead of the script's own; no scene file has them.
         sizes: Option<Sizing>,
+        /// What it may take and do.
+        guard: Guard,
     },
     /// A mesh file, format 4.1, text or binary.
     Msh {

@@ -7,18 +7,30 @@ mod layer;
 mod method;
 
 use super::read::{Keys, Node, Value};
-use crate::error::{Error, Located, Place, Result, nearest};
+use crate::error::{Error, Located, Place, Result, nearest, shown};
 use crate::expression::{Differentiable, Field};
 use crate::problem::elasticity::Plane;
-use crate::problem::mesh::MeshSource;
+use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::solver::{Preset, SolverSpec};
 use crate::scene::{AdaptSpec, OutputSpec, Scene};
 use std::path::{Path, PathBuf};
 
 /// Checks a whole scene, read from `path`. Looks whether the mesh file is there.
 pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
-    const KEYS: &[&str] =
-        &["title", "dimension", "plane", "mesh", "body", "contact", "method", "solver", "estimate", "adapt", "output"];
+    const KEYS: &[&str] = &[
+        "title",
+        "dimension",
+        "plane",
+        "mesh",
+        "body",
+        "contact",
+        "method",
+        "solver",
+        "estimate",
+        "adapt",
+        "output",
+        "trust_geo",
+    ];
     let keys = Keys::open(tree, "the scene", KEYS)?;
     let dimension = dimension(&keys)?;
     let plane = plane(&keys, dimension.value)?;
@@ -38,7 +50,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         path: path.to_owned(),
         title,
         plane,
-        mesh: decoder.mesh(keys.require("mesh")?)?,
+        mesh: decoder.mesh(keys.require("mesh")?, trust(tree, &keys)?)?,
         bodies: decoder.bodies(&keys)?,
         contacts,
         auto,
@@ -66,7 +78,7 @@ impl Decoder<'_> {
     fn positive_field(&self, node: &Node, what: &str) -> Result<Field> {
         match self.field(node)? {
             Field::Constant(value) if value <= 0.0 => {
-                Err(node.refuse(format!("{what} is {value}")).label("must be greater than 0"))
+                Err(node.refuse(format!("{what} is {}", shown(value))).label("must be greater than 0"))
             }
             field => Ok(field),
         }
@@ -114,30 +126,39 @@ impl Decoder<'_> {
         Ok(items)
     }
 
-    fn mesh(&self, node: &Node) -> Result<MeshSource> {
+    fn mesh(&self, node: &Node, trusted: bool) -> Result<MeshSource> {
         if let Value::String(name) = &node.value {
             let file = self.file(node)?;
             return Ok(match name.ends_with(".geo") {
-                true => MeshSource::Geo { file, set: Vec::new(), places: Vec::new(), sizes: None },
+                true => {
+                    let guard = Guard { trusted, ..Guard::default() };
+                    MeshSource::Geo { file, set: Vec::new(), places: Vec::new(), sizes: None, guard }
+                }
                 false => MeshSource::Msh { file },
             });
         }
         if !matches!(node.value, Value::Table(_)) {
             return Err(node.expected("a file name or a table"));
         }
-        let keys = Keys::open(node, "the mesh", &["geo", "msh", "set"])?;
+        let keys = Keys::open(node, "the mesh", &["geo", "msh", "set", "timeout", "memory"])?;
         keys.exclude("geo", "msh")?;
         if let Some(file) = keys.get("msh") {
-            return match keys.entry("set") {
+            return match ["set", "timeout", "memory"].iter().find_map(|key| keys.entry(key)) {
                 None => Ok(MeshSource::Msh { file: self.file(file)? }),
-                Some(set) => Err(Error::scene(&set.key_place, "`set` for a finished mesh")
-                    .help("numbers can be set in a Gmsh script: mesh = { geo = \"...\", set = ... }")),
+                Some(entry) => Err(Error::scene(&entry.key_place, format!("`{}` for a finished mesh", entry.key))
+                    .help("it is for Gmsh, which makes meshes from scripts: mesh = { geo = \"...\" }")),
             };
         }
         let file = self.file(keys.require("geo")?)?;
         let set = keys.get("set").map_or(Ok(Vec::new()), numbers)?;
         let (places, set) = set.into_iter().map(|(place, name, value)| (place, (name, value))).unzip();
-        Ok(MeshSource::Geo { file, set, places, sizes: None })
+        let usual = Guard::default();
+        let guard = Guard {
+            seconds: keys.get("timeout").map_or(Ok(usual.seconds), |node| node.positive("the timeout"))?,
+            gigabytes: keys.get("memory").map(|node| node.positive("the memory")).transpose()?,
+            trusted,
+        };
+        Ok(MeshSource::Geo { file, set, places, sizes: None, guard })
     }
 
     /// The path of a file that must exist, joined with the folder of the scene.
@@ -163,6 +184,16 @@ impl Decoder<'_> {
             Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
         }
     }
+}
+
+/// Whether the user trusts the mesh's script as a program: the command line says so, never the scene.
+fn trust(tree: &Node, keys: &Keys) -> Result<bool> {
+    let Some(entry) = keys.entry("trust_geo") else { return Ok(false) };
+    if std::sync::Arc::ptr_eq(&entry.key_place.source, &tree.place.source) {
+        return Err(Error::scene(&entry.key_place, "a scene cannot say that it is trusted")
+            .help("remove this, and give --trust-geo on the command line"));
+    }
+    entry.node.boolean()
 }
 
 fn dimension(keys: &Keys) -> Result<Located<usize>> {

@@ -19,7 +19,15 @@ use std::sync::Arc;
 ///
 /// Errors point at the words in the scene or the override; a file that cannot be read is [`Kind::File`].
 pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
-    let source = Arc::new(Source { name: path.display().to_string(), text: read_text(path)? });
+    parse(path, read_text(path)?, overrides)
+}
+
+/// Checks the text of a scene file like [`load`], which reads it from `path`.
+///
+/// # Errors
+/// Those of [`load`], but for reading the file.
+pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
+    let source = Arc::new(Source { name: path.display().to_string(), text });
     let mut tree = read::document(&source)?;
     for text in overrides {
         overrides::apply(&mut tree, text)?;

@@ -1,36 +1,72 @@
-//! `--set KEY=VALUE`: replaces any value of the scene before it is checked.
+//! `--set KEY=VALUE`, and options that are short for it: replaces any value of the scene before it is checked.
 //!
 //! KEY is a dotted path in which items of lists are numbered from 0 (`contact.0.layer.power.a`). VALUE is TOML, or a
-//! bare text. What is replaced then stands in the source `--set`, so later refusals point there.
+//! bare text. What is replaced then stands in the words of the option, so later refusals point there.
 
 use super::read::{self, Entry, Node, Value};
 use crate::error::{Error, Kind, Place, Result, Source};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Applies one override to the tree of a scene.
+/// Options that are short for `--set`, and the key that they set.
+const SHORT: [(&str, &str); 3] =
+    [("--method", "method.name"), ("--tolerance", "adapt.error"), ("--checkpoint", "output.checkpoint")];
+
+/// Options without a value, which set a key to true.
+const FLAGS: [(&str, &str); 3] = [("--estimate", "estimate"), ("--vtu", "output.vtu"), ("--trust-geo", "trust_geo")];
+
+/// Applies one override to the tree of a scene: `KEY=VALUE`, or an option with its value as typed (`--over KEY=VALUE`,
+/// `--tolerance 1e-3`, `--vtu`).
 pub(super) fn apply(tree: &mut Node, text: &str) -> Result<()> {
-    let source = Arc::new(Source { name: "--set".into(), text: text.trim_end().into() });
+    let text = text.trim_end();
+    let text = if text.starts_with("--") { text.to_owned() } else { format!("--set {text}") };
+    let end = text.find(' ').unwrap_or(text.len());
+    let option = text[..end].to_owned();
+    let source = Arc::new(Source { name: option.clone(), text });
+    let place = Place { source: source.clone(), span: 0..end };
+    let among = |list: &[(&str, &'static str)]| list.iter().find(|(name, _)| *name == option).map(|(_, key)| *key);
+    if let Some(path) = among(&FLAGS) {
+        return put(tree, path, &place, Node { place: place.clone(), value: Value::Boolean(true) });
+    }
+    if let Some(path) = among(&SHORT) {
+        return put(tree, path, &place, value(&source, end)?);
+    }
+    set(tree, &source, end + 1)
+}
+
+/// Puts a node at a path of tables, whose keys stand at `place`.
+fn put(tree: &mut Node, path: &str, place: &Place, new: Node) -> Result<()> {
+    let mut node = tree;
+    for name in path.split('.') {
+        node = descend(node, &Key { name, place: place.clone() }, "", false)?;
+    }
+    *node = new;
+    Ok(())
+}
+
+/// Applies the `KEY=VALUE` that begins at a byte of the source.
+fn set(tree: &mut Node, source: &Arc<Source>, start: usize) -> Result<()> {
     let text = source.text.as_str();
     let at = |span: Range<usize>| Place { source: source.clone(), span };
-    let Some(equals) = text.find('=') else {
-        return Err(Error::new(Kind::Usage, "--set without `=`")
+    let Some(equals) = text[start.min(text.len())..].find('=').map(|equals| start + equals) else {
+        let option = &source.name;
+        return Err(Error::new(Kind::Usage, format!("{option} without `=`"))
             .at(&at(0..text.len()))
-            .help("write --set KEY=VALUE, such as --set contact.0.layer.power.a=0.3"));
+            .help(format!("write {option} KEY=VALUE, such as {option} contact.0.layer.power.a=0.3")));
     };
-    let path = segments(&text[..equals]);
+    let path = segments(text, start..equals);
     for span in &path {
         let key = &text[span.clone()];
         if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
-            return Err(Error::scene(&at(0..equals), "this is not a key of the scene")
+            return Err(Error::scene(&at(start..equals), "this is not a key of the scene")
                 .help("a key is names and numbers joined by points: body.1.young"));
         }
     }
-    let new = value(&source, equals + 1)?;
+    let new = value(source, equals + 1)?;
     let mut node = tree;
     for (depth, span) in path.iter().enumerate() {
         let key = Key { name: &text[span.clone()], place: at(span.clone()) };
-        let parent = &text[..span.start.saturating_sub(1)];
+        let parent = &text[start..span.start.saturating_sub(1).max(start)];
         let indexed = path.get(depth + 1).is_some_and(|next| is_number(&text[next.clone()]));
         node = descend(node, &key, parent, indexed)?;
     }
@@ -44,14 +80,14 @@ struct Key<'a> {
 }
 
 /// Byte ranges of the parts of a dotted path, without the spaces around them.
-fn segments(path: &str) -> Vec<Range<usize>> {
-    let mut start = 0;
+fn segments(text: &str, path: Range<usize>) -> Vec<Range<usize>> {
+    let mut start = path.start;
     let segment = |part: &str| {
         let from = start + part.len() - part.trim_start().len();
         start += part.len() + 1;
         from..from + part.trim().len()
     };
-    path.split('.').map(segment).collect()
+    text[path].split('.').map(segment).collect()
 }
 
 /// The value that stands at `offset`: TOML, or a bare text.

@@ -1,6 +1,6 @@
 //! TOML as a tree of values that know where they stand, with getters that refuse in words.
 
-use crate::error::{Error, Located, Place, Result, Source, nearest};
+use crate::error::{Error, Located, Place, Result, Source, nearest, shown};
 use std::ops::Range;
 use std::sync::Arc;
 use toml::de::{DeTable, DeValue};
@@ -169,7 +169,7 @@ impl Node {
     pub fn positive(&self, what: &str) -> Result<f64> {
         match self.number()? {
             value if value > 0.0 => Ok(value),
-            value => Err(self.refuse(format!("{what} is {value}")).label("must be greater than 0")),
+            value => Err(self.refuse(format!("{what} is {}", shown(value))).label("must be greater than 0")),
         }
     }
 
@@ -196,6 +196,13 @@ impl Node {
     }
 }
 
+/// Names that others give to keys.
+const USUAL: [(&str, &str); 6] =
+    [("nu", "poisson"), ("E", "young"), ("e", "young"), ("modulus", "young"), ("dim", "dimension"), ("bc", "fix")];
+
+/// Keys of the whole scene that are values, which TOML gives to the table before them.
+const TOP: [&str; 7] = ["title", "dimension", "plane", "mesh", "solver", "estimate", "adapt"];
+
 /// A table whose keys are all known.
 pub(super) struct Keys<'a> {
     node: &'a Node,
@@ -213,8 +220,12 @@ impl<'a> Keys<'a> {
             None => Ok(Self { node, entries, what }),
             Some(Entry { key, key_place, .. }) => {
                 let error = Error::scene(key_place, format!("unknown key `{key}` in {what}")).label("unknown key");
-                Err(error.help(match nearest(key, known.iter().copied()) {
+                let other = USUAL.iter().find(|(usual, own)| usual == key && known.contains(own)).map(|(_, own)| *own);
+                Err(error.help(match other.or_else(|| nearest(key, known.iter().copied())) {
                     Some(near) => format!("did you mean `{near}`?"),
+                    None if TOP.contains(&key.as_str()) => {
+                        format!("`{key}` belongs to the whole scene: write it above the first line in [brackets]")
+                    }
                     None => format!("its keys are {}", known.join(", ")),
                 }))
             }

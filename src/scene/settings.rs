@@ -72,9 +72,14 @@ fn vector(components: &[Field; 3], dimension: usize) -> Value {
 fn mesh(mesh: &MeshSource) -> Value {
     match mesh {
         MeshSource::Msh { file } => json!({ "msh": file.value.display().to_string() }),
-        MeshSource::Geo { file, set, .. } => {
+        MeshSource::Geo { file, set, guard, .. } => {
             let set: Map<_, _> = set.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
-            json!({ "geo": file.value.display().to_string(), "set": set })
+            let (file, timeout, memory) = (file.value.display().to_string(), guard.seconds, guard.gigabytes);
+            let mut mesh = json!({ "geo": file, "set": set, "timeout": timeout });
+            if let Some(memory) = memory {
+                mesh["memory"] = json!(memory);
+            }
+            mesh
         }
     }
 }
@@ -172,6 +177,7 @@ fn contact(contact: &ContactSpec) -> Value {
     map.insert("touching".into(), json!(contact.touching));
     let overlap = Overlap::ALL.iter().find(|(_, named)| *named == contact.overlap).map(|(name, _)| name);
     map.insert("overlap".into(), json!(overlap));
+    map.insert("angle".into(), json!(contact.angle));
     map.insert("layer".into(), layer);
     insert(&mut map, "reference", contact.reference.as_ref().map(field));
     map.into()

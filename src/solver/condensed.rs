@@ -8,7 +8,7 @@
 use super::{Dense, Retained, SparseBody, memory};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
-use crate::linalg::{Csr, axpy, dot};
+use crate::linalg::{Csr, dot};
 use crate::model::{Body, BodyCounts, Energy, Matrices, Solved};
 use crate::petsc::{Schur, Session};
 use std::cell::RefCell;
@@ -229,8 +229,11 @@ impl Body for CondensedBody {
             None => vec![0.0; self.load.len()],
         };
         all = self.retained.turn_back(&all);
-        axpy(1.0, &self.whole.carried, &mut all);
         Ok(all)
+    }
+
+    fn carried(&self) -> &[f64] {
+        &self.whole.carried
     }
 
     fn describe(&self) -> String {

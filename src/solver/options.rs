@@ -10,11 +10,14 @@
 //! 4. [`mark_copies`] and [`unread()`] find what nobody read: a slip of the keyboard ends the run before it starts.
 
 mod global;
+mod looks;
 mod probe;
 mod refused;
 mod split;
 mod unread;
 
+pub use looks::looks;
+pub use probe::show_help;
 pub use refused::{refuse_log, refuse_traps, refuse_words};
 pub use split::split;
 pub use unread::{Unread, UnreadKind, unread};
@@ -154,12 +157,12 @@ pub fn typed(session: &Session, body: &str, name: &str) -> Option<String> {
     options.get(&own).or_else(|| is_plain(name, &[body]).then(|| options.get(name)).flatten())
 }
 
-/// Whether the user typed an option for the solver or matrix of this body, besides controls of MUMPS: then it is a KSP of
-/// PETSc that is asked for.
+/// Whether the user typed an option that chooses or steers the solver or matrix of this body, besides controls of MUMPS: then it is
+/// a KSP of PETSc that is asked for. One that [`looks`] at a run asks for nothing.
 ///
 /// ```
 /// use winkler::{petsc::Session, solver::options::*};
-/// let words = ["-up_pc_type", "icc", "-mat_mumps_icntl_14", "50", "-log_view"];
+/// let words = ["-up_pc_type", "icc", "-mat_mumps_icntl_14", "50", "-log_view", "-ksp_view"];
 /// let session = Session::start(&words.map(String::from))?;
 /// distribute(&session, &["up", "low"])?;
 /// set_default(&session, "low", "pc_type", Some("gamg"))?;
@@ -175,8 +178,21 @@ pub fn asks_for_ksp(session: &Session, body: &str) -> Result<bool> {
     let of_body = all.iter().filter(|(name, _)| !matches!(origin(name), Some(Origin::Default)));
     Ok(of_body.filter_map(|(name, _)| body_of(name, &[body])).any(|(_, bare)| {
         FAMILIES.iter().any(|family| bare.starts_with(family))
+            && !looks(bare)
             && !["mat_mumps_icntl_", "mat_mumps_cntl_"].iter().any(|control| bare.starts_with(control))
     }))
+}
+
+/// The options that the user typed and that look at a solver, with their dash.
+///
+/// # Errors
+/// When PETSc refuses, which it does not for options it has taken before.
+pub fn watching(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
+    let watches = |name: &String| {
+        let bare = body_of(name, bodies).map_or(name.trim_start_matches('-'), |(_, bare)| bare);
+        origin(name).is_none() && looks(bare) && FAMILIES.iter().any(|family| bare.starts_with(family))
+    };
+    Ok(session.options().all()?.into_iter().map(|(name, _)| name).filter(watches).collect())
 }
 
 /// Whether the user typed an option for this body alone, in the command line or the scene.

@@ -1,11 +1,14 @@
 //! A small part of `scripts/stress`: the default method and Newton's on random scenes, in one process.
 
+mod draft;
+mod laws;
 mod random;
 mod runs;
 mod scenes;
+mod wide;
 
 use runs::{Answer, Recipe, Verdict};
-use scenes::Expect;
+use scenes::{Case, Expect};
 use std::path::Path;
 use winkler::petsc::Session;
 
@@ -15,6 +18,9 @@ const SERIES: [(u64, &[&str]); 4] = [(1, &["auto"]), (2, &["auto"]), (3, &["auto
 
 /// Scenes of each series.
 const SCENES: usize = 24;
+
+/// A series of the wider box.
+const WIDE: u64 = 100;
 
 /// Runs scenes, all in one session, as a process has but one.
 struct Bench {
@@ -30,8 +36,12 @@ impl Bench {
 
     /// What methods make of a scene, and the scene in words.
     fn run(&self, seed: u64, index: usize, methods: &[&str]) -> (Vec<(Verdict, Answer)>, String) {
-        let case = scenes::scene(seed, index, &Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes"));
-        let path = self.folder.path().join(format!("{seed}-{index}.toml"));
+        self.solve(scenes::scene(seed, index, Path::new(env!("CARGO_MANIFEST_DIR"))), methods)
+    }
+
+    /// The same of any scene.
+    fn solve(&self, case: Case, methods: &[&str]) -> (Vec<(Verdict, Answer)>, String) {
+        let path = self.folder.path().join("scene.toml");
         std::fs::write(&path, &case.text).expect("a scene can be written");
         let reference = runs::reference(&self.session, &path, &case).expect("a session that lives");
         let by = |name: &&str| {
@@ -53,17 +63,24 @@ fn random_scenes() {
 /// Default settings converge on the scenes of a series that have a solution, agree with Newton's method, and say so when there is none.
 fn scenes_are_solved_by_default(bench: &Bench) {
     let mut bad = Vec::new();
-    for (seed, methods) in SERIES {
-        for index in 0..SCENES {
-            let (answers, scene) = bench.run(seed, index, methods);
-            for (name, (verdict, answer)) in methods.iter().zip(answers) {
-                if !matches!(verdict, Verdict::Right | Verdict::Named) {
-                    bad.push(format!("{seed} {index} {name}: {verdict:?}, {}: {scene}", answer.message));
-                }
+    let mut judge = |series: String, methods: &[&str], (answers, scene): (Vec<(Verdict, Answer)>, String)| {
+        for (name, (verdict, answer)) in methods.iter().zip(answers) {
+            if !matches!(verdict, Verdict::Right | Verdict::Named) {
+                bad.push(format!("{series} {name}: {verdict:?}, {}: {scene}", answer.message));
             }
         }
+    };
+    for (seed, methods) in SERIES {
+        for index in 0..SCENES {
+            judge(format!("{seed} {index}"), methods, bench.run(seed, index, methods));
+        }
     }
-    let advice = "`scripts/stress --seed SEED --only INDEX --keep DIR` writes the scene file";
+    for index in 0..SCENES {
+        let case = wide::scene(WIDE, index, Path::new(env!("CARGO_MANIFEST_DIR")));
+        judge(format!("wide {WIDE} {index}"), &["auto"], bench.solve(case, &["auto"]));
+    }
+    let advice =
+        "`scripts/stress --seed SEED --only INDEX --keep DIR` writes the scene file, with --wide of the wider box";
     assert!(bad.is_empty(), "{advice}\n{}", bad.join("\n"));
 }
 
@@ -115,7 +132,7 @@ fn numbers(text: &str, word: &str) -> Vec<f64> {
 /// The box is that of V9: its ends are nearly reached, nothing lies outside, and every kind of scene comes up.
 #[test]
 fn scenes_fill_the_box() {
-    let cases: Vec<_> = (0..3000).map(|index| scenes::scene(2, index, Path::new("meshes"))).collect();
+    let cases: Vec<_> = (0..3000).map(|index| scenes::scene(2, index, Path::new(""))).collect();
     let spread = |values: &mut dyn Iterator<Item = f64>| {
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
     };
@@ -151,4 +168,35 @@ fn scenes_fill_the_box() {
     for (b, a) in [(1e-6, 0.1), (1e-6, 1.0), (2e-4, 0.1), (2e-4, 1.0)] {
         assert!((kappa.0..kappa.1).contains(&paper(b, a)));
     }
+}
+
+/// The wider box has every kind of body, layer, gap, hold and start, and what must come of them.
+#[test]
+fn wide_scenes_fill_the_box() {
+    let cases: Vec<_> = (0..1000).map(|index| wide::scene(WIDE, index, Path::new(""))).collect();
+    let some = |what: &str, is: &dyn Fn(&Case) -> bool| {
+        let count = cases.iter().filter(|case| is(case)).count();
+        assert!(count >= 20, "{what}: {count} of {}", cases.len());
+    };
+    for kind in ["Grid", "Rings", "Blocks", "Round", "Cap", "Roll", "Ball", "Small", "Bricks"] {
+        some(kind, &|case| case.line.starts_with(kind));
+    }
+    for law in ["linear = ", "power = ", "exponential = ", "cubic = ", "table = ", "sinh(", "up_to = ", "c^2/"] {
+        some(law, &|case| case.text.contains(law));
+    }
+    for word in ["plane = \"stress\"", "spring = ", "force = ", "gap = \"-", "poisson = 0.4999"] {
+        some(word, &|case| case.text.contains(word));
+    }
+    for outcome in [Expect::Solution, Expect::Gauge, Expect::Nothing] {
+        some(&format!("{outcome:?}"), &|case| case.expect == outcome);
+    }
+    let bodies = |case: &Case| case.text.matches("[[body]]").count();
+    some("many bodies", &|case| bodies(case) >= 6);
+    some("three in space", &|case| case.text.starts_with("dimension = 3") && bodies(case) >= 3);
+    let kinds =
+        |case: &Case| ["linear = ", "power = ", "cubic = "].iter().filter(|law| case.text.contains(*law)).count();
+    some("different laws", &|case| kinds(case) >= 2);
+    some("bodies of 1e-4", &|case| numbers(&case.text, "size = ").contains(&1e-4));
+    some("a given start", &|case| case.start.is_some());
+    some("no start", &|case| case.start.is_none());
 }

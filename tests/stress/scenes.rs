@@ -35,6 +35,8 @@ pub struct Case {
     pub carried: Option<f64>,
     /// A relaxation for the paper's iteration.
     pub gamma: f64,
+    /// The key `start` of the method, if it is given.
+    pub start: Option<String>,
 }
 
 /// Mesh of a stack of blocks or of a ring of four: blocks, columns, width, height, elements along each width.
@@ -136,8 +138,8 @@ const HOLDS: [Hold; 20] = [
     Hold::Lifted,
 ];
 
-/// Scene `index` of the series `seed`; `meshes` is the folder of that name.
-pub fn scene(seed: u64, index: usize, meshes: &Path) -> Case {
+/// Scene `index` of the series `seed`; `root` is the folder of the program.
+pub fn scene(seed: u64, index: usize, root: &Path) -> Case {
     let mut random = Random::new(seed, index);
     let shape = random.pick(&SHAPES);
     // an end that holds a tall block keeps the load away from the contact
@@ -180,7 +182,7 @@ pub fn scene(seed: u64, index: usize, meshes: &Path) -> Case {
     let _ = writeln!(
         text,
         "mesh = {{ geo = \"{}\", set = {{ rows = {}, columns = {}, width = {}, height = {}, {} }} }}",
-        meshes.join("stack/stack.geo").display(),
+        root.join("meshes/stack/stack.geo").display(),
         shape.blocks / shape.columns,
         shape.columns,
         shape.width,
@@ -347,6 +349,7 @@ pub fn scene(seed: u64, index: usize, meshes: &Path) -> Case {
         pressure: pressure_scale,
         carried: statics.then_some(load * shape.width),
         gamma: random.power_of_ten(-2.0, 0.08),
+        start: None,
     }
 }
 

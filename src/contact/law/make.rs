@@ -1,7 +1,7 @@
 //! The law that a scene asks for, at the points of a pair.
 
 use super::{Cubic, Exponential, LayerLaw, Linear, PerPoint, Power, Table, Typed};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, Kind, Result, shown};
 use crate::expression::Field;
 use crate::problem::layer::{LawForm, LawKind, LayerSpec};
 
@@ -44,7 +44,7 @@ fn formed<L: LayerLaw + 'static>(
             match known.bounds.breach(value) {
                 None => Ok(value),
                 Some(breach) => {
-                    let message = format!("{} is {value} at ({}, {}, {})", known.what, x[0], x[1], x[2]);
+                    let message = format!("{} is {} at ({}, {}, {})", known.what, shown(value), x[0], x[1], x[2]);
                     let error = Error::new(Kind::Scene, message);
                     Err(match field.place() {
                         Some(place) => error.at(place).label(breach),

@@ -3,7 +3,7 @@
 use super::quadrature::integral;
 use super::root::{meeting, root};
 use super::{LayerLaw, Response};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown};
 use crate::expression::Differentiable;
 
 /// An expression p(c) at one place, continued as a straight line beyond its end.
@@ -39,7 +39,9 @@ impl Typed {
         // a formula may miss zero by rounding; one that is not a number misses it, too
         let is_zero = first == 0.0 || first.abs() <= 1e-12 * largest;
         if !is_zero {
-            return Err(typed.refuse(format!("p(0) is {first}, not 0"), "without compression there is no pressure"));
+            return Err(
+                typed.refuse(format!("p(0) is {}, not 0", shown(first)), "without compression there is no pressure")
+            );
         }
         if first_slope.is_infinite() {
             let advice = "p' must be finite: add a linear part, or begin with a power of c of at least 1";
@@ -52,13 +54,25 @@ impl Typed {
             if before.1 > HUGE {
                 break;
             }
-            let advice =
-                "say how far the law goes, as in { pressure = \"...\", up_to = 1e-3 }: it goes on linearly from there";
+            let advice = match (before.0 > 0.0, end) {
+                (false, _) => {
+                    "the pressure grows with the compression c from c = 0 on: look for a wrong sign".to_owned()
+                }
+                (_, Some(_)) => {
+                    format!("take a smaller up_to, such as {:.1e}: the law increases that far", 0.9 * before.0)
+                }
+                (_, None) => format!(
+                    "say how far the law goes, as in {{ pressure = \"...\", up_to = {:.1e} }}: it goes on linearly from there",
+                    0.9 * before.0
+                ),
+            };
             if !(pressure.is_finite() && slope.is_finite()) {
-                return Err(typed.refuse(format!("p is {pressure} and p' {slope} at c = {c:.3e}"), advice));
+                return Err(
+                    typed.refuse(format!("p is {} and p' {} at c = {c:.3e}", shown(pressure), shown(slope)), &advice)
+                );
             }
             if pressure <= before.1 || slope < 0.0 {
-                return Err(typed.refuse(format!("p does not increase at c = {c:.3e}"), advice));
+                return Err(typed.refuse(format!("p does not increase at c = {c:.3e}"), &advice));
             }
             before = (c, pressure);
         }

@@ -7,11 +7,13 @@
 
 mod plane;
 mod polygon;
+mod reach;
 mod search;
 mod space;
 
 pub use plane::plane;
-pub use search::{Reach, Search};
+pub use reach::{Reach, Refused};
+pub use search::Search;
 pub use space::space;
 
 use super::side::Side;
@@ -33,8 +35,20 @@ pub struct Shared<const D: usize> {
     pub gap: f64,
 }
 
-/// Finds the common pieces of two surfaces: integration points grouped by facet of side a.
-pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach) -> Vec<Shared<D>>;
+/// What two surfaces share.
+#[derive(Debug, Clone, Default)]
+pub struct Common<const D: usize> {
+    /// Integration points of the common pieces, grouped by facet of side a.
+    pub points: Vec<Shared<D>>,
+    /// What lies before each facet of side a and was refused.
+    pub refused: Vec<Refused>,
+}
+
+/// Finds the common pieces of two surfaces.
+pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach) -> Common<D>;
 
 /// Parameters closer than this to a facet's end are its end: surfaces that match do match.
 const SNAP: f64 = 1e-9;
+
+/// How far outside its parameters a ray may meet a facet in the plane, where pieces end exactly where facets do.
+const ON_FACET: f64 = 1e-6;

@@ -1,51 +1,56 @@
 //! Common pieces of two plane curves: intervals of the facets of side a.
 
-use super::search::{Reach, Search};
-use super::{SNAP, Shared};
-use crate::contact::side::{Side, length};
+use super::{Common, ON_FACET, Reach, Refused, SNAP, Search, Shared};
+use crate::contact::side::{Side, length, unit};
 use crate::fem::{element, quadrature};
 use crate::problem::order::Order;
 
-/// Integration points of the common pieces of two plane curves, grouped by facet of side a.
-pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Vec<Shared<2>> {
+/// The common pieces of two plane curves.
+pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
     let search = Search::new(b);
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = quadrature::gauss(if quadratic { 4 } else { 3 });
-    let mut points = Vec::new();
+    let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Curve::of(a, i);
+        let refused = &mut common.refused[i];
         let mut found: Vec<Piece> = search
             .around(a, i, reach)
             .into_iter()
             .filter_map(|index| Piece::between(&facet, Curve::of(b, index), index))
-            .filter(|piece| reach.holds(piece.gap))
+            .filter(|piece| refused.admits(reach, piece.gap, facet.direction, piece.other.direction))
             .collect();
         found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
         let mut free = vec![(0.0, 1.0)];
         let mut pieces = Vec::new();
-        for piece in found {
+        for piece in &found {
             for (low, high) in take(&mut free, piece.range) {
-                pieces.push((low, high, piece.index, Curve::of(b, piece.index)));
+                pieces.push((low, high, piece));
             }
         }
         pieces.sort_by(|p, q| p.0.total_cmp(&q.0));
-        for (low, high, index, other) in pieces {
+        for (low, high, Piece { index, other, .. }) in pieces {
             for &(position, weight) in &rule {
                 let s = low + (high - low) * position;
                 let (from, normal) = (facet.at(s), facet.normal(s));
                 let Some(t) = other.hit(from, normal) else { continue };
-                points.push(Shared {
+                let gap = other.distance(t, from, normal);
+                if !reach.holds(gap) {
+                    refused.far = true;
+                    continue;
+                }
+                common.points.push(Shared {
                     facet_a: i,
                     at_a: [1.0 - s, s],
-                    facet_b: index,
+                    facet_b: *index,
                     at_b: [1.0 - t, t],
                     weight: weight * (high - low) * length(facet.tangent(s)) * a.space.circle(&from),
-                    gap: other.distance(t, from, normal),
+                    gap,
                 });
             }
         }
     }
-    points
+    common
 }
 
 /// Removes `range` from the free intervals and returns what it got of them.
@@ -69,6 +74,8 @@ struct Curve {
     order: Order,
     x: Vec<[f64; 2]>,
     normals: [[f64; 2]; 2],
+    /// Outer unit normal in the middle.
+    direction: [f64; 2],
 }
 
 impl Curve {
@@ -78,6 +85,7 @@ impl Curve {
             order: side.facets.order,
             x: side.facets.coordinates(i, side.space),
             normals: [side.normals[&nodes[0]], side.normals[&nodes[1]]],
+            direction: unit(side.area(i)),
         }
     }
 
@@ -94,12 +102,13 @@ impl Curve {
         std::array::from_fn(|c| (1.0 - s) * self.normals[0][c] + s * self.normals[1][c])
     }
 
-    /// Parameter at which the ray from `x` along `n` meets the curve: cross(x(s) - x, n) = 0.
+    /// Parameter at which the line through `x` along `n` meets the curve: cross(x(s) - x, n) = 0. `None` if it does not.
     fn hit(&self, x: [f64; 2], n: [f64; 2]) -> Option<f64> {
         newton(|s| {
             let here = self.at(s);
             cross([here[0] - x[0], here[1] - x[1]], n) / cross(self.tangent(s), n)
         })
+        .filter(|s| (-ON_FACET..=1.0 + ON_FACET).contains(s))
     }
 
     /// Distance of the point at `s` from `x` along `n`, signed.
@@ -122,17 +131,19 @@ impl Curve {
 /// Zero of a function near the middle of \[0, 1\] by Newton's method; `step(s)` is value over slope. `None` if it runs away.
 fn newton(step: impl Fn(f64) -> f64) -> Option<f64> {
     let mut s = 0.5;
+    let mut last = f64::INFINITY;
     for _ in 0..30 {
-        let step = step(s);
-        s -= step;
+        last = step(s);
+        s -= last;
         if !s.is_finite() || s.abs() > 1e3 {
             return None;
         }
-        if step.abs() < 1e-14 {
+        if last.abs() < 1e-14 {
             break;
         }
     }
-    Some(s)
+    // rounding may keep the last digits moving
+    (last.abs() < SNAP * (1.0 + s.abs())).then_some(s)
 }
 
 fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
@@ -143,35 +154,36 @@ fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
 struct Piece {
     range: (f64, f64),
     index: usize,
+    other: Curve,
     gap: f64,
 }
 
 impl Piece {
     fn between(a: &Curve, b: Curve, index: usize) -> Option<Self> {
-        let facing: f64 =
-            (0..2).map(|c| (a.normals[0][c] + a.normals[1][c]) * (b.normals[0][c] + b.normals[1][c])).sum();
-        if facing >= 0.0 {
+        if dot(a.direction, b.direction) >= 0.0 {
             return None;
         }
-        let snap = |s: f64| {
-            if s.abs() < SNAP {
-                0.0
-            } else if (s - 1.0).abs() < SNAP {
-                1.0
-            } else {
-                s
-            }
+        // between these places the normals of a either all meet b or all miss it; the foot of an end that lies behind the
+        // centre of the curve means nothing, but does no harm as a place
+        let mut places = vec![0.0, 1.0];
+        places.extend(b.x[..2].iter().filter_map(|&x| a.foot(x)).filter(|s| *s > SNAP && *s < 1.0 - SNAP));
+        places.sort_by(f64::total_cmp);
+        let meets = |low: f64, high: f64| {
+            let middle = 0.5 * (low + high);
+            let (from, normal) = (a.at(middle), a.normal(middle));
+            b.hit(from, normal).map(|t| b.distance(t, from, normal))
         };
-        let (first, last) = (snap(a.foot(b.x[0])?), snap(a.foot(b.x[1])?));
-        let (low, high) = (first.min(last).max(0.0), first.max(last).min(1.0));
-        if high - low <= SNAP {
-            return None;
-        }
-        let middle = 0.5 * (low + high);
-        let (from, normal) = (a.at(middle), a.normal(middle));
-        let gap = b.distance(b.hit(from, normal)?, from, normal);
-        Some(Self { range: (low, high), index, gap })
+        let within = places.windows(2).filter(|ends| ends[1] - ends[0] > SNAP);
+        let mut met = within.filter(|ends| meets(ends[0], ends[1]).is_some());
+        let first = met.next()?;
+        let range = (first[0], met.next_back().unwrap_or(first)[1]);
+        let gap = meets(range.0, range.1)?;
+        Some(Self { range, index, other: b, gap })
     }
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
 }
 
 #[cfg(test)]

@@ -1,34 +1,9 @@
 //! Which facets of side b may face a facet of side a.
 
+use super::reach::Reach;
 use crate::contact::side::{Side, length};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
-
-/// How far apart two surfaces may be and still face each other.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reach {
-    /// Largest distance along the normal.
-    pub gap: f64,
-    /// Largest overlap.
-    pub overlap: f64,
-}
-
-impl Reach {
-    /// What is sensible for two surfaces: no gap larger than the smaller surface, and no overlap larger than a body is
-    /// thick behind its surface (volume over area): beyond that one would look at the far side of a thin body.
-    pub fn between<const D: usize>(a: &Side<D>, b: &Side<D>) -> Self {
-        let area = |side: &Side<D>| side.mean_measure() * side.facets.count() as f64;
-        let extent = |side: &Side<D>| area(side).powf(1.0 / (D - 1) as f64);
-        let thickness = |side: &Side<D>| side.space.measure() / area(side);
-        let gap = extent(a).min(extent(b));
-        Self { gap, overlap: gap.min(thickness(a)).min(thickness(b)) }
-    }
-
-    /// Whether a signed distance is within reach.
-    pub fn holds(&self, gap: f64) -> bool {
-        gap <= self.gap && -gap <= self.overlap
-    }
-}
 
 /// Corners of a box: all least and all largest coordinates.
 pub type Bounds<const D: usize> = ([f64; D], [f64; D]);
@@ -64,15 +39,16 @@ impl<const D: usize> Search<D> {
         self.tree.locate_in_envelope_intersecting(AABB::from_corners(low, high)).map(|candidate| candidate.data)
     }
 
-    /// Facets near the prism of facet `i` of side a along its normals. The prism is somewhat more than twice as high as the
-    /// nearest facet is away, so that tilted surfaces are met too, and no higher than `reach`. Empty if nothing is there.
+    /// Facets near the prism of facet `i` of side a along its normals. The prism is more than twice as high as the nearest facet
+    /// is away, so that tilted surfaces are met too, and no higher than `reach`. Empty if nothing is there.
     pub fn around(&self, a: &Side<D>, i: usize, reach: &Reach) -> Vec<usize> {
         let (low, high) = a.bounds(i);
         let middle: [f64; D] = std::array::from_fn(|c| 0.5 * (low[c] + high[c]));
         let size = length(std::array::from_fn::<f64, D, _>(|c| high[c] - low[c]));
         let Some(nearest) = self.tree.nearest_neighbor(middle) else { return Vec::new() };
         let (from, to) = (nearest.geom().lower(), nearest.geom().upper());
-        let away: [f64; D] = std::array::from_fn(|c| (from[c] - middle[c]).max(middle[c] - to[c]).max(0.0));
+        // the facet lies somewhere in its box
+        let away: [f64; D] = std::array::from_fn(|c| (from[c] - middle[c]).abs().max((middle[c] - to[c]).abs()));
         let height = 2.0 * length(away) + size;
         let found = self.within(a, i, reach.overlap.min(height) + size, reach.gap.min(height) + size);
         // something that does not face the facet may be nearer than what does

@@ -6,8 +6,7 @@
 //! is split into four at its mid-edges.
 
 use super::polygon::{self, Polygon};
-use super::search::{Reach, Search};
-use super::{SNAP, Shared};
+use super::{Common, Reach, Refused, SNAP, Search, Shared};
 use crate::contact::side::{Side, length, unit};
 use crate::fem::space::area_vector;
 use crate::fem::{assemble, element, quadrature};
@@ -16,22 +15,29 @@ use crate::problem::order::Order;
 /// Pieces smaller than this share of a facet are rounding.
 const TINY: f64 = 1e-11;
 
+/// How far outside its parameters a ray may meet a facet. The edge of a piece is a chord of the image of b's edge, which
+/// bows by an eighth of the angle that the normals turn along it: with a radian a facet a tenth.
+const ON_FACET: f64 = 0.1;
+
 /// Triangles of a facet, by its nodes: the facet itself, or four between its mid-edges.
 const WHOLE: [[usize; 3]; 1] = [[0, 1, 2]];
 const QUARTERS: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
 
-/// Integration points of the common pieces of two surfaces in space, grouped by facet of side a.
-pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Vec<Shared<3>> {
+/// The common pieces of two surfaces in space.
+pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
     let search = Search::new(b);
     let facets_b: Vec<Facet> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = quadrature::simplex::<3>(if quadratic { 5 } else { 2 });
-    let mut points = Vec::new();
+    let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
+        let refused = &mut common.refused[i];
         let mut found: Vec<Piece> = Vec::new();
         for index in search.around(a, i, reach) {
-            found.extend(Piece::between(&facet, &facets_b[index], index).into_iter().filter(|p| reach.holds(p.gap)));
+            let other = &facets_b[index];
+            let pieces = Piece::between(&facet, other, index).into_iter();
+            found.extend(pieces.filter(|p| refused.admits(reach, p.gap, facet.direction, other.direction)));
         }
         found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
         // the nearest facets take what they face, and nobody else gets it
@@ -50,14 +56,18 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Vec<Shared<3>> {
                         let Some((at_b, t)) = facets_b[index].hit(facet.at(u, v), normal) else { continue };
                         let weight = weight * share * length(facet.area(u, v));
                         let gap = t * length(normal);
-                        points.push(Shared { facet_a: i, at_a, facet_b: index, at_b, weight, gap });
+                        if !reach.holds(gap) {
+                            refused.far = true;
+                            continue;
+                        }
+                        common.points.push(Shared { facet_a: i, at_a, facet_b: index, at_b, weight, gap });
                     }
                 }
             }
             taken.extend(free);
         }
     }
-    points
+    common
 }
 
 /// A facet as a parametrised surface x(u, v), u, v >= 0, u + v <= 1: barycentric coordinates 1 - u - v, u, v.
@@ -102,7 +112,7 @@ impl Facet {
         [1, 2].map(|k| std::array::from_fn(|c| (0..self.x.len()).map(|n| (d[n][k] - d[n][0]) * self.x[n][c]).sum()))
     }
 
-    /// Where the ray x + t n meets the surface: barycentric coordinates and t.
+    /// Where the line x + t n meets the surface: barycentric coordinates and t. `None` if it does not.
     fn hit(&self, x: [f64; 3], n: [f64; 3]) -> Option<([f64; 3], f64)> {
         let middle = self.at(1.0 / 3.0, 1.0 / 3.0);
         let [u, v, t] = newton(dot(minus(middle, x), n) / dot(n, n), |[u, v, t]| {
@@ -111,7 +121,8 @@ impl Facet {
             let miss = std::array::from_fn(|c| here[c] - x[c] - t * n[c]);
             (miss, [along_u, along_v, n.map(|n| -n)])
         })?;
-        Some(([1.0 - u - v, u, v], t))
+        let at = [1.0 - u - v, u, v];
+        at.iter().all(|l| (-ON_FACET..=1.0 + ON_FACET).contains(l)).then_some((at, t))
     }
 
     /// Parameters (u, v) whose normal passes through `x`.

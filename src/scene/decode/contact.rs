@@ -3,7 +3,7 @@
 use super::{Decoder, choose};
 use crate::error::{Error, Located, Result};
 use crate::expression::Field;
-use crate::problem::contact::{AutoContact, ContactSpec, Overlap};
+use crate::problem::contact::{ANGLE, AutoContact, ContactSpec, Overlap};
 use crate::scene::read::{Keys, Node, Value};
 use std::collections::HashSet;
 
@@ -40,13 +40,14 @@ impl Decoder<'_> {
 
     /// A contact, and the distance within which pairs are looked for if it is `between = "auto"`.
     fn contact(&self, node: &Node) -> Result<(ContactSpec, Option<f64>)> {
-        const KEYS: &[&str] = &["between", "distance", "gap", "touching", "overlap", "layer", "reference"];
+        const KEYS: &[&str] = &["between", "distance", "gap", "angle", "touching", "overlap", "layer", "reference"];
         let keys = Keys::open(node, "[[contact]]", KEYS)?;
         let (between, distance) = between(&keys)?;
         let contact = ContactSpec {
             between,
             gap: keys.get("gap").map_or(Ok(Field::Constant(0.0)), |gap| self.field(gap))?,
             layer: self.layer(keys.require("layer")?)?,
+            angle: keys.get("angle").map_or(Ok(ANGLE), angle)?,
             touching: keys.get("touching").map_or(Ok(false), Node::boolean)?,
             overlap: keys
                 .get("overlap")
@@ -54,6 +55,14 @@ impl Decoder<'_> {
             reference: keys.get("reference").map(|reference| self.field(reference)).transpose()?,
         };
         Ok((contact, distance))
+    }
+}
+
+/// The largest angle between the normals of facets that face each other, in degrees.
+fn angle(node: &Node) -> Result<f64> {
+    match node.positive("the angle")? {
+        angle if angle <= 90.0 => Ok(angle),
+        angle => Err(node.refuse(format!("the angle is {angle} degrees")).label("must be at most 90")),
     }
 }
 

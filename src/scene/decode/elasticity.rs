@@ -1,7 +1,7 @@
 //! Elastic constants of bodies and regions.
 
 use super::Decoder;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown};
 use crate::expression::Field;
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, RegionSpec};
 use crate::scene::read::{Keys, Node, Value};
@@ -57,7 +57,8 @@ impl Decoder<'_> {
     fn poisson(&self, node: &Node) -> Result<Field> {
         match self.field(node)? {
             Field::Constant(value) if !(value > -1.0 && value < 0.5) => {
-                let error = node.refuse(format!("Poisson's ratio is {value}")).label("must lie between -1 and 0.5");
+                let error =
+                    node.refuse(format!("Poisson's ratio is {}", shown(value))).label("must lie between -1 and 0.5");
                 Err(match value == 0.5 {
                     true => error.help("incompressible bodies are not possible; take 0.4999 and order = 2, say"),
                     false => error,

@@ -1,7 +1,7 @@
 //! `layer` of a contact: a form with parameters, a table, or an expression.
 
 use super::Decoder;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown};
 use crate::expression::{Differentiable, Field};
 use crate::problem::layer::{FORMS, LawForm, LayerSpec};
 use crate::scene::read::{Keys, Node};
@@ -49,7 +49,7 @@ impl Decoder<'_> {
             if let Field::Constant(value) = field
                 && let Some(breach) = parameter.bounds.breach(value)
             {
-                let error = node.refuse(format!("{} is {value}", parameter.what)).label(breach);
+                let error = node.refuse(format!("{} is {}", parameter.what, shown(value))).label(breach);
                 return Err(match breach {
                     "must not exceed 1" => {
                         error.help("p(c) = (c/B)^(1/a) with a > 1 is infinitely stiff at first touch, p'(0) = infinity")
@@ -79,7 +79,7 @@ fn table(node: &Node) -> Result<LayerSpec> {
         for (i, (what, node)) in [("compression", c), ("pressure", p)].into_iter().enumerate() {
             if point[i] <= last[i] {
                 return Err(node
-                    .refuse(format!("the {what} {} of the table does not exceed {}", point[i], last[i]))
+                    .refuse(format!("the {what} {} of the table does not exceed {}", shown(point[i]), shown(last[i])))
                     .label("must be greater than the one before it")
                     .help("a layer's law increases from p(0) = 0"));
             }

@@ -132,6 +132,9 @@ const CASES: &[Case] = &[
     ("geo = \"groove.geo\"", "geo = \"grove.geo\"", "\"grove.geo\"", "/grove.geo", "did you mean `groove.geo`?"),
     ("geo = \"groove.geo\"", "geo = \"no/such.geo\"", "\"no/such.geo\"", "/no/such.geo", "relative"),
     ("geo = \"groove.geo\"", "geo = \".\"", "\".\"", " is not a file", ""),
+    ("n = 32 }", "n = 32 }, timeout = 0", "0", "the timeout is 0", ""),
+    ("n = 32 }", "n = 32 }, memory = \"all\"", "\"all\"", "expected a number, found a string", ""),
+    ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", memory = 1", "memory", "`memory` for a finished mesh", ""),
     ("n = 32", "n = \"many\"", "\"many\"", "expected a number, found a string", ""),
     ("n = 32", "\"n m\" = 32", "\"n m\"", "`n m` is no name of a Gmsh number", ""),
 ];
@@ -195,8 +198,39 @@ fn refusals_of_overrides_point_into_them() {
         if !marked.is_empty() {
             assert_eq!(caret(&error), marked, "{text}:\n{error}");
         }
-        assert!(error.render(false).contains("--set:1:"), "{error}");
+        let shown = error.render(false);
+        assert!(shown.contains(format!("1 | --set {text}").trim_end()) && !shown.contains("-->"), "{error}");
     }
     let error = load_text(GROOVE, &["gamma"]).expect_err("no =");
     assert_eq!(error.kind(), Kind::Usage);
+}
+
+#[test]
+fn refusals_of_short_options_point_into_what_was_typed() {
+    for (text, marked, message) in [
+        ("--tolerance -1", "-1", "the error is -1"),
+        ("--tolerance ", "", "the value is missing"),
+        ("--tolerance much", "much", "expected a number, found a string"),
+        ("--method newtn", "newtn", "unknown method `newtn`"),
+        ("--over method.gamma=-1", "-1", "gamma is -1"),
+    ] {
+        let error = load_text(GROOVE, &[text]).expect_err(text);
+        assert!(error.message().contains(message), "{text}: {error}");
+        assert_eq!(caret(&error), marked, "{text}:\n{error}");
+        assert!(error.render(false).contains(&format!("1 | {}", text.trim_end())), "{error}");
+    }
+}
+
+/// A scene that came from somebody else cannot let its script run programs.
+#[test]
+fn only_the_command_line_trusts_a_script() {
+    use crate::problem::mesh::MeshSource;
+    let trusted = |text: &str, more: &[&str]| match load_text(text, more).expect("a scene").mesh {
+        MeshSource::Geo { guard, .. } => guard.trusted,
+        MeshSource::Msh { .. } => false,
+    };
+    assert!(!trusted(GROOVE, &[]) && trusted(GROOVE, &["--trust-geo"]) && trusted(GROOVE, &["trust_geo=true"]));
+    let error = load_text(&format!("trust_geo = true\n{GROOVE}"), &[]).expect_err("a scene that trusts itself");
+    assert!(error.message().contains("cannot say that it is trusted"), "{error}");
+    assert_eq!(caret(&error), "trust_geo");
 }

@@ -126,6 +126,17 @@ fn ask(session: &Session, matrix: &Matrix, types: &[Entry]) -> Result<BTreeSet<S
     Ok(names_in(&text, &prefix))
 }
 
+/// Prints the options of a solver as `-help` does, where a run makes none.
+///
+/// # Errors
+/// When PETSc is out of memory.
+pub fn show_help(session: &Session) -> Result<()> {
+    let mut ksp = Ksp::new(session, "")?;
+    ksp.set_operator(&tiny(session)?)?;
+    ksp.set_from_options()?;
+    ksp.set_up()
+}
+
 /// The names in a help text: the words that begin its lines, without the prefix that most of them have.
 fn names_in(text: &str, prefix: &str) -> BTreeSet<String> {
     text.lines()

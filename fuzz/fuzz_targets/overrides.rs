@@ -1,0 +1,14 @@
+//! Overrides: up to four lines, each as typed behind `--set` or as a short option, applied to a whole scene.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use std::path::Path;
+
+const SCENE: &str = include_str!("../../meshes/groove/scene.toml");
+
+fuzz_target!(|text: &str| {
+    let overrides: Vec<String> = text.lines().take(4).map(str::to_owned).collect();
+    if let Err(error) = winkler::scene::parse(Path::new("../meshes/groove/scene.toml"), SCENE.to_owned(), &overrides) {
+        assert!(!error.message().is_empty() && !error.to_string().is_empty());
+    }
+});

@@ -1,0 +1,62 @@
+//! Which facets may be partners: how far apart, and at which angle.
+
+use crate::contact::side::Side;
+
+/// How far apart and how inclined two facets may be and still face each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    /// Largest distance along the normal.
+    pub gap: f64,
+    /// Largest overlap.
+    pub overlap: f64,
+    /// Least cosine between the normal of one facet and minus that of the other.
+    pub facing: f64,
+}
+
+/// Why facets of side b that lie before a facet of side a are no partners of it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Refused {
+    /// The angle between the normals is too large.
+    pub steep: bool,
+    /// The distance is too large.
+    pub far: bool,
+}
+
+impl Reach {
+    /// What is sensible for two surfaces whose facets may be inclined by `angle` degrees: no gap larger than the smaller
+    /// surface, and no overlap larger than a body is thick behind its surface (volume over area): beyond that one would look at
+    /// the far side of a thin body.
+    pub fn between<const D: usize>(a: &Side<D>, b: &Side<D>, angle: f64) -> Self {
+        let area = |side: &Side<D>| side.mean_measure() * side.facets.count() as f64;
+        let extent = |side: &Side<D>| area(side).powf(1.0 / (D - 1) as f64);
+        let thickness = |side: &Side<D>| side.space.measure() / area(side);
+        let gap = extent(a).min(extent(b));
+        Self { gap, overlap: gap.min(thickness(a)).min(thickness(b)), facing: angle.to_radians().cos() }
+    }
+
+    /// Whether a signed distance is within reach.
+    pub fn holds(&self, gap: f64) -> bool {
+        gap <= self.gap && -gap <= self.overlap
+    }
+
+    /// Whether facets with these unit normals face each other.
+    pub fn faces<const D: usize>(&self, normal: [f64; D], other: [f64; D]) -> bool {
+        -(0..D).map(|c| normal[c] * other[c]).sum::<f64>() > self.facing
+    }
+}
+
+impl Refused {
+    /// Whether `reach` admits facets with these unit normals at this distance; notes what it refuses.
+    pub(super) fn admits<const D: usize>(
+        &mut self,
+        reach: &Reach,
+        gap: f64,
+        normal: [f64; D],
+        other: [f64; D],
+    ) -> bool {
+        let (faces, holds) = (reach.faces(normal, other), reach.holds(gap));
+        self.steep |= holds && !faces;
+        self.far |= faces && gap > reach.gap;
+        faces && holds
+    }
+}

@@ -1,0 +1,88 @@
+//! The mesh against what the scene makes of it: what must hold before anything is assembled.
+
+use super::find::point;
+use super::part::Part;
+use crate::contact::pad;
+use crate::error::{Error, Result};
+use crate::fem::Space;
+use crate::fem::rigid::{self, RigidMotion};
+use crate::mesh::{Asked, Checked, Duty, Mesh, Parts};
+use crate::problem::body::BodySpec;
+use crate::scene::Scene;
+
+/// A mesh that holds what bodies must be.
+#[derive(Debug)]
+pub struct Verified<'a, const D: usize> {
+    /// The mesh.
+    pub mesh: &'a Mesh<D>,
+    /// What was found of each body, in the order of the scene; bodies that the mesh does not have are missing.
+    pub checked: Vec<Checked>,
+}
+
+/// Checks the mesh of a scene once: see [`Mesh::check`].
+///
+/// # Errors
+/// What is no mesh of a body, with body, place and elements.
+pub fn verify<'a, const D: usize>(scene: &Scene, mesh: &'a Mesh<D>) -> Result<Verified<'a, D>> {
+    let bodies: Vec<Asked> = scene.bodies.iter().map(asked).collect();
+    let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
+    let checked = mesh.check(&bodies, &contacts.collect::<Vec<_>>(), scene.auto.is_some())?;
+    Ok(Verified { mesh, checked })
+}
+
+/// A body with the groups that serve it.
+fn asked(body: &BodySpec) -> Asked<'_> {
+    let loads = body.load.iter().map(|load| (load.on.value.as_str(), Duty::Acts));
+    let springs = body.spring.iter().map(|spring| (spring.on.value.as_str(), Duty::Acts));
+    let supports = body.fix.iter().map(|fix| (fix.on.value.as_str(), Duty::Holds));
+    Asked { name: &body.name.value, order: body.order, groups: loads.chain(springs).chain(supports).collect() }
+}
+
+/// Refuses a body in parts of which supports and springs leave more free than of a body in one: contact and loads see its rigid
+/// motions as those of one body.
+///
+/// # Errors
+/// Such a body, with the place of a part that is free.
+pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Result<()> {
+    if parts.count == 1 {
+        return Ok(());
+    }
+    let space = &part.space;
+    let mut nodes = vec![Vec::new(); parts.count];
+    for (cell, &of) in space.cells.chunks_exact(space.stride).zip(&parts.of_cell) {
+        nodes[of as usize].extend_from_slice(cell);
+    }
+    nodes.iter_mut().for_each(|nodes| {
+        nodes.sort_unstable();
+        nodes.dedup();
+    });
+    let motions: Vec<Vec<RigidMotion>> = nodes.iter().map(|nodes| of_nodes(space, nodes)).collect();
+    let whole = part.left(&part.in_dofs(rigid::of(space))).len();
+    if part.left(&part.in_dofs(motions.concat())).len() <= whole {
+        return Ok(());
+    }
+    let is_free = |motions: &Vec<RigidMotion>| !part.left(&part.in_dofs(motions.clone())).is_empty();
+    let at = pad(space.nodes[nodes[motions.iter().position(is_free).unwrap_or(0)][0] as usize]);
+    let (name, count) = (&part.spec.name.value, parts.count);
+    let message =
+        format!("body `{name}` is in {count} parts that share no facet, and nothing holds that at {}", point(at));
+    Err(Error::mesh(&mesh.path, None, message)
+        .help("make a body of each part, support each of them, or let them share facets (in the script: `Coherence;`)"))
+}
+
+/// The rigid motions of some nodes of a body; the others stay at rest.
+fn of_nodes<const D: usize>(space: &Space<D>, nodes: &[u32]) -> Vec<RigidMotion> {
+    let places: Vec<[f64; D]> = nodes.iter().map(|&node| space.nodes[node as usize]).collect();
+    let mut motions = rigid::modes(&places);
+    if space.axisymmetric {
+        motions = vec![motions.swap_remove(1)];
+    }
+    for motion in &mut motions {
+        let mut all = vec![0.0; space.dofs()];
+        for (k, &node) in nodes.iter().enumerate() {
+            (0..D).for_each(|c| all[D * node as usize + c] = motion.displacement[D * k + c]);
+        }
+        motion.displacement = all;
+    }
+    motions
+}

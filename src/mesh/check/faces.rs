@@ -1,0 +1,137 @@
+//! The faces of all cells of a body, each found by its corners.
+
+use super::cells::Cells;
+use crate::error::Result;
+
+/// Corners of a cell on the face opposite each of its corners, in an order that turns the normal outwards.
+const OUTWARD: [&[[usize; 3]]; 2] = [&[[1, 2, 0], [2, 0, 0], [0, 1, 0]], &[[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]];
+
+/// A face of a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Face<const D: usize> {
+    /// Corners, sorted.
+    key: [u32; D],
+    /// The cell.
+    pub cell: u32,
+    /// Which corner of the cell it lacks.
+    opposite: u8,
+    /// Whether it takes an odd permutation from `key` to the order that turns the normal out of the cell.
+    odd: bool,
+}
+
+impl<const D: usize> Face<D> {
+    /// Places of its corners in the cell, the normal outwards.
+    pub fn corners(&self) -> [usize; D] {
+        std::array::from_fn(|i| OUTWARD[D - 2][self.opposite as usize][i])
+    }
+
+    /// Its nodes, the normal outwards: corners, then between 01, 12, 02 the mid-edge nodes of quadratic ones.
+    pub fn nodes(&self, cells: &Cells<D>) -> impl Iterator<Item = u32> {
+        let (cell, corners) = (self.cell as usize, self.corners());
+        let ends = [[0, 1], [1, 2], [0, 2]].map(|[i, j]: [usize; 2]| [corners[i % D], corners[j % D]]);
+        let edges = if cells.is_quadratic() { D * (D - 1) / 2 } else { 0 };
+        let ends = ends.into_iter().take(edges);
+        corners.into_iter().map(move |i| cells.cell(cell)[i]).chain(ends.map(move |ends| cells.middle(cell, ends)))
+    }
+
+    /// Mean of its corners.
+    fn centre(&self, cells: &Cells<D>) -> [f64; 3] {
+        let corners = self.key.map(|node| cells.at(node));
+        std::array::from_fn(|c| corners.iter().map(|x| x[c]).sum::<f64>() / D as f64)
+    }
+}
+
+/// All faces, those with the same corners one after the other.
+pub struct Faces<const D: usize> {
+    /// Sorted within those of one least corner.
+    list: Vec<Face<D>>,
+    /// Where the faces of each least corner begin; the end comes last.
+    first: Vec<u32>,
+}
+
+impl<const D: usize> Faces<D> {
+    /// Sorts the faces of a body by their corners, in linear time: few have the same least one.
+    pub fn new(cells: &Cells<D>) -> Self {
+        let face = |cell: usize, opposite: usize| {
+            let mut face = Face { key: [0; D], cell: cell as u32, opposite: opposite as u8, odd: false };
+            face.key = face.corners().map(|i| cells.cell(cell)[i]);
+            for end in (1..D).rev() {
+                for i in 0..end {
+                    if face.key[i] > face.key[i + 1] {
+                        face.key.swap(i, i + 1);
+                        face.odd = !face.odd;
+                    }
+                }
+            }
+            face
+        };
+        let all = || (0..cells.count()).flat_map(|cell| (0..=D).map(move |opposite| face(cell, opposite)));
+        let mut first = vec![0; cells.points.len() + 1];
+        all().for_each(|face| first[face.key[0] as usize + 1] += 1);
+        (1..first.len()).for_each(|i| first[i] += first[i - 1]);
+        let empty = Face { key: [0; D], cell: 0, opposite: 0, odd: false };
+        let (mut list, mut next) = (vec![empty; cells.count() * (D + 1)], first.clone());
+        for face in all() {
+            let next = &mut next[face.key[0] as usize];
+            list[*next as usize] = face;
+            *next += 1;
+        }
+        first.windows(2).for_each(|ends| list[ends[0] as usize..ends[1] as usize].sort_unstable());
+        Self { list, first }
+    }
+
+    /// Faces with the same corners.
+    fn alike(&self) -> impl Iterator<Item = &[Face<D>]> {
+        self.list.chunk_by(|a, b| a.key == b.key)
+    }
+
+    /// Faces between two cells, with both.
+    pub fn inner(&self) -> impl Iterator<Item = [&Face<D>; 2]> {
+        self.alike().filter_map(|alike| if let [a, b] = alike { Some([a, b]) } else { None })
+    }
+
+    /// Faces of one cell alone.
+    pub fn outer(&self) -> impl Iterator<Item = &Face<D>> {
+        self.alike().filter_map(|alike| if let [face] = alike { Some(face) } else { None })
+    }
+
+    /// How many cells have a facet with these nodes: corners, then mid-edge nodes if there are any.
+    pub fn cells_at(&self, cells: &Cells<D>, facet: &[u32]) -> usize {
+        let mut key = std::array::from_fn(|i| facet[i]);
+        key.sort_unstable();
+        let [from, to] = [0, 1].map(|next| self.first[key[0] as usize + next] as usize);
+        let same = |face: &&Face<D>| face.key == key && face.nodes(cells).skip(D).all(|node| facet.contains(&node));
+        self.list[from..to].iter().filter(same).count()
+    }
+
+    /// Two cells at most share a face, they lie on its two sides, and the nodes between its corners are the same for both.
+    pub fn check(&self, cells: &Cells<D>) -> Result<()> {
+        for alike in self.alike() {
+            let of = || alike.iter().map(|face| face.cell as usize).collect::<Vec<_>>();
+            let [a, b] = alike else {
+                if alike.len() > 2 {
+                    let what = format!("{} cells share the facet", alike.len());
+                    return Err(cells.refuse(&what, &of(), alike[0].centre(cells)).help(AGAIN));
+                }
+                continue;
+            };
+            if a.odd == b.odd {
+                let what = "two cells overlap: both lie on the same side of the facet that they share";
+                return Err(cells.refuse(what, &of(), a.centre(cells)).help(AGAIN));
+            }
+            if cells.is_quadratic() {
+                let [mut first, mut second] = [a, b].map(|face| face.nodes(cells).skip(D).collect::<Vec<_>>());
+                first.sort_unstable();
+                second.sort_unstable();
+                if first != second {
+                    let what = "two cells have different mid-edge nodes on the facet that they share";
+                    return Err(cells.refuse(what, &of(), a.centre(cells)).help(AGAIN));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What to do about cells that are wrong in themselves.
+const AGAIN: &str = "such a file is damaged or was put together from several: mesh the geometry again";

@@ -1,0 +1,143 @@
+//! Groups that serve bodies: whether they lie on them.
+
+use super::cells::{Cells, NONE};
+use super::faces::Faces;
+use crate::error::{Error, Result};
+use crate::mesh::{Group, Mesh};
+use std::collections::HashSet;
+
+/// What a group does for a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Duty {
+    /// Load, spring, contact: acts on the boundary of the bodies that it serves.
+    Acts,
+    /// Support: holds nodes of bodies, inside them, too.
+    Holds,
+}
+
+/// A group in use, and what is known of its simplices so far.
+pub struct InUse<'a> {
+    group: &'a Group,
+    duty: Duty,
+    /// For each simplex, what it is to the bodies.
+    found: Vec<Found>,
+}
+
+/// What a simplex is to the bodies looked at.
+#[derive(Clone, Copy, Default)]
+struct Found {
+    /// It is where the duty asks for it.
+    serves: bool,
+    /// Its nodes are nodes of a body that it serves.
+    touches: bool,
+}
+
+impl<'a> InUse<'a> {
+    /// A group that serves.
+    pub fn new(group: &'a Group, duty: Duty) -> Self {
+        Self { group, duty, found: vec![Found::default(); group.len()] }
+    }
+
+    /// Compares the group with a body that it serves, or, for `other`, with another one of the scene: supports may hold a
+    /// group in part. `node` has the nodes of the body.
+    pub fn compare<const D: usize>(&mut self, cells: &Cells<D>, faces: &Faces<D>, node: &[u32], other: bool) {
+        let dimension = self.group.dimension;
+        if dimension == D || (other && self.duty == Duty::Acts) {
+            return;
+        }
+        let corners = dimension + 1;
+        let wanted = if cells.is_quadratic() { self.group.stride } else { corners };
+        let edges = if dimension + 2 == D && dimension == 1 { self.edges(cells, node) } else { HashSet::new() };
+        for (simplex, found) in self.group.simplices().zip(&mut self.found) {
+            let mut own = [NONE; 6];
+            own.iter_mut().zip(&simplex[..wanted]).for_each(|(own, &point)| *own = node[point as usize]);
+            let own = &own[..wanted];
+            if own.contains(&NONE) {
+                continue;
+            }
+            found.touches |= !other;
+            found.serves |= match (dimension, self.duty) {
+                (0, _) => true,
+                (1, _) if D == 3 => edges.contains(&[own[0].min(own[1]), own[0].max(own[1])]),
+                (_, Duty::Acts) => faces.cells_at(cells, own) == 1,
+                (_, Duty::Holds) => faces.cells_at(cells, own) > 0,
+            };
+        }
+    }
+
+    /// Those edges of the body between nodes of the group, for groups of edges in space.
+    fn edges<const D: usize>(&self, cells: &Cells<D>, node: &[u32]) -> HashSet<[u32; 2]> {
+        let mut on_group = vec![false; cells.points.len()];
+        let nodes = self.group.connectivity.iter().map(|&point| node[point as usize]);
+        nodes.filter(|&node| node != NONE).for_each(|node| on_group[node as usize] = true);
+        let mut edges = HashSet::new();
+        for cell in 0..cells.count() {
+            let corners = &cells.cell(cell)[..=D];
+            let marked = corners.iter().copied().filter(|&node| on_group[node as usize]).collect::<Vec<_>>();
+            for (k, &a) in marked.iter().enumerate() {
+                edges.extend(marked[..k].iter().map(|&b| [a.min(b), a.max(b)]));
+            }
+        }
+        edges
+    }
+
+    /// Refuses a group that has a simplex twice, serves in part only, or whose simplices lie across its bodies. One that touches none is left to
+    /// the line of the scene that names it.
+    pub fn judge<const D: usize>(&self, mesh: &Mesh<D>) -> Result<()> {
+        if self.group.dimension == D {
+            return Ok(());
+        }
+        if let Some(twice) = self.twice() {
+            return Err(self.refuse(mesh, twice, "stands twice in it", "mesh the geometry again"));
+        }
+        let any = self.found.iter().any(|found| found.serves);
+        let Some(bad) = self.found.iter().position(|found| !found.serves && (any || found.touches)) else {
+            return Ok(());
+        };
+        Err(match self.duty {
+            Duty::Acts => self.refuse(
+                mesh,
+                bad,
+                "bounds no body that it serves",
+                "loads, springs and contacts act on boundaries: let the group have those of its own bodies alone",
+            ),
+            Duty::Holds => self.refuse(
+                mesh,
+                bad,
+                "belongs to no body of the scene",
+                "supports hold nodes of bodies: let the group have those of bodies alone",
+            ),
+        })
+    }
+
+    /// A simplex that has the corners of an earlier one.
+    fn twice(&self) -> Option<usize> {
+        let corners = |index: usize| {
+            let mut corners = [NONE; 3];
+            let simplex = &self.group.connectivity[index * self.group.stride..][..=self.group.dimension];
+            corners.iter_mut().zip(simplex).for_each(|(corner, &point)| *corner = point);
+            corners.sort_unstable();
+            corners
+        };
+        let mut seen = HashSet::with_capacity(self.group.len());
+        (0..self.group.len()).find(|&index| !seen.insert(corners(index)))
+    }
+
+    /// The refusal of a simplex of the group.
+    fn refuse<const D: usize>(&self, mesh: &Mesh<D>, index: usize, what: &str, help: &str) -> Error {
+        let points = &self.group.connectivity[index * self.group.stride..][..=self.group.dimension];
+        let mean = |c: usize| points.iter().map(|&p| mesh.points[p as usize][c]).sum::<f64>() / points.len() as f64;
+        let place = (0..D).map(|c| mean(c).to_string()).collect::<Vec<_>>().join(", ");
+        let thing = match (self.group.dimension, D) {
+            (0, _) => "point",
+            (1, 3) => "edge",
+            _ => "facet",
+        };
+        let message = format!("a {thing} of group `{}` {what}, at ({place})", self.group.name);
+        let error = Error::mesh(&mesh.path, None, message).help(help);
+        match self.group.tags.get(index) {
+            Some(tag) => error.because(format!("it is element {tag} of the mesh file")),
+            None => error,
+        }
+    }
+}

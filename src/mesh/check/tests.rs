@@ -1,0 +1,296 @@
+//! Meshes with one mistake each, and meshes without.
+
+use super::{Asked, Checked, Duty};
+use crate::mesh::{Group, Mesh};
+use crate::problem::order::Order;
+
+/// A body of simplices on points.
+fn mesh<const D: usize>(points: Vec<[f64; D]>, cells: &[u32]) -> Mesh<D> {
+    let stride = D + 1;
+    let tags = (1..=(cells.len() / stride) as u64).collect();
+    let body = Group { name: "body".into(), dimension: D, stride, connectivity: cells.to_vec(), tags };
+    Mesh { path: "a.msh".into(), points, order: Order::P1, groups: vec![body].into() }
+}
+
+fn with_group<const D: usize>(mesh: Mesh<D>, name: &str, dimension: usize, connectivity: Vec<u32>) -> Mesh<D> {
+    let (stride, tags) = (dimension + 1, vec![90, 91, 92, 93]);
+    let mut groups = mesh.groups.to_vec();
+    groups.push(Group { name: name.into(), dimension, stride, connectivity, tags });
+    Mesh { groups: groups.into(), ..mesh }
+}
+
+fn check<const D: usize>(mesh: &Mesh<D>, groups: &[(&str, Duty)]) -> Result<Checked, String> {
+    let asked = Asked { name: "body", order: mesh.order, groups: groups.to_vec() };
+    let found = mesh.check(&[asked], &[], false);
+    found.map(|mut found| found.remove(0)).map_err(|error| error.to_string())
+}
+
+fn refused<const D: usize>(mesh: &Mesh<D>, words: &[&str]) {
+    let message = check(mesh, &[]).expect_err(words[0]);
+    assert!(words.iter().all(|words| message.contains(words)) && message.contains("help: "), "{words:?}\n{message}");
+}
+
+/// Two squares side by side, each in two triangles.
+///
+/// ```text
+/// 3 - 4 - 5
+/// | \ | \ |
+/// 0 - 1 - 2
+/// ```
+fn squares() -> (Vec<[f64; 2]>, Vec<u32>) {
+    let points = vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 1.0], [1.0, 1.0], [2.0, 1.0]];
+    (points, vec![0, 1, 3, 1, 4, 3, 1, 2, 4, 2, 5, 4])
+}
+
+/// A unit cube in six tetrahedra around a diagonal, with a corner at `from`; corners are numbered from `first`.
+fn cube(from: [f64; 3], first: u32) -> (Vec<[f64; 3]>, Vec<u32>) {
+    let points = (0..8).map(|k| [0, 1, 2].map(|c| from[c] + f64::from(k >> c & 1))).collect();
+    let around = [1, 3, 2, 6, 4, 5];
+    let cells = (0..6).flat_map(|k| [0, around[k], around[(k + 1) % 6], 7].map(|corner| first + corner)).collect();
+    (points, cells)
+}
+
+/// The same simplices with a node in the middle of each edge.
+fn quadratic<const D: usize>(mesh: &Mesh<D>) -> Mesh<D> {
+    let edges = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
+    let (mut points, mut middles) = (mesh.points.clone(), std::collections::HashMap::new());
+    let mut groups = mesh.groups.to_vec();
+    for group in &mut groups {
+        let corners = group.dimension + 1;
+        let mut connectivity = Vec::new();
+        for simplex in group.simplices() {
+            connectivity.extend_from_slice(simplex);
+            for [i, j] in &edges[..corners * (corners - 1) / 2] {
+                let ends = [simplex[*i].min(simplex[*j]), simplex[*i].max(simplex[*j])];
+                connectivity.push(*middles.entry(ends).or_insert_with(|| {
+                    let [a, b] = ends.map(|end| mesh.points[end as usize]);
+                    points.push(std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
+                    points.len() as u32 - 1
+                }));
+            }
+        }
+        (group.connectivity, group.stride) = (connectivity, corners * (corners + 1) / 2);
+    }
+    Mesh { points, order: Order::P2, groups: groups.into(), ..mesh.clone() }
+}
+
+#[test]
+fn good_meshes_are_counted() {
+    let (points, cells) = squares();
+    let plane = mesh(points, &cells);
+    let (points, cells) = cube([0.0; 3], 0);
+    let space = mesh(points, &cells);
+    for (found, counts) in [
+        (check(&plane, &[]), [3, 6, 1]),
+        (check(&quadratic(&plane), &[]), [3, 6, 1]),
+        (check(&space, &[]), [6, 12, 1]),
+        (check(&quadratic(&space), &[]), [6, 12, 1]),
+    ] {
+        let found = found.unwrap();
+        assert_eq!([found.inner, found.outer, found.parts.count], counts);
+    }
+}
+
+#[test]
+fn parts_that_lie_apart_are_found() {
+    let ((mut points, mut cells), (more, others)) = (cube([0.0; 3], 0), cube([1.5, 0.0, 0.0], 8));
+    points.extend(more);
+    cells.extend(others);
+    let parts = check(&mesh(points, &cells), &[]).unwrap().parts;
+    assert_eq!((parts.count, &parts.of_cell[..7]), (2, &[0, 0, 0, 0, 0, 0, 1][..]));
+}
+
+#[test]
+fn cells_that_overlap() {
+    let (points, cells) = squares();
+    // given twice, as an inner one and alone
+    refused(&mesh(points.clone(), &[&cells[..], &[1, 4, 3]].concat()), &["3 cells share the facet", "elements"]);
+    refused(&mesh(points.clone(), &[0, 1, 3, 0, 1, 3]), &["same side", "elements 1 and 2"]);
+    // a node pulled out of the cells around it: the cell there was turned when it was read
+    let mut folded = points.clone();
+    folded[1] = [1.2, 1.4];
+    let turned = [0, 1, 3, 1, 3, 4, 1, 4, 2, 2, 5, 4];
+    refused(&mesh(folded, &turned), &["same side of the facet that they share"]);
+    // a spiral of triangles that goes around twice and a bit less: each fits to the next
+    let angle = |k: u32| f64::from(k) * 0.9;
+    let around: Vec<[f64; 2]> = (0..9).map(|k| [angle(k).cos(), angle(k).sin()]).collect();
+    let spiral: Vec<u32> = (0..8).flat_map(|k| [9, k, k + 1]).collect();
+    refused(&mesh([&around[..], &[[0.0; 2]]].concat(), &spiral), &["crosses itself"]);
+    // a part within another one
+    let inner = [[0.6, 0.6], [0.7, 0.6], [0.6, 0.7]];
+    let twice = mesh([&points[..], &inner].concat(), &[&cells[..], &[6, 7, 8]].concat());
+    refused(&twice, &["2 cells lie over each other", "(0.6"]);
+    refused(&quadratic(&twice), &["2 cells lie over each other"]);
+    let (mut points, mut cells) = cube([0.0; 3], 0);
+    points.extend([[0.5, 0.3, 0.2], [0.6, 0.3, 0.2], [0.5, 0.4, 0.2], [0.5, 0.3, 0.3]]);
+    cells.extend([8, 9, 10, 11]);
+    refused(&mesh(points.clone(), &cells), &["2 cells lie over each other"]);
+    // one that comes out of it
+    points[9] = [3.0, 0.35, 0.22];
+    refused(&mesh(points.clone(), &cells), &["crosses itself"]);
+    refused(&quadratic(&mesh(points, &cells)), &["crosses itself"]);
+}
+
+/// A hole is no mistake, nor is a part in a hole.
+#[test]
+fn holes_and_what_is_in_them() {
+    let ring: Vec<[f64; 2]> = (0..16)
+        .map(|k| {
+            let (angle, radius) = (f64::from(k % 8) * std::f64::consts::FRAC_PI_4, if k < 8 { 1.0 } else { 2.0 });
+            [radius * angle.cos(), radius * angle.sin()]
+        })
+        .collect();
+    let mut cells: Vec<u32> =
+        (0..8).flat_map(|k| [k, 8 + k, 8 + (k + 1) % 8, k, 8 + (k + 1) % 8, (k + 1) % 8]).collect();
+    assert_eq!(check(&mesh(ring.clone(), &cells), &[]).unwrap().outer, 16);
+    cells.extend([16, 17, 18]);
+    let core = mesh([&ring[..], &[[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]]].concat(), &cells);
+    assert_eq!(check(&core, &[]).unwrap().parts.count, 2);
+}
+
+#[test]
+fn cracks() {
+    // a node between 1 and 4 that the left square does not have
+    let (points, _) = squares();
+    let hanging = mesh([&points[..], &[[1.0, 0.5]]].concat(), &[0, 1, 3, 1, 4, 3, 1, 2, 6, 6, 5, 4, 2, 5, 6]);
+    refused(&hanging, &["a node hangs on a facet", "at (1, 0.5)"]);
+    // the left square has the corner 4 of another body
+    let own = mesh([&points[..], &[[1.0, 1.0]]].concat(), &[0, 1, 3, 1, 6, 3, 1, 2, 4, 2, 5, 4]);
+    refused(&own, &["nodes of their own", "at (1, 1)"]);
+    refused(&quadratic(&own), &["nodes of their own"]);
+    // both ends
+    let (mut points, mut cells) = cube([0.0; 3], 0);
+    let (more, others) = cube([1.0, 0.0, 0.0], 8);
+    points.extend(more);
+    cells.extend(others);
+    refused(&mesh(points.clone(), &cells), &["nodes of their own"]);
+    // and a mesh that does not match: half a cube along y
+    for x in &mut points[8..] {
+        (x[1], x[2]) = (0.3 + 0.4 * x[1], 0.2 + 0.5 * x[2]);
+    }
+    refused(&mesh(points, &cells), &["a node hangs on a facet"]);
+}
+
+#[test]
+fn cells_that_hang_by_less_than_a_facet() {
+    let (points, cells) = squares();
+    let by_corner = mesh([&points[..], &[[3.0, 2.0], [2.0, 2.0]]].concat(), &[&cells[..], &[5, 6, 7]].concat());
+    refused(&by_corner, &["an edge or a corner alone", "(2, 1)", "elements 4 and 5"]);
+    let (points, cells) = cube([0.0; 3], 0);
+    let more = [[2.0, 0.5, 2.0], [2.0, 0.6, 1.5]];
+    // by the edge between the corners 5 and 7
+    let by_edge = mesh([&points[..], &more].concat(), &[&cells[..], &[5, 7, 9, 8]].concat());
+    refused(&by_edge, &["an edge or a corner alone"]);
+}
+
+#[test]
+fn mid_edge_nodes() {
+    let (points, cells) = squares();
+    let good = quadratic(&mesh(points, &cells));
+    let mut other = good.clone();
+    // the middle of 1-4 once more, for the right square alone
+    let middle = good.groups[0].connectivity[6 + 3];
+    other.points.push(other.points[middle as usize]);
+    let new = other.points.len() as u32 - 1;
+    let cell = &mut other.groups[0].connectivity[12..18];
+    let place = cell.iter().position(|&node| node == middle).unwrap();
+    cell[place] = new;
+    refused(&other, &["different mid-edge nodes", "elements 2 and 3"]);
+    let mut two = good.clone();
+    two.groups[0].connectivity[3] = two.groups[0].connectivity[5];
+    refused(&two, &["a node lies on two edges"]);
+    let mut folded = good;
+    let bottom = folded.groups[0].connectivity[3];
+    folded.points[bottom as usize] = [0.5, 0.6];
+    refused(&folded, &["a curved cell is folded"]);
+}
+
+/// Arcs with a gap between them that is smaller than the distance of their chords.
+#[test]
+fn chords_that_meet_are_looked_at_closely() {
+    // two quarters of thin rings, one body in two parts, with nodes at different angles
+    let ring = |radius: [f64; 2], turn: f64, first: u32, n: u32| {
+        let at = |i: u32| {
+            let angle = turn + f64::from(i / 2) * 0.4;
+            let r = radius[i as usize % 2];
+            [r * angle.cos(), r * angle.sin()]
+        };
+        let points: Vec<[f64; 2]> = (0..2 * n + 2).map(at).collect();
+        let cells = (0..n).flat_map(|k| {
+            let i = first + 2 * k;
+            [i, i + 1, i + 3, i, i + 3, i + 2]
+        });
+        (points, cells.collect::<Vec<u32>>())
+    };
+    let (mut points, mut cells) = ring([0.9, 1.0], 0.0, 0, 3);
+    let (more, others) = ring([1.002, 1.1], 0.1, 8, 3);
+    points.extend(more);
+    cells.extend(others);
+    let straight = mesh(points, &cells);
+    refused(&straight, &["crosses itself"]);
+    let mut curved = quadratic(&straight);
+    for group in curved.groups.iter() {
+        for cell in group.simplices() {
+            for (k, [i, j]) in [[0, 1], [1, 2], [0, 2]].into_iter().enumerate() {
+                let radius = |node: u32| curved.points[node as usize][0].hypot(curved.points[node as usize][1]);
+                let (a, b, middle) =
+                    (straight.points[cell[i] as usize], straight.points[cell[j] as usize], cell[3 + k]);
+                let r = 0.5 * (a[0].hypot(a[1]) + b[0].hypot(b[1]));
+                let scale = r / radius(middle);
+                // places are read from the straight mesh, written to the curved one
+                let x = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
+                let scale = if (radius(middle) - x[0].hypot(x[1])).abs() < 1e-12 { scale } else { 1.0 };
+                curved.points[middle as usize] =
+                    [curved.points[middle as usize][0] * scale, curved.points[middle as usize][1] * scale];
+            }
+        }
+    }
+    assert_eq!(check(&curved, &[]).unwrap().parts.count, 2);
+}
+
+#[test]
+fn groups_lie_on_their_bodies() {
+    let (points, cells) = squares();
+    let plane = || mesh(points.clone(), &cells);
+    let bottom = with_group(plane(), "bottom", 1, vec![0, 1, 1, 2]);
+    for mesh in [bottom.clone(), quadratic(&bottom)] {
+        assert!(check(&mesh, &[("bottom", Duty::Acts), ("bottom", Duty::Holds)]).is_ok());
+    }
+    // a facet inside, which a support may hold; and one that is none
+    let inside = with_group(plane(), "bottom", 1, vec![0, 1, 1, 4]);
+    assert!(check(&inside, &[("bottom", Duty::Holds)]).is_ok());
+    for (mesh, duty, words) in [
+        (&inside, Duty::Acts, "a facet of group `bottom` bounds no body that it serves, at (1, 0.5)"),
+        (&with_group(plane(), "bottom", 1, vec![0, 1, 0, 2]), Duty::Acts, "bounds no body that it serves, at (1, 0)"),
+        (&with_group(plane(), "bottom", 1, vec![0, 1, 0, 2]), Duty::Holds, "belongs to no body of the scene"),
+    ] {
+        let message = check(mesh, &[("bottom", duty)]).unwrap_err();
+        assert!(message.contains(words) && message.contains("element 91"), "{message}");
+    }
+    let message = check(&with_group(plane(), "bottom", 1, vec![0, 1, 1, 0]), &[("bottom", Duty::Acts)]).unwrap_err();
+    assert!(message.contains("stands twice in it") && message.contains("element 91"), "{message}");
+    // the wrong mid-edge node
+    let mut wrong = quadratic(&bottom);
+    wrong.groups[1].connectivity.swap(2, 5);
+    assert!(check(&wrong, &[("bottom", Duty::Acts)]).is_err());
+    // one that lies elsewhere is refused with the line of the scene
+    let far = Mesh { points: [&points[..], &[[5.0, 5.0], [6.0, 5.0]]].concat(), ..plane() };
+    assert!(check(&with_group(far, "far", 1, vec![6, 7]), &[("far", Duty::Acts)]).is_ok());
+    // edges and points in space
+    let (points, cells) = cube([0.0; 3], 0);
+    let space = |edge: [u32; 2]| with_group(mesh(points.clone(), &cells), "edge", 1, edge.to_vec());
+    assert!(check(&space([0, 1]), &[("edge", Duty::Holds)]).is_ok());
+    assert!(check(&space([1, 2]), &[("edge", Duty::Holds)]).is_err());
+}
+
+#[test]
+fn bodies_have_nodes_of_their_own() {
+    let (points, cells) = squares();
+    let left = mesh(points, &cells[..6]);
+    let two = with_group(left, "other", 2, cells[6..].to_vec());
+    let asked = |name| Asked { name, order: Order::P1, groups: Vec::new() };
+    let check = |shared| two.check(&[asked("body"), asked("other")], &[], shared);
+    assert!(check(true).is_ok());
+    let message = check(false).unwrap_err().to_string();
+    assert!(message.contains("body `other`: it shares a node with body `body` at (1, 0)"), "{message}");
+}

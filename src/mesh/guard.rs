@@ -1,0 +1,146 @@
+//! Runs a program with limits of time and memory, which ends with this one.
+
+use crate::interrupt::Interrupt;
+use crate::problem::mesh::Guard;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus};
+use std::time::{Duration, Instant};
+
+/// How a guarded program ended.
+pub enum End {
+    /// By itself.
+    Itself(ExitStatus),
+    /// It took too long.
+    TimedOut,
+    /// A signal asked for its end.
+    Asked(i32),
+}
+
+/// A program of $PATH.
+pub fn find(name: &str) -> Option<PathBuf> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).map(|folder| folder.join(name)).find(|program| program.is_file())
+}
+
+/// Bytes that a guarded program may take: of what is free unless the user says it; no limit where the system does not tell.
+pub fn bytes(guard: &Guard) -> Option<u64> {
+    match guard.gigabytes {
+        Some(gigabytes) => Some((gigabytes * 1e9) as u64),
+        None => available(&std::fs::read_to_string("/proc/meminfo").unwrap_or_default()),
+    }
+}
+
+/// Bytes that Linux says programs can take without swapping.
+fn available(meminfo: &str) -> Option<u64> {
+    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    line.split_whitespace().next()?.parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
+}
+
+/// A command for a program that the system ends with the thread that starts it, and that may take so many bytes. Both are left to
+/// tools of util-linux, and left out where they are missing.
+pub fn command(program: &Path, bytes: Option<u64>) -> Command {
+    let mut words: Vec<PathBuf> = Vec::new();
+    if let (Some(tool), Some(bytes)) = (find("prlimit"), bytes) {
+        words.extend([tool, format!("--as={bytes}").into()]);
+    }
+    if let Some(tool) = find("setpriv") {
+        words.extend([tool, "--pdeathsig".into(), "KILL".into()]);
+    }
+    words.push(program.to_owned());
+    let mut command = Command::new(&words[0]);
+    command.args(&words[1..]);
+    command
+}
+
+/// Seconds after which a terminal is told what it waits for.
+const QUIET: Duration = Duration::from_secs(1);
+
+/// Longest pause between two looks at the program.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// Runs a command to its end, to a signal, or to `limit` seconds; `doing` says what it does ("Gmsh is meshing").
+///
+/// # Errors
+/// The program cannot be started.
+pub fn run(command: &mut Command, limit: f64, interrupt: &Interrupt, doing: &str) -> io::Result<End> {
+    let began = Instant::now();
+    let mut child = command.spawn()?;
+    let mut bar: Option<ProgressBar> = None;
+    let end = loop {
+        if let Some(status) = child.try_wait()? {
+            break End::Itself(status);
+        }
+        let elapsed = began.elapsed();
+        let asked = interrupt.asked().map(End::Asked);
+        if let Some(end) = asked.or_else(|| (elapsed.as_secs_f64() > limit).then_some(End::TimedOut)) {
+            child.kill()?;
+            child.wait()?;
+            break end;
+        }
+        if elapsed >= QUIET {
+            let bar = bar.get_or_insert_with(line);
+            bar.set_message(format!("{doing}, {} s", elapsed.as_secs()));
+            bar.tick();
+        }
+        // a twentieth of the time so far is lost at most
+        std::thread::sleep((elapsed / 20).clamp(Duration::from_millis(1), PAUSE));
+    };
+    if let Some(bar) = bar {
+        bar.finish_and_clear();
+    }
+    Ok(end)
+}
+
+/// A line on standard error, if that is a terminal.
+fn line() -> ProgressBar {
+    let bar = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_msg}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sleep(bytes: Option<u64>) -> Command {
+        let mut sleep = command(Path::new("/bin/sleep"), bytes);
+        sleep.arg("5");
+        sleep
+    }
+
+    #[test]
+    fn what_takes_too_long_or_too_much_is_ended() {
+        let began = Instant::now();
+        assert!(matches!(run(&mut sleep(None), 0.1, &Interrupt::default(), ""), Ok(End::TimedOut)));
+        assert!(began.elapsed() < Duration::from_secs(4));
+        // no program can be loaded into a hundred kilobytes
+        assert!(
+            matches!(run(&mut sleep(Some(100_000)), 9.0, &Interrupt::default(), ""), Ok(End::Itself(status)) if !status.success())
+        );
+        assert!(began.elapsed() < Duration::from_secs(4));
+        assert_eq!(available("MemTotal: 9 kB\nMemAvailable:   20 kB\n"), Some(20_480));
+    }
+
+    /// The system ends a program with the thread that started it, as it does when the whole process is killed.
+    #[test]
+    fn a_program_ends_with_its_parent() {
+        let parent = || {
+            let child = sleep(None).spawn().expect("a child");
+            let name = || std::fs::read_to_string(format!("/proc/{}/comm", child.id())).unwrap_or_default();
+            // until then it is one of the tools that start it
+            while name() != "sleep\n" {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            child
+        };
+        let child = std::thread::spawn(parent).join();
+        let mut child = child.expect("a child");
+        let began = Instant::now();
+        assert!(child.wait().is_ok_and(|status| !status.success()));
+        assert!(began.elapsed() < Duration::from_secs(4));
+    }
+}

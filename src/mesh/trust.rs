@@ -1,0 +1,196 @@
+//! What a Gmsh script may not do unless its user trusts it.
+//!
+//! A `.geo` file is a program. Gmsh runs commands of the shell for it, writes the files that it names, and reads others that may do
+//! the same. None of that is needed to describe a body. This reads the words as Gmsh's own scanner does (`Gmsh.l`), and refuses
+//! what cannot be judged by reading: names of files that the script computes, and texts that the scanner would cut.
+
+use super::tokens::{Token, tokens};
+use std::path::Path;
+
+/// What a script does that it may not, and the line.
+#[derive(Debug, PartialEq)]
+pub struct Breach {
+    /// Line, from 1 on.
+    pub line: usize,
+    /// What it does, in words.
+    pub what: String,
+}
+
+/// Commands that run other programs or text that the script makes up.
+const RUN: [&str; 9] = [
+    "SystemCall",
+    "System",
+    "NonBlockingSystemCall",
+    "NonBlockingSystem",
+    "OnelabRun",
+    "OnelabAction",
+    "ExternalProcess",
+    "Parse",
+    "Plugin",
+];
+
+/// Commands that write a file or a folder. `Print.Background` and the like are numbers.
+const WRITE: [&str; 5] = ["Save", "Print", "CreateDir", "RenameFile", "DeleteFile"];
+
+/// Commands that read a file as a script.
+const READ: [&str; 3] = ["Include", "Merge", "MergeWithBoundingBox"];
+
+/// Gmsh's scanner cuts texts of 1024 bytes, and reads the rest of one as commands.
+const LONGEST: usize = 1000;
+
+/// Kinds of file that Gmsh hands to a reader of shapes or meshes, whatever is in them.
+const DATA: [&str; 12] = ["step", "stp", "iges", "igs", "brep", "stl", "vtk", "unv", "med", "mesh", "bdf", "nas"];
+
+/// Kinds of file that Gmsh reads as a script, or knows by how they begin. It starts others as programs.
+const SCRIPTS: [&str; 8] = ["geo", "pos", "msh", "opt", "inc", "dat", "txt", "par"];
+
+/// The first thing in a file that its user must trust it for. `home` is the folder that it may read from.
+pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
+    if is_kind(path, &DATA) || bytes.starts_with(b"$MeshFormat") {
+        return None;
+    }
+    let text = String::from_utf8_lossy(bytes);
+    let at = |byte: usize, what: String| Some(Breach { line: 1 + text[..byte].matches('\n').count(), what });
+    if bytes.starts_with(&[0x1f, 0x8b]) {
+        return at(0, "is compressed, so that nobody reads what it does".to_owned());
+    }
+    if let Some(zero) = text.find('\0') {
+        return at(zero, "has a zero byte, at which Gmsh ends comments and texts".to_owned());
+    }
+    let all = tokens(&text);
+    for (index, (span, token)) in all.iter().enumerate() {
+        let next = all.get(index + 1).map(|(_, token)| *token);
+        let what = match *token {
+            Token::Text(text) if text.len() > LONGEST => Some("has a text that is too long for Gmsh".to_owned()),
+            Token::Name(name) if name.ends_with("FileName") && follows(&all[..index], "General") => {
+                Some(format!("chooses files that Gmsh writes: `General.{name}`"))
+            }
+            // a variable of this name is no command
+            Token::Name(_) if matches!(next, Some(Token::Sign('='))) => None,
+            Token::Name(name) if RUN.contains(&name) => Some(format!("runs other programs or made-up text: `{name}`")),
+            Token::Name(name) if WRITE.contains(&name) && next != Some(Token::Sign('.')) => {
+                Some(format!("writes files: `{name}`"))
+            }
+            Token::Name(name @ ("Printf" | "Error" | "Warning")) if redirects(&all[index + 1..]) => {
+                Some(format!("writes files: `{name}(...) > ...`"))
+            }
+            Token::Name("Solver") if next == Some(Token::Sign('.')) => Some("sets programs: `Solver`".to_owned()),
+            Token::Name(name) if READ.contains(&name) => reads(name, &all[index + 1..], path, home),
+            _ => None,
+        };
+        if let Some(what) = what {
+            return at(span.start, what);
+        }
+    }
+    None
+}
+
+type Spot<'a> = (std::ops::Range<usize>, Token<'a>);
+
+/// Whether these words end with `name` and a point.
+fn follows(before: &[Spot], name: &str) -> bool {
+    matches!(before, [.., (_, Token::Name(first)), (_, Token::Sign('.'))] if *first == name)
+}
+
+/// Whether an argument in parentheses or brackets comes first, and then `>`.
+fn redirects(after: &[Spot]) -> bool {
+    let mut depth = 0;
+    for (at, (_, token)) in after.iter().enumerate() {
+        match token {
+            Token::Sign('(' | '[') => depth += 1,
+            Token::Sign(')' | ']') => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return matches!(after.get(at + 1), Some((_, Token::Sign('>'))));
+        }
+    }
+    false
+}
+
+/// What is wrong with the file that a command reads: it must be one that is written out, of a known kind, below `home`.
+fn reads(command: &str, after: &[Spot], path: &Path, home: &Path) -> Option<String> {
+    let [(_, Token::Text(name)), (_, Token::Sign(';')), ..] = after else {
+        return Some(format!("reads a file whose name it makes up: `{command}`"));
+    };
+    let file = path.parent().unwrap_or(Path::new("")).join(name);
+    let known =
+        if command == "Include" { !is_kind(&file, &DATA) } else { is_kind(&file, &DATA) || is_kind(&file, &SCRIPTS) };
+    if !known {
+        return Some(format!("lets Gmsh open a file of unknown kind: `{command} \"{name}\"`"));
+    }
+    // Gmsh says what is not there
+    let outside = file.canonicalize().is_ok_and(|file| !file.starts_with(home));
+    outside.then(|| format!("reads a file outside its own folder: `{command} \"{name}\"`"))
+}
+
+/// Whether the name of a file ends in one of these, in small letters or in capitals: Gmsh knows no mixture.
+fn is_kind(path: &Path, kinds: &[&str]) -> bool {
+    let end = path.extension().unwrap_or_default();
+    kinds.iter().any(|kind| end == *kind || end == kind.to_ascii_uppercase().as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict(text: &str) -> Option<String> {
+        breach(Path::new("a.geo"), text.as_bytes(), Path::new("/nowhere")).map(|breach| breach.what)
+    }
+
+    #[test]
+    fn commands_that_run_or_write_are_refused() {
+        for (text, expected) in [
+            ("SystemCall \"id\";", "`SystemCall`"),
+            ("x = 1;System 'id';", "`System`"),
+            ("If (1)NonBlockingSystemCall \"id\";", "`NonBlockingSystemCall`"),
+            ("OnelabRun(\"a\", \"id\");", "`OnelabRun`"),
+            ("Field[1] = ExternalProcess;", "`ExternalProcess`"),
+            ("Plugin(Distance).Run;", "`Plugin`"),
+            ("Save \"../a.msh\";", "writes files: `Save`"),
+            ("Save View[0] \"a\";", "writes files: `Save`"),
+            ("Print StrCat(\"a\", \"b\");", "writes files: `Print`"),
+            ("Printf(\"a %g\", f(1)) >> \"a.txt\";", "`Printf(...) > ...`"),
+            ("CreateDir \"a\";", "`CreateDir`"),
+            ("Include StrCat(\"a\", \"b\");", "a file whose name it makes up: `Include`"),
+            ("Merge name;", "a file whose name it makes up: `Merge`"),
+            ("Merge \"a.py\";", "unknown kind: `Merge \"a.py\"`"),
+            ("Merge \"a.sTEP\";", "unknown kind"),
+            ("Include \"a.step\";", "unknown kind"),
+            ("Include \"/etc/passwd\";", "outside its own folder"),
+            ("Solver.Executable0 = \"id\";", "`Solver`"),
+            ("General.ErrorFileName = \"../a\";", "`General.ErrorFileName`"),
+            ("// \0 SystemCall \"id\";", "zero byte"),
+            ("\u{1f}", ""),
+        ] {
+            let found = verdict(text);
+            assert_eq!(found.is_some(), !expected.is_empty(), "{text}: {found:?}");
+            assert!(found.unwrap_or_default().contains(expected), "{text}: {expected}");
+        }
+        let long = format!("a = \"{} SystemCall 'id'; \";", "x".repeat(1100));
+        assert!(verdict(&long).is_some_and(|what| what.contains("too long")));
+        assert!(breach(Path::new("a.pos"), &[0x1f, 0x8b, 8], Path::new("/")).is_some());
+    }
+
+    #[test]
+    fn scripts_that_describe_bodies_pass() {
+        for text in [
+            "// SystemCall \"id\";\nPoint(1) = {0, 0, 0}; /* Save \"a\"; */",
+            "Printf(\"a > b\"); If (f(1) > f(2)) Print.Background = 1; EndIf",
+            "Physical Surface(\"Save\") = {1}; Mesh.SaveAll = 1; Systematic = 3; System = 2;",
+            "Merge \"part.step\"; Merge 'sizes.pos'; Include \"not there\";",
+            "Error(\"n must be greater than %g\", 3);",
+        ] {
+            assert_eq!(verdict(text), None, "{text}");
+        }
+        assert_eq!(breach(Path::new("a.STEP"), b"'SystemCall'Print \"x\"", Path::new("/")), None);
+        assert_eq!(breach(Path::new("a.msh"), b"$MeshFormat\n\0Print \"x\"", Path::new("/")), None);
+        assert!(breach(Path::new("a.msh"), b" Print \"x\"", Path::new("/")).is_some());
+    }
+
+    #[test]
+    fn the_line_is_told() {
+        let found = breach(Path::new("a.geo"), b"a = 1;\n\n  Save \"x\";", Path::new("/"));
+        assert_eq!(found.map(|breach| breach.line), Some(3));
+    }
+}

@@ -1,0 +1,248 @@
+//! Meshes that are none are refused with body, place and element; those that are give what they gave.
+
+mod common;
+
+use common::{Run, Scene, output, root, solve, text_of};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+use winkler::mesh::{Asked, Duty, Mesh, parse};
+use winkler::problem::order::Order;
+
+/// The mesh of a script as Gmsh writes it.
+fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (geo, out) = (folder.path().join("a.geo"), folder.path().join("a.msh"));
+    std::fs::write(&geo, script).expect("a script");
+    let mut command = Command::new("gmsh");
+    command.args(["-v", "0", "-2", "-format", "msh41"]).args(arguments).arg("-o").arg(&out).arg(&geo);
+    assert!(output(command, Duration::from_secs(60)).0.success());
+    std::fs::read(out).expect("a mesh")
+}
+
+/// Solves the patch of two blocks on a mesh of these bytes, with one text of its scene replaced.
+fn on_mesh(bytes: &[u8], from: &str, to: &str) -> Run {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("a.msh");
+    std::fs::write(&mesh, bytes).expect("a mesh");
+    let text = text_of("patch");
+    let line = text.lines().find(|line| line.starts_with("mesh =")).expect("a mesh");
+    let text = text.replace(line, &format!("mesh = \"{}\"", mesh.display()));
+    assert!(from.is_empty() || text.matches(from).count() == 1, "`{from}`");
+    solve(Scene::new(if from.is_empty() { text } else { text.replace(from, to) }), &[])
+}
+
+fn refused(run: &Run, words: &[&str]) {
+    assert_eq!(run.code, 4, "{}", run.said());
+    assert!(run.report.is_null() && run.stdout.is_empty(), "{}", run.said());
+    for word in words.iter().chain(&["a.msh", "help: "]) {
+        assert!(run.stderr.contains(word), "no `{word}`\n{}", run.said());
+    }
+}
+
+/// The patch with two elements along each side, its sides named.
+fn script() -> String {
+    let path = root().join("meshes/patch/patch.geo");
+    let text = std::fs::read_to_string(path).expect("a script").replace("{4, Name", "{2, Name");
+    text + "Physical Curve(\"lower_sides\") = {2, 4};\nPhysical Curve(\"upper_sides\") = {12, 14};\n"
+}
+
+#[test]
+fn what_is_checked_is_counted() {
+    let run = on_mesh(&gmsh(&script(), &[]), "", "").converged();
+    for body in [0, 1] {
+        let count = |what: &str| run.count(&format!("bodies/{body}/{what}"));
+        // two triangles in each of 2 x 2 squares
+        assert_eq!(["inner_facets", "boundary_facets", "parts"].map(count), [8, 8, 1]);
+    }
+}
+
+/// The text of a mesh with another line for an element of a block, found by dimension and entity.
+fn element(text: &str, dimension: usize, entity: usize, which: usize, nodes: impl Fn(&[u64]) -> Vec<u64>) -> String {
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let elements = lines.iter().position(|line| line == "$Elements").expect("elements");
+    let numbers = |line: &str| line.split_whitespace().map(|word| word.parse().expect("a tag")).collect::<Vec<u64>>();
+    let mut block = elements + 2;
+    loop {
+        let head = numbers(&lines[block]);
+        if head[..2] == [dimension as u64, entity as u64] {
+            break;
+        }
+        block += 1 + head[3] as usize;
+    }
+    let words = numbers(&lines[block + 1 + which]);
+    let changed = nodes(&words[1..]);
+    lines[block + 1 + which] =
+        format!("{} {}", words[0], changed.iter().map(u64::to_string).collect::<Vec<_>>().join(" "));
+    lines.join("\n") + "\n"
+}
+
+#[test]
+fn wrong_elements_are_named() {
+    let text = String::from_utf8(gmsh(&script(), &[])).expect("a text");
+    let first = |dimension: usize, entity: usize, which: usize| {
+        let found = std::cell::RefCell::new(Vec::new());
+        element(&text, dimension, entity, which, |nodes| {
+            found.borrow_mut().extend_from_slice(nodes);
+            nodes.to_vec()
+        });
+        found.into_inner()
+    };
+    // the second cell of the lower block in the place of the first
+    let twice = element(&text, 2, 1, 0, |_| first(2, 1, 1));
+    refused(&on_mesh(twice.as_bytes(), "", ""), &["body `lower`", "share"]);
+    // a cell of the lower block on a node of the upper one
+    let upper = first(2, 2, 0)[0];
+    let foreign = element(&text, 2, 1, 0, |nodes| [&[upper], &nodes[1..]].concat());
+    refused(&on_mesh(foreign.as_bytes(), "", ""), &["body `"]);
+    // a loaded facet across the block: its load would act nowhere
+    let chord = [first(1, 11, 0)[0], first(1, 13, 0)[0]];
+    let lost = element(&text, 1, 11, 0, |_| chord.to_vec());
+    refused(&on_mesh(lost.as_bytes(), "", ""), &["group `upper_face` bounds no body", "element"]);
+    // the same for what is held, and for a contact
+    let held = element(&text, 1, 1, 0, |_| vec![first(1, 1, 0)[0], first(1, 3, 0)[0]]);
+    refused(&on_mesh(held.as_bytes(), "", ""), &["group `lower_face` belongs to no body"]);
+    let contact = element(&text, 1, 13, 0, |_| chord.to_vec());
+    refused(&on_mesh(contact.as_bytes(), "", ""), &["group `upper_bottom` bounds no body"]);
+}
+
+#[test]
+fn bodies_in_parts() {
+    // a third block for the group of the upper one, far from it
+    let far = "Point(21) = {5, 1, 0};\nPoint(22) = {6, 1, 0};\nPoint(23) = {5, 2, 0};\nLine(21) = {21, 22};\n\
+               Line(22) = {22, 23};\nLine(23) = {23, 21};\nTransfinite Curve {21, 22, 23} = 2;\n\
+               Curve Loop(3) = {21, 22, 23};\nPlane Surface(3) = {3};\nPhysical Surface(\"upper\") = {2, 3};\n";
+    let mesh = gmsh(&script().replace("Physical Surface(\"upper\") = {2};", far), &[]);
+    let run = on_mesh(&mesh, "", "");
+    refused(&run, &["body `upper` is in 2 parts", "nothing holds that at (5", "make a body of each part"]);
+    // each part held as a whole
+    let run = on_mesh(&mesh, "fix = [{ on = \"upper_pin\", x = 0 }]", "fix = [{ on = \"upper\", x = 0, y = -1e-4 }]");
+    assert_eq!((run.code, run.count("bodies/1/parts")), (0, 2), "{}", run.said());
+}
+
+#[test]
+fn bodies_that_share_nodes() {
+    let joined = script().replace("Physical Surface(\"lower\")", "Coherence;\nPhysical Surface(\"lower\")");
+    let joined = joined.replace("{13}", "{3}");
+    refused(&on_mesh(&gmsh(&joined, &[]), "", ""), &["shares a node with body `lower`", "between = \"auto\""]);
+}
+
+/// What a mesh is computed with: for each group its simplices by the places of their points.
+type Used = BTreeMap<String, Vec<Vec<[u64; 2]>>>;
+
+fn used(mesh: &Mesh<2>) -> Used {
+    let place = |&point: &u32| mesh.points[point as usize].map(f64::to_bits);
+    let of = |group: &winkler::mesh::Group| {
+        let sorted = |simplex: &[u32]| {
+            let mut places: Vec<[u64; 2]> = simplex.iter().map(place).collect();
+            places.sort_unstable();
+            places
+        };
+        let mut all: Vec<_> = group.simplices().map(sorted).collect();
+        all.sort_unstable();
+        all
+    };
+    mesh.groups.iter().map(|group| (group.name.clone(), of(group))).collect()
+}
+
+/// What a changed file still gives, by section of the file.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord, Clone, Copy)]
+enum Kind {
+    Refused,
+    /// The same mesh: what changed is not read, or not used.
+    Same,
+    /// A name that the scene does not find.
+    Named,
+    /// Nodes at other places.
+    Moved,
+    /// Another node for a point.
+    Point,
+    /// The same simplices in other groups.
+    Member,
+    /// Anything else.
+    Wrong,
+}
+
+/// Reads a mesh as the patch asks for it.
+fn kind(bytes: &[u8], good: &Mesh<2>, known: &Used) -> Kind {
+    let Ok(mesh) = parse::<2>(Path::new("a.msh"), bytes, false) else { return Kind::Refused };
+    if good.groups.iter().any(|group| mesh.group(&group.name).is_none()) {
+        return Kind::Named;
+    }
+    let body = |name, groups: &[(&'static str, Duty)]| Asked { name, order: mesh.order, groups: groups.to_vec() };
+    let bodies = [
+        body("lower", &[("lower_face", Duty::Holds), ("lower_sides", Duty::Holds), ("lower_pin", Duty::Holds)]),
+        body("upper", &[("upper_face", Duty::Acts), ("upper_sides", Duty::Acts), ("upper_pin", Duty::Holds)]),
+    ];
+    if mesh.check(&bodies, &["lower_top", "upper_bottom"], false).is_err() {
+        return Kind::Refused;
+    }
+    let found = used(&mesh);
+    let connectivity = |mesh: &Mesh<2>| mesh.groups.iter().map(|group| group.connectivity.clone()).collect::<Vec<_>>();
+    if found == *known {
+        Kind::Same
+    } else if mesh.points.len() == good.points.len() && connectivity(&mesh) == connectivity(good) {
+        Kind::Moved
+    } else {
+        let only = |dimension: usize| {
+            let of = |groups: &Used| {
+                let mut all: Vec<_> = good
+                    .groups
+                    .iter()
+                    .filter(|group| group.dimension == dimension)
+                    .flat_map(|group| groups[&group.name].clone())
+                    .collect();
+                all.sort_unstable();
+                all
+            };
+            of(&found) == of(known)
+        };
+        match [0, 1, 2].map(only) {
+            [true, true, true] => Kind::Member,
+            [false, true, true] => Kind::Point,
+            _ => Kind::Wrong,
+        }
+    }
+}
+
+/// Every change of one bit of a mesh, text and binary, of both orders. What still runs is another good mesh (a node moved, a point
+/// or entity that the file itself puts elsewhere) or the same one: docs/meshes.md says why no check can tell.
+#[test]
+fn one_bit_changes() {
+    for arguments in [&[][..], &["-bin"], &["-bin", "-order", "2"]] {
+        let bytes = gmsh(&script(), arguments);
+        let good = parse::<2>(Path::new("a.msh"), &bytes, false).expect("a mesh");
+        assert_eq!(good.order == Order::P2, arguments.len() == 3);
+        let known = used(&good);
+        assert_eq!(kind(&bytes, &good, &known), Kind::Same);
+        let mut counts: BTreeMap<(String, Kind), usize> = BTreeMap::new();
+        let mut section = String::new();
+        for position in 0..bytes.len() {
+            if bytes[position] == b'$' && !bytes[position..].starts_with(b"$End") {
+                let name = bytes[position..].iter().take_while(|byte| byte.is_ascii_alphanumeric() || **byte == b'$');
+                section = name.map(|&byte| char::from(byte)).collect();
+            }
+            for bit in 0..8 {
+                let mut changed = bytes.clone();
+                changed[position] ^= 1 << bit;
+                let kind = kind(&changed, &good, &known);
+                let of_section = match kind {
+                    Kind::Refused | Kind::Same => true,
+                    Kind::Named => section == "$PhysicalNames",
+                    Kind::Moved => section == "$Nodes",
+                    Kind::Point => section == "$Elements",
+                    Kind::Member => section == "$Entities",
+                    Kind::Wrong => false,
+                };
+                *counts.entry((section.clone(), kind)).or_default() += 1;
+                assert!(of_section, "{arguments:?} {section} bit {bit} of byte {position}: {kind:?}");
+            }
+        }
+        println!("{arguments:?}");
+        counts.iter().for_each(|((section, kind), count)| println!("  {section} {kind:?}: {count}"));
+        // a node moved by half its place or more is a fold here or lies outside
+        let of = |kind: Kind| counts.iter().filter(|entry| entry.0.1 == kind).map(|entry| entry.1).sum::<usize>();
+        assert!(of(Kind::Refused) > 2 * of(Kind::Moved) && of(Kind::Moved) > 0);
+    }
+}
