@@ -1,5 +1,6 @@
 //! Outcome -> report, contact tables and plots.
 
+use super::asking;
 use super::balance;
 use super::clock::Clock;
 use super::preflight;
@@ -10,6 +11,7 @@ use super::verdict::{forecast, message, status_name};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{self, Outcome, Status};
 use crate::discretize::Discrete;
+use crate::error::Kind;
 use crate::estimate::Estimate;
 use crate::model::BodyCounts;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
@@ -24,6 +26,7 @@ use serde::{Deserialize, Serialize};
 pub fn exit_code(done: &Done) -> i32 {
     match done.outcome.status {
         Status::Converged | Status::RoundoffLimited if steps::warnings(&done.steps).is_empty() => 0,
+        Status::Paused { asked } => asking::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
 }
