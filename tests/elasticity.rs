@@ -216,7 +216,7 @@ fn materials_that_cannot_be() {
     let young = |to: &str| patch("young = 2.1e5", &format!("young = {to}"));
     refused(&young("\"2.1e5 * (x - 0.5)\""), &["body `lower`: young is -", " at (", "greater than 0"]);
     refused(&patch("poisson = 0.3", "poisson = \"0.3 + y\""), &["body `lower`: poisson is 0.", "between -1 and 0.5"]);
-    refused(&young("\"1/(x - x)\""), &["body `lower`: young is ", " at ("]);
+    refused(&young("\"1/(x - x)\""), &["young is not a finite number at x = ", "gives inf there"]);
     let own = "young = 2.1e5\npoisson = 0.3";
     let fibres = |nu23: &str, axes: &str| {
         let constants = format!("E1=1.4e5, E2=1e4, E3=1e4, nu12=0.3, nu13=0.3, nu23={nu23}, G12=5e3, G13=5e3, G23=3e3");

@@ -83,36 +83,25 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
     results::fill(discrete, recovered, &mut report.bodies);
     let balances = balance::gather(done, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
-    if let (Status::Converged, Some(message)) = (&outcome.status, lost(done, &report.bodies)) {
+    if let (Status::Converged, Some(message)) = (&outcome.status, lost(done)) {
         (report.status, report.message) = (status_name(&Status::RoundoffLimited).to_owned(), message);
     }
     report
 }
 
-/// What displacements that are far larger than the deformations have cost a run that would be converged otherwise, in words.
-fn lost(done: &Done, bodies: &[BodyReport]) -> Option<String> {
-    const WHY: &str = "the displacements are so large that few digits are left for";
-    let tolerated = tolerated(done);
-    let lacks = |body: &BodyReport| body.balance.force_imbalance;
-    let worst = bodies.iter().max_by(|a, b| lacks(a).total_cmp(&lacks(b)))?;
-    let pressure = ddm::lost(done.model(), &done.outcome);
-    if lacks(worst) > tolerated {
-        return Some(format!(
-            "{WHY} the forces on body `{}`, which lack {} of balance",
-            worst.name,
-            sci(lacks(worst), 1)
-        ));
-    }
-    (pressure > tolerated)
-        .then(|| format!("{WHY} the pressures, which may be off by {} of their peak", sci(pressure, 1)))
-}
-
-/// Share of the forces on a body, and of a pressure, that a converged run may lack: ten times what the run or its inner solvers were asked for.
-fn tolerated(done: &Done) -> f64 {
+/// What displacements that are far larger than the deformations have cost a run that would be converged otherwise, in words: more than
+/// ten times what the run or its inner solvers were asked for.
+fn lost(done: &Done) -> Option<String> {
     let stop = &done.built.scene.method.stop;
     let reached = done.outcome.rows.last().map(|row| row.error).filter(|_| stop.balanced);
-    let asked = [stop.residual, stop.increment, reached].into_iter().flatten();
-    10.0 * asked.fold(INNER, f64::max)
+    let asked = [stop.residual, stop.increment, reached].into_iter().flatten().fold(INNER, f64::max);
+    let pressure = ddm::lost(done.model(), &done.outcome);
+    (pressure > 10.0 * asked).then(|| {
+        format!(
+            "the displacements are so large that few digits are left for the pressures, which may be off by {} of their peak",
+            sci(pressure, 1)
+        )
+    })
 }
 
 /// Relative tolerance of an inner solver by default.

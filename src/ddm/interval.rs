@@ -70,7 +70,8 @@ const SETTLED: f64 = 1e-9;
 /// Robin term that the model carries.
 fn spectrum(model: &mut Model, slope: &[f64], load: &[Vec<f64>]) -> Result<Option<(f64, f64)>> {
     let springs = model.forces(slope);
-    let found = gradients(model, &mut Sweeper::default(), &springs, load, (SETTLED, f64::INFINITY, MOST))?;
+    let found =
+        gradients(model, &mut Sweeper::default(), &springs, load, (SETTLED, f64::INFINITY, MOST), f64::INFINITY)?;
     Ok(found.ok().and_then(|found| found.spectrum))
 }
 

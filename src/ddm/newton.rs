@@ -11,11 +11,13 @@
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
 use super::bound::{Gap, Reached, contact_energy};
+use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
 use super::stop::Status;
 use super::{barrier, start};
 use crate::error::Result;
+use crate::model::Model;
 use crate::model::field::{Field, residual};
 use crate::model::layer::{Layer, meeting_slopes};
 use crate::model::linear::{LinearStep, System};
@@ -66,14 +68,34 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             return Ok(run.end(status, u, met, linear));
         }
         run.memory.forcing.learn(&gap, &reached, run.stop.residual);
-        let path = |barrier| barrier::meet(run.model, &c, &p, &rho, barrier);
+        // a step that knew of no contact runs through the other body
+        let blind = places.closed == 0 && met.closed > 0;
+        if blind {
+            search(run.model, &mut u, &x.field)?;
+        }
         let barrier = run.memory.progress.barrier(gap.change, run.model);
         if exact {
-            places = if barrier > 0.0 { path(barrier) } else { met.clone() };
+            places = match barrier {
+                _ if blind => Layer::at(run.model, &u.trace),
+                0.0 => met.clone(),
+                barrier => barrier::meet(run.model, &c, &p, &rho, barrier),
+            };
         }
         if measured.asked != 0 {
             run.memory.places = Some(places);
             return Ok(run.end(Status::Paused { asked: measured.asked }, u, met, linear));
         }
     }
+}
+
+/// Replaces a step x that led to u by the exact search on F1 along it.
+fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<()> {
+    u.add(-1.0, x);
+    u.retrace(model);
+    let layer = Layer::at(model, &u.trace);
+    let (r, _) = residual(model, u, &layer.force);
+    let line = Line::new(model, &layer, &r, x);
+    u.add(line.minimize(1e-2).unwrap_or(0.0), x);
+    u.retrace(model);
+    Ok(())
 }

@@ -34,6 +34,8 @@ pub struct Sweeps {
     sweeper: Sweeper,
     systems: usize,
     spectrum: Option<(f64, f64)>,
+    /// Least eigenvalue that any system showed.
+    least: f64,
 }
 
 impl Sweeps {
@@ -44,7 +46,7 @@ impl Sweeps {
 
     /// With the Robin term that bodies carry.
     pub fn carried() -> Self {
-        Self { coefficient: None, sweeper: Sweeper::default(), systems: 0, spectrum: None }
+        Self { coefficient: None, sweeper: Sweeper::default(), systems: 0, spectrum: None, least: f64::INFINITY }
     }
 }
 
@@ -62,9 +64,10 @@ impl LinearStep for Sweeps {
         }
         self.systems += 1;
         let before = self.sweeper.sweeps;
-        let found = gradients(model, &mut self.sweeper, springs, residual, (reduction, most, MOST))?;
+        let found = gradients(model, &mut self.sweeper, springs, residual, (reduction, most, MOST), self.least)?;
         Ok(found.and_then(|found| {
             self.spectrum = found.spectrum.or(self.spectrum);
+            self.least = found.spectrum.map_or(self.least, |(low, _)| low.min(self.least));
             let Solution { energy, error, .. } = found.solution;
             match self.sweeper.sweeps - before > MOST && error * error > LEAST * LEAST * energy {
                 true => {
@@ -94,7 +97,8 @@ pub(super) struct Found {
 }
 
 /// Solves (K + B' diag(springs) B) x = r with the Robin term that the model carries, until the error has fallen to `reduction` in
-/// the energy norm and to `wanted`, or after `most` iterations.
+/// the energy norm and to `wanted`, or after `most` iterations. `least` is the least eigenvalue that earlier systems showed, infinite
+/// if there were none: a young iteration knows of no slow mode.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -104,11 +108,12 @@ pub(super) fn gradients(
     springs: &[f64],
     residual: &[Vec<f64>],
     (reduction, wanted, most): (f64, f64, usize),
+    least: f64,
 ) -> Result<std::result::Result<Found, Failure>> {
     let coarse = Coarse::new(model, springs);
     let mut r = residual.to_vec();
     let mut x = Field::zero(model);
-    let mut lanczos = Lanczos { energy: coarse.start(model, &mut r, &mut x), ..Lanczos::default() };
+    let mut lanczos = Lanczos { energy: coarse.start(model, &mut r, &mut x), least, ..Lanczos::default() };
     let mut last: Option<(Field, f64, Vec<Vec<f64>>)> = None;
     let squared = loop {
         let before = last.as_ref().map_or(&r, |(_, _, r)| r);
@@ -160,6 +165,8 @@ pub(super) fn gradients(
 struct Lanczos {
     alphas: Vec<f64>,
     betas: Vec<f64>,
+    /// Least eigenvalue that is known from elsewhere.
+    least: f64,
     /// Squared energy norm that each iteration gained, and that of x.
     gains: Vec<f64>,
     energy: f64,
@@ -183,7 +190,11 @@ impl Lanczos {
             n => self.gains[n - n.min(DELAY)..].iter().sum(),
         };
         // either is too small as long as a slow mode has not come up; a run that ends early has gained all of it lately
-        let low = if self.alphas.len() <= SETTLED { self.spectrum().map_or(0.0, |(low, _)| low) } else { 0.0 };
+        let low = if self.alphas.len() <= SETTLED {
+            self.spectrum().map_or(0.0, |(low, _)| low.min(self.least))
+        } else {
+            0.0
+        };
         let by_spectrum = rz.max(0.0) / low;
         if self.gains.len() <= DELAY || by_spectrum.is_infinite() {
             by_spectrum.min(lately)

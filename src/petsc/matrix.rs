@@ -17,7 +17,6 @@ use std::rc::Rc;
 /// let session = Session::start(&[])?;
 /// let mut a = Matrix::from_csr(&session, 1, vec![0, 2, 4], vec![0, 1, 0, 1], vec![2.0, 1.0, 1.0, 2.0])?;
 /// a.set_spd()?;
-/// a.set_prefix("upper_")?;
 /// a.set_near_null_space(&[vec![1.0, 1.0]])?;
 /// let mut y = [0.0; 2];
 /// a.multiply(&[1.0, 2.0], &mut y)?;
