@@ -193,6 +193,26 @@ fn a_snapshot_is_written_and_the_run_goes_on() {
     assert!(report["iterations"].as_u64().is_some_and(|now| now as usize > reached));
 }
 
+/// A run that pauses at each iterate takes the same steps, to the last digit, also where the laws have a barrier meanwhile.
+#[test]
+fn pauses_change_nothing() {
+    let sets = [
+        "mesh.set.n=7",
+        "body.0.order=2",
+        "body.1.order=2",
+        "method={name=\"newton\", start={normal=3e-4}}",
+        "contact.0.layer={linear={stiffness=1e9}}",
+    ];
+    let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+    let whole = solve(case("groove"), &args);
+    let paused = solve(case("groove"), &[&args[..], &["--checkpoint", "1e-9"]].concat());
+    let table = |run: &Run| fs::read_to_string(run.folder.join("contact-lower-upper.csv")).expect("a table");
+    assert_eq!(table(&paused), table(&whole));
+    for name in ["status", "iterations", "residual", "F1"] {
+        assert_eq!(paused.report[name], whole.report[name], "{name}");
+    }
+}
+
 /// A solve that never ends hears one signal, and ends by the second.
 #[test]
 fn a_second_signal_ends_at_once() {
