@@ -37,7 +37,6 @@ use crate::model::origin;
 pub use asks::ASKS;
 pub use balance::{Discretisation, SHARE};
 pub use coefficient::Coefficient;
-pub use digits::lost;
 pub use extend::prepare;
 pub use forecast::Forecast;
 pub use history::{Observer, Row, Silent};

@@ -14,7 +14,7 @@ use super::run::{End, Run};
 use super::scale::Scale;
 use super::start::{self, RigidStart};
 use super::stop::Status;
-use super::{newton, robin};
+use super::{digits, newton, robin};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::body::BodyCounts;
@@ -129,6 +129,8 @@ pub struct Outcome {
     pub joint: BodyCounts,
     /// Estimated bounds of the spectrum of G^-1 F1'', if the method saw enough.
     pub spectrum: Option<(f64, f64)>,
+    /// What rounding of gaps and displacements can make of a pressure, as a share of the largest.
+    pub rounding: f64,
     /// What it would still need to the residual that is asked for, where that can be told.
     pub forecast: Option<Forecast>,
     /// The interval (33) of gamma, if it was asked for and can be told.
@@ -288,6 +290,7 @@ impl Outcome {
             method: method.name(),
             joint: BodyCounts::default(),
             spectrum: None,
+            rounding: 0.0,
             forecast: None,
             interval: None,
         }
@@ -313,6 +316,7 @@ impl Run<'_> {
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
+        let rounding = digits::lost(model, &iterate.trace, &layer);
         Ok(Outcome {
             status,
             iterations: updates,
@@ -320,6 +324,7 @@ impl Run<'_> {
             solves_skipped: skipped,
             iterate,
             layer,
+            rounding,
             forecast: settings.stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
             rows,
             memory: Some(memory),

@@ -16,7 +16,7 @@ use winkler::scene;
 use winkler::solver::options;
 
 /// Relative residual that methods are asked for.
-const RESIDUAL: f64 = 1e-8;
+pub const RESIDUAL: f64 = 1e-8;
 /// Relative residual of the reference.
 const REFERENCE: f64 = 1e-11;
 /// Pressures that differ by more, relative to the largest, are wrong.
