@@ -2,13 +2,15 @@
 
 use crate::commands::{bench, check, mesh, solve, sweep};
 use crate::error::{Error, Kind, Result};
+use crate::interrupt::Interrupt;
+use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::solver::options;
 use clap::error::ContextKind;
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
-use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::io::{ErrorKind, IsTerminal};
+use std::path::{Path, PathBuf};
 
 /// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition on PETSc.
 ///
@@ -22,7 +24,7 @@ struct Cli {
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 converged, 1 not converged (results are written), 2 command line, 3 scene, 4 mesh, \
-5 solver or PETSc option, 6 file system.";
+5 solver or PETSc option, 6 file system, 130, 143 or 129 ended by SIGINT, SIGTERM or SIGHUP (results are written).";
 
 #[derive(Subcommand)]
 enum Command {
@@ -56,6 +58,12 @@ enum Solving {
         /// Write displacements and stresses of the bodies for ParaView (short for --set output.vtu=true)
         #[arg(long)]
         vtu: bool,
+        /// Minutes between checkpoints (short for --set output.checkpoint=T)
+        #[arg(long, value_name = "T", allow_hyphen_values = true)]
+        checkpoint: Option<String>,
+        /// Go on from the checkpoint in a folder of results
+        #[arg(long, value_name = "DIR")]
+        restart: Option<PathBuf>,
     },
     /// Build a scene's problem, solve nothing, and say what is there
     Check {
@@ -198,13 +206,13 @@ impl SceneArgs {
         let method = self.method.iter().map(|name| format!("--method {name}"));
         let tolerance = self.tolerance.iter().map(|error| format!("--tolerance {error}"));
         let flags = [(self.estimate, "--estimate"), (self.trust_geo, "--trust-geo")];
-        let flags = flags.into_iter().filter_map(|(given, flag)| given.then(|| flag.to_owned()));
+        let flags = flags.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.to_owned());
         self.overrides.iter().cloned().chain(method).chain(tolerance).chain(flags).collect()
     }
 }
 
 /// Flags of the program that begin with two dashes: with one they look like PETSc's.
-const TWO_DASHES: [&str; 13] = [
+const TWO_DASHES: [&str; 15] = [
     "-trust-geo",
     "-set",
     "-json",
@@ -212,6 +220,8 @@ const TWO_DASHES: [&str; 13] = [
     "-estimate",
     "-tolerance",
     "-vtu",
+    "-checkpoint",
+    "-restart",
     "-over",
     "-solver",
     "-order",
@@ -249,30 +259,43 @@ pub fn run(words: Vec<OsString>) -> i32 {
             }
             // nothing that the program takes would help behind `--`
             refusal.remove(ContextKind::Suggested);
-            // a closed pipe is no reason to say more
-            let _ = refusal.print();
-            return refusal.exit_code();
+            return match refusal.print() {
+                // a closed pipe is no reason to say more
+                Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {
+                    complain(&Error::file(Path::new("standard output"), "write", &cause))
+                }
+                _ => refusal.exit_code(),
+            };
         }
     };
     // these start other programs and need neither MPI nor PETSc
+    let interrupt = match Interrupt::watch() {
+        Ok(interrupt) => interrupt,
+        Err(error) => return complain(&error),
+    };
     let alone = match cli.command {
-        Command::Bench(arguments) => bench::bench(&arguments.request(petsc)),
+        Command::Bench(arguments) => bench::bench(&interrupt, &arguments.request(petsc)),
         Command::Mesh { scene, output, json } => {
-            mesh::mesh(&mesh::Request { scene: scene.scene.clone(), overrides: scene.overrides(), output, json })
+            let (scene, overrides) = (scene.scene.clone(), scene.overrides());
+            mesh::mesh(&interrupt, &mesh::Request { scene, overrides, output, json })
         }
-        Command::Solving(command) => return with_session(&petsc, command),
+        Command::Solving(command) => return with_session(&petsc, &interrupt, command),
     };
     alone.unwrap_or_else(|error| complain(&error))
 }
 
 /// Runs a command that solves.
-fn with_session(petsc: &[String], command: Solving) -> i32 {
-    let session = match Session::start(petsc) {
+fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
+    let session = match options::refuse_words(petsc).and_then(|()| Session::start(petsc)) {
         Ok(session) => session,
         Err(error) => return complain(&error),
     };
-    match dispatch(&session, command) {
-        Ok(code) => code,
+    let ended = agree(&session, options::refuse_traps(&session)).and_then(|()| dispatch(&session, interrupt, command));
+    match ended {
+        Ok(code) => match session.finish() {
+            Err(error) if code == 0 => complain(&error),
+            _ => code,
+        },
         Err(error) if error.is_silent() => error.kind().exit_code(),
         Err(error) if error.is_common() && session.rank() > 0 => error.kind().exit_code(),
         Err(error) => {
@@ -286,21 +309,24 @@ fn with_session(petsc: &[String], command: Solving) -> i32 {
     }
 }
 
-fn dispatch(session: &Session, command: Solving) -> Result<i32> {
+fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Result<i32> {
     match command {
-        Solving::Solve { scene, output, vtu } => {
+        Solving::Solve { scene, output, vtu, checkpoint, restart } => {
             let mut overrides = scene.overrides();
             overrides.extend(vtu.then(|| "--vtu".to_owned()));
-            solve::solve(session, solve::Request { scene: scene.scene, folder: output, overrides, json: scene.json })
+            overrides.extend(checkpoint.map(|minutes| format!("--checkpoint {minutes}")));
+            let request = solve::Request { scene: scene.scene, folder: output, restart, overrides, json: scene.json };
+            solve::solve(session, interrupt, request)
         }
         Solving::Check { scene } => {
             let overrides = scene.overrides();
-            check::check(session, scene.scene, overrides, scene.json)
+            check::check(session, interrupt, scene.scene, overrides, scene.json)
         }
         Solving::Sweep { scene, output, over } => {
             let overrides = scene.overrides();
             sweep::sweep(
                 session,
+                interrupt,
                 sweep::Request { scene: scene.scene, folder: output, overrides, over, json: scene.json },
             )
         }

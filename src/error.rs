@@ -56,7 +56,12 @@ pub enum Kind {
     Solver,
     /// The file system: exit code 6.
     File,
+    /// A signal with this number ended the program before it had results: exit code 128 and the number, as a shell has it.
+    Stopped(i32),
 }
+
+/// What a shell adds to the number of the signal that ended a program.
+const SIGNALLED: i32 = 128;
 
 impl Kind {
     /// Exit code of the process for this kind of error.
@@ -67,6 +72,7 @@ impl Kind {
             Kind::Mesh => 4,
             Kind::Solver => 5,
             Kind::File => 6,
+            Kind::Stopped(signal) => SIGNALLED + signal,
         }
     }
 }
@@ -131,7 +137,8 @@ impl Error {
     /// The end of a rank whose fellow has the words: not printed, same exit code.
     pub fn silent(exit_code: i32) -> Self {
         let kinds = [Kind::Usage, Kind::Scene, Kind::Mesh, Kind::Solver, Kind::File];
-        let kind = kinds.into_iter().find(|kind| kind.exit_code() == exit_code).unwrap_or(Kind::Solver);
+        let stopped = (exit_code > SIGNALLED).then(|| Kind::Stopped(exit_code - SIGNALLED));
+        let kind = kinds.into_iter().find(|kind| kind.exit_code() == exit_code).or(stopped).unwrap_or(Kind::Solver);
         Self::new(kind, String::new())
     }
 
@@ -281,20 +288,6 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_and_numbers_are_short() {
-        let names = ["translation along x", "rotation about x", "rotation about y", "rotation about z"];
-        assert_eq!(joined(names), "translation along x with rotation about x, y and z");
-        assert_eq!(joined(["x", "y"]), "x with y");
-        assert_eq!(joined(["translation along y", "rotation"]), "translation along y with rotation");
-        assert_eq!([1e308, -2.1e5, 0.0, 1e-7, f64::NAN].map(shown), ["1e308", "-210000", "0", "1e-7", "NaN"]);
-    }
-}
-
 /// The text that the caret of a rendered error marks.
 #[cfg(test)]
 pub(crate) fn caret(error: &Error) -> String {
@@ -307,4 +300,18 @@ pub(crate) fn caret(error: &Error) -> String {
     let start = lines[marks].chars().position(|c| c == '^').unwrap_or(0);
     let length = lines[marks].chars().skip(start).take_while(|c| *c == '^').count();
     lines[marks - 1].chars().skip(start).take(length).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_numbers_are_short() {
+        let names = ["translation along x", "rotation about x", "rotation about y", "rotation about z"];
+        assert_eq!(joined(names), "translation along x with rotation about x, y and z");
+        assert_eq!(joined(["x", "y"]), "x with y");
+        assert_eq!(joined(["translation along y", "rotation"]), "translation along y with rotation");
+        assert_eq!([1e308, -2.1e5, 0.0, 1e-7, f64::NAN].map(shown), ["1e308", "-210000", "0", "1e-7", "NaN"]);
+    }
 }

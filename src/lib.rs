@@ -17,6 +17,8 @@ pub mod error;
 pub mod estimate;
 pub mod expression;
 pub mod fem;
+pub mod file;
+pub mod interrupt;
 pub mod linalg;
 pub mod mesh;
 pub mod model;

@@ -3,8 +3,10 @@
 use std::path::Path;
 use winkler::commands::clock::Clock;
 use winkler::commands::run;
+use winkler::commands::stages::Begin;
 use winkler::ddm::{Outcome, Silent};
 use winkler::error::Result;
+use winkler::interrupt::Interrupt;
 use winkler::model::field::{apply_stiffness, local_dot, residual};
 use winkler::model::{Field, Model};
 use winkler::petsc::Session;
@@ -45,11 +47,11 @@ struct Ended {
 }
 
 fn solve(session: &Session, path: &Path, sets: &[String]) -> Result<Ended> {
-    let mut clock = Clock::default();
+    let (mut clock, interrupt) = (Clock::default(), Interrupt::default());
     let scene = scene::load(path, sets)?;
-    let built = run::build(session, scene, &mut clock)?;
-    let ready = run::set_up(session, built, None, &mut clock)?;
-    let done = run::iterate(ready, &mut Silent, &mut clock)?;
+    let built = run::build(session, scene, &interrupt, &mut clock)?;
+    let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
+    let done = run::iterate(ready, &interrupt, &mut Silent, &mut clock)?;
     options::withdraw(session)?;
     Ok(Ended { model: done.built.discrete.model, outcome: done.outcome })
 }

@@ -219,3 +219,18 @@ fn help_is_shown_without_a_scene() {
         assert!(run.stdout.contains("Usage: winkler"), "{word}: {}", run.said());
     }
 }
+
+/// What PETSc would say at its end, or in a trap, is said before the first sweep.
+#[test]
+fn options_that_cannot_end_well_are_refused() {
+    let run = groove("-fp_trap");
+    assert_eq!(run.code, 5, "{}", run.said());
+    assert!(run.stderr.starts_with("error: -fp_trap") && run.stderr.contains("help:"), "{}", run.stderr);
+    groove("-fp_trap false").converged();
+    let run = groove("-log_view :/nope/x");
+    assert_eq!(run.code, 6, "{}", run.said());
+    assert!(run.stderr.contains("/nope/x") && run.stderr.contains("-log_view"), "{}", run.stderr);
+    // in the folder of results, which is not there before
+    let run = groove("-log_view :results/log.txt").converged();
+    assert!(fs::read_to_string(run.folder.join("log.txt")).expect("a log").contains("Performance Summary"));
+}

@@ -143,3 +143,15 @@ fn steps_on_adapted_meshes_are_refused() {
     let run = groove("{steps=2}", &["--set", "adapt.error=1e-3"]);
     assert!(run.code == 3 && run.stderr.contains("an adapted mesh and load steps in one scene"), "{}", run.said());
 }
+
+/// A step that begins at its solution makes fewer sweeps than the one before; those are not counted again.
+#[test]
+fn sweeps_of_a_step_are_counted_once() {
+    let sets = ["--method", "newton-robin", "--set", "mesh.set.n=8", "--set", "method.steps=[1,1]"];
+    let run = solve(case("groove-held"), &sets).converged();
+    let (step, sweeps) = (run.history().counts("step"), run.history().counts("sweeps"));
+    let first = sweeps[step.iter().rposition(|&step| step == 1).expect("a first step")];
+    let all = sweeps[sweeps.len() - 1];
+    assert_eq!(run.count("sweeps"), all);
+    assert!(first < all && all < 2 * first, "{sweeps:?}");
+}

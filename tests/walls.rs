@@ -10,8 +10,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms from the ground up; each may use those below it.
-const ROOMS: [&str; 19] = [
+const ROOMS: [&str; 21] = [
     "error",
+    "file",
+    "interrupt",
     "linalg",
     "petsc",
     "expression",

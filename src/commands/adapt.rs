@@ -1,13 +1,15 @@
 //! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
 
+use super::checkpoint::{Checkpoint, Head, settings_digest};
 use super::clock::Clock;
 use super::run;
-use super::stages::{Built, Done};
+use super::stages::{Begin, Built, Done};
 use super::{carry, report};
-use crate::ddm::Start;
+use crate::ddm::{Start, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Sizes};
+use crate::interrupt::Interrupt;
 use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::agree;
@@ -38,25 +40,36 @@ pub struct Plan {
     goal: Option<AdaptSpec>,
     /// The scene that follows a coarse one.
     finer: Option<Rc<Scene>>,
+    /// Where the first round goes on.
+    resumed: Option<Checkpoint>,
+    settings: String,
     purpose: String,
     carried: Vec<ContactTable>,
     seconds: f64,
 }
 
 impl Plan {
-    /// The first round of a scene: its own mesh, a coarse one, or the one that an earlier run ended with.
+    /// The first round of a scene: its own mesh, a coarse one, the one that an earlier run ended with, or that of a checkpoint.
     ///
     /// # Errors
     /// A scene whose mesh cannot follow sizes; what [`run::build`] refuses.
-    pub fn new(session: &Session, scene: Rc<Scene>, clock: &mut Clock) -> Result<Self> {
+    pub fn new(
+        session: &Session,
+        scene: Rc<Scene>,
+        resumed: Option<Checkpoint>,
+        interrupt: &Interrupt,
+        clock: &mut Clock,
+    ) -> Result<Self> {
         let goal = scene.adapt.clone();
         let nested = matches!(scene.method.start, method::Start::Nested);
         let mut settings = scene.settings();
         ["output", "solver", "method"].iter().for_each(|key| settings[*key] = serde_json::Value::Null);
         let mut plan = Self {
             purpose: settings.to_string(),
+            settings: settings_digest(&scene),
             scene,
-            rounds: Vec::new(),
+            rounds: resumed.as_ref().map_or(Vec::new(), |checkpoint| checkpoint.head.rounds.clone()),
+            resumed,
             limit: None,
             goal,
             finer: None,
@@ -68,10 +81,19 @@ impl Plan {
         }
         agree(session, plan.refuse_finished_mesh())?;
         let bodies = plan.scene.bodies.len();
+        if plan.adapts() {
+            let scene = Rc::make_mut(&mut plan.scene);
+            scene.estimate = true;
+            scene.method.stop.balanced = true;
+        }
+        if let Some(checkpoint) = &plan.resumed {
+            follow(Rc::make_mut(&mut plan.scene), checkpoint.head.sizes.clone());
+            return Ok(plan);
+        }
         if plan.goal.is_none() {
             let mut coarse = Scene::clone(&plan.scene);
             coarse.estimate = true;
-            let built = run::build(session, coarse.clone(), clock)?;
+            let built = run::build(session, coarse.clone(), interrupt, clock)?;
             let sizes = built.discrete.meshes.as_ref().map(|meshes| sizes::scaled(&**meshes, bodies, 2.0));
             options::withdraw(session)?;
             coarse.method.stop.balanced = true;
@@ -79,18 +101,20 @@ impl Plan {
             plan.finer = Some(std::mem::replace(&mut plan.scene, Rc::new(coarse)));
             return Ok(plan);
         }
-        let scene = Rc::make_mut(&mut plan.scene);
-        scene.estimate = true;
-        scene.method.stop.balanced = true;
         let mut view_of_first = mesh::recall_final(&plan.purpose);
         if view_of_first.is_none() {
-            let built = run::build(session, plan.scene.clone(), clock)?;
+            let built = run::build(session, plan.scene.clone(), interrupt, clock)?;
             let sizes = built.discrete.meshes.as_ref().map(|m| sizes::uniform(&**m, bodies, FIRST * bodies));
             options::withdraw(session)?;
             view_of_first = sizes.map(view);
         }
         follow(Rc::make_mut(&mut plan.scene), view_of_first);
         Ok(plan)
+    }
+
+    /// Whether meshes are adapted to an error.
+    pub fn adapts(&self) -> bool {
+        self.goal.is_some()
     }
 
     /// A mesh that is a file cannot follow sizes.
@@ -101,8 +125,29 @@ impl Plan {
             .help("let the scene name a Gmsh script: mesh = \"file.geo\""))
     }
 
+    /// Where this round begins: where a checkpoint or an earlier round ended.
+    ///
+    /// # Errors
+    /// The checkpoint is of another mesh.
+    pub fn begin(&mut self, built: &Built) -> Result<Begin> {
+        match self.resumed.take() {
+            Some(checkpoint) => checkpoint.resume(&built.discrete),
+            None => Ok(Begin { start: self.start(built), ..Begin::default() }),
+        }
+    }
+
+    /// What a checkpoint of this round says of it; none of a coarse mesh that only gives the start.
+    pub fn head(&self) -> Option<Head> {
+        let sizes = match &self.scene.mesh {
+            MeshSource::Geo { sizes: Some(Sizing::View(view)), .. } => Some(view.to_string()),
+            _ => None,
+        };
+        let (settings, rounds) = (self.settings.clone(), self.rounds.clone());
+        self.finer.is_none().then(|| Head { settings, rounds, sizes, ..Head::default() })
+    }
+
     /// The start of this round, if an earlier one gives it.
-    pub fn start(&self, built: &Built) -> Option<Start> {
+    fn start(&self, built: &Built) -> Option<Start> {
         let Built { scene, discrete, .. } = built;
         let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
         (!self.carried.is_empty()).then(|| match newton {
@@ -122,6 +167,9 @@ impl Plan {
         estimate: Option<&Estimate>,
         clock: &mut Clock,
     ) -> Result<bool> {
+        if matches!(done.outcome.status, Status::Paused { .. }) {
+            return Ok(false);
+        }
         let good = done.outcome.status.is_solved();
         let (discrete, model) = (&done.built.discrete, done.model());
         let tables = || (0..model.pairs.len()).map(|i| report::contact_table(done, None, i)).collect();

@@ -6,6 +6,7 @@ use super::stages::Built;
 use super::{load, preflight, report};
 use crate::contact::Left;
 use crate::error::Result;
+use crate::interrupt::Interrupt;
 use crate::output::{say, sci};
 use crate::petsc::Session;
 use serde_json::json;
@@ -16,10 +17,16 @@ use std::path::PathBuf;
 ///
 /// # Errors
 /// Refusals of scene and mesh.
-pub fn check(session: &Session, path: PathBuf, overrides: Vec<String>, as_json: bool) -> Result<i32> {
+pub fn check(
+    session: &Session,
+    interrupt: &Interrupt,
+    path: PathBuf,
+    overrides: Vec<String>,
+    as_json: bool,
+) -> Result<i32> {
     let mut clock = Clock::default();
     let scene = load(session, &path, &overrides)?;
-    let built = run::build(session, scene, &mut clock)?;
+    let built = run::build(session, scene, interrupt, &mut clock)?;
     clock.total();
     let shared = report::Shared::gather(&built.discrete);
     if session.rank() != 0 {
@@ -35,9 +42,9 @@ pub fn check(session: &Session, path: PathBuf, overrides: Vec<String>, as_json: 
             value["bodies"][body]["rigid_motions_unconstrained"] = json!(info.left_by_all);
         }
         value["pairs"] = pairs(&built);
-        say(format_args!("{value:#}"));
+        say(format_args!("{value:#}"))?;
     } else {
-        print(&built, &report::solvers_in_words(&shared.solvers));
+        print(&built, &report::solvers_in_words(&shared.solvers))?;
     }
     Ok(0)
 }
@@ -69,18 +76,18 @@ fn gap_range(gap: &[f64]) -> (f64, f64) {
     (gap.iter().copied().fold(f64::INFINITY, f64::min), gap.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
-fn print(built: &Built, solvers: &str) {
-    say(&built.scene.title);
+fn print(built: &Built, solvers: &str) -> Result<()> {
+    say(&built.scene.title)?;
     for info in &built.discrete.bodies {
         say(format_args!(
             "  body {}: {} cells, {} nodes, {} dofs, {} of them supported",
             info.name, info.cells, info.nodes, info.dofs, info.supported
-        ));
+        ))?;
         if !info.left_by_supports.is_empty() {
-            say(format_args!("    rigid motions left to contact: {}", info.left_by_supports.join("; ")));
+            say(format_args!("    rigid motions left to contact: {}", info.left_by_supports.join("; ")))?;
         }
         if !info.left_by_all.is_empty() {
-            say(format_args!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")));
+            say(format_args!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")))?;
         }
     }
     for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
@@ -95,10 +102,10 @@ fn print(built: &Built, solvers: &str) {
             pair.weight.iter().sum::<f64>(),
             sci(low, 3),
             sci(high, 3)
-        ));
+        ))?;
         let coupling = preflight::coupling(built, i);
         if coupling.pressure == 0.0 {
-            say("    the loads push no body as a whole: pressure and sweeps cannot be estimated from them");
+            say("    the loads push no body as a whole: pressure and sweeps cannot be estimated from them")?;
             continue;
         }
         let sweeps = coupling.sweeps.iter().map(|(method, count)| match count.is_finite() {
@@ -111,10 +118,11 @@ fn print(built: &Built, solvers: &str) {
             coupling.theta[0],
             coupling.theta[1],
             sweeps.collect::<Vec<_>>().join(", ")
-        ));
+        ))?;
     }
-    say(format_args!("  inner solver: {} ({})", solvers, built.choice));
+    say(format_args!("  inner solver: {} ({})", solvers, built.choice))?;
     for warning in &built.warnings {
-        say(format_args!("  warning: {warning}"));
+        say(format_args!("  warning: {warning}"))?;
     }
+    Ok(())
 }

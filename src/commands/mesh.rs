@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Kind, Result};
 use crate::fem::Space;
+use crate::interrupt::Interrupt;
 use crate::mesh::{Loaded, Origin};
 use crate::output::{CellKind, Grid, say, write_whole};
 use crate::problem::order::Order;
@@ -27,27 +28,28 @@ pub struct Request {
 ///
 /// # Errors
 /// Refusals of scene and mesh, a body without cells, a file that cannot be written.
-pub fn mesh(request: &Request) -> Result<i32> {
+pub fn mesh(interrupt: &Interrupt, request: &Request) -> Result<i32> {
+    interrupt.hold();
     let scene = crate::scene::load(&request.scene, &request.overrides)?;
     match scene.dimension.value {
-        2 => show::<2>(&scene, request),
-        _ => show::<3>(&scene, request),
+        2 => show::<2>(&scene, interrupt, request),
+        _ => show::<3>(&scene, interrupt, request),
     }
 }
 
-fn show<const D: usize>(scene: &Scene, request: &Request) -> Result<i32> {
+fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let began = Instant::now();
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let loaded = crate::mesh::load::<D>(&scene.mesh, order)?;
+    let loaded = crate::mesh::load_unless::<D>(&scene.mesh, order, interrupt)?;
     let seconds = began.elapsed().as_secs_f64();
     if let Some(path) = &request.output {
         write(path, &loaded)?;
     }
     let facts = facts(scene, &loaded, seconds)?;
     if request.json {
-        say(format_args!("{facts:#}"));
+        say(format_args!("{facts:#}"))?;
     } else {
-        print(&facts);
+        print(&facts)?;
     }
     Ok(0)
 }
@@ -95,11 +97,11 @@ fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Res
     }))
 }
 
-fn print(facts: &Value) {
+fn print(facts: &Value) -> Result<()> {
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
     let list = |key: &str| facts[key].as_array().cloned().unwrap_or_default();
-    say(text(&facts["title"]));
+    say(text(&facts["title"]))?;
     say(format_args!(
         "  {} ({}, {:.2} s): {} nodes, order {}",
         text(&facts["file"]),
@@ -107,7 +109,7 @@ fn print(facts: &Value) {
         number(&facts["seconds"]),
         facts["nodes"],
         facts["order"]
-    ));
+    ))?;
     for body in list("bodies") {
         say(format_args!(
             "  body {}: {} cells, {} nodes, {} dofs, quality at least {:.3}, mean {:.3}",
@@ -117,13 +119,14 @@ fn print(facts: &Value) {
             body["dofs"],
             number(&body["quality"]["least"]),
             number(&body["quality"]["mean"])
-        ));
+        ))?;
     }
     let cells = facts["dimension"].clone();
     for group in list("groups").iter().filter(|group| group["dimension"] != cells) {
         let kind = ["points", "lines", "triangles"][number(&group["dimension"]) as usize];
-        say(format_args!("  group {}: {} {kind}", text(&group["name"]), group["simplices"]));
+        say(format_args!("  group {}: {} {kind}", text(&group["name"]), group["simplices"]))?;
     }
+    Ok(())
 }
 
 /// Writes the mesh: `.msh` as the file that was read, `.vtu` as cells with the number of their body.

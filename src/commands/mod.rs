@@ -2,12 +2,15 @@
 //! that solve share is in [`run`], the [`stages`] of a run, and the report of its end.
 
 pub mod adapt;
+pub mod asking;
 mod balance;
 pub mod bench;
 pub mod carry;
 pub mod check;
+pub mod checkpoint;
 pub mod clock;
 pub mod inner;
+pub mod keep;
 pub mod mesh;
 pub mod method;
 pub mod preflight;
@@ -21,6 +24,7 @@ pub mod steps;
 pub mod sweep;
 pub mod verdict;
 mod words;
+pub mod write;
 
 use crate::error::Result;
 use crate::petsc::Session;

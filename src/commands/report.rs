@@ -1,5 +1,6 @@
 //! Outcome -> report, contact tables and plots.
 
+use super::asking;
 use super::balance;
 use super::clock::Clock;
 use super::preflight;
@@ -8,8 +9,9 @@ use super::stages::{Built, Done};
 use super::steps;
 use super::verdict::{forecast, message, status_name};
 use crate::contact::{ContactPair, Left};
-use crate::ddm::{self, Outcome, Status};
+use crate::ddm::{Outcome, Status};
 use crate::discretize::Discrete;
+use crate::error::Kind;
 use crate::estimate::Estimate;
 use crate::model::BodyCounts;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
@@ -24,6 +26,7 @@ use serde::{Deserialize, Serialize};
 pub fn exit_code(done: &Done) -> i32 {
     match done.outcome.status {
         Status::Converged | Status::RoundoffLimited if steps::warnings(&done.steps).is_empty() => 0,
+        Status::Paused { asked } => asking::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
 }
@@ -92,7 +95,7 @@ fn lost(done: &Done) -> Option<String> {
     let stop = &done.built.scene.method.stop;
     let reached = done.outcome.rows.last().map(|row| row.error).filter(|_| stop.balanced);
     let asked = [stop.residual, stop.increment, reached].into_iter().flatten().fold(INNER, f64::max);
-    let pressure = ddm::lost(done.model(), &done.outcome);
+    let pressure = done.outcome.rounding;
     (pressure > 10.0 * asked).then(|| {
         format!(
             "the displacements are so large that few digits are left for the pressures, which may be off by {} of their peak",

@@ -5,6 +5,7 @@ use super::clock::Clock;
 use super::run;
 use super::stages::{Built, Done};
 use crate::error::Result;
+use crate::interrupt::Interrupt;
 use crate::parallel::Ranks;
 use crate::petsc::Session;
 use crate::scene::Scene;
@@ -16,8 +17,14 @@ use std::rc::Rc;
 ///
 /// # Errors
 /// Those of [`run::build`].
-pub fn build(session: &Session, scene: Rc<Scene>, before: Option<Done>, clock: &mut Clock) -> Result<Built> {
-    let Some(Done { built: mut last, .. }) = before else { return run::build(session, scene, clock) };
+pub fn build(
+    session: &Session,
+    scene: Rc<Scene>,
+    before: Option<Done>,
+    interrupt: &Interrupt,
+    clock: &mut Clock,
+) -> Result<Built> {
+    let Some(Done { built: mut last, .. }) = before else { return run::build(session, scene, interrupt, clock) };
     let same = |without: &[&str]| settings(&last.scene, without) == settings(&scene, without);
     let condensed = last.condensed.len() == last.discrete.bodies.len();
     // an estimate of the error needs the meshes, which are kept only for it
@@ -32,7 +39,7 @@ pub fn build(session: &Session, scene: Rc<Scene>, before: Option<Done>, clock: &
     }
     let kept = if same(&["gap", "layer", "reference"]) { last.into_condensed() } else { Vec::new() };
     options::withdraw(session)?;
-    run::build_with(session, scene, kept, clock)
+    run::build_with(session, scene, kept, interrupt, clock)
 }
 
 /// A scene without what no body depends on, and without some keys of its contacts.

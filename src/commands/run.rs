@@ -2,16 +2,18 @@
 
 use super::clock::Clock;
 use super::inner::{Inner, WHOLE};
+use super::keep::{self, Keep};
 use super::method;
-use super::stages::{Built, Done, Ready};
+use super::stages::{Begin, Built, Done, Ready};
 use super::steps;
 use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
 use crate::contact::{ContactPair, Left};
-use crate::ddm::{self, Observer, Outcome, Settings, Start, Status};
+use crate::ddm::{self, Outcome, Start, Status};
 use crate::discretize::{self, ContactInfo, Discrete};
 use crate::error::{Error, Kind, Result};
-use crate::estimate::{self, Estimate, Nodal};
+use crate::estimate::{self, Estimate};
+use crate::interrupt::Interrupt;
 use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
@@ -31,22 +33,33 @@ const LARGE_FRONTS: usize = 30_000;
 ///
 /// # Errors
 /// Refusals of scene and mesh, printed on one rank; failures of PETSc.
-pub fn build(session: &Session, scene: impl Into<Rc<Scene>>, clock: &mut Clock) -> Result<Built> {
-    build_with(session, scene.into(), Vec::new(), clock)
+pub fn build(
+    session: &Session,
+    scene: impl Into<Rc<Scene>>,
+    interrupt: &Interrupt,
+    clock: &mut Clock,
+) -> Result<Built> {
+    build_with(session, scene.into(), Vec::new(), interrupt, clock)
 }
 
 /// The same, with the bodies `kept` from an earlier scene.
 ///
 /// # Errors
 /// Those of [`build`].
-pub fn build_with(session: &Session, scene: Rc<Scene>, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
-    agree(session, refuse(&scene))?;
+pub fn build_with(
+    session: &Session,
+    scene: Rc<Scene>,
+    kept: Vec<BodySlot>,
+    interrupt: &Interrupt,
+    clock: &mut Clock,
+) -> Result<Built> {
+    agree(session, refuse(&scene).and_then(|()| options::refuse_log(session)))?;
     agree(session, scene_options(session, &scene))?;
     let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
     options::distribute(session, &names)?;
     match scene.dimension.value {
-        2 => build_in::<2>(session, scene, pieces::plane, kept, clock),
-        _ => build_in::<3>(session, scene, pieces::space, kept, clock),
+        2 => build_in::<2>(session, scene, pieces::plane, kept, interrupt, clock),
+        _ => build_in::<3>(session, scene, pieces::space, kept, interrupt, clock),
     }
 }
 
@@ -56,10 +69,12 @@ fn build_in<const D: usize>(
     scene: Rc<Scene>,
     cut: Cut<D>,
     kept: Vec<BodySlot>,
+    interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
-    let mesh = mesh::<D>(session, &scene)?;
-    let mesh = agree(session, discretize::verify(&scene, &mesh))?;
+    interrupt.hold();
+    let mesh = mesh::<D>(session, &scene, interrupt)?;
+    let mesh = agree(session, interrupt.release().and_then(|()| discretize::verify(&scene, &mesh)))?;
     clock.phase("mesh");
     let largest = mesh.mesh.points.len() * D;
     // small fronts and several ranks lose by BLAS threads, large factorisations gain
@@ -107,9 +122,9 @@ fn scene_options(session: &Session, scene: &Scene) -> Result<()> {
 }
 
 /// The mesh: one rank lets Gmsh work, then every rank reads.
-fn mesh<const D: usize>(session: &Session, scene: &Scene) -> Result<crate::mesh::Mesh<D>> {
+fn mesh<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<crate::mesh::Mesh<D>> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let load = || crate::mesh::load::<D>(&scene.mesh, order).map(|loaded| loaded.mesh);
+    let load = || crate::mesh::load_unless::<D>(&scene.mesh, order, interrupt).map(|loaded| loaded.mesh);
     if session.size() == 1 {
         return load();
     }
@@ -186,14 +201,14 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
     format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.motion)
 }
 
-/// Makes the method, factors every body for the start, then refuses options that nobody read. Without a `given` start it is that of
-/// the scene.
+/// Makes the method, factors every body for the start, then refuses options that nobody read.
 ///
 /// # Errors
 /// Unknown PETSc options, a start that is not finite, failures of PETSc.
-pub fn set_up(session: &Session, mut built: Built, given: Option<Start>, clock: &mut Clock) -> Result<Ready> {
+pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clock) -> Result<Ready> {
     let scene = built.scene.clone();
-    let start = match given {
+    let Begin { start, steps, earlier } = begin;
+    let start = match start {
         Some(start) => start,
         None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete, 1.0)?.into(),
         None => Start::Automatic,
@@ -225,7 +240,7 @@ pub fn set_up(session: &Session, mut built: Built, given: Option<Start>, clock: 
         }
     }
     clock.phase("set-up");
-    Ok(Ready { built, method, start, warnings })
+    Ok(Ready { built, method, start, steps, earlier, warnings })
 }
 
 /// Warnings of options that no solver with one of these `names` has read, but for those that are `known`.
@@ -259,21 +274,18 @@ fn agree_on_unread(session: &Session, names: &[&str], known: &[String]) -> Resul
     Ok(warnings)
 }
 
-/// Iterates.
+/// Iterates. From here on a signal ends the run after its step, and lets its results be written.
 ///
 /// # Errors
 /// Failures of PETSc; not converging is a status of the outcome.
-pub fn iterate(ready: Ready, observer: &mut dyn Observer, clock: &mut Clock) -> Result<Done> {
-    let Ready { mut built, mut method, start, warnings } = ready;
-    let (stop, interval) = (built.scene.method.stop.clone(), built.scene.method.interval);
-    let balance = built.discrete.meshes.clone().filter(|_| stop.balanced).map(|meshes| Box::new(Nodal(meshes)) as _);
-    let mut settings = Settings { stop, interval, balance, start };
-    let (outcome, steps) = match built.scene.method.steps.is_empty() {
-        true => (ddm::solve(&mut built.discrete.model, &mut method, &mut settings, observer)?, Vec::new()),
-        false => steps::iterate(&mut built, &mut method, settings, observer)?,
+pub fn iterate(ready: Ready, interrupt: &Interrupt, keep: &mut dyn Keep, clock: &mut Clock) -> Result<Done> {
+    interrupt.hold();
+    let done = match ready.built.scene.method.steps.is_empty() {
+        true => keep::solve(ready, true, keep)?,
+        false => steps::iterate(ready, keep)?,
     };
     clock.phase("iterate");
-    Ok(Done { built, method, outcome, steps, warnings })
+    Ok(done)
 }
 
 /// Estimates the error of what a run found, if the scene asks for it.

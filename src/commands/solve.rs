@@ -1,19 +1,21 @@
 //! `winkler solve`: one scene, one run, all its results.
 
 use super::adapt::Plan;
+use super::asking::{Asking, is_snapshot, signal};
+use super::checkpoint::{self, Checkpoint};
 use super::clock::Clock;
-use super::results::Recovered;
-use super::run;
+use super::keep::Keep;
 use super::stages::Done;
-use super::{folder_of, load, report, results};
-use crate::ddm::{Observer, Row};
-use crate::error::{Error, Kind, Result};
-use crate::estimate::Estimate;
-use crate::output::{Folder, HistoryWriter, IterationTable, Plot, Report, Verbosity, say, vtu};
+use super::write::{Writing, to_json};
+use super::{folder_of, load, report, run};
+use crate::ddm::{Observer, Row, Status};
+use crate::error::Result;
+use crate::interrupt::Interrupt;
+use crate::output::{Folder, HistoryWriter, IterationTable, Verbosity, say};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::scene::Scene;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What the user typed.
 pub struct Request {
@@ -21,6 +23,8 @@ pub struct Request {
     pub scene: PathBuf,
     /// Folder of results, if typed.
     pub folder: Option<PathBuf>,
+    /// Folder of an earlier run to go on from.
+    pub restart: Option<PathBuf>,
     /// Overrides of scene keys.
     pub overrides: Vec<String>,
     /// Whether to print the report as JSON instead of the table.
@@ -32,24 +36,39 @@ pub struct Request {
 /// # Errors
 /// Everything that keeps the run from starting, and failures of the file system. Not converging is an exit code, and all
 /// that was computed is written.
-pub fn solve(session: &Session, request: Request) -> Result<i32> {
+pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Result<i32> {
     let mut clock = Clock::default();
     let scene = load(session, &request.scene, &request.overrides)?;
+    let read = |folder: &PathBuf| Checkpoint::read(folder, &scene);
+    let kept = agree(session, request.restart.as_ref().map(read).transpose())?;
     let folder = agree(session, Folder::create(folder_of(&scene, request.folder)))?;
+    let path = folder.path();
     let first = session.rank() == 0;
-    let mut plan = Plan::new(session, scene, &mut clock)?;
+    let mut plan = Plan::new(session, scene, kept, interrupt, &mut clock)?;
+    // one rank has the clock
+    let asking = Asking::new(interrupt, plan.scene.output.checkpoint.filter(|_| first));
+    let mut saved = request.restart.is_some_and(|from| from.canonicalize().ok() == path.canonicalize().ok());
     let (done, estimate, failed) = loop {
-        let built = run::build(session, plan.scene.clone(), &mut clock)?;
-        let start = plan.start(&built);
-        let ready = run::set_up(session, built, start, &mut clock)?;
+        let built = run::build(session, plan.scene.clone(), interrupt, &mut clock)?;
+        let begin = agree(session, plan.begin(&built))?;
+        let ready = run::set_up(session, built, begin, &mut clock)?;
         let all = session.options().all()?;
         let monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
         let verbosity = if request.json || monitored || !first { Verbosity::Quiet } else { Verbosity::Table };
         let mut watchers = Watchers {
             table: IterationTable::new(verbosity, &run::targets(&plan.scene)),
             history: if first { Some(history(&folder, &plan.scene)?) } else { None },
+            asking: &asking,
+            session,
+            path,
+            plan: &plan,
+            clock: clock.clone(),
+            saved,
+            failed: Vec::new(),
         };
-        let mut done = run::iterate(ready, &mut watchers, &mut clock)?;
+        let mut done = run::iterate(ready, interrupt, &mut watchers, &mut clock)?;
+        done.warnings.append(&mut watchers.failed);
+        saved = watchers.saved;
         let estimate = run::estimate(&mut done, &mut clock)?;
         watchers.table.finish();
         let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
@@ -57,48 +76,47 @@ pub fn solve(session: &Session, request: Request) -> Result<i32> {
         if !more {
             break (done, estimate, failed);
         }
+        if plan.adapts() {
+            // whatever comes of the next mesh, this one's results are there
+            let estimate = estimate.as_ref();
+            let writing = Writing { session, path, plan: &plan, done: &done, estimate, fields: false };
+            let ended = "ended while the next mesh was at work: the error asked for is not reached";
+            let (_, written) = writing.all(&mut clock, |report| {
+                (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
+            });
+            agree(session, failed.and(written))?;
+        }
     };
-    let recovered = results::recover(&done);
-    let written = failed.and(write(session, &done, &recovered, estimate.as_ref(), &folder));
-    clock.phase("output");
-    clock.total();
-    let mut report = report::report(session, &done, &recovered, &clock);
-    report.discretization_error = estimate.as_ref().map(report::discretization_error);
-    report.rounds = plan.rounds;
-    if let Some(limit) = &plan.limit {
-        report.status = "mesh-limit".to_owned();
-        report.message = format!("the error asked for is not reached: {limit}");
-    }
+    let writing = Writing { session, path, plan: &plan, done: &done, estimate: estimate.as_ref(), fields: true };
+    let (report, written) = writing.all(&mut clock, |report| {
+        if let Some(limit) = &plan.limit {
+            report.status = "mesh-limit".to_owned();
+            report.message = format!("the error asked for is not reached: {limit}");
+        }
+    });
+    let code = if plan.limit.is_some() { 1 } else { report::exit_code(&done) };
     if first {
-        report.files = names(&folder, &done);
-        let json = to_json(&report)?;
-        folder.write("report.json", |out| out.write_all(json.as_bytes()))?;
+        let file = path.join(checkpoint::FILE);
+        if saved && code == 0 {
+            // nothing is left to go on from; one that is gone already is as well
+            let _ = std::fs::remove_file(&file);
+        }
         if request.json {
-            say(json.trim_end());
+            say(to_json(&report)?.trim_end())?;
         } else {
             let solvers: Vec<String> = report.bodies.iter().map(|body| body.solver.clone()).collect();
+            let again = if saved && code > 1 { "; --restart with this folder goes on" } else { "" };
             say(format_args!(
-                "{}\n  inner solver: {} ({})\n  results in {}",
+                "{}\n  inner solver: {} ({})\n  results in {}{again}",
                 report.summary(),
                 report::solvers_in_words(&solvers),
                 done.built.choice,
-                folder.path().display()
-            ));
+                path.display()
+            ))?;
         }
     }
-    written?;
-    recovered.into_iter().flatten().collect::<Result<Vec<_>>>()?;
-    Ok(if plan.limit.is_some() { 1 } else { report::exit_code(&done) })
-}
-
-/// A report as JSON text, ended by a newline.
-///
-/// # Errors
-/// None in practice: a report holds nothing that JSON cannot hold.
-pub fn to_json(report: &Report) -> Result<String> {
-    serde_json::to_string_pretty(report)
-        .map(|text| text + "\n")
-        .map_err(|cause| Error::new(Kind::File, "the report cannot be written as JSON").because(cause.to_string()))
+    failed.and(written)?;
+    Ok(code)
 }
 
 fn history(folder: &Folder, scene: &Scene) -> Result<HistoryWriter> {
@@ -106,13 +124,22 @@ fn history(folder: &Folder, scene: &Scene) -> Result<HistoryWriter> {
     HistoryWriter::create(folder, &names, !scene.method.steps.is_empty())
 }
 
-/// Table and file of the iterations.
-struct Watchers {
+/// Table and file of the iterations of a round, what is asked meanwhile, and its checkpoints and snapshots.
+struct Watchers<'a> {
     table: IterationTable,
     history: Option<HistoryWriter>,
+    asking: &'a Asking,
+    session: &'a Session,
+    path: &'a Path,
+    plan: &'a Plan,
+    clock: Clock,
+    /// Whether the folder has a checkpoint of this run.
+    saved: bool,
+    /// What could not be written, in words.
+    failed: Vec<String>,
 }
 
-impl Observer for Watchers {
+impl Observer for Watchers<'_> {
     fn row(&mut self, row: &Row) {
         self.table.row(row);
         if let Some(history) = &mut self.history {
@@ -123,64 +150,38 @@ impl Observer for Watchers {
     fn note(&mut self, text: &str) {
         self.table.note(text);
     }
+
+    fn asked(&self) -> u8 {
+        self.asking.bits()
+    }
 }
 
-/// Writes fields (each rank its bodies), contact tables and plots (the first rank).
-fn write(
-    session: &Session,
-    done: &Done,
-    recovered: &results::All,
-    estimate: Option<&Estimate>,
-    folder: &Folder,
-) -> Result<()> {
-    let (scene, discrete, model) = (&done.built.scene, &done.built.discrete, done.model());
-    let first = session.rank() == 0;
-    if scene.output.vtu {
-        for Recovered { field, .. } in recovered.iter().flatten().flatten() {
-            folder.write(&field.file_name(), |out| field.clone().write(out))?;
-        }
-        if first {
-            let mut names: Vec<String> = discrete.bodies.iter().map(|body| body.name.clone()).collect();
-            for i in 0..model.pairs.len() {
-                let file = folder.unused(&report::contact_table(done, None, i).stem(), "vtu");
-                let name = file.trim_end_matches(".vtu").to_owned();
-                folder.write(&file, |out| report::contact_surface(&name, done, i).write(out))?;
-                names.push(name);
+impl Watchers<'_> {
+    /// Notes a failure once: a disk that is full now may have room later.
+    fn note_failure(&mut self, what: &str, written: Result<()>) {
+        if let Err(error) = written {
+            let text = format!("{what} was not written: {}", error.message());
+            if !self.failed.contains(&text) {
+                self.failed.push(text);
             }
-            folder.write(&vtu::pvd_name("bodies"), |out| vtu::write_pvd(&names, out))?;
         }
     }
-    if !first {
-        return Ok(());
-    }
-    for i in 0..model.pairs.len() {
-        report::contact_table(done, estimate, i).save(folder)?;
-    }
-    if scene.output.plots {
-        let convergence = Plot::convergence(&scene.title, &[report::convergence("", &done.outcome)]);
-        folder.write("convergence.svg", |out| convergence.write(out))?;
-        // only along curves: points of a surface over one coordinate would be a cloud
-        for i in (0..model.pairs.len()).filter(|&i| model.pairs[i].along_curve) {
-            let mut curves = vec![report::pressure("pressure", done, i)];
-            curves.extend(report::reference(discrete, i));
-            let (_, axis) = report::main_axis(&model.pairs[i]);
-            let plot = Plot::pressure(&scene.title, axis, &curves);
-            folder.write(&folder.unused("pressure", "svg"), |out| plot.write(out))?;
-        }
-    }
-    Ok(())
 }
 
-/// Names of the files of a run, those of other ranks included.
-fn names(folder: &Folder, done: &Done) -> Vec<String> {
-    let own = folder.files();
-    let mut names: Vec<String> =
-        own.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned()).collect();
-    if done.built.scene.output.vtu {
-        names.extend(done.built.discrete.bodies.iter().map(|body| format!("{}.vtu", body.name)));
+impl Keep for Watchers<'_> {
+    fn state(&mut self, done: &Done) {
+        let Status::Paused { asked } = done.outcome.status else { return };
+        let is_due = signal(asked).is_some() || !is_snapshot(asked);
+        let Some(head) = self.plan.head().filter(|_| is_due) else { return };
+        let written = Checkpoint::write(self.path, head, done, self.session.rank() == 0);
+        self.saved |= written.is_ok();
+        self.note_failure("a checkpoint", written);
     }
-    names.push("report.json".to_owned());
-    names.sort();
-    names.dedup();
-    names
+
+    fn results(&mut self, done: &mut Done) {
+        let Self { session, path, plan, .. } = *self;
+        let writing = Writing { session, path, plan, done, estimate: None, fields: true };
+        let (_, written) = writing.all(&mut self.clock.clone(), |_| {});
+        self.note_failure("a snapshot", written);
+    }
 }

@@ -1,7 +1,8 @@
 //! The stages of a run, each made from the one before: [`Scene`], [`Built`], [`Ready`], [`Done`].
 
-use crate::ddm::{Method, Outcome, Start};
+use crate::ddm::{Discretisation, Method, Outcome, Row, Start};
 use crate::discretize::Discrete;
+use crate::estimate::Nodal;
 use crate::model::{BodySlot, Model};
 use crate::output::StepReport;
 use crate::problem::method::Linear;
@@ -24,33 +25,56 @@ pub struct Built {
     pub warnings: Vec<String>,
 }
 
+/// What another mesh or another process gives a run.
+#[derive(Default)]
+pub struct Begin {
+    /// The start; none for that of the scene.
+    pub start: Option<Start>,
+    /// Load steps before.
+    pub steps: Vec<StepReport>,
+    /// Their rows.
+    pub earlier: Vec<Row>,
+}
+
 /// A problem with its method set up and a start: the next is the first step.
 pub struct Ready {
     /// The problem.
     pub built: Built,
     /// The method, whose solvers are set up.
     pub method: Method,
-    /// Where it begins; with load steps each step finds its own.
+    /// Where it begins; with load steps each finds its own, but for one that another process has begun.
     pub start: Start,
+    /// Load steps before.
+    pub steps: Vec<StepReport>,
+    /// Their rows.
+    pub earlier: Vec<Row>,
     /// What the user should know of the set-up.
     pub warnings: Vec<String>,
 }
 
-/// A run that has ended, well or not.
+/// A run that has ended, well or not, or has paused.
 pub struct Done {
     /// The problem.
     pub built: Built,
     /// The method as the run has left it.
     pub method: Method,
-    /// How it ended.
+    /// How it ended; of a load step that has paused, in the units of the step.
     pub outcome: Outcome,
-    /// Its load steps.
+    /// Its load steps so far.
     pub steps: Vec<StepReport>,
+    /// Rows of the load steps before one that has paused.
+    pub earlier: Vec<Row>,
     /// What the user should know of the set-up.
     pub warnings: Vec<String>,
 }
 
 impl Built {
+    /// Who knows the error of the discretisation, if the scene lets the run end by it.
+    pub fn balance(&self) -> Option<Box<dyn Discretisation>> {
+        let meshes = self.discrete.meshes.clone().filter(|_| self.scene.method.stop.balanced);
+        meshes.map(|meshes| Box::new(Nodal(meshes)) as _)
+    }
+
     /// Whether PETSc has no solver in it: all bodies are condensed, and what joins them is dense.
     pub fn is_without_petsc(&self) -> bool {
         self.linear == Linear::Dense || self.condensed.len() == self.discrete.bodies.len()
@@ -66,6 +90,12 @@ impl Built {
 }
 
 impl Done {
+    /// The next run of the same problem and method, from what this one has found.
+    pub fn go_on(self, start: impl FnOnce(Outcome) -> Start) -> Ready {
+        let Self { built, method, outcome, steps, earlier, warnings } = self;
+        Ready { built, method, start: start(outcome), steps, earlier, warnings }
+    }
+
     /// The discrete problem.
     pub fn model(&self) -> &Model {
         &self.built.discrete.model

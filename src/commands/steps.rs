@@ -3,64 +3,58 @@
 //! At a share s of all loads and prescribed displacements, u/s solves the problem of the full loads with the gap d/s and the layer
 //! p(s c)/s. So a step changes gaps and laws alone: no body is assembled, reduced or factored anew.
 
-use super::stages::Built;
+use super::keep::{self, Keep};
+use super::stages::{Done, Ready};
 use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
-use crate::ddm::{self, Method, Observer, Outcome, Row, Settings, Start, Status};
+use crate::ddm::{Method, Observer, Outcome, Row, Start, Status};
 use crate::discretize::{self, Discrete};
 use crate::error::Result;
-use crate::model::{Field, Model};
+use crate::model::{Field, Layer, Model};
 use crate::output::{StepPairReport, StepReport};
 use std::rc::Rc;
 
 /// Runs the steps of a scene, the last of which is its full load, and reports each. The outcome is that of the last one with the
-/// counts and the history of all. A step that ends badly leaves its start to the next one.
+/// counts and the history of all. A step that ends badly leaves its start to the next one; one that a signal ends is the last.
 ///
 /// # Errors
 /// Failures of the solver library.
-pub fn iterate(
-    built: &mut Built,
-    method: &mut Method,
-    settings: Settings,
-    observer: &mut dyn Observer,
-) -> Result<(Outcome, Vec<StepReport>)> {
-    let Built { scene, discrete, .. } = built;
+pub fn iterate(mut ready: Ready, keep: &mut dyn Keep) -> Result<Done> {
+    let scene = ready.built.scene.clone();
     let factors = &scene.method.steps;
-    let laws: Vec<Rc<dyn LayerLaw>> = discrete.model.pairs.iter().map(|pair| pair.law.clone()).collect();
-    let Settings { stop, interval, mut balance, .. } = settings;
-    let mut all = Steps { observer, rows: Vec::new(), factor: 1.0, step: 0, iterations: 0, sweeps: 0, seconds: 0.0 };
-    let (mut reports, mut skipped) = (Vec::new(), 0);
-    let mut before: Option<(Field, f64)> = None;
+    let mut all = Steps::new(keep, &ready);
     loop {
-        let factor = factors[all.step];
+        let (before, factor) = (all.factor, factors[all.step]);
         (all.step, all.factor) = (all.step + 1, factor);
         let last = all.step == factors.len();
-        load(&mut discrete.model, &laws, factor);
-        let start = match before.take() {
-            Some((field, share)) => {
-                if let Method::Sweeps { acceleration, .. } = method {
+        let discrete = &mut ready.built.discrete;
+        load(&mut discrete.model, &all.laws, factor);
+        ready.start = match ready.start {
+            Start::Resume(field) => {
+                if let Method::Sweeps { acceleration, .. } = &mut ready.method {
                     acceleration.restart();
                 }
-                Start::Resume(rescaled(&discrete.model, field, share / factor))
+                Start::Resume(rescaled(&discrete.model, field, before / factor))
             }
-            None => discretize::start(scene, discrete, factor)?.into(),
+            paused @ Start::Continue(_) => paused,
+            _ => discretize::start(&scene, discrete, factor)?.into(),
         };
-        let balance = if last { balance.take() } else { None };
-        let mut settings = Settings { stop: stop.clone(), interval: interval && last, balance, start };
-        let mut outcome = ddm::solve(&mut discrete.model, method, &mut settings, &mut all)?;
-        all.iterations += outcome.iterations;
-        all.sweeps += outcome.sweeps;
-        all.seconds += outcome.rows.last().map_or(0.0, |row| row.seconds);
-        skipped += outcome.solves_skipped;
-        reports.push(report(discrete, &outcome, factor));
-        if last {
-            (outcome.iterations, outcome.sweeps, outcome.solves_skipped) = (all.iterations, all.sweeps, skipped);
-            outcome.rows = all.rows;
-            return Ok((outcome, reports));
+        let mut done = keep::solve(ready, last, &mut all)?;
+        let interrupted = matches!(done.outcome.status, Status::Paused { .. });
+        if interrupted && !last {
+            done.warnings.push(format!(
+                "interrupted in load step {} of {}: pressures and displacements are those of {factor} of the loads",
+                all.step,
+                factors.len()
+            ));
         }
-        if outcome.status.is_solved() || outcome.status == Status::IterationLimit {
-            before = Some((outcome.iterate, factor));
+        if last || interrupted {
+            all.complete(&mut done);
+            return Ok(done);
         }
+        all.end_step(&mut done);
+        let usable = done.outcome.status.is_solved() || done.outcome.status == Status::IterationLimit;
+        ready = done.go_on(|outcome| if usable { Start::Resume(outcome.iterate) } else { Start::Automatic });
     }
 }
 
@@ -113,31 +107,97 @@ pub fn warnings(steps: &[StepReport]) -> Vec<String> {
     bad.map(|(i, step)| format!("load step {} (factor {}): {}", i + 1, step.factor, step.message)).collect()
 }
 
-/// Passes rows on in the units of the scene, numbered through.
+/// Passes rows and results on in the units of the scene, numbered through.
 struct Steps<'a> {
-    observer: &'a mut dyn Observer,
-    rows: Vec<Row>,
+    keep: &'a mut dyn Keep,
+    /// Laws at the full load.
+    laws: Vec<Rc<dyn LayerLaw>>,
     factor: f64,
     /// Steps begun.
     step: usize,
+    /// Counts of the steps before.
     iterations: usize,
     sweeps: usize,
+    skipped: usize,
     seconds: f64,
 }
 
-impl Observer for Steps<'_> {
-    fn row(&mut self, row: &Row) {
+impl<'a> Steps<'a> {
+    /// After the steps that another process made.
+    fn new(keep: &'a mut dyn Keep, ready: &Ready) -> Self {
+        ready.earlier.iter().for_each(|row| keep.row(row));
+        let (sweeps, seconds) = ready.earlier.last().map_or((0, 0.0), |row| (row.sweeps, row.seconds));
+        let iterations = ready.steps.iter().map(|step| step.iterations).sum();
+        let laws = ready.built.discrete.model.pairs.iter().map(|pair| pair.law.clone()).collect();
+        Self { keep, laws, factor: 1.0, step: ready.steps.len(), iterations, sweeps, skipped: 0, seconds }
+    }
+
+    /// A row of this step in the units of the scene.
+    fn whole(&self, row: &Row) -> Row {
         let mut row = row.clone();
         row.step = self.step;
         row.iteration += self.iterations;
         row.sweeps += self.sweeps;
         row.seconds += self.seconds;
         row.energy *= self.factor * self.factor;
-        self.observer.row(&row);
-        self.rows.push(row);
+        row
+    }
+
+    /// Leaves a step for the next one.
+    fn end_step(&mut self, done: &mut Done) {
+        let Done { built, outcome, steps, earlier, .. } = done;
+        steps.push(report(&built.discrete, outcome, self.factor));
+        earlier.extend(outcome.rows.iter().map(|row| self.whole(row)));
+        self.iterations += outcome.iterations;
+        self.sweeps += outcome.sweeps;
+        self.skipped += outcome.solves_skipped;
+        self.seconds += outcome.rows.last().map_or(0.0, |row| row.seconds);
+    }
+
+    /// Brings what this step has found, and the model, to the units of the scene, with the counts and the history of all steps.
+    /// Displacements that supports prescribe are in the states of bodies, or are added to them in full where those are condensed.
+    fn complete(&self, done: &mut Done) {
+        let Done { built, outcome, steps, earlier, .. } = done;
+        steps.push(report(&built.discrete, outcome, self.factor));
+        outcome.iterations += self.iterations;
+        outcome.sweeps += self.sweeps;
+        outcome.solves_skipped += self.skipped;
+        outcome.rows = earlier.iter().cloned().chain(outcome.rows.iter().map(|row| self.whole(row))).collect();
+        if self.factor != 1.0 {
+            load(&mut built.discrete.model, &self.laws, 1.0);
+            outcome.iterate.add_to(self.factor, &Field::zero(&built.discrete.model));
+            let compression = outcome.layer.compression.iter().map(|c| self.factor * c).collect();
+            outcome.layer = Layer::new(&built.discrete.model, compression);
+        }
+    }
+}
+
+impl Observer for Steps<'_> {
+    fn row(&mut self, row: &Row) {
+        let row = self.whole(row);
+        self.keep.row(&row);
+    }
+
+    fn asked(&self) -> u8 {
+        self.keep.asked()
     }
 
     fn note(&mut self, text: &str) {
-        self.observer.note(text);
+        self.keep.note(text);
+    }
+}
+
+impl Keep for Steps<'_> {
+    fn state(&mut self, done: &Done) {
+        self.keep.state(done);
+    }
+
+    fn results(&mut self, done: &mut Done) {
+        let paused = done.outcome.clone();
+        self.complete(done);
+        self.keep.results(done);
+        done.steps.pop();
+        done.outcome = paused;
+        load(&mut done.built.discrete.model, &self.laws, self.factor);
     }
 }

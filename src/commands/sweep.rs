@@ -1,10 +1,14 @@
 //! `winkler sweep`: a scene over values of its keys, one row a run.
 
+use super::asking::Asking;
 use super::clock::Clock;
+use super::keep::Keep;
 use super::run;
+use super::stages::Begin;
 use super::{folder_of, report, results, reuse};
-use crate::ddm::Silent;
+use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
+use crate::interrupt::Interrupt;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::{Folder, Plot, Report, say, sci};
 use crate::parallel::agree;
@@ -27,11 +31,11 @@ pub struct Request {
 }
 
 /// Runs a scene for every combination of values and writes `sweep.csv`, `convergence.svg` and `pressure.svg`; returns the
-/// exit code: that of a run that did not converge, if there is one.
+/// exit code: that of a run that did not converge, if there is one. The run that a signal ends is the last.
 ///
 /// # Errors
 /// Refusals of any scene of the sweep, before the first run; failures of the file system.
-pub fn sweep(session: &Session, request: Request) -> Result<i32> {
+pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Result<i32> {
     let axes = agree(session, request.over.iter().map(|text| axis(text)).collect::<Result<Vec<_>>>())?;
     let runs = combinations(&axes);
     let load = |values: &[String]| {
@@ -46,17 +50,22 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
     let mut exit = 0;
     let (mut reports, mut histories, mut pressures, mut reference) = (Vec::new(), Vec::new(), Vec::new(), None);
     let mut before = None;
+    let mut watched = Watched(Asking::new(interrupt, None));
     for (scene, values) in scenes.iter().zip(&runs) {
         let mut clock = Clock::default();
-        let built = reuse::build(session, scene.clone(), before.take(), &mut clock)?;
-        let ready = run::set_up(session, built, None, &mut clock)?;
-        let done = run::iterate(ready, &mut Silent, &mut clock)?;
+        let built = reuse::build(session, scene.clone(), before.take(), interrupt, &mut clock)?;
+        let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
+        let done = run::iterate(ready, interrupt, &mut watched, &mut clock)?;
         clock.total();
         // the table has nothing from inside the bodies
         let recovered = if request.json { results::recover(&done) } else { results::skipped(&done) };
         let report = report::report(session, &done, &recovered, &clock);
         exit = exit.max(report::exit_code(&done));
+        let interrupted = matches!(done.outcome.status, Status::Paused { .. });
         if !first {
+            if interrupted {
+                break;
+            }
             before = Some(done);
             continue;
         }
@@ -71,7 +80,7 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
                 report.status,
                 report.iterations,
                 sci(report.residual.unwrap_or(f64::NAN), 2)
-            ));
+            ))?;
         }
         histories.push(report::convergence(&label, &done.outcome));
         let pairs = &done.model().pairs;
@@ -82,6 +91,9 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
             }
         }
         reports.push(report);
+        if interrupted {
+            break;
+        }
         before = Some(done);
     }
     if first {
@@ -92,13 +104,26 @@ pub fn sweep(session: &Session, request: Request) -> Result<i32> {
             let list = serde_json::to_string_pretty(&reports).map_err(|cause| {
                 Error::new(Kind::File, "the reports cannot be written as JSON").because(cause.to_string())
             })?;
-            say(format_args!("{list}"));
+            say(format_args!("{list}"))?;
         } else {
-            say(format_args!("results in {}", folder.path().display()));
+            say(format_args!("results in {}", folder.path().display()))?;
         }
     }
     Ok(exit)
 }
+
+/// Nobody looks at the rows of a sweep, but signals are heard.
+struct Watched(Asking);
+
+impl Observer for Watched {
+    fn row(&mut self, _row: &Row) {}
+
+    fn asked(&self) -> u8 {
+        self.0.bits()
+    }
+}
+
+impl Keep for Watched {}
 
 /// One `--over`: key and values. Commas inside brackets, braces, parentheses or quotes do not separate.
 pub(super) fn axis(text: &str) -> Result<(String, Vec<String>)> {

@@ -1,5 +1,6 @@
 //! How a run ended: the name of its status, and in words what happened and what to try.
 
+use super::asking;
 use super::words::in_words;
 use crate::ddm::forecast::{best_factor, best_gamma};
 use crate::ddm::{Outcome, Status};
@@ -17,6 +18,13 @@ pub fn status_name(status: &Status) -> &'static str {
         Status::Underconstrained(_) | Status::Mechanism(_) => "underconstrained",
         Status::Unbounded { .. } => "unbounded",
         Status::InnerSolver { .. } => "inner-solver",
+        Status::Paused { asked } => {
+            if asking::signal(*asked).is_some() {
+                "interrupted"
+            } else {
+                "running"
+            }
+        }
     }
 }
 
@@ -76,6 +84,13 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
             let reason = if failure.reason.is_empty() { "its rank knows more" } else { &failure.reason };
             let whose = failure.body.map_or("all bodies".to_owned(), |body| format!("body `{}`", name(&body)));
             format!("{whose}: the inner solver failed in iteration {k}: {reason}")
+        }
+        Status::Paused { asked } => {
+            let what = match asking::signal_name(*asked) {
+                "" => "snapshot".to_owned(),
+                name => format!("interrupted by {name}"),
+            };
+            format!("{what} after {k} iterations, {} {}", measure(outcome), sci(residual, 1))
         }
     }
 }

@@ -9,27 +9,17 @@
 
 use super::acceleration::{Acceleration, Here, Step};
 use super::coefficient::{Coefficient, underconstrained};
+use super::memory::Last;
 use super::run::{End, Run, Swept};
 use super::stop::Status;
-use super::sweep::{Sweep, Sweeper};
+use super::sweep::Sweeper;
 use crate::error::Result;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
 
-/// The step that led to an iterate.
-pub(super) struct Last {
-    /// The sweep before it.
-    pub sweep: Sweep,
-    /// gamma, if it went along the sweep's correction.
-    pub relaxed: Option<f64>,
-    /// How far it went along its direction.
-    pub length: f64,
-    /// Change of the traces.
-    pub moved: Vec<f64>,
-}
-
-/// Iterates from a displacement until a rule ends it; `linear` serves estimates of the mesh's error.
+/// Iterates from a displacement until a rule ends it; `linear` serves estimates of the mesh's error. A run that goes on has the row of
+/// the displacement already.
 ///
 /// # Errors
 /// Failures of the solver library. Not converging is a status.
@@ -40,33 +30,40 @@ pub(super) fn iterate(
     linear: &mut dyn LinearStep,
     mut u: Field,
 ) -> Result<End> {
-    let mut sweeper = Sweeper::default();
-    let mut last: Option<Last> = None;
-    let end = |status, u, layer, weight, sweeper: &Sweeper| {
-        let (sweeps, skipped) = (sweeper.sweeps, sweeper.solves_skipped);
+    let end = |status, u, layer, weight, run: &Run| {
+        let Sweeper { sweeps, solves_skipped: skipped } = run.memory.sweeper;
         Ok(End { status, iterate: u, layer, weight, sweeps, skipped })
     };
-    for k in 0.. {
+    for k in run.rows.len().saturating_sub(1).. {
         let layer = Layer::at(run.model, &u.trace);
         let weight = coefficient.weight(run.model, &layer, k)?;
         if let Some(moved) = underconstrained(run.model, &weight) {
-            return end(Status::Underconstrained(moved), u, layer, weight, &sweeper);
+            return end(Status::Underconstrained(moved), u, layer, weight, run);
         }
         run.model.robin(&weight)?;
-        let relaxed = last.as_ref().and_then(|last| Some((&last.sweep, last.relaxed?)));
-        let sweep = sweeper.sweep(run.model, &u, &layer, &weight, relaxed)?;
-
-        let reached = last.as_ref().map(|last| (&last.moved[..], last.length));
-        let (amplification, sweeps) = (acceleration.amplification().sqrt(), sweeper.sweeps);
-        let swept = Swept { k, u: &u, layer: &layer, sweep: &sweep, last: reached, amplification, sweeps };
-        if let Some(status) = run.end_of_sweep(&swept, linear)? {
-            return end(status, u, layer, weight, &sweeper);
+        let last = run.memory.last.take();
+        let sweep = match run.memory.sweep.take() {
+            Some(sweep) => sweep,
+            None => {
+                let relaxed = last.as_ref().and_then(|last| Some((&last.sweep, last.relaxed?)));
+                let asked = run.observer.asked();
+                run.memory.sweeper.sweep(run.model, &u, &layer, &weight, relaxed, asked)?
+            }
+        };
+        if k == run.rows.len() {
+            let reached = last.as_ref().map(|last| (&last.moved[..], last.length));
+            let (amplification, sweeps) = (acceleration.amplification().sqrt(), run.memory.sweeper.sweeps);
+            let swept = Swept { k, u: &u, layer: &layer, sweep: &sweep, last: reached, amplification, sweeps };
+            if let Some(status) = run.end_of_sweep(&swept, linear)? {
+                run.memory.sweep = Some(sweep);
+                return end(status, u, layer, weight, run);
+            }
         }
-        let residual = run.rows[run.rows.len() - 1].residual;
+        let residual = run.rows[k].residual;
         let mut here = Here { model: run.model, k, layer: &layer, weight: &weight, sweep: &sweep, residual };
         let (direction, length, relaxed) = match acceleration.step(&mut here)? {
             Step::Unbounded => {
-                return end(Status::Unbounded { moving: Vec::new() }, u, layer, weight, &sweeper);
+                return end(Status::Unbounded { moving: Vec::new() }, u, layer, weight, run);
             }
             Step::Sweep(gamma) => (None, gamma, Some(gamma)),
             Step::Along(direction, length) => (Some(direction), length, None),
@@ -74,7 +71,7 @@ pub(super) fn iterate(
         let direction = direction.as_ref().unwrap_or(&sweep.correction);
         u.add(length, direction);
         let moved = direction.trace.iter().map(|t| length * t).collect();
-        last = Some(Last { sweep, relaxed, length, moved });
+        run.memory.last = Some(Last { sweep, relaxed, length, moved });
     }
     unreachable!("the limit of iterations ends the loop")
 }

@@ -1,12 +1,14 @@
 //! What both loops share: the history of a run, its scales, when it ends, and who is told of it.
 
+use super::asks::{ASKS, joined, numbers};
 use super::balance::Balance;
 use super::bound::Reached;
 use super::history::{Observer, Row};
+use super::memory::Memory;
 use super::origin::Origin;
 use super::scale::Scale;
-use super::steady::{Steady, most_apart};
-use super::stop::{Cycle, Floor, Status, relative_increment};
+use super::steady::most_apart;
+use super::stop::{Status, relative_increment};
 use super::sweep::Sweep;
 use crate::error::Result;
 use crate::model::Model;
@@ -24,15 +26,17 @@ pub(super) struct Run<'a> {
     pub balance: Option<Balance>,
     pub observer: &'a mut dyn Observer,
     pub began: Instant,
+    /// Seconds that it had taken before.
+    pub earlier: f64,
     pub origin: Option<Origin>,
     pub scale: Scale,
-    pub cycle: Cycle,
-    pub floor: Floor,
-    /// Pressures of earlier sweeps, and of the last.
-    pub steady: Steady,
-    pub before: Option<Vec<f64>>,
+    pub memory: Memory,
+    /// From its first iterate on, also where it goes on.
     pub rows: Vec<Row>,
 }
+
+/// Numbers in the message of a step, beside what is asked.
+const SUMS: usize = 4;
 
 /// How a loop ended.
 pub(super) struct End {
@@ -48,14 +52,6 @@ pub(super) struct End {
     pub skipped: usize,
 }
 
-impl End {
-    /// After a linear step that failed.
-    pub fn failed(failure: Failure, iterate: Field, layer: Layer, sweeps: usize) -> Self {
-        let status = Status::InnerSolver(failure);
-        Self { status, iterate, layer, weight: Vec::new(), sweeps, skipped: 0 }
-    }
-}
-
 /// What every rank knows of an iterate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Measured {
@@ -65,13 +61,17 @@ pub(super) struct Measured {
     pub f1: f64,
     pub factorizations: usize,
     pub inner_iterations: usize,
+    /// What ranks were asked for.
+    pub asked: u8,
 }
 
 impl Run<'_> {
     /// Sums over the ranks what bodies know of an iterate; `energy` is that of the bodies that live here, `layer` the layers at
     /// their compressions.
     pub fn measure(&self, energy: Energy, layer: &Layer, linear: &dyn LinearStep) -> Measured {
-        let mut sums = [energy.strain, energy.potential, 0.0, 0.0];
+        let mut sums = [0.0; SUMS + ASKS];
+        (sums[0], sums[1]) = (energy.strain, energy.potential);
+        sums[SUMS..].copy_from_slice(&numbers(self.observer.asked()));
         for body in self.model.bodies.iter().filter_map(|slot| slot.local.as_ref()) {
             let counts = body.counts();
             sums[2] += counts.factorizations as f64;
@@ -84,6 +84,7 @@ impl Run<'_> {
             f1: sums[1] + layer.energy.iter().sum::<f64>(),
             factorizations: sums[2] as usize + joint.factorizations,
             inner_iterations: sums[3] as usize + joint.inner_iterations,
+            asked: joined(&sums[SUMS..]),
         }
     }
 
@@ -107,7 +108,7 @@ impl Run<'_> {
             points: self.model.points(),
             factorizations: measured.factorizations,
             inner_iterations: measured.inner_iterations,
-            seconds: self.began.elapsed().as_secs_f64(),
+            seconds: self.earlier + self.began.elapsed().as_secs_f64(),
             ..Row::default()
         }
     }
@@ -116,6 +117,16 @@ impl Run<'_> {
     pub fn push(&mut self, row: Row) {
         self.observer.row(&row);
         self.rows.push(row);
+    }
+
+    /// The end of Newton's method at an iterate with its layers.
+    pub fn end(&self, status: Status, iterate: Field, layer: Layer, linear: &dyn LinearStep) -> End {
+        End { status, iterate, layer, weight: Vec::new(), sweeps: self.sweeps(linear), skipped: 0 }
+    }
+
+    /// Sweeps that the linear steps of this run have made.
+    fn sweeps(&self, linear: &dyn LinearStep) -> usize {
+        self.memory.earlier + linear.sweeps() - self.memory.foreign
     }
 
     /// Whether these errors are as small as was asked for.
@@ -139,7 +150,7 @@ impl Run<'_> {
         let k = self.rows.len() + 1;
         let mut row = self.row(k, u, Some(&x.trace), measured, places.closed);
         (row.residual, row.error, row.is_bound) = (reached.worst(), reached.error, reached.is_bound);
-        (row.gamma, row.sweeps) = (1.0, linear.sweeps());
+        (row.gamma, row.sweeps) = (1.0, self.sweeps(linear));
         let increment = row.increment;
         self.push(row);
         let worst = reached.worst();
@@ -156,10 +167,10 @@ impl Run<'_> {
             return Ok(Some(Status::Converged));
         }
         let closed = places.compression.iter().map(|&c| c > 0.0);
-        if let Some(period) = self.cycle.period(&u.trace, closed, worst, measured.f1) {
+        if let Some(period) = self.memory.cycle.period(&u.trace, closed, worst, measured.f1) {
             return Ok(Some(Status::Cycle { period }));
         }
-        if self.floor.is_reached(worst) {
+        if self.memory.floor.is_reached(worst) {
             let floor = rounding(self.model, u, places).sqrt();
             let reference = self.scale.energy(measured.strain + places.work).sqrt();
             if reached.error * reference <= floor {
@@ -200,6 +211,7 @@ impl Run<'_> {
             f1: potential + layer.energy.iter().sum::<f64>(),
             factorizations: sweep.factorizations,
             inner_iterations: sweep.inner_iterations,
+            asked: sweep.asked,
         };
         let mut row = self.row(k, u, last.map(|last| last.0), &measured, layer.closed);
         row.residual = self.scale.relative(decrement, strain + layer.work);
@@ -218,30 +230,33 @@ impl Run<'_> {
         let imbalance = self.scale.imbalance(self.model, &layer.force);
         // a small residual of a slow mode is no small error: the pressures stand still, too
         let steady = self.stop.residual.is_none_or(|tolerance| {
-            let before = self.before.replace(layer.pressure.clone());
+            let before = self.memory.before.replace(layer.pressure.clone());
             let moved = before.map_or(0.0, |before| most_apart(&before, &layer.pressure));
             let peak = self.scale.peak(&layer.pressure);
-            let missing = self.steady.missing(residual, &layer.pressure, peak);
+            let missing = self.memory.steady.missing(residual, &layer.pressure, peak);
             moved <= MOVED * tolerance * peak && missing <= tolerance * peak && imbalance <= SPARE * tolerance
         });
         let steady = steady && self.stop.increment.is_none_or(|tolerance| imbalance <= SPARE * tolerance);
         if self.stop.is_met(residual, increment) && steady {
             return Ok(Some(Status::Converged));
         }
-        self.steady.note(residual, &layer.pressure);
+        self.memory.steady.note(residual, &layer.pressure);
         if let Some(balance) = &mut self.balance
             && balance.is_met(self.model, linear, u, layer, error)?
         {
             return Ok(Some(Status::Converged));
         }
         let closed = layer.compression.iter().map(|&c| c > 0.0);
-        if let Some(period) = self.cycle.period(&u.trace, closed, residual, measured.f1) {
+        if let Some(period) = self.memory.cycle.period(&u.trace, closed, residual, measured.f1) {
             return Ok(Some(Status::Cycle { period }));
         }
-        if self.floor.is_reached(residual) && decrement <= rounding(self.model, u, layer) {
+        if self.memory.floor.is_reached(residual) && decrement <= rounding(self.model, u, layer) {
             return Ok(Some(Status::RoundoffLimited));
         }
-        Ok((k >= self.stop.iterations).then_some(Status::IterationLimit))
+        if k >= self.stop.iterations {
+            return Ok(Some(Status::IterationLimit));
+        }
+        Ok((measured.asked != 0).then_some(Status::Paused { asked: measured.asked }))
     }
 }
 

@@ -8,12 +8,13 @@ use super::forecast::Forecast;
 use super::history::{Observer, Row};
 use super::interval::{Interval, interval};
 use super::linear::resisting;
+use super::memory::Memory;
 use super::origin::Origin;
 use super::run::{End, Run};
 use super::scale::Scale;
 use super::start::{self, RigidStart};
-use super::stop::{Cycle, Floor, Status};
-use super::{newton, robin};
+use super::stop::Status;
+use super::{digits, newton, robin};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::body::BodyCounts;
@@ -67,6 +68,21 @@ pub enum Start {
     Pressure(Vec<f64>),
     /// A displacement as it is.
     Resume(Field),
+    /// Where another run paused.
+    Continue(Box<State>),
+}
+
+/// What a run goes on from.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// Displacements. If the states of a body are not those that its solver works with, its traces count.
+    pub field: Field,
+    /// Compressions of the layers' places, n.
+    pub compression: Vec<f64>,
+    /// History up to there.
+    pub rows: Vec<Row>,
+    /// What the run remembers; none if it comes from a file.
+    pub memory: Option<Memory>,
 }
 
 impl From<Option<Vec<f64>>> for Start {
@@ -89,6 +105,7 @@ pub struct Settings {
 }
 
 /// Result of a run: the last iterate that made sense, and how it came about.
+#[derive(Clone)]
 pub struct Outcome {
     /// How it ended.
     pub status: Status,
@@ -104,12 +121,16 @@ pub struct Outcome {
     pub layer: Layer,
     /// History, one row an iterate.
     pub rows: Vec<Row>,
+    /// What it remembers besides.
+    pub memory: Option<Memory>,
     /// Name of the method.
     pub method: &'static str,
     /// What was done with all bodies together, besides what bodies count themselves.
     pub joint: BodyCounts,
     /// Estimated bounds of the spectrum of G^-1 F1'', if the method saw enough.
     pub spectrum: Option<(f64, f64)>,
+    /// What rounding of gaps and displacements can make of a pressure, as a share of the largest.
+    pub rounding: f64,
     /// What it would still need to the residual that is asked for, where that can be told.
     pub forecast: Option<Forecast>,
     /// The interval (33) of gamma, if it was asked for and can be told.
@@ -144,28 +165,34 @@ pub fn solve(
     let places = places(model, &begin, &rigid);
     // an estimate of the discretisation's error needs the iterates whole
     let origin = if floats && settings.balance.is_none() { Origin::take(model, &rigid.amounts) } else { None };
+    let patience = PATIENCE[usize::from(matches!(method, Method::Sweeps { .. }))];
+    let (mut rows, mut memory) = (Vec::new(), None);
     let resumed = match begin {
-        Start::Resume(mut field) => {
-            if let Some(origin) = &origin {
-                origin.take_from(model, &mut field);
-            }
-            Some(field)
+        Start::Resume(field) => Some(field),
+        Start::Continue(state) => {
+            (rows, memory) = (state.rows, state.memory);
+            trace.clone_from(&state.field.trace);
+            if memory.is_some() || fits(model, &state.field) { Some(state.field) } else { None }
         }
         _ => None,
     };
+    let relative = |mut field| {
+        origin.iter().for_each(|origin| origin.take_from(model, &mut field));
+        field
+    };
+    let resumed = resumed.map(relative);
+    let foreign = method.linear().sweeps();
     let mut run = Run {
         model,
         stop: &settings.stop,
         balance: settings.balance.take().map(Balance::new),
         observer,
         began,
+        earlier: rows.last().map_or(0.0, |row: &Row| row.seconds),
         origin,
         scale,
-        cycle: Cycle::default(),
-        floor: Floor::new(PATIENCE[usize::from(matches!(method, Method::Sweeps { .. }))]),
-        steady: Default::default(),
-        before: None,
-        rows: Vec::new(),
+        memory: memory.unwrap_or_else(|| Memory::new(patience, &rows, foreign)),
+        rows,
     };
     let end = match method {
         Method::Newton(linear) => {
@@ -179,11 +206,26 @@ pub fn solve(
             }
             match resumed.map_or_else(|| extend(run.model, &trace), |field| Ok(Ok(field)))? {
                 Ok(u) => robin::iterate(&mut run, &mut **acceleration, coefficient, &mut **linear, u)?,
-                Err(failure) => End::failed(failure, Field::rest(run.model), places, 0),
+                Err(failure) => run.end(Status::InnerSolver(failure), Field::rest(run.model), places, &**linear),
             }
         }
     };
     run.conclude(end, method, settings)
+}
+
+/// Whether a field has the states that the bodies work with: as long, and with its traces to half the digits. Collective.
+fn fits(model: &Model, field: &Field) -> bool {
+    let local =
+        || model.bodies.iter().zip(&field.states).filter_map(|(slot, state)| Some((slot.local.as_ref()?, state)));
+    let mut odd = [local().filter(|(body, state)| body.len() != state.len()).count() as f64];
+    model.exchange.sum(&mut odd);
+    if odd[0] > 0.0 {
+        return false;
+    }
+    let mut traced = field.clone();
+    traced.retrace(model);
+    let apart = traced.trace.iter().zip(&field.trace).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    apart <= f64::EPSILON * crate::linalg::dot(&field.trace, &field.trace)
 }
 
 /// Springs omega kappa of the first linear step of Newton's method; none if there is no solution.
@@ -212,6 +254,10 @@ fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
             Err(_) => start::at(model, trace),
         },
         Start::Resume(field) => Layer::at(model, &field.trace),
+        Start::Continue(state) => {
+            let paused = state.memory.as_ref().and_then(|memory| memory.places.clone());
+            paused.unwrap_or_else(|| Layer::new(model, state.compression.clone()))
+        }
         Start::Pressure(pressure) => {
             let mut compression = Vec::with_capacity(pressure.len());
             for (i, pair) in model.pairs.iter().enumerate() {
@@ -223,6 +269,12 @@ fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
 }
 
 impl Outcome {
+    /// What a run can go on from.
+    pub fn into_state(self) -> Box<State> {
+        let Self { iterate: field, layer, rows, memory, .. } = self;
+        Box::new(State { field, compression: layer.compression, rows, memory })
+    }
+
     /// Of a run that ended before its first iterate.
     fn early(status: Status, model: &Model, method: &Method) -> Self {
         let iterate = Field::rest(model);
@@ -234,9 +286,11 @@ impl Outcome {
             layer: Layer::at(model, &iterate.trace),
             iterate,
             rows: Vec::new(),
+            memory: None,
             method: method.name(),
             joint: BodyCounts::default(),
             spectrum: None,
+            rounding: 0.0,
             forecast: None,
             interval: None,
         }
@@ -246,7 +300,7 @@ impl Outcome {
 impl Run<'_> {
     /// The result of a loop's end.
     fn conclude(self, end: End, method: &mut Method, settings: &Settings) -> Result<Outcome> {
-        let Run { model, rows, origin, .. } = self;
+        let Run { model, rows, origin, memory, .. } = self;
         let End { status, mut iterate, layer, weight, sweeps, skipped } = end;
         let mut found = None;
         let (spectrum, factor, updates) = match method {
@@ -262,6 +316,7 @@ impl Run<'_> {
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
+        let rounding = digits::lost(model, &iterate.trace, &layer);
         Ok(Outcome {
             status,
             iterations: updates,
@@ -269,8 +324,10 @@ impl Run<'_> {
             solves_skipped: skipped,
             iterate,
             layer,
+            rounding,
             forecast: settings.stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
             rows,
+            memory: Some(memory),
             method: method.name(),
             joint: method.linear().counts(),
             spectrum,

@@ -12,7 +12,7 @@ const FALLEN: f64 = 0.1;
 const NEXT: f64 = 0.3;
 
 /// Pressures of earlier iterates, with residuals that fall from each to the next.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub struct Steady {
     past: Vec<(f64, Vec<f64>)>,
 }

@@ -36,6 +36,11 @@ pub enum Status {
     },
     /// An inner solver failed.
     InnerSolver(Failure),
+    /// Somebody outside asked for it; the run can go on from its outcome.
+    Paused {
+        /// The bits of [`Observer::asked`](super::Observer::asked) of all ranks.
+        asked: u8,
+    },
 }
 
 impl Status {
@@ -53,7 +58,7 @@ pub fn relative_increment(step: &[f64], now: &[f64]) -> f64 {
 }
 
 /// Watches for progress: at the rounding floor the error stays where it is.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Floor {
     best: f64,
     since: usize,
@@ -85,7 +90,7 @@ impl Floor {
 
 /// Recognises an iteration that runs in a circle: the same traces again, or the same contact sets again and again without
 /// progress.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub struct Cycle {
     recent: VecDeque<Vec<f64>>,
     /// Contact sets of the last iterates, as hashes, and the least residual and F1 up to each.

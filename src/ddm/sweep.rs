@@ -1,5 +1,6 @@
 //! One sweep (41): every body solves its own linear problem, independently.
 
+use super::asks::{ASKS, joined, numbers};
 use crate::error::Result;
 use crate::linalg::{axpy, dot};
 use crate::model::Model;
@@ -28,6 +29,8 @@ pub struct Sweep {
     pub factorizations: usize,
     /// Krylov iterations so far, all bodies.
     pub inner_iterations: usize,
+    /// What ranks were asked for.
+    pub asked: u8,
     /// y'z for another residual y, if one was given.
     pub product: f64,
     /// Whether each body was open: no pressure and no Robin term.
@@ -41,7 +44,7 @@ fn is_multiple(r: &[f64], s: f64, r0: &[f64]) -> bool {
 }
 
 /// Does sweeps and remembers what need not be done again.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub struct Sweeper {
     /// Sweeps done.
     pub sweeps: usize,
@@ -54,7 +57,8 @@ impl Sweeper {
     /// (`weight` = omega psi kappa of the contact rows).
     ///
     /// A body without pressure and Robin term now and in the `last` sweep (which led here with relaxation gamma) has
-    /// r = (1 - gamma) r_last and the same G: its z is known and nothing is solved, as long as rounding is far below r.
+    /// r = (1 - gamma) r_last and the same G: its z is known and nothing is solved, as long as rounding is far below r. What this
+    /// rank was `asked` for goes with the message.
     ///
     /// # Errors
     /// Failures of the solver library.
@@ -65,6 +69,7 @@ impl Sweeper {
         layer: &Layer,
         weight: &[f64],
         last: Option<(&Sweep, f64)>,
+        asked: u8,
     ) -> Result<Sweep> {
         let mut energies = Vec::new();
         let mut open = Vec::new();
@@ -91,7 +96,7 @@ impl Sweeper {
             })
         };
         let known: Vec<_> = (0..model.bodies.len()).map(known).collect();
-        let mut sweep = self.solve(model, residual, known, energies, None)?;
+        let mut sweep = self.solve(model, residual, known, energies, None, asked)?;
         sweep.open = open;
         Ok(sweep)
     }
@@ -102,7 +107,7 @@ impl Sweeper {
     /// Failures of the solver library.
     pub fn precondition(&mut self, model: &mut Model, residual: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Result<Sweep> {
         let bodies = model.bodies.len();
-        self.solve(model, residual, vec![None; bodies], vec![Energy::default(); bodies], Some(other))
+        self.solve(model, residual, vec![None; bodies], vec![Energy::default(); bodies], Some(other), 0)
     }
 
     fn solve(
@@ -112,10 +117,13 @@ impl Sweeper {
         mut known: Vec<Option<Vec<f64>>>,
         energies: Vec<Energy>,
         other: Option<&[Vec<f64>]>,
+        asked: u8,
     ) -> Result<Sweep> {
         let (bodies, rows) = (model.bodies.len(), 2 * model.points());
-        // one message: traces, then SCALARS of each body
-        let mut buffer = vec![0.0; rows + SCALARS * bodies];
+        // one message: traces, then SCALARS of each body, and what is asked
+        let end = rows + SCALARS * bodies;
+        let mut buffer = vec![0.0; end + ASKS];
+        buffer[end..].copy_from_slice(&numbers(asked));
         let mut sweep = Sweep::default();
         let mut reasons = vec![String::new(); bodies];
         for index in 0..bodies {
@@ -158,7 +166,8 @@ impl Sweeper {
             sweep.correction.states.push(z);
         }
         model.exchange.sum(&mut buffer);
-        for (index, scalars) in buffer[rows..].chunks_exact(SCALARS).enumerate() {
+        sweep.asked = joined(&buffer[end..]);
+        for (index, scalars) in buffer[rows..end].chunks_exact(SCALARS).enumerate() {
             sweep.decrement.push(scalars[0]);
             sweep.energy.push(Energy { strain: scalars[1], potential: scalars[2] });
             if scalars[3] != 0.0 && sweep.failed.is_none() {

@@ -1,8 +1,9 @@
 //! The cache of meshes that Gmsh made: one file for each script, set of numbers, order, dimension and Gmsh.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 use sha2::{Digest, Sha256};
 use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -52,6 +53,9 @@ fn choose(variable: impl Fn(&str) -> Option<PathBuf>) -> Vec<PathBuf> {
     .collect()
 }
 
+/// Bytes that a disk must still take after a mesh failed, else it was full: some pages, more than what the end of a file leaves.
+const ROOM: usize = 1 << 16;
+
 /// A folder of one process inside the cache, gone with its last use: files are finished there and then moved, so that
 /// nobody ever reads half a file. What a killed process left is removed by the next one.
 pub struct Workshop {
@@ -86,14 +90,29 @@ impl Workshop {
                 Err(cause) => failure = Some(failure.unwrap_or(Error::file(&folder, "create", &cause))),
             }
         }
-        let error =
-            failure.unwrap_or_else(|| Error::new(crate::error::Kind::File, "there is no folder for the mesh cache"));
+        let error = failure.unwrap_or_else(|| Error::new(Kind::File, "there is no folder for the mesh cache"));
         Err(error.help("meshes are kept there: name a folder that can be written in $WINKLER_CACHE"))
     }
 
     /// The folder to work in.
     pub fn path(&self) -> &Path {
         &self.folder
+    }
+
+    /// The error of a mesh that could not be made, or that of the disk, if it is full: then Gmsh leaves half a file.
+    pub fn blame(&self, error: Error) -> Error {
+        if error.kind() != Kind::Mesh {
+            return error;
+        }
+        let probe = self.folder.join("probe");
+        let written =
+            File::create(&probe).and_then(|mut file| file.write_all(&[0; ROOM]).and_then(|()| file.sync_all()));
+        let _ = std::fs::remove_file(&probe);
+        match written {
+            Ok(()) => error,
+            Err(cause) => Error::file(&self.cache, "write the mesh to", &cause)
+                .help("meshes are kept there: free some space, or name a folder on another disk in $WINKLER_CACHE"),
+        }
     }
 
     /// Moves a finished file into the cache, over an older one, and gives its place there.
@@ -177,6 +196,14 @@ mod tests {
         let file = workshop.path().join("a");
         std::fs::write(&file, "a").unwrap();
         assert_eq!(workshop.publish(&file, "b.msh").unwrap(), good.join("b.msh"));
+        let blamed = |error: Error| workshop.blame(error).message().to_owned();
+        assert_eq!(blamed(Error::new(Kind::Mesh, "no mesh")), "no mesh");
+        let left = std::fs::read_dir(workshop.path()).unwrap().map(|entry| entry.unwrap().file_name());
+        assert_eq!(left.collect::<Vec<_>>(), ["lock"]);
+        // a folder that takes nothing any more is at fault, if the mesh is
+        std::fs::remove_dir_all(workshop.path()).unwrap();
+        assert_eq!(blamed(Error::new(Kind::Solver, "no memory")), "no memory");
+        assert_eq!(blamed(Error::new(Kind::Mesh, "no mesh")), format!("cannot write the mesh to {}", good.display()));
         drop(workshop);
         assert_eq!(std::fs::read_dir(&good).unwrap().count(), 1);
         let error = Workshop::open(&[blocked]).err().unwrap().to_string();

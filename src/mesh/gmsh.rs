@@ -2,8 +2,10 @@
 
 use super::guard::{self, End};
 use crate::error::{Error, Kind, Result};
+use crate::interrupt::{self, Interrupt};
 use crate::problem::mesh::Guard;
 use crate::problem::order::Order;
+use signal_hook::consts::SIGXFSZ;
 use std::fs::File;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -31,6 +33,8 @@ pub struct Task<'a> {
     pub order: Order,
     /// What it may take.
     pub guard: &'a Guard,
+    /// What may end it.
+    pub interrupt: &'a Interrupt,
 }
 
 impl Gmsh {
@@ -59,7 +63,7 @@ impl Gmsh {
     /// change meshes without changing the key in the cache. What Gmsh says goes to a file there.
     ///
     /// # Errors
-    /// Gmsh fails; its own messages are the causes. It takes more time or memory than it may.
+    /// Gmsh fails; its own messages are the causes. It takes more time or memory than it may. A signal, or a limit on the size of files, ends it.
     pub fn run(&self, task: &Task, output: &Path, home: &Path) -> Result<()> {
         let bytes = guard::bytes(task.guard);
         let mut command = guard::command(&self.program, bytes);
@@ -94,7 +98,7 @@ impl Gmsh {
                 command.env_remove(&name);
             }
         }
-        let end = guard::run(&mut command, task.guard.seconds, "Gmsh is meshing")
+        let end = guard::run(&mut command, task.guard.seconds, task.interrupt, "Gmsh is meshing")
             .map_err(|cause| Error::file(&self.program, "run", &cause))?;
         let refuse = |message: String| Error::mesh(task.shown, None, message);
         let status = match end {
@@ -102,6 +106,11 @@ impl Gmsh {
                 return Err(refuse(format!("Gmsh has not finished this script after {} s", task.guard.seconds)).help(
                     "a number in it may be far too large, or not a number; to wait longer set `timeout` in `mesh`",
                 ));
+            }
+            End::Asked(signal) => return Err(interrupt::ended(signal)),
+            End::Itself(status) if status.signal() == Some(SIGXFSZ) => {
+                return Err(Error::file(output, "write", &std::io::ErrorKind::FileTooLarge.into())
+                    .help("there is a limit on the size of files (ulimit -f)"));
             }
             End::Itself(status) if status.success() && output.is_file() => return Ok(()),
             End::Itself(status) => status,

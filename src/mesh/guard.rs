@@ -1,5 +1,6 @@
 //! Runs a program with limits of time and memory, which ends with this one.
 
+use crate::interrupt::Interrupt;
 use crate::problem::mesh::Guard;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io;
@@ -13,6 +14,8 @@ pub enum End {
     Itself(ExitStatus),
     /// It took too long.
     TimedOut,
+    /// A signal asked for its end.
+    Asked(i32),
 }
 
 /// A program of $PATH.
@@ -57,11 +60,11 @@ const QUIET: Duration = Duration::from_secs(1);
 /// Longest pause between two looks at the program.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// Runs a command to its end, or to `limit` seconds; `doing` says what it does ("Gmsh is meshing").
+/// Runs a command to its end, to a signal, or to `limit` seconds; `doing` says what it does ("Gmsh is meshing").
 ///
 /// # Errors
 /// The program cannot be started.
-pub fn run(command: &mut Command, limit: f64, doing: &str) -> io::Result<End> {
+pub fn run(command: &mut Command, limit: f64, interrupt: &Interrupt, doing: &str) -> io::Result<End> {
     let began = Instant::now();
     let mut child = command.spawn()?;
     let mut bar: Option<ProgressBar> = None;
@@ -70,10 +73,11 @@ pub fn run(command: &mut Command, limit: f64, doing: &str) -> io::Result<End> {
             break End::Itself(status);
         }
         let elapsed = began.elapsed();
-        if elapsed.as_secs_f64() > limit {
+        let asked = interrupt.asked().map(End::Asked);
+        if let Some(end) = asked.or_else(|| (elapsed.as_secs_f64() > limit).then_some(End::TimedOut)) {
             child.kill()?;
             child.wait()?;
-            break End::TimedOut;
+            break end;
         }
         if elapsed >= QUIET {
             let bar = bar.get_or_insert_with(line);
@@ -111,10 +115,12 @@ mod tests {
     #[test]
     fn what_takes_too_long_or_too_much_is_ended() {
         let began = Instant::now();
-        assert!(matches!(run(&mut sleep(None), 0.1, ""), Ok(End::TimedOut)));
+        assert!(matches!(run(&mut sleep(None), 0.1, &Interrupt::default(), ""), Ok(End::TimedOut)));
         assert!(began.elapsed() < Duration::from_secs(4));
         // no program can be loaded into a hundred kilobytes
-        assert!(matches!(run(&mut sleep(Some(100_000)), 9.0, ""), Ok(End::Itself(status)) if !status.success()));
+        assert!(
+            matches!(run(&mut sleep(Some(100_000)), 9.0, &Interrupt::default(), ""), Ok(End::Itself(status)) if !status.success())
+        );
         assert!(began.elapsed() < Duration::from_secs(4));
         assert_eq!(available("MemTotal: 9 kB\nMemAvailable:   20 kB\n"), Some(20_480));
     }

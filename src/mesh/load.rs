@@ -5,6 +5,7 @@ use super::gmsh::{Gmsh, Task};
 use super::script::Script;
 use super::{Mesh, msh};
 use crate::error::{Error, Located, Result};
+use crate::interrupt::Interrupt;
 use crate::problem::mesh::{Guard, MeshSource, Sizing};
 use crate::problem::order::Order;
 use std::path::{Path, PathBuf};
@@ -40,13 +41,21 @@ pub enum Origin {
 /// A file that cannot be read, a number that the script does not take, Gmsh missing or failing, a mesh that is not one
 /// of named simplices in `D` dimensions (see [`read`](super::read)), or of too low an order.
 pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<D>> {
+    load_unless(source, order, &Interrupt::default())
+}
+
+/// [`load`], unless a signal ends it.
+///
+/// # Errors
+/// Those of [`load`], and the signal.
+pub fn load_unless<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes, guard } => {
             let script = Script::read(&file.value).map_err(|error| error.at(&file.place))?;
             for ((name, _), place) in set.iter().zip(places) {
                 script.check(name, &Located::new(file.value.clone(), place.clone()))?;
             }
-            from_script(file, set, sizes.as_ref(), order, guard, &folders())?
+            from_script(file, set, sizes.as_ref(), order, (guard, interrupt), &folders())?
         }
         MeshSource::Msh { file } => from_file(file, order)?,
     };
@@ -58,7 +67,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<
 
 fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order) -> Result<Loaded<D>> {
     let path = &file.value;
-    let bytes = std::fs::read(path).map_err(|cause| Error::file(path, "read", &cause).at(&file.place))?;
+    let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
     let mesh = msh::parse(path, &bytes, false)?;
     let mesh = match (mesh.order, order) {
         (Order::P2, Order::P1) => mesh.lower_order(),
@@ -81,7 +90,7 @@ pub(super) fn from_script<const D: usize>(
     set: &[(String, f64)],
     sizes: Option<&Sizing>,
     order: Order,
-    guard: &Guard,
+    (guard, interrupt): (&Guard, &Interrupt),
     folders: &[PathBuf],
 ) -> Result<Loaded<D>> {
     let path = &file.value;
@@ -111,10 +120,11 @@ pub(super) fn from_script<const D: usize>(
         None => (None, 1.0),
     };
     let script = sized.as_deref().unwrap_or(path);
-    let task = Task { script, shown: path, set, times, dimension: D, order, guard };
-    gmsh.run(&task, &made, workshop.path())?;
-    let bytes = std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause))?;
-    let mesh = checked(path, &bytes, order)?;
+    let task = Task { script, shown: path, set, times, dimension: D, order, guard, interrupt };
+    let ran = gmsh.run(&task, &made, workshop.path());
+    let read = ran.and_then(|()| std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause)));
+    // half a file is no fault of the script
+    let mesh = read.and_then(|bytes| checked(path, &bytes, order)).map_err(|error| workshop.blame(error))?;
     Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })
 }
 

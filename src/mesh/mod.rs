@@ -26,7 +26,7 @@ mod trust;
 
 pub use check::{Asked, Checked, Duty, Parts};
 pub use groups::{Group, Groups};
-pub use load::{Loaded, Origin, keep_final, load, recall_final};
+pub use load::{Loaded, Origin, keep_final, load, load_unless, recall_final};
 pub use msh::{parse, read};
 pub use quality::Quality;
 pub use sizes::{follows, unstructured, view};

@@ -15,7 +15,7 @@ use std::path::Path;
 /// Everything that makes the file no mesh of named simplices in `D` dimensions is a [`Kind::Mesh`](crate::error::Kind)
 /// error with the line or byte and a way out.
 pub fn read<const D: usize>(path: &Path) -> Result<Mesh<D>> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::file(path, "read", &cause))?;
+    let bytes = crate::file::read(path)?;
     parse(path, &bytes, false)
 }
 

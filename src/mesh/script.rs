@@ -47,7 +47,7 @@ impl Script {
         let mut next = 0;
         while let Some(path) = found.get(next).cloned() {
             next += 1;
-            let bytes = std::fs::read(&path).map_err(|cause| Error::file(&path, "read", &cause))?;
+            let bytes = crate::file::read(&path)?;
             // Gmsh looks for a file beside the one that names it. Every quoted name of a file counts, so that
             // `Merge "part.step"` and the like need no list of commands.
             let folder = path.parent().unwrap_or(Path::new(""));

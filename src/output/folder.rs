@@ -28,6 +28,7 @@ impl Folder {
         fs::create_dir_all(&path).map_err(|cause| {
             Error::file(&path, "create the folder", &cause).help("name a folder that can be made with `-o FOLDER`")
         })?;
+        remove_parts(&path);
         let probe = path.join(format!(".winkler-{}", std::process::id()));
         File::create(&probe).and_then(|_| fs::remove_file(&probe)).map_err(|cause| {
             Error::file(&path, "write to the folder", &cause)
@@ -116,6 +117,18 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<
     })
 }
 
+/// Removes the temporary files of processes that were killed while they wrote; what cannot be removed is litter, not an error.
+fn remove_parts(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let process = name.strip_prefix('.').and_then(|name| name.strip_suffix(".part")?.rsplit_once('.'));
+        let is_dead = |id: &str| id.parse::<u32>().is_ok() && !Path::new("/proc").join(id).exists();
+        if process.is_some_and(|(_, id)| is_dead(id)) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
 /// The error for a file that could not be written.
 pub(super) fn failed(path: &Path, cause: &io::Error) -> Error {
     let help = match cause.kind() {
@@ -181,6 +194,20 @@ mod tests {
         assert!(error.advice().unwrap().contains("space"), "{error}");
         assert_eq!(fs::read_to_string(folder.path().join("x.txt")).unwrap(), "whole");
         assert_eq!(names(folder.path()), ["x.txt"]);
+    }
+
+    #[test]
+    fn parts_of_the_dead_are_removed() {
+        let base = tempfile::tempdir().unwrap();
+        let own = format!(".x.txt.{}.part", std::process::id());
+        // no process has this number: it is above the largest that the kernel gives
+        for name in [".x.txt.4194305.part", ".notes.part", "x.4194305.part", &own] {
+            fs::write(base.path().join(name), "").unwrap();
+        }
+        Folder::create(base.path()).unwrap();
+        let mut left = [own.as_str(), ".notes.part", "x.4194305.part"];
+        left.sort_unstable();
+        assert_eq!(names(base.path()), left);
     }
 
     #[test]

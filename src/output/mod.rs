@@ -15,11 +15,23 @@ mod ticks;
 pub mod vtu;
 
 /// Prints a line to standard output. A reader that has gone is no reason to stop.
-pub fn say(text: impl std::fmt::Display) {
-    use std::io::Write;
+///
+/// # Errors
+/// What is printed is lost otherwise, as on a full disk.
+pub fn say(text: impl std::fmt::Display) -> Result<()> {
     // in one piece: standard output would pass each of its lines on by itself
-    let _ = std::io::stdout().write_all(format!("{text}\n").as_bytes());
+    let mut out = std::io::stdout();
+    match out.write_all(format!("{text}\n").as_bytes()).and_then(|()| out.flush()) {
+        Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::file(Path::new("standard output"), "write", &cause))
+        }
+        _ => Ok(()),
+    }
 }
+
+use crate::error::{Error, Result};
+use std::io::{ErrorKind, Write};
+use std::path::Path;
 
 pub use contact::ContactTable;
 pub use folder::{Folder, safe_name, write_whole};

@@ -1,7 +1,7 @@
 //! The report of a run: `report.json`, and the closing lines on the terminal.
 
 use super::format::{sci, seconds};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub struct Report {
     /// Title of the scene.
     pub title: String,
     /// How the run ended: `converged`, `roundoff-limited`, `iteration-limit`, `not-finite`, `cycle`, `underconstrained`,
-    /// `unbounded`, `inner-solver`.
+    /// `unbounded`, `inner-solver`, `interrupted`; `running` in a snapshot.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
     pub message: String,
@@ -121,7 +121,7 @@ pub struct IntervalReport {
 }
 
 /// A load step.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Share of all loads and prescribed displacements.
     pub factor: f64,
@@ -138,7 +138,7 @@ pub struct StepReport {
 }
 
 /// A pair of surfaces at the end of a load step.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepPairReport {
     /// Contact force on the side that stands first in the scene (x, y, z).
     pub force: [f64; 3],
@@ -175,7 +175,7 @@ pub struct EstimateReport {
 }
 
 /// One mesh of an adaptation; errors are relative estimates.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct RoundReport {
     /// Cells of all bodies.
     pub cells: usize,

@@ -109,15 +109,12 @@ pub(super) fn start(words: &[String]) -> Result<()> {
     })
 }
 
-/// Ends PETSc, if it runs. What the user asked to see at the end (-log_view) is printed here; there is nobody left to tell an
-/// error.
-pub(super) fn end() {
+/// Ends PETSc, if it runs. What the user asked to see at the end (-log_view) is printed here.
+pub(super) fn end() -> Result<()> {
     if !runs() {
-        return;
-    }
-    if let Ok(library) = open() {
-        // SAFETY: no object of PETSc is left: each held the session.
-        let _ = check_in(library, "PetscFinalize", |petsc| unsafe { petsc.PetscFinalize() });
+        return Ok(());
     }
     RUNS.set(false);
+    // SAFETY: no object of PETSc is left: each held the session.
+    check_in(open()?, "PetscFinalize", |petsc| unsafe { petsc.PetscFinalize() })
 }

@@ -71,6 +71,14 @@ impl Session {
         Ok(Session(Rc::new(Running { world, _universe: universe })))
     }
 
+    /// Ends PETSc and MPI if this is the last clone, and tells what goes wrong with it: PETSc writes its logs then.
+    ///
+    /// # Errors
+    /// PETSc's, as of a log that it cannot write.
+    pub fn finish(self) -> Result<()> {
+        if Rc::strong_count(&self.0) == 1 { library::end() } else { Ok(()) }
+    }
+
     /// Lets OpenBLAS use `count` threads in this process, unless the user set OPENBLAS_NUM_THREADS or OMP_NUM_THREADS.
     /// Returns whether the number is in force.
     pub fn set_blas_threads(&self, count: usize) -> bool {
@@ -131,7 +139,8 @@ impl Session {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        library::end();
+        // who wants to know of an error calls `finish`
+        let _ = library::end();
         drop(waiting::take());
     }
 }

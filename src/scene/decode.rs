@@ -292,10 +292,11 @@ fn adapt(node: &Node) -> Result<AdaptSpec> {
 fn output(node: Option<&Node>) -> Result<OutputSpec> {
     let default = OutputSpec::default();
     let Some(node) = node else { return Ok(default) };
-    let keys = Keys::open(node, "[output]", &["dir", "vtu", "plots"])?;
+    let keys = Keys::open(node, "[output]", &["dir", "vtu", "plots", "checkpoint"])?;
     Ok(OutputSpec {
         dir: keys.get("dir").map(|dir| dir.name().map(|name| name.value.into())).transpose()?,
         vtu: keys.get("vtu").map_or(Ok(default.vtu), Node::boolean)?,
         plots: keys.get("plots").map_or(Ok(default.plots), Node::boolean)?,
+        checkpoint: keys.get("checkpoint").map(|minutes| minutes.positive("the time in minutes")).transpose()?,
     })
 }

@@ -44,7 +44,7 @@ fn read_text(path: &Path) -> Result<String> {
             false => error,
         });
     }
-    let bytes = std::fs::read(path).map_err(|cause| Error::file(path, "read", &cause))?;
+    let bytes = crate::file::read(path)?;
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let line = 1 + error.as_bytes()[..valid].iter().filter(|byte| **byte == b'\n').count();

@@ -9,7 +9,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Options that are short for `--set`, and the key that they set.
-const SHORT: [(&str, &str); 2] = [("--method", "method.name"), ("--tolerance", "adapt.error")];
+const SHORT: [(&str, &str); 3] =
+    [("--method", "method.name"), ("--tolerance", "adapt.error"), ("--checkpoint", "output.checkpoint")];
 
 /// Options without a value, which set a key to true.
 const FLAGS: [(&str, &str); 3] = [("--estimate", "estimate"), ("--vtu", "output.vtu"), ("--trust-geo", "trust_geo")];

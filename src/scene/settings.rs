@@ -46,6 +46,7 @@ impl Scene {
         insert(&mut output, "dir", self.output.dir.as_ref().map(|dir| json!(dir.display().to_string())));
         output.insert("vtu".into(), json!(self.output.vtu));
         output.insert("plots".into(), json!(self.output.plots));
+        insert(&mut output, "checkpoint", self.output.checkpoint.map(|minutes| json!(minutes)));
         settings.insert("output".into(), output.into());
         settings.into()
     }

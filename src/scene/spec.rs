@@ -62,10 +62,12 @@ pub struct OutputSpec {
     pub vtu: bool,
     /// Whether to draw the SVG plots; default true.
     pub plots: bool,
+    /// Minutes between checkpoints; none by default.
+    pub checkpoint: Option<f64>,
 }
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { dir: None, vtu: false, plots: true }
+        Self { dir: None, vtu: false, plots: true, checkpoint: None }
     }
 }

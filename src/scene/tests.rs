@@ -97,7 +97,7 @@ fn the_groove_is_read() {
         StopRule { residual: None, increment: Some(1e-3), balanced: false, iterations: 2000 }
     );
     assert_eq!(scene.solver, SolverSpec { preset: None, options: vec![] });
-    assert_eq!(scene.output, OutputSpec { dir: None, vtu: false, plots: true });
+    assert_eq!(scene.output, OutputSpec::default());
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn defaults_and_a_scene_in_space() {
     );
     let options = vec!["-ksp_rtol".to_owned(), "1e-10".to_owned()];
     assert_eq!(scene.solver, SolverSpec { preset: Some(Preset::Hypre), options });
-    assert_eq!(scene.output, OutputSpec { dir: Some("out".into()), vtu: true, plots: true });
+    assert_eq!(scene.output, OutputSpec { dir: Some("out".into()), vtu: true, plots: true, checkpoint: None });
 }
 
 #[test]

@@ -12,11 +12,13 @@
 mod global;
 mod looks;
 mod probe;
+mod refused;
 mod split;
 mod unread;
 
 pub use looks::looks;
 pub use probe::show_help;
+pub use refused::{refuse_log, refuse_traps, refuse_words};
 pub use split::split;
 pub use unread::{Unread, UnreadKind, unread};
 

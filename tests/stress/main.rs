@@ -103,7 +103,8 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     for (seed, index, name) in DECEPTIVE {
         for (verdict, answer) in bench.run(seed, index, &[name]).0 {
             assert!(!matches!(verdict, Verdict::Wrong(_)), "{seed} {index} {name}: {verdict:?}, {}", answer.message);
-            assert_ne!(answer.status, "roundoff-limited", "{seed} {index} {name}: rounding is far");
+            let claimed = answer.status == "roundoff-limited" && answer.residual > runs::RESIDUAL;
+            assert!(!claimed, "{seed} {index} {name}: rounding is far");
         }
     }
     for index in STEEP {

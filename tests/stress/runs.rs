@@ -6,15 +6,17 @@ use crate::scenes::{Case, Expect};
 use std::path::Path;
 use winkler::commands::clock::Clock;
 use winkler::commands::run;
+use winkler::commands::stages::Begin;
 use winkler::commands::{report, results};
 use winkler::ddm::Silent;
 use winkler::error::Result;
+use winkler::interrupt::Interrupt;
 use winkler::petsc::Session;
 use winkler::scene;
 use winkler::solver::options;
 
 /// Relative residual that methods are asked for.
-const RESIDUAL: f64 = 1e-8;
+pub const RESIDUAL: f64 = 1e-8;
 /// Relative residual of the reference.
 const REFERENCE: f64 = 1e-11;
 /// Pressures that differ by more, relative to the largest, are wrong.
@@ -121,11 +123,11 @@ pub fn solve(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> 
 }
 
 fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Result<Answer> {
-    let mut clock = Clock::default();
+    let (mut clock, interrupt) = (Clock::default(), Interrupt::default());
     let scene = scene::load(path, &[format!("method={}", recipe.value(residual))])?;
-    let built = run::build(session, scene, &mut clock)?;
-    let ready = run::set_up(session, built, None, &mut clock)?;
-    let done = run::iterate(ready, &mut Silent, &mut clock)?;
+    let built = run::build(session, scene, &interrupt, &mut clock)?;
+    let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
+    let done = run::iterate(ready, &interrupt, &mut Silent, &mut clock)?;
     let seconds = clock.total();
     let recovered = results::recover(&done);
     let report = report::report(session, &done, &recovered, &clock);

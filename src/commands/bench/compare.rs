@@ -73,7 +73,8 @@ impl Points {
             Error::new(Kind::File, format!("{} is no contact table: {why}", path.display()))
                 .help("it needs the columns x, y, z and pressure of a contact-*.csv")
         };
-        let mut file = csv::Reader::from_path(path).map_err(|cause| refuse(cause.to_string()))?;
+        let bytes = crate::file::read(path)?;
+        let mut file = csv::Reader::from_reader(&bytes[..]);
         let header = file.headers().map_err(|cause| refuse(cause.to_string()))?.clone();
         let place = |name: &str| header.iter().position(|column| column == name);
         let columns = ["x", "y", "z", "pressure"]

@@ -13,6 +13,7 @@ pub use request::Request;
 
 use super::folder_of;
 use crate::error::Result;
+use crate::interrupt::Interrupt;
 use crate::output::{Folder, say};
 use crate::scene::Scene;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -28,9 +29,10 @@ use table::{Row, Table};
 /// not converge, was refused or did not end in time.
 ///
 /// # Errors
-/// Command lines that make no sense, scenes that cannot be read, a folder that cannot be written. What goes wrong in a
+/// Command lines that make no sense, scenes that cannot be read, a folder that cannot be written, a signal. What goes wrong in a
 /// run is a row.
-pub fn bench(request: &Request) -> Result<i32> {
+pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
+    interrupt.hold();
     let is_one_of_many = |name| std::env::var(name).is_ok_and(|size| size.parse::<usize>().is_ok_and(|size| size > 1));
     if ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].into_iter().any(is_one_of_many) {
         return Err(usage("`bench` starts the ranks of its runs itself").help("`--ranks 1,2` instead of mpiexec"));
@@ -39,7 +41,7 @@ pub fn bench(request: &Request) -> Result<i32> {
     let folder = Folder::create(folder(request, &plan))?;
     let reference = compare::References::read(request.against.as_deref(), &plan)?;
     let mut table = Table::open(&folder, &plan, request)?;
-    let runner = Runner::new(request, folder.path())?;
+    let runner = Runner::new(interrupt, request, folder.path())?;
     let bar = progress(plan.cases.len());
     let mut meshed = BTreeSet::new();
     let began = Instant::now();
@@ -53,7 +55,7 @@ pub fn bench(request: &Request) -> Result<i32> {
             None if began.elapsed().as_secs_f64() >= request.budget => Row::skipped(case, "the budget is spent"),
             None => measure(case, &runner, &reference, &mut meshed)?,
         };
-        bar.suspend(|| say(row.line(&case.label(), is_new)));
+        bar.suspend(|| say(row.line(&case.label(), is_new)))?;
         table.add(row)?;
         bar.inc(1);
     }
@@ -64,7 +66,7 @@ pub fn bench(request: &Request) -> Result<i32> {
     for (name, plot) in charts::all(&table, &plan) {
         folder.write(&name, |out| plot.write(out))?;
     }
-    say(format_args!("results in {}", folder.path().display()));
+    say(format_args!("results in {}", folder.path().display()))?;
     Ok(i32::from(!table.rows.iter().all(Row::is_good)))
 }
 

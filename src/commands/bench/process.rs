@@ -2,7 +2,8 @@
 
 use super::plan::Case;
 use super::request::{Request, usage};
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
+use crate::interrupt::{self, Interrupt};
 use crate::output::safe_name;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -40,10 +41,14 @@ pub(super) struct Runner {
     folder: PathBuf,
     timeout: Duration,
     repeat: usize,
+    interrupt: Interrupt,
 }
 
 /// Seconds that a process gets to end itself.
 const GRACE: Duration = Duration::from_secs(5);
+
+/// Time between looks for a signal.
+const LOOK: Duration = Duration::from_millis(100);
 
 /// Folder of the results of all runs.
 pub(super) const RUNS: &str = "runs";
@@ -56,14 +61,15 @@ impl Runner {
     ///
     /// # Errors
     /// A time limit that is no time, a system that does not tell where the program lies.
-    pub fn new(request: &Request, folder: &Path) -> Result<Self> {
+    pub fn new(interrupt: &Interrupt, request: &Request, folder: &Path) -> Result<Self> {
         let timeout = Duration::try_from_secs_f64(request.timeout)
             .ok()
             .filter(|timeout| !timeout.is_zero())
             .ok_or_else(|| usage(format!("`--timeout {}` is no time in seconds", request.timeout)))?;
         let program =
             std::env::current_exe().map_err(|cause| Error::file(Path::new("this program"), "find", &cause))?;
-        Ok(Self { program, folder: folder.join(RUNS), timeout, repeat: request.repeat })
+        let (folder, interrupt) = (folder.join(RUNS), interrupt.clone());
+        Ok(Self { program, folder, timeout, repeat: request.repeat, interrupt })
     }
 
     /// Folder of a run's results.
@@ -161,7 +167,13 @@ impl Runner {
         let (send, receive) = mpsc::channel();
         // a process that ended is told at once, without asking again and again
         std::thread::spawn(move || send.send(child.wait4()));
-        let mut answer = receive.recv_timeout(self.timeout);
+        let mut answer = receive.recv_timeout(LOOK.min(self.timeout));
+        while matches!(answer, Err(RecvTimeoutError::Timeout))
+            && began.elapsed() < self.timeout
+            && self.interrupt.asked().is_none()
+        {
+            answer = receive.recv_timeout(LOOK.min(self.timeout.saturating_sub(began.elapsed())));
+        }
         let is_late = |answer: &Answer| matches!(answer, Err(RecvTimeoutError::Timeout));
         let late = is_late(&answer);
         for signal in [Signal::SIGTERM, Signal::SIGKILL] {
@@ -170,6 +182,10 @@ impl Runner {
                 let _ = kill(id, signal);
                 answer = receive.recv_timeout(GRACE);
             }
+        }
+        if let Some(signal) = self.interrupt.asked() {
+            let message = format!("ended by {}: the rows so far are kept", interrupt::name(signal));
+            return Err(Error::new(Kind::Stopped(signal), message).help("`--resume` makes those that are missing"));
         }
         let seconds = began.elapsed().as_secs_f64();
         let said = String::from_utf8_lossy(&fs::read(&path).unwrap_or_default()).into_owned();

@@ -1,6 +1,7 @@
 //! The geometries in `meshes/`.
 
 use super::*;
+use crate::interrupt::Interrupt;
 use crate::mesh::Loaded;
 use crate::mesh::load::from_script;
 
@@ -8,8 +9,15 @@ fn case(script: &str, set: &[(&str, f64)]) -> Mesh<2> {
     let folder = tempfile::tempdir().unwrap();
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes").join(script);
     let set: Vec<(String, f64)> = set.iter().map(|(name, value)| (name.to_string(), *value)).collect();
-    let loaded: Loaded<2> =
-        from_script(&located(file), &set, None, Order::P1, &Guard::default(), &[folder.path().to_owned()]).unwrap();
+    let loaded: Loaded<2> = from_script(
+        &located(file),
+        &set,
+        None,
+        Order::P1,
+        (&Guard::default(), &Interrupt::default()),
+        &[folder.path().to_owned()],
+    )
+    .unwrap();
     loaded.mesh
 }
 

@@ -199,7 +199,7 @@ fn refusals_of_overrides_point_into_them() {
             assert_eq!(caret(&error), marked, "{text}:\n{error}");
         }
         let shown = error.render(false);
-        assert!(shown.contains(&format!("1 | --set {text}").trim_end()) && !shown.contains("-->"), "{error}");
+        assert!(shown.contains(format!("1 | --set {text}").trim_end()) && !shown.contains("-->"), "{error}");
     }
     let error = load_text(GROOVE, &["gamma"]).expect_err("no =");
     assert_eq!(error.kind(), Kind::Usage);

@@ -1,0 +1,65 @@
+//! What is asked of a run while it iterates: to end, to write what it has, to keep its state.
+
+use crate::interrupt::{self, ENDING, Interrupt};
+use std::cell::Cell;
+use std::time::{Duration, Instant};
+
+/// Bits of [`Observer::asked`](crate::ddm::Observer::asked) behind those of [`ENDING`].
+const SNAPSHOT: u8 = 1 << ENDING.len();
+const CHECKPOINT: u8 = SNAPSHOT << 1;
+
+/// Signals, and the time for the next checkpoint.
+pub struct Asking {
+    interrupt: Interrupt,
+    /// Time between checkpoints, on the rank that keeps it.
+    every: Option<Duration>,
+    last: Cell<Instant>,
+}
+
+impl Asking {
+    /// Asks for a checkpoint after every `minutes`, if there are any.
+    pub fn new(interrupt: &Interrupt, minutes: Option<f64>) -> Self {
+        let every = minutes.and_then(|minutes| Duration::try_from_secs_f64(60.0 * minutes).ok());
+        Self { interrupt: interrupt.clone(), every, last: Cell::new(Instant::now()) }
+    }
+
+    /// What is asked now.
+    pub fn bits(&self) -> u8 {
+        let ending = ENDING.iter().position(|&signal| self.interrupt.asked() == Some(signal));
+        let snapshot = if self.interrupt.wants_snapshot() { SNAPSHOT } else { 0 };
+        let due = self.every.is_some_and(|every| self.last.get().elapsed() >= every);
+        if due {
+            self.last.set(Instant::now());
+        }
+        ending.map_or(0, |bit| 1 << bit) | snapshot | if due { CHECKPOINT } else { 0 }
+    }
+}
+
+/// The signal by which a run is asked to end.
+pub fn signal(asked: u8) -> Option<i32> {
+    ENDING.iter().enumerate().find(|(bit, _)| asked >> bit & 1 == 1).map(|(_, &signal)| signal)
+}
+
+/// Its name; empty without one.
+pub fn signal_name(asked: u8) -> &'static str {
+    signal(asked).map_or("", interrupt::name)
+}
+
+/// Whether a snapshot is asked for.
+pub fn is_snapshot(asked: u8) -> bool {
+    asked & SNAPSHOT != 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_asks_for_checkpoints_and_nothing_else() {
+        let asking = |minutes| Asking::new(&Interrupt::default(), minutes).bits();
+        assert_eq!([asking(None), asking(Some(1e9)), asking(Some(0.0))], [0, 0, CHECKPOINT]);
+        assert_eq!((signal(CHECKPOINT | SNAPSHOT), is_snapshot(CHECKPOINT)), (None, false));
+        let told = [0b111, 0b110, 0b100].map(signal_name);
+        assert_eq!(told, ["SIGTERM", "SIGINT", "SIGHUP"]);
+    }
+}

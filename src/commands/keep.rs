@@ -1,0 +1,44 @@
+//! Runs that pause: who watches them and keeps what they have, and how they go on.
+
+use super::asking;
+use super::stages::{Done, Ready};
+use crate::ddm::{self, Observer, Settings, Silent, Start, Status};
+use crate::error::Result;
+
+/// An observer that keeps what a run has. All calls are collective; what cannot be written is no reason to end the run.
+pub trait Keep: Observer {
+    /// Keeps the state of a run, or of its load step, from which it can go on.
+    fn state(&mut self, _done: &Done) {}
+
+    /// Keeps the results so far, and leaves the run as it is.
+    fn results(&mut self, _done: &mut Done) {}
+}
+
+impl Keep for Silent {}
+
+/// Solves through all pauses until a rule or a signal ends the run. At the full load it may end at the error of the discretisation,
+/// and the interval of gamma is found if the scene asks for it.
+///
+/// # Errors
+/// Failures of the solver library.
+pub fn solve(mut ready: Ready, full: bool, keep: &mut dyn Keep) -> Result<Done> {
+    if let Start::Continue(state) = &ready.start {
+        state.rows.iter().for_each(|row| keep.row(row));
+    }
+    loop {
+        let Ready { mut built, mut method, start, steps, earlier, warnings } = ready;
+        let (stop, interval) = (built.scene.method.stop.clone(), built.scene.method.interval && full);
+        let mut settings = Settings { stop, interval, balance: built.balance().filter(|_| full), start };
+        let outcome = ddm::solve(&mut built.discrete.model, &mut method, &mut settings, keep)?;
+        let mut done = Done { built, method, outcome, steps, earlier, warnings };
+        let Status::Paused { asked } = done.outcome.status else { return Ok(done) };
+        keep.state(&done);
+        if asking::signal(asked).is_some() {
+            return Ok(done);
+        }
+        if asking::is_snapshot(asked) {
+            keep.results(&mut done);
+        }
+        ready = done.go_on(|outcome| Start::Continue(outcome.into_state()));
+    }
+}

@@ -1,0 +1,66 @@
+//! What a run remembers of its iterates beside the last one: how far and how fast it came. It decides when a run ends and how exact
+//! inner solvers are, not what the solution is, so a run that goes on from a file begins without it.
+
+use super::forcing::Forcing;
+use super::history::Row;
+use super::progress::Progress;
+use super::steady::Steady;
+use super::stop::{Cycle, Floor};
+use super::sweep::{Sweep, Sweeper};
+use crate::model::layer::Layer;
+
+/// The step of a sweep that led to an iterate.
+#[derive(Debug, Clone)]
+pub(super) struct Last {
+    /// The sweep before it.
+    pub sweep: Sweep,
+    /// gamma, if it went along the sweep's correction.
+    pub relaxed: Option<f64>,
+    /// How far it went along its direction.
+    pub length: f64,
+    /// Change of the traces.
+    pub moved: Vec<f64>,
+}
+
+/// The memory of a run.
+#[derive(Debug, Clone)]
+pub struct Memory {
+    pub(super) cycle: Cycle,
+    pub(super) floor: Floor,
+    /// Pressures of earlier sweeps, and of the last.
+    pub(super) steady: Steady,
+    pub(super) before: Option<Vec<f64>>,
+    /// Of Newton's method.
+    pub(super) forcing: Forcing,
+    pub(super) progress: Progress,
+    /// Places of the next step where a run paused: not on the laws if they have a barrier.
+    pub(super) places: Option<Layer>,
+    /// Of sweeps: what was done, the last step, and the sweep at the iterate where a run paused.
+    pub(super) sweeper: Sweeper,
+    pub(super) last: Option<Last>,
+    pub(super) sweep: Option<Sweep>,
+    /// Sweeps of this run that another process made, and those that the solver of linear steps had made before it began.
+    pub(super) earlier: usize,
+    pub(super) foreign: usize,
+}
+
+impl Memory {
+    /// Of a run with these rows behind it and nothing else, at the floor of rounding after `patience` iterations without progress.
+    pub(super) fn new(patience: usize, rows: &[Row], foreign: usize) -> Self {
+        let earlier = rows.last().map_or(0, |row| row.sweeps);
+        Self {
+            cycle: Cycle::default(),
+            floor: Floor::new(patience),
+            steady: Steady::default(),
+            before: None,
+            forcing: Forcing::default(),
+            progress: Progress::default(),
+            places: None,
+            sweeper: Sweeper { sweeps: earlier, solves_skipped: 0 },
+            last: None,
+            sweep: None,
+            earlier,
+            foreign,
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! Reading of files that users name.
+
+use crate::error::{Error, Kind, Result};
+use std::os::unix::fs::FileTypeExt;
+use std::path::Path;
+
+/// All bytes of a regular file. Devices and pipes may have no end, or keep a reader waiting for ever.
+///
+/// # Errors
+/// [`Kind::File`]: it is none, or cannot be read.
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    let failed = |cause| Error::file(path, "read", &cause);
+    let kind = std::fs::metadata(path).map_err(failed)?.file_type();
+    let odd = match () {
+        _ if kind.is_file() => return std::fs::read(path).map_err(failed),
+        _ if kind.is_dir() => "a folder",
+        _ if kind.is_fifo() => "a pipe",
+        _ if kind.is_socket() => "a socket",
+        _ => "a device",
+    };
+    Err(Error::new(Kind::File, format!("{} is {odd}, not a file", path.display()))
+        .help("name a regular file; what a pipe gives can be saved as one"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_regular_files_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("text");
+        std::fs::write(&path, "text").unwrap();
+        assert_eq!(read(&path).unwrap(), b"text");
+        let refused = |path: &Path| read(path).unwrap_err().message().to_owned();
+        assert!(refused(folder.path()).ends_with("is a folder, not a file"));
+        assert_eq!(refused(Path::new("/dev/zero")), "/dev/zero is a device, not a file");
+        let _socket = std::os::unix::net::UnixListener::bind(folder.path().join("socket")).unwrap();
+        assert!(refused(&folder.path().join("socket")).contains("is a socket"));
+        assert!(refused(&folder.path().join("none")).starts_with("cannot read"));
+    }
+}

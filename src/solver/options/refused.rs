@@ -1,0 +1,57 @@
+//! Options that PETSc takes and that would end the program in words of its own, or without any.
+
+use crate::error::{Error, Kind, Result};
+use crate::petsc::Session;
+use std::fs::OpenOptions;
+use std::path::Path;
+
+/// Refuses a file of options, among the words of the command line, that PETSc would read for ever.
+///
+/// # Errors
+/// It is there and no regular file.
+pub fn refuse_words(words: &[String]) -> Result<()> {
+    let files = words.windows(2).filter(|two| two[0] == "-options_file").map(|two| Path::new(&two[1]));
+    files.filter(|file| file.exists() && !file.is_file()).try_for_each(|file| crate::file::read(file).map(|_| ()))
+}
+
+/// Refuses traps of numbers that are not finite.
+///
+/// # Errors
+/// `-fp_trap` is on.
+pub fn refuse_traps(session: &Session) -> Result<()> {
+    let is_off = |value: &str| ["false", "no", "off", "0"].contains(&value.to_lowercase().as_str());
+    if session.options().get("-fp_trap").is_some_and(|value| !is_off(&value)) {
+        return Err(Error::new(
+            Kind::Solver,
+            "-fp_trap would end this program: it computes with infinities on purpose",
+        )
+        .help("a number that should be finite and is not ends a run anyway, with the status `not-finite`"));
+    }
+    Ok(())
+}
+
+/// Refuses a log that PETSc could not write at its end, when nobody hears of it. It may lie in the folder of results.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn refuse_log(session: &Session) -> Result<()> {
+    // TYPE:FILE:FORMAT
+    let log = session.options().get("-log_view").unwrap_or_default();
+    match log.split(':').nth(1).filter(|file| !file.is_empty() && session.rank() == 0) {
+        Some(file) => try_file(Path::new(file)),
+        None => Ok(()),
+    }
+}
+
+/// Whether a file can be written; nothing is left of the trial.
+fn try_file(path: &Path) -> Result<()> {
+    let is_new = !path.exists();
+    OpenOptions::new().append(true).create(true).open(path).map_err(|cause| {
+        Error::file(path, "write", &cause).help("-log_view names this file: let it lie in a folder that is there")
+    })?;
+    if is_new {
+        // it was made a moment ago; PETSc makes it again
+        let _ = std::fs::remove_file(path);
+    }
+    Ok(())
+}
