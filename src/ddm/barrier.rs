@@ -34,7 +34,8 @@ fn root(law: &dyn LayerLaw, point: usize, (s, rho, mu): (f64, f64, f64)) -> f64 
     // that of a rigid layer
     let half = (s * s + 4.0 * mu / rho).sqrt();
     let rigid = if s > 0.0 { 0.5 * rho * (half + s) } else { 2.0 * mu / (half - s) };
-    let mut high = if rigid.is_finite() { rigid } else { law.pressure(point, s).max(f64::MIN_POSITIVE) };
+    // a gap can be so wide that the pressure is below all numbers
+    let mut high = if rigid.is_finite() { rigid } else { law.pressure(point, s) }.max(f64::MIN_POSITIVE);
     while !beyond(high) && high < f64::MAX {
         high = (1e2 * high).min(f64::MAX);
     }
@@ -76,5 +77,7 @@ mod tests {
             let exact: f64 = if s > 0.0 { 0.5 * (s + wide) / flat } else { 2.0 * mu / (wide - s) };
             assert!((p / exact - 1.0).abs() < 1e-11, "{s} {rho} {mu}: {p} of {exact}");
         }
+        // less than all numbers
+        assert_eq!(root(&law, 0, (-1e200, 2.0, 1e-200)), f64::MIN_POSITIVE);
     }
 }
