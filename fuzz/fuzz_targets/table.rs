@@ -39,7 +39,7 @@ fuzz_target!(|bytes: &[u8]| {
     let again = law.response(0, back).pressure;
     assert!((again - response.pressure).abs() <= 1e-6 * response.pressure, "{c} {back} of {points:?}");
     let meet = law.meet(0, c, rho);
-    assert!((0.0..=c).contains(&meet), "{meet} of {c}, {rho} of {points:?}");
+    assert!((0.0..=c * (1.0 + 1e-12)).contains(&meet), "{meet} of {c}, {rho} of {points:?}");
     let gap = law.duality_gap(0, c, 0.5 * response.pressure);
     assert!(gap >= 0.0, "{gap} at {c} of {points:?}");
 });
