@@ -36,8 +36,10 @@ fuzz_target!(|bytes: &[u8]| {
         assert!((found - pressure).abs() <= 1e-9 * pressure, "{found} at {c} of {points:?}");
     }
     let back = law.compression(0, response.pressure);
-    let again = law.response(0, back).pressure;
-    assert!((again - response.pressure).abs() <= 1e-6 * response.pressure, "{c} {back} of {points:?}");
+    // where points lie a rounding apart, no compression has the pressure: it lies between those of two beside each other
+    let [below, above] = [1.0 - 1e-14, 1.0 + 1e-14].map(|by| law.response(0, back * by).pressure);
+    let brackets = below <= response.pressure * (1.0 + 1e-6) && above >= response.pressure * (1.0 - 1e-6);
+    assert!(brackets, "{c} {back} of {points:?}");
     let meet = law.meet(0, c, rho);
     assert!((0.0..=c * (1.0 + 1e-12)).contains(&meet), "{meet} of {c}, {rho} of {points:?}");
     let gap = law.duality_gap(0, c, 0.5 * response.pressure);

@@ -2,7 +2,7 @@
 //!
 //! The derivatives that `exmex` forms on its own know neither `min`, `max` nor `abs`, and take a comparison for its own derivative.
 
-use super::operators::{and, compare, max, min, not, or, sign};
+use super::operators::{and, compare, not, or, sign};
 use super::{Expression, MOST_VARIABLES, grammar};
 use crate::error::{Place, Result};
 use exmex::{BinOp, Express, FlatEx, MakeOperators, NumberMatcher, Operator};
@@ -76,8 +76,9 @@ const BINARY: &[(&str, Binary)] = &[
         let square = a.value * a.value + b.value * b.value;
         a.join(b, a.value.atan2(b.value), b.value / square, -a.value / square)
     }),
-    ("max", |a, b| if max(a.value, b.value) == b.value { b } else { a }),
-    ("min", |a, b| if min(a.value, b.value) == b.value { b } else { a }),
+    // a NaN stays, as in `operators::max`
+    ("max", |a, b| if a.value.is_nan() || a.value > b.value { a } else { b }),
+    ("min", |a, b| if a.value.is_nan() || a.value < b.value { a } else { b }),
     ("||", |a, b| Dual::truth(or(a.value, b.value))),
     ("&&", |a, b| Dual::truth(and(a.value, b.value))),
     ("==", |a, b| Dual::truth(compare(a.value, b.value, a.value == b.value))),
@@ -204,6 +205,13 @@ mod tests {
                     "{text} at {c}, {x}: {slope} {difference}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn nan_is_not_hidden() {
+        for text in ["max(c, log(-1))", "max(log(-1), c)", "min(c, log(-1))", "min(log(-1), c)", "max(0, sqrt(-c))"] {
+            assert!(parse(text).eval(&[1.0, 1.0]).0.is_nan(), "{text}");
         }
     }
 

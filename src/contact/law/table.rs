@@ -13,6 +13,10 @@ pub struct Table {
     knots: Vec<Knot>,
 }
 
+/// Slopes at both ends of a piece, as shares of its secant, have at most this for the root of their squares' sum: three, less what is far above
+/// rounding. At three a piece with a slope of zero at one end has none to spare, and p falls below its end by rounding.
+const STEEPEST: f64 = 3.0 - 1e-9;
+
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Knot {
     c: f64,
@@ -41,9 +45,9 @@ impl Table {
         }
         for (i, secant) in secants.iter().enumerate() {
             let size = (knots[i].slope / secant).hypot(knots[i + 1].slope / secant);
-            if size > 3.0 {
-                knots[i].slope *= 3.0 / size;
-                knots[i + 1].slope *= 3.0 / size;
+            if size > STEEPEST {
+                knots[i].slope *= STEEPEST / size;
+                knots[i + 1].slope *= STEEPEST / size;
             }
         }
         for i in 0..secants.len() {

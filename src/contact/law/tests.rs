@@ -69,6 +69,16 @@ fn laws_are_consistent() {
     assert!((p - q).abs() < 1e-13);
 }
 
+/// Beside a piece 10^35 times as steep the slope at zero is cut to nothing, and the pressure still does not fall below zero.
+#[test]
+fn a_table_increases_beside_a_jump() {
+    let law = Table::new(&[[10659179687.5, 1e-12], [10659179687.500042, 680819702.1484375]]);
+    for c in (-300..=10).map(|exponent| 10_f64.powi(exponent)) {
+        let Response { pressure, tangent, energy } = law.response(0, c);
+        assert!(pressure >= 0.0 && tangent > 0.0 && energy >= 0.0, "{pressure} {tangent} {energy} at {c}");
+    }
+}
+
 #[test]
 fn a_table_goes_through_its_points_and_on_with_its_last_slope() {
     let points = [[1e-5, 2.0], [1.5e-5, 2.1], [2e-5, 40.0], [1e-4, 41.0]];
