@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 use winkler::error::Result;
 use winkler::petsc::{ConvergedReason, Int, Ksp, Matrix, Schur, Session};
-use winkler::solver::options::{UnreadKind, distribute, set_default, unread};
+use winkler::solver::options::{Typed, UnreadKind, unread};
 
 /// After this, ranks that wait for each other are ended.
 const TIMEOUT: Duration = Duration::from_secs(60);
@@ -196,10 +196,9 @@ fn options_come_from_line_file_and_environment() {
     expect_success(alone("options_come_from_line_file_and_environment", 0, &environment, || {
         let file = std::env::var("WINKLER_FILE").unwrap_or_default();
         let session = Session::start(&words(&format!("-ksp_type cg -options_file {file} -shift -1e-3")))?;
-        distribute(&session, &["upper"])?;
-        let options = session.options();
+        let (options, upper) = (session.options(), Typed::read(&session, &["upper"])?.of("upper"));
         for (name, value) in [("ksp_type", "cg"), ("pc_type", "sor"), ("ksp_rtol", "1e-3"), ("ksp_max_it", "7")] {
-            assert_eq!(options.get(&format!("-upper_{name}")).as_deref(), Some(value));
+            assert_eq!(upper.typed(name), Some(value));
         }
         assert_eq!(options.get("-shift").as_deref(), Some("-1e-3"));
         let left = unread(&session, &["upper"], &|_| ())?;
@@ -239,13 +238,12 @@ fn an_option_read_on_one_rank_is_read() {
             "-ksp_type cg -lower_ksp_rtol 1e-3 -upper_ksp_rtol 1e-9 -upper_ksp_rtoll 1e-9 -pc_sor_its 2 -log_veiw";
         let session = Session::start(&words(line))?;
         let bodies = ["upper", "lower"];
-        distribute(&session, &bodies)?;
         // Each rank has one body, and tells PETSc only what concerns that.
         let body = bodies[session.rank()];
-        set_default(&session, body, "pc_type", Some("jacobi"))?;
+        let mut chosen = Typed::read(&session, &bodies)?.of(body);
+        chosen.set_default("pc_type", "jacobi");
         let matrix = chain(&session, 9)?;
-        let ksp = solver(&session, &format!("{body}_"), &matrix)?;
-        ksp.set_up()?;
+        chosen.lend(&session, || solver(&session, &format!("{body}_"), &matrix)?.set_up())?;
         let or = |flags: &mut [u8]| {
             let mine = flags.to_vec();
             session.world().all_reduce_into(&mine[..], flags, SystemOperation::bitwise_or());

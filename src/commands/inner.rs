@@ -3,6 +3,7 @@
 //! Newton's method on one rank joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
 //! bodies then need no solver of their own. Else every body has one, and sweeps solve the linear steps.
 
+use super::words::{SHOWN, in_words};
 use crate::discretize::{Assembled, Factory, Outline};
 use crate::error::{Error, Kind, Result};
 use crate::model::{Body, BodySlot};
@@ -10,10 +11,12 @@ use crate::petsc::Session;
 use crate::problem::method::{Linear, MethodName};
 use crate::problem::solver::Preset;
 use crate::scene::Scene;
+use crate::solver::options::{Chosen, Typed};
 use crate::solver::preset::{self, Size};
-use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory, options};
+use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
+use std::collections::{BTreeMap, HashMap};
 
 /// Prefix of the PETSc options of the matrix of all bodies.
 pub const WHOLE: &str = "newton";
@@ -33,14 +36,22 @@ pub struct Inner<'a> {
     wanted: Option<Linear>,
     /// How linear steps are solved, from the plan on.
     linear: Linear,
+    /// What the user wrote for the solvers.
+    typed: Typed,
+    /// Options of the matrix of all bodies.
+    whole: Chosen,
     plans: Vec<Plan>,
+    /// Place of each body in `plans`.
+    places: HashMap<String, usize>,
     /// Condensed bodies that an earlier scene has left; `local` is there on the rank that owns it.
-    kept: Vec<BodySlot>,
+    kept: HashMap<String, BodySlot>,
 }
 
 /// The choice for a body.
 struct Plan {
     name: String,
+    /// Its PETSc options.
+    chosen: Chosen,
     preset: Preset,
     reason: String,
     dimension: usize,
@@ -57,33 +68,84 @@ impl Plan {
 }
 
 impl<'a> Inner<'a> {
-    /// Starts from the memory that is free now; collective. `kept` are bodies of an earlier scene that serve this one, too.
-    pub fn new(session: &'a Session, scene: &Scene, kept: Vec<BodySlot>) -> Self {
+    /// Starts from the memory that is free now and the options that the user wrote; collective. `kept` are bodies of an earlier scene
+    /// that serve this one, too.
+    ///
+    /// # Errors
+    /// When PETSc is out of memory.
+    pub fn new(session: &'a Session, scene: &Scene, kept: Vec<BodySlot>) -> Result<Self> {
         let mine = memory::available() as u64;
         let mut least = mine;
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
-        Self {
+        let bodies = scene.bodies.iter().map(|body| body.name.value.as_str());
+        let typed = Typed::read(session, &bodies.chain([WHOLE]).collect::<Vec<_>>())?;
+        Ok(Self {
             session,
             asked: scene.solver.preset,
             memory: least as usize,
             method: scene.method.name,
             wanted: scene.method.linear,
             linear: Linear::Sweeps,
+            whole: typed.of(WHOLE),
+            typed,
             plans: Vec::new(),
-            kept,
-        }
+            places: HashMap::new(),
+            kept: kept.into_iter().map(|slot| (slot.name.clone(), slot)).collect(),
+        })
     }
 
-    /// Why the solvers are what they are, in words: once if all bodies have the same.
+    /// Why the solvers are what they are, in words: once if all bodies have the same; of many bodies once for each kind of solver, by
+    /// the largest that has it.
     pub fn reason(&self) -> String {
         let Some(largest) = self.plans.iter().max_by_key(|plan| plan.dofs) else { return String::new() };
-        if self.plans.iter().all(|plan| plan.preset == largest.preset) {
+        let mut kinds: Vec<Vec<&Plan>> = Vec::new();
+        for plan in &self.plans {
+            match kinds.iter_mut().find(|kind| kind[0].preset == plan.preset) {
+                Some(kind) => kind.push(plan),
+                None => kinds.push(vec![plan]),
+            }
+        }
+        if kinds.len() == 1 {
             return largest.reason.clone();
         }
-        let all = self.plans.iter().map(|plan| format!("{}: {}", plan.name, plan.reason));
-        all.collect::<Vec<_>>().join("; ")
+        let of = |plan: &&Plan| format!("{}: {}", plan.name, plan.reason);
+        let of_kind = |kind: &Vec<&Plan>| {
+            let largest = kind.iter().max_by_key(|plan| plan.dofs).map(of).unwrap_or_default();
+            format!("{} bodies, the largest {largest}", kind.len())
+        };
+        let all: Vec<String> = match self.plans.len() {
+            ..=SHOWN => self.plans.iter().map(|plan| of(&plan)).collect(),
+            _ => kinds.iter().map(of_kind).collect(),
+        };
+        all.join("; ")
+    }
+
+    /// Options of the matrix of all bodies.
+    pub fn whole(&self) -> &Chosen {
+        &self.whole
+    }
+
+    /// The solvers that apply a preconditioner once instead of solving, as a warning each kind.
+    pub fn applied_once(&self) -> Vec<String> {
+        let chosen: Vec<&Chosen> = match self.linear {
+            Linear::Sweeps => self.plans.iter().map(|plan| &plan.chosen).collect(),
+            _ => vec![&self.whole],
+        };
+        let mut kinds: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+        for chosen in chosen.into_iter().filter(|chosen| chosen.get("ksp_type") == Some("preonly")) {
+            let pc = chosen.get("pc_type").unwrap_or_default();
+            if !matches!(pc, "cholesky" | "lu") {
+                kinds.entry(pc).or_default().push(chosen.prefix().to_owned());
+            }
+        }
+        let warning = |(pc, names): (&str, Vec<String>)| {
+            let bodies = if names.len() == 1 { "body" } else { "bodies" };
+            let names = in_words(names.iter());
+            format!("{bodies} {names}: preonly applies {pc} once instead of solving; the residual is measured by it")
+        };
+        kinds.into_iter().map(warning).collect()
     }
 
     /// Names of the condensed bodies.
@@ -97,10 +159,10 @@ impl<'a> Inner<'a> {
         self.linear
     }
 
-    fn choose(&self, name: &str, size: &Size) -> Result<(Preset, String)> {
-        let typed = options::asks_for_ksp(self.session, name)?;
+    fn choose(&self, chosen: &Chosen, size: &Size) -> (Preset, String) {
+        let typed = chosen.asks_for_ksp();
         let condensable = size.can_condense() && !typed;
-        Ok(match self.asked {
+        match self.asked {
             Some(Preset::Condensed) if !condensable => {
                 let why = if typed { "PETSc options were typed" } else { "there is nothing to condense" };
                 (Preset::Mumps, why.to_owned())
@@ -119,7 +181,7 @@ impl<'a> Inner<'a> {
                 (Preset::Condensed, why) if !condensable => (Preset::Mumps, why),
                 chosen => chosen,
             },
-        })
+        }
     }
 
     /// How linear steps are solved, once bodies have their presets.
@@ -132,28 +194,27 @@ impl<'a> Inner<'a> {
         if !newton || self.session.size() > 1 || self.wanted == Some(Linear::Sweeps) {
             return Ok(Linear::Sweeps);
         }
-        let asks = |prefix: &str| options::asks_for_ksp(self.session, prefix);
         let mut typed = false;
-        for plan in &self.plans {
-            typed |= asks(&plan.name)?;
+        for Plan { chosen, .. } in &self.plans {
+            typed |= chosen.asks_for_ksp();
             // what is typed for one body reaches that body
-            if self.method == MethodName::Auto && options::names_body(self.session, &plan.name)? && asks(&plan.name)? {
+            if self.method == MethodName::Auto && chosen.has_own() && chosen.asks_for_ksp() {
                 return Ok(Linear::Sweeps);
             }
         }
         if self.asked.is_none() && self.wanted.is_none() && !typed {
             agree(&mut self.plans);
         }
-        let names: Vec<&str> = self.plans.iter().map(|plan| plan.name.as_str()).chain([WHOLE]).collect();
-        options::distribute(self.session, &names)?;
         let all = |preset: Preset| self.plans.iter().all(|plan| plan.preset == preset);
         let dense: usize = self.plans.iter().map(Plan::on_contact).sum();
-        let pc = options::typed(self.session, WHOLE, "pc_type");
-        Ok(match pc.as_deref() {
+        Ok(match self.whole.typed("pc_type") {
             Some("hypre") => Linear::Multigrid,
             Some("cholesky" | "lu") => Linear::Direct,
             Some(_) if self.method == MethodName::Auto => Linear::Sweeps,
-            None if all(Preset::Condensed) && (dense <= DENSE || self.wanted.is_some()) && !asks(WHOLE)? => {
+            None if all(Preset::Condensed)
+                && (dense <= DENSE || self.wanted.is_some())
+                && !self.whole.asks_for_ksp() =>
+            {
                 Linear::Dense
             }
             None if all(Preset::Hypre) => Linear::Multigrid,
@@ -191,14 +252,16 @@ impl Factory for Inner<'_> {
         for &Outline { name, dimension, rows, prescribed, motions } in outlines {
             let retained = Retained::new(dimension, rows, prescribed, motions);
             // a body that is kept has its memory already
-            let memory = if self.kept.iter().any(|slot| slot.name == name) { usize::MAX } else { self.memory };
+            let memory = if self.kept.contains_key(name) { usize::MAX } else { self.memory };
             let size = Size { dimension, dofs: rows.columns, retained: retained.dofs.len(), memory };
-            let (preset, reason) = self.choose(name, &size)?;
+            let chosen = self.typed.of(name);
+            let (preset, reason) = self.choose(&chosen, &size);
             if matches!(preset, Preset::Mumps | Preset::Condensed) && memory == self.memory {
                 self.memory = self.memory.saturating_sub(size.bytes(preset));
             }
             let (name, dofs, retained) = (name.to_owned(), size.dofs, Some(retained));
-            self.plans.push(Plan { name, preset, reason, dimension, dofs, retained });
+            self.places.insert(name.clone(), self.plans.len());
+            self.plans.push(Plan { name, chosen, preset, reason, dimension, dofs, retained });
         }
         self.linear = self.join()?;
         for plan in &mut self.plans {
@@ -206,40 +269,39 @@ impl Factory for Inner<'_> {
         }
         match self.linear {
             Linear::Dense => {}
-            Linear::Direct => preset::apply(self.session, WHOLE, Preset::Mumps)?,
+            Linear::Direct => preset::apply(&mut self.whole, Preset::Mumps),
             Linear::Multigrid => {
-                preset::made_often(self.session, WHOLE)?;
-                preset::apply(self.session, WHOLE, Preset::Hypre)?;
+                preset::made_often(&mut self.whole);
+                preset::apply(&mut self.whole, Preset::Hypre);
             }
-            Linear::Sweeps => {
-                self.plans.iter().try_for_each(|plan| preset::apply(self.session, &plan.name, plan.preset))?;
-            }
+            Linear::Sweeps => self.plans.iter_mut().for_each(|plan| preset::apply(&mut plan.chosen, plan.preset)),
         }
         Ok(())
     }
 
     fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>> {
         let Assembled { name, dimension, body, rows, motions, left } = assembled;
-        let plan = self.plans.iter_mut().find(|plan| plan.name == name);
-        if let Some(retained) = plan.and_then(|plan| plan.retained.take()) {
-            return Ok(Box::new(CondensedBody::new(self.session, &name, dimension, body, left, retained)));
+        let Some(plan) = self.places.get(&name).map(|&place| &mut self.plans[place]) else {
+            return Err(Error::new(Kind::Solver, format!("no solver is planned for body `{name}`")));
+        };
+        let (session, chosen) = (self.session.clone(), plan.chosen.clone());
+        if let Some(retained) = plan.retained.take() {
+            return Ok(Box::new(CondensedBody::new(&session, chosen, dimension, body, left, retained)));
         }
-        let session = self.session.clone();
         let words = match self.linear {
-            Linear::Sweeps => preset::in_words(&session, &name),
-            _ => preset::in_words(&session, WHOLE),
+            Linear::Sweeps => preset::in_words(&chosen),
+            _ => preset::in_words(&self.whole),
         };
         let modes: Vec<Vec<f64>> = match self.linear {
             Linear::Sweeps => motions.into_iter().map(|motion| motion.displacement).collect(),
             _ => Vec::new(),
         };
-        let make = move |stiffness: &crate::linalg::Csr| Krylov::new(&session, &name, dimension, stiffness, &modes);
+        let make = move |stiffness: &crate::linalg::Csr| Krylov::new(&session, chosen, dimension, stiffness, &modes);
         Ok(Box::new(SparseBody::new(body, rows, &left, make, words)))
     }
 
     fn kept(&mut self, name: &str) -> Option<BodySlot> {
-        let at = self.kept.iter().position(|slot| slot.name == name && slot.local.is_some())?;
-        Some(self.kept.swap_remove(at))
+        self.kept.remove(name).filter(|slot| slot.local.is_some())
     }
 }
 
@@ -254,7 +316,16 @@ mod tests {
         (0..contact).for_each(|i| rows.push_row([(3 * i, 1.0)]));
         let prescribed: Vec<(usize, f64)> = (29_000..30_000).map(|dof| (dof, 0.0)).collect();
         let retained = Some(Retained::new(3, &rows, &prescribed, &[]));
-        Plan { name: name.to_owned(), preset, reason: "its own".to_owned(), dimension: 3, dofs: 30_000, retained }
+        let chosen = Typed::default().of(name);
+        Plan {
+            name: name.to_owned(),
+            chosen,
+            preset,
+            reason: "its own".to_owned(),
+            dimension: 3,
+            dofs: 30_000,
+            retained,
+        }
     }
 
     fn presets(plans: &[Plan]) -> Vec<Preset> {

@@ -1,6 +1,6 @@
 //! The scene's method -> the method that runs.
 
-use super::inner::WHOLE;
+use super::stages::Built;
 use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
 use crate::ddm::{Coefficient, Method, Start, Sweeps, first_springs};
@@ -10,17 +10,20 @@ use crate::model::{LinearStep, Model};
 use crate::petsc::Session;
 use crate::problem::method::{Gamma, Linear, MethodName};
 use crate::scene::Scene;
+use crate::solver::options::Chosen;
 use crate::solver::{Dense, Krylov, Monolithic, Union};
 
 /// Makes the method of a scene and the solvers it needs, set up; refusals come before the first sweep.
 ///
 /// # Errors
 /// Failures of PETSc.
-pub fn make(session: &Session, scene: &Scene, model: &mut Model, linear: Linear, start: &Start) -> Result<Method> {
+pub fn make(session: &Session, built: &mut Built, start: &Start) -> Result<Method> {
+    let Built { scene, discrete, linear, whole, .. } = built;
+    let model = &mut discrete.model;
     let coefficient = || Coefficient::new(scene.method.psi.clone(), scene.method.robin);
     let acceleration: Box<dyn Acceleration> = match scene.method.name {
         MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => {
-            return Ok(Method::Newton(linear_step(session, scene, model, linear, coefficient(), start)?));
+            return Ok(Method::Newton(linear_step(session, scene, model, (*linear, whole), coefficient(), start)?));
         }
         MethodName::Robin => Box::new(Relaxed::new(rule(&scene.method.gamma))),
         MethodName::Ncg => Box::new(Conjugate::default()),
@@ -30,12 +33,12 @@ pub fn make(session: &Session, scene: &Scene, model: &mut Model, linear: Linear,
     Ok(Method::Sweeps { acceleration, coefficient: coefficient(), linear: Box::new(Sweeps::carried()) })
 }
 
-/// What solves the linear steps of Newton's method.
+/// What solves the linear steps of Newton's method: how, and the options of the matrix of all bodies.
 fn linear_step(
     session: &Session,
     scene: &Scene,
     model: &mut Model,
-    linear: Linear,
+    (linear, whole): (Linear, &Chosen),
     coefficient: Coefficient,
     start: &Start,
 ) -> Result<Box<dyn LinearStep>> {
@@ -49,14 +52,15 @@ fn linear_step(
     let Some(union) = Union::of(model, !multigrid) else {
         return Err(Error::new(Kind::Solver, "the bodies of other ranks cannot be joined").help("choose newton-robin"));
     };
-    let (session, block) = (session.clone(), if multigrid { scene.dimension.value } else { 1 });
+    let (session, whole) = (session.clone(), whole.clone());
+    let block = if multigrid { scene.dimension.value } else { 1 };
     let mut step: Box<dyn LinearStep> = match linear {
         Linear::Dense => {
             let dense = |stiffness: &Csr| Ok(Dense::new(stiffness.rows(), stiffness.values.clone()));
             Box::new(Monolithic::new(union.without_zeros(), dense))
         }
         _ => {
-            Box::new(Monolithic::new(union, move |stiffness: &Csr| Krylov::new(&session, WHOLE, block, stiffness, &[])))
+            Box::new(Monolithic::new(union, move |stiffness: &Csr| Krylov::new(&session, whole, block, stiffness, &[])))
         }
     };
     if let Some(springs) = first_springs(model, start) {

@@ -55,8 +55,6 @@ pub fn build_with(
 ) -> Result<Built> {
     agree(session, refuse(&scene).and_then(|()| options::refuse_log(session)))?;
     agree(session, scene_options(session, &scene))?;
-    let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
-    options::distribute(session, &names)?;
     match scene.dimension.value {
         2 => build_in::<2>(session, scene, pieces::plane, kept, interrupt, clock),
         _ => build_in::<3>(session, scene, pieces::space, kept, interrupt, clock),
@@ -81,7 +79,7 @@ fn build_in<const D: usize>(
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
     let threads = if D == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
     session.set_blas_threads(threads);
-    let mut inner = Inner::new(session, &scene, kept);
+    let mut inner = Inner::new(session, &scene, kept)?;
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
     let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
@@ -89,9 +87,11 @@ fn build_in<const D: usize>(
     let mut discrete = agree(session, discrete)?;
     discrete.share();
     clock.phase("discretize");
-    let warnings = warnings(session, &discrete);
-    let (linear, choice, condensed) = (inner.linear(), inner.reason(), inner.condensed());
-    Ok(Built { scene, discrete, linear, choice, condensed, warnings })
+    let mut warnings = warnings(session, &discrete);
+    warnings.extend(inner.applied_once());
+    let (linear, whole) = (inner.linear(), inner.whole().clone());
+    let (choice, condensed) = (inner.reason(), inner.condensed());
+    Ok(Built { scene, discrete, linear, whole, choice, condensed, warnings })
 }
 
 /// What the decoder of the scene cannot know.
@@ -213,7 +213,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete, 1.0)?.into(),
         None => Start::Automatic,
     };
-    let method = agree(session, method::make(session, &scene, &mut built.discrete.model, built.linear, &start))?;
+    let method = agree(session, method::make(session, &mut built, &start))?;
     let mut names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
     if matches!(built.linear, Linear::Direct | Linear::Multigrid) {
         names.push(WHOLE);
@@ -229,15 +229,6 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     }
     if built.is_without_petsc() && session.options().has("-help") {
         options::show_help(session)?;
-    }
-    for name in &names {
-        let in_force = |option: &str| session.options().get(&format!("-{name}_{option}")).unwrap_or_default();
-        if in_force("ksp_type") == "preonly" && !matches!(in_force("pc_type").as_str(), "cholesky" | "lu") {
-            warnings.push(format!(
-                "body {name}: preonly applies {} once instead of solving; the residual is measured by it",
-                in_force("pc_type")
-            ));
-        }
     }
     clock.phase("set-up");
     Ok(Ready { built, method, start, steps, earlier, warnings })

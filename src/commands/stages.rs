@@ -7,6 +7,7 @@ use crate::model::{BodySlot, Model};
 use crate::output::StepReport;
 use crate::problem::method::Linear;
 use crate::scene::Scene;
+use crate::solver::options::Chosen;
 use std::rc::Rc;
 
 /// A scene with its discrete problem. Bodies have their inner solvers, nothing is factored.
@@ -17,6 +18,8 @@ pub struct Built {
     pub discrete: Discrete,
     /// How linear steps are solved.
     pub linear: Linear,
+    /// PETSc options of the matrix of all bodies.
+    pub whole: Chosen,
     /// Why the inner solver is what it is where no PETSc option was typed.
     pub choice: String,
     /// Names of the condensed bodies, with which another run can go on.

@@ -1,7 +1,7 @@
 //! Lists of names in sentences.
 
 /// Most names of bodies in a sentence.
-const SHOWN: usize = 12;
+pub const SHOWN: usize = 12;
 
 /// Names of bodies as in a sentence.
 pub fn in_words<'a>(names: impl Iterator<Item = &'a String>) -> String {

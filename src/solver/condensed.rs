@@ -5,6 +5,7 @@
 //! S + B_R' diag(weight) B_R, dense and small. States are those of the whole body whose interior is in equilibrium: residual,
 //! energies and all that is printed are the same numbers.
 
+use super::options::Chosen;
 use super::{Dense, Retained, SparseBody, memory};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
@@ -17,7 +18,7 @@ use std::time::Instant;
 /// A body whose states are its retained dofs.
 pub struct CondensedBody {
     session: Session,
-    name: String,
+    chosen: Chosen,
     retained: Retained,
     dimension: usize,
     /// K, f and B of all dofs till they are condensed; f stays.
@@ -39,11 +40,10 @@ struct Condensed {
 }
 
 impl CondensedBody {
-    /// A body that will be condensed when it is set up. `name` is the prefix of its PETSc options, of which those of MUMPS are
-    /// read.
+    /// A body that will be condensed when it is set up. Of its PETSc options those of MUMPS are read.
     pub fn new(
         session: &Session,
-        name: &str,
+        chosen: Chosen,
         dimension: usize,
         whole: ElasticBody,
         free: Vec<FreeMotion>,
@@ -55,16 +55,7 @@ impl CondensedBody {
         };
         let free = free.into_iter().map(on_retained).collect();
         let load = retained.turn(&whole.load);
-        Self {
-            session: session.clone(),
-            name: name.to_owned(),
-            retained,
-            dimension,
-            whole,
-            load,
-            free,
-            condensed: None,
-        }
+        Self { session: session.clone(), chosen, retained, dimension, whole, load, free, condensed: None }
     }
 
     /// Eliminates the interior, once.
@@ -83,12 +74,13 @@ impl CondensedBody {
         let began = Instant::now();
         let (dofs, retained) = (&self.retained.dofs, self.retained.dofs.len());
         let lower = self.retained.lower_triangle(&self.whole.stiffness);
-        let mut schur = Schur::analyse(&self.session, &self.name, self.dimension, self.load.len(), &lower, dofs)?;
+        let (session, name, len) = (&self.session, self.chosen.prefix(), self.load.len());
+        let mut schur =
+            self.chosen.lend(session, || Schur::analyse(session, name, self.dimension, len, &lower, dofs))?;
         drop(lower);
         let (needed, free) = (schur.expected_megabytes(), memory::available() / 1_000_000);
         if needed > free {
-            let message =
-                format!("body `{}`: its factorisation needs {needed} MB of memory, {free} MB are free", self.name);
+            let message = format!("body `{name}`: its factorisation needs {needed} MB of memory, {free} MB are free");
             return Err(Error::new(Kind::Solver, message).help("take multigrid: --set solver=hypre"));
         }
         schur.factor()?;

@@ -1,6 +1,7 @@
 //! Any PETSc KSP and PC as inner solver.
 
-use super::{InnerSolver, options};
+use super::InnerSolver;
+use super::options::Chosen;
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::Solved;
@@ -8,6 +9,8 @@ use crate::petsc::{Int, Ksp, Matrix, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
 pub struct Krylov {
+    session: Session,
+    chosen: Chosen,
     matrix: Matrix,
     ksp: Ksp,
     changed: bool,
@@ -32,14 +35,14 @@ const WORN: f64 = 1.5;
 const FEW: usize = 12;
 
 impl Krylov {
-    /// Starts from G = K, with the options of prefix `<body>_` that stand in the database now. `near_null_space` are the
+    /// Starts from G = K, with the options that were chosen. `near_null_space` are the
     /// rigid motions that algebraic multigrid (GAMG) wants to know, one entry a dof each.
     ///
     /// # Errors
     /// PETSc's refusal of a matrix or an option value.
     pub fn new(
         session: &Session,
-        body: &str,
+        chosen: Chosen,
         dimension: usize,
         stiffness: &Csr,
         near_null_space: &[Vec<f64>],
@@ -53,16 +56,24 @@ impl Krylov {
             stiffness.values.clone(),
         )?;
         matrix.set_spd()?;
-        let mut ksp = Ksp::new(session, &format!("{body}_"))?;
+        let mut ksp = Ksp::new(session, &format!("{}_", chosen.prefix()))?;
         ksp.set_operator(&matrix)?;
-        ksp.set_from_options()?;
+        chosen.lend(session, || ksp.set_from_options())?;
         if ksp.pc_type() == "gamg" {
             matrix.set_near_null_space(near_null_space)?;
         }
         let multigrid = matches!(ksp.pc_type().as_str(), "hypre" | "gamg" | "ml" | "mg") && ksp.ksp_type() != "preonly";
-        let keeps = multigrid && session.options().get(&format!("-{body}_ksp_reuse_preconditioner")).is_none();
-        let free = ksp.ksp_type() != "preonly" && options::typed(session, body, "ksp_rtol").is_none();
-        Ok(Self { matrix, ksp, free, changed: true, set_ups: 0, multigrid, keeps, stale: true, fresh: None })
+        let keeps = multigrid && chosen.get("ksp_reuse_preconditioner").is_none();
+        let free = ksp.ksp_type() != "preonly" && chosen.typed("ksp_rtol").is_none();
+        let session = session.clone();
+        let (changed, stale) = (true, true);
+        Ok(Self { session, chosen, matrix, ksp, free, changed, set_ups: 0, multigrid, keeps, stale, fresh: None })
+    }
+
+    /// Some work of the solver that may read options: what the program chose is read by the set-up, but of the options of PETSc some are
+    /// read in a solve (`-ksp_converged_reason`, all of a solver nested in another).
+    fn with_options<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        if self.chosen.has_typed() { self.chosen.lend(&self.session, work) } else { work() }
     }
 }
 
@@ -84,14 +95,14 @@ impl InnerSolver for Krylov {
                 self.stale = false;
                 self.fresh = None;
             }
-            self.ksp.set_up()?;
+            self.chosen.lend(&self.session, || self.ksp.set_up())?;
         }
         Ok(())
     }
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         self.set_up()?;
-        let solved = self.ksp.solve(r, z)?;
+        let solved = self.with_options(|| self.ksp.solve(r, z))?;
         let direct = self.ksp.ksp_type() == "preonly";
         if self.keeps && solved.iterations > FEW {
             // the next change of G brings a new preconditioner if this one is worn
@@ -125,7 +136,7 @@ impl InnerSolver for Krylov {
             return self.solve(r, z);
         }
         self.set_up()?;
-        self.ksp.precondition(r, z)?;
+        self.with_options(|| self.ksp.precondition(r, z))?;
         Ok(Solved { iterations: 1, failure: self.ksp.failure() })
     }
 

@@ -1,8 +1,7 @@
 //! Which inner solver a body gets when the user typed no PETSc option, and the defaults of each.
 
-use super::{memory, options};
-use crate::error::Result;
-use crate::petsc::Session;
+use super::memory;
+use super::options::Chosen;
 use crate::problem::solver::Preset;
 
 /// Options of algebraic multigrid by hypre for elasticity with many solves a set-up; docs/solvers.md has the
@@ -99,56 +98,43 @@ pub fn choose(size: &Size) -> (Preset, String) {
 }
 
 /// Sets, before [`apply`], what is better for multigrid of a matrix that changes with nearly every solve.
-///
-/// # Errors
-/// Failures of PETSc's options database.
-pub fn made_often(session: &Session, body: &str) -> Result<()> {
-    MADE_OFTEN.iter().try_for_each(|(name, value)| options::set_default(session, body, name, Some(value)))
+pub fn made_often(chosen: &mut Chosen) {
+    MADE_OFTEN.iter().for_each(|(name, value)| chosen.set_default(name, value));
 }
 
-/// The solver that the options in force make for a prefix, in words.
-pub fn in_words(session: &Session, prefix: &str) -> String {
-    let in_force = |name: &str| session.options().get(&format!("-{prefix}_{name}"));
-    let package = in_force("pc_factor_mat_solver_type").map_or(String::new(), |package| format!(" by {package}"));
-    let word = |name: &str| in_force(name).unwrap_or_default();
+/// The solver that the options in force make, in words.
+pub fn in_words(chosen: &Chosen) -> String {
+    let package = chosen.get("pc_factor_mat_solver_type").map_or(String::new(), |package| format!(" by {package}"));
+    let word = |name: &str| chosen.get(name).unwrap_or_default();
     format!("{} + {}{package}", word("ksp_type"), word("pc_type"))
 }
 
-/// Sets the defaults of a body's solver: after the typed options, and only for the KSP and PC in force. A condensed body has
-/// no KSP and no defaults.
-///
-/// # Errors
-/// Failures of PETSc's options database.
-pub fn apply(session: &Session, body: &str, preset: Preset) -> Result<()> {
-    let default = |name: &str, value: &str| options::set_default(session, body, name, Some(value));
-    let table = session.options();
-    let in_force = |name: &str| table.get(&format!("-{body}_{name}")).unwrap_or_default();
-    match preset {
-        Preset::Condensed => return Ok(()),
-        Preset::Mumps => default("pc_type", "cholesky")?,
-        Preset::Hypre => default("pc_type", "hypre")?,
-        Preset::Gamg => default("pc_type", "gamg")?,
-        Preset::Icc => default("pc_type", "icc")?,
-    }
-    let pc = in_force("pc_type");
-    let direct = matches!(pc.as_str(), "cholesky" | "lu");
-    default("ksp_type", if direct { "preonly" } else { "cg" })?;
-    options::prefer_mumps(session, body)?;
-    let ksp = in_force("ksp_type");
-    if ksp != "preonly" {
-        default("ksp_rtol", TOLERANCE)?;
-        if matches!(ksp.as_str(), "cg" | "fcg" | "pipecg") {
+/// Sets the defaults of a solver: after the typed options, and only for the KSP and PC in force. A condensed body has no KSP and no
+/// defaults.
+pub fn apply(chosen: &mut Chosen, preset: Preset) {
+    let pc = match preset {
+        Preset::Condensed => return,
+        Preset::Mumps => "cholesky",
+        Preset::Hypre => "hypre",
+        Preset::Gamg => "gamg",
+        Preset::Icc => "icc",
+    };
+    chosen.set_default("pc_type", pc);
+    let is = |chosen: &Chosen, name: &str, values: &[&str]| values.contains(&chosen.get(name).unwrap_or_default());
+    let direct = is(chosen, "pc_type", &["cholesky", "lu"]);
+    chosen.set_default("ksp_type", if direct { "preonly" } else { "cg" });
+    chosen.prefer_mumps();
+    if !is(chosen, "ksp_type", &["preonly"]) {
+        chosen.set_default("ksp_rtol", TOLERANCE);
+        if is(chosen, "ksp_type", &["cg", "fcg", "pipecg"]) {
             // r'M^-1 r: with a good preconditioner the energy of the error, which the outer residual measures
-            default("ksp_norm_type", "natural")?;
+            chosen.set_default("ksp_norm_type", "natural");
         }
     }
-    if pc == "hypre" && matches!(in_force("pc_hypre_type").as_str(), "" | "boomeramg") {
-        for (name, value) in HYPRE {
-            default(name, value)?;
-        }
+    if is(chosen, "pc_type", &["hypre"]) && is(chosen, "pc_hypre_type", &["", "boomeramg"]) {
+        HYPRE.iter().for_each(|(name, value)| chosen.set_default(name, value));
     }
-    if pc == "icc" && preset == Preset::Icc {
-        default("pc_factor_levels", "1")?;
+    if is(chosen, "pc_type", &["icc"]) && preset == Preset::Icc {
+        chosen.set_default("pc_factor_levels", "1");
     }
-    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use super::global::{GLOBAL, GLOBAL_WORDS};
 use super::probe::Names;
-use super::{body_of, mark_copies, origin};
+use super::typed::{Prefixes, Typed};
 use crate::error::{Result, nearest};
 use crate::petsc::{Entry, Session};
 
@@ -39,13 +39,15 @@ const LATE: &str = "ksp_converged_reason";
 /// use winkler::{petsc::{Ksp, Matrix, Session}, solver::options::*};
 /// let words = ["-ksp_tpye", "cg", "-pc_gamg_threshold", "0.1", "-ksp_max_it", "9", "-uper_pc_type", "icc", "-log"];
 /// let session = Session::start(&words.map(String::from))?;
-/// distribute(&session, &["upper"])?;
-/// set_default(&session, "upper", "pc_type", Some("jacobi"))?;
+/// let mut upper = Typed::read(&session, &["upper"])?.of("upper");
+/// upper.set_default("pc_type", "jacobi");
 /// let matrix = Matrix::from_csr(&session, 1, vec![0, 1], vec![0], vec![2.0])?;
-/// let mut ksp = Ksp::new(&session, "upper_")?;
-/// ksp.set_operator(&matrix)?;
-/// ksp.set_from_options()?;
-/// ksp.set_up()?;
+/// upper.lend(&session, || {
+///     let mut ksp = Ksp::new(&session, "upper_")?;
+///     ksp.set_operator(&matrix)?;
+///     ksp.set_from_options()?;
+///     ksp.set_up()
+/// })?;
 /// let unread = unread(&session, &["upper"], &|_| ())?;
 /// let told: Vec<_> = unread.iter().map(|u| (u.name.as_str(), u.kind, u.nearest.as_deref())).collect();
 /// assert_eq!(told, [
@@ -59,17 +61,15 @@ const LATE: &str = "ksp_converged_reason";
 /// # Errors
 /// When PETSc is out of memory.
 pub fn unread(session: &Session, bodies: &[&str], all_reduce: &dyn Fn(&mut [u8])) -> Result<Vec<Unread>> {
-    mark_copies(session, bodies)?;
     let options = session.options();
+    let (prefixes, typed) = (Prefixes::new(bodies), Typed::read(session, bodies)?);
     let all = options.all()?;
-    // Ours are nobody's mistake; -options_left shall not list them.
-    for (name, _) in all.iter().filter(|(name, _)| origin(name).is_some()) {
-        options.mark_used(name)?;
-    }
-    // What the user typed is the same on every rank, unlike our defaults.
-    let candidates: Vec<&Entry> =
-        all.iter().filter(|(name, _)| origin(name).is_none() && !is_late(name, bodies)).collect();
-    let mut read: Vec<u8> = candidates.iter().map(|(name, _)| u8::from(options.used(name))).collect();
+    let candidates: Vec<&Entry> = all.iter().filter(|(name, _)| !is_late(name, &prefixes)).collect();
+    // one that every solver has of its own serves none, and is no mistake
+    let is_served =
+        |name: &str| prefixes.is_plain(name) && !bodies.is_empty() && typed.owners(bare(name)) == bodies.len();
+    let mut read: Vec<u8> =
+        candidates.iter().map(|(name, _)| u8::from(options.used(name) || is_served(name))).collect();
     all_reduce(&mut read);
     let mut left: Vec<&Entry> = Vec::new();
     for (entry, read) in candidates.into_iter().zip(read) {
@@ -83,34 +83,39 @@ pub fn unread(session: &Session, bodies: &[&str], all_reduce: &dyn Fn(&mut [u8])
         return Ok(Vec::new());
     }
 
-    let of_body = |body: &&str| {
-        all.iter().filter_map(|(name, value)| Some((body_of(name, &[body])?.1.to_owned(), value.clone()))).collect()
-    };
-    let in_use: Vec<Vec<Entry>> = bodies.iter().map(of_body).collect();
-    let names = Names::collect(session, &in_use)?;
-    let known: Vec<String> = std::iter::once(String::new())
-        .chain(bodies.iter().map(|body| format!("{body}_")))
-        .flat_map(|prefix| names.iter().map(move |name| format!("-{prefix}{name}")))
-        .collect();
+    let names = Names::collect(session, &typed.combinations())?;
     let found = left.into_iter().map(|(name, value)| {
-        let bare = body_of(name, bodies).map_or(name.trim_start_matches('-'), |(_, bare)| bare);
-        let valid = names.contains(bare);
+        let valid = names.contains(prefixes.bare(name));
         Unread {
             name: name.clone(),
             value: value.clone(),
             kind: if valid { UnreadKind::NotInUse } else { UnreadKind::Unknown },
-            nearest: (!valid).then(|| nearest(name, known.iter().map(String::as_str))).flatten().map(String::from),
+            nearest: if valid { None } else { near(name, bodies, &names) },
         }
     });
     Ok(found.collect())
 }
 
+fn bare(name: &str) -> &str {
+    name.trim_start_matches('-')
+}
+
+/// The most similar name that PETSc knows, plain or of the body that the first word of `name` resembles most.
+fn near(name: &str, bodies: &[&str], names: &Names) -> Option<String> {
+    let first = bare(name).split('_').next().unwrap_or_default();
+    let body = bodies.iter().find(|body| **body == first).copied().or_else(|| nearest(first, bodies.iter().copied()));
+    let prefixes = std::iter::once(String::new()).chain(body.map(|body| format!("{body}_")));
+    let known: Vec<String> =
+        prefixes.flat_map(|prefix| names.iter().map(move |name| format!("-{prefix}{name}"))).collect();
+    nearest(name, known.iter().map(String::as_str)).map(str::to_owned)
+}
+
 /// Whether an option is not read by the objects at set-up: one of PETSc as a whole, or one read later.
-fn is_late(name: &str, bodies: &[&str]) -> bool {
-    let bare = match body_of(name, bodies) {
+fn is_late(name: &str, prefixes: &Prefixes) -> bool {
+    let bare = match prefixes.split(name) {
         Some((_, own)) => own,
         None => {
-            let bare = name.trim_start_matches('-');
+            let bare = bare(name);
             let global = GLOBAL.split_whitespace().any(|known| known == bare);
             if global || bare.split('_').next().is_some_and(|first| GLOBAL_WORDS.contains(&first)) {
                 return true;
