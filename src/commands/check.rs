@@ -1,13 +1,17 @@
 //! `winkler check`: builds everything, solves nothing, says what is there.
 
 use super::clock::Clock;
+use super::preflight::Coupling;
 use super::run;
 use super::stages::Built;
+use super::words::in_words;
 use super::{load, preflight, report};
-use crate::contact::Left;
+use crate::contact::{ContactPair, Left};
+use crate::discretize::BodyInfo;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
-use crate::output::{say, sci};
+use crate::output::report::warning_lines;
+use crate::output::{LISTED, say, sci};
 use crate::petsc::Session;
 use serde_json::json;
 use std::path::PathBuf;
@@ -78,21 +82,71 @@ fn gap_range(gap: &[f64]) -> (f64, f64) {
 
 fn print(built: &Built, solvers: &str) -> Result<()> {
     say(&built.scene.title)?;
+    let lines = match built.discrete.bodies.len() {
+        ..=LISTED => each_body(built),
+        _ => all_bodies(built),
+    };
+    let lines = lines.into_iter().chain(match built.discrete.model.pairs.len() {
+        ..=LISTED => each_pair(built),
+        _ => all_pairs(built),
+    });
+    let solver = format!("  inner solver: {} ({})", solvers, built.choice);
+    lines.chain([solver]).chain(warning_lines(&built.warnings, "--json")).try_for_each(say)
+}
+
+/// Two lines or three a body.
+fn each_body(built: &Built) -> Vec<String> {
+    let mut lines = Vec::new();
     for info in &built.discrete.bodies {
-        say(format_args!(
+        lines.push(format!(
             "  body {}: {} cells, {} nodes, {} dofs, {} of them supported",
             info.name, info.cells, info.nodes, info.dofs, info.supported
-        ))?;
+        ));
         if !info.left_by_supports.is_empty() {
-            say(format_args!("    rigid motions left to contact: {}", info.left_by_supports.join("; ")))?;
+            lines.push(format!("    rigid motions left to contact: {}", info.left_by_supports.join("; ")));
         }
         if !info.left_by_all.is_empty() {
-            say(format_args!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")))?;
+            lines.push(format!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")));
         }
     }
+    lines
+}
+
+/// Sums over the bodies, and which of them supports or nothing hold.
+fn all_bodies(built: &Built) -> Vec<String> {
+    let bodies = &built.discrete.bodies;
+    let sum = |of: fn(&BodyInfo) -> usize| bodies.iter().map(of).sum::<usize>();
+    let range = |of: fn(&BodyInfo) -> usize| {
+        let (least, most) = bodies.iter().map(of).fold((usize::MAX, 0), |(a, b), n| (a.min(n), b.max(n)));
+        if least == most { least.to_string() } else { format!("{least} to {most}") }
+    };
+    let mut lines = vec![format!(
+        "  {} bodies: {} cells, {} nodes, {} dofs, {} of them supported; in each {} cells, {} dofs; --json has every one",
+        bodies.len(),
+        sum(|info| info.cells),
+        sum(|info| info.nodes),
+        sum(|info| info.dofs),
+        sum(|info| info.supported),
+        range(|info| info.cells),
+        range(|info| info.dofs)
+    )];
+    let named = |what: &str, of: fn(&BodyInfo) -> &Vec<String>| {
+        let names: Vec<&String> = bodies.iter().filter(|info| !of(info).is_empty()).map(|info| &info.name).collect();
+        let line =
+            || format!("    rigid motions {what}: of {} bodies, {}", names.len(), in_words(names.iter().copied()));
+        (!names.is_empty()).then(line)
+    };
+    lines.extend(named("left to contact", |info| &info.left_by_supports));
+    lines.extend(named("that nothing can hold", |info| &info.left_by_all));
+    lines
+}
+
+/// Two lines a pair.
+fn each_pair(built: &Built) -> Vec<String> {
+    let mut lines = Vec::new();
     for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
         let (low, high) = gap_range(&pair.gap);
-        say(format_args!(
+        lines.push(format!(
             "  contact {} - {}: {} points on {}, {} {:.6}, gap {} to {}",
             pair.surfaces[0],
             pair.surfaces[1],
@@ -102,27 +156,60 @@ fn print(built: &Built, solvers: &str) -> Result<()> {
             pair.weight.iter().sum::<f64>(),
             sci(low, 3),
             sci(high, 3)
-        ))?;
+        ));
         let coupling = preflight::coupling(built, i);
-        if coupling.pressure == 0.0 {
-            say("    the loads push no body as a whole: pressure and sweeps cannot be estimated from them")?;
-            continue;
-        }
-        let sweeps = coupling.sweeps.iter().map(|(method, count)| match count.is_finite() {
-            true => format!("{method} {count:.0}"),
-            false => format!("{method} no end in sight"),
+        lines.push(match coupling.pressure == 0.0 {
+            true => {
+                "    the loads push no body as a whole: pressure and sweeps cannot be estimated from them".to_owned()
+            }
+            false => format!("    mean pressure {}, {}", sci(coupling.pressure, 3), expected(&coupling)),
         });
-        say(format_args!(
-            "    mean pressure {}, theta {:.3} and {:.3}; sweeps to expect for a residual of 1e-8: {}",
-            sci(coupling.pressure, 3),
-            coupling.theta[0],
-            coupling.theta[1],
-            sweeps.collect::<Vec<_>>().join(", ")
-        ))?;
     }
-    say(format_args!("  inner solver: {} ({})", solvers, built.choice))?;
-    for warning in &built.warnings {
-        say(format_args!("  warning: {warning}"))?;
+    lines
+}
+
+/// theta and sweeps of a pair in words.
+fn expected(coupling: &Coupling) -> String {
+    let sweeps = coupling.sweeps.iter().map(|(method, count)| match count.is_finite() {
+        true => format!("{method} {count:.0}"),
+        false => format!("{method} no end in sight"),
+    });
+    let [a, b] = coupling.theta;
+    let sweeps = sweeps.collect::<Vec<_>>().join(", ");
+    format!("theta {a:.3} and {b:.3}; sweeps to expect for a residual of 1e-8: {sweeps}")
+}
+
+/// Sums over the pairs, and what to expect of the one with the largest theta.
+fn all_pairs(built: &Built) -> Vec<String> {
+    let pairs = &built.discrete.model.pairs;
+    let gaps = pairs.iter().map(|pair| gap_range(&pair.gap));
+    let (low, high) = gaps.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (c, d)| (a.min(c), b.max(d)));
+    let mut lines = vec![format!(
+        "  {} contacts: {} points, {} {:.6}, gap {} to {}; --json has every one",
+        pairs.len(),
+        pairs.iter().map(ContactPair::len).sum::<usize>(),
+        pairs[0].measure,
+        pairs.iter().flat_map(|pair| &pair.weight).sum::<f64>(),
+        sci(low, 3),
+        sci(high, 3)
+    )];
+    let all = (0..pairs.len()).map(|i| (&pairs[i], preflight::coupling(built, i)));
+    let pushed: Vec<(&ContactPair, Coupling)> = all.filter(|(_, coupling)| coupling.pressure > 0.0).collect();
+    if pushed.len() < pairs.len() {
+        let rest = pairs.len() - pushed.len();
+        lines.push(format!(
+            "    {rest} of them have no load of a body as a whole across: their pressure cannot be estimated"
+        ));
     }
-    Ok(())
+    let both = |coupling: &Coupling| coupling.theta[0] * coupling.theta[1];
+    if let Some((pair, coupling)) = pushed.iter().max_by(|(_, a), (_, b)| both(a).total_cmp(&both(b))) {
+        let [least, most] = [f64::min, f64::max].map(|pick| pushed.iter().map(|(_, of)| of.pressure).reduce(pick));
+        let [least, most] = [least, most].map(|pressure| sci(pressure.unwrap_or(f64::NAN), 3));
+        let [a, b] = &pair.surfaces;
+        lines.push(format!(
+            "    mean pressure {least} to {most}; the largest theta, of {a} - {b}: {}",
+            expected(coupling)
+        ));
+    }
+    lines
 }

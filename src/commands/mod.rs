@@ -18,6 +18,7 @@ pub mod report;
 pub mod results;
 mod reuse;
 pub mod run;
+mod shown;
 pub mod solve;
 pub mod stages;
 pub mod steps;

@@ -17,10 +17,13 @@ use crate::model::BodyCounts;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::sci;
 use crate::output::vtu::Grid;
-use crate::output::{BodyReport, ContactTable, EstimateReport, InnerTimes, IntervalReport, PairReport, Report};
+use crate::output::{
+    BodyReport, ContactTable, EstimateReport, InnerTimes, IntervalReport, LISTED, PairReport, PairRow, Report,
+};
 use crate::parallel::share;
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Exit code of a run that ended like this.
 pub fn exit_code(done: &Done) -> i32 {
@@ -150,11 +153,23 @@ pub struct Shared {
     pub solvers: Vec<String>,
 }
 
-/// Inner solvers in words: once if all bodies have the same.
+/// Kinds of inner solvers in a sentence.
+const KINDS: usize = 4;
+
+/// Inner solvers in words: once if all bodies have the same, of many bodies the kinds that most of them have.
 pub fn solvers_in_words(solvers: &[String]) -> String {
     match solvers {
         [first, rest @ ..] if rest.iter().all(|other| other == first) => first.clone(),
-        all => all.join(", "),
+        all if all.len() <= LISTED => all.join(", "),
+        all => {
+            let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+            all.iter().for_each(|solver| *counts.entry(solver).or_default() += 1);
+            let mut kinds: Vec<(&str, usize)> = counts.into_iter().collect();
+            kinds.sort_by_key(|kind| std::cmp::Reverse(kind.1));
+            let others: usize = kinds.iter().skip(KINDS).map(|kind| kind.1).sum();
+            let said = kinds.iter().take(KINDS).map(|(solver, count)| format!("{count} bodies {solver}"));
+            said.chain((others > 0).then(|| format!("{others} others"))).collect::<Vec<_>>().join(", ")
+        }
     }
 }
 
@@ -223,6 +238,12 @@ fn pair_report(done: &Done, i: usize) -> PairReport {
         open_length: length(|c| c < 0.0),
         contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
     }
+}
+
+/// What `contacts.csv` says of pair `i` besides.
+pub fn pair_row(done: &Done, i: usize) -> PairRow {
+    let pair = &done.model().pairs[i];
+    PairRow::new(&pair.weight, &pair.gap, &done.outcome.layer.compression[done.model().range(i)])
 }
 
 /// Where the compression changes sign between neighbouring points of a curve.

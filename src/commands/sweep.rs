@@ -4,15 +4,17 @@ use super::asking::Asking;
 use super::clock::Clock;
 use super::keep::Keep;
 use super::run;
+use super::shown::{self, Shown};
 use super::stages::Begin;
 use super::{folder_of, report, results, reuse};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
-use crate::output::{Folder, Plot, Report, say, sci};
+use crate::output::{Folder, LISTED, Plot, Report, say, sci};
 use crate::parallel::agree;
 use crate::petsc::Session;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -48,7 +50,9 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     let first = session.rank() == 0;
     let mut table = csv::Writer::from_writer(folder.open("sweep.csv")?.1);
     let mut exit = 0;
-    let (mut reports, mut histories, mut pressures, mut reference) = (Vec::new(), Vec::new(), Vec::new(), None);
+    let (mut reports, mut histories, mut pressures, mut reference) = (Vec::new(), Vec::new(), Pressures::new(), None);
+    // the same pairs of all runs
+    let mut shown = None;
     let mut before = None;
     let mut watched = Watched(Asking::new(interrupt, None));
     for (scene, values) in scenes.iter().zip(&runs) {
@@ -84,8 +88,11 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         }
         histories.push(report::convergence(&label, &done.outcome));
         let pairs = &done.model().pairs;
-        for i in (0..pairs.len()).filter(|&i| pairs[i].along_curve) {
-            pressures.push((i, report::main_axis(&pairs[i]).1, report::pressure(&label, &done, i)));
+        let shown =
+            shown.get_or_insert_with(|| Shown::busiest(&report.pairs, scenes[0].output.pairs.unwrap_or(LISTED)));
+        for i in (0..pairs.len()).filter(|&i| pairs[i].along_curve && shown.has(i)) {
+            let curve = (report::main_axis(&pairs[i]).1, report::pressure(&label, &done, i));
+            pressures.entry(i).or_default().push(curve);
             if let Some(curve) = report::reference(&done.built.discrete, i) {
                 reference.get_or_insert((i, curve));
             }
@@ -219,23 +226,25 @@ fn row(table: &mut csv::Writer<std::fs::File>, folder: &Folder, fields: Vec<Stri
     written.map_err(|cause| Error::file(&folder.path().join("sweep.csv"), "write", &cause))
 }
 
+/// The pressures of all runs along each pair, with the name of the coordinate.
+type Pressures = BTreeMap<usize, Vec<(&'static str, PressureSeries)>>;
+
 fn plots(
     folder: &Folder,
     title: &str,
     histories: Vec<ConvergenceSeries>,
-    pressures: Vec<(usize, &'static str, PressureSeries)>,
+    pressures: Pressures,
     reference: Option<(usize, PressureSeries)>,
 ) -> Result<()> {
     let convergence = Plot::convergence(title, &histories);
     folder.write("convergence.svg", |out| convergence.write(out))?;
-    let pairs = pressures.iter().map(|(pair, ..)| pair + 1).max().unwrap_or(0);
-    for pair in 0..pairs {
-        let of_pair = || pressures.iter().filter(|(index, ..)| *index == pair);
-        let mut curves: Vec<PressureSeries> = of_pair().map(|(.., curve)| curve.clone()).collect();
+    let names = shown::numbered(pressures.iter().map(|_| "pressure".to_owned()));
+    for ((pair, of_pair), name) in pressures.into_iter().zip(names) {
+        let axis = of_pair.first().map_or("x", |(axis, _)| axis);
+        let mut curves: Vec<PressureSeries> = of_pair.into_iter().map(|(_, curve)| curve).collect();
         curves.extend(reference.iter().filter(|(index, _)| *index == pair).map(|(_, curve)| curve.clone()));
-        let axis = of_pair().map(|(_, axis, _)| *axis).next().unwrap_or("x");
         let plot = Plot::pressure(title, axis, &curves);
-        folder.write(&folder.unused("pressure", "svg"), |out| plot.write(out))?;
+        folder.write(&format!("{name}.svg"), |out| plot.write(out))?;
     }
     Ok(())
 }

@@ -2,11 +2,12 @@
 
 use super::clock::Clock;
 use super::results::{self, Recovered};
+use super::shown::{self, Shown};
 use super::stages::Done;
 use super::{adapt::Plan, report};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
-use crate::output::{Folder, Plot, Report, vtu};
+use crate::output::{Folder, LISTED, PairRow, Plot, Report, contacts, vtu};
 use crate::petsc::Session;
 use std::path::Path;
 
@@ -49,8 +50,12 @@ impl Writing<'_> {
         let mut report = make(clock);
         let mut written = Ok(());
         if first {
-            let early = self.small(&folder).and(self.report(&folder, &mut report, false));
-            written = early.and(plots(done, &folder));
+            let most = done.built.scene.output.pairs.unwrap_or(LISTED);
+            let shown = Shown::busiest(&report.pairs, most);
+            report.left_out = shown.left_out();
+            let plots = Plots::of(done, &shown);
+            let early = self.small(&folder, &report, &shown, &plots).and(self.report(&folder, &mut report, false));
+            written = early.and(plots.write(done, &folder));
         }
         if fields {
             written = written.and(self.fields(&recovered, &folder));
@@ -65,11 +70,20 @@ impl Writing<'_> {
         (report, failed.map_or(written, Err))
     }
 
-    /// Contact tables.
-    fn small(&self, folder: &Folder) -> Result<()> {
-        let pairs = 0..self.done.model().pairs.len();
-        let save = |i| report::contact_table(self.done, self.estimate, i).save(folder).map(|_| ());
-        pairs.map(save).fold(Ok(()), Result::and)
+    /// Tables: one of all pairs, and those of the pairs shown.
+    fn small(&self, folder: &Folder, report: &Report, shown: &Shown, plots: &Plots) -> Result<()> {
+        let mut rows: Vec<PairRow> = (0..report.pairs.len()).map(|i| report::pair_row(self.done, i)).collect();
+        let stems = shown::stems(self.done);
+        for (i, row) in rows.iter_mut().enumerate().filter(|(i, _)| shown.has(*i)) {
+            row.table = format!("{}.csv", stems[i]);
+        }
+        plots.0.iter().for_each(|(i, file)| rows[*i].plot.clone_from(file));
+        let save = |(i, row): (usize, &PairRow)| {
+            let table = report::contact_table(self.done, self.estimate, i);
+            folder.write(&row.table, |out| table.write(out)).map(|_| ())
+        };
+        let tables = rows.iter().enumerate().filter(|(_, row)| !row.table.is_empty());
+        tables.map(save).fold(contacts::save(folder, &report.pairs, &rows).map(|_| ()), Result::and)
     }
 
     fn report(&self, folder: &Folder, report: &mut Report, fields: bool) -> Result<()> {
@@ -88,10 +102,8 @@ impl Writing<'_> {
             return Ok(());
         }
         let mut names: Vec<String> = done.built.discrete.bodies.iter().map(|body| body.name.clone()).collect();
-        for i in 0..done.model().pairs.len() {
-            let file = folder.unused(&report::contact_table(done, None, i).stem(), "vtu");
-            let name = file.trim_end_matches(".vtu").to_owned();
-            folder.write(&file, |out| report::contact_surface(&name, done, i).write(out))?;
+        for (i, name) in shown::stems(done).into_iter().enumerate() {
+            folder.write(&format!("{name}.vtu"), |out| report::contact_surface(&name, done, i).write(out))?;
             names.push(name);
         }
         folder.write(&vtu::pvd_name("bodies"), |out| vtu::write_pvd(&names, out)).map(|_| ())
@@ -122,20 +134,38 @@ pub fn to_json(report: &Report) -> Result<String> {
         .map_err(|cause| Error::new(Kind::File, "the report cannot be written as JSON").because(cause.to_string()))
 }
 
-fn plots(done: &Done, folder: &Folder) -> Result<()> {
-    let (scene, model) = (&done.built.scene, done.model());
-    if !scene.output.plots {
-        return Ok(());
+/// The pairs that have a plot of their pressure, with its file.
+struct Plots(Vec<(usize, String)>);
+
+impl Plots {
+    /// Only along curves: points of a surface over one coordinate would be a cloud.
+    fn of(done: &Done, shown: &Shown) -> Self {
+        let pairs = &done.model().pairs;
+        let has_plot = |i: &usize| done.built.scene.output.plots && shown.has(*i) && pairs[*i].along_curve;
+        let plotted: Vec<usize> = (0..pairs.len()).filter(has_plot).collect();
+        let files = shown::numbered(plotted.iter().map(|_| "pressure".to_owned()));
+        Self(plotted.into_iter().zip(files.into_iter().map(|name| format!("{name}.svg"))).collect())
     }
-    let convergence = Plot::convergence(&scene.title, &[report::convergence("", &done.outcome)]);
-    folder.write("convergence.svg", |out| convergence.write(out))?;
-    // only along curves: points of a surface over one coordinate would be a cloud
-    for i in (0..model.pairs.len()).filter(|&i| model.pairs[i].along_curve) {
-        let mut curves = vec![report::pressure("pressure", done, i)];
-        curves.extend(report::reference(&done.built.discrete, i));
-        let (_, axis) = report::main_axis(&model.pairs[i]);
-        let plot = Plot::pressure(&scene.title, axis, &curves);
-        folder.write(&folder.unused("pressure", "svg"), |out| plot.write(out))?;
+
+    fn write(&self, done: &Done, folder: &Folder) -> Result<()> {
+        let (scene, model) = (&done.built.scene, done.model());
+        if !scene.output.plots {
+            return Ok(());
+        }
+        let convergence = Plot::convergence(&scene.title, &[report::convergence("", &done.outcome)]);
+        folder.write("convergence.svg", |out| convergence.write(out))?;
+        for &(i, ref file) in &self.0 {
+            let mut curves = vec![report::pressure("pressure", done, i)];
+            curves.extend(report::reference(&done.built.discrete, i));
+            let (_, axis) = report::main_axis(&model.pairs[i]);
+            // with more plots than pairs that a person knows by heart, each says whose it is
+            let title = match model.pairs.len() {
+                ..=LISTED => scene.title.clone(),
+                _ => format!("{}: {} - {}", scene.title, model.pairs[i].surfaces[0], model.pairs[i].surfaces[1]),
+            };
+            let plot = Plot::pressure(&title, axis, &curves);
+            folder.write(file, |out| plot.write(out))?;
+        }
+        Ok(())
     }
-    Ok(())
 }

@@ -1,10 +1,7 @@
 //! `contact-<a>-<b>.csv`: weight, gap, compression, pressure and normal displacements at the contact points of one pair.
 
-use super::folder::{Folder, safe_name};
 use super::format::field;
-use crate::error::Result;
 use std::io::{self, Write};
-use std::path::PathBuf;
 
 /// The result on one pair of contact surfaces; all vectors have one entry per contact point.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -28,20 +25,6 @@ pub struct ContactTable {
 }
 
 impl ContactTable {
-    /// `contact-<a>-<b>`, safe as a file name.
-    pub fn stem(&self) -> String {
-        let [a, b] = &self.side_names;
-        format!("contact-{}-{}", safe_name(a), safe_name(b))
-    }
-
-    /// Writes the table into the folder of results under a name of its own; returns the path.
-    ///
-    /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
-    pub fn save(&self, folder: &Folder) -> Result<PathBuf> {
-        folder.write(&folder.unused(&self.stem(), "csv"), |out| self.write(out))
-    }
-
     /// Writes the table as CSV, points in their order, numbers to full precision.
     ///
     /// # Errors
@@ -85,12 +68,10 @@ mod tests {
 
     #[test]
     fn every_number_reads_back_in_its_column() {
-        let base = tempfile::tempdir().unwrap();
-        let folder = Folder::create(base.path()).unwrap();
         let table = table();
-        let path = table.save(&folder).unwrap();
-        assert_eq!(path, base.path().join("contact-upper_bottom-lower.csv"));
-        let mut csv = csv::Reader::from_path(&path).unwrap();
+        let mut text = Vec::new();
+        table.write(&mut text).unwrap();
+        let mut csv = csv::Reader::from_reader(&text[..]);
         let header: Vec<_> = csv.headers().unwrap().iter().map(String::from).collect();
         let names = "x,y,z,weight,gap,compression,pressure,u_n_upper bottom,u_n_lower,pressure_error";
         assert_eq!(header.join(","), names);
@@ -114,15 +95,6 @@ mod tests {
             ];
             assert_eq!(row[..], expected);
         }
-    }
-
-    #[test]
-    fn two_pairs_never_share_a_file() {
-        let base = tempfile::tempdir().unwrap();
-        let folder = Folder::create(base.path()).unwrap();
-        let mut other = table();
-        other.side_names = ["upper/bottom".into(), "lower".into()];
-        assert_ne!(table().save(&folder).unwrap(), other.save(&folder).unwrap());
     }
 
     #[test]

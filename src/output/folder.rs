@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use std::cell::RefCell;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -14,8 +14,6 @@ pub struct Folder {
     files: RefCell<Vec<PathBuf>>,
     /// The same, to be looked up.
     known: RefCell<HashSet<PathBuf>>,
-    /// Number of the last file of each stem and extension that [`Folder::unused`] gave.
-    numbers: RefCell<HashMap<(String, String), usize>>,
 }
 
 impl Folder {
@@ -34,7 +32,7 @@ impl Folder {
             Error::file(&path, "write to the folder", &cause)
                 .help("give yourself write permission, or name another folder with `-o FOLDER`")
         })?;
-        Ok(Self { path, files: RefCell::default(), known: RefCell::default(), numbers: RefCell::default() })
+        Ok(Self { path, files: RefCell::default(), known: RefCell::default() })
     }
 
     /// The folder as it was named.
@@ -69,21 +67,6 @@ impl Folder {
         let file = File::create(&path).map_err(|cause| failed(&path, &cause))?;
         self.add(&path);
         Ok((path, file))
-    }
-
-    /// `stem.extension`, or `stem-2.extension` and so on when this run has already written a file of that name.
-    pub fn unused(&self, stem: &str, extension: &str) -> String {
-        let known = self.known.borrow();
-        let mut numbers = self.numbers.borrow_mut();
-        let number = numbers.entry((stem.to_owned(), extension.to_owned())).or_insert(1);
-        loop {
-            let name =
-                if *number == 1 { format!("{stem}.{extension}") } else { format!("{stem}-{number}.{extension}") };
-            if !known.contains(&self.path.join(&name)) {
-                return name;
-            }
-            *number += 1;
-        }
     }
 
     fn add(&self, path: &Path) {
@@ -174,8 +157,6 @@ mod tests {
         assert_eq!(fs::read_to_string(folder.path().join("x.txt")).unwrap(), "second");
         assert_eq!(folder.files(), [folder.path().join("x.txt")]);
         assert_eq!(names(folder.path()), ["x.txt"]);
-        assert_eq!(folder.unused("x", "txt"), "x-2.txt");
-        assert_eq!(folder.unused("y", "txt"), "y.txt");
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 mod chart;
 pub mod contact;
+pub mod contacts;
 pub mod folder;
 mod format;
 pub mod history;
@@ -34,13 +35,14 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 pub use contact::ContactTable;
+pub use contacts::PairRow;
 pub use folder::{Folder, safe_name, write_whole};
 pub use format::{sci, seconds};
 pub use history::HistoryWriter;
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, PressureSeries, Series, Style};
 pub use report::{
-    BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, PairReport,
-    Report, RoundReport, StepPairReport, StepReport,
+    BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
+    PairReport, Report, RoundReport, StepPairReport, StepReport,
 };
 pub use table::{IterationTable, Verbosity};
 pub use vtu::{BodyField, CellKind, Grid};

@@ -90,6 +90,8 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// The scene with all defaults filled in.
     pub settings: Value,
+    /// Which pairs have no table and plot of their own, and how to get them, in words; none if all have.
+    pub left_out: Option<String>,
     /// Files written, relative to the folder of results.
     pub files: Vec<String>,
 }
@@ -299,8 +301,9 @@ pub struct PairReport {
     pub contact_ends: Vec<[f64; 3]>,
 }
 
-/// Load steps that the closing lines list; more stand in the report only.
-const LISTED: usize = 20;
+/// Bodies, pairs, load steps or warnings that the terminal lists, and pairs with files of their own unless the scene says how many: as
+/// many as a person looks through. More stand in the report only.
+pub const LISTED: usize = 24;
 
 impl Report {
     /// The closing lines for a terminal.
@@ -349,11 +352,24 @@ impl Report {
                 let (peak, force) = (readable(pair.peak_pressure, 6), vector(pair.force));
                 format!("force {force}, peak pressure {peak}, {} points closed", pair.closed)
             });
-            let (pairs, factor) = (pairs.collect::<Vec<_>>().join("; "), readable(step.factor, 4));
+            let pairs = match step.pairs.len() {
+                ..=LISTED => pairs.collect::<Vec<_>>().join("; "),
+                count => {
+                    let peak = step.pairs.iter().map(|pair| pair.peak_pressure).fold(0.0, f64::max);
+                    let closed: usize = step.pairs.iter().map(|pair| pair.closed).sum();
+                    format!("{count} pairs, peak pressure {}, {closed} points closed", readable(peak, 6))
+                }
+            };
+            let factor = readable(step.factor, 4);
             let (number, k) = (index + 1, step.iterations);
             lines.push(format!("  step {number}, factor {factor}: {k} iterations, {}: {pairs}", step.status));
         }
-        for pair in &self.pairs {
+        let mut busiest: Vec<&PairReport> = self.pairs.iter().collect();
+        if let Some(left_out) = &self.left_out {
+            busiest.sort_by(|a, b| size(b.force[0]).total_cmp(&size(a.force[0])));
+            lines.push(format!("  {left_out}"));
+        }
+        for pair in busiest.into_iter().take(LISTED) {
             let names = format!("  {} - {}", pair.bodies[0], pair.bodies[1]);
             lines.push(if pair.peak_pressure > 0.0 {
                 let [x, y, z] = pair.peak_at.map(|x| readable(x, 4));
@@ -368,7 +384,20 @@ impl Report {
                 format!("{names}: no contact")
             });
         }
-        for body in self.bodies.iter().filter(|_| self.residual.is_some()) {
+        if self.bodies.len() > LISTED && self.residual.is_some() {
+            let worst = |of: fn(&BalanceReport) -> f64| {
+                let all = self.bodies.iter().map(|body| (of(&body.balance), &body.name));
+                all.max_by(|a, b| a.0.total_cmp(&b.0))
+                    .map_or(String::new(), |(most, name)| format!("{} (`{name}`)", sci(most, 1)))
+            };
+            lines.push(format!(
+                "  {} bodies: imbalance at most {} of forces, {} of moments",
+                self.bodies.len(),
+                worst(|balance| balance.force_imbalance),
+                worst(|balance| balance.moment_imbalance)
+            ));
+        }
+        for body in self.bodies.iter().filter(|_| self.residual.is_some() && self.bodies.len() <= LISTED) {
             let BalanceReport { supports, springs, rigid, force_imbalance, moment_imbalance, .. } = &body.balance;
             let all = supports.iter().chain(springs).chain(rigid);
             let held: Vec<_> = all.map(|part| format!("{} {}", part.on, vector(part.force))).collect();
@@ -380,9 +409,23 @@ impl Report {
                 sci(*moment_imbalance, 1)
             ));
         }
-        lines.extend(self.warnings.iter().map(|warning| format!("  warning: {warning}")));
+        lines.extend(warning_lines(&self.warnings, "report.json"));
         lines.join("\n")
     }
+}
+
+/// A line each for the first warnings, and one that says where the others stand.
+pub fn warning_lines(warnings: &[String], others: &str) -> Vec<String> {
+    let mut lines: Vec<String> = warnings.iter().take(LISTED).map(|warning| format!("  warning: {warning}")).collect();
+    if warnings.len() > LISTED {
+        lines.push(format!("  and {} more warnings: {others} has all", warnings.len() - LISTED));
+    }
+    lines
+}
+
+/// Length of a vector.
+fn size(v: [f64; 3]) -> f64 {
+    v.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
 /// A vector as text.

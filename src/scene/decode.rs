@@ -292,11 +292,21 @@ fn adapt(node: &Node) -> Result<AdaptSpec> {
 fn output(node: Option<&Node>) -> Result<OutputSpec> {
     let default = OutputSpec::default();
     let Some(node) = node else { return Ok(default) };
-    let keys = Keys::open(node, "[output]", &["dir", "vtu", "plots", "checkpoint"])?;
+    let keys = Keys::open(node, "[output]", &["dir", "vtu", "plots", "pairs", "checkpoint"])?;
     Ok(OutputSpec {
         dir: keys.get("dir").map(|dir| dir.name().map(|name| name.value.into())).transpose()?,
         vtu: keys.get("vtu").map_or(Ok(default.vtu), Node::boolean)?,
         plots: keys.get("plots").map_or(Ok(default.plots), Node::boolean)?,
+        pairs: keys.get("pairs").map(pairs).transpose()?,
         checkpoint: keys.get("checkpoint").map(|minutes| minutes.positive("the time in minutes")).transpose()?,
     })
+}
+
+/// Most pairs with files of their own: a number, or all.
+fn pairs(node: &Node) -> Result<usize> {
+    match node.string() {
+        Ok("all") => Ok(usize::MAX),
+        Ok(_) => Err(node.expected("a whole number or \"all\"")),
+        Err(_) => usize::try_from(node.whole()?).map_err(|_| node.refuse("the number of pairs is below 0")),
+    }
 }

@@ -46,6 +46,8 @@ impl Scene {
         insert(&mut output, "dir", self.output.dir.as_ref().map(|dir| json!(dir.display().to_string())));
         output.insert("vtu".into(), json!(self.output.vtu));
         output.insert("plots".into(), json!(self.output.plots));
+        let pairs = |&most: &usize| if most == usize::MAX { json!("all") } else { json!(most) };
+        insert(&mut output, "pairs", self.output.pairs.as_ref().map(pairs));
         insert(&mut output, "checkpoint", self.output.checkpoint.map(|minutes| json!(minutes)));
         settings.insert("output".into(), output.into());
         settings.into()

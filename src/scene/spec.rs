@@ -62,12 +62,14 @@ pub struct OutputSpec {
     pub vtu: bool,
     /// Whether to draw the SVG plots; default true.
     pub plots: bool,
+    /// Most pairs with tables and plots of their own; by default as many as a person looks through.
+    pub pairs: Option<usize>,
     /// Minutes between checkpoints; none by default.
     pub checkpoint: Option<f64>,
 }
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { dir: None, vtu: false, plots: true, checkpoint: None }
+        Self { dir: None, vtu: false, plots: true, pairs: None, checkpoint: None }
     }
 }

@@ -120,7 +120,7 @@ fn defaults_and_a_scene_in_space() {
     );
     let options = vec!["-ksp_rtol".to_owned(), "1e-10".to_owned()];
     assert_eq!(scene.solver, SolverSpec { preset: Some(Preset::Hypre), options });
-    assert_eq!(scene.output, OutputSpec { dir: Some("out".into()), vtu: true, plots: true, checkpoint: None });
+    assert_eq!(scene.output, OutputSpec { dir: Some("out".into()), vtu: true, ..OutputSpec::default() });
 }
 
 #[test]

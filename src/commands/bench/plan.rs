@@ -129,7 +129,7 @@ impl Plan {
                         ranks.to_string(),
                     ]);
                     let mut overrides = mesh.clone();
-                    overrides.extend(["output.vtu=false", "output.plots=false"].map(str::to_owned));
+                    overrides.extend(["output.vtu=false", "output.plots=false", "output.pairs=all"].map(str::to_owned));
                     overrides.extend(solver.overrides.iter().cloned());
                     overrides.extend(method.map(|name| match name {
                         // a sweep that is not the last, whatever the tolerance

@@ -1,0 +1,124 @@
+//! `contacts.csv`: one row a pair of contact surfaces.
+
+use super::folder::Folder;
+use super::format::field;
+use super::report::PairReport;
+use crate::error::Result;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+/// What `contacts.csv` says of a pair besides what its report says.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PairRow {
+    /// Points with c > 0.
+    pub closed: usize,
+    /// Initial gap d at the points: least, mean by weight, largest.
+    pub gap: [f64; 3],
+    /// How far the surfaces are apart after deformation, -c where that is positive: mean by weight over all points, and largest.
+    pub opening: [f64; 2],
+    /// File of its contact table; empty if it has none.
+    pub table: String,
+    /// File of its plot; empty if it has none.
+    pub plot: String,
+}
+
+impl PairRow {
+    /// The numbers of a pair from `weight`, gap d and compression c of its points; without files.
+    pub fn new(weight: &[f64], gap: &[f64], compression: &[f64]) -> Self {
+        let open = || compression.iter().map(|c| (-c).max(0.0));
+        let total: f64 = weight.iter().sum();
+        let mean =
+            |values: &mut dyn Iterator<Item = f64>| weight.iter().zip(values).map(|(w, v)| w * v).sum::<f64>() / total;
+        let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = gap.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self {
+            closed: compression.iter().filter(|&&c| c > 0.0).count(),
+            gap: [least, mean(&mut gap.iter().copied()), most],
+            opening: [mean(&mut open()), open().fold(0.0, f64::max)],
+            ..Self::default()
+        }
+    }
+}
+
+/// Columns in their order.
+const COLUMNS: [&str; 23] = [
+    "a",
+    "b",
+    "surface_a",
+    "surface_b",
+    "points",
+    "closed",
+    "force_x",
+    "force_y",
+    "force_z",
+    "peak_pressure",
+    "peak_x",
+    "peak_y",
+    "peak_z",
+    "contact",
+    "open",
+    "gap_least",
+    "gap_mean",
+    "gap_largest",
+    "opening_mean",
+    "opening_largest",
+    "energy",
+    "table",
+    "plot",
+];
+
+/// Writes the pairs in the order of the scene; returns the path.
+///
+/// # Errors
+/// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
+pub fn save(folder: &Folder, pairs: &[PairReport], rows: &[PairRow]) -> Result<PathBuf> {
+    folder.write("contacts.csv", |out| write(out, pairs, rows))
+}
+
+fn write(out: &mut dyn Write, pairs: &[PairReport], rows: &[PairRow]) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(out);
+    csv.write_record(COLUMNS)?;
+    for (pair, row) in pairs.iter().zip(rows) {
+        let names = pair.bodies.iter().chain(&pair.surfaces).cloned();
+        let counts = [pair.points, row.closed].map(|count| count.to_string());
+        let [force, _] = pair.force;
+        let numbers = force.into_iter().chain([pair.peak_pressure]).chain(pair.peak_at);
+        let numbers = numbers.chain([pair.contact_length, pair.open_length]).chain(row.gap).chain(row.opening);
+        let numbers = numbers.chain([pair.layer_energy]).map(field);
+        csv.write_record(names.chain(counts).chain(numbers).chain([row.table.clone(), row.plot.clone()]))?;
+    }
+    csv.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_has_means_by_weight_and_stands_under_its_columns() {
+        let row = PairRow::new(&[1.0, 3.0], &[0.25, -0.75], &[-2.0, 0.5]);
+        assert_eq!((row.closed, row.gap, row.opening), (1, [-0.75, -0.5, 0.25], [0.5, 2.0]));
+        let pair = PairReport {
+            bodies: ["up", "low"].map(str::to_owned),
+            surfaces: ["up_bottom", "low_top"].map(str::to_owned),
+            points: 2,
+            force: [[1.0, 2.0, 3.0], [-1.0, -2.0, -3.0]],
+            peak_pressure: 4.0,
+            peak_at: [5.0, 6.0, 7.0],
+            contact_length: 8.0,
+            open_length: 9.0,
+            layer_energy: 10.0,
+            ..PairReport::default()
+        };
+        let mut out = Vec::new();
+        let row = PairRow { table: "contact-up-low.csv".into(), ..row };
+        write(&mut out, &[pair], &[row]).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let (header, line) = text.trim().split_once('\n').unwrap();
+        assert_eq!(header.split(',').count(), 23);
+        assert_eq!(
+            line,
+            "up,low,up_bottom,low_top,2,1,1.0,2.0,3.0,4.0,5.0,6.0,7.0,8.0,9.0,-0.75,-0.5,0.25,0.5,2.0,10.0,contact-up-low.csv,"
+        );
+    }
+}
