@@ -133,7 +133,7 @@ fn check_sums_up() {
     let path = scene.path.display().to_string();
     let run = winkler(&["check", &path]);
     assert!(run.code == 0 && run.stdout.lines().count() < 10, "{}", run.said());
-    for words in ["52 bodies: 784 cells", "b11` and ", "contacts: ", "the largest theta, of "] {
+    for words in ["52 bodies: 784 cells", "`b13` and ", "contacts: ", "the largest theta, of "] {
         assert!(run.stdout.contains(words), "{words}\n{}", run.stdout);
     }
     let json: serde_json::Value = serde_json::from_str(&winkler(&["check", &path, "--json"]).stdout).expect("JSON");

@@ -345,18 +345,18 @@ fn structure(matrix: &Blocks) -> Vec<Column> {
         graph[vertex[j]].push(vertex[i]);
     }
     graph.iter_mut().for_each(|near| near.sort_unstable());
-    let order = degree::order(graph);
+    let order = degree::order_again(graph);
     let mut step = vec![0; order.len()];
     order.iter().enumerate().for_each(|(k, (v, _))| step[*v] = k);
-    let column = |(v, near): (usize, Vec<usize>)| {
-        let mut below: Vec<_> = near.into_iter().map(|w| (step[w], matrix.range(bodies[w]))).collect();
+    let column = |(v, near): &(usize, Vec<usize>)| {
+        let mut below: Vec<_> = near.iter().map(|&w| (step[w], matrix.range(bodies[w]))).collect();
         below.sort_unstable_by_key(|entry| entry.0);
-        let own = matrix.range(bodies[v]);
+        let own = matrix.range(bodies[*v]);
         let height = own.len() + below.iter().map(|(_, range)| range.len()).sum::<usize>();
         let pivot = vec![0.0; own.len()];
         Column { own, below, height, panel: Vec::new(), pivot, order: Vec::new() }
     };
-    order.into_iter().map(column).collect()
+    order.iter().map(column).collect()
 }
 
 /// The column of each row of blocks; any for those without unknowns.
