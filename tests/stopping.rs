@@ -176,7 +176,7 @@ fn a_snapshot_is_written_and_the_run_goes_on() {
         run.signal("USR1");
         // the report is written before what is larger, and again behind it
         let files = || serde_json::from_slice::<Value>(&fs::read(&path).unwrap_or_default()).unwrap_or_default();
-        run.until("the snapshot", |_| files()["files"].as_array().is_some_and(|files| files.len() >= 5));
+        run.until("the snapshot", |_| files()["files"].as_array().is_some_and(|files| files.len() >= 6));
         run.until_rows(reached + 3);
         let report = report(&run.results());
         assert_eq!(report["status"], "running");
@@ -184,7 +184,7 @@ fn a_snapshot_is_written_and_the_run_goes_on() {
         assert!(now > reached);
         reached = now;
         // a second one has no names of its own
-        assert_eq!(report["files"].as_array().map(Vec::len), Some(5), "{}", report["files"]);
+        assert_eq!(report["files"].as_array().map(Vec::len), Some(6), "{}", report["files"]);
     }
     run.signal("TERM");
     let (status, scratch, said) = run.end();
