@@ -44,17 +44,11 @@ impl Krylov {
         session: &Session,
         chosen: Chosen,
         dimension: usize,
-        stiffness: &Csr,
+        stiffness: Csr,
         near_null_space: &[Vec<f64>],
     ) -> Result<Self> {
-        let pattern = |part: &[i32]| part.iter().map(|&i| Int::from(i)).collect();
-        let mut matrix = Matrix::from_csr(
-            session,
-            dimension,
-            pattern(&stiffness.ptr),
-            pattern(&stiffness.col),
-            stiffness.values.clone(),
-        )?;
+        let Csr { ptr, col, values, .. } = stiffness;
+        let mut matrix = Matrix::from_csr(session, dimension, integers(ptr), integers(col), values)?;
         matrix.set_spd()?;
         let mut ksp = Ksp::new(session, &format!("{}_", chosen.prefix()))?;
         ksp.set_operator(&matrix)?;
@@ -75,6 +69,12 @@ impl Krylov {
     fn with_options<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
         if self.chosen.has_typed() { self.chosen.lend(&self.session, work) } else { work() }
     }
+}
+
+/// A pattern in PETSc's integers; where these have 32 bits, the array itself.
+#[allow(clippy::useless_conversion)]
+fn integers(part: Vec<i32>) -> Vec<Int> {
+    part.into_iter().map(Int::from).collect()
 }
 
 impl InnerSolver for Krylov {
