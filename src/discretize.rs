@@ -22,6 +22,7 @@ use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::fem::{
     ElasticBody,
+    assemble::NodeGraph,
     rigid::{self, FreeMotion, RigidMotion},
 };
 use crate::linalg::{Csr, axpy};
@@ -38,6 +39,7 @@ use fields::{ErrorMaker, FieldMaker};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
+use std::cell::OnceCell;
 use std::rc::Rc;
 pub use surface::ContactSurface;
 pub use verify::{Verified, verify};
@@ -54,6 +56,8 @@ pub struct Outline<'a> {
     pub prescribed: &'a [(usize, f64)],
     /// Rigid motions of the free body.
     pub motions: &'a [RigidMotion],
+    /// Which of its nodes K couples, made when it is first asked for.
+    pub graph: &'a dyn Fn() -> &'a NodeGraph,
 }
 
 /// Gives bodies their inner solvers.
@@ -244,17 +248,25 @@ pub fn discretize<const D: usize>(
     let Fixed { gauged, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs);
     let supported: Vec<Supported> =
         parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
-    let outlines = parts.iter().zip(&drafts).zip(&supported).map(|((part, draft), supported)| Outline {
+    let graphs: Vec<OnceCell<NodeGraph>> = parts.iter().map(|_| OnceCell::new()).collect();
+    let lazy = parts.iter().zip(&drafts).zip(&graphs);
+    let lazy: Vec<_> =
+        lazy.map(|((part, draft), graph)| move || graph.get_or_init(|| part.graph(&draft.rows))).collect();
+    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(&lazy);
+    let outlines = outlines.map(|(((part, draft), supported), graph)| Outline {
         name: &part.spec.name.value,
         dimension: D,
         rows: &draft.rows,
         prescribed: &supported.prescribed,
         motions: &draft.free,
+        graph,
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
-    let drafts = drafts.into_iter().zip(supported);
+    let drafts = drafts.into_iter().zip(supported).zip(graphs);
     let known = gauged.into_iter().zip(loose);
-    for (index, ((part, (draft, supported)), (gauged, loose))) in parts.into_iter().zip(drafts).zip(known).enumerate() {
+    for (index, ((part, ((draft, supported), graph)), (gauged, loose))) in
+        parts.into_iter().zip(drafts).zip(known).enumerate()
+    {
         let Draft { segments, rows, free, nodal_load, load } = draft;
         let Supported { carried, prescribed } = supported;
         let mut offset = vec![0.0; rows.rows()];
@@ -281,7 +293,9 @@ pub fn discretize<const D: usize>(
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 {
             let left = rigid::free(&left, &prescribed, &load);
-            let body = part.assemble(mesh, &rows, &elasticity, load, prescribed, carried)?;
+            let graph = graph.into_inner().unwrap_or_else(|| part.graph(&rows));
+            let body = part.assemble(mesh, &graph, &elasticity, load, prescribed, carried)?;
+            drop(graph);
             assemblies += 1;
             scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
             row_stiffness = rows.quadratic_diagonal(&body.stiffness);
