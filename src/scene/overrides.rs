@@ -1,7 +1,7 @@
 //! `--set KEY=VALUE`, and options that are short for it: replaces any value of the scene before it is checked.
 //!
-//! KEY is a dotted path in which items of lists are numbered from 0 (`contact.0.layer.power.a`). VALUE is TOML, or a
-//! bare text. What is replaced then stands in the words of the option, so later refusals point there.
+//! KEY is a dotted path in which items of lists are numbered from 0 (`contact.0.layer.power.a`), and tables with a name go by it, too
+//! (`body.upper.order`). VALUE is TOML, or a bare text. What is replaced then stands in the words of the option, so later refusals point there.
 
 use super::read::{self, Entry, Node, Value};
 use crate::error::{Error, Kind, Place, Result, Source};
@@ -57,7 +57,7 @@ fn set(tree: &mut Node, source: &Arc<Source>, start: usize) -> Result<()> {
     let path = segments(text, start..equals);
     for span in &path {
         let key = &text[span.clone()];
-        if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
+        if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || "_-*?[]!".contains(c)) {
             return Err(Error::scene(&at(start..equals), "this is not a key of the scene")
                 .help("a key is names and numbers joined by points: body.1.young"));
         }
@@ -126,7 +126,11 @@ fn descend<'a>(node: &'a mut Node, key: &Key<'_>, parent: &str, indexed: bool) -
                 }
             };
             if !is_number(key.name) {
-                return Err(refuse(format!("`{parent}` is a list of {count}; `{}` is no number", key.name)));
+                let mut named = (0..items.len()).filter(|&item| items[item].is_named(key.name));
+                return match named.next() {
+                    Some(item) => Ok(&mut items[item]),
+                    None => Err(refuse(format!("`{parent}` is a list of {count}; `{}` is no number", key.name))),
+                };
             }
             match key.name.parse::<usize>() {
                 Ok(index) if index < items.len() => Ok(&mut items[index]),

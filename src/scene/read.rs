@@ -140,6 +140,12 @@ impl Node {
         matches!(&self.value, Value::Table(entries) if entries.iter().any(|entry| entry.key == key))
     }
 
+    /// Whether it is a table with this name.
+    pub fn is_named(&self, name: &str) -> bool {
+        let is_name = |entry: &Entry| entry.key == "name" && matches!(&entry.node.value, Value::String(own) if own == name);
+        matches!(&self.value, Value::Table(entries) if entries.iter().any(is_name))
+    }
+
     pub fn string(&self) -> Result<&str> {
         match &self.value {
             Value::String(text) => Ok(text),
