@@ -102,7 +102,9 @@ pub fn find<'a, const D: usize>(
             let message = format!("no facets of {bodies} face each other within {}", rule.distance);
             let help = match rules.len() {
                 1 => "a larger distance may find some",
-                _ => "a larger distance may find some, unless narrower rules or contacts with names have all these pairs",
+                _ => {
+                    "a larger distance may find some, unless narrower rules or contacts with names have all these pairs"
+                }
             };
             Err(Error::scene(place, message).help(help))
         }

@@ -28,17 +28,23 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Vec<BodyS
         let lines = Lines { table, mesh, names, lying: lying.by_ref().take(names.len()).collect() };
         let all: Vec<usize> = (0..=D).rev().collect();
         let regions = lines.deal(&table.regions, |line| &mut line.on, "region", |_| &[D])?;
-        let fix = lines.deal(&table.fix, |line| &mut line.on, "support", |line| match line.normal {
-            Some(_) => &all[1..2],
-            None => &all,
-        })?;
+        let fix = lines.deal(
+            &table.fix,
+            |line| &mut line.on,
+            "support",
+            |line| match line.normal {
+                Some(_) => &all[1..2],
+                None => &all,
+            },
+        )?;
         let load = lines.deal(&table.load, |line| &mut line.on, "load", |_| &[D - 1])?;
         let spring = lines.deal(&table.spring, |line| &mut line.on, "spring", |_| &[D - 1, 0])?;
         for line in &table.load {
             let places = load.iter().flatten().filter(|load| load.on.place == line.on.place).count();
             let own = line.on.value.contains(BODY) && !is_pattern(&line.on.value);
             if matches!(line.kind, LoadKind::Force { .. }) && places > 1 && !own {
-                let message = format!("a total force on {places} surfaces: `{}` of `{}`", line.on.value, table.name.value);
+                let message =
+                    format!("a total force on {places} surfaces: `{}` of `{}`", line.on.value, table.name.value);
                 return Err(Error::scene(&line.on.place, message).help(format!(
                     "give a pressure or a traction; or, for a force on each body, the group of each: on = \"{BODY}_top\""
                 )));
@@ -93,7 +99,8 @@ fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Ve
             return Err(tie(name, [&own.value, &other.value], &other.place));
         }
         if let Some([label, help]) = fault(name) {
-            let message = format!("`{name}`, which `{}` matches, cannot be the name of a body", scene.bodies[own].name.value);
+            let message =
+                format!("`{name}`, which `{}` matches, cannot be the name of a body", scene.bodies[own].name.value);
             return Err(Error::scene(&scene.bodies[own].name.place, message).label(label).help(help));
         }
         members[own].push(name);
@@ -175,7 +182,8 @@ impl<const D: usize> Lines<'_, D> {
                 let wanted = Located::new(name.value.replace(BODY, body), name.place.clone());
                 let wanted = pattern(&wanted)?;
                 let kinds = kinds(line);
-                let fitting = groups.iter().filter(|group| kinds.contains(&group.dimension) && wanted.matches(&group.name));
+                let fitting =
+                    groups.iter().filter(|group| kinds.contains(&group.dimension) && wanted.matches(&group.name));
                 own.extend(fitting.map(|group| {
                     let mut line = line.clone();
                     on(&mut line).value.clone_from(&group.name);
@@ -199,7 +207,13 @@ impl<const D: usize> Lines<'_, D> {
             true => format!("no group for this {what} matches `{}` on `{}`", on.value, self.table.name.value),
             false => format!("`{}` lies on no body of `{}`", on.value, self.table.name.value),
         };
-        let mut known: Vec<&str> = self.lying.iter().flatten().filter(|group| kinds.contains(&group.dimension)).map(|group| group.name.as_str()).collect();
+        let mut known: Vec<&str> = self
+            .lying
+            .iter()
+            .flatten()
+            .filter(|group| kinds.contains(&group.dimension))
+            .map(|group| group.name.as_str())
+            .collect();
         known.dedup();
         Error::scene(&on.place, message).help(format!("groups of that kind on these bodies: {}", few(&known)))
     }

@@ -142,7 +142,8 @@ impl Node {
 
     /// Whether it is a table with this name.
     pub fn is_named(&self, name: &str) -> bool {
-        let is_name = |entry: &Entry| entry.key == "name" && matches!(&entry.node.value, Value::String(own) if own == name);
+        let is_name =
+            |entry: &Entry| entry.key == "name" && matches!(&entry.node.value, Value::String(own) if own == name);
         matches!(&self.value, Value::Table(entries) if entries.iter().any(is_name))
     }
 

@@ -3,9 +3,7 @@
 use super::{Decoder, elasticity, pattern};
 use crate::error::{Error, Located, Result};
 use crate::expression::Field;
-use crate::problem::body::{
-    BodySpec, Load, LoadKind, SPELLING, SpringKind, SpringSpec, Support, fault, is_in_name,
-};
+use crate::problem::body::{BodySpec, Load, LoadKind, SPELLING, SpringKind, SpringSpec, Support, fault, is_in_name};
 use crate::problem::elasticity::Plane;
 use crate::problem::order::Order;
 use crate::problem::pattern::is_pattern;

@@ -114,7 +114,9 @@ fn between(keys: &Keys) -> Result<([Located<String>; 2], Option<Rule>)> {
     if let Some(plural) = [&first, &second].into_iter().find(|name| is_pattern(&name.value)) {
         return Err(Error::scene(&plural.place, format!("the pattern `{}` for one surface", plural.value))
             .label("one name belongs here")
-            .help("many pairs are found between bodies: between = \"auto\", of = [\"one_*\", \"other_*\"], distance = D"));
+            .help(
+                "many pairs are found between bodies: between = \"auto\", of = [\"one_*\", \"other_*\"], distance = D",
+            ));
     }
     if first.value == second.value {
         return Err(b
