@@ -15,6 +15,9 @@ const SHORT: [(&str, &str); 3] =
 /// Options without a value, which set a key to true.
 const FLAGS: [(&str, &str); 3] = [("--estimate", "estimate"), ("--vtu", "output.vtu"), ("--trust-geo", "trust_geo")];
 
+/// Names that a refusal lists at most.
+const NAMES: usize = 12;
+
 /// Applies one override to the tree of a scene: `KEY=VALUE`, or an option with its value as typed (`--over KEY=VALUE`,
 /// `--tolerance 1e-3`, `--vtu`).
 pub(super) fn apply(tree: &mut Node, text: &str) -> Result<()> {
@@ -126,10 +129,18 @@ fn descend<'a>(node: &'a mut Node, key: &Key<'_>, parent: &str, indexed: bool) -
                 }
             };
             if !is_number(key.name) {
-                let mut named = (0..items.len()).filter(|&item| items[item].is_named(key.name));
+                let mut named = (0..items.len()).filter(|&item| items[item].name_in() == Some(key.name));
                 return match named.next() {
                     Some(item) => Ok(&mut items[item]),
-                    None => Err(refuse(format!("`{parent}` is a list of {count}; `{}` is no number", key.name))),
+                    None => {
+                        let error = refuse(format!("`{parent}` is a list of {count}; `{}` is no number", key.name));
+                        let names: Vec<&str> = items.iter().filter_map(Node::name_in).take(NAMES).collect();
+                        Err(if names.is_empty() {
+                            error
+                        } else {
+                            error.help(format!("their names: {}", names.join(", ")))
+                        })
+                    }
                 };
             }
             match key.name.parse::<usize>() {

@@ -140,11 +140,10 @@ impl Node {
         matches!(&self.value, Value::Table(entries) if entries.iter().any(|entry| entry.key == key))
     }
 
-    /// Whether it is a table with this name.
-    pub fn is_named(&self, name: &str) -> bool {
-        let is_name =
-            |entry: &Entry| entry.key == "name" && matches!(&entry.node.value, Value::String(own) if own == name);
-        matches!(&self.value, Value::Table(entries) if entries.iter().any(is_name))
+    /// The name of a table that has one.
+    pub fn name_in(&self) -> Option<&str> {
+        let Value::Table(entries) = &self.value else { return None };
+        entries.iter().find(|entry| entry.key == "name").and_then(|entry| entry.node.string().ok())
     }
 
     pub fn string(&self) -> Result<&str> {
