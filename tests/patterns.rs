@@ -4,6 +4,7 @@ mod common;
 
 use common::{Run, Scene, root, solve, text_of};
 use std::fmt::Write;
+use std::path::Path;
 
 /// The wall of these tests: small, and no number of a brick begins another one's.
 const SIZE: [&str; 4] = ["--set", "mesh.set.columns=3", "--set", "mesh.set.rows=3"];
@@ -19,7 +20,7 @@ fn script() -> String {
         let _ = writeln!(groups, "Physical Curve{} {{c + {}}};", named(&format!("_{name}")), side + 1);
     }
     groups += &surface;
-    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("sides.geo");
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("sides.geo");
     // tests run at the same time: a script is there as a whole or not at all
     let own = path.with_extension(format!("{:?}", std::thread::current().id()));
     std::fs::write(&own, text.replace(&surface, &groups)).expect("a script");
@@ -248,6 +249,70 @@ fn the_narrowest_table_and_rule_win() {
         assert_eq!(run.count(&format!("pairs/{pair}/contact")), rule, "{:?}", bodies(&run, pair));
     }
     assert!(run.report["pairs"].as_array().is_some_and(|pairs| pairs.len() == 16));
+}
+
+/// A region of a table's bodies is that of those in which its cells lie, as if they had tables of their own.
+#[test]
+fn regions_lie_in_their_bodies() {
+    let core = Path::new(env!("CARGO_TARGET_TMPDIR")).join("core.geo");
+    let text = std::fs::read_to_string(root().join("meshes/wall/wall.geo")).expect("the script of the wall");
+    std::fs::write(&core, text + "Physical Surface(\"core\") = {1, 5};\n").expect("a script");
+    let text = text_of("wall");
+    let geo = root().join("meshes/wall/wall.geo").display().to_string();
+    let text = text.replace(&geo, &core.display().to_string());
+    let line = "poisson = 0.15\n";
+    let with_region =
+        text.replacen(line, &format!("{line}region = [{{ on = \"core\", young = 3e4, poisson = 0.3 }}]\n"), 1);
+    let from = text.find("[[body]]").expect("a table");
+    let to = text.find("[[contact]]").expect("another");
+    let own = |name: &str| {
+        text[from..to].replace("\"brick_*\"", &format!("\"{name}\"")).replace("1e4", "3e4").replace("0.15", "0.3")
+    };
+    // the one below lies on `bottom` and `left`, the other on nothing
+    let below = own("brick_odd_1").replace("{ on = \"top\", pressure = \"0.5 * (1 + cos(pi*x))\" }, ", "");
+    let below = below.replace(", { on = \"right\", x = 0 }", "");
+    let inside = own("brick_even_5");
+    let inside: String = inside
+        .lines()
+        .filter(|line| !line.starts_with("fix") && !line.starts_with("load"))
+        .fold(String::new(), |all, line| all + line + "\n");
+    let with_tables = format!("{}{below}{inside}{}", &text[..to], &text[to..]);
+    let [region, tables] = [with_region, with_tables].map(|text| solved(&Scene::new(text), &[]));
+    let peaks = |run: &Run| -> Vec<([String; 2], f64)> {
+        let peak = |pair: usize| {
+            let mut names = bodies(run, pair);
+            names.sort();
+            (names, run.number(&format!("pairs/{pair}/peak_pressure")))
+        };
+        let mut peaks: Vec<_> = (0..16).map(peak).collect();
+        peaks.sort_by(|a, b| a.0.cmp(&b.0));
+        peaks
+    };
+    for (a, b) in peaks(&region).iter().zip(&peaks(&tables)) {
+        assert!(a.0 == b.0 && (a.1 - b.1).abs() < 1e-12, "{a:?} {b:?}");
+    }
+}
+
+/// A group lies on a body that has a whole element of it, not on one that shares a corner alone.
+#[test]
+fn a_shared_corner_is_no_group() {
+    let script = Path::new(env!("CARGO_TARGET_TMPDIR")).join("shared.geo");
+    let text = "For x In {0 : 2}\nPoint(1 + x) = {x, 0, 0};\nPoint(11 + x) = {x, 1, 0};\nLine(1 + x) = {1 + x, 11 + x};\nEndFor\n\
+                For x In {1 : 2}\nLine(10 + x) = {x, x + 1};\nLine(20 + x) = {10 + x, 11 + x};\n\
+                Curve Loop(x) = {10 + x, x + 1, -(20 + x), -x};\nPlane Surface(x) = {x};\n\
+                Physical Surface(Sprintf(\"cell_%g\", x)) = {x};\nPhysical Curve(Sprintf(\"bottom_%g\", x)) = {10 + x};\nEndFor\n\
+                Physical Curve(\"left\") = {1};\nPhysical Curve(\"right\") = {3};\nTransfinite Curve {1 : 3, 11, 12, 21, 22} = 3;\n";
+    std::fs::write(&script, text).expect("a script");
+    let scene = Scene::new(format!(
+        "dimension = 2\nmesh = \"{}\"\n[[body]]\nname = \"cell_*\"\nyoung = 1\npoisson = 0\n\
+         fix = [{{ on = \"bottom_1\", x = 0 }}, {{ on = \"{{body}}\", y = 0 }}]\nload = [{{ on = \"right\", pressure = 1e-3 }}]\n\
+         [[contact]]\nbetween = \"auto\"\ndistance = 0.1\nlayer = {{ linear = {{ stiffness = 1 }} }}\n",
+        script.display()
+    ));
+    let run = solve(&scene, &[]).converged();
+    let on = |body: usize, k: usize| run.report.pointer(&format!("/bodies/{body}/balance/supports/{k}/on")).cloned();
+    assert_eq!([on(0, 0), on(0, 1), on(0, 2)], [Some("bottom_1".into()), Some("cell_1".into()), None]);
+    assert_eq!([on(1, 0), on(1, 1)], [Some("cell_2".into()), None]);
 }
 
 #[test]

@@ -22,7 +22,7 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Vec<BodyS
     }
     let members = members(scene, mesh)?;
     let names: Vec<&str> = members.iter().flatten().copied().collect();
-    let mut lying = lying(&names, mesh, scene.bodies.iter().any(|table| !table.regions.is_empty())).into_iter();
+    let mut lying = lying(&names, mesh).into_iter();
     let mut bodies = Vec::new();
     for (table, names) in scene.bodies.iter().zip(&members) {
         let lines = Lines { table, mesh, names, lying: lying.by_ref().take(names.len()).collect() };
@@ -123,8 +123,9 @@ pub fn tie(what: &str, [first, second]: [&str; 2], place: &Place) -> Error {
         .help("the name itself wins, then the pattern with more characters of its own: give one of them more")
 }
 
-/// The groups that lie on each body: the body has all corners of one of their elements. Groups of cells only on demand.
-fn lying<'m, const D: usize>(names: &[&str], mesh: &'m Mesh<D>, cells: bool) -> Vec<Vec<&'m Group>> {
+/// The groups that lie on each body: its own cells, and those of which it has all corners of an element.
+fn lying<'m, const D: usize>(names: &[&str], mesh: &'m Mesh<D>) -> Vec<Vec<&'m Group>> {
+    let number: HashMap<&str, usize> = names.iter().copied().zip(0..).collect();
     let mut last = vec![usize::MAX; mesh.points.len()];
     let mut owners: Vec<(u32, usize)> = Vec::new();
     for (body, name) in names.iter().enumerate() {
@@ -140,7 +141,11 @@ fn lying<'m, const D: usize>(names: &[&str], mesh: &'m Mesh<D>, cells: bool) -> 
         owners[first..].iter().take_while(move |entry| entry.0 == point).map(|entry| entry.1)
     };
     let mut lying = vec![Vec::new(); names.len()];
-    for group in mesh.groups.iter().filter(|group| cells || group.dimension < D) {
+    for group in mesh.groups.iter() {
+        if let Some(&body) = number.get(group.name.as_str()).filter(|_| group.dimension == D) {
+            lying[body].push(group);
+            continue;
+        }
         let on_all = |corners: &[u32], body: usize| corners.iter().all(|&point| of(point).any(|other| other == body));
         let on = |simplex: &[u32]| {
             let corners = simplex[1..=group.dimension].to_vec();
