@@ -305,14 +305,14 @@ fn a_shared_corner_is_no_group() {
     std::fs::write(&script, text).expect("a script");
     let scene = Scene::new(format!(
         "dimension = 2\nmesh = \"{}\"\n[[body]]\nname = \"cell_*\"\nyoung = 1\npoisson = 0\n\
-         fix = [{{ on = \"bottom_1\", x = 0 }}, {{ on = \"{{body}}\", y = 0 }}]\nload = [{{ on = \"right\", pressure = 1e-3 }}]\n\
+         fix = [{{ on = \"bottom_?\", x = 0 }}, {{ on = \"{{body}}\", y = 0 }}]\nload = [{{ on = \"right\", pressure = 1e-3 }}]\n\
          [[contact]]\nbetween = \"auto\"\ndistance = 0.1\nlayer = {{ linear = {{ stiffness = 1 }} }}\n",
         script.display()
     ));
     let run = solve(&scene, &[]).converged();
     let on = |body: usize, k: usize| run.report.pointer(&format!("/bodies/{body}/balance/supports/{k}/on")).cloned();
     assert_eq!([on(0, 0), on(0, 1), on(0, 2)], [Some("bottom_1".into()), Some("cell_1".into()), None]);
-    assert_eq!([on(1, 0), on(1, 1)], [Some("cell_2".into()), None]);
+    assert_eq!([on(1, 0), on(1, 1), on(1, 2)], [Some("bottom_2".into()), Some("cell_2".into()), None]);
 }
 
 #[test]
