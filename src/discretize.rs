@@ -289,7 +289,7 @@ pub fn discretize<const D: usize>(
             let body = part.assemble(mesh, &rows, &elasticity, load, prescribed, carried)?;
             assemblies += 1;
             scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-            row_stiffness = body.row_stiffness(&rows);
+            row_stiffness = rows.quadratic_diagonal(&body.stiffness);
             local = Some(factory.make(Assembled {
                 name: name.clone(),
                 dimension: D,

@@ -233,7 +233,7 @@ impl Factory for Inner<'_> {
             Linear::Sweeps => motions.into_iter().map(|motion| motion.displacement).collect(),
             _ => Vec::new(),
         };
-        let make = move |stiffness: &crate::linalg::Csr| Krylov::new(&session, &name, dimension, stiffness, &modes);
+        let make = move |stiffness: crate::linalg::Csr| Krylov::new(&session, &name, dimension, stiffness, &modes);
         Ok(Box::new(SparseBody::new(body, rows, &left, make, words)))
     }
 

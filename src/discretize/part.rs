@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::fem::assemble::{self, NodalBlock};
 use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
-use crate::linalg::{Csr, dot};
+use crate::linalg::{Csr, countable, dot};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, LoadKind};
 use crate::problem::elasticity::Plane;
@@ -191,6 +191,7 @@ impl<'a, const D: usize> Part<'a, D> {
             .collect();
         let graph = NodeGraph::new(&self.space, &coupled, &self.held.frame);
         let name = &self.spec.name;
+        countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
         let mut stiffness = assemble::stiffness(&self.space, &graph, elasticity).map_err(|defect| match defect {
             assemble::Defect::Inverted(cell) => {
                 let corner = contact::pad(self.space.cell_nodes(cell)[0]);
