@@ -31,9 +31,9 @@ impl<'a> Pattern<'a> {
         Ok(Self { text, glob })
     }
 
-    /// Whether a name is this one, or one of the pattern.
+    /// Whether a name is this one to the letter, or one of the pattern.
     pub fn matches(&self, name: &str) -> bool {
-        self.glob.as_ref().map_or(self.text == name, |glob| glob.matches(name))
+        self.text == name || self.glob.as_ref().is_some_and(|glob| glob.matches(name))
     }
 
     /// Whether it stands for many names.
@@ -71,6 +71,7 @@ mod tests {
         assert!(pattern("brick_*").matches("brick_17") && !pattern("brick_*").matches("block_17"));
         assert!(pattern("b[0-9]").matches("b7") && pattern("b?").matches("bx") && !pattern("b?").matches("b17"));
         assert!(pattern("a[b").matches("a[b") && !pattern("a[b").is_plural(), "an open bracket is a plain character");
+        assert!(pattern("a[1]").matches("a[1]") && pattern("a[1]").matches("a1"), "groups may be called so");
         let narrower = ["*", "b*", "b?*", "b[0-9]*", "br*", "brick_*", "*_brick_1", "b1"];
         let ranks = narrower.map(|text| pattern(text).rank());
         assert!(ranks.is_sorted() && ranks.windows(2).all(|two| two[0] < two[1]), "{ranks:?}");

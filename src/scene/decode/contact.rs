@@ -4,7 +4,6 @@ use super::{Decoder, body, choose};
 use crate::error::{Error, Located, Result};
 use crate::expression::Field;
 use crate::problem::contact::{ANGLE, AutoContact, ContactSpec, Overlap};
-use crate::problem::pattern::is_pattern;
 use crate::scene::read::{Keys, Node, Value};
 use std::collections::HashSet;
 
@@ -111,7 +110,7 @@ fn between(keys: &Keys) -> Result<([Located<String>; 2], Option<Rule>)> {
         return Err(between.refuse("a contact is between two surfaces").help(EXAMPLE));
     };
     let (first, second) = (a.name()?, b.name()?);
-    if let Some(plural) = [&first, &second].into_iter().find(|name| is_pattern(&name.value)) {
+    if let Some(plural) = [&first, &second].into_iter().find(|name| name.value.contains(['*', '?'])) {
         return Err(Error::scene(&plural.place, format!("the pattern `{}` for one surface", plural.value))
             .label("one name belongs here")
             .help(
