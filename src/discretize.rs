@@ -12,6 +12,7 @@ mod mechanism;
 pub mod meshes;
 mod pairs;
 mod part;
+mod roster;
 mod springs;
 mod supports;
 mod surface;
@@ -141,6 +142,10 @@ pub struct BodyInfo {
     pub load: [f64; 3],
     /// Rank that owns the body.
     pub rank: usize,
+    /// Names of the groups of its supports.
+    pub supports: Vec<String>,
+    /// Names of the groups of its springs.
+    pub springs: Vec<String>,
     /// Names of its rigid surfaces.
     pub rigid: Vec<String>,
     field: FieldMaker,
@@ -227,8 +232,8 @@ pub fn discretize<const D: usize>(
     exchange: Box<dyn Exchange>,
     factory: &mut dyn Factory,
 ) -> Result<Discrete> {
-    let Verified { mesh, checked } = verified;
-    let mut parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
+    let Verified { mesh, bodies, checked } = verified;
+    let mut parts = bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
     parts.iter().zip(checked).try_for_each(|(part, checked)| verify::held(part, &checked.parts, mesh))?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
@@ -323,6 +328,8 @@ pub fn discretize<const D: usize>(
             stiffness,
             load: resultant,
             rank: owner[index],
+            supports: part.spec.fix.iter().map(|support| support.on.value.clone()).collect(),
+            springs: part.spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
             rigid: held.rigid.iter().map(|(load, _)| part.spec.load[*load].on.value.clone()).collect(),
             nodal: {
                 let held = held.clone();
