@@ -1,43 +1,49 @@
-// A wall in running bond: `rows` courses of `columns` bricks 1 x 1/2, every other course between two half bricks. Nothing is shared, so that
-// `between = "auto"` finds bed and head joints. Bricks are numbered course by course from the left; the ends, the first bed and the top have
-// groups of their own.
-DefineConstant[ rows = {8, Name "rows"} ];
-DefineConstant[ columns = {8, Name "columns"} ];
-DefineConstant[ n = {4, Name "n"} ]; // elements along a brick, half as many up
-brick = 0;
-For row In {0 : rows - 1}
-  odd = row % 2;
-  For place In {0 : columns - 1 + odd}
-    x = (odd && place > 0) ? place - 0.5 : place;
-    width = (odd && (place == 0 || place == columns)) ? 0.5 : 1;
-    y = 0.5*row;
-    p = 4*brick + 1;
-    Point(p) = {x, y, 0};
-    Point(p + 1) = {x + width, y, 0};
-    Point(p + 2) = {x + width, y + 0.5, 0};
-    Point(p + 3) = {x, y + 0.5, 0};
-    Line(p) = {p, p + 1};
-    Line(p + 1) = {p + 1, p + 2};
-    Line(p + 2) = {p + 2, p + 3};
-    Line(p + 3) = {p + 3, p};
-    brick += 1;
-    Transfinite Curve {p, p + 2} = Max(1, Round(n*width)) + 1;
-    Transfinite Curve {p + 1, p + 3} = Max(1, Round(n/2)) + 1;
-    Curve Loop(brick) = {p, p + 1, p + 2, p + 3};
+// A wall in running bond: `rows` courses of `columns` bricks, numbered course by course from the left below. Joints of even courses lie
+// over the middles of bricks: there the first brick is half as long and the last one half as long again. Nothing is shared.
+DefineConstant[ columns = {8, Name "columns"} ]; // bricks in a course
+DefineConstant[ rows = {8, Name "rows"} ];       // courses
+DefineConstant[ length = {0.25, Name "length"} ];
+DefineConstant[ height = {0.125, Name "height"} ];
+DefineConstant[ n = {4, Name "n"} ];             // elements along a brick, half as many over its height
+
+parity() = Str("even", "odd");
+bottom() = {}; top() = {}; left() = {}; right() = {};
+For row In {1 : rows}
+  For column In {1 : columns}
+    brick = (row - 1)*columns + column;
+    c = 4*(brick - 1); // corners and sides: below, right, above, left
+    shift = (row % 2 == 1 || columns == 1) ? 0 : 0.5;
+    from = (column == 1) ? 0 : column - 1 - shift;
+    to = (column == columns) ? columns : column - shift;
+    y = (row - 1)*height;
+    Point(c + 1) = {from*length, y, 0};
+    Point(c + 2) = {to*length, y, 0};
+    Point(c + 3) = {to*length, y + height, 0};
+    Point(c + 4) = {from*length, y + height, 0};
+    For side In {1 : 4}
+      Line(c + side) = {c + side, c + side % 4 + 1};
+    EndFor
+    Transfinite Curve {c + 1, c + 3} = Max(1, Round(n*(to - from))) + 1;
+    Transfinite Curve {c + 2, c + 4} = Max(1, Round(n/2)) + 1;
+    Curve Loop(brick) = {c + 1 : c + 4};
     Plane Surface(brick) = {brick};
-    Transfinite Surface {brick} = {p, p + 1, p + 2, p + 3} Left;
-    Physical Surface(Sprintf("b%g", brick)) = {brick};
-    If (row == 0)
-      Physical Curve(Sprintf("b%g_bottom", brick)) = {p};
+    Transfinite Surface {brick} Alternate;
+    Physical Surface(Sprintf(StrCat("brick_", parity(row % 2), "_%g"), brick)) = {brick};
+    If (row == 1)
+      bottom() += c + 1;
     EndIf
-    If (place == columns - 1 + odd)
-      Physical Curve(Sprintf("b%g_right", brick)) = {p + 1};
+    If (row == rows)
+      top() += c + 3;
     EndIf
-    If (row == rows - 1)
-      Physical Curve(Sprintf("b%g_top", brick)) = {p + 2};
+    If (column == 1)
+      left() += c + 4;
     EndIf
-    If (place == 0)
-      Physical Curve(Sprintf("b%g_left", brick)) = {p + 3};
+    If (column == columns)
+      right() += c + 2;
     EndIf
   EndFor
 EndFor
+Physical Curve("bottom") = {bottom()};
+Physical Curve("top") = {top()};
+Physical Curve("left") = {left()};
+Physical Curve("right") = {right()};

@@ -8,9 +8,11 @@ mod blocks;
 mod blocks_tests;
 mod degree;
 mod factor;
+mod symbolic;
 
 pub use blocks::Blocks;
 pub use factor::{Factor, PART, TOLERANCE};
+pub use symbolic::{Work, factorisation};
 
 use crate::error::{Error, Kind, Result};
 use nalgebra::{DMatrix, DVector};

@@ -4,6 +4,7 @@
 //! [`InnerSolver`]. A new way to solve is a new file with that trait. [`CondensedBody`] is such a body whose dofs are those of its contact.
 
 mod condensed;
+pub mod cost;
 pub mod dense;
 pub mod krylov;
 pub mod memory;

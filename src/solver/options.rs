@@ -30,7 +30,7 @@ pub use unread::{Unread, UnreadKind, unread};
 use crate::petsc::FAMILIES;
 
 /// Why a name cannot be that of a body; `None` for a good one. A body's name begins its options, so it is
-/// `[a-z][a-z0-9]*` and no word that begins options of PETSc.
+/// `[a-z][a-z0-9_]*`, no word that begins options of PETSc, and between two `_` none of a solver inside another.
 ///
 /// ```
 /// use winkler::solver::options::forbidden_body_name;
@@ -39,13 +39,13 @@ use crate::petsc::FAMILIES;
 /// assert!(forbidden_body_name("mg").is_some_and(|reason| reason.contains("PETSc")));
 /// ```
 pub fn forbidden_body_name(name: &str) -> Option<&'static str> {
-    let letters = name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit());
+    let letters = name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_');
     if !letters || !name.starts_with(|first: char| first.is_ascii_lowercase()) {
         return Some(
-            "it begins the PETSc options of the body, so it has small letters and digits only, a letter first",
+            "it begins the PETSc options of the body, so it has small letters, digits and _ only, a letter first",
         );
     }
-    let family = FAMILIES.iter().any(|family| family.strip_suffix('_') == Some(name));
+    let family = name.split('_').any(|word| FAMILIES.iter().any(|family| family.strip_suffix('_') == Some(word)));
     if family || global::is_global_word(name) || MORE_WORDS.contains(&name) {
         return Some("options of PETSc itself begin with this word");
     }

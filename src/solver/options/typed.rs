@@ -19,9 +19,11 @@ impl<'a> Prefixes<'a> {
         Self(names.iter().copied().collect())
     }
 
-    /// The solver whose prefix an option has, and the option without it. No prefix has an underscore in it.
+    /// The solver whose prefix an option has, and the option without it; of `brick` and `brick_1` the longer one.
     pub(super) fn split<'b>(&self, name: &'b str) -> Option<(&'b str, &'b str)> {
-        name.trim_start_matches('-').split_once('_').filter(|(first, _)| self.0.contains(first))
+        let bare = name.trim_start_matches('-');
+        let mut parts = bare.rmatch_indices('_').map(|(at, _)| (&bare[..at], &bare[at + 1..]));
+        parts.find(|(first, _)| self.0.contains(first))
     }
 
     /// The option without dash and prefix.
@@ -137,6 +139,9 @@ mod tests {
         assert!(!prefixes.is_plain("-log_view"));
         assert_eq!(prefixes.split("-up_ksp_type"), Some(("up", "ksp_type")));
         assert_eq!(prefixes.split("-upper_ksp_type"), None);
+        let prefixes = Prefixes::new(&["brick", "brick_1", "brick_12"]);
+        assert_eq!(prefixes.split("-brick_12_ksp_type"), Some(("brick_12", "ksp_type")));
+        assert_eq!(prefixes.split("-brick_2_ksp_type"), Some(("brick", "2_ksp_type")));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::probe::Names;
 use super::typed::{Prefixes, Typed};
 use crate::error::{Result, nearest};
 use crate::petsc::{Entry, Session};
+use std::collections::BTreeSet;
 
 /// An option that the user typed and nobody read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -100,11 +101,11 @@ fn bare(name: &str) -> &str {
     name.trim_start_matches('-')
 }
 
-/// The most similar name that PETSc knows, plain or of the body that the first word of `name` resembles most.
+/// The most similar name that PETSc knows, plain or of a body whose name resembles the beginning of `name`.
 fn near(name: &str, bodies: &[&str], names: &Names) -> Option<String> {
-    let first = bare(name).split('_').next().unwrap_or_default();
-    let body = bodies.iter().find(|body| **body == first).copied().or_else(|| nearest(first, bodies.iter().copied()));
-    let prefixes = std::iter::once(String::new()).chain(body.map(|body| format!("{body}_")));
+    let heads = bare(name).match_indices('_').map(|(at, _)| &bare(name)[..at]);
+    let bodies: BTreeSet<&str> = heads.filter_map(|head| nearest(head, bodies.iter().copied())).collect();
+    let prefixes = std::iter::once(String::new()).chain(bodies.iter().map(|body| format!("{body}_")));
     let known: Vec<String> =
         prefixes.flat_map(|prefix| names.iter().map(move |name| format!("-{prefix}{name}"))).collect();
     nearest(name, known.iter().map(String::as_str)).map(str::to_owned)
