@@ -77,6 +77,9 @@ impl Gmsh {
             "-v",
             "2",
         ]);
+        if let Some(threads) = task.guard.threads {
+            command.args(["-algo", "hxt", "-nt", &threads.to_string()]);
+        }
         if task.times != 1.0 {
             command.args(["-clscale", &task.times.to_string()]);
         }

@@ -102,7 +102,7 @@ pub(super) fn from_script<const D: usize>(
         script.check(name, file)?;
     }
     let gmsh = Gmsh::find()?;
-    let name = file_name::<D>(path, &script, set, sizes, order, &gmsh);
+    let name = file_name::<D>(path, &script, set, sizes, order, guard.threads, &gmsh);
 
     // A file of the cache that cannot be read or is damaged is as good as none.
     for folder in folders {
@@ -159,11 +159,14 @@ fn file_name<const D: usize>(
     set: &[(String, f64)],
     sizes: Option<&Sizing>,
     order: Order,
+    threads: Option<usize>,
     gmsh: &Gmsh,
 ) -> String {
     let mut key = Key::new();
     key.add(gmsh.identity().as_bytes());
     key.add(&[D as u8, order as u8]);
+    // one thread or many: the same algorithm
+    key.add(&[u8::from(threads.is_some())]);
     for (name, value) in set {
         key.add(name.as_bytes());
         key.add(&value.to_le_bytes());

@@ -157,3 +157,24 @@ fn loads_at_the_same_time_do_not_meet() {
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 1);
     assert_eq!(load().origin, Origin::Cache);
 }
+
+/// Gmsh's parallel algorithm makes another mesh of the same cube, with a file of its own in the cache, whatever the number of threads.
+#[test]
+fn free_meshes_in_space_by_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = [folder.path().join("cache")];
+    let geo = folder.path().join("cube.geo");
+    let cube = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\nMeshSize{:} = 0.2;\n\
+                Physical Volume(\"all\") = {1};\nPhysical Surface(\"bottom\") = {5};\n";
+    std::fs::write(&geo, cube).unwrap();
+    let run = |threads: Option<usize>| {
+        let guard = Guard { threads, ..Guard::default() };
+        let limits = (&guard, &Interrupt::default());
+        let loaded = from_script::<3>(&located(geo.clone()), &[], None, Order::P1, limits, &cache).unwrap();
+        (loaded.origin, loaded.mesh.points.len())
+    };
+    let ((_, usual), (origin, parallel)) = (run(None), run(Some(1)));
+    assert_eq!(origin, Origin::Gmsh);
+    assert!(usual != parallel && usual.abs_diff(parallel) < usual / 4, "{usual} {parallel}");
+    assert_eq!((run(Some(2)), run(None)), ((Origin::Cache, parallel), (Origin::Cache, usual)));
+}
