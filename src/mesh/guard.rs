@@ -124,7 +124,7 @@ mod tests {
     fn what_takes_too_long_or_too_much_is_ended() {
         let began = Instant::now();
         let silent = Path::new("");
-        let mut ended = |command: &mut Command, limit| run(command, limit, silent, &Interrupt::default(), "");
+        let ended = |command: &mut Command, limit| run(command, limit, silent, &Interrupt::default(), "");
         assert!(matches!(ended(&mut sleep(None), 0.1), Ok(End::TimedOut)));
         assert!(began.elapsed() < Duration::from_secs(4));
         // no program can be loaded into a hundred kilobytes

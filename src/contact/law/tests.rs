@@ -152,6 +152,40 @@ fn all_laws() -> Vec<(Box<dyn LayerLaw>, f64)> {
     laws
 }
 
+#[test]
+fn pressures_and_tangents_are_those_of_responses() {
+    for (law, scale) in all_laws() {
+        for share in [1e-3, 0.4, 1.0, 7.0, 1e3] {
+            let c = share * scale;
+            let (here, (pressure, tangent)) = (law.response(0, c), law.pressure_and_tangent(0, c));
+            if here.pressure.is_infinite() {
+                continue;
+            }
+            assert!((pressure / here.pressure - 1.0).abs() < 1e-12, "{law:?} at {c}: {pressure} {here:?}");
+            assert!((tangent / here.tangent - 1.0).abs() < 1e-12, "{law:?} at {c}: {tangent} {here:?}");
+        }
+    }
+}
+
+/// Far from the graph, and nowhere: an open layer without pressure is on the graph, all else is not.
+#[test]
+fn gaps_at_the_ends_of_numbers() {
+    for (law, scale) in all_laws() {
+        let inf = f64::INFINITY;
+        for (c, pressure, gap) in [
+            (-scale, 0.0, 0.0),
+            (-inf, 0.0, 0.0),
+            (inf, 0.0, inf),
+            (-scale, -1.0, inf),
+            (-inf, -1.0, inf),
+            (scale, inf, inf),
+        ] {
+            assert_eq!(law.duality_gap(0, c, pressure), gap, "{law:?} {c} {pressure}");
+        }
+        assert!(law.duality_gap(0, f64::NAN, 0.0).is_nan() && law.duality_gap(0, 0.0, f64::NAN).is_nan());
+    }
+}
+
 /// Powers of ten from 10^low to 10^high, not at round numbers.
 fn decades(low: i32, high: i32, each: i32) -> impl Iterator<Item = f64> {
     (low * each..=high * each).map(move |i| 1.137 * 10f64.powf(f64::from(i) / f64::from(each)))
