@@ -206,7 +206,6 @@ fn forces_are_in_balance_after_any_fall() {
 #[test]
 fn lost_digits_have_their_status() {
     let pressed = "fix = [{ on = \"b2_left\", x = 0 }]\nload = [{ on = \"b2_top\", pressure = 0.5 }]";
-    let mut lost = 0;
     for gap in ["1", "1e3", "1e6", "1e9", "1e12", "1e15"] {
         for method in ["auto", "ncg"] {
             let scene = blocks([2.1e5; 2], [3, 2], pressed, gap, "linear = { stiffness = 1e6 }");
@@ -217,11 +216,9 @@ fn lost_digits_have_their_status() {
             // what rounding of the gap makes of a pressure: the layer and half of a cell on either side are springs of 10^5
             let gap: f64 = gap.parse().expect("a number");
             let expected = f64::EPSILON * gap * 1e5 / 0.5;
+            assert_eq!(told, expected > 1e-5, "{method}, gap {gap}: {expected:e}\n{}", run.said());
             assert!(told || worst < 1e-4, "{method}, gap {gap}: {worst:e}\n{}", run.said());
-            assert!(!told || expected > 1e-6, "{method}, gap {gap}: {expected:e}\n{}", run.said());
             assert!(run.code == 0 || told && !run.text("message").contains("allow more"), "{}", run.said());
-            lost += usize::from(told);
         }
     }
-    assert!((4..=6).contains(&lost), "{lost}");
 }

@@ -193,20 +193,20 @@ mod tests {
             let mut each = |k: usize| traces.period(&[(k % period) as f64, 2.0], std::iter::empty(), 1.0, 0.0);
             assert_eq!(first(&mut each), Some((period, period)));
             let mut sets = Cycle::default();
-            let mut each = |k: usize| sets.period(&[k as f64], [k % period == 0, true].into_iter(), 1.0, 0.0);
+            let mut each = |k: usize| sets.period(&[k as f64], [k.is_multiple_of(period), true].into_iter(), 1.0, 0.0);
             assert_eq!(first(&mut each), Some((64, period)));
             // the residual falls once in a while
             let mut falling = Cycle::default();
             let mut each = |k: usize| {
                 let residual = 0.5f64.powi((k / 50) as i32);
-                falling.period(&[k as f64], [k % period == 0, true].into_iter(), residual, 0.0)
+                falling.period(&[k as f64], [k.is_multiple_of(period), true].into_iter(), residual, 0.0)
             };
             assert_eq!(first(&mut each), None);
         }
         let mut traces = Cycle::default();
         assert_eq!(first(&mut |k| traces.period(&[(k % 9) as f64, 2.0], std::iter::empty(), 1.0, 0.0)), None);
         let mut sets = Cycle::default();
-        assert_eq!(first(&mut |k| sets.period(&[k as f64], [k % 9 == 0, true].into_iter(), 1.0, 0.0)), None);
+        assert_eq!(first(&mut |k| sets.period(&[k as f64], [k.is_multiple_of(9), true].into_iter(), 1.0, 0.0)), None);
         // steps of 1e-8 are none, and traces that differ by 1e-11 are others
         let mut small = Cycle::default();
         assert_eq!(first(&mut |k| small.period(&[1.0 + 1e-8 * (k % 2) as f64], std::iter::empty(), 1.0, 0.0)), None);
