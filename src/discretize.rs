@@ -12,6 +12,7 @@ mod mechanism;
 pub mod meshes;
 mod pairs;
 mod part;
+mod roster;
 mod springs;
 mod supports;
 mod surface;
@@ -22,6 +23,7 @@ use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::fem::{
     ElasticBody,
+    assemble::NodeGraph,
     rigid::{self, FreeMotion, RigidMotion},
 };
 use crate::linalg::{Csr, axpy};
@@ -38,6 +40,7 @@ use fields::{ErrorMaker, FieldMaker};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
+use std::cell::OnceCell;
 use std::rc::Rc;
 pub use surface::ContactSurface;
 pub use verify::{Verified, verify};
@@ -54,6 +57,8 @@ pub struct Outline<'a> {
     pub prescribed: &'a [(usize, f64)],
     /// Rigid motions of the free body.
     pub motions: &'a [RigidMotion],
+    /// Which of its nodes K couples, made when it is first asked for.
+    pub graph: &'a dyn Fn() -> &'a NodeGraph,
 }
 
 /// Gives bodies their inner solvers.
@@ -137,6 +142,10 @@ pub struct BodyInfo {
     pub load: [f64; 3],
     /// Rank that owns the body.
     pub rank: usize,
+    /// Names of the groups of its supports.
+    pub supports: Vec<String>,
+    /// Names of the groups of its springs.
+    pub springs: Vec<String>,
     /// Names of its rigid surfaces.
     pub rigid: Vec<String>,
     field: FieldMaker,
@@ -223,8 +232,8 @@ pub fn discretize<const D: usize>(
     exchange: Box<dyn Exchange>,
     factory: &mut dyn Factory,
 ) -> Result<Discrete> {
-    let Verified { mesh, checked } = verified;
-    let mut parts = scene.bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
+    let Verified { mesh, bodies, checked } = verified;
+    let mut parts = bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
     parts.iter().zip(checked).try_for_each(|(part, checked)| verify::held(part, &checked.parts, mesh))?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
@@ -244,17 +253,25 @@ pub fn discretize<const D: usize>(
     let Fixed { gauged, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs);
     let supported: Vec<Supported> =
         parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
-    let outlines = parts.iter().zip(&drafts).zip(&supported).map(|((part, draft), supported)| Outline {
+    let graphs: Vec<OnceCell<NodeGraph>> = parts.iter().map(|_| OnceCell::new()).collect();
+    let lazy = parts.iter().zip(&drafts).zip(&graphs);
+    let lazy: Vec<_> =
+        lazy.map(|((part, draft), graph)| move || graph.get_or_init(|| part.graph(&draft.rows))).collect();
+    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(&lazy);
+    let outlines = outlines.map(|(((part, draft), supported), graph)| Outline {
         name: &part.spec.name.value,
         dimension: D,
         rows: &draft.rows,
         prescribed: &supported.prescribed,
         motions: &draft.free,
+        graph,
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
-    let drafts = drafts.into_iter().zip(supported);
+    let drafts = drafts.into_iter().zip(supported).zip(graphs);
     let known = gauged.into_iter().zip(loose);
-    for (index, ((part, (draft, supported)), (gauged, loose))) in parts.into_iter().zip(drafts).zip(known).enumerate() {
+    for (index, ((part, ((draft, supported), graph)), (gauged, loose))) in
+        parts.into_iter().zip(drafts).zip(known).enumerate()
+    {
         let Draft { segments, rows, free, nodal_load, load } = draft;
         let Supported { carried, prescribed } = supported;
         let mut offset = vec![0.0; rows.rows()];
@@ -281,10 +298,12 @@ pub fn discretize<const D: usize>(
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 {
             let left = rigid::free(&left, &prescribed, &load);
-            let body = part.assemble(mesh, &rows, &elasticity, load, prescribed, carried)?;
+            let graph = graph.into_inner().unwrap_or_else(|| part.graph(&rows));
+            let body = part.assemble(mesh, &graph, &elasticity, load, prescribed, carried)?;
+            drop(graph);
             assemblies += 1;
             scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-            row_stiffness = body.row_stiffness(&rows);
+            row_stiffness = rows.quadratic_diagonal(&body.stiffness);
             local = Some(factory.make(Assembled {
                 name: name.clone(),
                 dimension: D,
@@ -309,6 +328,8 @@ pub fn discretize<const D: usize>(
             stiffness,
             load: resultant,
             rank: owner[index],
+            supports: part.spec.fix.iter().map(|support| support.on.value.clone()).collect(),
+            springs: part.spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
             rigid: held.rigid.iter().map(|(load, _)| part.spec.load[*load].on.value.clone()).collect(),
             nodal: {
                 let held = held.clone();

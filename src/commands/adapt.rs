@@ -80,7 +80,6 @@ impl Plan {
             return Ok(plan);
         }
         agree(session, plan.refuse_finished_mesh())?;
-        let bodies = plan.scene.bodies.len();
         if plan.adapts() {
             let scene = Rc::make_mut(&mut plan.scene);
             scene.estimate = true;
@@ -94,7 +93,8 @@ impl Plan {
             let mut coarse = Scene::clone(&plan.scene);
             coarse.estimate = true;
             let built = run::build(session, coarse.clone(), interrupt, clock)?;
-            let sizes = built.discrete.meshes.as_ref().map(|meshes| sizes::scaled(&**meshes, bodies, 2.0));
+            let (meshes, bodies) = (&built.discrete.meshes, built.discrete.bodies.len());
+            let sizes = meshes.as_ref().map(|meshes| sizes::scaled(&**meshes, bodies, 2.0));
             options::withdraw(session)?;
             coarse.method.stop.balanced = true;
             follow(&mut coarse, sizes.map(view));
@@ -104,7 +104,8 @@ impl Plan {
         let mut view_of_first = mesh::recall_final(&plan.purpose);
         if view_of_first.is_none() {
             let built = run::build(session, plan.scene.clone(), interrupt, clock)?;
-            let sizes = built.discrete.meshes.as_ref().map(|m| sizes::uniform(&**m, bodies, FIRST * bodies));
+            let (meshes, bodies) = (&built.discrete.meshes, built.discrete.bodies.len());
+            let sizes = meshes.as_ref().map(|meshes| sizes::uniform(&**meshes, bodies, FIRST * bodies));
             options::withdraw(session)?;
             view_of_first = sizes.map(view);
         }

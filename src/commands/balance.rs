@@ -1,7 +1,7 @@
 //! Forces on every body, from the ranks that own them to the report.
 
 use super::results::{All, Recovered};
-use super::stages::{Built, Done};
+use super::stages::Done;
 use crate::discretize::Balance;
 use crate::output::{BalanceReport, ForceReport};
 
@@ -10,15 +10,12 @@ const WIDTH: usize = 6;
 
 /// The forces on every body in the result; collective.
 pub fn gather(done: &Done, recovered: &All) -> Vec<BalanceReport> {
-    let Built { scene, discrete, .. } = &done.built;
+    let discrete = &done.built.discrete;
     let model = &discrete.model;
     let mut reports = Vec::new();
     for (index, info) in discrete.bodies.iter().enumerate() {
-        let spec = &scene.bodies[index];
         let mut names = vec!["loads".to_owned(), "contacts".to_owned()];
-        names.extend(spec.fix.iter().map(|support| support.on.value.clone()));
-        names.extend(spec.spring.iter().map(|spring| spring.on.value.clone()));
-        names.extend(info.rigid.iter().cloned());
+        names.extend(info.supports.iter().chain(&info.springs).chain(&info.rigid).cloned());
         let mut message = vec![0.0; WIDTH * names.len() + 2];
         match &recovered[index] {
             None => {}
@@ -47,8 +44,8 @@ pub fn gather(done: &Done, recovered: &All) -> Vec<BalanceReport> {
         };
         let (force_imbalance, moment_imbalance) =
             (share(|part| part.force, size[0]), share(|part| part.moment, size[1]));
-        let rigid = parts.split_off(2 + spec.fix.len() + spec.spring.len());
-        let springs = parts.split_off(2 + spec.fix.len());
+        let rigid = parts.split_off(2 + info.supports.len() + info.springs.len());
+        let springs = parts.split_off(2 + info.supports.len());
         let supports = parts.split_off(2);
         let contacts = parts.pop().unwrap_or_default();
         let loads = parts.pop().unwrap_or_default();

@@ -56,6 +56,7 @@ fn pairs(built: &Built) -> serde_json::Value {
         let coupling = preflight::coupling(built, i);
         json!({
             "surfaces": pair.surfaces,
+            "contact": built.discrete.contacts[i].spec.table,
             "carrier": pair.surfaces[0],
             "points": pair.len(),
             "length": pair.weight.iter().sum::<f64>(),

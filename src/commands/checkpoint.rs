@@ -90,7 +90,7 @@ impl Checkpoint {
         let bytes = crate::file::read(&path).map_err(|error| {
             error.help("name the folder of results of a run that was interrupted, or had `--checkpoint`")
         })?;
-        let checkpoint = parse(&path, &bytes, scene.bodies.len()).ok_or_else(|| {
+        let checkpoint = parse(&path, &bytes).ok_or_else(|| {
             Error::new(Kind::File, format!("{} is damaged, or no checkpoint of this version", path.display()))
                 .help("begin anew, without `--restart`")
         })?;
@@ -138,11 +138,12 @@ fn gather(model: &Model, field: &Field) -> (Vec<usize>, Vec<f64>) {
     (lengths.into_iter().map(|length| length as usize).collect(), all)
 }
 
-fn parse(path: &Path, bytes: &[u8], bodies: usize) -> Option<Checkpoint> {
+fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
     let (text, digest) = bytes.split_at_checked(bytes.len().checked_sub(DIGEST)?)?;
     let mut lines = text.splitn(3, |&byte| byte == b'\n');
     let is_ours = lines.next()? == FORMAT.as_bytes() && Sha256::digest(text)[..] == *digest;
     let head: Head = serde_json::from_slice(lines.next()?).ok().filter(|_| is_ours)?;
+    let bodies = head.states.len();
     let (numbers, odd) = lines.next()?.as_chunks::<8>();
     let mut numbers = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes));
     let mut take = |count: usize| numbers.by_ref().take(count).collect::<Vec<f64>>();
@@ -150,7 +151,7 @@ fn parse(path: &Path, bytes: &[u8], bodies: usize) -> Option<Checkpoint> {
     let (earlier, rows) = (rows(head.rows[0])?, rows(head.rows[1])?);
     let (compression, trace) = (take(head.points), take(2 * head.points));
     let states = head.states.iter().map(|&length| take(length)).collect();
-    let is_whole = odd.is_empty() && head.states.len() == bodies && numbers.next().is_none();
+    let is_whole = odd.is_empty() && numbers.next().is_none();
     let state = State { field: Field { states, trace }, compression, rows, memory: None };
     is_whole.then(|| Checkpoint { path: path.to_owned(), head, earlier, state })
 }

@@ -57,9 +57,10 @@ fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request)
 /// All that is said about a mesh.
 fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Result<Value> {
     let mesh = &loaded.mesh;
-    let mut checked = crate::discretize::verify(scene, mesh)?.checked.into_iter();
+    let verified = crate::discretize::verify(scene, mesh)?;
+    let mut checked = verified.checked.into_iter();
     let mut bodies = Vec::new();
-    for body in &scene.bodies {
+    for body in &verified.bodies {
         let name = &body.name.value;
         let Some(group) = mesh.group(name).filter(|group| group.dimension == D) else {
             let known: Vec<&str> = mesh.group_names(D).collect();

@@ -46,18 +46,16 @@ fn linear_step(
     model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.reveal())?;
     // multigrid wants nodes, without numbers for rigid motions among them
     let multigrid = linear == Linear::Multigrid;
-    let Some(union) = Union::of(model, !multigrid) else {
+    let Some(union) = Union::of(model, !multigrid)? else {
         return Err(Error::new(Kind::Solver, "the bodies of other ranks cannot be joined").help("choose newton-robin"));
     };
     let (session, block) = (session.clone(), if multigrid { scene.dimension.value } else { 1 });
     let mut step: Box<dyn LinearStep> = match linear {
         Linear::Dense => {
-            let dense = |stiffness: &Csr| Ok(Dense::new(stiffness.rows(), stiffness.values.clone()));
-            Box::new(Monolithic::new(union.without_zeros(), dense))
+            let dense = |stiffness: Csr| Ok(Dense::new(stiffness.rows(), stiffness.values));
+            Box::new(Monolithic::new(union.without_zeros(), dense)?)
         }
-        _ => {
-            Box::new(Monolithic::new(union, move |stiffness: &Csr| Krylov::new(&session, WHOLE, block, stiffness, &[])))
-        }
+        _ => Box::new(Monolithic::new(union, |stiffness| Krylov::new(&session, WHOLE, block, stiffness, &[]))?),
     };
     if let Some(springs) = first_springs(model, start) {
         step.set_up(&springs)?;

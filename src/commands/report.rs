@@ -216,6 +216,7 @@ fn pair_report(done: &Done, i: usize) -> PairReport {
     PairReport {
         surfaces: discrete.contacts[i].spec.between.each_ref().map(|name| name.value.clone()),
         bodies: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
+        contact: discrete.contacts[i].spec.table,
         points: pair.len(),
         carrier: pair.surfaces[0].clone(),
         theta: sides.map(|side| coupling.theta[side]),

@@ -17,6 +17,7 @@ use crate::interrupt::Interrupt;
 use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
+use crate::problem::body::BodySpec;
 use crate::problem::mesh::MeshSource;
 use crate::problem::method::Linear;
 use crate::problem::order::Order;
@@ -53,10 +54,7 @@ pub fn build_with(
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
-    agree(session, refuse(&scene).and_then(|()| options::refuse_log(session)))?;
-    agree(session, scene_options(session, &scene))?;
-    let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
-    options::distribute(session, &names)?;
+    agree(session, options::refuse_log(session))?;
     match scene.dimension.value {
         2 => build_in::<2>(session, scene, pieces::plane, kept, interrupt, clock),
         _ => build_in::<3>(session, scene, pieces::space, kept, interrupt, clock),
@@ -75,6 +73,10 @@ fn build_in<const D: usize>(
     interrupt.hold();
     let mesh = mesh::<D>(session, &scene, interrupt)?;
     let mesh = agree(session, interrupt.release().and_then(|()| discretize::verify(&scene, &mesh)))?;
+    agree(session, refuse(&mesh.bodies))?;
+    let names: Vec<&str> = mesh.bodies.iter().map(|body| body.name.value.as_str()).collect();
+    agree(session, scene_options(session, &scene, &names))?;
+    options::distribute(session, &names)?;
     clock.phase("mesh");
     let largest = mesh.mesh.points.len() * D;
     // small fronts and several ranks lose by BLAS threads, large factorisations gain
@@ -95,8 +97,8 @@ fn build_in<const D: usize>(
 }
 
 /// What the decoder of the scene cannot know.
-fn refuse(scene: &Scene) -> Result<()> {
-    for body in &scene.bodies {
+fn refuse(bodies: &[BodySpec]) -> Result<()> {
+    for body in bodies {
         if let Some(reason) = options::forbidden_body_name(&body.name.value) {
             let message = format!("`{}` cannot name a body: {reason}", body.name.value);
             return Err(Error::scene(&body.name.place, message).help("rename the physical group and the body"));
@@ -106,8 +108,7 @@ fn refuse(scene: &Scene) -> Result<()> {
 }
 
 /// PETSc options of the scene, weaker than typed ones.
-fn scene_options(session: &Session, scene: &Scene) -> Result<()> {
-    let bodies: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
+fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()> {
     let mut words = scene.solver.options.iter().peekable();
     while let Some(word) = words.next() {
         if !word.starts_with('-') {
@@ -116,7 +117,7 @@ fn scene_options(session: &Session, scene: &Scene) -> Result<()> {
         }
         let is_value = |next: &&String| !next.starts_with('-') || next.parse::<f64>().is_ok();
         let value = words.next_if(is_value).map(String::as_str);
-        options::set_of_scene(session, &bodies, word, value)?;
+        options::set_of_scene(session, bodies, word, value)?;
     }
     Ok(())
 }

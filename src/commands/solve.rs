@@ -5,7 +5,7 @@ use super::asking::{Asking, is_snapshot, signal};
 use super::checkpoint::{self, Checkpoint};
 use super::clock::Clock;
 use super::keep::Keep;
-use super::stages::Done;
+use super::stages::{Built, Done};
 use super::write::{Writing, to_json};
 use super::{folder_of, load, report, run};
 use crate::ddm::{Observer, Row, Status};
@@ -14,7 +14,6 @@ use crate::interrupt::Interrupt;
 use crate::output::{Folder, HistoryWriter, IterationTable, Verbosity, say};
 use crate::parallel::agree;
 use crate::petsc::Session;
-use crate::scene::Scene;
 use std::path::{Path, PathBuf};
 
 /// What the user typed.
@@ -57,7 +56,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         let verbosity = if request.json || monitored || !first { Verbosity::Quiet } else { Verbosity::Table };
         let mut watchers = Watchers {
             table: IterationTable::new(verbosity, &run::targets(&plan.scene)),
-            history: if first { Some(history(&folder, &plan.scene)?) } else { None },
+            history: if first { Some(history(&folder, &ready.built)?) } else { None },
             asking: &asking,
             session,
             path,
@@ -119,9 +118,9 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     Ok(code)
 }
 
-fn history(folder: &Folder, scene: &Scene) -> Result<HistoryWriter> {
-    let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.value.as_str()).collect();
-    HistoryWriter::create(folder, &names, !scene.method.steps.is_empty())
+fn history(folder: &Folder, built: &Built) -> Result<HistoryWriter> {
+    let names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
+    HistoryWriter::create(folder, &names, !built.scene.method.steps.is_empty())
 }
 
 /// Table and file of the iterations of a round, what is asked meanwhile, and its checkpoints and snapshots.

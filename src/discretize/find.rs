@@ -35,8 +35,18 @@ pub fn find_group<'m, const D: usize>(
     }
     Err(match crate::error::nearest(&name.value, known.iter().copied()) {
         Some(near) => error.help(format!("did you mean `{near}`?")),
-        None => error.help(format!("physical groups of that kind: {}", known.join(", "))),
+        None => error.help(format!("physical groups of that kind: {}", few(&known))),
     })
+}
+
+/// Names in a row, as many as a person reads.
+pub fn few(names: &[&str]) -> String {
+    const FEW: usize = 12;
+    match names.len().saturating_sub(FEW) {
+        0 if names.is_empty() => "none".to_owned(),
+        0 | 1 => names.join(", "),
+        more => format!("{} and {more} more", names[..FEW].join(", ")),
+    }
 }
 
 /// The refusal of a support or load on another body's group.

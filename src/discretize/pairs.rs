@@ -58,14 +58,13 @@ pub fn all<const D: usize>(
         named.insert([a.min(b), a.max(b)]);
         contacts.push(make_pair(spec.clone(), None, cut, parts, surfaces, fine)?);
     }
-    if let Some(auto) = &scene.auto {
-        for surfaces in auto::find(auto, cut, parts, &named)? {
-            let mut spec = auto.contact.clone();
-            for (name, surface) in spec.between.iter_mut().zip(&surfaces) {
-                surface.name.clone_into(&mut name.value);
-            }
-            contacts.push(make_pair(spec, Some(auto.distance), cut, parts, surfaces, fine)?);
+    for (rule, surfaces) in auto::find(&scene.auto, cut, parts, &named)? {
+        let rule = &scene.auto[rule];
+        let mut spec = rule.contact.clone();
+        for (name, surface) in spec.between.iter_mut().zip(&surfaces) {
+            surface.name.clone_into(&mut name.value);
         }
+        contacts.push(make_pair(spec, Some(rule.distance), cut, parts, surfaces, fine)?);
     }
     Ok(contacts)
 }

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::fem::assemble::{self, NodalBlock};
 use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
-use crate::linalg::{Csr, dot};
+use crate::linalg::{Csr, countable, dot};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, LoadKind};
 use crate::problem::elasticity::Plane;
@@ -171,16 +171,8 @@ impl<'a, const D: usize> Part<'a, D> {
         load
     }
 
-    /// K, f and supports; `carried` is the rigid motion that was taken out of `prescribed`, if any.
-    pub fn assemble(
-        &self,
-        mesh: &Mesh<D>,
-        rows: &Csr,
-        elasticity: &Elasticity,
-        load: Vec<f64>,
-        prescribed: Vec<(usize, f64)>,
-        carried: Vec<f64>,
-    ) -> Result<ElasticBody> {
+    /// Which nodes K couples: those of a cell, and those of a contact row.
+    pub fn graph(&self, rows: &Csr) -> NodeGraph {
         let coupled: Vec<Vec<u32>> = (0..rows.rows())
             .map(|q| {
                 let mut nodes: Vec<u32> = rows.row(q).map(|(dof, _)| (dof / D) as u32).collect();
@@ -189,9 +181,22 @@ impl<'a, const D: usize> Part<'a, D> {
             })
             .filter(|nodes| nodes.len() > 1)
             .collect();
-        let graph = NodeGraph::new(&self.space, &coupled, &self.held.frame);
+        NodeGraph::new(&self.space, &coupled, &self.held.frame)
+    }
+
+    /// K on its graph, f and supports; `carried` is the rigid motion that was taken out of `prescribed`, if any.
+    pub fn assemble(
+        &self,
+        mesh: &Mesh<D>,
+        graph: &NodeGraph,
+        elasticity: &Elasticity,
+        load: Vec<f64>,
+        prescribed: Vec<(usize, f64)>,
+        carried: Vec<f64>,
+    ) -> Result<ElasticBody> {
         let name = &self.spec.name;
-        let mut stiffness = assemble::stiffness(&self.space, &graph, elasticity).map_err(|defect| match defect {
+        countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
+        let mut stiffness = assemble::stiffness(&self.space, graph, elasticity).map_err(|defect| match defect {
             assemble::Defect::Inverted(cell) => {
                 let corner = contact::pad(self.space.cell_nodes(cell)[0]);
                 let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
@@ -203,7 +208,7 @@ impl<'a, const D: usize> Part<'a, D> {
             let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
             return Err(Error::scene(&self.spec.elasticity.place, message).label("far too large"));
         }
-        self.springs.iter().for_each(|springs| assemble::add_blocks(&graph, springs, &mut stiffness));
+        self.springs.iter().for_each(|springs| assemble::add_blocks(graph, springs, &mut stiffness));
         self.held.frame.turn_matrix(&mut stiffness);
         let work = dot(&load, &carried);
         let mut body = assemble::support(stiffness, load, prescribed);

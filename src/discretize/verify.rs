@@ -2,6 +2,7 @@
 
 use super::find::point;
 use super::part::Part;
+use super::roster;
 use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::fem::Space;
@@ -15,19 +16,22 @@ use crate::scene::Scene;
 pub struct Verified<'a, const D: usize> {
     /// The mesh.
     pub mesh: &'a Mesh<D>,
-    /// What was found of each body, in the order of the scene; bodies that the mesh does not have are missing.
+    /// The bodies of the scene, each with a name of its own.
+    pub bodies: Vec<BodySpec>,
+    /// What was found of each body, in the same order; bodies that the mesh does not have are missing.
     pub checked: Vec<Checked>,
 }
 
-/// Checks the mesh of a scene once: see [`Mesh::check`].
+/// Finds the bodies of a scene and checks its mesh once: see [`roster::bodies`] and [`Mesh::check`].
 ///
 /// # Errors
-/// What is no mesh of a body, with body, place and elements.
+/// Patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.
 pub fn verify<'a, const D: usize>(scene: &Scene, mesh: &'a Mesh<D>) -> Result<Verified<'a, D>> {
-    let bodies: Vec<Asked> = scene.bodies.iter().map(asked).collect();
+    let bodies = roster::bodies(scene, mesh)?;
+    let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
-    let checked = mesh.check(&bodies, &contacts.collect::<Vec<_>>(), scene.auto.is_some())?;
-    Ok(Verified { mesh, checked })
+    let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty())?;
+    Ok(Verified { mesh, bodies, checked })
 }
 
 /// A body with the groups that serve it.

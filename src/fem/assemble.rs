@@ -79,11 +79,16 @@ impl NodeGraph {
         graph
     }
 
+    /// Entries of the matrix on this graph with D x D blocks.
+    pub fn entries<const D: usize>(&self) -> usize {
+        D * D * self.col.len()
+    }
+
     /// Scalar compressed rows with D x D blocks on this graph, all zero.
     fn matrix<const D: usize>(&self) -> Csr {
         let n = self.ptr.len() - 1;
         let mut ptr = Vec::with_capacity(D * n + 1);
-        let mut col = Vec::with_capacity(D * D * self.col.len());
+        let mut col = Vec::with_capacity(self.entries::<D>());
         ptr.push(0);
         for i in 0..n {
             let neighbours = &self.col[self.ptr[i] as usize..self.ptr[i + 1] as usize];
@@ -149,13 +154,6 @@ pub struct ElasticBody {
     /// Rigid displacement of all dofs that supports give the body, to be added to u; empty if there is none. All else here
     /// is relative to it.
     pub carried: Vec<f64>,
-}
-
-impl ElasticBody {
-    /// b diag(K) b' of each row b: stiffness of the nodes under a contact point.
-    pub fn row_stiffness(&self, rows: &Csr) -> Vec<f64> {
-        (0..rows.rows()).map(|q| rows.row(q).map(|(i, b)| b * b * self.stiffness.diagonal(i)).sum()).collect()
-    }
 }
 
 /// Why a body could not be assembled.

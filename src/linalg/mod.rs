@@ -8,10 +8,13 @@ mod blocks;
 mod blocks_tests;
 mod degree;
 mod factor;
+mod symbolic;
 
 pub use blocks::Blocks;
 pub use factor::{Factor, PART, TOLERANCE};
+pub use symbolic::{Work, factorisation};
 
+use crate::error::{Error, Kind, Result};
 use nalgebra::{DMatrix, DVector};
 
 /// A sparse matrix in compressed rows: row `i` holds columns `col[ptr[i]..ptr[i+1]]`, sorted.
@@ -98,10 +101,27 @@ impl Csr {
         Some(range.start + offset)
     }
 
+    /// b diag(K) b' of each row b, for a square K.
+    pub fn quadratic_diagonal(&self, k: &Csr) -> Vec<f64> {
+        (0..self.rows()).map(|q| self.row(q).map(|(i, b)| b * b * k.diagonal(i)).sum()).collect()
+    }
+
     /// Diagonal entry of row i; zero if the pattern does not have it.
     pub fn diagonal(&self, i: usize) -> f64 {
         self.position(i, i).map_or(0.0, |k| self.values[k])
     }
+}
+
+/// Refuses a number of entries that the 32-bit starts of rows cannot count; `what` names the matrix.
+///
+/// # Errors
+/// [`Kind::Solver`] with the number.
+pub fn countable(what: &str, entries: usize) -> Result<()> {
+    if entries <= i32::MAX as usize {
+        return Ok(());
+    }
+    let message = format!("{what} has {entries} entries, and 32 bits count no more than {}", i32::MAX);
+    Err(Error::new(Kind::Solver, message).help("take a coarser mesh, or order = 1"))
 }
 
 /// Sum of products of a row without holes, in partial sums that the processor adds side by side.
@@ -147,6 +167,13 @@ pub fn fit<V: AsRef<[f64]>>(vectors: &[V], to: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn more_entries_than_32_bits_are_refused() {
+        assert!(countable("K", i32::MAX as usize).is_ok());
+        let error = countable("the stiffness matrix of body `lower`", i32::MAX as usize + 1).unwrap_err();
+        assert!(error.message().contains("`lower` has 2147483648 entries"), "{error}");
+    }
 
     #[test]
     fn products_agree_with_their_transposes() {

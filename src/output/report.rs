@@ -267,6 +267,8 @@ pub struct PairReport {
     pub surfaces: [String; 2],
     /// Names of the bodies.
     pub bodies: [String; 2],
+    /// Number of the scene's `[[contact]]` that it comes from, counted from 0, as in the settings.
+    pub contact: usize,
     /// Contact points.
     pub points: usize,
     /// Surface whose mesh carries the points.

@@ -25,7 +25,7 @@ type NodeNd = unsafe extern "C" fn(*mut i32, *mut i32, *mut i32, *mut i32, *mut 
 ///
 /// # Errors
 /// When METIS is not installed, or does not return an order.
-pub(super) fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
+pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
     let nodes = ptr.len() - 1;
     if col.is_empty() {
         // METIS refuses graphs without edges

@@ -46,6 +46,7 @@ pub use blas::{cholesky, cholesky_solve};
 pub use ffi::Int;
 pub use ksp::{Ksp, Solved};
 pub use matrix::Matrix;
+pub use metis::nested_dissection;
 pub use mumps::Schur;
 pub use options::{FAMILIES, Options};
 pub use reason::ConvergedReason;

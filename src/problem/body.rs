@@ -5,10 +5,11 @@ use super::order::Order;
 use crate::error::Located;
 use crate::expression::{Differentiable, Field};
 
-/// A body: a named group of cells, its elasticity, supports and loads.
+/// A body: a named group of cells, its elasticity, supports and loads; or, in a scene, as many bodies as its name, a
+/// [pattern](super::pattern), stands for.
 #[derive(Debug, Clone)]
 pub struct BodySpec {
-    /// Name of the physical group of cells; `[a-z][a-z0-9]*`, no PETSc family word (it is an option prefix).
+    /// Name of the physical group of cells; `[a-z][a-z0-9_]*` without words of PETSc's own (it is an option prefix).
     pub name: Located<String>,
     /// What it is made of.
     pub elasticity: ElasticitySpec,
@@ -80,4 +81,28 @@ pub enum LoadKind {
         /// Whether the boundary moves as one, by a translation; else the force is spread evenly.
         rigid: bool,
     },
+}
+
+/// What is wrong with a name that is not spelt like that of a body, and what to do about it.
+pub const SPELLING: [&str; 2] =
+    ["", "it is a prefix of PETSc options: a small letter, then small letters, digits and _"];
+
+/// Whether names of bodies may have this character.
+pub fn is_in_name(c: char) -> bool {
+    c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_'
+}
+
+/// Why a body cannot have this name, and what to do about it. A word of PETSc's own options is none, as the body could not have options
+/// of its own; one that follows another would give it those of a solver inside that body's (`-brick_sub_ksp_type`).
+pub fn fault(name: &str) -> Option<[&'static str; 2]> {
+    const WORDS: &[&str] = &[
+        "ksp", "pc", "mat", "vec", "sub", "mg", "snes", "ts", "tao", "dm", "is", "log", "options", "help", "malloc",
+        "info", "on", "fp", "newton",
+    ];
+    if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.chars().all(is_in_name) {
+        return Some(SPELLING);
+    }
+    let nested = name.split('_').any(|word| ["ksp", "pc", "mat", "vec", "sub", "mg"].contains(&word));
+    (nested || WORDS.contains(&name))
+        .then_some(["a word of PETSc's own options", "choose another name, also for the physical group in the mesh"])
 }

@@ -27,13 +27,17 @@ pub struct ContactSpec {
     pub overlap: Overlap,
     /// A known contact pressure to draw and compare with, if any.
     pub reference: Option<Field>,
+    /// Number of its table in the scene.
+    pub table: usize,
 }
 
-/// Contact of all bodies that come near each other, where no [`ContactSpec`] names surfaces of the two.
+/// Contact of all bodies that come near each other, where no [`ContactSpec`] names surfaces of the two and no narrower rule holds.
 #[derive(Debug, Clone)]
 pub struct AutoContact {
     /// Largest distance of facets that form a pair, > 0.
     pub distance: f64,
+    /// Names or patterns of the bodies: one of the first and one of the second form a pair. All bodies if `None`.
+    pub of: Option<[Located<String>; 2]>,
     /// What holds for each pair; `between` is to be replaced by the names of the bodies.
     pub contact: ContactSpec,
 }

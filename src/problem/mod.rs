@@ -10,6 +10,7 @@ pub mod layer;
 pub mod mesh;
 pub mod method;
 pub mod order;
+pub mod pattern;
 pub mod robin;
 pub mod solver;
 pub mod stop;

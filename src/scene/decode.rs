@@ -11,6 +11,7 @@ use crate::error::{Error, Located, Place, Result, nearest, shown};
 use crate::expression::{Differentiable, Field};
 use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
+use crate::problem::pattern::Pattern;
 use crate::problem::solver::{Preset, SolverSpec};
 use crate::scene::{AdaptSpec, OutputSpec, Scene};
 use std::path::{Path, PathBuf};
@@ -245,6 +246,17 @@ fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Result<T>
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("it is one of {}", names.join(", ")),
     }))
+}
+
+/// The name of a group, or a pattern of such names.
+fn pattern(node: &Node) -> Result<Located<String>> {
+    let name = node.name()?;
+    match Pattern::new(&name.value) {
+        Ok(_) => Ok(name),
+        Err(flaw) => Err(node
+            .refuse(format!("`{}` is no pattern: {flaw}", name.value))
+            .help("`*` is any text, `?` one character, `[0-9]` one of some")),
+    }
 }
 
 fn preset(node: &Node) -> Result<Preset> {

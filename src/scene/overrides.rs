@@ -1,7 +1,7 @@
 //! `--set KEY=VALUE`, and options that are short for it: replaces any value of the scene before it is checked.
 //!
-//! KEY is a dotted path in which items of lists are numbered from 0 (`contact.0.layer.power.a`). VALUE is TOML, or a
-//! bare text. What is replaced then stands in the words of the option, so later refusals point there.
+//! KEY is a dotted path in which items of lists are numbered from 0 (`contact.0.layer.power.a`), and tables with a name go by it, too
+//! (`body.upper.order`). VALUE is TOML, or a bare text. What is replaced then stands in the words of the option, so later refusals point there.
 
 use super::read::{self, Entry, Node, Value};
 use crate::error::{Error, Kind, Place, Result, Source};
@@ -14,6 +14,9 @@ const SHORT: [(&str, &str); 3] =
 
 /// Options without a value, which set a key to true.
 const FLAGS: [(&str, &str); 3] = [("--estimate", "estimate"), ("--vtu", "output.vtu"), ("--trust-geo", "trust_geo")];
+
+/// Names that a refusal lists at most.
+const NAMES: usize = 12;
 
 /// Applies one override to the tree of a scene: `KEY=VALUE`, or an option with its value as typed (`--over KEY=VALUE`,
 /// `--tolerance 1e-3`, `--vtu`).
@@ -57,7 +60,7 @@ fn set(tree: &mut Node, source: &Arc<Source>, start: usize) -> Result<()> {
     let path = segments(text, start..equals);
     for span in &path {
         let key = &text[span.clone()];
-        if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
+        if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || "_-*?[]!".contains(c)) {
             return Err(Error::scene(&at(start..equals), "this is not a key of the scene")
                 .help("a key is names and numbers joined by points: body.1.young"));
         }
@@ -126,7 +129,19 @@ fn descend<'a>(node: &'a mut Node, key: &Key<'_>, parent: &str, indexed: bool) -
                 }
             };
             if !is_number(key.name) {
-                return Err(refuse(format!("`{parent}` is a list of {count}; `{}` is no number", key.name)));
+                let mut named = (0..items.len()).filter(|&item| items[item].name_in() == Some(key.name));
+                return match named.next() {
+                    Some(item) => Ok(&mut items[item]),
+                    None => {
+                        let error = refuse(format!("`{parent}` is a list of {count}; `{}` is no number", key.name));
+                        let names: Vec<&str> = items.iter().filter_map(Node::name_in).take(NAMES).collect();
+                        Err(if names.is_empty() {
+                            error
+                        } else {
+                            error.help(format!("their names: {}", names.join(", ")))
+                        })
+                    }
+                };
             }
             match key.name.parse::<usize>() {
                 Ok(index) if index < items.len() => Ok(&mut items[index]),

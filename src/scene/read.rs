@@ -140,6 +140,12 @@ impl Node {
         matches!(&self.value, Value::Table(entries) if entries.iter().any(|entry| entry.key == key))
     }
 
+    /// The name of a table that has one.
+    pub fn name_in(&self) -> Option<&str> {
+        let Value::Table(entries) = &self.value else { return None };
+        entries.iter().find(|entry| entry.key == "name").and_then(|entry| entry.node.string().ok())
+    }
+
     pub fn string(&self) -> Result<&str> {
         match &self.value {
             Value::String(text) => Ok(text),

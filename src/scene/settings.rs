@@ -33,9 +33,15 @@ impl Scene {
             let mut map = contact(&auto.contact);
             map["between"] = json!("auto");
             map["distance"] = json!(auto.distance);
-            map
+            if let Some(of) = &auto.of {
+                map["of"] = of.iter().map(|name| json!(name.value)).collect();
+            }
+            (auto.contact.table, map)
         });
-        settings.insert("contact".into(), self.contacts.iter().map(contact).chain(auto).collect());
+        let named = self.contacts.iter().map(|spec| (spec.table, contact(spec)));
+        let mut contacts: Vec<_> = named.chain(auto).collect();
+        contacts.sort_by_key(|(table, _)| *table);
+        settings.insert("contact".into(), contacts.into_iter().map(|(_, map)| map).collect());
         settings.insert("method".into(), method(&self.method));
         settings.insert("solver".into(), solver(&self.solver));
         settings.insert("estimate".into(), json!(self.estimate));

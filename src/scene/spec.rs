@@ -22,12 +22,12 @@ pub struct Scene {
     pub plane: Plane,
     /// Where the mesh comes from.
     pub mesh: MeshSource,
-    /// The bodies, in the order of the file.
+    /// The tables of bodies, in the order of the file; the name of one may be a pattern, and so may those of groups.
     pub bodies: Vec<BodySpec>,
     /// The pairs of contact surfaces, in the order of the file.
     pub contacts: Vec<ContactSpec>,
-    /// Pairs to be found on the mesh, if the scene asks for that.
-    pub auto: Option<AutoContact>,
+    /// Rules for pairs to be found on the mesh, in the order of the file.
+    pub auto: Vec<AutoContact>,
     /// The outer iteration.
     pub method: MethodSpec,
     /// The inner solver.

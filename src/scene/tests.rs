@@ -129,6 +129,7 @@ fn overrides_replace_and_add() {
         GROOVE,
         &[
             "body.1.young=1e5",
+            "body.upper.order=2",
             "body.1.load.0.traction=[1, 2]",
             "contact.0.layer = {linear={stiffness=1}}",
             "contact.0.gap=1e-4 * x",
@@ -149,6 +150,7 @@ fn overrides_replace_and_add() {
     )
     .unwrap();
     assert_eq!(isotropic(&scene.bodies[1]).0, 1e5);
+    assert_eq!([0, 1].map(|body| scene.bodies[body].order), [Order::P1, Order::P2]);
     assert_eq!(scene.bodies[1].elasticity.place.source.name, "--set");
     let LoadKind::Traction(traction) = &scene.bodies[1].load[0].kind else { panic!() };
     assert_eq!(traction[1].eval([0.0; 3]), 2.0);
@@ -172,10 +174,24 @@ fn overrides_replace_and_add() {
 /// The echo, written as a scene again, gives the same echo: nothing is lost and no key is misspelt.
 #[test]
 fn settings_are_a_scene() {
-    let scene = load_text(GROOVE, &["solver=hypre", "output.dir=out", "contact.0.reference=x"]).unwrap();
+    // tables and rules for many bodies are echoed as they are, in their order
+    let rule = |key: &str| {
+        format!("[[contact]]\nbetween = 'auto'\ndistance = 1\n{key}\nlayer = {{ linear = {{ stiffness = 1 }} }}\n")
+    };
+    let rules = ["of = ['u*', 'l?w*']", ""].map(rule).concat();
+    let text = GROOVE.replacen("[[contact]]", &(rules + "[[contact]]"), 1).replace("\"lower_end\"", "\"{body}_e*\"");
+    let overrides = ["solver=hypre", "output.dir=out", "contact.2.reference=x", "body.upper.name=u*"];
+    let scene = load_text(&text, &overrides).unwrap();
     let settings = scene.settings();
+    assert_eq!(
+        (&settings["body"][1]["name"], &settings["body"][0]["fix"][1]["on"]),
+        (&"u*".into(), &"{body}_e*".into())
+    );
+    let of = [0, 1, 2].map(|table| settings["contact"][table]["of"].clone());
+    assert_eq!(of, [serde_json::json!(["u*", "l?w*"]), serde_json::Value::Null, serde_json::Value::Null]);
+    assert_eq!(settings["contact"][2]["between"][0], "lower_top");
     assert_eq!(settings["method"]["stop"], serde_json::json!({ "increment": 1e-3, "iterations": 2000 }));
-    assert_eq!(settings["contact"][0]["gap"], "5e-4 * max(0, 1 - (x - 4)^2)^1.5");
+    assert_eq!(settings["contact"][2]["gap"], "5e-4 * max(0, 1 - (x - 4)^2)^1.5");
     assert_eq!(settings["body"][1]["order"], 1);
     assert_eq!(settings["body"][1]["load"][0]["traction"], serde_json::json!(["2*x", -10.0]));
     let mut again = settings.clone();

@@ -110,7 +110,7 @@ impl CondensedBody {
             lifting,
             carried: Vec::new(),
         };
-        let dense = move |stiffness: &Csr| Ok(Dense::new(retained, stiffness.values.clone()));
+        let dense = move |stiffness: Csr| Ok(Dense::new(retained, stiffness.values));
         let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, dense, String::new());
         Ok(Condensed { kept: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
     }

@@ -41,17 +41,11 @@ impl Krylov {
         session: &Session,
         body: &str,
         dimension: usize,
-        stiffness: &Csr,
+        stiffness: Csr,
         near_null_space: &[Vec<f64>],
     ) -> Result<Self> {
-        let pattern = |part: &[i32]| part.iter().map(|&i| Int::from(i)).collect();
-        let mut matrix = Matrix::from_csr(
-            session,
-            dimension,
-            pattern(&stiffness.ptr),
-            pattern(&stiffness.col),
-            stiffness.values.clone(),
-        )?;
+        let Csr { ptr, col, values, .. } = stiffness;
+        let mut matrix = Matrix::from_csr(session, dimension, integers(ptr), integers(col), values)?;
         matrix.set_spd()?;
         let mut ksp = Ksp::new(session, &format!("{body}_"))?;
         ksp.set_operator(&matrix)?;
@@ -64,6 +58,12 @@ impl Krylov {
         let free = ksp.ksp_type() != "preonly" && options::typed(session, body, "ksp_rtol").is_none();
         Ok(Self { matrix, ksp, free, changed: true, set_ups: 0, multigrid, keeps, stale: true, fresh: None })
     }
+}
+
+/// A pattern in PETSc's integers; where these have 32 bits, the array itself.
+#[allow(clippy::useless_conversion)]
+fn integers(part: Vec<i32>) -> Vec<Int> {
+    part.into_iter().map(Int::from).collect()
 }
 
 impl InnerSolver for Krylov {

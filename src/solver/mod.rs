@@ -1,9 +1,10 @@
 //! Inner solvers: how a body solves G z = r.
 //!
-//! [`SparseBody`] owns K, f and B and answers the verbs of [`Body`](crate::model::Body); an [`InnerSolver`] owns G. A new
-//! way to solve is a new file with that trait. [`CondensedBody`] is such a body whose dofs are those of its contact.
+//! [`SparseBody`] owns K, f and B and answers the verbs of [`Body`](crate::model::Body); a [`RobinMatrix`] is G, by an
+//! [`InnerSolver`]. A new way to solve is a new file with that trait. [`CondensedBody`] is such a body whose dofs are those of its contact.
 
 mod condensed;
+pub mod cost;
 pub mod dense;
 pub mod krylov;
 pub mod memory;
@@ -11,6 +12,7 @@ pub mod monolithic;
 pub mod options;
 pub mod preset;
 mod retained;
+mod robin;
 mod sparse;
 mod split;
 
@@ -19,6 +21,7 @@ pub use dense::Dense;
 pub use krylov::Krylov;
 pub use monolithic::{Monolithic, Union};
 pub use retained::Retained;
+pub use robin::RobinMatrix;
 pub use sparse::SparseBody;
 pub use split::Split;
 

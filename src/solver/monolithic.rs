@@ -3,12 +3,12 @@
 //! With whole bodies it is the reference for methods that decompose: same functional, one big sparse factorisation. With
 //! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. One rank.
 
-use super::{InnerSolver, SparseBody};
+use super::{InnerSolver, RobinMatrix};
 use crate::error::Result;
-use crate::fem::ElasticBody;
-use crate::linalg::{Csr, axpy, dot};
+use crate::linalg::{Csr, axpy, countable, dot};
 use crate::model::linear::{Failure, LinearStep, Solution, Solved, System};
-use crate::model::{Body, BodyCounts, Field, Model};
+use crate::model::{BodyCounts, Field, Model};
+use std::collections::HashMap;
 
 /// Stiffness matrices side by side and the rows that couple them, on the states of the bodies.
 ///
@@ -27,9 +27,12 @@ pub struct Union {
 impl Union {
     /// Of the bodies of a model; `None` if one of them has no matrices in this process. Without `rigid` the rigid motions stay
     /// part of v: multigrid wants to see nodes only.
-    pub fn of(model: &Model, rigid: bool) -> Option<Self> {
+    ///
+    /// # Errors
+    /// More entries than 32 bits can count.
+    pub fn of(model: &Model, rigid: bool) -> Result<Option<Self>> {
         let parts = model.bodies.iter().map(|slot| slot.local.as_ref()?.matrices());
-        let mut parts = parts.collect::<Option<Vec<_>>>()?;
+        let Some(mut parts) = parts.collect::<Option<Vec<_>>>() else { return Ok(None) };
         if !rigid {
             parts.iter_mut().for_each(|part| (part.motions, part.traces) = (&[], &[]));
         }
@@ -46,8 +49,8 @@ impl Union {
             }
         }
         let mut rows = Csr::new(n);
-        // entries of K that are to be there, with what is added to K
-        let mut extra: Vec<Vec<(i32, f64)>> = (0..n).map(|i| vec![(i as i32, 0.0)]).collect();
+        // columns that are to be there in a row, besides those of K
+        let mut coupled: HashMap<usize, Vec<i32>> = HashMap::new();
         for sides in &points {
             let mut entries = Vec::new();
             for &(body, row) in sides {
@@ -56,35 +59,54 @@ impl Union {
                 entries.extend(part.rows.row(row).chain(rigid).map(|(i, value)| (offset[body] + i, value)));
             }
             for &(i, _) in &entries {
-                extra[i].extend(entries.iter().map(|&(j, _)| (j as i32, 0.0)));
+                coupled.entry(i).or_default().extend(entries.iter().map(|&(j, _)| j as i32));
             }
             rows.push_row(entries);
         }
-        let mut stiffness = Csr::new(n);
+        for columns in coupled.values_mut() {
+            columns.sort_unstable();
+            columns.dedup();
+        }
+        let known: usize = parts.iter().map(|part| part.stiffness.values.len()).sum();
+        let room = known + coupled.values().map(Vec::len).sum::<usize>();
+        countable("the matrix of all bodies together", room)?;
+        let mut stiffness = Csr { columns: n, ptr: vec![0], ..Csr::default() };
+        stiffness.ptr.reserve_exact(n);
+        stiffness.col.reserve_exact(room);
+        stiffness.values.reserve_exact(room);
         for ((&first, part), slot) in offset.iter().zip(&parts).zip(&model.bodies) {
-            let own = part.stiffness;
-            // of the size that the stiffness had before elimination: what is left of it may be nothing but rounding
-            for dof in pins(part.motions) {
-                extra[first + dof].push(((first + dof) as i32, slot.scale));
-            }
+            let (own, pins) = (part.stiffness, pins(part.motions));
             for i in 0..part.len() {
-                let known = (0..own.rows()).contains(&i).then(|| own.row(i)).into_iter().flatten();
-                let mut entries: Vec<(i32, f64)> = known.map(|(j, value)| ((first + j) as i32, value)).collect();
-                entries.append(&mut extra[first + i]);
-                entries.sort_unstable_by_key(|entry| entry.0);
-                entries.dedup_by(|next, kept| {
-                    let same = next.0 == kept.0;
-                    kept.1 += if same { next.1 } else { 0.0 };
-                    same
-                });
-                for (j, value) in entries {
+                let known = if i < own.rows() { own.range(i) } else { 0..0 };
+                let known = own.col[known.clone()].iter().map(|j| first as i32 + j).zip(&own.values[known]);
+                let mut known = known.peekable();
+                // a rigid motion that no contact row feels has nothing but its diagonal
+                let (coupled, diagonal) = (coupled.remove(&(first + i)), [(first + i) as i32]);
+                for &j in coupled.as_deref().unwrap_or(if i < own.rows() { &[] } else { &diagonal }) {
+                    while let Some((before, value)) = known.next_if(|entry| entry.0 < j) {
+                        stiffness.col.push(before);
+                        stiffness.values.push(*value);
+                    }
                     stiffness.col.push(j);
-                    stiffness.values.push(value);
+                    stiffness.values.push(known.next_if(|entry| entry.0 == j).map_or(0.0, |entry| *entry.1));
+                }
+                for (j, value) in known {
+                    stiffness.col.push(j);
+                    stiffness.values.push(*value);
                 }
                 stiffness.ptr.push(stiffness.col.len() as i32);
             }
+            for pin in pins.into_iter().map(|pin| first + pin) {
+                // of the size that the stiffness had before elimination: what is left of it may be nothing but rounding
+                match stiffness.position(pin, pin) {
+                    Some(at) => stiffness.values[at] += slot.scale,
+                    None => unreachable!("a stiffness matrix has its diagonal"),
+                }
+            }
         }
-        Some(Self { stiffness, rows, offset })
+        stiffness.col.shrink_to_fit();
+        stiffness.values.shrink_to_fit();
+        Ok(Some(Self { stiffness, rows, offset }))
     }
 
     /// The same with all entries of K stored, row by row.
@@ -101,24 +123,19 @@ impl Union {
 
 /// All bodies as one.
 pub struct Monolithic<S> {
-    whole: SparseBody<S>,
+    matrix: RobinMatrix<S>,
+    rows: Csr,
     offset: Vec<usize>,
 }
 
 impl<S: InnerSolver> Monolithic<S> {
-    /// The joined bodies, and what makes a solver of their K.
-    pub fn new(union: Union, make: impl FnOnce(&Csr) -> Result<S> + 'static) -> Self {
-        let n = union.stiffness.rows();
-        let body = ElasticBody {
-            stiffness: union.stiffness,
-            load: vec![0.0; n],
-            prescribed: Vec::new(),
-            lifting: Vec::new(),
-            energy_constant: 0.0,
-            strain_constant: 0.0,
-            carried: Vec::new(),
-        };
-        Self { whole: SparseBody::new(body, union.rows, &[], make, String::new()), offset: union.offset }
+    /// The joined bodies, with the solver that `make` makes of their K.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn new(union: Union, make: impl FnOnce(Csr) -> Result<S>) -> Result<Self> {
+        let Union { stiffness, rows, offset } = union;
+        Ok(Self { matrix: RobinMatrix::new(stiffness, &rows, make)?, rows, offset })
     }
 }
 
@@ -128,18 +145,18 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
     }
 
     fn set_up(&mut self, springs: &[f64]) -> Result<()> {
-        self.whole.robin(springs)?;
-        self.whole.set_up()
+        self.matrix.update(&self.rows, springs)?;
+        self.matrix.set_up()
     }
 
     fn solve(&mut self, system: System) -> Result<Solved> {
         let System { model, springs, residual, reduction, .. } = system;
-        self.whole.precision(reduction)?;
-        self.whole.robin(springs)?;
+        self.matrix.solver_mut().precision(reduction)?;
+        self.matrix.update(&self.rows, springs)?;
         let parts = || self.offset.windows(2).map(|part| part[0]..part[1]);
         let whole: Vec<f64> = parts().zip(residual).flat_map(|(part, r)| &r[..part.len()]).copied().collect();
         let mut x = vec![0.0; whole.len()];
-        if let Some(reason) = self.whole.solve(&whole, &mut x)?.failure {
+        if let Some(reason) = self.matrix.apply(|solver| solver.solve(&whole, &mut x))?.failure {
             return Ok(Err(Failure { body: None, reason }));
         }
         let mut states: Vec<Vec<f64>> = parts().map(|part| x[part].to_vec()).collect();
@@ -152,16 +169,16 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
         let energy: f64 = states.iter().zip(residual).map(|(x, r)| dot(x, r)).sum();
         let mut field = Field { states, trace: vec![0.0; 2 * model.points()] };
         field.retrace(model);
-        let accuracy = self.whole.accuracy();
+        let accuracy = self.matrix.solver().accuracy();
         Ok(Ok(Solution { field, energy, error: accuracy * energy.max(0.0).sqrt(), is_exact: accuracy == 0.0 }))
     }
 
     fn counts(&self) -> BodyCounts {
-        self.whole.counts()
+        self.matrix.counts()
     }
 
     fn describe(&self) -> String {
-        self.whole.describe()
+        self.matrix.solver().describe()
     }
 }
 

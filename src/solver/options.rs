@@ -56,7 +56,9 @@ fn is_plain(name: &str, bodies: &[&str]) -> bool {
 /// The body whose prefix an option has, and the option without it.
 fn body_of<'a, 'b>(name: &'a str, bodies: &[&'b str]) -> Option<(&'b str, &'a str)> {
     let bare = name.trim_start_matches('-');
-    bodies.iter().find_map(|body| Some((*body, bare.strip_prefix(body)?.strip_prefix('_')?)))
+    // of `brick` and `brick_1` the longer one
+    let own = bodies.iter().filter_map(|body| Some((*body, bare.strip_prefix(body)?.strip_prefix('_')?)));
+    own.min_by_key(|(_, rest)| rest.len())
 }
 
 /// Sets an option that nobody typed and remembers why.
@@ -269,7 +271,7 @@ pub fn mark_copies(session: &Session, bodies: &[&str]) -> Result<()> {
 }
 
 /// Why a name cannot be that of a body; `None` for a good one. A body's name begins its options, so it is
-/// `[a-z][a-z0-9]*` and no word that begins options of PETSc.
+/// `[a-z][a-z0-9_]*`, no word that begins options of PETSc, and between two `_` none of a solver inside another.
 ///
 /// ```
 /// use winkler::solver::options::forbidden_body_name;
@@ -278,13 +280,13 @@ pub fn mark_copies(session: &Session, bodies: &[&str]) -> Result<()> {
 /// assert!(forbidden_body_name("mg").is_some_and(|reason| reason.contains("PETSc")));
 /// ```
 pub fn forbidden_body_name(name: &str) -> Option<&'static str> {
-    let letters = name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit());
+    let letters = name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_');
     if !letters || !name.starts_with(|first: char| first.is_ascii_lowercase()) {
         return Some(
-            "it begins the PETSc options of the body, so it has small letters and digits only, a letter first",
+            "it begins the PETSc options of the body, so it has small letters, digits and _ only, a letter first",
         );
     }
-    let family = FAMILIES.iter().any(|family| family.strip_suffix('_') == Some(name));
+    let family = name.split('_').any(|word| FAMILIES.iter().any(|family| family.strip_suffix('_') == Some(word)));
     if family || global::is_global_word(name) || MORE_WORDS.contains(&name) {
         return Some("options of PETSc itself begin with this word");
     }

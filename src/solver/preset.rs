@@ -18,29 +18,22 @@ const HYPRE: [(&str, &str); 7] = [
 ];
 
 /// What differs where the preconditioner is made anew for nearly every solve: four times cheaper to make, twice the iterations.
-const MADE_OFTEN: [(&str, &str); 3] = [
+const MADE_OFTEN: [(&str, &str); 4] = [
     ("pc_hypre_boomeramg_coarsen_type", "HMIS"),
     ("pc_hypre_boomeramg_interp_type", "ext+i"),
     ("pc_hypre_boomeramg_agg_nl", "1"),
+    ("pc_hypre_boomeramg_nodal_coarsen", "6"),
 ];
 
 /// Relative tolerance of an inner Krylov solve: relative to the outer residual, because corrections are solved.
 const TOLERANCE: &str = "1e-6";
 
-/// Dofs of a body in space above which multigrid beats a factorisation.
-const LARGE: usize = 150_000;
-
-/// Retained dofs of a body in space beyond which dense algebra on all contacts together is dearer than multigrid.
-const WIDE: usize = 2000;
-
 /// Retained dofs up to which a dense factorisation costs nothing worth comparing.
 const SMALL: usize = 300;
 
-/// What the choice of a solver depends on.
+/// What the choice of a solver in the plane depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Size {
-    /// Space dimension.
-    pub dimension: usize,
     /// Dofs of the body.
     pub dofs: usize,
     /// Dofs that a condensed body would retain.
@@ -55,40 +48,33 @@ impl Size {
         (1..self.dofs).contains(&self.retained)
     }
 
-    /// Estimated bytes of a solver that factors.
+    /// Estimated bytes of a solver that factors, in the plane.
     pub fn bytes(&self, preset: Preset) -> usize {
         let dense = if preset == Preset::Condensed { memory::of_condensed(self.retained) } else { 0 };
-        memory::of_factor(self.dimension, self.dofs) + dense
+        memory::in_plane(self.dofs) + dense
     }
 }
 
-/// The preset for a body whose scene names none, with the reason.
+/// The preset for a body in the plane whose scene names none, with the reason: there a factorisation costs little, and only
+/// memory speaks against it. In space [`cost`](super::cost) decides.
 ///
 /// ```
-/// use winkler::{problem::solver::Preset, solver::preset::{Size, choose}};
-/// let size = Size { dimension: 3, dofs: 98_000, retained: 1024, memory: 8_000_000_000 };
-/// assert_eq!(choose(&size).0, Preset::Condensed);
-/// // too little memory for a factor, or too many dofs: multigrid
-/// assert_eq!(choose(&Size { memory: 500_000_000, ..size }).0, Preset::Hypre);
-/// assert_eq!(choose(&Size { dofs: 1_000_000, ..size }).0, Preset::Hypre);
-/// // nor is a dense matrix of a wide contact small
-/// assert_eq!(choose(&Size { retained: 5000, ..size }).0, Preset::Hypre);
+/// use winkler::{problem::solver::Preset, solver::preset::{Size, in_plane}};
+/// let size = Size { dofs: 98_000, retained: 1024, memory: 8_000_000_000 };
+/// assert_eq!(in_plane(&size).0, Preset::Condensed);
 /// // a sheet that is nothing but contact has nothing to gain
-/// assert_eq!(choose(&Size { dimension: 2, dofs: 40_000, retained: 20_000, ..size }).0, Preset::Mumps);
+/// assert_eq!(in_plane(&Size { dofs: 40_000, retained: 20_000, ..size }).0, Preset::Mumps);
+/// // too little memory for a factor: multigrid
+/// assert_eq!(in_plane(&Size { memory: 50_000_000, ..size }).0, Preset::Hypre);
 /// ```
-pub fn choose(size: &Size) -> (Preset, String) {
-    let &Size { dimension, dofs, retained, memory } = size;
-    let place = if dimension == 2 { "in the plane" } else { "in space" };
-    let what = format!("{dofs} dofs {place}, {retained} of them on the contact");
+pub fn in_plane(size: &Size) -> (Preset, String) {
+    let &Size { dofs, retained, memory } = size;
+    let what = format!("{dofs} dofs in the plane, {retained} of them on the contact");
     let megabytes = |preset: Preset| size.bytes(preset) / 1_000_000;
     let fits = |preset: Preset| size.bytes(preset) < memory;
     let dense = (retained as f64).powi(3) / 3.0;
-    let pays = retained <= SMALL || dense <= memory::work_of_factor(dimension, dofs);
-    if dimension != 2 && dofs > LARGE {
-        (Preset::Hypre, format!("{what}: too many to factor"))
-    } else if dimension != 2 && retained > WIDE && 2 * retained < dofs {
-        (Preset::Hypre, format!("{what}: too many there for dense algebra"))
-    } else if size.can_condense() && pays && fits(Preset::Condensed) {
+    let pays = retained <= SMALL || dense <= memory::work_in_plane(dofs);
+    if size.can_condense() && pays && fits(Preset::Condensed) {
         (Preset::Condensed, format!("{what}, about {} MB", megabytes(Preset::Condensed)))
     } else if fits(Preset::Mumps) {
         (Preset::Mumps, format!("{what}, about {} MB", megabytes(Preset::Mumps)))

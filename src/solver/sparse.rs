@@ -1,11 +1,10 @@
 //! A body whose state is all its dofs and its rigid motion, and whose G is a sparse matrix.
 
-use super::{InnerSolver, Split};
+use super::{InnerSolver, RobinMatrix, Split};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, dot};
 use crate::model::{Body, BodyCounts, Energy, Matrices, Solved};
-use std::time::Instant;
 
 /// A body with assembled K and f, its contact rows B, and a solver for G = K + B' diag(d) B.
 ///
@@ -14,19 +13,23 @@ pub struct SparseBody<S> {
     body: ElasticBody,
     rows: Csr,
     split: Split,
-    solver: Solver<S>,
-    /// Robin weight of each row that G has now.
-    weight: Vec<f64>,
-    /// Robin weight of each row when G was last far from what its preconditioner was made of.
-    prepared: Vec<f64>,
-    /// b diag(K) b' of each row.
-    row_stiffness: Vec<f64>,
-    coupling: Coupling,
-    counts: BodyCounts,
-    /// Symbolic and numeric factorisations before the counts began.
-    before: (usize, usize),
+    robin: Lazy<S>,
     product: Vec<f64>,
 }
+
+/// G, made when something is first to be solved: a body that is only measured, or joined with others, needs none.
+enum Lazy<S> {
+    Later {
+        /// Makes a solver of K; gone if it failed.
+        make: Option<Maker<S>>,
+        /// What it will be, for reports.
+        words: String,
+    },
+    Now(Box<RobinMatrix<S>>),
+}
+
+/// Makes a solver of K.
+type Maker<S> = Box<dyn FnOnce(Csr) -> Result<S>>;
 
 impl<S: InnerSolver> SparseBody<S> {
     /// Joins a body, its contact rows (columns: its dofs, none of them prescribed) and a solver that `make` makes of K, on a
@@ -35,18 +38,13 @@ impl<S: InnerSolver> SparseBody<S> {
         body: ElasticBody,
         rows: Csr,
         free: &[FreeMotion],
-        make: impl FnOnce(&Csr) -> Result<S> + 'static,
+        make: impl FnOnce(Csr) -> Result<S> + 'static,
         words: String,
     ) -> Self {
-        let solver = Solver::Later { make: Some(Box::new(make)), words };
-        let coupling = Coupling::new(&body.stiffness, &rows);
+        let robin = Lazy::Later { make: Some(Box::new(make)), words };
         let split = Split::new(free, &rows);
-        let weight = vec![0.0; rows.rows()];
-        let prepared = weight.clone();
-        let row_stiffness = body.row_stiffness(&rows);
         let product = vec![0.0; body.load.len()];
-        let (counts, before) = (BodyCounts::default(), (0, 0));
-        Self { body, rows, split, solver, weight, prepared, row_stiffness, coupling, counts, before, product }
+        Self { body, rows, split, robin, product }
     }
 
     /// Displacements of all dofs for a state.
@@ -57,120 +55,34 @@ impl<S: InnerSolver> SparseBody<S> {
     fn dofs(&self) -> usize {
         self.body.load.len()
     }
-}
 
-/// Makes a solver of K.
-type Maker<S> = Box<dyn FnOnce(&Csr) -> Result<S>>;
-
-/// An inner solver, made when it is first needed: a body that is only measured, or joined with others, needs none.
-enum Solver<S> {
-    Later {
-        make: Option<Maker<S>>,
-        /// What it will be, for reports.
-        words: String,
-    },
-    Now(S),
-}
-
-impl<S> Solver<S> {
-    /// The solver, made of K if it is not there.
-    fn of(&mut self, stiffness: &Csr) -> Result<&mut S> {
-        if let Solver::Later { make, .. } = self
+    /// G, made of K if it is not there.
+    fn robin_matrix(&mut self) -> Result<&mut RobinMatrix<S>> {
+        if let Lazy::Later { make, .. } = &mut self.robin
             && let Some(make) = make.take()
         {
-            *self = Solver::Now(make(stiffness)?);
+            let matrix = RobinMatrix::new(self.body.stiffness.clone(), &self.rows, make)?;
+            self.robin = Lazy::Now(Box::new(matrix));
         }
-        match self {
-            Solver::Now(solver) => Ok(solver),
-            Solver::Later { .. } => Err(Error::new(Kind::Solver, "an inner solver could not be made")),
+        match &mut self.robin {
+            Lazy::Now(robin) => Ok(robin),
+            Lazy::Later { .. } => Err(Error::new(Kind::Solver, "an inner solver could not be made")),
+        }
+    }
+
+    /// G, if it was made.
+    fn made(&self) -> Option<&RobinMatrix<S>> {
+        match &self.robin {
+            Lazy::Now(robin) => Some(robin),
+            Lazy::Later { .. } => None,
         }
     }
 
-    /// The solver, if it was made.
-    fn made(&self) -> Option<&S> {
-        match self {
-            Solver::Now(solver) => Some(solver),
-            Solver::Later { .. } => None,
-        }
-    }
-}
-
-/// Where B' diag(d) B goes in the values of G.
-struct Coupling {
-    /// Positions in the values that some row touches, sorted, each once.
-    touched: Vec<u32>,
-    /// (index into `touched`, row, b_i b_j).
-    terms: Vec<(u32, u32, f64)>,
-}
-
-impl Coupling {
-    fn new(pattern: &Csr, rows: &Csr) -> Self {
-        let mut places = Vec::new();
-        for q in 0..rows.rows() {
-            for (i, a) in rows.row(q) {
-                for (j, b) in rows.row(q) {
-                    match pattern.position(i, j) {
-                        Some(position) => places.push((position as u32, q as u32, a * b)),
-                        None => unreachable!("the pattern holds the couplings of every contact row"),
-                    }
-                }
-            }
-        }
-        places.sort_by_key(|place| (place.0, place.1));
-        let mut touched: Vec<u32> = Vec::new();
-        let terms = places
-            .into_iter()
-            .map(|(position, q, product)| {
-                if touched.last() != Some(&position) {
-                    touched.push(position);
-                }
-                (touched.len() as u32 - 1, q, product)
-            })
-            .collect();
-        Self { touched, terms }
-    }
-
-    /// Writes K + B' diag(d) B where it differs from K; the rest of G is K already.
-    fn write(&self, stiffness: &[f64], weight: &[f64], g: &mut [f64]) {
-        for &position in &self.touched {
-            g[position as usize] = stiffness[position as usize];
-        }
-        for &(slot, q, product) in &self.terms {
-            g[self.touched[slot as usize] as usize] += weight[q as usize] * product;
-        }
-    }
-}
-
-/// Growth of the stiffness under a contact point, either way, beyond which a preconditioner is poor.
-const FAR: f64 = 3.0;
-
-/// One row in so many may be far: each is an eigenvalue apart from the others, and costs conjugate gradients about one step.
-const FEW: usize = 64;
-
-/// Whether Robin terms `old` and `new` change the stiffness under too many contact rows by more than [`FAR`]. The eigenvalues of
-/// G_old^-1 G_new lie between the least and the largest ratio of the weights; where the body is stiff beside the Robin term
-/// they do not come near that, and only the sum of both counts.
-fn is_far(rows: &Csr, row_stiffness: &[f64], old: &[f64], new: &[f64]) -> bool {
-    let far = |q: &usize| {
-        let square: f64 = rows.row(*q).map(|(_, b)| b * b).sum();
-        let (before, after) =
-            (row_stiffness[*q] + old[*q] * square * square, row_stiffness[*q] + new[*q] * square * square);
-        after > FAR * before || before > FAR * after
-    };
-    (0..rows.rows()).filter(far).nth(rows.rows() / FEW).is_some()
-}
-
-impl<S: InnerSolver> SparseBody<S> {
-    /// One solve, or one application of the preconditioner, counted and timed apart from the set-up it may need.
+    /// One solve, or one application of the preconditioner.
     fn apply(&mut self, z: &mut [f64], solve: impl FnOnce(&mut S, &mut [f64]) -> Result<Solved>) -> Result<Solved> {
-        self.set_up()?;
-        self.counts.solves += 1;
-        let began = Instant::now();
-        let solver = self.solver.of(&self.body.stiffness)?;
-        let solved = solve(solver, &mut z[..self.body.load.len()])?;
-        self.counts.solve_seconds += began.elapsed().as_secs_f64();
-        self.counts.inner_iterations += solved.iterations;
-        z[self.body.load.len()..].fill(0.0);
+        let n = self.dofs();
+        let solved = self.robin_matrix()?.apply(|solver| solve(solver, &mut z[..n]))?;
+        z[n..].fill(0.0);
         self.split.separate(z);
         Ok(solved)
     }
@@ -227,33 +139,19 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn robin(&mut self, weight: &[f64]) -> Result<()> {
-        if weight == self.weight {
-            self.counts.robin_skipped += 1;
-            return Ok(());
+        self.robin_matrix()?;
+        match &mut self.robin {
+            Lazy::Now(robin) => robin.update(&self.rows, weight),
+            Lazy::Later { .. } => Ok(()),
         }
-        self.weight.copy_from_slice(weight);
-        self.counts.robin_updates += 1;
-        let (coupling, stiffness) = (&self.coupling, &self.body.stiffness.values);
-        let far = is_far(&self.rows, &self.row_stiffness, &self.prepared, weight);
-        if far {
-            self.prepared.copy_from_slice(weight);
-        }
-        self.solver.of(&self.body.stiffness)?.update(&mut |g| coupling.write(stiffness, weight, g), far)
     }
 
     fn set_up(&mut self) -> Result<()> {
-        let began = Instant::now();
-        let done = self.solver.of(&self.body.stiffness).and_then(InnerSolver::set_up);
-        let seconds = began.elapsed().as_secs_f64();
-        self.counts.factor_seconds += seconds;
-        if self.counts.first_seconds == 0.0 {
-            self.counts.first_seconds = seconds;
-        }
-        done
+        self.robin_matrix()?.set_up()
     }
 
     fn precision(&mut self, rtol: f64) -> Result<bool> {
-        self.solver.of(&self.body.stiffness)?.precision(rtol)
+        self.robin_matrix()?.solver_mut().precision(rtol)
     }
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
@@ -262,7 +160,7 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn accuracy(&self) -> f64 {
-        self.solver.made().map_or(1.0, InnerSolver::accuracy)
+        self.made().map_or(1.0, |robin| robin.solver().accuracy())
     }
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
@@ -294,18 +192,13 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn counts(&self) -> BodyCounts {
-        let Some(solver) = self.solver.made() else { return self.counts };
-        let (symbolic, factorizations) = solver.factorizations();
-        let (symbolic, factorizations) = (symbolic - self.before.0, factorizations - self.before.1);
-        if solver.is_dense() {
-            return BodyCounts { dense_factorizations: factorizations, ..self.counts };
-        }
-        BodyCounts { symbolic, factorizations, ..self.counts }
+        self.made().map_or_else(BodyCounts::default, |robin| robin.counts())
     }
 
     fn begin_anew(&mut self) {
-        self.before = self.solver.made().map_or((0, 0), InnerSolver::factorizations);
-        self.counts = BodyCounts::default();
+        if let Lazy::Now(robin) = &mut self.robin {
+            robin.begin_anew();
+        }
     }
 
     fn matrices(&self) -> Option<Matrices<'_>> {
@@ -330,9 +223,9 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn describe(&self) -> String {
-        match &self.solver {
-            Solver::Now(solver) => solver.describe(),
-            Solver::Later { words, .. } => words.clone(),
+        match &self.robin {
+            Lazy::Now(robin) => robin.solver().describe(),
+            Lazy::Later { words, .. } => words.clone(),
         }
     }
 }

@@ -1,25 +1,10 @@
 //! A roller bearing: twelve and more bodies that only contact and soft springs hold.
 
-use super::{case, close, solve};
-use crate::common::{Run, Scene, root};
-use std::fs;
-use std::process::Command;
+use super::{close, solved};
+use crate::common::Run;
 
 /// Total load, on the inner ring.
 const LOAD: f64 = 300.0;
-
-/// The scene that `scripts/bearing` prints.
-fn made(rollers: usize) -> String {
-    let output =
-        Command::new(root().join("scripts/bearing")).arg(rollers.to_string()).output().expect("the script runs");
-    String::from_utf8(output.stdout).expect("text")
-}
-
-/// The same as a scene of its own, with one kind of value replaced and coarser meshes.
-fn varied(rollers: usize, from: &str, to: &str) -> Scene {
-    let folder = root().join("meshes/bearing");
-    Scene::new(made(rollers).replace("geo = \"", &format!("geo = \"{}/", folder.display())).replace(from, to))
-}
 
 /// What the inner ring presses on each roller, whose forces on the ring must add up to the load.
 fn carried(run: &Run, rollers: usize) -> Vec<f64> {
@@ -56,8 +41,7 @@ fn rigid(rollers: usize, clearance: f64, stiffness: f64) -> Vec<f64> {
 /// open, and near Stribeck's share for the most loaded one.
 #[test]
 fn by_default() {
-    assert_eq!(fs::read_to_string(case("bearing")).expect("the scene"), made(12), "run scripts/bearing 12 again");
-    let run = solve(case("bearing"), &["--set", "mesh.set.n=4"]).converged();
+    let run = solved("bearing", &["mesh.set.n=4"]);
     let forces = carried(&run, 12);
     assert!(forces[4..9].iter().all(|&force| force == 0.0), "{forces:?}");
     assert!(forces[..3].iter().all(|&force| force > 20.0), "{forces:?}");
@@ -72,8 +56,8 @@ fn by_default() {
 /// Rings and rollers that are stiff against the layer share the load as in closed form.
 #[test]
 fn stiff_rings() {
-    let scene = varied(12, "young = 2.1e5", "young = 2.1e8");
-    let run = solve(&scene, &["--set", "mesh.set.n=8"]).converged();
+    let young = ["inner", "outer", "roller*"].map(|name| format!("body.{name}.young=2.1e8"));
+    let run = solved("bearing", &young.each_ref().map(String::as_str));
     let forces = carried(&run, 12);
     for (k, exact) in rigid(12, 0.01, 2.5e4).into_iter().enumerate() {
         assert!((forces[k] - exact).abs() < 0.005 * forces[0], "roller {k}: {}, closed form {exact}", forces[k]);
@@ -83,8 +67,7 @@ fn stiff_rings() {
 /// Another number of rollers, none of them at the bottom.
 #[test]
 fn turned() {
-    let scene = varied(16, "turn = 0", "turn = 0.5");
-    let run = solve(&scene, &["--set", "mesh.set.n=4"]).converged();
+    let run = solved("bearing", &["mesh.set.rollers=16", "mesh.set.turn=0.5", "mesh.set.n=4"]);
     let forces = carried(&run, 16);
     close("the two lowest", forces[0], forces[15], 1e-3);
     assert!(forces[0] > forces[1] && forces[1] > forces[2], "{forces:?}");

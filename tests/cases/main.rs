@@ -8,6 +8,7 @@ mod flange;
 mod hertz;
 mod ring;
 mod spheres;
+mod walls;
 mod westergaard;
 
 use common::{Run, case, solve};

@@ -33,7 +33,7 @@ impl References {
             return Err(usage("`--against` goes with one scene"));
         };
         let found = if path.is_dir() { tables(path)? } else { vec![Points::read(path)?] };
-        if found.len() != scene.contacts.len() {
+        if scene.auto.is_empty() && found.len() != scene.contacts.len() {
             let help = "give the folder of results of the same scene, or the table of its only pair";
             let message = format!(
                 "{} has {} contact tables, the scene {} pairs",

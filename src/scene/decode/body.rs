@@ -1,25 +1,17 @@
 //! `[[body]]`: supports, loads.
 
-use super::{Decoder, elasticity};
+use super::{Decoder, elasticity, pattern};
 use crate::error::{Error, Located, Result};
 use crate::expression::Field;
-use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Support};
+use crate::problem::body::{BodySpec, Load, LoadKind, SPELLING, SpringKind, SpringSpec, Support, fault, is_in_name};
 use crate::problem::elasticity::Plane;
 use crate::problem::order::Order;
+use crate::problem::pattern::is_pattern;
 use crate::scene::read::{Keys, Node, Value};
 use std::collections::HashSet;
 
 /// Names of components, for supports.
 const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// Whether PETSc options start with this word, so that a body of this name could not have options of its own.
-fn reserved(name: &str) -> bool {
-    const WORDS: &[&str] = &[
-        "ksp", "pc", "mat", "vec", "sub", "mg", "snes", "ts", "tao", "dm", "is", "log", "options", "help", "malloc",
-        "info", "on", "fp", "newton",
-    ];
-    WORDS.contains(&name)
-}
 
 impl Decoder<'_> {
     /// The bodies: at least one, with different names.
@@ -68,7 +60,7 @@ impl Decoder<'_> {
             keys.exclude(axis, "symmetry")?;
         }
         keys.exclude("normal", "symmetry")?;
-        let on = keys.require("on")?.name()?;
+        let on = pattern(keys.require("on")?)?;
         if let (2, Some(entry)) = (self.dimension, keys.entry("z")) {
             return Err(Error::scene(&entry.key_place, "a support in `z` in a plane problem")
                 .label("there is no z")
@@ -94,7 +86,7 @@ impl Decoder<'_> {
 
     fn spring(&self, node: &Node) -> Result<SpringSpec> {
         let keys = Keys::open(node, "a spring", &["on", "stiffness", "normal"])?;
-        let on = keys.require("on")?.name()?;
+        let on = pattern(keys.require("on")?)?;
         keys.exclude("stiffness", "normal")?;
         let kind = match (keys.get("stiffness"), keys.get("normal")) {
             (Some(node), _) if matches!(node.value, Value::List(_)) => {
@@ -122,7 +114,7 @@ impl Decoder<'_> {
 
     fn load(&self, node: &Node) -> Result<Load> {
         let keys = Keys::open(node, "a load", &["on", "pressure", "traction", "force", "rigid"])?;
-        let on = keys.require("on")?.name()?;
+        let on = pattern(keys.require("on")?)?;
         for (one, other) in [("pressure", "traction"), ("pressure", "force"), ("traction", "force")] {
             keys.exclude(one, other)?;
         }
@@ -175,21 +167,16 @@ impl Decoder<'_> {
     }
 }
 
-fn name(node: &Node) -> Result<Located<String>> {
-    let name = node.name()?;
-    let word = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
-    if !name.value.starts_with(|c: char| c.is_ascii_lowercase()) || !name.value.chars().all(word) {
-        return Err(node
-            .refuse(format!("`{}` cannot be the name of a body", name.value))
-            .help("it is a prefix of PETSc options: a small letter, then small letters and digits"));
-    }
-    if reserved(&name.value) {
-        return Err(node
-            .refuse(format!("`{}` cannot be the name of a body", name.value))
-            .label("a word of PETSc's own options")
-            .help("choose another name, also for the physical group in the mesh"));
-    }
-    Ok(name)
+/// The name of a body, or a pattern of such names.
+pub(super) fn name(node: &Node) -> Result<Located<String>> {
+    let name = pattern(node)?;
+    let fault = match is_pattern(&name.value) {
+        true => name.value.chars().any(|c| !is_in_name(c) && !"*?[]!-".contains(c)).then_some(SPELLING),
+        false => fault(&name.value),
+    };
+    fault.map_or(Ok(name.clone()), |[label, help]| {
+        Err(node.refuse(format!("`{}` cannot be the name of a body", name.value)).label(label).help(help))
+    })
 }
 
 fn order(node: &Node) -> Result<Order> {

@@ -49,7 +49,7 @@ impl Decoder<'_> {
         let items = list.list().map_err(|error| error.help("a region starts with the line [[body.region]]"))?;
         let region = |node: &Node| {
             let keys = Keys::open(node, "[[body.region]]", &[&["on"], &KEYS[..]].concat())?;
-            Ok(RegionSpec { on: keys.require("on")?.name()?, elasticity: self.elasticity(&keys)? })
+            Ok(RegionSpec { on: super::pattern(keys.require("on")?)?, elasticity: self.elasticity(&keys)? })
         };
         items.iter().map(region).collect()
     }

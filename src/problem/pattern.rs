@@ -1,0 +1,80 @@
+//! Names of bodies and groups, and patterns that stand for many of them, as shells have them.
+
+use glob::Pattern as Glob;
+
+/// What stands for the name of the body in the names of its groups.
+pub const BODY: &str = "{body}";
+
+/// Whether a name is a pattern: `*` is any text, `?` one character, `[0-9]` one of some.
+pub fn is_pattern(name: &str) -> bool {
+    name.contains(['*', '?']) || name.find('[').is_some_and(|open| name[open..].contains(']'))
+}
+
+/// A name, or a pattern of names.
+#[derive(Debug, Clone)]
+pub struct Pattern<'a> {
+    text: &'a str,
+    /// None of a plain name.
+    glob: Option<Glob>,
+}
+
+/// How narrow a pattern is, the narrowest last: plain names, then characters that stand for themselves, `[ ]`, `?`.
+pub type Rank = [usize; 4];
+
+impl<'a> Pattern<'a> {
+    /// Reads a name or a pattern.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    pub fn new(text: &'a str) -> Result<Self, &'static str> {
+        let glob = if is_pattern(text) { Some(Glob::new(text).map_err(|error| error.msg)?) } else { None };
+        Ok(Self { text, glob })
+    }
+
+    /// Whether a name is this one to the letter, or one of the pattern.
+    pub fn matches(&self, name: &str) -> bool {
+        self.text == name || self.glob.as_ref().is_some_and(|glob| glob.matches(name))
+    }
+
+    /// Whether it stands for many names.
+    pub fn is_plural(&self) -> bool {
+        self.glob.is_some()
+    }
+
+    /// How narrow it is.
+    pub fn rank(&self) -> Rank {
+        if self.glob.is_none() {
+            return [1, self.text.len(), 0, 0];
+        }
+        let (mut rank, mut rest) = ([0; 4], self.text);
+        while let Some(first) = rest.chars().next() {
+            let class = if first == '[' { rest.find(']') } else { None };
+            match (first, class) {
+                (_, Some(_)) => rank[2] += 1,
+                ('*', _) => {}
+                ('?', _) => rank[3] += 1,
+                _ => rank[1] += 1,
+            }
+            rest = &rest[class.map_or(first.len_utf8(), |end| end + 1)..];
+        }
+        rank
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns_match_and_rank() {
+        let pattern = |text| Pattern::new(text).unwrap();
+        assert!(pattern("brick_*").matches("brick_17") && !pattern("brick_*").matches("block_17"));
+        assert!(pattern("b[0-9]").matches("b7") && pattern("b?").matches("bx") && !pattern("b?").matches("b17"));
+        assert!(pattern("a[b").matches("a[b") && !pattern("a[b").is_plural(), "an open bracket is a plain character");
+        assert!(pattern("a[1]").matches("a[1]") && pattern("a[1]").matches("a1"), "groups may be called so");
+        let narrower = ["*", "b*", "b?*", "b[0-9]*", "br*", "brick_*", "*_brick_1", "b1"];
+        let ranks = narrower.map(|text| pattern(text).rank());
+        assert!(ranks.is_sorted() && ranks.windows(2).all(|two| two[0] < two[1]), "{ranks:?}");
+        assert!(Pattern::new("a**b").is_err());
+    }
+}

@@ -1,0 +1,185 @@
+//! What inner solvers cost: the choice between a factorisation and multigrid for bodies in space.
+//!
+//! A factorisation is counted before it is made ([`linalg::factorisation`](crate::linalg::factorisation)), multigrid goes with the
+//! entries of K. The rates were measured on one machine, and only their ratio decides: docs/solvers.md has both on
+//! fifteen scenes against the choice.
+
+use super::Retained;
+use crate::error::Result;
+use crate::linalg::factorisation;
+use crate::petsc::nested_dissection;
+
+/// Operations in a second of one core: factorisations of cubes of 15 000 to 108 000 dofs, and dense ones of 4000 rows.
+const RATE: f64 = 1.1e10;
+
+/// Seconds of multigrid for an entry of K, from its set-up to the last of Newton's steps: P1 and P2, 30 000 to 10^6 dofs.
+const MULTIGRID: f64 = 1.5e-6;
+
+/// How many times as long multigrid takes where each body is solved by itself, in every sweep.
+const SWEPT: f64 = 4.0;
+
+/// Dense factorisations of all contacts together: Newton's steps of a common scene.
+const STEPS: f64 = 5.0;
+
+/// Bytes of multigrid for an entry of K: K and G, hypre's copy of G, and half as much for its levels.
+const LEVELS: f64 = 42.0;
+
+/// What MUMPS takes over the entries of its factor: fronts that wait, and what it sets aside for pivots.
+const FRONTS: f64 = 1.2;
+
+/// A body in space, before it is assembled.
+pub struct Candidate<'a> {
+    /// Its dofs.
+    pub dofs: usize,
+    /// Those that it retains if it is condensed; none where every factorisation is of the whole body.
+    pub retained: Option<&'a Retained>,
+    /// Which of its nodes K couples: row i is `col[ptr[i]..ptr[i + 1]]`, with i itself.
+    pub ptr: &'a [u32],
+    /// See `ptr`.
+    pub col: &'a [u32],
+}
+
+/// Seconds of one core and bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Cost {
+    /// Seconds; rather a measure than a forecast, since machines differ.
+    pub seconds: f64,
+    /// Bytes at its peak.
+    pub bytes: f64,
+}
+
+impl Cost {
+    /// In words.
+    pub fn words(&self) -> String {
+        let megabytes = self.bytes / 1e6;
+        let digits = |value: f64| if value < 10.0 { format!("{value:.1}") } else { format!("{value:.0}") };
+        format!("{} s and {} MB", digits(self.seconds), digits(megabytes))
+    }
+}
+
+/// A choice for some bodies in space.
+pub struct Comparison {
+    /// Condensed, or factored where nothing can be condensed.
+    pub direct: Cost,
+    /// Conjugate gradients with multigrid.
+    pub multigrid: Cost,
+}
+
+impl Comparison {
+    /// Whether the factorisation is the better of the two, and fits into `memory` bytes.
+    pub fn is_direct(&self, memory: usize) -> bool {
+        self.direct.seconds <= self.multigrid.seconds && self.direct.bytes <= memory as f64
+    }
+}
+
+/// Compares both ways to solve for these bodies; `joined` if Newton's method has one matrix of all of them.
+///
+/// The order of elimination is asked for only where the answer depends on it: no body needs more operations than a cube of as
+/// many dofs, and the dense algebra on the contact is known.
+pub fn compare(bodies: &[Candidate], joined: bool) -> Comparison {
+    let entries: f64 = bodies.iter().map(|body| 9.0 * body.col.len() as f64).sum();
+    let multigrid = Cost { seconds: MULTIGRID * entries * if joined { 1.0 } else { SWEPT }, bytes: LEVELS * entries };
+    let retained = bodies.iter().map(|body| body.retained.map_or(0, |retained| retained.dofs.len()));
+    let retained = if joined { retained.sum() } else { retained.max().unwrap_or(0) } as f64;
+    let dense = Cost { seconds: STEPS * retained.powi(3) / 3.0 / RATE, bytes: 36.0 * retained * retained };
+    let mut direct = bodies.iter().fold(dense, |sum, body| sum.and(of_cube(body)));
+    let known = dense.seconds > multigrid.seconds || direct.seconds <= multigrid.seconds;
+    if !known {
+        // without METIS there is no better answer
+        direct = bodies.iter().fold(dense, |sum, body| sum.and(analysed(body).unwrap_or(of_cube(body))));
+    }
+    Comparison { direct, multigrid }
+}
+
+impl Cost {
+    fn and(self, other: Cost) -> Cost {
+        Cost { seconds: self.seconds + other.seconds, bytes: self.bytes + other.bytes }
+    }
+}
+
+impl Candidate<'_> {
+    /// How often it is factored.
+    fn times(&self) -> f64 {
+        if self.retained.is_some() { 1.0 } else { STEPS }
+    }
+}
+
+/// At most: nested dissection of a cube, measured on blocks of 32 000 to 500 000 dofs.
+fn of_cube(body: &Candidate) -> Cost {
+    let n = body.dofs as f64;
+    Cost { seconds: body.times() * 19.0 * n * n / RATE, bytes: 220.0 * n.powf(4.0 / 3.0) }
+}
+
+/// By the symbolic factorisation of the nodes.
+fn analysed(body: &Candidate) -> Result<Cost> {
+    let &Candidate { ptr, col, .. } = body;
+    let nodes = ptr.len() - 1;
+    let mut neighbours = vec![0];
+    let mut others = Vec::with_capacity(col.len() - nodes);
+    for node in 0..nodes {
+        let row = &col[ptr[node] as usize..ptr[node + 1] as usize];
+        others.extend(row.iter().filter(|other| **other as usize != node).map(|&other| other as i32));
+        neighbours.push(others.len() as i32);
+    }
+    let position = nested_dissection(&mut neighbours, &mut others)?;
+    let mut weight = vec![3; nodes];
+    body.retained.into_iter().flat_map(|retained| &retained.dofs).for_each(|dof| weight[dof / 3] -= 1);
+    let stays = (0..nodes).map(|node| (node, 3 - weight[node])).filter(|stay| stay.1 > 0);
+    let work = factorisation(ptr, col, &position, &weight, &stays.collect::<Vec<_>>());
+    Ok(Cost { seconds: body.times() * work.operations / RATE, bytes: 8.0 * FRONTS * work.entries })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::Csr;
+
+    /// Nodes of a box with bricks as cells, and contact along z on those with z = 0.
+    fn body([x, y, z]: [usize; 3]) -> (Vec<u32>, Vec<u32>, Retained) {
+        let (mut ptr, mut col, mut rows) = (vec![0], Vec::new(), Csr::new(3 * x * y * z));
+        let range = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
+        for (i, j, k) in (0..x * y * z).map(|node| (node % x, node / x % y, node / x / y)) {
+            for (k, j) in range(k, z).flat_map(|k| range(j, y).map(move |j| (k, j))) {
+                col.extend(range(i, x).map(|i| (i + x * (j + y * k)) as u32));
+            }
+            ptr.push(col.len() as u32);
+            if k == 0 {
+                rows.push_row([(3 * (i + x * (j + y * k)) + 2, 1.0)]);
+            }
+        }
+        (ptr, col, Retained::new(3, &rows, &[], &[]))
+    }
+
+    fn of(sizes: &[[usize; 3]], joined: bool) -> Comparison {
+        let bodies: Vec<_> = sizes.iter().map(|&size| body(size)).collect();
+        let candidates = bodies.iter().map(|(ptr, col, retained)| Candidate {
+            dofs: 3 * (ptr.len() - 1),
+            retained: Some(retained),
+            ptr,
+            col,
+        });
+        compare(&candidates.collect::<Vec<_>>(), joined)
+    }
+
+    /// A cube is dear to factor and a long bar of as many nodes is not, which its dofs alone do not say.
+    #[test]
+    fn a_bar_is_factored_where_a_cube_is_not() {
+        let (bar, cube) = (of(&[[6, 6, 750]], true), of(&[[30, 30, 30]], true));
+        assert!(bar.is_direct(usize::MAX) && !cube.is_direct(usize::MAX));
+        assert!(!bar.is_direct(1_000_000), "{}", bar.direct.bytes);
+        assert!(20.0 * bar.direct.seconds < cube.direct.seconds, "{} {}", bar.direct.words(), cube.direct.words());
+        // and the count is below that of a cube of bricks without contact
+        let most = 19.0 * 81_000f64.powi(2) / RATE;
+        assert!((0.3..1.2).contains(&(cube.direct.seconds / most)), "{} {most}", cube.direct.seconds);
+    }
+
+    /// Dense algebra on the contacts of two bodies counts where Newton's method joins them, and multigrid more where it does not.
+    #[test]
+    fn joined_bodies_share_their_contact() {
+        let wide = [[40, 40, 2]; 2];
+        let (joined, apart) = (of(&wide, true), of(&wide, false));
+        assert!(joined.direct.seconds > 5.0 * apart.direct.seconds);
+        assert_eq!(apart.multigrid.seconds, SWEPT * joined.multigrid.seconds);
+        assert!(!joined.is_direct(usize::MAX) && apart.is_direct(usize::MAX));
+    }
+}

@@ -1,0 +1,186 @@
+//! The matrix of a linear system with springs at contact points, G = K + B' diag(d) B, and what solves it.
+
+use super::InnerSolver;
+use crate::error::Result;
+use crate::linalg::Csr;
+use crate::model::{BodyCounts, Solved};
+use std::time::Instant;
+
+/// G of one body, or of all bodies together.
+///
+/// Of K it keeps what G differs from; the rest is in the solver alone. The rows B stay with the owner, who passes the same ones
+/// to every call that wants them.
+pub struct RobinMatrix<S> {
+    solver: S,
+    /// Springs d of G, one a row of B.
+    weight: Vec<f64>,
+    /// Those when G was last far from what its preconditioner was made of.
+    prepared: Vec<f64>,
+    /// b diag(K) b' of each row.
+    row_stiffness: Vec<f64>,
+    coupling: Coupling,
+    counts: BodyCounts,
+    /// Symbolic and numeric factorisations before the counts began.
+    before: (usize, usize),
+}
+
+impl<S: InnerSolver> RobinMatrix<S> {
+    /// Starts from G = K, on a pattern that holds B'B; `make` turns K into its solver.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn new(stiffness: Csr, rows: &Csr, make: impl FnOnce(Csr) -> Result<S>) -> Result<Self> {
+        let weight = vec![0.0; rows.rows()];
+        Ok(Self {
+            prepared: weight.clone(),
+            weight,
+            row_stiffness: rows.quadratic_diagonal(&stiffness),
+            coupling: Coupling::new(&stiffness, rows),
+            counts: BodyCounts::default(),
+            before: (0, 0),
+            solver: make(stiffness)?,
+        })
+    }
+
+    /// Sets the springs d.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn update(&mut self, rows: &Csr, weight: &[f64]) -> Result<()> {
+        if weight == self.weight {
+            self.counts.robin_skipped += 1;
+            return Ok(());
+        }
+        self.weight.copy_from_slice(weight);
+        self.counts.robin_updates += 1;
+        let far = is_far(rows, &self.row_stiffness, &self.prepared, weight);
+        if far {
+            self.prepared.copy_from_slice(weight);
+        }
+        let coupling = &self.coupling;
+        self.solver.update(&mut |g| coupling.write(rows, weight, g), far)
+    }
+
+    /// Factors G, or makes its preconditioner, if it changed since.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn set_up(&mut self) -> Result<()> {
+        let began = Instant::now();
+        let done = self.solver.set_up();
+        let seconds = began.elapsed().as_secs_f64();
+        self.counts.factor_seconds += seconds;
+        if self.counts.first_seconds == 0.0 {
+            self.counts.first_seconds = seconds;
+        }
+        done
+    }
+
+    /// One solve, or one application of the preconditioner, counted and timed apart from the set-up it may need.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn apply(&mut self, solve: impl FnOnce(&mut S) -> Result<Solved>) -> Result<Solved> {
+        self.set_up()?;
+        self.counts.solves += 1;
+        let began = Instant::now();
+        let solved = solve(&mut self.solver)?;
+        self.counts.solve_seconds += began.elapsed().as_secs_f64();
+        self.counts.inner_iterations += solved.iterations;
+        Ok(solved)
+    }
+
+    /// What was done so far.
+    pub fn counts(&self) -> BodyCounts {
+        let (symbolic, factorizations) = self.solver.factorizations();
+        let (symbolic, factorizations) = (symbolic - self.before.0, factorizations - self.before.1);
+        if self.solver.is_dense() {
+            return BodyCounts { dense_factorizations: factorizations, ..self.counts };
+        }
+        BodyCounts { symbolic, factorizations, ..self.counts }
+    }
+
+    /// Counts from zero.
+    pub fn begin_anew(&mut self) {
+        self.before = self.solver.factorizations();
+        self.counts = BodyCounts::default();
+    }
+
+    /// The solver.
+    pub fn solver(&self) -> &S {
+        &self.solver
+    }
+
+    /// The solver, for what does not change G.
+    pub fn solver_mut(&mut self) -> &mut S {
+        &mut self.solver
+    }
+}
+
+/// Where B' diag(d) B goes in the values of G.
+struct Coupling {
+    /// Position in the values of G of every product b_i b_j of every row, in the order of rows, i and j.
+    positions: Vec<u32>,
+    /// Each position that some row has, once.
+    touched: Vec<u32>,
+    /// The value of K there.
+    stiffness: Vec<f64>,
+}
+
+impl Coupling {
+    fn new(stiffness: &Csr, rows: &Csr) -> Self {
+        let products = (0..rows.rows()).map(|q| rows.range(q).len().pow(2)).sum();
+        let mut positions = Vec::with_capacity(products);
+        for q in 0..rows.rows() {
+            for (i, _) in rows.row(q) {
+                for (j, _) in rows.row(q) {
+                    match stiffness.position(i, j) {
+                        Some(position) => positions.push(position as u32),
+                        None => unreachable!("the pattern holds the couplings of every contact row"),
+                    }
+                }
+            }
+        }
+        let mut touched = positions.clone();
+        touched.sort_unstable();
+        touched.dedup();
+        touched.shrink_to_fit();
+        let stiffness = touched.iter().map(|&at| stiffness.values[at as usize]).collect();
+        Self { positions, touched, stiffness }
+    }
+
+    /// Writes K + B' diag(d) B where it differs from K; the rest of G is K already.
+    fn write(&self, rows: &Csr, weight: &[f64], g: &mut [f64]) {
+        self.touched.iter().zip(&self.stiffness).for_each(|(&at, stiffness)| g[at as usize] = *stiffness);
+        let mut left = &self.positions[..];
+        for (q, &weight) in weight.iter().enumerate() {
+            let b = &rows.values[rows.range(q)];
+            let (mine, others) = left.split_at(b.len() * b.len());
+            left = others;
+            if weight == 0.0 {
+                continue;
+            }
+            let products = b.iter().flat_map(|x| b.iter().map(move |y| x * y));
+            mine.iter().zip(products).for_each(|(&at, product)| g[at as usize] += weight * product);
+        }
+    }
+}
+
+/// Growth of the stiffness under a contact point, either way, beyond which a preconditioner is poor.
+const FAR: f64 = 3.0;
+
+/// One row in so many may be far: each is an eigenvalue apart from the others, and costs conjugate gradients about one step.
+const FEW: usize = 64;
+
+/// Whether Robin terms `old` and `new` change the stiffness under too many contact rows by more than [`FAR`]. The eigenvalues of
+/// G_old^-1 G_new lie between the least and the largest ratio of the weights; where the body is stiff beside the Robin term
+/// they do not come near that, and only the sum of both counts.
+fn is_far(rows: &Csr, row_stiffness: &[f64], old: &[f64], new: &[f64]) -> bool {
+    let far = |q: &usize| {
+        let square: f64 = rows.row(*q).map(|(_, b)| b * b).sum();
+        let (before, after) =
+            (row_stiffness[*q] + old[*q] * square * square, row_stiffness[*q] + new[*q] * square * square);
+        after > FAR * before || before > FAR * after
+    };
+    (0..rows.rows()).filter(far).nth(rows.rows() / FEW).is_some()
+}
