@@ -118,6 +118,8 @@ fn expressions_that_are_no_laws() {
     refused("1e5*c*sqrt(1e-3 - c)", None, "p does not increase at c = 6");
     refused("1e5*c + asin(100*c)", None, "p is 1001.570796326795 and p' inf at c = 1.000e-2");
     refused("1e-5*c/(1e-4 - c)", None, "at c = 1");
+    // advice that can help: there is nothing to cut off where the law falls from zero on
+    assert!(typed("-1e5*c", None).expect_err("no law").to_string().contains("wrong sign"));
     // as far as they are laws, they are
     assert!(typed("1e5*c - 1e7*c^3", Some(0.05)).is_ok());
     assert!(typed("1e-5*c/(1e-4 - c)", Some(9e-5)).is_ok());
