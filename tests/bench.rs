@@ -36,17 +36,17 @@ fn scene(name: &str) -> String {
 fn errors_fall_with_the_mesh_and_rows_are_whole() {
     let exact = "contact.0.reference=40 + 6.3508814*cos(pi*x)";
     let solvers = ["--solver", "mumps", "--solver", "-ksp_type cg -pc_type jacobi -ksp_rtol 1e-10"];
-    let over = ["--over", "mesh.set.n=8,16", "--repeat", "2", "--linear", "--set", exact, "--method", "ncg"];
+    let over = ["--over", "mesh.set.n=8,16,32", "--repeat", "2", "--linear", "--set", exact, "--method", "ncg"];
     let (run, rows) = bench(&[&[scene("wavy").as_str()], &solvers[..], &over].concat());
     assert_eq!(run.code, 0, "{}", run.said());
-    // two meshes, two solvers, one method and the linear solve
-    assert_eq!(rows.len(), 8);
+    // three meshes, two solvers, one method and the linear solve
+    assert_eq!(rows.len(), 12);
     let solved = |solver: &str| -> Vec<&BTreeMap<String, String>> {
         rows.iter().filter(|row| row["solver"].starts_with(solver) && row["method"] == "ncg").collect()
     };
     for solver in ["mumps", "-ksp_type cg"] {
         let rows = solved(solver);
-        assert_eq!(rows.len(), 2);
+        assert_eq!(rows.len(), 3);
         for pair in rows.windows(2) {
             let order = (number(pair[0], "error") / number(pair[1], "error")).log2();
             assert!((1.6..2.6).contains(&order), "{solver}: order {order} of linear elements");
@@ -158,6 +158,25 @@ fn check_rows(solver: &str) {
     assert!((number(linear, "linear_seconds") / seconds - 1.0).abs() < 1e-9);
     let own = number(solved, "set_up_seconds") + number(solved, "iterate_seconds");
     assert!((number(solved, "linear_solves") / (own / seconds) - 1.0).abs() < 1e-9);
+}
+
+/// A row names the method that ran beside the one that was asked for, and the last table has every row.
+#[test]
+fn rows_name_what_ran() {
+    let words = ["--solver", "mumps,icc", "--method", "auto", "--over", "mesh.set.n=4,8"];
+    let (run, rows) = bench(&[&[scene("groove-held").as_str()], &words[..]].concat());
+    assert_eq!(run.code, 0, "{}", run.said());
+    let names = |row: &BTreeMap<String, String>| ["solver", "asked", "method"].map(|name| row[name].clone());
+    let ran = ["mumps auto newton", "icc auto newton-robin"];
+    assert_eq!(rows.iter().map(|row| names(row).join(" ")).collect::<Vec<_>>(), [ran, ran].concat());
+    let lines: Vec<Vec<&str>> = run.stdout.lines().map(|line| line.split_whitespace().collect()).collect();
+    let head =
+        ["mesh.set.n", "solver", "method", "status", "dofs", "iterations", "sweeps", "s", "CPU", "s", "MB", "error"];
+    let at = lines.iter().position(|line| *line == head).expect("a heading");
+    for (line, row) in lines[at + 1..].iter().zip(&rows) {
+        let same = ["mesh.set.n", "solver", "method", "status", "dofs", "iterations", "sweeps"];
+        assert_eq!(line[..same.len()], same.map(|name| row[name].as_str()));
+    }
 }
 
 /// What goes wrong is a row with its words, and the other rows are there.

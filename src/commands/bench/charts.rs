@@ -1,6 +1,6 @@
 //! The plots of a benchmark.
 
-use super::plan::{Plan, part};
+use super::plan::{ASKED, Plan, part};
 use super::table::{Row, Table};
 use crate::output::{Axis, Color, Plot, Series, Style};
 
@@ -39,16 +39,20 @@ impl Chart<'_> {
     fn curves(&self, along: impl Fn(&str) -> bool) -> Vec<Curve<'_>> {
         let columns = self.plan.columns();
         let kept: Vec<usize> = (1..columns.len()).filter(|&column| !along(&columns[column])).collect();
-        let differs = |column: usize| self.rows.iter().any(|row| row.key[column] != self.rows[0].key[column]);
+        // a curve has one method: that which ran
+        let value = |row: &'_ Row, column: usize| -> String {
+            if columns[column] == ASKED { row.method.clone() } else { row.key[column].clone() }
+        };
+        let differs = |column: usize| self.rows.iter().any(|row| value(row, column) != value(self.rows[0], column));
         let named: Vec<usize> = kept.iter().copied().filter(|&column| differs(column)).collect();
-        let mut curves: Vec<(Vec<&str>, Curve)> = Vec::new();
+        let mut curves: Vec<(Vec<String>, Curve)> = Vec::new();
         for row in self.rows {
-            let key: Vec<&str> = kept.iter().map(|&column| row.key[column].as_str()).collect();
+            let key: Vec<String> = kept.iter().map(|&column| value(row, column)).collect();
             if let Some((_, (_, rows))) = curves.iter_mut().find(|(known, _)| *known == key) {
                 rows.push(row);
                 continue;
             }
-            let parts: Vec<String> = named.iter().map(|&column| part(&columns[column], &row.key[column])).collect();
+            let parts: Vec<String> = named.iter().map(|&column| part(&columns[column], &value(row, column))).collect();
             let name = if parts.is_empty() { row.key[columns.len() - 4].clone() } else { parts.join(", ") };
             curves.push((key, (name, vec![row])));
         }
@@ -113,20 +117,34 @@ fn is_of_mesh(column: &str) -> bool {
     column.starts_with("mesh.")
 }
 
-/// The points that no other one is below in both coordinates, sorted by the first.
+/// Errors that differ by less than this are those of one mesh, solved by others.
+const ALIKE: f64 = 0.01;
+
+/// The points (error, time) that no other one beats, sorted by the error: each is faster than all with a smaller error, and more
+/// accurate than all faster ones by more than [`ALIKE`].
 fn pareto(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    points.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));
     let mut front: Vec<(f64, f64)> = Vec::new();
     for point in points {
-        if front.last().is_none_or(|last| point.1 < last.1) {
+        if front.last().is_none_or(|last| point.0 < (1.0 - ALIKE) * last.0) {
             front.push(point);
         }
     }
+    front.reverse();
     front
 }
 
-/// Exponent of the power law through points by least squares of the logarithms; `None` if they share one place.
+/// Sizes from which on an exponent is more than the slope of a line between two measured times.
+const SIZES: usize = 3;
+
+/// Exponent of the power law through points by least squares of the logarithms; `None` with fewer than [`SIZES`] places.
 fn exponent(points: &[(f64, f64)]) -> Option<f64> {
+    let mut places: Vec<f64> = points.iter().map(|point| point.0).collect();
+    places.sort_by(f64::total_cmp);
+    places.dedup();
+    if places.len() < SIZES {
+        return None;
+    }
     let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
     let count = logs.len() as f64;
     let mean = logs.iter().fold((0.0, 0.0), |sum, log| (sum.0 + log.0 / count, sum.1 + log.1 / count));
@@ -136,7 +154,7 @@ fn exponent(points: &[(f64, f64)]) -> Option<f64> {
         xy += (x - mean.0) * (y - mean.1);
     }
     let slope = xy / xx;
-    (xx > 1e-12 && slope.is_finite()).then_some(slope)
+    slope.is_finite().then_some(slope)
 }
 
 #[cfg(test)]
@@ -147,12 +165,14 @@ mod tests {
     fn the_front_is_what_nothing_beats() {
         let points = vec![(1.0, 9.0), (2.0, 5.0), (3.0, 6.0), (2.0, 7.0), (4.0, 1.0)];
         assert_eq!(pareto(points), [(1.0, 9.0), (2.0, 5.0), (4.0, 1.0)]);
+        // solvers of one mesh: the fastest is enough
+        assert_eq!(pareto(vec![(1.0, 5.0), (1.002, 4.0), (0.999, 7.0), (3.0, 1.0)]), [(1.002, 4.0), (3.0, 1.0)]);
     }
 
     #[test]
     fn a_power_law_has_its_exponent() {
         let points: Vec<(f64, f64)> = [1.0, 2.0, 5.0, 9.0].iter().map(|&x: &f64| (x, 3.0 * x.powf(1.5))).collect();
         assert!(exponent(&points).is_some_and(|slope| (slope - 1.5).abs() < 1e-12));
-        assert_eq!(exponent(&[(2.0, 1.0), (2.0, 3.0)]), None);
+        assert_eq!(exponent(&[(2.0, 1.0), (4.0, 3.0), (2.0, 1.1)]), None);
     }
 }

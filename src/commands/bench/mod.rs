@@ -7,6 +7,7 @@ mod errors;
 mod plan;
 mod process;
 mod request;
+mod summary;
 mod table;
 
 pub use request::Request;
@@ -22,7 +23,7 @@ use process::Runner;
 use request::usage;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use table::{Row, Table};
 
 /// Runs all combinations, writes `bench.csv` row by row and the plots at the end; returns the exit code: 1 if a run did
@@ -66,6 +67,7 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     for (name, plot) in charts::all(&table, &plan) {
         folder.write(&name, |out| plot.write(out))?;
     }
+    say(summary::of(&table, &plan))?;
     say(format_args!("results in {}", folder.path().display()))?;
     Ok(i32::from(!table.rows.iter().all(Row::is_good)))
 }
@@ -78,11 +80,18 @@ fn folder(request: &Request, plan: &Plan) -> PathBuf {
     }
 }
 
+/// How often the progress line is drawn.
+const TICK: Duration = Duration::from_millis(200);
+
 fn progress(runs: usize) -> ProgressBar {
     let bar = ProgressBar::new(runs as u64);
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len}, {elapsed} gone, {eta} left: {wide_msg}") {
+    if let Ok(style) =
+        ProgressStyle::with_template("{spinner} {bar:30} {pos}/{len}, {elapsed} gone, {eta} left: {wide_msg}")
+    {
         bar.set_style(style);
     }
+    // time goes on while a run is on its way
+    bar.enable_steady_tick(TICK);
     bar
 }
 

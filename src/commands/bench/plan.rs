@@ -45,7 +45,10 @@ pub(super) struct Case {
 pub(super) const LINEAR: &str = "linear";
 
 /// Columns of a key besides those of `--over`.
-const COLUMNS: [&str; 4] = ["solver", "method", "order", "ranks"];
+const COLUMNS: [&str; 4] = ["solver", ASKED, "order", "ranks"];
+
+/// Column of the method that was asked for; what ran can be another.
+pub(super) const ASKED: &str = "asked";
 
 /// An inner solver: a name in the table with its overrides of the scene and its PETSc options.
 #[derive(Clone)]
@@ -192,9 +195,14 @@ impl Case {
         self.parts.join(", ")
     }
 
+    /// The method asked for.
+    pub fn asked(&self) -> &str {
+        &self.key[self.key.len() - 3]
+    }
+
     /// Whether it is one linear factor-and-solve.
     pub fn is_linear(&self) -> bool {
-        self.key[self.key.len() - 3] == LINEAR
+        self.asked() == LINEAR
     }
 }
 
@@ -202,7 +210,7 @@ impl Case {
 pub(super) fn part(column: &str, value: &str) -> String {
     let last = column.rsplit('.').next().unwrap_or(column);
     match column {
-        "scene" | "solver" | "method" => value.to_owned(),
+        "scene" | "solver" | ASKED => value.to_owned(),
         "order" => format!("P{value}"),
         "ranks" => format!("{value} ranks"),
         _ => format!("{last} = {value}"),

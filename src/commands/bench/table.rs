@@ -10,7 +10,10 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::PathBuf;
 
-/// Columns with a number, after the key, `runs`, `status` and `message`.
+/// Columns of words and of the number of runs, after the key.
+const WORDS: [&str; 4] = ["runs", "status", "message", "method"];
+
+/// Columns with a number, after the words.
 pub(super) const NUMBERS: [&str; 25] = [
     "dofs",
     "points",
@@ -48,6 +51,8 @@ pub(super) struct Row {
     /// How it ended.
     pub status: String,
     message: String,
+    /// The method that ran; the one that was asked for where nothing ran.
+    pub method: String,
     numbers: BTreeMap<&'static str, f64>,
     /// What the error is measured in and against; empty without an error.
     pub error_of: String,
@@ -89,6 +94,9 @@ impl Row {
         };
         let mut row = Self::empty(case, status, message);
         row.runs = runs.len();
+        if let (false, Some(method)) = (case.is_linear(), first.report["method"].as_str()) {
+            row.method = method.to_owned();
+        }
         let mut put = |name: &'static str, of: &dyn Fn(&Run) -> Option<f64>| {
             let values: Vec<f64> = runs.iter().filter_map(of).filter(|value| value.is_finite()).collect();
             if let Some(middle) = median(values) {
@@ -184,6 +192,7 @@ impl Row {
             runs: 0,
             status: status.to_owned(),
             message: message.to_owned(),
+            method: case.asked().to_owned(),
             numbers: BTreeMap::new(),
             error_of: String::new(),
             displacement_error: None,
@@ -237,7 +246,7 @@ impl Row {
 
     fn fields(&self) -> Vec<String> {
         let mut fields = self.key.clone();
-        fields.extend([self.runs.to_string(), self.status.clone(), self.message.clone()]);
+        fields.extend([self.runs.to_string(), self.status.clone(), self.message.clone(), self.method.clone()]);
         fields.extend(NUMBERS.iter().map(|name| self.number(name).map_or(String::new(), |value| format!("{value}"))));
         fields.push(self.error_of.clone());
         fields
@@ -267,7 +276,7 @@ impl<'a> Table<'a> {
     /// A file that cannot be written.
     pub fn open(folder: &'a Folder, plan: &Plan, request: &Request) -> Result<Self> {
         let mut columns = plan.columns();
-        columns.extend(["runs", "status", "message"].map(str::to_owned));
+        columns.extend(WORDS.map(str::to_owned));
         columns.extend(NUMBERS.map(str::to_owned));
         columns.push("error_of".to_owned());
         let settings = format!(
@@ -368,15 +377,16 @@ fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
     if !file.headers().is_ok_and(|header| header.iter().eq(columns)) {
         return Vec::new();
     }
-    let keys = columns.len() - NUMBERS.len() - 4;
+    let keys = columns.len() - NUMBERS.len() - WORDS.len() - 1;
     let row = |record: csv::StringRecord| {
         let numbers = NUMBERS.iter().enumerate();
-        let numbers = numbers.filter_map(|(k, &name)| Some((name, record[keys + 3 + k].parse().ok()?)));
+        let numbers = numbers.filter_map(|(k, &name)| Some((name, record[keys + WORDS.len() + k].parse().ok()?)));
         Row {
             key: record.iter().take(keys).map(str::to_owned).collect(),
             runs: record[keys].parse().unwrap_or(0),
             status: record[keys + 1].to_owned(),
             message: record[keys + 2].to_owned(),
+            method: record[keys + 3].to_owned(),
             numbers: numbers.collect(),
             error_of: record[columns.len() - 1].to_owned(),
             displacement_error: None,

@@ -1,0 +1,58 @@
+//! The table on the terminal at the end of a benchmark.
+
+use super::plan::{ASKED, Plan};
+use super::table::{Row, Table as Rows};
+use crate::output::{sci, seconds};
+use comfy_table::{CellAlignment, Table, presets};
+
+/// Writes a number of a row for people.
+type Writer = fn(f64) -> String;
+
+/// Columns with a number: heading, name in the rows, how it is written.
+const NUMBERS: [(&str, &str, Writer); 8] = [
+    ("dofs", "dofs", whole),
+    ("iterations", "iterations", whole),
+    ("sweeps", "sweeps", whole),
+    ("s", "seconds", seconds),
+    ("CPU s", "cpu_seconds", seconds),
+    ("MB", "memory_mb", whole),
+    ("linear solves", "linear_solves", tenths),
+    ("error", "error", two),
+];
+
+fn whole(value: f64) -> String {
+    format!("{value:.0}")
+}
+
+fn tenths(value: f64) -> String {
+    format!("{value:.1}")
+}
+
+fn two(value: f64) -> String {
+    sci(value, 2)
+}
+
+/// One line a row: what tells it from the others, the method that ran, and numbers that some row has.
+pub(super) fn of(rows: &Rows, plan: &Plan) -> Table {
+    let columns = plan.columns();
+    let differs = |column: &usize| {
+        columns[*column] != ASKED && rows.rows.iter().any(|row| row.key[*column] != rows.rows[0].key[*column])
+    };
+    let named: Vec<usize> = (0..columns.len()).filter(differs).collect();
+    let known = |name: &str| rows.rows.iter().any(|row| row.number(name).is_some());
+    let numbers: Vec<_> = NUMBERS.iter().filter(|(_, name, _)| known(name)).collect();
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    let heads = named.iter().map(|&column| columns[column].as_str());
+    table.set_header(heads.chain(["method", "status"]).chain(numbers.iter().map(|number| number.0)));
+    let line = |row: &Row| -> Vec<String> {
+        let words = named.iter().map(|&column| row.key[column].clone());
+        let words = words.chain([row.method.clone(), row.status.clone()]);
+        words.chain(numbers.iter().map(|(_, name, write)| row.number(name).map_or(String::new(), write))).collect()
+    };
+    table.add_rows(rows.rows.iter().map(line));
+    for column in table.column_iter_mut().skip(named.len() + 2) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
