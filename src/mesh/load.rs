@@ -116,8 +116,8 @@ pub(super) fn from_script<const D: usize>(
     let made = workshop.path().join(&name);
     let (sized, times) = match sizes {
         Some(Sizing::View(view)) => (Some(super::sizes::script(file, &script, view, workshop.path())?), 1.0),
-        Some(Sizing::Times(times)) => (None, *times),
-        None => (None, 1.0),
+        Some(Sizing::Times(times)) => (ended(path, &script, workshop.path())?, *times),
+        None => (ended(path, &script, workshop.path())?, 1.0),
     };
     let script = sized.as_deref().unwrap_or(path);
     let task = Task { script, shown: path, set, times, dimension: D, order, guard, interrupt };
@@ -126,6 +126,17 @@ pub(super) fn from_script<const D: usize>(
     // half a file is no fault of the script
     let mesh = read.and_then(|bytes| checked(path, &bytes, order)).map_err(|error| workshop.blame(error))?;
     Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })
+}
+
+/// For a script whose last line is not ended: one in the folder `work` that includes it.
+fn ended(path: &Path, script: &Script, work: &Path) -> Result<Option<PathBuf>> {
+    if script.is_ended() {
+        return Ok(None);
+    }
+    let whole = std::path::absolute(path).map_err(|cause| Error::file(path, "find", &cause))?;
+    let made = work.join("ended.geo");
+    let text = format!("Include \"{}\";\n", whole.display());
+    std::fs::write(&made, text).map_err(|cause| Error::file(&made, "write", &cause)).map(|()| Some(made))
 }
 
 /// Keeps the sizes of a mesh that an adaptation ended with: `purpose` is all that it was for, scene and error.
@@ -173,6 +184,9 @@ fn file_name<const D: usize>(
     }
     for text in &script.files {
         key.add(text);
+    }
+    if !script.is_ended() {
+        key.add(b"ended");
     }
     match sizes {
         Some(Sizing::View(view)) => key.add(view.as_bytes()),

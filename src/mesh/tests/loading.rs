@@ -3,7 +3,7 @@
 use super::*;
 use crate::interrupt::Interrupt;
 use crate::mesh::load::from_script;
-use crate::mesh::{Origin, follows, load};
+use crate::mesh::{Origin, follows, load, view};
 use crate::problem::mesh::{MeshSource, Sizing};
 
 #[test]
@@ -51,6 +51,25 @@ fn scripts_are_meshed_once_for_each_key() {
     assert_eq!(run(4.0, Order::P1).origin, Origin::Cache);
     // Nothing but meshes is left: n = 4, n = 3, order 2, and the moved one.
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 4);
+}
+
+/// Gmsh leaves out the last command of a script whose last line is not ended.
+#[test]
+fn the_last_line_of_a_script_need_not_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = [folder.path().join("cache")];
+    let geo = folder.path().join("main.geo");
+    std::fs::write(folder.path().join("part.geo"), SQUARE.trim_end()).unwrap();
+    let corners = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
+    let sizes = Sizing::View(view(3, &corners, &[0.5; 3]).into());
+    for script in [SQUARE.trim_end(), "Include 'part.geo';"] {
+        std::fs::write(&geo, script).unwrap();
+        for sizes in [None, Some(&sizes)].into_iter().take(if script.contains("Include") { 1 } else { 2 }) {
+            let guard = (&Guard::default(), &Interrupt::default());
+            let loaded = from_script::<2>(&located(geo.clone()), &[], sizes, Order::P1, guard, &cache).unwrap();
+            assert!(loaded.mesh.group("outside").is_some(), "{script}");
+        }
+    }
 }
 
 /// Elements twice as large are another mesh, if the script leaves them free.
