@@ -173,6 +173,16 @@ fn petsc_prints_what_it_is_asked_for() {
     }
 }
 
+/// To end a run at the first solve that does not converge is to steer its solvers: the bodies have some then.
+#[test]
+fn a_solve_that_must_converge_ends_the_run() {
+    let good = groove("-ksp_error_if_not_converged").converged();
+    assert_eq!(good.solvers(), ["preonly + cholesky by mumps"; 2]);
+    let bad = groove("-ksp_type cg -pc_type jacobi -ksp_max_it 3 -ksp_error_if_not_converged");
+    assert_eq!(bad.code, 5, "{}", bad.said());
+    assert!(bad.stderr.contains("not converged") && bad.stderr.contains("DIVERGED_ITS"), "{}", bad.stderr);
+}
+
 /// Options that look at a run leave it as it is, bit by bit, and say so where there is nothing to look at.
 #[test]
 fn options_that_look_change_nothing() {

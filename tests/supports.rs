@@ -96,6 +96,39 @@ fn a_displacement_that_varies() {
     balanced(&run, 1e-11);
 }
 
+/// Supports that prescribe what the solution has there anyway, at the nodes of the contact, too, change nothing. Blocks of E = 100 and
+/// height 1, a gap of 0.002 and a layer of 300 share 0.01.
+#[test]
+fn displacements_of_the_contact_itself() {
+    let pressure = 0.008 / (2.0 / 100.0 + 1.0 / 300.0);
+    let block = |name: &str, face: &str, u: f64, side: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0\nfix = [{{ on = \"{name}_{face}\", y = {u} }}, \
+             {{ on = \"{name}_left\", x = 0, y = \"{side}\" }}]\n"
+        )
+    };
+    let scene = Scene::new(format!(
+        "dimension = 2\nmesh = {{ geo = \"{}\", set = {{ rows = 2, n1 = 2, n2 = 3 }} }}\n{}{}[[contact]]\n\
+         between = [\"b1_top\", \"b2_bottom\"]\ngap = 0.002\nlayer = {{ linear = {{ stiffness = 300 }} }}\n",
+        root().join("meshes/stack/stack.geo").display(),
+        block("b1", "bottom", 0.0, &format!("-{pressure}/100*y")),
+        block("b2", "top", -0.01, &format!("-0.01 + {pressure}/100*(2 - y)"))
+    ));
+    for solver in ["condensed", "mumps"] {
+        let run = solve(&scene, &["--set", "method={stop={residual=1e-10}}", "--set", &format!("solver={solver}")]);
+        let run = run.converged();
+        uniform(&run, "pressure", pressure);
+        uniform(&run, "u_n_b1", -pressure / 100.0);
+        uniform(&run, "u_n_b2", 0.01 - pressure / 100.0);
+        // every facet is paired as a whole
+        assert_eq!(
+            ["uncovered", "averaged", "steep", "far"].map(|what| run.count(&format!("pairs/0/facets_{what}"))),
+            [0; 4]
+        );
+        balanced(&run, 1e-11);
+    }
+}
+
 #[test]
 fn total_forces() {
     let spread = patch(&["body.1.load=[{on=\"upper_face\",force=[0,-10]}]"]);
@@ -184,24 +217,36 @@ fn planes_of_symmetry_at_any_angle() {
     let text = text.replace("../groove/groove.geo", "groove.geo").replace("(x - 4)", along);
     let planes = text.replace("x = 0 }", "symmetry = true }").replace("y = 0 }", "normal = \"1e-4*(1 + 1e-3*r)\" }");
     let planes = planes.replace("*r)", "*(x*cos(pi/6) + y*sin(pi/6)))");
+    // the tangent of the lower face moved by its component along x: two directions at 60 degrees
+    let sinks = "1e-4*(1 + 1e-3*(x*cos(pi/6) + y*sin(pi/6)))";
+    let both = format!(
+        "normal = \"{sinks}\" }}, {{ on = \"lower_face\", x = \"sin(pi/6)*{sinks} - cos(pi/6)*1e-5*{along}\" }}"
+    );
+    let tight = planes.replace(&format!("normal = \"{sinks}\" }}"), &both);
+    assert_eq!(tight.matches("sin(pi/6)*1e-4").count(), 1);
     assert_eq!((planes.matches("symmetry = true").count(), planes.matches("normal = \"").count()), (2, 1));
     // the same without the turn; the outer normal there is -y
     let sunk = "body.0.fix.1.y=-1e-4*(1 + 1e-3*x)";
     let scene = folder.path().join("scene.toml");
-    std::fs::write(&scene, planes).expect("a scene");
-    for (order, solver) in [(1, "mumps"), (2, "mumps"), (1, "hypre")] {
+    for (order, solver, slides) in [(1, "mumps", true), (2, "mumps", true), (1, "hypre", true), (2, "mumps", false)] {
+        std::fs::write(&scene, if slides { &planes } else { &tight }).expect("a scene");
         let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
         let solver = format!("solver={solver}");
         let sets = ["mesh.set.n=8", "method={stop={residual=1e-12}}", &orders[0], &orders[1], &solver];
         let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
         let turned = solve(&scene, &args);
-        let aligned = solve(case("groove-held"), &[&args[..], &["--set", sunk]].concat());
+        let held = if slides { &[][..] } else { &["--set", "body.0.fix.1.x=-1e-5*(x - 4)"] };
+        let aligned = solve(case("groove-held"), &[&args[..], &["--set", sunk], held].concat());
         for column in ["pressure", "u_n_lower"] {
             let apart = distance(&turned.contact()[column], &aligned.contact()[column]);
             assert!(apart < 1e-10, "P{order} {solver} {column}: {apart:e}\n{}", turned.said());
         }
         balanced(&turned, 1e-9);
-        let [ours, theirs] = [&turned, &aligned].map(|run| force(run, 0, "supports", 1));
+        let [mut ours, theirs] = [&turned, &aligned].map(|run| force(run, 0, "supports", 1));
+        if !slides {
+            let along = force(&turned, 0, "supports", 2);
+            (0..2).for_each(|c| ours[c] += along[c]);
+        }
         let (s, c) = (PI / 6.0).sin_cos();
         near(ours, [c * theirs[0] - s * theirs[1], s * theirs[0] + c * theirs[1]]);
     }

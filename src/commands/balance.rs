@@ -22,9 +22,12 @@ pub fn gather(done: &Done, recovered: &All) -> Vec<BalanceReport> {
             // a solver that fails here leaves the forces unknown; the run itself is over
             Some(Err(_)) => message.fill(f64::NAN),
             Some(Ok(Recovered { bent, .. })) => {
-                let Balance { parts, size } = info.balance(bent, &model.at_rows(index, &done.outcome.layer.force));
+                // bodies know of full loads alone
+                let full = |v: &[f64]| v.iter().map(|v| v / done.share).collect::<Vec<_>>();
+                let force = model.at_rows(index, &done.outcome.layer.force);
+                let Balance { parts, size } = info.balance(&full(bent), &full(&force));
                 let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
-                message.iter_mut().zip(numbers).for_each(|(place, number)| *place = number);
+                message.iter_mut().zip(numbers).for_each(|(place, number)| *place = done.share * number);
             }
         }
         model.exchange.sum(&mut message);

@@ -30,7 +30,7 @@ pub fn solve(mut ready: Ready, full: bool, keep: &mut dyn Keep) -> Result<Done> 
         let (stop, interval) = (built.scene.method.stop.clone(), built.scene.method.interval && full);
         let mut settings = Settings { stop, interval, balance: built.balance().filter(|_| full), start };
         let outcome = ddm::solve(&mut built.discrete.model, &mut method, &mut settings, keep)?;
-        let mut done = Done { built, method, outcome, steps, earlier, warnings };
+        let mut done = Done { built, method, outcome, share: 1.0, steps, earlier, warnings };
         let Status::Paused { asked } = done.outcome.status else { return Ok(done) };
         keep.state(&done);
         if asking::signal(asked).is_some() {

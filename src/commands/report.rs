@@ -86,22 +86,31 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
     results::fill(discrete, recovered, &mut report.bodies);
     let balances = balance::gather(done, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
-    if let (Status::Converged, Some(message)) = (&outcome.status, lost(done)) {
-        (report.status, report.message) = (status_name(&Status::RoundoffLimited).to_owned(), message);
+    if let Some(message) = lost(done) {
+        match outcome.status {
+            Status::Converged | Status::RoundoffLimited => {
+                (report.status, report.message) = (status_name(&Status::RoundoffLimited).to_owned(), message);
+            }
+            Status::IterationLimit | Status::Cycle { .. } => {
+                report.message = format!("not converged in {} iterations: {message}", outcome.iterations);
+            }
+            _ => {}
+        }
     }
     report
 }
 
-/// What displacements that are far larger than the deformations have cost a run that would be converged otherwise, in words: more than
-/// ten times what the run or its inner solvers were asked for.
+/// What displacements that are far larger than the deformations have cost the pressures, in words: more than ten times what the run or its
+/// inner solvers were asked for.
 fn lost(done: &Done) -> Option<String> {
     let stop = &done.built.scene.method.stop;
-    let reached = done.outcome.rows.last().map(|row| row.error).filter(|_| stop.balanced);
+    let reached = done.outcome.rows.last().map(|row| row.error).filter(|error| stop.balanced && error.is_finite());
     let asked = [stop.residual, stop.increment, reached].into_iter().flatten().fold(INNER, f64::max);
     let pressure = done.outcome.rounding;
     (pressure > 10.0 * asked).then(|| {
         format!(
-            "the displacements are so large that few digits are left for the pressures, which may be off by {} of their peak",
+            "the displacements are so large that few digits are left for the pressures, which may be off by {} of their peak: begin \
+             with a smaller gap, or let supports move bodies less",
             sci(pressure, 1)
         )
     })
@@ -266,7 +275,7 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
     let sides = done.built.discrete.sides(i);
     let displacement = |side: usize| -> Vec<f64> {
         let trace = &outcome.iterate.trace[side * points + range.start..side * points + range.end];
-        trace.iter().zip(&pair.prescribed[side]).map(|(free, known)| free + known).collect()
+        trace.iter().zip(&pair.prescribed[side]).map(|(free, known)| free + done.share * known).collect()
     };
     ContactTable {
         side_names: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),

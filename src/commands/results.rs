@@ -8,7 +8,7 @@ use crate::output::vtu::BodyField;
 
 /// The end of a run in one body of this rank.
 pub struct Recovered {
-    /// All dofs.
+    /// Displacements of all nodes.
     pub state: Vec<f64>,
     /// The same without the rigid motions that supports leave or carry the body by, which strain nothing.
     pub bent: Vec<f64>,
@@ -29,12 +29,15 @@ pub fn recover(done: &Done) -> All {
             let body = slot.local.as_ref()?;
             // what springs hold is strain, too
             let rigid = if slot.sprung.is_some() { 0 } else { body.rigid() };
+            // bodies know of full loads alone
+            let state: Vec<f64> = state.iter().map(|u| u / done.share).collect();
             let mut still = state.clone();
             still[state.len() - rigid..].fill(0.0);
             let recover = || -> Result<Recovered> {
-                let bent = body.recover(&still)?;
-                let mut state = if still == *state { bent.clone() } else { body.recover(state)? };
+                let mut bent = body.recover(&still)?;
+                let mut state = if still == state { bent.clone() } else { body.recover(&state)? };
                 state.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
+                bent.iter_mut().chain(&mut state).for_each(|u| *u *= done.share);
                 Ok(Recovered { field: info.field(&state, &bent), state, bent })
             };
             Some(recover())

@@ -63,6 +63,8 @@ pub struct Done {
     pub method: Method,
     /// How it ended; of a load step that has paused, in the units of the step.
     pub outcome: Outcome,
+    /// Share of the loads and prescribed displacements that the outcome is the answer to.
+    pub share: f64,
     /// Its load steps so far.
     pub steps: Vec<StepReport>,
     /// Rows of the load steps before one that has paused.
@@ -95,7 +97,7 @@ impl Built {
 impl Done {
     /// The next run of the same problem and method, from what this one has found.
     pub fn go_on(self, start: impl FnOnce(Outcome) -> Start) -> Ready {
-        let Self { built, method, outcome, steps, earlier, warnings } = self;
+        let Self { built, method, outcome, steps, earlier, warnings, .. } = self;
         Ready { built, method, start: start(outcome), steps, earlier, warnings }
     }
 

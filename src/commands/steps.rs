@@ -155,9 +155,9 @@ impl<'a> Steps<'a> {
     }
 
     /// Brings what this step has found, and the model, to the units of the scene, with the counts and the history of all steps.
-    /// Displacements that supports prescribe are in the states of bodies, or are added to them in full where those are condensed.
     fn complete(&self, done: &mut Done) {
-        let Done { built, outcome, steps, earlier, .. } = done;
+        let Done { built, outcome, share, steps, earlier, .. } = done;
+        *share = self.factor;
         steps.push(report(&built.discrete, outcome, self.factor));
         outcome.iterations += self.iterations;
         outcome.sweeps += self.sweeps;
@@ -197,7 +197,7 @@ impl Keep for Steps<'_> {
         self.complete(done);
         self.keep.results(done);
         done.steps.pop();
-        done.outcome = paused;
+        (done.outcome, done.share) = (paused, 1.0);
         load(&mut done.built.discrete.model, &self.laws, self.factor);
     }
 }

@@ -61,7 +61,7 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
         }
         Status::Underconstrained(Moved { body, name: motion }) => format!(
             "body `{}`: nothing holds its {motion} in iteration {k}: neither a support nor the Robin zone; add a support, \
-             or a start that closes the contact (method.start)",
+             or a start that closes the contact (method.start), or try {other}",
             name(body)
         ),
         Status::Mechanism(Mechanism { bodies, motion, work, .. }) => format!(

@@ -122,3 +122,71 @@ impl Reached {
         all.into_iter().fold(0.0, |worst, error| if error.is_nan() || error > worst { error } else { worst })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Field;
+    use crate::model::sample::{WEIGHT, two_pairs};
+
+    fn close(x: f64, y: f64) {
+        assert!((x - y).abs() <= 1e-12 * y.abs(), "{x} {y}");
+    }
+
+    fn step(trace: Vec<f64>, energy: f64, error: f64) -> Solution {
+        Solution { field: Field { states: Vec::new(), trace }, energy, error, is_exact: error == 0.0 }
+    }
+
+    /// Points beside the laws p = 4 c and p = c^2 by known gaps: (4 c - p)^2/8, and c^3/3 + 2 p^1.5/3 - c p.
+    #[test]
+    fn a_gap_in_closed_form() {
+        let model = two_pairs();
+        let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
+        let (c, rho) = ([0.5, 1.0, 2.0, 3.0], [2.0, 0.5, 0.25, 3.0]);
+        let p = [2.0, 5.0, 1.0, 9.0];
+        let gap = Gap::new(&model, &c, &p, &places, &rho);
+        close(gap.energy, 2.0 / 8.0 + 3.0 * (8.0 / 3.0 + 2.0 / 3.0 - 2.0));
+        assert!(gap.is_bound);
+        close(gap.mismatch, 3.0);
+        // places have p = 2, 4, 4, 1
+        close(gap.change, 2.0 * 1.0 / 0.5 + 3.0 * 9.0 / 0.25 + 0.25 * 64.0 / 3.0);
+        close(gap.share, (2.0 * 1.0 + 3.0 * 3.0 + 0.25 * 8.0) / (1.0 + 8.0 + 12.0 + 0.25));
+        // a negative pressure leaves no bound, and counts by the work of its change
+        let gap = Gap::new(&model, &c, &[2.0, 4.0, 4.0, -1.0], &places, &rho);
+        assert!(!gap.is_bound);
+        close(gap.energy, 0.25 * 4.0 / 3.0);
+        assert_eq!(Gap::new(&model, &places.compression, &places.pressure, &places, &rho).share, 0.0);
+    }
+
+    #[test]
+    fn errors_in_closed_form() {
+        let model = two_pairs();
+        let places = Layer::new(&model, vec![0.5, -1.0, 2.0, 1.0]);
+        let slopes = surface_slopes(&model);
+        let at = |q: usize| WEIGHT[q] * places.pressure[q].powi(2) * (1.0 / places.tangent[q] + 1.0 / slopes[q]);
+        let contact = contact_energy(&model, &places);
+        close(contact, at(0) + at(2) + at(3));
+        let (gap, scale) = (Gap { energy: 0.08, is_bound: true, mismatch: 0.2, ..Gap::default() }, Scale::default());
+        let work: f64 = 0.5 * 2.0 * 0.5 + 3.0 * 4.0 * 2.0 + 0.25;
+        let inexact = Reached::new(&model, &scale, 5.0, &gap, &step(vec![0.0; 8], 0.0, 0.3), &[0.0; 4], &places);
+        close(inexact.error, (0.4 + 0.3) / (5.0 + work).sqrt());
+        close(inexact.pressure, f64::max(0.2 / 4.0, 0.3 / contact.sqrt()));
+        assert!(!inexact.is_bound && inexact.imbalance == 0.0);
+        let mut exact = Reached::new(&model, &scale, 5.0, &gap, &step(vec![0.0; 8], 0.0, 0.0), &[0.0; 4], &places);
+        close(exact.error, 0.4 / (5.0 + work).sqrt());
+        close(exact.pressure, 0.05);
+        assert!(exact.is_bound);
+        // a further step that closes the points by 0.01, -0.03, 0 and 0.02
+        let more = step(vec![0.01, -0.01, 0.0, 0.0, 0.0, -0.02, 0.0, 0.02], 0.05, 0.1);
+        exact.add_rounding(&scale, 5.0, &more, &places, &places);
+        close(exact.error, (0.4 + 0.06f64.sqrt()) / (5.0 + work).sqrt());
+        close(exact.pressure, 0.05 + 0.04 / 4.0);
+    }
+
+    #[test]
+    fn the_worst_of_all_errors() {
+        let of = |error, pressure, imbalance| Reached { error, is_bound: true, pressure, imbalance }.worst();
+        assert_eq!([of(3.0, 1.0, 2.0), of(1.0, 3.0, 2.0), of(1.0, 2.0, 3.0)], [3.0; 3]);
+        assert!(of(f64::NAN, 1.0, 2.0).is_nan() && of(1.0, 2.0, f64::NAN).is_nan() && of(1.0, f64::NAN, 2.0).is_nan());
+    }
+}

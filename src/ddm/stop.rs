@@ -183,10 +183,57 @@ mod tests {
         assert!((0..20).all(|_| still.period(&[1.0], [true].into_iter(), 1.0, 0.0).is_none()));
     }
 
+    /// Traces that come back are seen at once, sets of points when all 64 repeat; periods above eight never.
+    #[test]
+    fn periods_are_told_apart() {
+        let first =
+            |each: &mut dyn FnMut(usize) -> Option<usize>| (0..200).find_map(|k| each(k).map(|period| (k, period)));
+        for period in 2..=8 {
+            let mut traces = Cycle::default();
+            let mut each = |k: usize| traces.period(&[(k % period) as f64, 2.0], std::iter::empty(), 1.0, 0.0);
+            assert_eq!(first(&mut each), Some((period, period)));
+            let mut sets = Cycle::default();
+            let mut each = |k: usize| sets.period(&[k as f64], [k.is_multiple_of(period), true].into_iter(), 1.0, 0.0);
+            assert_eq!(first(&mut each), Some((64, period)));
+            // the residual falls once in a while
+            let mut falling = Cycle::default();
+            let mut each = |k: usize| {
+                let residual = 0.5f64.powi((k / 50) as i32);
+                falling.period(&[k as f64], [k.is_multiple_of(period), true].into_iter(), residual, 0.0)
+            };
+            assert_eq!(first(&mut each), None);
+        }
+        let mut traces = Cycle::default();
+        assert_eq!(first(&mut |k| traces.period(&[(k % 9) as f64, 2.0], std::iter::empty(), 1.0, 0.0)), None);
+        let mut sets = Cycle::default();
+        assert_eq!(first(&mut |k| sets.period(&[k as f64], [k.is_multiple_of(9), true].into_iter(), 1.0, 0.0)), None);
+        // steps of 1e-8 are none, and traces that differ by 1e-11 are others
+        let mut small = Cycle::default();
+        assert_eq!(first(&mut |k| small.period(&[1.0 + 1e-8 * (k % 2) as f64], std::iter::empty(), 1.0, 0.0)), None);
+        let mut drifting = Cycle::default();
+        let mut each =
+            |k: usize| drifting.period(&[(k % 2) as f64 + 1e-11 * k as f64, 1.0], std::iter::empty(), 1.0, 0.0);
+        assert_eq!(first(&mut each), None);
+    }
+
+    #[test]
+    fn increments_are_shares() {
+        assert!((relative_increment(&[3.0, 4.0], &[0.0, 10.0]) - 0.5).abs() < 1e-15);
+        assert_eq!((relative_increment(&[0.0], &[0.0]), relative_increment(&[1.0], &[0.0])), (0.0, f64::INFINITY));
+    }
+
     #[test]
     fn stalling_is_suspected_only_after_a_while() {
         let mut floor = Floor::new(20);
-        assert!((0..200).all(|k| !floor.is_reached(0.95f64.powi(k))));
-        assert!((0..=20).any(|_| floor.is_reached(1e-5)));
+        assert!((0..200).all(|k| !floor.is_reached(0.89f64.powi(k))));
+        // at the 20th iterate without progress, and at every 20th from there on
+        let reached: Vec<usize> = (1..=60).filter(|_| floor.is_reached(1e-5)).collect();
+        assert_eq!(reached, [20, 40, 60]);
+        assert!((1..20).all(|_| !floor.is_reached(1e-5)) && !floor.is_reached(1e-11));
+        // nine tenths of the best are no progress, less is
+        let mut near = Floor::new(1);
+        assert_eq!([1e-5, 0.9 * 1e-5, 0.89e-5].map(|error| near.is_reached(error)), [false, true, false]);
+        let mut far = Floor::new(2);
+        assert!((0..9).all(|_| !far.is_reached(1.1e-4)));
     }
 }

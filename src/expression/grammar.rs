@@ -90,7 +90,9 @@ impl<'a> Parser<'a> {
             }
             Token::Symbol(symbol) => Err(Slip::new(span, format!("expected a value before `{symbol}`"))),
             Token::End => {
-                Err(Slip::new(self.text.len().saturating_sub(1)..self.text.len(), "the expression stops short")
+                // blanks may have several bytes
+                let last = self.text.char_indices().next_back().map_or(0, |(at, _)| at);
+                Err(Slip::new(last..self.text.len(), "the expression stops short")
                     .help("after this a number, a variable or a function is missing"))
             }
         }

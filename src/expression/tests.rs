@@ -161,6 +161,8 @@ fn slips_are_pointed_at() {
         ("x = 1", "=", "unexpected `=`", "=="),
         ("x**2", "**", "unknown operator `**`", "x^2"),
         ("x +", "+", "the expression stops short", ""),
+        // a blank of two bytes, as word processors have it
+        ("x + \u{a0}", "\u{a0}", "the expression stops short", ""),
         ("* x", "*", "expected a value before `*`", ""),
         ("1.2.3", "1.2.3", "not a number", ""),
         ("1e999", "1e999", "too large", ""),

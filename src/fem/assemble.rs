@@ -371,4 +371,17 @@ mod tests {
         let exact = 0.5 * dot(&u, &full) - 5.0 * u[0] - 0.7 * u[1];
         assert!((energy - exact).abs() < 1e-14, "{energy} {exact}");
     }
+
+    #[test]
+    fn a_cell_is_straight_if_each_edge_is() {
+        let straight = [[0.0, 0.0], [2.0, 0.0], [0.0, 4.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]];
+        assert!(is_straight(&straight, 3) && is_straight(&straight[..3], 3));
+        for (node, c) in [(3, 1), (4, 0), (5, 1)] {
+            let mut bent = straight;
+            bent[node][c] += 1e-6;
+            assert!(!is_straight(&bent, 3), "{node}");
+            bent[node][c] = straight[node][c] + 1e-10;
+            assert!(is_straight(&bent, 3), "{node}");
+        }
+    }
 }

@@ -189,5 +189,9 @@ mod tests {
         swapped.swap(5, 6);
         swapped.swap(7, 8);
         assert!(gradients(Order::P2, &swapped, &l).is_none(), "inverted: {measure}");
+        let flat = x.iter().map(|x| [x[0], x[1], 0.0]).collect::<Vec<_>>();
+        assert!(gradients(Order::P2, &flat, &l).is_none(), "flat");
+        let far = x.iter().map(|x| x.map(|x| 1e150 * x)).collect::<Vec<_>>();
+        assert!(gradients(Order::P2, &far, &l).is_none(), "beyond the range of numbers");
     }
 }

@@ -77,6 +77,9 @@ impl Gmsh {
             "-v",
             "2",
         ]);
+        if let Some(threads) = task.guard.threads {
+            command.args(["-algo", "hxt", "-nt", &threads.to_string()]);
+        }
         if task.times != 1.0 {
             command.args(["-clscale", &task.times.to_string()]);
         }
@@ -98,7 +101,7 @@ impl Gmsh {
                 command.env_remove(&name);
             }
         }
-        let end = guard::run(&mut command, task.guard.seconds, task.interrupt, "Gmsh is meshing")
+        let end = guard::run(&mut command, task.guard.seconds, &said, task.interrupt, "Gmsh is meshing")
             .map_err(|cause| Error::file(&self.program, "run", &cause))?;
         let refuse = |message: String| Error::mesh(task.shown, None, message);
         let status = match end {
@@ -106,6 +109,11 @@ impl Gmsh {
                 return Err(refuse(format!("Gmsh has not finished this script after {} s", task.guard.seconds)).help(
                     "a number in it may be far too large, or not a number; to wait longer set `timeout` in `mesh`",
                 ));
+            }
+            End::Talked => {
+                let repeated = "Gmsh does not stop to repeat its errors about this script".to_owned();
+                let help = "end each file that it merges with a line break, without which Gmsh reads beyond the end";
+                return Err(because(refuse(repeated), &complaints(&words(&said))).help(help));
             }
             End::Asked(signal) => return Err(interrupt::ended(signal)),
             End::Itself(status) if status.signal() == Some(SIGXFSZ) => {
@@ -115,23 +123,29 @@ impl Gmsh {
             End::Itself(status) if status.success() && output.is_file() => return Ok(()),
             End::Itself(status) => status,
         };
-        let said = String::from_utf8_lossy(&std::fs::read(&said).unwrap_or_default()).into_owned();
+        let said = words(&said);
         if is_out_of_memory(status, &said) {
             let most = bytes.map_or(String::new(), |bytes| format!(" of {:.1} GB", bytes as f64 / 1e9));
             return Err(refuse(format!("Gmsh needs more memory for this script than it may take{most}"))
                 .help("ask for fewer elements; to give it more set `memory`, in GB, in `mesh`"));
         }
-        let mut error = refuse(match status.success() {
+        let error = refuse(match status.success() {
             true => "Gmsh ran this script to its end but wrote no mesh".to_owned(),
             false => format!("Gmsh cannot mesh this script ({status})"),
         });
-        let causes = complaints(&said);
-        for cause in &causes {
-            error = error.because(cause);
-        }
         let again = format!("gmsh -{} {}", task.dimension, task.shown.display());
-        Err(if causes.is_empty() { error.help(format!("see what it says: {again}")) } else { error })
+        let causes = complaints(&said);
+        Err(if causes.is_empty() { error.help(format!("see what it says: {again}")) } else { because(error, &causes) })
     }
+}
+
+/// What a program wrote into a file.
+fn words(said: &Path) -> String {
+    String::from_utf8_lossy(&std::fs::read(said).unwrap_or_default()).into_owned()
+}
+
+fn because(error: Error, causes: &[String]) -> Error {
+    causes.iter().fold(error, Error::because)
 }
 
 /// Whether a program ended for want of memory: the C++ library gave up, the loader did, or the system.

@@ -14,6 +14,8 @@ pub enum End {
     Itself(ExitStatus),
     /// It took too long.
     TimedOut,
+    /// It wrote more words than anybody reads.
+    Talked,
     /// A signal asked for its end.
     Asked(i32),
 }
@@ -60,11 +62,15 @@ const QUIET: Duration = Duration::from_secs(1);
 /// Longest pause between two looks at the program.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// Runs a command to its end, to a signal, or to `limit` seconds; `doing` says what it does ("Gmsh is meshing").
+/// Bytes that a program may say: half a million lines. Gmsh repeats some errors for ever, 25 MB of them in a second.
+const MOST_SAID: u64 = 1 << 25;
+
+/// Runs a command, whose words go to the file `said`, to its end, to a signal, or to `limit` seconds; `doing` says what it does
+/// ("Gmsh is meshing").
 ///
 /// # Errors
 /// The program cannot be started.
-pub fn run(command: &mut Command, limit: f64, interrupt: &Interrupt, doing: &str) -> io::Result<End> {
+pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt, doing: &str) -> io::Result<End> {
     let began = Instant::now();
     let mut child = command.spawn()?;
     let mut bar: Option<ProgressBar> = None;
@@ -74,7 +80,9 @@ pub fn run(command: &mut Command, limit: f64, interrupt: &Interrupt, doing: &str
         }
         let elapsed = began.elapsed();
         let asked = interrupt.asked().map(End::Asked);
-        if let Some(end) = asked.or_else(|| (elapsed.as_secs_f64() > limit).then_some(End::TimedOut)) {
+        let talked = || std::fs::metadata(said).is_ok_and(|data| data.len() > MOST_SAID).then_some(End::Talked);
+        let late = || (elapsed.as_secs_f64() > limit).then_some(End::TimedOut);
+        if let Some(end) = asked.or_else(talked).or_else(late) {
             child.kill()?;
             child.wait()?;
             break end;
@@ -115,14 +123,22 @@ mod tests {
     #[test]
     fn what_takes_too_long_or_too_much_is_ended() {
         let began = Instant::now();
-        assert!(matches!(run(&mut sleep(None), 0.1, &Interrupt::default(), ""), Ok(End::TimedOut)));
+        let silent = Path::new("");
+        let ended = |command: &mut Command, limit| run(command, limit, silent, &Interrupt::default(), "");
+        assert!(matches!(ended(&mut sleep(None), 0.1), Ok(End::TimedOut)));
         assert!(began.elapsed() < Duration::from_secs(4));
         // no program can be loaded into a hundred kilobytes
-        assert!(
-            matches!(run(&mut sleep(Some(100_000)), 9.0, &Interrupt::default(), ""), Ok(End::Itself(status)) if !status.success())
-        );
+        assert!(matches!(ended(&mut sleep(Some(100_000)), 9.0), Ok(End::Itself(status)) if !status.success()));
         assert!(began.elapsed() < Duration::from_secs(4));
         assert_eq!(available("MemTotal: 9 kB\nMemAvailable:   20 kB\n"), Some(20_480));
+    }
+
+    #[test]
+    fn what_never_stops_to_talk_is_ended() {
+        let said = tempfile::NamedTempFile::new().expect("a file");
+        let mut yes = command(Path::new("/usr/bin/yes"), None);
+        yes.stdout(said.reopen().expect("a file"));
+        assert!(matches!(run(&mut yes, 60.0, said.path(), &Interrupt::default(), ""), Ok(End::Talked)));
     }
 
     /// The system ends a program with the thread that started it, as it does when the whole process is killed.

@@ -102,7 +102,7 @@ pub(super) fn from_script<const D: usize>(
         script.check(name, file)?;
     }
     let gmsh = Gmsh::find()?;
-    let name = file_name::<D>(path, &script, set, sizes, order, &gmsh);
+    let name = file_name::<D>(path, &script, set, sizes, order, guard.threads, &gmsh);
 
     // A file of the cache that cannot be read or is damaged is as good as none.
     for folder in folders {
@@ -116,8 +116,8 @@ pub(super) fn from_script<const D: usize>(
     let made = workshop.path().join(&name);
     let (sized, times) = match sizes {
         Some(Sizing::View(view)) => (Some(super::sizes::script(file, &script, view, workshop.path())?), 1.0),
-        Some(Sizing::Times(times)) => (None, *times),
-        None => (None, 1.0),
+        Some(Sizing::Times(times)) => (ended(path, &script, workshop.path())?, *times),
+        None => (ended(path, &script, workshop.path())?, 1.0),
     };
     let script = sized.as_deref().unwrap_or(path);
     let task = Task { script, shown: path, set, times, dimension: D, order, guard, interrupt };
@@ -126,6 +126,17 @@ pub(super) fn from_script<const D: usize>(
     // half a file is no fault of the script
     let mesh = read.and_then(|bytes| checked(path, &bytes, order)).map_err(|error| workshop.blame(error))?;
     Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })
+}
+
+/// For a script whose last line is not ended: one in the folder `work` that includes it.
+fn ended(path: &Path, script: &Script, work: &Path) -> Result<Option<PathBuf>> {
+    if script.is_ended() {
+        return Ok(None);
+    }
+    let whole = std::path::absolute(path).map_err(|cause| Error::file(path, "find", &cause))?;
+    let made = work.join("ended.geo");
+    let text = format!("Include \"{}\";\n", whole.display());
+    std::fs::write(&made, text).map_err(|cause| Error::file(&made, "write", &cause)).map(|()| Some(made))
 }
 
 /// Keeps the sizes of a mesh that an adaptation ended with: `purpose` is all that it was for, scene and error.
@@ -159,17 +170,23 @@ fn file_name<const D: usize>(
     set: &[(String, f64)],
     sizes: Option<&Sizing>,
     order: Order,
+    threads: Option<usize>,
     gmsh: &Gmsh,
 ) -> String {
     let mut key = Key::new();
     key.add(gmsh.identity().as_bytes());
     key.add(&[D as u8, order as u8]);
+    // one thread or many: the same algorithm
+    key.add(&[u8::from(threads.is_some())]);
     for (name, value) in set {
         key.add(name.as_bytes());
         key.add(&value.to_le_bytes());
     }
     for text in &script.files {
         key.add(text);
+    }
+    if !script.is_ended() {
+        key.add(b"ended");
     }
     match sizes {
         Some(Sizing::View(view)) => key.add(view.as_bytes()),

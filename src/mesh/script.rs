@@ -71,6 +71,11 @@ impl Script {
         Ok(script)
     }
 
+    /// Whether its last line is ended. Gmsh leaves the last command out else, without a word, unless another script includes it.
+    pub fn is_ended(&self) -> bool {
+        self.files.first().is_none_or(|text| text.ends_with(b"\n"))
+    }
+
     /// Notes the names in a piece of the script.
     fn note(&mut self, tokens: &[Token]) {
         use Token::{Name, Sign, Text};

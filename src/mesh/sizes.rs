@@ -29,7 +29,7 @@ pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: 
     }
     let sizes = write("sizes.pos", field)?;
     let text = format!(
-        "Merge \"{}\";\nMesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\n\
+        "Include \"{}\";\nMesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\n\
          Mesh.MeshSizeFromCurvature = 0;\nMerge \"{}\";\nBackground Mesh View[PostProcessing.NbViews - 1];\n",
         script.display(),
         sizes.display()

@@ -103,3 +103,48 @@ pub fn meeting_slopes(model: &Model) -> Vec<f64> {
     };
     (0..points).map(slope).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::sample::two_pairs;
+
+    #[test]
+    fn places_have_the_laws_answers_times_the_areas_of_their_points() {
+        let model = two_pairs();
+        let layer = Layer::new(&model, vec![-1.0, 0.5, 3.0, 0.0]);
+        assert_eq!(layer.pressure, [0.0, 2.0, 9.0, 0.0]);
+        assert_eq!((layer.tangent[1], layer.tangent[2]), (4.0, 6.0));
+        assert_eq!(layer.force, [0.0, 4.0, 27.0, 0.0]);
+        // 2 (4 c^2/2) and 3 c^3/3
+        assert!((layer.energy[0] - 1.0).abs() < 1e-14 && (layer.energy[1] - 27.0).abs() < 1e-12, "{:?}", layer.energy);
+        assert_eq!((layer.work, layer.closed, layer.peak()), (83.0, 2, 9.0));
+        assert_eq!(layer.springs(&model)[1..3], [8.0, 18.0]);
+        assert_eq!(layer.linear(&[0.0, 0.75, 2.5, 0.0]), [0.0, 3.0, 6.0, 0.0]);
+        let far = Layer::new(&model, vec![f64::NEG_INFINITY; 4]);
+        assert_eq!((far.work, far.closed), (0.0, 0));
+        assert_eq!(far.linear(&[0.0; 4]), [0.0; 4]);
+        assert_eq!(Layer::at(&model, &[0.1, 0.2, 0.3, 0.4, 1.0, 2.0, 3.0, 4.0]).compression[2], 3.3);
+    }
+
+    #[test]
+    fn places_lie_on_lines_through_the_states() {
+        let model = two_pairs();
+        let (c, p, rho) = ([0.3, -0.5, 2.0, -1.0], [4.0, 1.0, 0.5, -2.0], [2.0, 0.5, 0.25, 3.0]);
+        let met = Layer::meet(&model, &c, &p, &rho);
+        for q in 0..4 {
+            let (here, there) = (met.compression[q] + met.pressure[q] / rho[q], c[q] + p[q] / rho[q]);
+            assert!((here - there).abs() < 1e-12, "{q}: {here} {there}");
+        }
+        assert_eq!(met.closed, 3);
+    }
+
+    /// A tenth of the stiffness of the softer side over the area; a row without stiffness is that of prescribed dofs.
+    #[test]
+    fn slopes_are_those_of_the_softer_side() {
+        let slopes = meeting_slopes(&two_pairs());
+        for (slope, expected) in slopes.iter().zip([0.8, 0.6, 0.5 / 3.0, 2.4]) {
+            assert!((slope - expected).abs() < 1e-14, "{slopes:?}");
+        }
+    }
+}

@@ -245,3 +245,63 @@ impl Model {
         Ok(())
     }
 }
+
+/// A model for tests of what needs points and no body.
+#[cfg(test)]
+pub(crate) mod sample {
+    use super::*;
+    use crate::contact::law::Linear;
+    use crate::contact::{LayerLaw, Response};
+    use crate::linalg::Csr;
+    use std::rc::Rc;
+
+    /// omega of the points.
+    pub const WEIGHT: [f64; 4] = [0.5, 2.0, 3.0, 0.25];
+
+    /// p = s c^2, with s of each point.
+    #[derive(Debug)]
+    struct Square([f64; 2]);
+
+    impl LayerLaw for Square {
+        fn compressed(&self, point: usize, c: f64) -> Response {
+            let s = self.0[point];
+            Response { pressure: s * c * c, tangent: 2.0 * s * c, energy: s * c.powi(3) / 3.0 }
+        }
+    }
+
+    /// Two bodies with two pairs of two points each: p = 4 c in the first pair, p = c^2 in the second.
+    pub fn two_pairs() -> Model {
+        let laws: [Rc<dyn LayerLaw>; 2] = [Rc::new(Linear { stiffness: 4.0 }), Rc::new(Square([1.0; 2]))];
+        let pair = |(i, law): (usize, Rc<dyn LayerLaw>)| ContactPair {
+            surfaces: ["a".to_owned(), "b".to_owned()],
+            bodies: [0, 1],
+            nodes: vec![0, 1],
+            position: vec![[0.0; 3]; 2],
+            weight: WEIGHT[2 * i..2 * i + 2].to_vec(),
+            normal: vec![[0.0, 1.0, 0.0]; 2],
+            gap: vec![0.0; 2],
+            prescribed: [vec![0.0; 2], vec![0.0; 2]],
+            rows: [Csr::new(0), Csr::new(0)],
+            nodal: [Csr::new(0), Csr::new(0)],
+            resultant: [vec![[0.0; 3]; 2], vec![[0.0; 3]; 2]],
+            moment: [vec![[0.0; 3]; 2], vec![[0.0; 3]; 2]],
+            along_curve: true,
+            measure: "length",
+            law,
+            cover: Vec::new(),
+        };
+        let body = |side: usize, row_stiffness: [f64; 4]| BodySlot {
+            name: side.to_string(),
+            local: None,
+            segments: (0..2).map(|pair| Segment { pair, side }).collect(),
+            motions: Vec::new(),
+            sprung: None,
+            scale: 1.0,
+            modulus: 3.0,
+            depth: 1.0,
+            row_stiffness: row_stiffness.to_vec(),
+        };
+        let bodies = vec![body(0, [8.0, 12.0, 0.0, 6.0]), body(1, [4.0, 20.0, 5.0, 7.0])];
+        Model::new(bodies, laws.into_iter().enumerate().map(pair).collect(), Box::new(Serial))
+    }
+}

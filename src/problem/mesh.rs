@@ -20,6 +20,8 @@ pub struct Guard {
     pub seconds: f64,
     /// Gigabytes that it may take; what is free when it starts if `None`.
     pub gigabytes: Option<f64>,
+    /// Threads of Gmsh's parallel algorithm for free meshes in space (HXT); the algorithm of the script if `None`.
+    pub threads: Option<usize>,
     /// Whether the user trusts the script as a program.
     pub trusted: bool,
 }
@@ -27,7 +29,7 @@ pub struct Guard {
 impl Default for Guard {
     /// A script that nobody trusts, and ten times what Gmsh takes for a million tetrahedra.
     fn default() -> Self {
-        Self { seconds: 1000.0, gigabytes: None, trusted: false }
+        Self { seconds: 1000.0, gigabytes: None, threads: None, trusted: false }
     }
 }
 

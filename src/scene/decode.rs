@@ -141,10 +141,10 @@ impl Decoder<'_> {
         if !matches!(node.value, Value::Table(_)) {
             return Err(node.expected("a file name or a table"));
         }
-        let keys = Keys::open(node, "the mesh", &["geo", "msh", "set", "timeout", "memory"])?;
+        let keys = Keys::open(node, "the mesh", &["geo", "msh", "set", "threads", "timeout", "memory"])?;
         keys.exclude("geo", "msh")?;
         if let Some(file) = keys.get("msh") {
-            return match ["set", "timeout", "memory"].iter().find_map(|key| keys.entry(key)) {
+            return match ["set", "threads", "timeout", "memory"].iter().find_map(|key| keys.entry(key)) {
                 None => Ok(MeshSource::Msh { file: self.file(file)? }),
                 Some(entry) => Err(Error::scene(&entry.key_place, format!("`{}` for a finished mesh", entry.key))
                     .help("it is for Gmsh, which makes meshes from scripts: mesh = { geo = \"...\" }")),
@@ -157,6 +157,7 @@ impl Decoder<'_> {
         let guard = Guard {
             seconds: keys.get("timeout").map_or(Ok(usual.seconds), |node| node.positive("the timeout"))?,
             gigabytes: keys.get("memory").map(|node| node.positive("the memory")).transpose()?,
+            threads: keys.get("threads").map(threads).transpose()?,
             trusted,
         };
         Ok(MeshSource::Geo { file, set, places, sizes: None, guard })
@@ -216,6 +217,13 @@ fn plane(keys: &Keys, dimension: usize) -> Result<Plane> {
             .help("remove it, or set dimension = 2"));
     }
     choose(&entry.node, "plane", &Plane::ALL)
+}
+
+fn threads(node: &Node) -> Result<usize> {
+    match usize::try_from(node.whole()?) {
+        Ok(count @ 1..) => Ok(count),
+        _ => Err(node.refuse("`threads` must be 1 or more".to_owned())),
+    }
 }
 
 /// Named numbers for Gmsh, sorted by name.

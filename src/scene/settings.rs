@@ -84,6 +84,9 @@ fn mesh(mesh: &MeshSource) -> Value {
             let set: Map<_, _> = set.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
             let (file, timeout, memory) = (file.value.display().to_string(), guard.seconds, guard.gigabytes);
             let mut mesh = json!({ "geo": file, "set": set, "timeout": timeout });
+            if let Some(threads) = guard.threads {
+                mesh["threads"] = json!(threads);
+            }
             if let Some(memory) = memory {
                 mesh["memory"] = json!(memory);
             }

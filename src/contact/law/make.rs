@@ -70,3 +70,14 @@ fn extent(position: &[[f64; 3]]) -> f64 {
     let size = (0..3).map(|c| spread(c).powi(2)).sum::<f64>().sqrt();
     if size > 0.0 { size } else { 1.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::extent;
+
+    #[test]
+    fn the_extent_is_a_diagonal() {
+        assert_eq!(extent(&[[1.0, -2.0, 5.0], [2.0, 2.0, 5.0], [-2.0, 1.0, 5.0]]), 32f64.sqrt());
+        assert_eq!(extent(&[[1.0; 3]]), 1.0);
+    }
+}

@@ -118,6 +118,8 @@ fn expressions_that_are_no_laws() {
     refused("1e5*c*sqrt(1e-3 - c)", None, "p does not increase at c = 6");
     refused("1e5*c + asin(100*c)", None, "p is 1001.570796326795 and p' inf at c = 1.000e-2");
     refused("1e-5*c/(1e-4 - c)", None, "at c = 1");
+    // advice that can help: there is nothing to cut off where the law falls from zero on
+    assert!(typed("-1e5*c", None).expect_err("no law").to_string().contains("wrong sign"));
     // as far as they are laws, they are
     assert!(typed("1e5*c - 1e7*c^3", Some(0.05)).is_ok());
     assert!(typed("1e-5*c/(1e-4 - c)", Some(9e-5)).is_ok());
@@ -150,6 +152,40 @@ fn all_laws() -> Vec<(Box<dyn LayerLaw>, f64)> {
         laws.push((Box::new(typed(text, end).expect(text)), 3e-5));
     }
     laws
+}
+
+#[test]
+fn pressures_and_tangents_are_those_of_responses() {
+    for (law, scale) in all_laws() {
+        for share in [1e-3, 0.4, 1.0, 7.0, 1e3] {
+            let c = share * scale;
+            let (here, (pressure, tangent)) = (law.response(0, c), law.pressure_and_tangent(0, c));
+            if here.pressure.is_infinite() {
+                continue;
+            }
+            assert!((pressure / here.pressure - 1.0).abs() < 1e-12, "{law:?} at {c}: {pressure} {here:?}");
+            assert!((tangent / here.tangent - 1.0).abs() < 1e-12, "{law:?} at {c}: {tangent} {here:?}");
+        }
+    }
+}
+
+/// Far from the graph, and nowhere: an open layer without pressure is on the graph, all else is not.
+#[test]
+fn gaps_at_the_ends_of_numbers() {
+    for (law, scale) in all_laws() {
+        let inf = f64::INFINITY;
+        for (c, pressure, gap) in [
+            (-scale, 0.0, 0.0),
+            (-inf, 0.0, 0.0),
+            (inf, 0.0, inf),
+            (-scale, -1.0, inf),
+            (-inf, -1.0, inf),
+            (scale, inf, inf),
+        ] {
+            assert_eq!(law.duality_gap(0, c, pressure), gap, "{law:?} {c} {pressure}");
+        }
+        assert!(law.duality_gap(0, f64::NAN, 0.0).is_nan() && law.duality_gap(0, 0.0, f64::NAN).is_nan());
+    }
 }
 
 /// Powers of ten from 10^low to 10^high, not at round numbers.

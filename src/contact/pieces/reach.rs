@@ -60,3 +60,28 @@ impl Refused {
         faces && holds
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a pair leaves out is told by its reason: steep where the distance would do, far where the direction would.
+    #[test]
+    fn refusals_have_their_reasons() {
+        let reach = Reach { gap: 2.0, overlap: 1.0, facing: 0.5 };
+        let (up, down, steep) = ([0.0, 1.0], [0.0, -1.0], [1.0, 0.0]);
+        for (gap, other, admitted, is_steep, is_far) in [
+            (1.0, down, true, false, false),
+            (-0.5, down, true, false, false),
+            (3.0, down, false, false, true),
+            (-2.0, down, false, false, false),
+            (1.0, steep, false, true, false),
+            (3.0, steep, false, false, false),
+        ] {
+            let mut refused = Refused::default();
+            assert_eq!(refused.admits(&reach, gap, up, other), admitted, "{gap} {other:?}");
+            assert_eq!((refused.steep, refused.far), (is_steep, is_far), "{gap} {other:?}");
+        }
+        assert!(!reach.faces(up, up) && !reach.faces(up, [0.9, -0.4]) && reach.faces(up, [0.8, -0.6]));
+    }
+}

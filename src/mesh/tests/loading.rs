@@ -3,7 +3,7 @@
 use super::*;
 use crate::interrupt::Interrupt;
 use crate::mesh::load::from_script;
-use crate::mesh::{Origin, follows, load};
+use crate::mesh::{Origin, follows, load, view};
 use crate::problem::mesh::{MeshSource, Sizing};
 
 #[test]
@@ -51,6 +51,25 @@ fn scripts_are_meshed_once_for_each_key() {
     assert_eq!(run(4.0, Order::P1).origin, Origin::Cache);
     // Nothing but meshes is left: n = 4, n = 3, order 2, and the moved one.
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 4);
+}
+
+/// Gmsh leaves out the last command of a script whose last line is not ended.
+#[test]
+fn the_last_line_of_a_script_need_not_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = [folder.path().join("cache")];
+    let geo = folder.path().join("main.geo");
+    std::fs::write(folder.path().join("part.geo"), SQUARE.trim_end()).unwrap();
+    let corners = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
+    let sizes = Sizing::View(view(3, &corners, &[0.5; 3]).into());
+    for script in [SQUARE.trim_end(), "Include 'part.geo';"] {
+        std::fs::write(&geo, script).unwrap();
+        for sizes in [None, Some(&sizes)].into_iter().take(if script.contains("Include") { 1 } else { 2 }) {
+            let guard = (&Guard::default(), &Interrupt::default());
+            let loaded = from_script::<2>(&located(geo.clone()), &[], sizes, Order::P1, guard, &cache).unwrap();
+            assert!(loaded.mesh.group("outside").is_some(), "{script}");
+        }
+    }
 }
 
 /// Elements twice as large are another mesh, if the script leaves them free.
@@ -156,4 +175,25 @@ fn loads_at_the_same_time_do_not_meet() {
     });
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 1);
     assert_eq!(load().origin, Origin::Cache);
+}
+
+/// Gmsh's parallel algorithm makes another mesh of the same cube, with a file of its own in the cache, whatever the number of threads.
+#[test]
+fn free_meshes_in_space_by_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = [folder.path().join("cache")];
+    let geo = folder.path().join("cube.geo");
+    let cube = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\nMeshSize{:} = 0.2;\n\
+                Physical Volume(\"all\") = {1};\nPhysical Surface(\"bottom\") = {5};\n";
+    std::fs::write(&geo, cube).unwrap();
+    let run = |threads: Option<usize>| {
+        let guard = Guard { threads, ..Guard::default() };
+        let limits = (&guard, &Interrupt::default());
+        let loaded = from_script::<3>(&located(geo.clone()), &[], None, Order::P1, limits, &cache).unwrap();
+        (loaded.origin, loaded.mesh.points.len())
+    };
+    let ((_, usual), (origin, parallel)) = (run(None), run(Some(1)));
+    assert_eq!(origin, Origin::Gmsh);
+    assert!(usual != parallel && usual.abs_diff(parallel) < usual / 4, "{usual} {parallel}");
+    assert_eq!((run(Some(2)), run(None)), ((Origin::Cache, parallel), (Origin::Cache, usual)));
 }

@@ -142,6 +142,7 @@ const CASES: &[Case] = &[
     ("geo = \"groove.geo\"", "geo = \"no/such.geo\"", "\"no/such.geo\"", "/no/such.geo", "relative"),
     ("geo = \"groove.geo\"", "geo = \".\"", "\".\"", " is not a file", ""),
     ("n = 32 }", "n = 32 }, timeout = 0", "0", "the timeout is 0", ""),
+    ("n = 32 }", "n = 32 }, threads = 0", "0", "`threads` must be 1 or more", ""),
     ("n = 32 }", "n = 32 }, memory = \"all\"", "\"all\"", "expected a number, found a string", ""),
     ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", memory = 1", "memory", "`memory` for a finished mesh", ""),
     ("n = 32", "n = \"many\"", "\"many\"", "expected a number, found a string", ""),
