@@ -13,11 +13,12 @@ use crate::scene::Scene;
 use crate::solver::options::Chosen;
 use crate::solver::{Dense, Krylov, Monolithic, Union};
 
-/// Makes the method of a scene and the solvers it needs, set up; refusals come before the first sweep.
+/// Makes the method of a scene and the solvers it needs, set up; refusals come before the first sweep. An automatic start that the set-up
+/// finds is left in `start`.
 ///
 /// # Errors
 /// Failures of PETSc.
-pub fn make(session: &Session, built: &mut Built, start: &Start) -> Result<Method> {
+pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<Method> {
     let Built { scene, discrete, linear, whole, .. } = built;
     let model = &mut discrete.model;
     let coefficient = || Coefficient::new(scene.method.psi.clone(), scene.method.robin);
@@ -40,7 +41,7 @@ fn linear_step(
     model: &mut Model,
     (linear, whole): (Linear, &Chosen),
     coefficient: Coefficient,
-    start: &Start,
+    start: &mut Start,
 ) -> Result<Box<dyn LinearStep>> {
     if linear == Linear::Sweeps {
         crate::ddm::prepare(model)?;

@@ -210,12 +210,17 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
 pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clock) -> Result<Ready> {
     let scene = built.scene.clone();
     let Begin { start, steps, earlier } = begin;
-    let start = match start {
+    let mut start = match start {
         Some(start) => start,
         None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete, 1.0)?.into(),
         None => Start::Automatic,
     };
-    let method = agree(session, method::make(session, &mut built, &start))?;
+    let mut full = start.clone();
+    let method = agree(session, method::make(session, &mut built, &mut full))?;
+    if scene.method.steps.is_empty() {
+        // what the set-up found is the start of the run; load steps have other loads
+        start = full;
+    }
     let mut names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
     if matches!(built.linear, Linear::Direct | Linear::Multigrid) {
         names.push(WHOLE);

@@ -62,6 +62,8 @@ pub enum Start {
     /// Rigid bodies on their own surfaces.
     #[default]
     Automatic,
+    /// The same, already found for these loads.
+    Found(Box<RigidStart>),
     /// Outer normal displacement of all contact rows (2n, layout of a trace vector).
     Trace(Vec<f64>),
     /// Contact pressures (n), from another mesh say, for Newton's method; sweeps begin automatically.
@@ -151,7 +153,11 @@ pub fn solve(
     observer: &mut dyn Observer,
 ) -> Result<Outcome> {
     let began = Instant::now();
-    let rigid = match infeasible(model) {
+    let found = match &settings.start {
+        Start::Found(rigid) => Ok((**rigid).clone()),
+        _ => infeasible(model),
+    };
+    let rigid = match found {
         Ok(rigid) => rigid,
         Err(status) => return Ok(Outcome::early(status, model, method)),
     };
@@ -228,10 +234,15 @@ fn fits(model: &Model, field: &Field) -> bool {
     apart <= f64::EPSILON * crate::linalg::dot(&field.trace, &field.trace)
 }
 
-/// Springs omega kappa of the first linear step of Newton's method; none if there is no solution.
-pub fn first_springs(model: &Model, begin: &Start) -> Option<Vec<f64>> {
+/// Springs omega kappa of the first linear step of Newton's method; none if there is no solution. An automatic start becomes the one
+/// found.
+pub fn first_springs(model: &Model, begin: &mut Start) -> Option<Vec<f64>> {
     let rigid = infeasible(model).ok()?;
-    Some(resisting(model, places(model, begin, &rigid).springs(model)))
+    let springs = resisting(model, places(model, begin, &rigid).springs(model));
+    if let Start::Automatic = begin {
+        *begin = Start::Found(Box::new(rigid));
+    }
+    Some(springs)
 }
 
 /// Why no method can find a solution: a motion that nothing can hold, or loads that push a body off for ever; else the start.
@@ -248,7 +259,7 @@ fn infeasible(model: &Model) -> std::result::Result<RigidStart, Status> {
 /// The places from which Newton's method begins.
 fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
     match begin {
-        Start::Automatic => rigid.places.clone(),
+        Start::Automatic | Start::Found(_) => rigid.places.clone(),
         Start::Trace(trace) => match start::find(model, Some(trace)) {
             Ok(rigid) => rigid.places,
             Err(_) => start::at(model, trace),
