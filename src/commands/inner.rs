@@ -211,9 +211,11 @@ impl<'a> Inner<'a> {
                 Candidate { dofs: plan.dofs, retained, ptr, col }
             });
             let comparison = cost::compare(&candidates.collect::<Vec<_>>(), joined);
-            let is_direct = comparison.is_direct(self.memory);
+            // bodies that are kept have their memory already
+            let are_kept = plans.iter().all(|plan| self.kept.contains_key(&plan.name));
+            let is_direct = comparison.is_direct(if are_kept { usize::MAX } else { self.memory });
             let Comparison { direct, multigrid } = comparison;
-            if is_direct {
+            if is_direct && !are_kept {
                 self.memory = self.memory.saturating_sub(direct.bytes as usize);
             }
             let dofs: usize = plans.iter().map(|plan| plan.dofs).sum();
