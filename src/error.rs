@@ -278,6 +278,21 @@ pub fn joined<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     groups.into_iter().map(group).collect::<Vec<_>>().join(" with ")
 }
 
+/// Most names in a sentence: as many as a person reads.
+const NAMES: usize = 12;
+
+/// The first of many names, and the number of others: of a few names all.
+pub fn few(names: impl IntoIterator<Item = impl ToString>) -> Vec<String> {
+    let mut names: Vec<String> = names.into_iter().map(|name| name.to_string()).collect();
+    let others = names.len().saturating_sub(NAMES);
+    // a single other one is said as fast as counted
+    if others > 1 {
+        names.truncate(NAMES);
+        names.push(format!("{others} others"));
+    }
+    names
+}
+
 /// The known name nearest to `name`, if one is near enough to be a slip of the keyboard.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known

@@ -3,7 +3,7 @@
 //! Newton's method on one rank joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
 //! bodies then need no solver of their own. Else every body has one, and sweeps solve the linear steps.
 
-use super::words::{SHOWN, in_words};
+use super::words::in_words;
 use crate::discretize::{Assembled, Factory, Outline};
 use crate::error::{Error, Kind, Result};
 use crate::fem::assemble::NodeGraph;
@@ -99,10 +99,8 @@ impl<'a> Inner<'a> {
         })
     }
 
-    /// Why the solvers are what they are, in words: once if all bodies have the same; of many bodies once for each kind of solver, by
-    /// the largest that has it.
+    /// Why the solvers are what they are, in words: for each kind of solver once, by the largest body that has it.
     pub fn reason(&self) -> String {
-        let Some(largest) = self.plans.iter().max_by_key(|plan| plan.dofs) else { return String::new() };
         let mut kinds: Vec<Vec<&Plan>> = Vec::new();
         for plan in &self.plans {
             match kinds.iter_mut().find(|kind| kind[0].preset == plan.preset) {
@@ -110,19 +108,16 @@ impl<'a> Inner<'a> {
                 None => kinds.push(vec![plan]),
             }
         }
-        if kinds.len() == 1 {
-            return largest.reason.clone();
-        }
-        let of = |plan: &&Plan| format!("{}: {}", plan.name, plan.reason);
-        let of_kind = |kind: &Vec<&Plan>| {
-            let largest = kind.iter().max_by_key(|plan| plan.dofs).map(of).unwrap_or_default();
-            format!("{} bodies, the largest {largest}", kind.len())
+        let is_one = kinds.len() == 1;
+        let of_kind = |kind: Vec<&Plan>| {
+            let largest = kind.iter().max_by_key(|plan| plan.dofs)?;
+            Some(match kind.len() {
+                _ if is_one => largest.reason.clone(),
+                1 => format!("{}: {}", largest.name, largest.reason),
+                count => format!("{count} bodies, the largest {}: {}", largest.name, largest.reason),
+            })
         };
-        let all: Vec<String> = match self.plans.len() {
-            ..=SHOWN => self.plans.iter().map(|plan| of(&plan)).collect(),
-            _ => kinds.iter().map(of_kind).collect(),
-        };
-        all.join("; ")
+        kinds.into_iter().filter_map(of_kind).collect::<Vec<_>>().join("; ")
     }
 
     /// Options of the matrix of all bodies.
@@ -160,6 +155,12 @@ impl<'a> Inner<'a> {
     /// How linear steps are solved.
     pub fn linear(&self) -> Linear {
         self.linear
+    }
+
+    /// Whether a matrix is factored on the way, by the program's choice.
+    pub fn factors(&self) -> bool {
+        let direct = |plan: &Plan| matches!(plan.preset, Preset::Condensed | Preset::Mumps);
+        self.linear != Linear::Multigrid && self.plans.iter().any(direct)
     }
 
     /// What scene and options say of a body, with the reason; none where the program is to choose. `condensable` tells whether it
@@ -299,28 +300,27 @@ fn agree(plans: &mut [Plan]) {
 
 impl Factory for Inner<'_> {
     fn plan(&mut self, outlines: &[Outline]) -> Result<()> {
-        let (mut plans, mut open) = (Vec::new(), Vec::new());
+        let mut plans = Vec::new();
+        // bodies for which the program is to choose
+        let mut open = Vec::new();
         for (index, &Outline { name, dimension, rows, prescribed, motions, .. }) in outlines.iter().enumerate() {
             let (dofs, retained) = (rows.columns, Retained::new(dimension, rows, prescribed, motions));
             let chosen = self.typed.of(name);
             let typed = chosen.asks_for_ksp();
             let condensable = (1..dofs).contains(&retained.dofs.len()) && !typed;
             let asked = self.asked_for(typed, condensable);
-            if asked.is_none() {
-                open.push(index);
-            }
+            open.push(asked.is_none());
             let (preset, reason) =
                 asked.map_or((Preset::Mumps, String::new()), |(preset, why)| (preset, why.to_owned()));
             let (name, retained) = (name.to_owned(), Some(retained));
             self.places.insert(name.clone(), index);
             plans.push(Plan { name, chosen, preset, reason, dimension, dofs, condensable, retained });
         }
-        let free = plans.iter_mut().enumerate().filter(|(index, _)| open.binary_search(index).is_ok());
-        if outlines.first().is_some_and(|outline| outline.dimension == 2) {
-            free.for_each(|(_, plan)| self.choose_in_plane(plan));
-        } else {
-            let (open, mut free): (Vec<&Outline>, Vec<&mut Plan>) = free.map(|(i, plan)| (&outlines[i], plan)).unzip();
-            self.choose_in_space(&mut free, &open);
+        let (mut plans_open, outlines_open): (Vec<&mut Plan>, Vec<&Outline>) =
+            plans.iter_mut().zip(outlines).zip(open).filter_map(|(both, open)| open.then_some(both)).unzip();
+        match outlines.first().map(|outline| outline.dimension) {
+            Some(2) => plans_open.into_iter().for_each(|plan| self.choose_in_plane(plan)),
+            _ => self.choose_in_space(&mut plans_open, &outlines_open),
         }
         self.plans = plans;
         self.linear = self.join()?;

@@ -11,7 +11,7 @@ use super::verdict::{forecast, message, status_name};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{Outcome, Status};
 use crate::discretize::Discrete;
-use crate::error::Kind;
+use crate::error::{Kind, few};
 use crate::estimate::Estimate;
 use crate::model::BodyCounts;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
@@ -162,10 +162,7 @@ pub struct Shared {
     pub solvers: Vec<String>,
 }
 
-/// Kinds of inner solvers in a sentence.
-const KINDS: usize = 4;
-
-/// Inner solvers in words: once if all bodies have the same, of many bodies the kinds that most of them have.
+/// Inner solvers in words: once if all bodies have the same, of many bodies each kind with the number of those that have it.
 pub fn solvers_in_words(solvers: &[String]) -> String {
     match solvers {
         [first, rest @ ..] if rest.iter().all(|other| other == first) => first.clone(),
@@ -175,9 +172,7 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
             all.iter().for_each(|solver| *counts.entry(solver).or_default() += 1);
             let mut kinds: Vec<(&str, usize)> = counts.into_iter().collect();
             kinds.sort_by_key(|kind| std::cmp::Reverse(kind.1));
-            let others: usize = kinds.iter().skip(KINDS).map(|kind| kind.1).sum();
-            let said = kinds.iter().take(KINDS).map(|(solver, count)| format!("{count} bodies {solver}"));
-            said.chain((others > 0).then(|| format!("{others} others"))).collect::<Vec<_>>().join(", ")
+            few(kinds.iter().map(|(solver, count)| format!("{count} bodies {solver}"))).join(", ")
         }
     }
 }

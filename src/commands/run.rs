@@ -17,7 +17,6 @@ use crate::interrupt::Interrupt;
 use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
-use crate::problem::body::BodySpec;
 use crate::problem::mesh::MeshSource;
 use crate::problem::method::Linear;
 use crate::problem::order::Order;
@@ -73,15 +72,9 @@ fn build_in<const D: usize>(
     interrupt.hold();
     let mesh = mesh::<D>(session, &scene, interrupt)?;
     let mesh = agree(session, interrupt.release().and_then(|()| discretize::verify(&scene, &mesh)))?;
-    agree(session, refuse(&mesh.bodies))?;
     let names: Vec<&str> = mesh.bodies.iter().map(|body| body.name.value.as_str()).collect();
     agree(session, scene_options(session, &scene, &names))?;
     clock.phase("mesh");
-    let largest = mesh.mesh.points.len() * D;
-    // small fronts and several ranks lose by BLAS threads, large factorisations gain
-    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-    let threads = if D == 2 || largest < LARGE_FRONTS { 1 } else { cores / session.size() };
-    session.set_blas_threads(threads);
     let mut inner = Inner::new(session, &scene, &names, kept)?;
     let ranks = (session.rank(), session.size());
     let exchange = Box::new(Ranks::new(session));
@@ -89,23 +82,16 @@ fn build_in<const D: usize>(
     let discrete = discretize::discretize(&scene, &mesh, cut, ranks, keep, exchange, &mut inner);
     let mut discrete = agree(session, discrete)?;
     discrete.share();
+    // small fronts and several ranks lose by BLAS threads, and the short vectors of a Krylov method do; large factorisations gain
+    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
+    let gains = D == 3 && mesh.mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
+    session.set_blas_threads(if gains { cores / session.size() } else { 1 });
     clock.phase("discretize");
     let mut warnings = warnings(session, &discrete);
     warnings.extend(inner.applied_once());
     let (linear, whole) = (inner.linear(), inner.whole().clone());
     let (choice, condensed) = (inner.reason(), inner.condensed());
     Ok(Built { scene, discrete, linear, whole, choice, condensed, warnings })
-}
-
-/// What the decoder of the scene cannot know.
-fn refuse(bodies: &[BodySpec]) -> Result<()> {
-    for body in bodies {
-        if let Some(reason) = options::forbidden_body_name(&body.name.value) {
-            let message = format!("`{}` cannot name a body: {reason}", body.name.value);
-            return Err(Error::scene(&body.name.place, message).help("rename the physical group and the body"));
-        }
-    }
-    Ok(())
 }
 
 /// PETSc options of the scene, weaker than typed ones.

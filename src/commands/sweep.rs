@@ -4,14 +4,14 @@ use super::asking::Asking;
 use super::clock::Clock;
 use super::keep::Keep;
 use super::run;
-use super::shown::{self, Shown};
+use super::shown;
 use super::stages::Begin;
 use super::{folder_of, report, results, reuse};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::plot::{ConvergenceSeries, PressureSeries};
-use crate::output::{Folder, LISTED, Plot, Report, say, sci};
+use crate::output::{Folder, LISTED, Plot, Report, busiest, say, sci};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use std::collections::BTreeMap;
@@ -88,9 +88,8 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         }
         histories.push(report::convergence(&label, &done.outcome));
         let pairs = &done.model().pairs;
-        let shown =
-            shown.get_or_insert_with(|| Shown::busiest(&report.pairs, scenes[0].output.pairs.unwrap_or(LISTED)));
-        for i in (0..pairs.len()).filter(|&i| pairs[i].along_curve && shown.has(i)) {
+        let shown = shown.get_or_insert_with(|| busiest(&report.pairs, scenes[0].output.pairs.unwrap_or(LISTED)));
+        for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
             let curve = (report::main_axis(&pairs[i]).1, report::pressure(&label, &done, i));
             pressures.entry(i).or_default().push(curve);
             if let Some(curve) = report::reference(&done.built.discrete, i) {

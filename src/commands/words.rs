@@ -1,16 +1,10 @@
 //! Lists of names in sentences.
 
-/// Most names of bodies in a sentence.
-pub const SHOWN: usize = 12;
+use crate::error::few;
 
 /// Names of bodies as in a sentence.
 pub fn in_words<'a>(names: impl Iterator<Item = &'a String>) -> String {
-    let mut names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
-    let others = names.len().saturating_sub(SHOWN);
-    if others > 1 {
-        names.truncate(SHOWN);
-        names.push(format!("{others} others"));
-    }
+    let mut names = few(names.map(|name| format!("`{name}`")));
     match names.pop() {
         Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
         last => last.unwrap_or_default(),

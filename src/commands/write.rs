@@ -2,12 +2,12 @@
 
 use super::clock::Clock;
 use super::results::{self, Recovered};
-use super::shown::{self, Shown};
+use super::shown;
 use super::stages::Done;
 use super::{adapt::Plan, report};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
-use crate::output::{Folder, LISTED, PairRow, Plot, Report, contacts, vtu};
+use crate::output::{Folder, LISTED, PairRow, Plot, Report, busiest, contacts, vtu};
 use crate::petsc::Session;
 use std::path::Path;
 
@@ -50,12 +50,16 @@ impl Writing<'_> {
         let mut report = make(clock);
         let mut written = Ok(());
         if first {
-            let most = done.built.scene.output.pairs.unwrap_or(LISTED);
-            let shown = Shown::busiest(&report.pairs, most);
-            report.left_out = shown.left_out();
+            let output = &done.built.scene.output;
+            let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
+            report.left_out = shown::left_out(&report.pairs, &shown);
             let plots = Plots::of(done, &shown);
-            let early = self.small(&folder, &report, &shown, &plots).and(self.report(&folder, &mut report, false));
-            written = early.and(plots.write(done, &folder));
+            written = self.small(&folder, &report, &shown, &plots);
+            if output.plots || fields {
+                // before what is large
+                written = written.and(self.report(&folder, &mut report, false));
+            }
+            written = written.and(plots.write(done, &folder));
         }
         if fields {
             written = written.and(self.fields(&recovered, &folder));
@@ -71,19 +75,16 @@ impl Writing<'_> {
     }
 
     /// Tables: one of all pairs, and those of the pairs shown.
-    fn small(&self, folder: &Folder, report: &Report, shown: &Shown, plots: &Plots) -> Result<()> {
+    fn small(&self, folder: &Folder, report: &Report, shown: &[usize], plots: &Plots) -> Result<()> {
         let mut rows: Vec<PairRow> = (0..report.pairs.len()).map(|i| report::pair_row(self.done, i)).collect();
         let stems = shown::stems(self.done);
-        for (i, row) in rows.iter_mut().enumerate().filter(|(i, _)| shown.has(*i)) {
-            row.table = format!("{}.csv", stems[i]);
-        }
+        shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));
         plots.0.iter().for_each(|(i, file)| rows[*i].plot.clone_from(file));
-        let save = |(i, row): (usize, &PairRow)| {
+        let save = |&i: &usize| {
             let table = report::contact_table(self.done, self.estimate, i);
-            folder.write(&row.table, |out| table.write(out)).map(|_| ())
+            folder.write(&rows[i].table, |out| table.write(out)).map(|_| ())
         };
-        let tables = rows.iter().enumerate().filter(|(_, row)| !row.table.is_empty());
-        tables.map(save).fold(contacts::save(folder, &report.pairs, &rows).map(|_| ()), Result::and)
+        shown.iter().map(save).fold(contacts::save(folder, &report.pairs, &rows).map(|_| ()), Result::and)
     }
 
     fn report(&self, folder: &Folder, report: &mut Report, fields: bool) -> Result<()> {
@@ -139,10 +140,9 @@ struct Plots(Vec<(usize, String)>);
 
 impl Plots {
     /// Only along curves: points of a surface over one coordinate would be a cloud.
-    fn of(done: &Done, shown: &Shown) -> Self {
-        let pairs = &done.model().pairs;
-        let has_plot = |i: &usize| done.built.scene.output.plots && shown.has(*i) && pairs[*i].along_curve;
-        let plotted: Vec<usize> = (0..pairs.len()).filter(has_plot).collect();
+    fn of(done: &Done, shown: &[usize]) -> Self {
+        let has_plot = |i: &usize| done.built.scene.output.plots && done.model().pairs[*i].along_curve;
+        let plotted: Vec<usize> = shown.iter().copied().filter(has_plot).collect();
         let files = shown::numbered(plotted.iter().map(|_| "pressure".to_owned()));
         Self(plotted.into_iter().zip(files.into_iter().map(|name| format!("{name}.svg"))).collect())
     }

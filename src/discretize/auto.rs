@@ -1,13 +1,12 @@
 //! Pairs that rules of the scene leave to be found: boundary facets of different bodies that face each other within a distance.
 
-use super::find::few;
 use super::part::Part;
 use super::roster::{pattern, tie};
 use super::surface::Surface;
 use crate::contact::Side;
 use crate::contact::pieces::{Cut, Reach, Search};
 use crate::contact::side::unit;
-use crate::error::{Error, Place, Result};
+use crate::error::{Error, Place, Result, few};
 use crate::fem::Facets;
 use crate::problem::contact::AutoContact;
 use crate::problem::pattern::Rank;
@@ -124,7 +123,7 @@ impl Matches {
         let names = || parts.iter().map(|part| part.spec.name.value.as_str());
         let matching = patterns.each_ref().map(|pattern| names().map(|name| pattern.matches(name)).collect::<Vec<_>>());
         if let Some((nothing, _)) = of.iter().zip(&matching).find(|(_, matching)| !matching.contains(&true)) {
-            let help = format!("the bodies of the scene: {}", few(&names().collect::<Vec<_>>()));
+            let help = format!("the bodies of the scene: {}", few(names()).join(", "));
             return Err(Error::scene(&nothing.place, format!("no body matches `{}`", nothing.value)).help(help));
         }
         let [a, b] = patterns.map(|pattern| pattern.rank());

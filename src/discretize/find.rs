@@ -1,7 +1,7 @@
 //! Mesh groups by name, and refusals that point into the scene.
 
 use crate::contact;
-use crate::error::{Error, Located, Result};
+use crate::error::{Error, Located, Result, few};
 use crate::expression::Field;
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::BodySpec;
@@ -35,18 +35,8 @@ pub fn find_group<'m, const D: usize>(
     }
     Err(match crate::error::nearest(&name.value, known.iter().copied()) {
         Some(near) => error.help(format!("did you mean `{near}`?")),
-        None => error.help(format!("physical groups of that kind: {}", few(&known))),
+        None => error.help(format!("physical groups of that kind: {}", few(known).join(", "))),
     })
-}
-
-/// Names in a row, as many as a person reads.
-pub fn few(names: &[&str]) -> String {
-    const FEW: usize = 12;
-    match names.len().saturating_sub(FEW) {
-        0 if names.is_empty() => "none".to_owned(),
-        0 | 1 => names.join(", "),
-        more => format!("{} and {more} more", names[..FEW].join(", ")),
-    }
 }
 
 /// The refusal of a support or load on another body's group.

@@ -7,6 +7,7 @@ use super::draft::{Draft, Loose, NO_WORK, works};
 use super::gauge;
 use super::part::Part;
 use crate::contact::ContactPair;
+use crate::error::few;
 use crate::fem::Space;
 use crate::fem::rigid::{self, RigidMotion};
 use crate::linalg::{Blocks, PART, TOLERANCE, axpy, dot, fit};
@@ -18,9 +19,6 @@ use std::collections::HashMap;
 /// of rounding: chords of the arc between neighbouring nodes leave it by 1/8 of their angle squared, and two meshes turn against
 /// each other by that much: 0.03 are chords of 28 degrees.
 const FLAWED: f64 = 0.03;
-
-/// Most bodies whose motions make the name of a motion of all.
-const SHOWN: usize = 12;
 
 /// What was fixed, and what cannot be.
 pub struct Fixed {
@@ -210,11 +208,7 @@ impl<const D: usize> Search<'_, '_, D> {
                 moving.displacement.push(displacement);
                 each.push(format!("{} of {}", rigid::combine(left, &weights).name, self.parts[body].spec.name.value));
             }
-            moving.name = self.name_as_one(&moving).unwrap_or_else(|| {
-                let others = each.len().saturating_sub(SHOWN);
-                let more = if others > 0 { format!(", and motions of {others} others") } else { String::new() };
-                each[..each.len() - others].join(", ") + &more
-            });
+            moving.name = self.name_as_one(&moving).unwrap_or_else(|| few(each).join(", "));
             moving
         };
         factor.kernel_entries().iter().map(moving).collect()

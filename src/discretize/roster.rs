@@ -1,7 +1,7 @@
 //! The single bodies of a scene in which tables, and lines in them, stand for many by patterns of names.
 
-use super::find::{few, find_group};
-use crate::error::{Error, Located, Place, Result};
+use super::find::find_group;
+use crate::error::{Error, Located, Place, Result, few};
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, LoadKind, fault};
 use crate::problem::pattern::{BODY, Pattern, Rank, is_pattern};
@@ -108,10 +108,9 @@ fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Ve
     match in_vain.first().map(|&table| &scene.bodies[table].name) {
         None => Ok(members),
         Some(name) => {
-            let known: Vec<&str> = mesh.group_names(D).collect();
             let message = format!("no group of cells matches `{}`", name.value);
             let error = Error::scene(&name.place, message).because(format!("mesh {}", mesh.path.display()));
-            Err(error.help(format!("its groups of cells: {}", few(&known))))
+            Err(error.help(format!("its groups of cells: {}", few(mesh.group_names(D)).join(", "))))
         }
     }
 }
@@ -220,6 +219,6 @@ impl<const D: usize> Lines<'_, D> {
             .map(|group| group.name.as_str())
             .collect();
         known.dedup();
-        Error::scene(&on.place, message).help(format!("groups of that kind on these bodies: {}", few(&known)))
+        Error::scene(&on.place, message).help(format!("groups of that kind on these bodies: {}", few(known).join(", ")))
     }
 }

@@ -366,12 +366,8 @@ impl Report {
             let (number, k) = (index + 1, step.iterations);
             lines.push(format!("  step {number}, factor {factor}: {k} iterations, {}: {pairs}", step.status));
         }
-        let mut busiest: Vec<&PairReport> = self.pairs.iter().collect();
-        if let Some(left_out) = &self.left_out {
-            busiest.sort_by(|a, b| size(b.force[0]).total_cmp(&size(a.force[0])));
-            lines.push(format!("  {left_out}"));
-        }
-        for pair in busiest.into_iter().take(LISTED) {
+        lines.extend(self.left_out.iter().map(|left_out| format!("  {left_out}")));
+        for pair in busiest(&self.pairs, LISTED).into_iter().map(|i| &self.pairs[i]) {
             let names = format!("  {} - {}", pair.bodies[0], pair.bodies[1]);
             lines.push(if pair.peak_pressure > 0.0 {
                 let [x, y, z] = pair.peak_at.map(|x| readable(x, 4));
@@ -425,9 +421,16 @@ pub fn warning_lines(warnings: &[String], others: &str) -> Vec<String> {
     lines
 }
 
-/// Length of a vector.
-fn size(v: [f64; 3]) -> f64 {
-    v.iter().map(|v| v * v).sum::<f64>().sqrt()
+/// Numbers of the pairs with the largest forces, at most `most`, in the order of the scene; of equal ones the first.
+pub fn busiest(pairs: &[PairReport], most: usize) -> Vec<usize> {
+    let size = |i: &usize| pairs[*i].force[0].iter().map(|f| f * f).sum::<f64>();
+    // a force that is not a number is none
+    let size = |i: &usize| Some(size(i)).filter(|size| size.is_finite()).unwrap_or(0.0);
+    let mut order: Vec<usize> = (0..pairs.len()).collect();
+    order.sort_by(|i, j| size(j).total_cmp(&size(i)));
+    order.truncate(most);
+    order.sort_unstable();
+    order
 }
 
 /// A vector as text.
@@ -439,4 +442,16 @@ fn vector(v: [f64; 3]) -> String {
 fn readable(value: f64, digits: usize) -> String {
     let size = value.abs();
     if value == 0.0 || (1e-3..1e6).contains(&size) { format!("{value:.digits$}") } else { sci(value, digits) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_busiest_pairs_are_those_with_the_largest_forces() {
+        let pair = |x: f64, y: f64| PairReport { force: [[x, y, 0.0]; 2], ..PairReport::default() };
+        let pairs = [pair(3.0, 4.0), pair(f64::NAN, 0.0), pair(0.0, -9.0), pair(5.0, 0.0)];
+        assert_eq!([1, 2, 9].map(|most| busiest(&pairs, most)), [vec![2], vec![0, 2], vec![0, 1, 2, 3]]);
+    }
 }

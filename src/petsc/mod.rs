@@ -41,6 +41,7 @@ mod session;
 mod table;
 mod vector;
 mod waiting;
+mod words;
 
 pub use blas::{cholesky, cholesky_solve};
 pub use ffi::Int;
@@ -52,6 +53,7 @@ pub use options::{FAMILIES, Options};
 pub use reason::ConvergedReason;
 pub use session::Session;
 pub use waiting::Entry;
+pub use words::{begins_options, is_family, is_global};
 
 /// Runs `action` and returns its result and all that PETSc printed meanwhile, which is not shown.
 ///

@@ -4,6 +4,7 @@ use super::elasticity::{ElasticitySpec, RegionSpec};
 use super::order::Order;
 use crate::error::Located;
 use crate::expression::{Differentiable, Field};
+use crate::petsc::{begins_options, is_family};
 
 /// A body: a named group of cells, its elasticity, supports and loads; or, in a scene, as many bodies as its name, a
 /// [pattern](super::pattern), stands for.
@@ -95,14 +96,28 @@ pub fn is_in_name(c: char) -> bool {
 /// Why a body cannot have this name, and what to do about it. A word of PETSc's own options is none, as the body could not have options
 /// of its own; one that follows another would give it those of a solver inside that body's (`-brick_sub_ksp_type`).
 pub fn fault(name: &str) -> Option<[&'static str; 2]> {
-    const WORDS: &[&str] = &[
-        "ksp", "pc", "mat", "vec", "sub", "mg", "snes", "ts", "tao", "dm", "is", "log", "options", "help", "malloc",
-        "info", "on", "fp", "newton",
-    ];
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.chars().all(is_in_name) {
         return Some(SPELLING);
     }
-    let nested = name.split('_').any(|word| ["ksp", "pc", "mat", "vec", "sub", "mg"].contains(&word));
-    (nested || WORDS.contains(&name))
+    // `newton` begins those of all bodies together
+    (begins_options(name) || name.split('_').any(is_family) || name == "newton")
         .then_some(["a word of PETSc's own options", "choose another name, also for the physical group in the mesh"])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_of_names() {
+        for name in
+            ["ksp", "mg", "snes", "is", "log", "options", "help", "viewer", "mumps", "newton", "brick_sub", "a_pc_b"]
+        {
+            assert!(fault(name).is_some_and(|[label, _]| label.contains("PETSc")), "{name}");
+        }
+        for name in ["", "2up", "up-per", "üb", "a b", "Upper"] {
+            assert_eq!(fault(name), Some(SPELLING), "{name}");
+        }
+        assert_eq!(["punch", "upper2", "brick_17", "subway_log"].map(fault), [None; 4]);
+    }
 }

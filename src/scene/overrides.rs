@@ -4,7 +4,7 @@
 //! (`body.upper.order`). VALUE is TOML, or a bare text. What is replaced then stands in the words of the option, so later refusals point there.
 
 use super::read::{self, Entry, Node, Value};
-use crate::error::{Error, Kind, Place, Result, Source};
+use crate::error::{Error, Kind, Place, Result, Source, few};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -14,9 +14,6 @@ const SHORT: [(&str, &str); 3] =
 
 /// Options without a value, which set a key to true.
 const FLAGS: [(&str, &str); 3] = [("--estimate", "estimate"), ("--vtu", "output.vtu"), ("--trust-geo", "trust_geo")];
-
-/// Names that a refusal lists at most.
-const NAMES: usize = 12;
 
 /// Applies one override to the tree of a scene: `KEY=VALUE`, or an option with its value as typed (`--over KEY=VALUE`,
 /// `--tolerance 1e-3`, `--vtu`).
@@ -134,11 +131,11 @@ fn descend<'a>(node: &'a mut Node, key: &Key<'_>, parent: &str, indexed: bool) -
                     Some(item) => Ok(&mut items[item]),
                     None => {
                         let error = refuse(format!("`{parent}` is a list of {count}; `{}` is no number", key.name));
-                        let names: Vec<&str> = items.iter().filter_map(Node::name_in).take(NAMES).collect();
+                        let names: Vec<&str> = items.iter().filter_map(Node::name_in).collect();
                         Err(if names.is_empty() {
                             error
                         } else {
-                            error.help(format!("their names: {}", names.join(", ")))
+                            error.help(format!("their names: {}", few(names).join(", ")))
                         })
                     }
                 };

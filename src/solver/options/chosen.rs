@@ -1,8 +1,8 @@
 //! The options of one solver, which PETSc sees only while that solver is made and set up.
 
-use super::{FAMILIES, looks};
+use super::looks;
 use crate::error::Result;
-use crate::petsc::Session;
+use crate::petsc::{FAMILIES, Session};
 use std::collections::BTreeMap;
 
 /// Why a solver has an option.

@@ -1,10 +1,9 @@
 //! Options that nobody read: slips of the keyboard, and good options that have no effect.
 
-use super::global::{GLOBAL, GLOBAL_WORDS};
 use super::probe::Names;
 use super::typed::{Prefixes, Typed};
 use crate::error::{Result, nearest};
-use crate::petsc::{Entry, Session};
+use crate::petsc::{Entry, Session, is_global};
 use std::collections::BTreeSet;
 
 /// An option that the user typed and nobody read.
@@ -117,8 +116,7 @@ fn is_late(name: &str, prefixes: &Prefixes) -> bool {
         Some((_, own)) => own,
         None => {
             let bare = bare(name);
-            let global = GLOBAL.split_whitespace().any(|known| known == bare);
-            if global || bare.split('_').next().is_some_and(|first| GLOBAL_WORDS.contains(&first)) {
+            if is_global(bare) {
                 return true;
             }
             bare

@@ -1,0 +1,69 @@
+//! Words that begin options of PETSc, and options of PETSc as a whole, which belong to no solver.
+
+use super::FAMILIES;
+
+/// Options of PETSc as a whole, some of which it reads only at its end.
+const GLOBAL: &str = "log log_all log_exclude log_exclude_actions log_exclude_objects log_mpe log_nvtx log_perfstubs \
+    log_summary log_sync log_threshold log_trace log_view log_view_gpu_energy log_view_gpu_time log_view_memory \
+    options_file options_file_yaml options_left options_monitor options_monitor_cancel options_string_yaml \
+    options_suppress_deprecated_warnings options_view malloc malloc_coalesce malloc_debug malloc_dump malloc_hbw \
+    malloc_info malloc_requested_size malloc_test malloc_view malloc_view_threshold on_error_abort \
+    on_error_attach_debugger on_error_emacs on_error_malloc_dump on_error_mpiabort help version info info_exclude \
+    memory_view objects_dump error_output_none error_output_stdout debug_terminal debugger_nodes debugger_pause \
+    debugger_ranks start_in_debugger stop_for_debugger fp_trap no_signal_handler check_pointer_intensity citations \
+    history get_total_flops shared_tmp not_shared_tmp tmp mpi_return_on_error nox nox_warning display x_virtual \
+    skip_petscrc process_view petsc_ci petsc_ci_portable_error_output petsc_sleep use_gpu_aware_mpi saws_options \
+    splitreduction_async vecscatter_view build_twosided";
+
+/// First words of options that PETSc reads when it makes a device, a window or a file.
+const GLOBAL_WORDS: [&str; 8] = ["draw", "drawaxis", "viewer", "device", "cuda", "hip", "lg", "prefix"];
+
+/// Words that begin options of PETSc, besides [`FAMILIES`] and those of PETSc as a whole.
+const MORE_WORDS: [&str; 29] = [
+    "snes",
+    "ts",
+    "tao",
+    "dm",
+    "is",
+    "da",
+    "dmda",
+    "dmplex",
+    "petscspace",
+    "petscfv",
+    "petscds",
+    "sf",
+    "sfnode",
+    "partitioner",
+    "petscpartitioner",
+    "vecscatter",
+    "ao",
+    "pf",
+    "ps",
+    "eps",
+    "svd",
+    "st",
+    "bv",
+    "hypre",
+    "mumps",
+    "npc",
+    "no",
+    "not",
+    "winklerprobe",
+];
+
+/// Whether an option, without its dash, is one of PETSc as a whole.
+pub fn is_global(name: &str) -> bool {
+    GLOBAL.split_whitespace().any(|known| known == name)
+        || name.split('_').next().is_some_and(|first| GLOBAL_WORDS.contains(&first))
+}
+
+/// Whether options of PETSc begin with this word.
+pub fn begins_options(word: &str) -> bool {
+    let of_whole = || GLOBAL.split_whitespace().any(|name| name.split('_').next() == Some(word));
+    is_family(word) || GLOBAL_WORDS.contains(&word) || MORE_WORDS.contains(&word) || of_whole()
+}
+
+/// Whether a word is that of an object family, alone or between two `_` (`-sub_ksp_type`).
+pub fn is_family(word: &str) -> bool {
+    FAMILIES.iter().any(|family| family.strip_suffix('_') == Some(word))
+}
