@@ -3,8 +3,10 @@
 mod auto;
 mod balance;
 mod carried;
+mod distribute;
 mod draft;
 mod elastic;
+mod factory;
 mod fields;
 mod find;
 mod gauge;
@@ -22,20 +24,21 @@ use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
 use crate::fem::{
-    ElasticBody,
     assemble::NodeGraph,
-    rigid::{self, FreeMotion, RigidMotion},
+    rigid::{self, RigidMotion},
 };
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Checked;
-use crate::model::{Body, BodySlot, Exchange, Mechanism, Model, Segment};
+use crate::model::{BodySlot, Exchange, Mechanism, Model, Segment};
 use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
 use crate::problem::method::Start;
 use crate::scene::Scene;
 use balance::Forces;
 pub use balance::{Balance, Resultant};
+pub use distribute::Graph;
 use draft::{Draft, Loose};
+pub use factory::{Assembled, Factory, Outline};
 use fields::{ErrorMaker, FieldMaker};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
@@ -44,57 +47,6 @@ use std::cell::OnceCell;
 use std::rc::Rc;
 pub use surface::ContactSurface;
 pub use verify::{Verified, verify};
-
-/// What every rank knows of a body before its owner assembles it.
-pub struct Outline<'a> {
-    /// Name in the scene.
-    pub name: &'a str,
-    /// Space dimension: dofs of a node.
-    pub dimension: usize,
-    /// All contact rows of the body, pair by pair; columns: its dofs.
-    pub rows: &'a Csr,
-    /// Prescribed (dof, value), sorted by dof.
-    pub prescribed: &'a [(usize, f64)],
-    /// Rigid motions of the free body.
-    pub motions: &'a [RigidMotion],
-    /// Which of its nodes K couples, made when it is first asked for.
-    pub graph: &'a dyn Fn() -> &'a NodeGraph,
-}
-
-/// Gives bodies their inner solvers.
-pub trait Factory {
-    /// Decides on the solvers of all bodies, in the order of the scene: called once, on every rank.
-    ///
-    /// # Errors
-    /// Failures of PETSc's options.
-    fn plan(&mut self, outlines: &[Outline]) -> Result<()>;
-
-    /// Makes a body, on the rank that owns it, after its plan.
-    ///
-    /// # Errors
-    /// PETSc's refusal of a matrix or an option value.
-    fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>>;
-
-    /// A body of this name with the same K, f and contact rows, left by an earlier scene on the rank that owns it.
-    fn kept(&mut self, name: &str) -> Option<BodySlot>;
-}
-
-/// A body ready for its inner solver.
-pub struct Assembled {
-    /// Name in the scene.
-    pub name: String,
-    /// Space dimension: block size of the matrix.
-    pub dimension: usize,
-    /// K, f and supports.
-    pub body: ElasticBody,
-    /// All contact rows of the body, pair by pair.
-    pub rows: Csr,
-    /// Motions with hardly any strain in a few cells, for multigrid's near-null space: the rigid ones of the free body, in one of
-    /// revolution those of its meridian.
-    pub motions: Vec<RigidMotion>,
-    /// Those that its supports leave.
-    pub left: Vec<FreeMotion>,
-}
 
 /// What the check of the mesh of a body counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -229,7 +181,7 @@ pub fn discretize<const D: usize>(
     cut: contact::pieces::Cut<D>,
     ranks: (usize, usize),
     keep: bool,
-    exchange: Box<dyn Exchange>,
+    exchange: Rc<dyn Exchange>,
     factory: &mut dyn Factory,
 ) -> Result<Discrete> {
     let Verified { mesh, bodies, checked } = verified;
@@ -244,7 +196,7 @@ pub fn discretize<const D: usize>(
         contacts.push(ContactInfo { spec, swapped, surface });
     }
     let loads: Vec<usize> = parts.iter().map(|part| part.space.dofs()).collect();
-    let owner = crate::parallel::owners(&loads, ranks.1);
+    let mut owner = crate::parallel::owners(&loads, ranks.1);
     let (mut slots, mut infos, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
     let (mut assemblies, mut assemblies_avoided) = (0, 0);
     let drafts = parts.iter().zip(draft::segments(parts.len(), &pairs));
@@ -267,6 +219,14 @@ pub fn discretize<const D: usize>(
         graph,
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
+    let all_graphs = || lazy.iter().map(|graph| graph()).collect::<Vec<&NodeGraph>>();
+    let dealt = factory.deal_out(&|| distribute::graph::<D>(&all_graphs(), &drafts, &pairs))?;
+    let dealt = dealt.map(|dealt| distribute::distribute::<D>(&all_graphs(), &drafts, &dealt, ranks, &exchange));
+    let mut dealt: Vec<_> =
+        dealt.map_or_else(|| drafts.iter().map(|_| None).collect(), |all| all.into_iter().map(Some).collect());
+    for (owner, dealt) in owner.iter_mut().zip(&dealt) {
+        *owner = dealt.as_ref().map_or(*owner, |(_, places)| places.leader);
+    }
     let drafts = drafts.into_iter().zip(supported).zip(graphs);
     let known = gauged.into_iter().zip(loose);
     for (index, ((part, ((draft, supported), graph)), (gauged, loose))) in
@@ -296,18 +256,27 @@ pub fn discretize<const D: usize>(
         if let Some(before) = factory.kept(&name) {
             (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             assemblies_avoided += 1;
-        } else if owner[index] == ranks.0 {
+        } else if owner[index] == ranks.0 || dealt[index].is_some() {
             let left = rigid::free(&left, &prescribed, &load);
-            let graph = graph.into_inner().unwrap_or_else(|| part.graph(&rows));
-            let body = part.assemble(mesh, &graph, &elasticity, load, prescribed, carried)?;
+            let mut graph = graph.into_inner().unwrap_or_else(|| part.graph(&rows));
+            let dealt = dealt[index].take();
+            if let Some((own, places)) = &dealt {
+                graph = graph.of(|node| places.is_own::<D>(own, node));
+            }
+            let body = part.assemble(mesh, &graph, &elasticity, load, prescribed, carried, dealt.as_ref())?;
             drop(graph);
-            assemblies += 1;
-            scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-            row_stiffness = rows.quadratic_diagonal(&body.stiffness);
+            let distribution = dealt.map(|(distribution, _)| distribution);
+            if owner[index] == ranks.0 {
+                assemblies += 1;
+                scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
+            }
+            let own = distribution.as_ref().map(|distribution| distribution.of_rows(&rows));
+            row_stiffness = own.as_ref().unwrap_or(&rows).quadratic_diagonal(&body.stiffness);
             local = Some(factory.make(Assembled {
                 name: name.clone(),
                 dimension: D,
                 body,
+                distribution,
                 rows,
                 motions: part.smooth(free),
                 left,

@@ -59,7 +59,7 @@ pub fn estimate(
         if let Some(body) = &model.bodies[index].local {
             let mut u = body.recover(state)?;
             u.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
-            all = Some(u);
+            all = Some(u).filter(|_| body.leads());
         }
         displacements.push(all.map(|all| meshes.displacements(index, &all)));
     }
@@ -111,6 +111,12 @@ pub fn estimate(
     drop(recovered);
     for (body, load) in loads.iter_mut().enumerate().filter(|(_, load)| !load.is_empty()) {
         meshes.forces(body, load);
+    }
+    for (slot, load) in model.bodies.iter().zip(&mut loads) {
+        if let Some(distribution) = slot.local.as_ref().and_then(|body| body.distribution()) {
+            load.resize(distribution.dofs, 0.0);
+            model.exchange.sum(load);
+        }
     }
 
     let response = linear::respond(model, step, layer, &loads, ROUGH)?;

@@ -7,7 +7,7 @@ use super::stages::{Begin, Done};
 use crate::ddm::{Row, Start, State};
 use crate::discretize::Discrete;
 use crate::error::{Error, Kind, Result};
-use crate::model::{Field, Model};
+use crate::model::{BodySlot, Distribution, Field, Model};
 use crate::output::{RoundReport, StepReport, write_whole};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -109,8 +109,18 @@ impl Checkpoint {
             return Err(self.other("mesh"));
         }
         let Self { head, earlier, mut state, .. } = self;
-        let here = discrete.model.bodies.iter().map(|slot| slot.local.is_some());
-        state.field.states.iter_mut().zip(here).filter(|(_, here)| !here).for_each(|(state, _)| state.clear());
+        for (state, slot) in state.field.states.iter_mut().zip(&discrete.model.bodies) {
+            match &slot.local {
+                None => state.clear(),
+                Some(body) => {
+                    // of a body that another solver worked with the traces count
+                    let fits = |whole: &&Distribution| state.len() == whole.dofs + body.rigid();
+                    if let Some(distribution) = body.distribution().filter(fits) {
+                        *state = distribution.scatter(state);
+                    }
+                }
+            }
+        }
         Ok(Begin { start: Some(Start::Continue(Box::new(state))), steps: head.steps, earlier })
     }
 
@@ -122,13 +132,22 @@ impl Checkpoint {
     }
 }
 
-/// States of all bodies one after another, and their lengths; two messages.
+/// States of all bodies one after another, and their lengths; two messages, and one for each body that is dealt out.
 fn gather(model: &Model, field: &Field) -> (Vec<usize>, Vec<f64>) {
-    let mut lengths: Vec<f64> = field.states.iter().map(|state| state.len() as f64).collect();
+    let whole = |(slot, state): (&BodySlot, &Vec<f64>)| {
+        let Some((body, distribution)) = slot.local.as_ref().and_then(|body| Some((body, body.distribution()?))) else {
+            return state.clone();
+        };
+        let (own, rigid) = state.split_at(state.len() - body.rigid());
+        let all = distribution.gather(own, rigid);
+        if body.leads() { all } else { Vec::new() }
+    };
+    let states: Vec<Vec<f64>> = model.bodies.iter().zip(&field.states).map(whole).collect();
+    let mut lengths: Vec<f64> = states.iter().map(|state| state.len() as f64).collect();
     model.exchange.sum(&mut lengths);
     let mut all = vec![0.0; lengths.iter().sum::<f64>() as usize];
     let mut rest = &mut all[..];
-    for (state, length) in field.states.iter().zip(&lengths) {
+    for (state, length) in states.iter().zip(&lengths) {
         let (own, others) = rest.split_at_mut(*length as usize);
         // empty where the body lives elsewhere
         own.iter_mut().zip(state).for_each(|(place, number)| *place = *number);

@@ -1,23 +1,24 @@
 //! The inner solvers: what was asked for, or the program's choice and its reason.
 //!
-//! Newton's method on one rank joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
+//! Newton's method joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
 //! bodies then need no solver of their own. Else every body has one, and sweeps solve the linear steps.
 
 use super::words::in_words;
-use crate::discretize::{Assembled, Factory, Outline};
+use crate::discretize::{Assembled, Factory, Graph, Outline};
 use crate::error::{Error, Kind, Result};
 use crate::fem::assemble::NodeGraph;
 use crate::model::{Body, BodySlot};
-use crate::petsc::Session;
+use crate::parallel::agree as agreed;
+use crate::petsc::{Session, partition};
 use crate::problem::method::{Linear, MethodName};
 use crate::problem::solver::Preset;
 use crate::scene::Scene;
-use crate::solver::cost::{self, Candidate, Comparison};
+use crate::solver::cost::{self, Candidate, Comparison, Step};
 use crate::solver::options::{Chosen, Typed};
 use crate::solver::preset::{self, Size};
 use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory};
 use mpi::collective::SystemOperation;
-use mpi::traits::CommunicatorCollectives;
+use mpi::traits::{Communicator, CommunicatorCollectives, Root};
 use std::collections::{BTreeMap, HashMap};
 
 /// Prefix of the PETSc options of the matrix of all bodies.
@@ -183,7 +184,7 @@ impl<'a> Inner<'a> {
     /// Whether Newton's method may have one matrix of all bodies.
     fn may_join(&self) -> bool {
         let newton = matches!(self.method, MethodName::Auto | MethodName::Newton);
-        newton && self.session.size() == 1 && self.wanted != Some(Linear::Sweeps)
+        newton && self.wanted != Some(Linear::Sweeps)
     }
 
     /// Chooses for a body in the plane.
@@ -211,7 +212,12 @@ impl<'a> Inner<'a> {
                 let retained = plan.retained.as_ref().filter(|_| plan.condensable);
                 Candidate { dofs: plan.dofs, retained, ptr, col }
             });
-            let comparison = cost::compare(&candidates.collect::<Vec<_>>(), joined);
+            let step = match self.method {
+                _ if joined => Step::Joined,
+                MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => Step::Swept,
+                MethodName::Robin | MethodName::Ncg | MethodName::Anderson => Step::Sweeps,
+            };
+            let comparison = cost::compare(&candidates.collect::<Vec<_>>(), step);
             // bodies that are kept have their memory already
             let are_kept = plans.iter().all(|plan| self.kept.contains_key(&plan.name));
             let is_direct = comparison.is_direct(if are_kept { usize::MAX } else { self.memory });
@@ -238,10 +244,6 @@ impl<'a> Inner<'a> {
 
     /// How linear steps are solved, once bodies have their presets.
     fn join(&mut self) -> Result<Linear> {
-        if self.method == MethodName::Newton && self.session.size() > 1 {
-            return Err(Error::new(Kind::Usage, "method `newton` solves for all bodies together and runs on one rank")
-                .help("choose newton-robin, or start without mpiexec"));
-        }
         if !self.may_join() {
             return Ok(Linear::Sweeps);
         }
@@ -339,8 +341,27 @@ impl Factory for Inner<'_> {
         Ok(())
     }
 
+    fn deal_out(&mut self, graph: &dyn Fn() -> Graph) -> Result<Option<Vec<u32>>> {
+        let ranks = self.session.size();
+        if ranks == 1 || !matches!(self.linear, Linear::Direct | Linear::Multigrid) {
+            return Ok(None);
+        }
+        let mut owner = Ok(Vec::new());
+        if self.session.rank() == 0 {
+            let Graph { mut ptr, mut col, mut weight } = graph();
+            owner = partition(&mut ptr, &mut col, &mut weight, ranks);
+        }
+        let mut owner = agreed(self.session, owner)?;
+        let world = self.session.world();
+        let mut nodes = owner.len();
+        world.process_at_rank(0).broadcast_into(&mut nodes);
+        owner.resize(nodes, 0);
+        world.process_at_rank(0).broadcast_into(&mut owner[..]);
+        Ok(Some(owner))
+    }
+
     fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>> {
-        let Assembled { name, dimension, body, rows, motions, left } = assembled;
+        let Assembled { name, dimension, body, distribution, rows, motions, left } = assembled;
         let Some(plan) = self.places.get(&name).map(|&place| &mut self.plans[place]) else {
             return Err(Error::new(Kind::Solver, format!("no solver is planned for body `{name}`")));
         };
@@ -356,7 +377,10 @@ impl Factory for Inner<'_> {
             Linear::Sweeps => motions.into_iter().map(|motion| motion.displacement).collect(),
             _ => Vec::new(),
         };
-        let make = move |stiffness: crate::linalg::Csr| Krylov::new(&session, chosen, dimension, stiffness, &modes);
+        if let Some(distribution) = distribution {
+            return Ok(Box::new(SparseBody::<Krylov>::dealt_out(body, &rows, &left, distribution, words)));
+        }
+        let make = move |stiffness: crate::linalg::Slab| Krylov::new(&session, chosen, dimension, stiffness, &modes);
         Ok(Box::new(SparseBody::new(body, rows, &left, make, words)))
     }
 

@@ -5,7 +5,7 @@ use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
 use crate::ddm::{Coefficient, Method, Start, Sweeps, first_springs};
 use crate::error::{Error, Kind, Result};
-use crate::linalg::Csr;
+use crate::linalg::Slab;
 use crate::model::{LinearStep, Model};
 use crate::petsc::Session;
 use crate::problem::method::{Gamma, Linear, MethodName};
@@ -48,15 +48,15 @@ fn linear_step(
         return Ok(Box::new(Sweeps::new(coefficient)));
     }
     model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.reveal())?;
-    // multigrid wants nodes, without numbers for rigid motions among them
-    let multigrid = linear == Linear::Multigrid;
-    let Some(union) = Union::of(model, !multigrid)? else {
-        return Err(Error::new(Kind::Solver, "the bodies of other ranks cannot be joined").help("choose newton-robin"));
+    // multigrid wants nodes, without numbers for rigid motions among them; so do rows that are dealt out
+    let nodes = linear == Linear::Multigrid || (linear == Linear::Direct && session.size() > 1);
+    let Some(union) = Union::of(model, !nodes)? else {
+        return Err(Error::new(Kind::Solver, "a body has no matrices to be joined").help("choose newton-robin"));
     };
-    let block = if multigrid { scene.dimension.value } else { 1 };
+    let block = if nodes { scene.dimension.value } else { 1 };
     let mut step: Box<dyn LinearStep> = match linear {
         Linear::Dense => {
-            let dense = |stiffness: Csr| Ok(Dense::new(stiffness.rows(), stiffness.values));
+            let dense = |stiffness: Slab| Ok(Dense::new(stiffness.rows(), stiffness.values));
             Box::new(Monolithic::new(union.without_zeros(), dense)?)
         }
         _ => Box::new(Monolithic::new(union, |stiffness| Krylov::new(session, whole.clone(), block, stiffness, &[]))?),

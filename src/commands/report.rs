@@ -183,7 +183,8 @@ impl Shared {
         let (assemblies, assemblies_avoided) = (discrete.assemblies, discrete.assemblies_avoided);
         let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
         for slot in &discrete.model.bodies {
-            mine.solvers.push(slot.local.as_ref().map_or(String::new(), |body| body.describe()));
+            let leader = slot.local.as_ref().filter(|body| body.leads());
+            mine.solvers.push(leader.map_or(String::new(), |body| body.describe()));
             mine.counts += slot.local.as_ref().map_or(BodyCounts::default(), |body| body.counts());
         }
         share(&*discrete.model.exchange, &mine).into_iter().reduce(Self::with).unwrap_or_default()

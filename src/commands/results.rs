@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::output::BodyReport;
 use crate::output::vtu::BodyField;
 
-/// The end of a run in one body of this rank.
+/// The end of a run in one body that this rank speaks for.
 pub struct Recovered {
     /// Displacements of all nodes.
     pub state: Vec<f64>,
@@ -20,7 +20,7 @@ pub struct Recovered {
 /// interior of a body.
 pub type All = Vec<Option<Result<Recovered>>>;
 
-/// Recovers the bodies of this rank.
+/// Recovers the bodies that this rank speaks for. Collective.
 pub fn recover(done: &Done) -> All {
     let bodies = done.built.discrete.bodies.iter().zip(&done.model().bodies);
     bodies
@@ -33,14 +33,19 @@ pub fn recover(done: &Done) -> All {
             let state: Vec<f64> = state.iter().map(|u| u / done.share).collect();
             let mut still = state.clone();
             still[state.len() - rigid..].fill(0.0);
-            let recover = || -> Result<Recovered> {
+            let recover = || -> Result<Option<Recovered>> {
                 let mut bent = body.recover(&still)?;
-                let mut state = if still == state { bent.clone() } else { body.recover(&state)? };
+                // the rigid motion is the same on all ranks, so that they agree on this
+                let is_still = state[state.len() - rigid..].iter().all(|a| *a == 0.0);
+                let mut state = if is_still { bent.clone() } else { body.recover(&state)? };
+                if !body.leads() {
+                    return Ok(None);
+                }
                 state.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
                 bent.iter_mut().chain(&mut state).for_each(|u| *u *= done.share);
-                Ok(Recovered { field: info.field(&state, &bent), state, bent })
+                Ok(Some(Recovered { field: info.field(&state, &bent), state, bent }))
             };
-            Some(recover())
+            recover().transpose()
         })
         .collect()
 }

@@ -31,7 +31,7 @@ pub fn build(
     let meshes = |scene: &Scene| scene.estimate || scene.method.stop.balanced;
     if condensed && meshes(&last.scene) == meshes(&scene) && same(&[]) {
         let discrete = &mut last.discrete;
-        discrete.model.exchange = Box::new(Ranks::new(session));
+        discrete.model.exchange = Rc::new(Ranks::new(session));
         let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
         discrete.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
         discrete.assemblies = 0;

@@ -77,7 +77,7 @@ fn build_in<const D: usize>(
     clock.phase("mesh");
     let mut inner = Inner::new(session, &scene, &names, kept)?;
     let ranks = (session.rank(), session.size());
-    let exchange = Box::new(Ranks::new(session));
+    let exchange = Rc::new(Ranks::new(session));
     let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
     let discrete = discretize::discretize(&scene, &mesh, cut, ranks, keep, exchange, &mut inner);
     let mut discrete = agree(session, discrete)?;
@@ -130,7 +130,8 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if session.size() > discrete.bodies.len() {
+    let is_dealt_out = |slot: &BodySlot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some());
+    if session.size() > discrete.bodies.len() && !discrete.model.bodies.iter().any(is_dealt_out) {
         warnings.push(format!(
             "{} of {} ranks have no body to solve",
             session.size() - discrete.bodies.len(),

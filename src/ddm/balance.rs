@@ -76,7 +76,7 @@ mod tests {
     fn it_asks_first_when_worth_it_and_again_to_confirm() {
         let asked = Rc::new(Cell::new(0));
         let mut balance = Balance::new(Box::new(Fixed(asked.clone(), vec![0.1, 0.02, 0.02])));
-        let mut model = Model::new(Vec::new(), Vec::new(), Box::new(Serial));
+        let mut model = Model::new(Vec::new(), Vec::new(), std::rc::Rc::new(Serial));
         let layer = Layer::default();
         let mut linear = Sweeps::carried();
         let mut ask = |error: f64| {

@@ -1,5 +1,6 @@
 //! One body of the scene on its mesh: space, supports, loads, stiffness.
 
+use super::distribute::Places;
 use super::elastic;
 use super::find::{Values, find_group, not_on_body, point, without_area};
 use super::springs;
@@ -11,6 +12,7 @@ use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
 use crate::linalg::{Csr, countable, dot};
 use crate::mesh::Mesh;
+use crate::model::Distribution;
 use crate::problem::body::{BodySpec, LoadKind};
 use crate::problem::elasticity::Plane;
 use nalgebra::DMatrix;
@@ -184,15 +186,17 @@ impl<'a, const D: usize> Part<'a, D> {
         NodeGraph::new(&self.space, &coupled, &self.held.frame)
     }
 
-    /// K on its graph, f and supports; `carried` is the rigid motion that was taken out of `prescribed`, if any.
+    /// K on its graph, f and supports; `carried` is the rigid motion that was taken out of `prescribed`, if any. Of a body that is dealt
+    /// out over ranks, the rows of this one, which are all that the graph has.
     pub fn assemble(
         &self,
         mesh: &Mesh<D>,
         graph: &NodeGraph,
         elasticity: &Elasticity,
-        load: Vec<f64>,
-        prescribed: Vec<(usize, f64)>,
+        mut load: Vec<f64>,
+        mut prescribed: Vec<(usize, f64)>,
         carried: Vec<f64>,
+        dealt: Option<&(Distribution, Places)>,
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
@@ -210,7 +214,13 @@ impl<'a, const D: usize> Part<'a, D> {
         }
         self.springs.iter().for_each(|springs| assemble::add_blocks(graph, springs, &mut stiffness));
         self.held.frame.turn_matrix(&mut stiffness);
-        let work = dot(&load, &carried);
+        let mut work = dot(&load, &carried);
+        if let Some((own, places)) = dealt {
+            stiffness = places.rows::<D>(own, stiffness);
+            prescribed = places.entries::<D>(&prescribed);
+            load = own.scatter(&load);
+            work = if own.leads { work } else { 0.0 };
+        }
         let mut body = assemble::support(stiffness, load, prescribed);
         body.energy_constant -= work;
         body.carried = carried;

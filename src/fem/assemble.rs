@@ -79,6 +79,24 @@ impl NodeGraph {
         graph
     }
 
+    /// The rows of some nodes; those of others are empty.
+    pub fn of(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let mut graph = Self { ptr: vec![0], col: Vec::new(), master: self.master.clone() };
+        for node in 0..self.ptr.len() - 1 {
+            if keep(node) {
+                graph.col.extend(&self.col[self.ptr[node] as usize..self.ptr[node + 1] as usize]);
+            }
+            graph.ptr.push(graph.col.len() as u32);
+        }
+        graph
+    }
+
+    /// Whether the graph has the row of the node that stands for a node.
+    fn has(&self, node: u32) -> bool {
+        let node = self.master.get(node as usize).copied().unwrap_or(node) as usize;
+        self.ptr[node] < self.ptr[node + 1]
+    }
+
     /// Entries of the matrix on this graph with D x D blocks.
     pub fn entries<const D: usize>(&self) -> usize {
         D * D * self.col.len()
@@ -123,7 +141,7 @@ pub struct NodalBlock<const D: usize> {
 
 /// Adds springs to a stiffness matrix on a graph.
 pub fn add_blocks<const D: usize>(graph: &NodeGraph, blocks: &[NodalBlock<D>], matrix: &mut Csr) {
-    for NodalBlock { nodes: [a, b], block } in blocks {
+    for NodalBlock { nodes: [a, b], block } in blocks.iter().filter(|block| graph.has(block.nodes[0])) {
         let (start, step) = graph.block::<D>(*a, *b);
         for (i, row) in block.iter().enumerate() {
             for (j, value) in row.iter().enumerate() {
@@ -165,7 +183,7 @@ pub enum Defect {
     Elasticity(usize, [f64; 3], Flaw),
 }
 
-/// Stiffness matrix of a space on a graph. Where the elasticity varies within a cell, and in bodies of revolution, it is taken
+/// Stiffness matrix of a space on a graph, which may have the rows of some nodes only. Where the elasticity varies within a cell, and in bodies of revolution, it is taken
 /// at the points of a rule of degree 2 (P1) or 5 (P2); all of these lie off the axis.
 ///
 /// # Errors
@@ -191,6 +209,11 @@ fn stiffness_on<const D: usize, const N: usize>(
     let mut local = vec![[[0.0; D]; D]; stride * stride];
     let mut x = vec![[0.0; D]; stride];
     for (index, cell) in space.cells.chunks_exact(stride).enumerate() {
+        let mut here = [false; element::MOST];
+        here.iter_mut().zip(cell).for_each(|(here, &node)| *here = graph.has(node));
+        if !here.contains(&true) {
+            continue;
+        }
         for (x, &node) in x.iter_mut().zip(cell) {
             *x = space.nodes[node as usize];
         }
@@ -227,13 +250,15 @@ fn stiffness_on<const D: usize, const N: usize>(
         for a in 0..stride {
             for b in a..stride {
                 let block = &local[a * stride + b];
-                let (start, step) = graph.block::<D>(cell[a], cell[b]);
-                for i in 0..D {
-                    for j in 0..D {
-                        matrix.values[start + i * step + j] += block[i][j];
+                if here[a] {
+                    let (start, step) = graph.block::<D>(cell[a], cell[b]);
+                    for i in 0..D {
+                        for j in 0..D {
+                            matrix.values[start + i * step + j] += block[i][j];
+                        }
                     }
                 }
-                if a != b {
+                if a != b && here[b] {
                     let (start, step) = graph.block::<D>(cell[b], cell[a]);
                     for i in 0..D {
                         for j in 0..D {
@@ -296,10 +321,11 @@ pub fn interpolate<const D: usize>(x: &[[f64; D]], phi: &[f64]) -> [f64; D] {
 
 /// Takes prescribed dofs out of K and f, symmetrically, and keeps what energies need.
 ///
-/// `prescribed` holds (dof, value), sorted, without repetition.
-pub fn support(mut stiffness: Csr, mut load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> ElasticBody {
+/// `prescribed` holds (dof, value), sorted, without repetition. K may have the first rows alone, as many as f has entries; its columns
+/// behind them are dofs that live elsewhere.
+pub fn support(mut stiffness: Csr, mut load: Vec<f64>, mut prescribed: Vec<(usize, f64)>) -> ElasticBody {
     let n = load.len();
-    let mut value = vec![None; n];
+    let mut value = vec![None; stiffness.columns];
     for &(dof, u) in &prescribed {
         value[dof] = Some(u);
     }
@@ -336,6 +362,7 @@ pub fn support(mut stiffness: Csr, mut load: Vec<f64>, prescribed: Vec<(usize, f
             load[i] -= lifting[i];
         }
     }
+    prescribed.retain(|entry| entry.0 < n);
     energy_constant += 0.5 * strain_constant;
     strain_constant -= prescribed.iter().map(|(_, u)| scale * u * u).sum::<f64>();
     let carried = Vec::new();

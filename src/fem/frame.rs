@@ -83,20 +83,27 @@ impl<const D: usize> Frame<D> {
         }
     }
 
-    /// Turns rows and columns of a symmetric matrix of D x D blocks in place. (Ties are a matter of its pattern.)
+    /// Turns rows and columns of a symmetric matrix of D x D blocks in place, which may have the rows of some nodes only. (Ties are
+    /// a matter of its pattern.)
     pub fn turn_matrix(&self, k: &mut Csr) {
+        if self.axes.is_empty() {
+            return;
+        }
+        let mut is_turned = vec![false; k.columns / D];
         for &node in self.axes.keys() {
+            is_turned[node as usize] = true;
             let first = D * node as usize;
             let rows: [_; D] = std::array::from_fn(|c| k.range(first + c).start);
             for entry in 0..k.range(first).len() {
                 let column = self.turned(node, rows.map(|row| k.values[row + entry]));
                 rows.iter().zip(column).for_each(|(row, value)| k.values[row + entry] = value);
             }
-            let neighbours: Vec<usize> = k.row(first).map(|(j, _)| j).collect();
-            for row in neighbours {
-                let Some(at) = k.position(row, first) else { continue };
-                let turned = self.turned(node, std::array::from_fn(|c| k.values[at + c]));
-                k.values[at..at + D].copy_from_slice(&turned);
+        }
+        for block in (0..k.values.len()).step_by(D) {
+            let node = k.col[block] as usize / D;
+            if is_turned[node] {
+                let turned = self.turned(node as u32, std::array::from_fn(|c| k.values[block + c]));
+                k.values[block..block + D].copy_from_slice(&turned);
             }
         }
     }

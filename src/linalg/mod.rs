@@ -8,17 +8,20 @@ mod blocks;
 mod blocks_tests;
 mod degree;
 mod factor;
+mod slab;
 mod symbolic;
 
 pub use blocks::Blocks;
 pub use factor::{Factor, PART, TOLERANCE};
+pub use slab::Slab;
 pub use symbolic::{Work, factorisation};
 
 use crate::error::{Error, Kind, Result};
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 /// A sparse matrix in compressed rows: row `i` holds columns `col[ptr[i]..ptr[i+1]]`, sorted.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Csr {
     /// Number of columns.
     pub columns: usize,
@@ -65,7 +68,7 @@ impl Csr {
     }
 
     /// Entries (column, value) of row `i`.
-    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
         self.range(i).map(|k| (self.col[k] as usize, self.values[k]))
     }
 

@@ -1,5 +1,6 @@
 //! What the method asks of a body.
 
+use super::Distribution;
 use crate::error::Result;
 use crate::linalg::Csr;
 use serde::{Deserialize, Serialize};
@@ -202,7 +203,18 @@ pub trait Body {
         &[]
     }
 
-    /// Displacements of all nodes for a state, without the motion of [`Body::carried`].
+    /// How its dofs are dealt out over the ranks; none for a body of this rank alone. Of a body that is dealt out, `residual`,
+    /// `apply_stiffness`, `rounding`, `separate` and `recover` are collective.
+    fn distribution(&self) -> Option<&Distribution> {
+        None
+    }
+
+    /// Whether this rank speaks for the body.
+    fn leads(&self) -> bool {
+        self.distribution().is_none_or(|distribution| distribution.leads)
+    }
+
+    /// Displacements of all nodes for a state, without the motion of [`Body::carried`], on every rank that has a part of the body.
     ///
     /// # Errors
     /// Failures of the solver library.

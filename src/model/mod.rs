@@ -4,6 +4,7 @@
 //! point, first all of side a, then all of side b: `trace[side * points + offset[pair] + q]`.
 
 pub mod body;
+pub mod distribution;
 pub mod field;
 pub mod layer;
 pub mod linear;
@@ -11,6 +12,7 @@ pub mod origin;
 pub mod rigid;
 
 pub use body::{Body, BodyCounts, Energy, Matrices, Solved};
+pub use distribution::Distribution;
 pub use field::Field;
 pub use layer::Layer;
 pub use linear::{LinearStep, Solution};
@@ -20,15 +22,20 @@ use crate::contact::ContactPair;
 use crate::error::Result;
 use nalgebra::DMatrix;
 use std::ops::Range;
+use std::rc::Rc;
 
 /// What the ranks of a parallel run tell each other; every call is collective.
 pub trait Exchange {
-    /// Replaces `values` on every rank by the sum over the ranks. Every entry is non-zero on one rank only, so sums are exact and every
-    /// rank gets the serial numbers.
+    /// Replaces `values` on every rank by the sum over the ranks: the same numbers everywhere, as MPI promises. Where every body lives
+    /// on one rank, every entry is non-zero on one only, so that sums are exact.
     fn sum(&self, values: &mut [f64]);
+    /// Sends the first `to[0]` values to rank 0, the next `to[1]` to rank 1, ...; returns `from[r]` values of each rank r.
+    fn swap(&self, values: &[f64], to: &[i32], from: &[i32]) -> Vec<f64>;
+    /// Number of ranks.
+    fn ranks(&self) -> usize;
     /// The bytes of each rank, in their order.
     fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>>;
-    /// Sums and shares so far between several ranks.
+    /// Sums, swaps and shares so far between several ranks.
     fn messages(&self) -> usize;
 }
 
@@ -38,6 +45,12 @@ pub struct Serial;
 
 impl Exchange for Serial {
     fn sum(&self, _values: &mut [f64]) {}
+    fn swap(&self, values: &[f64], _to: &[i32], _from: &[i32]) -> Vec<f64> {
+        values.to_vec()
+    }
+    fn ranks(&self) -> usize {
+        1
+    }
     fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
         vec![mine]
     }
@@ -92,7 +105,7 @@ pub struct Sprung {
 pub struct BodySlot {
     /// Name in the scene.
     pub name: String,
-    /// The body, on the rank that owns it.
+    /// The body, on the rank that owns it, or on every rank that may own a part of it.
     pub local: Option<Box<dyn Body>>,
     /// Its contact rows, in this order.
     pub segments: Vec<Segment>,
@@ -125,12 +138,12 @@ pub struct Model {
     /// Why there is no solution, where that is known beforehand.
     pub mechanism: Option<Mechanism>,
     /// Connection to the other ranks.
-    pub exchange: Box<dyn Exchange>,
+    pub exchange: Rc<dyn Exchange>,
 }
 
 impl Model {
     /// Joins bodies and pairs.
-    pub fn new(bodies: Vec<BodySlot>, pairs: Vec<ContactPair>, exchange: Box<dyn Exchange>) -> Self {
+    pub fn new(bodies: Vec<BodySlot>, pairs: Vec<ContactPair>, exchange: Rc<dyn Exchange>) -> Self {
         let mut offset = vec![0];
         for pair in &pairs {
             offset.push(offset[offset.len() - 1] + pair.len());
@@ -253,7 +266,6 @@ pub(crate) mod sample {
     use crate::contact::law::Linear;
     use crate::contact::{LayerLaw, Response};
     use crate::linalg::Csr;
-    use std::rc::Rc;
 
     /// omega of the points.
     pub const WEIGHT: [f64; 4] = [0.5, 2.0, 3.0, 0.25];
@@ -302,6 +314,6 @@ pub(crate) mod sample {
             row_stiffness: row_stiffness.to_vec(),
         };
         let bodies = vec![body(0, [8.0, 12.0, 0.0, 6.0]), body(1, [4.0, 20.0, 5.0, 7.0])];
-        Model::new(bodies, laws.into_iter().enumerate().map(pair).collect(), Box::new(Serial))
+        Model::new(bodies, laws.into_iter().enumerate().map(pair).collect(), Rc::new(Serial))
     }
 }

@@ -8,6 +8,7 @@ pub mod contacts;
 pub mod folder;
 mod format;
 pub mod history;
+mod largest;
 mod look;
 pub mod plot;
 pub mod report;

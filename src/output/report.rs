@@ -1,6 +1,7 @@
 //! The report of a run: `report.json`, and the closing lines on the terminal.
 
 use super::format::{sci, seconds};
+use super::largest::largest;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -421,16 +422,9 @@ pub fn warning_lines(warnings: &[String], others: &str) -> Vec<String> {
     lines
 }
 
-/// Numbers of the pairs with the largest forces, at most `most`, in the order of the scene; of equal ones the first.
+/// Numbers of the pairs with the largest forces, at most `most`, in the order of the scene.
 pub fn busiest(pairs: &[PairReport], most: usize) -> Vec<usize> {
-    let size = |i: &usize| pairs[*i].force[0].iter().map(|f| f * f).sum::<f64>();
-    // a force that is not a number is none
-    let size = |i: &usize| Some(size(i)).filter(|size| size.is_finite()).unwrap_or(0.0);
-    let mut order: Vec<usize> = (0..pairs.len()).collect();
-    order.sort_by(|i, j| size(j).total_cmp(&size(i)));
-    order.truncate(most);
-    order.sort_unstable();
-    order
+    largest(pairs.iter().map(|pair| pair.force[0].iter().map(|f| f * f).sum()), most)
 }
 
 /// A vector as text.
@@ -442,16 +436,4 @@ fn vector(v: [f64; 3]) -> String {
 fn readable(value: f64, digits: usize) -> String {
     let size = value.abs();
     if value == 0.0 || (1e-3..1e6).contains(&size) { format!("{value:.digits$}") } else { sci(value, digits) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_busiest_pairs_are_those_with_the_largest_forces() {
-        let pair = |x: f64, y: f64| PairReport { force: [[x, y, 0.0]; 2], ..PairReport::default() };
-        let pairs = [pair(3.0, 4.0), pair(f64::NAN, 0.0), pair(0.0, -9.0), pair(5.0, 0.0)];
-        assert_eq!([1, 2, 9].map(|most| busiest(&pairs, most)), [vec![2], vec![0, 2], vec![0, 1, 2, 3]]);
-    }
 }

@@ -12,6 +12,9 @@ use std::ptr::null_mut;
 pub(super) struct Arrays {
     pub(super) row_ptr: Vec<Int>,
     pub(super) columns: Vec<Int>,
+    /// Of the columns of other processes; empty for a matrix of one.
+    pub(super) other_row_ptr: Vec<Int>,
+    pub(super) other_columns: Vec<Int>,
     pub(super) values: Vec<f64>,
 }
 
@@ -35,7 +38,18 @@ pub(super) fn attach(mat: ffi::Mat, arrays: *mut Arrays) -> Result<()> {
 }
 
 /// Checks that arrays are those of a square matrix with sorted columns.
-pub(super) fn check(block_size: usize, row_ptr: &[Int], columns: &[Int], values: &[f64]) -> Result<()> {
+pub(super) fn check(block_size: usize, row_ptr: &[Int], columns: &[Int], values: usize) -> Result<()> {
+    check_rows(block_size, row_ptr, columns, values, row_ptr.len().saturating_sub(1))
+}
+
+/// Checks that arrays are compressed rows of so many columns, sorted.
+pub(super) fn check_rows(
+    block_size: usize,
+    row_ptr: &[Int],
+    columns: &[Int],
+    values: usize,
+    width: usize,
+) -> Result<()> {
     let wrong = |what: &str| Err(Error::new(Kind::Solver, format!("not a sparse matrix in compressed rows: {what}")));
     let Some((&last, rows)) = row_ptr.split_last() else {
         return wrong("row_ptr is empty");
@@ -47,7 +61,7 @@ pub(super) fn check(block_size: usize, row_ptr: &[Int], columns: &[Int], values:
     if row_ptr[0] != 0 || row_ptr.windows(2).any(|pair| pair[0] > pair[1]) {
         return wrong("row_ptr does not start at 0 and grow");
     }
-    if last as usize != columns.len() || columns.len() != values.len() {
+    if last as usize != columns.len() || columns.len() != values {
         return wrong("the numbers of columns and values are not the last entry of row_ptr");
     }
     for row in row_ptr.windows(2) {
@@ -55,7 +69,7 @@ pub(super) fn check(block_size: usize, row_ptr: &[Int], columns: &[Int], values:
         if row.windows(2).any(|pair| pair[0] >= pair[1]) {
             return wrong("the columns of a row do not increase");
         }
-        if row.first().is_some_and(|c| *c < 0) || row.last().is_some_and(|c| *c as usize >= rows) {
+        if row.first().is_some_and(|c| *c < 0) || row.last().is_some_and(|c| *c as usize >= width) {
             return wrong("a column is not among the rows");
         }
     }
@@ -78,9 +92,9 @@ mod tests {
             (1, &[0, 1], &[1], "not among"),
         ];
         for (block_size, row_ptr, columns, words) in cases {
-            let error = check(block_size, row_ptr, columns, &vec![1.0; columns.len()]).expect_err(words);
+            let error = check(block_size, row_ptr, columns, columns.len()).expect_err(words);
             assert!(error.message().contains(words), "{error}");
         }
-        assert!(check(1, &[0, 1, 2], &[0, 1], &[1.0, 1.0]).is_ok());
+        assert!(check(1, &[0, 1, 2], &[0, 1], 2).is_ok());
     }
 }

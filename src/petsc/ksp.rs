@@ -5,9 +5,8 @@ use super::library::petsc;
 use super::matrix::same;
 use super::table::text;
 use super::vector::Vector;
-use super::{ConvergedReason, FAMILIES, Int, Matrix, Session, ffi, print};
+use super::{ConvergedReason, FAMILIES, Int, Matrix, Scope, Session, ffi, print};
 use crate::error::{Error, Kind, Result};
-use mpi::ffi::RSMPI_COMM_SELF;
 use std::cell::Cell;
 use std::ffi::c_char;
 use std::ptr::{null, null_mut};
@@ -70,6 +69,7 @@ pub struct Ksp {
     /// Whether a solve writes to its right-hand side.
     writes_to_b: bool,
     prefix: String,
+    scope: Scope,
     session: Session,
 }
 
@@ -79,9 +79,15 @@ impl Ksp {
     /// # Errors
     /// When PETSc does not accept the prefix.
     pub fn new(session: &Session, prefix: &str) -> Result<Ksp> {
-        // SAFETY: the constant of MPI itself.
-        let comm = unsafe { RSMPI_COMM_SELF };
-        let mut ksp = null_mut();
+        Self::of(session, Scope::Process, prefix)
+    }
+
+    /// The same for matrices of this [`Scope`]; all calls are collective over it.
+    ///
+    /// # Errors
+    /// When PETSc does not accept the prefix.
+    pub fn of(session: &Session, scope: Scope, prefix: &str) -> Result<Ksp> {
+        let (comm, mut ksp) = (scope.comm(session), null_mut());
         petsc!(KSPCreate(comm, &mut ksp))?;
         let solver = Ksp {
             ksp,
@@ -91,6 +97,7 @@ impl Ksp {
             failed_at: Cell::new(None),
             writes_to_b: false,
             prefix: prefix.to_owned(),
+            scope,
             session: session.clone(),
         };
         let prefix = text(prefix)?;
@@ -102,11 +109,14 @@ impl Ksp {
     /// Sets the matrix, of the system and of the preconditioner. The solver keeps it alive and sees its updates.
     ///
     /// # Errors
-    /// When the solver had a matrix of another size.
+    /// When the solver had a matrix of another size, or belongs to other processes.
     pub fn set_operator(&mut self, matrix: &Matrix) -> Result<()> {
+        if matrix.scope() != self.scope {
+            return Err(Error::new(Kind::Solver, "a matrix and its solver belong to different processes"));
+        }
         petsc!(KSPSetOperators(self.ksp, matrix.raw(), matrix.raw()))?;
         if self.vectors.is_none() || self.rows != matrix.rows() {
-            let new = || Vector::new(&self.session, matrix.rows(), matrix.block_size());
+            let new = || Vector::new(&self.session, self.scope, matrix.rows(), matrix.block_size());
             self.vectors = Some([new()?, new()?]);
             self.rows = matrix.rows();
         }
@@ -306,8 +316,7 @@ impl Ksp {
     /// # Errors
     /// When PETSc cannot show the solver.
     pub fn describe(&self) -> Result<String> {
-        // SAFETY: the constant of MPI itself.
-        let comm = unsafe { RSMPI_COMM_SELF };
+        let comm = self.scope.comm(&self.session);
         let (viewed, text) = print::caught(|| {
             let mut viewer = null_mut();
             petsc!(PetscViewerASCIIGetStdout(comm, &mut viewer))?;

@@ -1,12 +1,14 @@
 //! Vectors: PETSc's headers, made once, over slices that belong to Rust.
 
 use super::library::petsc;
-use super::{Int, Session, ffi};
+use super::{Int, Scope, Session, ffi};
 use crate::error::Result;
-use mpi::ffi::RSMPI_COMM_SELF;
 use std::ptr::{null, null_mut};
 
-/// A sequential PETSc vector.
+/// PETSC_DETERMINE: the sum over the processes.
+const DETERMINE: Int = -1;
+
+/// A PETSc vector: the entries of this process.
 pub(super) struct Vector {
     pub(super) vec: ffi::Vec,
     _session: Session,
@@ -14,25 +16,28 @@ pub(super) struct Vector {
 
 impl Vector {
     /// A vector without memory of its own, for [`place`](Self::place).
-    pub(super) fn new(session: &Session, rows: usize, block_size: usize) -> Result<Vector> {
-        // SAFETY: the constant of MPI itself.
-        let comm = unsafe { RSMPI_COMM_SELF };
-        let mut vec = null_mut();
-        petsc!(VecCreateSeqWithArray(comm, block_size as Int, rows as Int, null(), &mut vec))?;
+    pub(super) fn new(session: &Session, scope: Scope, rows: usize, block_size: usize) -> Result<Vector> {
+        let (comm, mut vec) = (scope.comm(session), null_mut());
+        let (block, rows) = (block_size as Int, rows as Int);
+        match scope {
+            Scope::Process => petsc!(VecCreateSeqWithArray(comm, block, rows, null(), &mut vec))?,
+            Scope::World => petsc!(VecCreateMPIWithArray(comm, block, rows, DETERMINE, null(), &mut vec))?,
+        }
         Ok(Vector { vec, _session: session.clone() })
     }
 
     /// A vector with memory of its own.
-    pub(super) fn owned(session: &Session, values: &[f64], block_size: usize) -> Result<Vector> {
-        // SAFETY: the constant of MPI itself.
-        let comm = unsafe { RSMPI_COMM_SELF };
-        let mut vec = null_mut();
-        petsc!(VecCreateSeq(comm, values.len() as Int, &mut vec))?;
+    pub(super) fn owned(session: &Session, scope: Scope, values: &[f64], block_size: usize) -> Result<Vector> {
+        let (comm, mut vec) = (scope.comm(session), null_mut());
+        match scope {
+            Scope::Process => petsc!(VecCreateSeq(comm, values.len() as Int, &mut vec))?,
+            Scope::World => petsc!(VecCreateMPI(comm, values.len() as Int, DETERMINE, &mut vec))?,
+        }
         let vector = Vector { vec, _session: session.clone() };
         petsc!(VecSetBlockSize(vec, block_size as Int))?;
         let mut array = null_mut();
         petsc!(VecGetArray(vec, &mut array))?;
-        // SAFETY: PETSc's array has as many entries as the vector, which was made that long above.
+        // SAFETY: PETSc's array has as many entries as the vector has here, which was made that long above.
         unsafe { std::slice::from_raw_parts_mut(array, values.len()) }.copy_from_slice(values);
         petsc!(VecRestoreArray(vec, &mut array))?;
         Ok(vector)

@@ -9,23 +9,46 @@ use crate::error::Result;
 use crate::linalg::factorisation;
 use crate::petsc::nested_dissection;
 
-/// Operations in a second of one core: factorisations of cubes of 15 000 to 108 000 dofs, and dense ones of 4000 rows.
+/// Operations in a second of one core: the eleven factored runs of docs/solvers.md ("The choice") that take half a second or more
+/// differ from it by -25 % to +60 %.
 const RATE: f64 = 1.1e10;
 
-/// Seconds of multigrid for an entry of K, from its set-up to the last of Newton's steps: P1 and P2, 30 000 to 10^6 dofs.
-const MULTIGRID: f64 = 1.5e-6;
+/// Seconds of multigrid for an entry of K, from its set-up to the last of Newton's steps: the median of the sixteen scenes there, P1
+/// and P2, 5000 to 216 000 dofs, which differ from it by -30 % to +80 %.
+const MULTIGRID: f64 = 1.3e-6;
 
-/// How many times as long multigrid takes where each body is solved by itself, in every sweep.
-const SWEPT: f64 = 4.0;
-
-/// Dense factorisations of all contacts together: Newton's steps of a common scene.
+/// Newton's steps of a scene there, which take 3 to 7: dense factorisations of all contacts together.
 const STEPS: f64 = 5.0;
 
-/// Bytes of multigrid for an entry of K: K and G, hypre's copy of G, and half as much for its levels.
+/// Bytes of multigrid for an entry of K: 12 each for K, G and hypre's copy of G, and half a copy for its levels.
 const LEVELS: f64 = 42.0;
 
-/// What MUMPS takes over the entries of its factor: fronts that wait, and what it sets aside for pivots.
+/// What MUMPS takes over the entries of its factor, for fronts that wait and for pivots: 754 MB for two bodies with 31 million entries
+/// each, beside 150 MB for all else (two cubes of 24^3).
 const FRONTS: f64 = 1.2;
+
+/// What solves a linear step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// One matrix of all bodies.
+    Joined,
+    /// Newton's method by sweeps, each with one application of the bodies' multigrid.
+    Swept,
+    /// None: every sweep solves for each body.
+    Sweeps,
+}
+
+impl Step {
+    /// How many times as long multigrid takes as in one matrix of all bodies: `newton-robin` and `robin` on the first scenes there took
+    /// 1.0 to 1.9 and 5.4 to 12 times as long.
+    fn times(self) -> f64 {
+        match self {
+            Step::Joined => 1.0,
+            Step::Swept => 1.2,
+            Step::Sweeps => 7.0,
+        }
+    }
+}
 
 /// A body in space, before it is assembled.
 pub struct Candidate<'a> {
@@ -72,15 +95,15 @@ impl Comparison {
     }
 }
 
-/// Compares both ways to solve for these bodies; `joined` if Newton's method has one matrix of all of them.
+/// Compares both ways to solve for these bodies.
 ///
 /// The order of elimination is asked for only where the answer depends on it: no body needs more operations than a cube of as
 /// many dofs, and the dense algebra on the contact is known.
-pub fn compare(bodies: &[Candidate], joined: bool) -> Comparison {
+pub fn compare(bodies: &[Candidate], step: Step) -> Comparison {
     let entries: f64 = bodies.iter().map(|body| 9.0 * body.col.len() as f64).sum();
-    let multigrid = Cost { seconds: MULTIGRID * entries * if joined { 1.0 } else { SWEPT }, bytes: LEVELS * entries };
+    let multigrid = Cost { seconds: MULTIGRID * entries * step.times(), bytes: LEVELS * entries };
     let retained = bodies.iter().map(|body| body.retained.map_or(0, |retained| retained.dofs.len()));
-    let retained = if joined { retained.sum() } else { retained.max().unwrap_or(0) } as f64;
+    let retained = if step == Step::Joined { retained.sum() } else { retained.max().unwrap_or(0) } as f64;
     let dense = Cost { seconds: STEPS * retained.powi(3) / 3.0 / RATE, bytes: 36.0 * retained * retained };
     let mut direct = bodies.iter().fold(dense, |sum, body| sum.and(of_cube(body)));
     let known = dense.seconds > multigrid.seconds || direct.seconds <= multigrid.seconds;
@@ -150,7 +173,7 @@ mod tests {
         (ptr, col, Retained::new(3, &rows, &[], &[]))
     }
 
-    fn of(sizes: &[[usize; 3]], joined: bool) -> Comparison {
+    fn of(sizes: &[[usize; 3]], step: Step) -> Comparison {
         let bodies: Vec<_> = sizes.iter().map(|&size| body(size)).collect();
         let candidates = bodies.iter().map(|(ptr, col, retained)| Candidate {
             dofs: 3 * (ptr.len() - 1),
@@ -158,13 +181,13 @@ mod tests {
             ptr,
             col,
         });
-        compare(&candidates.collect::<Vec<_>>(), joined)
+        compare(&candidates.collect::<Vec<_>>(), step)
     }
 
     /// A cube is dear to factor and a long bar of as many nodes is not, which its dofs alone do not say.
     #[test]
     fn a_bar_is_factored_where_a_cube_is_not() {
-        let (bar, cube) = (of(&[[6, 6, 750]], true), of(&[[30, 30, 30]], true));
+        let (bar, cube) = (of(&[[6, 6, 750]], Step::Joined), of(&[[30, 30, 30]], Step::Joined));
         assert!(bar.is_direct(usize::MAX) && !cube.is_direct(usize::MAX));
         assert!(!bar.is_direct(1_000_000), "{}", bar.direct.bytes);
         assert!(20.0 * bar.direct.seconds < cube.direct.seconds, "{} {}", bar.direct.words(), cube.direct.words());
@@ -177,9 +200,9 @@ mod tests {
     #[test]
     fn joined_bodies_share_their_contact() {
         let wide = [[40, 40, 2]; 2];
-        let (joined, apart) = (of(&wide, true), of(&wide, false));
+        let (joined, apart) = (of(&wide, Step::Joined), of(&wide, Step::Sweeps));
         assert!(joined.direct.seconds > 5.0 * apart.direct.seconds);
-        assert_eq!(apart.multigrid.seconds, SWEPT * joined.multigrid.seconds);
+        assert_eq!(apart.multigrid.seconds, Step::Sweeps.times() * joined.multigrid.seconds);
         assert!(!joined.is_direct(usize::MAX) && apart.is_direct(usize::MAX));
     }
 }

@@ -3,9 +3,9 @@
 use super::InnerSolver;
 use super::options::Chosen;
 use crate::error::Result;
-use crate::linalg::Csr;
+use crate::linalg::Slab;
 use crate::model::Solved;
-use crate::petsc::{Int, Ksp, Matrix, Session};
+use crate::petsc::{Int, Ksp, Matrix, OwnedRows, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
 pub struct Krylov {
@@ -35,7 +35,7 @@ const WORN: f64 = 1.5;
 const FEW: usize = 12;
 
 impl Krylov {
-    /// Starts from G = K, with the options that were chosen. `near_null_space` are the
+    /// Starts from G = K, with the options that were chosen; collective if K is shared. `near_null_space` are the
     /// rigid motions that algebraic multigrid (GAMG) wants to know, one entry a dof each.
     ///
     /// # Errors
@@ -44,13 +44,20 @@ impl Krylov {
         session: &Session,
         chosen: Chosen,
         dimension: usize,
-        stiffness: Csr,
+        stiffness: Slab,
         near_null_space: &[Vec<f64>],
     ) -> Result<Self> {
-        let Csr { ptr, col, values, .. } = stiffness;
-        let mut matrix = Matrix::from_csr(session, dimension, integers(ptr), integers(col), values)?;
+        let Slab { first, total, is_shared, ptr, col, other_ptr, other_col, values } = stiffness;
+        let (row_ptr, columns) = (integers(ptr), integers(col));
+        let mut matrix = if is_shared {
+            let (other_row_ptr, other_columns) = (integers(other_ptr), integers(other_col));
+            let rows = OwnedRows { first, total, row_ptr, columns, other_row_ptr, other_columns, values };
+            Matrix::from_owned_rows(session, dimension, rows)?
+        } else {
+            Matrix::from_csr(session, dimension, row_ptr, columns, values)?
+        };
         matrix.set_spd()?;
-        let mut ksp = Ksp::new(session, &format!("{}_", chosen.prefix()))?;
+        let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", chosen.prefix()))?;
         ksp.set_operator(&matrix)?;
         chosen.lend(session, || ksp.set_from_options())?;
         if ksp.pc_type() == "gamg" {

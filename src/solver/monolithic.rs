@@ -1,14 +1,18 @@
 //! The Newton matrix (35) of all bodies together: K + B' diag(omega kappa) B with B = [B_a B_b], factored as one.
 //!
 //! With whole bodies it is the reference for methods that decompose: same functional, one big sparse factorisation. With
-//! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. One rank.
+//! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Of bodies that are dealt out over ranks each
+//! rank has its rows; of bodies that live whole on several ranks, condensed ones, every rank has the matrix and solves for itself.
 
 use super::{InnerSolver, RobinMatrix};
 use crate::error::Result;
-use crate::linalg::{Csr, axpy, countable, dot};
+use crate::linalg::{Csr, Slab, axpy, countable, dot};
 use crate::model::linear::{Failure, LinearStep, Solution, Solved, System};
-use crate::model::{BodyCounts, Field, Model};
+use crate::model::{Body, BodyCounts, BodySlot, Field, Matrices, Model};
+use crate::parallel::share;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+use std::ops::Range;
 
 /// Stiffness matrices side by side and the rows that couple them, on the states of the bodies.
 ///
@@ -16,31 +20,48 @@ use std::collections::HashMap;
 /// leaves no rounding in the strains. v + R a is not unique: as many springs as R has columns, each under one dof of v, make
 /// it so. They carry no force, since the rows for a say that all forces are balanced without them.
 pub struct Union {
-    /// Stiffness matrix of all bodies with these springs, with the pattern of B'B.
-    pub stiffness: Csr,
-    /// One row a contact point: [B_a B_a R_a B_b B_b R_b].
+    /// Stiffness matrix of all bodies with these springs, with the pattern of B'B: the rows of this rank.
+    pub stiffness: Slab,
+    /// One row a contact point, [B_a B_a R_a B_b B_b R_b]: all of them.
     pub rows: Csr,
-    /// First entry of each body's state, and the number of all.
+    /// First entry here of each body's state, and the number of all.
     pub offset: Vec<usize>,
+    /// b diag(K) b' of each row b.
+    row_stiffness: Vec<f64>,
+    /// Whether every rank has the whole matrix and some of the bodies.
+    is_redundant: bool,
 }
 
 impl Union {
-    /// Of the bodies of a model; `None` if one of them has no matrices in this process. Without `rigid` the rigid motions stay
-    /// part of v: multigrid wants to see nodes only.
+    /// Of the bodies of a model; without `rigid` the rigid motions stay part of v: multigrid wants to see nodes only, and so do bodies
+    /// that are dealt out. `None` if a body has no matrices. Collective.
     ///
     /// # Errors
     /// More entries than 32 bits can count.
     pub fn of(model: &Model, rigid: bool) -> Result<Option<Self>> {
-        let parts = model.bodies.iter().map(|slot| slot.local.as_ref()?.matrices());
-        let Some(mut parts) = parts.collect::<Option<Vec<_>>>() else { return Ok(None) };
+        let here = |slot: &BodySlot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some());
+        if model.exchange.ranks() > 1 && !model.bodies.iter().any(here) {
+            let Some(copies) = copies(model) else { return Ok(None) };
+            let union = Self::new(model, copies.iter().map(Copy::matrices).collect(), rigid)?;
+            return Ok(Some(Self { is_redundant: true, ..union }));
+        }
+        let parts = matrices(model).collect::<Option<Vec<_>>>();
+        parts.map(|parts| Self::new(model, parts, rigid)).transpose()
+    }
+
+    fn new(model: &Model, mut parts: Vec<Matrices>, rigid: bool) -> Result<Self> {
         if !rigid {
             parts.iter_mut().for_each(|part| (part.motions, part.traces) = (&[], &[]));
         }
+        let bodies: Vec<Option<&dyn Body>> = model.bodies.iter().map(|slot| slot.local.as_deref()).collect();
+        let distribution = |body: usize| bodies[body].and_then(|body| body.distribution());
+        let shared = (0..parts.len()).find_map(distribution);
         let mut offset = vec![0];
         for part in &parts {
             offset.push(offset[offset.len() - 1] + part.len());
         }
         let n = offset[parts.len()];
+        let (first, total) = shared.map_or((0, n), |shared| (shared.start, shared.total));
         // the two rows of each contact point as (body, row of the body)
         let mut points = vec![[(0, 0); 2]; model.points()];
         for body in 0..parts.len() {
@@ -48,18 +69,23 @@ impl Union {
                 points[place % model.points()][place / model.points()] = (body, row);
             }
         }
-        let mut rows = Csr::new(n);
+        let mut rows = Csr::new(total);
         // columns that are to be there in a row, besides those of K
         let mut coupled: HashMap<usize, Vec<i32>> = HashMap::new();
         for sides in &points {
             let mut entries = Vec::new();
             for &(body, row) in sides {
                 let part = &parts[body];
-                let rigid = part.traces.iter().enumerate().map(|(k, trace)| (part.stiffness.rows() + k, trace[row]));
-                entries.extend(part.rows.row(row).chain(rigid).map(|(i, value)| (offset[body] + i, value)));
+                match distribution(body) {
+                    Some(distribution) => entries.extend(distribution.rows.row(row)),
+                    None => {
+                        let rigid = part.traces.iter().enumerate().map(|(k, t)| (part.stiffness.rows() + k, t[row]));
+                        entries.extend(part.rows.row(row).chain(rigid).map(|(i, value)| (offset[body] + i, value)));
+                    }
+                }
             }
-            for &(i, _) in &entries {
-                coupled.entry(i).or_default().extend(entries.iter().map(|&(j, _)| j as i32));
+            for &(i, _) in entries.iter().filter(|entry| (first..first + n).contains(&entry.0)) {
+                coupled.entry(i - first).or_default().extend(entries.iter().map(|&(j, _)| j as i32));
             }
             rows.push_row(entries);
         }
@@ -70,43 +96,61 @@ impl Union {
         let known: usize = parts.iter().map(|part| part.stiffness.values.len()).sum();
         let room = known + coupled.values().map(Vec::len).sum::<usize>();
         countable("the matrix of all bodies together", room)?;
-        let mut stiffness = Csr { columns: n, ptr: vec![0], ..Csr::default() };
+        let mut stiffness = Csr { columns: total, ptr: vec![0], ..Csr::default() };
         stiffness.ptr.reserve_exact(n);
         stiffness.col.reserve_exact(room);
         stiffness.values.reserve_exact(room);
-        for ((&first, part), slot) in offset.iter().zip(&parts).zip(&model.bodies) {
+        let mut entries: Vec<(i32, f64)> = Vec::new();
+        for (body, (&begin, part)) in offset.iter().zip(&parts).enumerate() {
             let (own, pins) = (part.stiffness, pins(part.motions));
             for i in 0..part.len() {
                 let known = if i < own.rows() { own.range(i) } else { 0..0 };
-                let known = own.col[known.clone()].iter().map(|j| first as i32 + j).zip(&own.values[known]);
-                let mut known = known.peekable();
+                let columns = own.col[known.clone()].iter();
+                let values = own.values[known].iter().copied();
+                entries.clear();
+                match distribution(body) {
+                    None => entries.extend(columns.map(|j| begin as i32 + j).zip(values)),
+                    Some(distribution) => {
+                        let (here, first) = (distribution.own.len(), distribution.first as i32);
+                        let number = |&j: &i32| match (j as usize).checked_sub(here) {
+                            None => first + j,
+                            Some(ghost) => distribution.ghosts[ghost],
+                        };
+                        entries.extend(columns.map(number).zip(values));
+                        entries.sort_unstable_by_key(|entry| entry.0);
+                    }
+                }
+                let mut known = entries.iter().copied().peekable();
                 // a rigid motion that no contact row feels has nothing but its diagonal
-                let (coupled, diagonal) = (coupled.remove(&(first + i)), [(first + i) as i32]);
+                let (coupled, diagonal) = (coupled.remove(&(begin + i)), [(begin + i) as i32]);
                 for &j in coupled.as_deref().unwrap_or(if i < own.rows() { &[] } else { &diagonal }) {
                     while let Some((before, value)) = known.next_if(|entry| entry.0 < j) {
                         stiffness.col.push(before);
-                        stiffness.values.push(*value);
+                        stiffness.values.push(value);
                     }
                     stiffness.col.push(j);
-                    stiffness.values.push(known.next_if(|entry| entry.0 == j).map_or(0.0, |entry| *entry.1));
+                    stiffness.values.push(known.next_if(|entry| entry.0 == j).map_or(0.0, |entry| entry.1));
                 }
                 for (j, value) in known {
                     stiffness.col.push(j);
-                    stiffness.values.push(*value);
+                    stiffness.values.push(value);
                 }
                 stiffness.ptr.push(stiffness.col.len() as i32);
             }
-            for pin in pins.into_iter().map(|pin| first + pin) {
+            for pin in pins.into_iter().map(|pin| begin + pin) {
                 // of the size that the stiffness had before elimination: what is left of it may be nothing but rounding
                 match stiffness.position(pin, pin) {
-                    Some(at) => stiffness.values[at] += slot.scale,
+                    Some(at) => stiffness.values[at] += model.bodies[body].scale,
                     None => unreachable!("a stiffness matrix has its diagonal"),
                 }
             }
         }
         stiffness.col.shrink_to_fit();
         stiffness.values.shrink_to_fit();
-        Ok(Some(Self { stiffness, rows, offset }))
+        let (sides, points) = (model.row_stiffness(), model.points());
+        let row_stiffness = (0..points).map(|q| sides[q] + sides[points + q]).collect();
+        let stiffness = if shared.is_some() { Slab::of_rows(stiffness, first) } else { Slab::from(stiffness) };
+        Ok(Self { stiffness, rows, offset, row_stiffness, is_redundant: false })
     }
 
     /// The same with all entries of K stored, row by row.
@@ -114,9 +158,10 @@ impl Union {
         let n = self.stiffness.rows();
         let mut values = vec![0.0; n * n];
         for i in 0..n {
-            self.stiffness.row(i).for_each(|(j, value)| values[i * n + j] = value);
+            let row = self.stiffness.ptr[i] as usize..self.stiffness.ptr[i + 1] as usize;
+            row.for_each(|k| values[i * n + self.stiffness.col[k] as usize] = self.stiffness.values[k]);
         }
-        self.stiffness = Csr::full(n, values);
+        self.stiffness = Csr::full(n, values).into();
         self
     }
 }
@@ -126,6 +171,8 @@ pub struct Monolithic<S> {
     matrix: RobinMatrix<S>,
     rows: Csr,
     offset: Vec<usize>,
+    /// Whether every rank has the whole matrix and some of the bodies.
+    is_redundant: bool,
 }
 
 impl<S: InnerSolver> Monolithic<S> {
@@ -133,9 +180,10 @@ impl<S: InnerSolver> Monolithic<S> {
     ///
     /// # Errors
     /// Those of `make`.
-    pub fn new(union: Union, make: impl FnOnce(Csr) -> Result<S>) -> Result<Self> {
-        let Union { stiffness, rows, offset } = union;
-        Ok(Self { matrix: RobinMatrix::new(stiffness, &rows, make)?, rows, offset })
+    pub fn new(union: Union, make: impl FnOnce(Slab) -> Result<S>) -> Result<Self> {
+        let Union { stiffness, rows, offset, row_stiffness, is_redundant } = union;
+        let matrix = RobinMatrix::new(stiffness, &rows, row_stiffness, make)?;
+        Ok(Self { matrix, rows, offset, is_redundant })
     }
 }
 
@@ -154,21 +202,33 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
         self.matrix.solver_mut().precision(reduction)?;
         self.matrix.update(&self.rows, springs)?;
         let parts = || self.offset.windows(2).map(|part| part[0]..part[1]);
-        let whole: Vec<f64> = parts().zip(residual).flat_map(|(part, r)| &r[..part.len()]).copied().collect();
+        let mut whole = vec![0.0; self.offset[self.offset.len() - 1]];
+        // bodies of other ranks have no residual here
+        for (part, r) in parts().zip(residual).filter(|(_, r)| !r.is_empty()) {
+            whole[part.clone()].copy_from_slice(&r[..part.len()]);
+        }
+        if self.is_redundant {
+            model.exchange.sum(&mut whole);
+        }
         let mut x = vec![0.0; whole.len()];
         if let Some(reason) = self.matrix.apply(|solver| solver.solve(&whole, &mut x))?.failure {
             return Ok(Err(Failure { body: None, reason }));
         }
-        let mut states: Vec<Vec<f64>> = parts().map(|part| x[part].to_vec()).collect();
-        for (slot, state) in model.bodies.iter().zip(&mut states) {
-            if let Some(body) = &slot.local {
-                state.resize(body.len(), 0.0);
-                body.separate(state);
-            }
-        }
+        let state = |(slot, part): (&BodySlot, Range<usize>)| {
+            let Some(body) = &slot.local else { return Vec::new() };
+            let mut state = x[part].to_vec();
+            state.resize(body.len(), 0.0);
+            body.separate(&mut state);
+            state
+        };
+        let states: Vec<Vec<f64>> = model.bodies.iter().zip(parts()).map(state).collect();
         let energy: f64 = states.iter().zip(residual).map(|(x, r)| dot(x, r)).sum();
         let mut field = Field { states, trace: vec![0.0; 2 * model.points()] };
-        field.retrace(model);
+        // one message: traces, then the energy
+        field.trace_here(model);
+        field.trace.push(energy);
+        model.exchange.sum(&mut field.trace);
+        let energy = field.trace.pop().unwrap_or_default();
         let accuracy = self.matrix.solver().accuracy();
         Ok(Ok(Solution { field, energy, error: accuracy * energy.max(0.0).sqrt(), is_exact: accuracy == 0.0 }))
     }
@@ -180,6 +240,56 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
     fn describe(&self) -> String {
         self.matrix.solver().describe()
     }
+}
+
+/// The matrices of a condensed body as every rank gets them: K without its values, which go apart.
+#[derive(Clone, Serialize, Deserialize)]
+struct Copy {
+    stiffness: Csr,
+    rows: Csr,
+    motions: Vec<Vec<f64>>,
+    traces: Vec<Vec<f64>>,
+}
+
+impl Copy {
+    fn matrices(&self) -> Matrices<'_> {
+        let Self { stiffness, rows, motions, traces } = self;
+        Matrices { stiffness, rows, motions, traces }
+    }
+}
+
+/// Matrices of the bodies that are here.
+fn matrices(model: &Model) -> impl Iterator<Item = Option<Matrices<'_>>> {
+    model.bodies.iter().map(|slot| slot.local.as_ref().and_then(|body| body.matrices()))
+}
+
+/// Gives every rank the matrices of all bodies, each of which lives on one; two messages. `None` if a body has none.
+fn copies(model: &Model) -> Option<Vec<Copy>> {
+    let here: Vec<Option<Matrices>> = matrices(model).collect();
+    let mine = here.iter().map(|matrices| {
+        let Matrices { stiffness, rows, motions, traces } = (*matrices)?;
+        let stiffness = Csr { values: Vec::new(), ..stiffness.clone() };
+        Some(Copy { stiffness, rows: rows.clone(), motions: motions.to_vec(), traces: traces.to_vec() })
+    });
+    let mine: Vec<Option<Copy>> = mine.collect();
+    let mut all = share(&*model.exchange, &mine);
+    let of = |body: usize| all.iter_mut().find_map(|of_rank| of_rank.get_mut(body)?.take());
+    let mut copies: Vec<Copy> = (0..here.len()).map(of).collect::<Option<_>>()?;
+    let mut values = Vec::new();
+    for (copy, matrices) in copies.iter().zip(&here) {
+        match matrices {
+            Some(matrices) => values.extend_from_slice(&matrices.stiffness.values),
+            None => values.resize(values.len() + copy.stiffness.col.len(), 0.0),
+        }
+    }
+    model.exchange.sum(&mut values);
+    let mut rest = &values[..];
+    for copy in &mut copies {
+        let (own, others) = rest.split_at(copy.stiffness.col.len());
+        copy.stiffness.values = own.to_vec();
+        rest = others;
+    }
+    Some(copies)
 }
 
 /// As many dofs as there are motions such that no combination of these leaves them all at rest: the pivots of an elimination.

@@ -2,8 +2,9 @@
 
 use super::InnerSolver;
 use crate::error::Result;
-use crate::linalg::Csr;
+use crate::linalg::{Csr, Slab};
 use crate::model::{BodyCounts, Solved};
+use std::ops::Range;
 use std::time::Instant;
 
 /// G of one body, or of all bodies together.
@@ -25,16 +26,22 @@ pub struct RobinMatrix<S> {
 }
 
 impl<S: InnerSolver> RobinMatrix<S> {
-    /// Starts from G = K, on a pattern that holds B'B; `make` turns K into its solver.
+    /// Starts from G = K, on a pattern that holds B'B; `make` turns K into its solver. `row_stiffness` is b diag(K) b' of each row b,
+    /// also of those on other ranks.
     ///
     /// # Errors
     /// Those of `make`.
-    pub fn new(stiffness: Csr, rows: &Csr, make: impl FnOnce(Csr) -> Result<S>) -> Result<Self> {
+    pub fn new(
+        stiffness: Slab,
+        rows: &Csr,
+        row_stiffness: Vec<f64>,
+        make: impl FnOnce(Slab) -> Result<S>,
+    ) -> Result<Self> {
         let weight = vec![0.0; rows.rows()];
         Ok(Self {
             prepared: weight.clone(),
             weight,
-            row_stiffness: rows.quadratic_diagonal(&stiffness),
+            row_stiffness,
             coupling: Coupling::new(&stiffness, rows),
             counts: BodyCounts::default(),
             before: (0, 0),
@@ -119,7 +126,9 @@ impl<S: InnerSolver> RobinMatrix<S> {
 
 /// Where B' diag(d) B goes in the values of G.
 struct Coupling {
-    /// Position in the values of G of every product b_i b_j of every row, in the order of rows, i and j.
+    /// Dofs of this rank.
+    own: Range<usize>,
+    /// Position in the values of G of every product b_i b_j of every row with i here, in the order of rows, i and j.
     positions: Vec<u32>,
     /// Each position that some row has, once.
     touched: Vec<u32>,
@@ -128,13 +137,15 @@ struct Coupling {
 }
 
 impl Coupling {
-    fn new(stiffness: &Csr, rows: &Csr) -> Self {
-        let products = (0..rows.rows()).map(|q| rows.range(q).len().pow(2)).sum();
+    fn new(stiffness: &Slab, rows: &Csr) -> Self {
+        let own = stiffness.first..stiffness.first + stiffness.rows();
+        let here = |q: usize| rows.row(q).map(|entry| entry.0).filter(|i| own.contains(i));
+        let products = (0..rows.rows()).map(|q| here(q).count() * rows.range(q).len()).sum();
         let mut positions = Vec::with_capacity(products);
         for q in 0..rows.rows() {
-            for (i, _) in rows.row(q) {
+            for i in here(q) {
                 for (j, _) in rows.row(q) {
-                    match stiffness.position(i, j) {
+                    match stiffness.position(i - own.start, j) {
                         Some(position) => positions.push(position as u32),
                         None => unreachable!("the pattern holds the couplings of every contact row"),
                     }
@@ -146,7 +157,7 @@ impl Coupling {
         touched.dedup();
         touched.shrink_to_fit();
         let stiffness = touched.iter().map(|&at| stiffness.values[at as usize]).collect();
-        Self { positions, touched, stiffness }
+        Self { own, positions, touched, stiffness }
     }
 
     /// Writes K + B' diag(d) B where it differs from K; the rest of G is K already.
@@ -155,12 +166,13 @@ impl Coupling {
         let mut left = &self.positions[..];
         for (q, &weight) in weight.iter().enumerate() {
             let b = &rows.values[rows.range(q)];
-            let (mine, others) = left.split_at(b.len() * b.len());
+            let here = rows.row(q).filter(|entry| self.own.contains(&entry.0));
+            let (mine, others) = left.split_at(here.clone().count() * b.len());
             left = others;
             if weight == 0.0 {
                 continue;
             }
-            let products = b.iter().flat_map(|x| b.iter().map(move |y| x * y));
+            let products = here.flat_map(|(_, x)| b.iter().map(move |y| x * y));
             mine.iter().zip(products).for_each(|(&at, product)| g[at as usize] += weight * product);
         }
     }

@@ -3,8 +3,10 @@
 use super::{InnerSolver, RobinMatrix, Split};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
-use crate::linalg::{Csr, dot};
-use crate::model::{Body, BodyCounts, Energy, Matrices, Solved};
+use crate::linalg::{Csr, Slab, dot};
+use crate::model::{Body, BodyCounts, Distribution, Energy, Matrices, Solved};
+use std::borrow::Cow;
+use std::rc::Rc;
 
 /// A body with assembled K and f, its contact rows B, and a solver for G = K + B' diag(d) B.
 ///
@@ -13,6 +15,8 @@ pub struct SparseBody<S> {
     body: ElasticBody,
     rows: Csr,
     split: Split,
+    /// Where its dofs are dealt out over the ranks: how. K and B have the dofs of this rank then, K with columns for its ghosts.
+    distribution: Option<Rc<Distribution>>,
     robin: Lazy<S>,
     product: Vec<f64>,
 }
@@ -29,7 +33,7 @@ enum Lazy<S> {
 }
 
 /// Makes a solver of K.
-type Maker<S> = Box<dyn FnOnce(Csr) -> Result<S>>;
+type Maker<S> = Box<dyn FnOnce(Slab) -> Result<S>>;
 
 impl<S: InnerSolver> SparseBody<S> {
     /// Joins a body, its contact rows (columns: its dofs, none of them prescribed) and a solver that `make` makes of K, on a
@@ -38,13 +42,35 @@ impl<S: InnerSolver> SparseBody<S> {
         body: ElasticBody,
         rows: Csr,
         free: &[FreeMotion],
-        make: impl FnOnce(Csr) -> Result<S> + 'static,
+        make: impl FnOnce(Slab) -> Result<S> + 'static,
         words: String,
     ) -> Self {
         let robin = Lazy::Later { make: Some(Box::new(make)), words };
         let split = Split::new(free, &rows);
         let product = vec![0.0; body.load.len()];
-        Self { body, rows, split, robin, product }
+        Self { body, rows, split, distribution: None, robin, product }
+    }
+
+    /// The part of this rank of a body that has no solver of its own; `body` has the dofs of this rank, `rows` and `free` those of all.
+    pub fn dealt_out(
+        body: ElasticBody,
+        rows: &Csr,
+        free: &[FreeMotion],
+        distribution: Distribution,
+        words: String,
+    ) -> Self {
+        let distribution = Rc::new(distribution);
+        let split = Split::new(free, rows).dealt_out(distribution.clone());
+        let (rows, product) = (distribution.of_rows(rows), vec![0.0; body.load.len()]);
+        Self { body, rows, split, distribution: Some(distribution), robin: Lazy::Later { make: None, words }, product }
+    }
+
+    /// Values at all columns of K.
+    fn at_columns<'v>(&self, v: &'v [f64]) -> Cow<'v, [f64]> {
+        match &self.distribution {
+            None => Cow::Borrowed(v),
+            Some(distribution) => Cow::Owned(distribution.with_ghosts(v)),
+        }
     }
 
     /// Displacements of all dofs for a state.
@@ -61,7 +87,9 @@ impl<S: InnerSolver> SparseBody<S> {
         if let Lazy::Later { make, .. } = &mut self.robin
             && let Some(make) = make.take()
         {
-            let matrix = RobinMatrix::new(self.body.stiffness.clone(), &self.rows, make)?;
+            let stiffness = &self.body.stiffness;
+            let row_stiffness = self.rows.quadratic_diagonal(stiffness);
+            let matrix = RobinMatrix::new(stiffness.clone().into(), &self.rows, row_stiffness, make)?;
             self.robin = Lazy::Now(Box::new(matrix));
         }
         match &mut self.robin {
@@ -116,7 +144,7 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
         let n = self.dofs();
         let (v, rigid) = u.split_at(n);
-        self.body.stiffness.multiply(v, &mut self.product);
+        self.body.stiffness.multiply(&self.at_columns(v), &mut self.product);
         for i in 0..n {
             r[i] = self.body.load[i] - self.product[i];
         }
@@ -134,7 +162,7 @@ impl<S: InnerSolver> Body for SparseBody<S> {
 
     fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
         let n = self.dofs();
-        self.body.stiffness.multiply(&u[..n], &mut y[..n]);
+        self.body.stiffness.multiply(&self.at_columns(&u[..n]), &mut y[..n]);
         y[n..].fill(0.0);
     }
 
@@ -169,7 +197,7 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn rounding(&self, u: &[f64], force: &[f64]) -> f64 {
-        let k = &self.body.stiffness;
+        let (k, u) = (&self.body.stiffness, self.at_columns(&u[..self.dofs()]));
         let mut size: Vec<f64> = self.body.load.iter().map(|f| f.abs()).collect();
         for (i, size) in size.iter_mut().enumerate() {
             *size += k.row(i).map(|(j, a)| (a * u[j]).abs()).sum::<f64>();
@@ -185,7 +213,10 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>> {
-        let mut r = load.to_vec();
+        let mut r = match &self.distribution {
+            None => load.to_vec(),
+            Some(distribution) => distribution.scatter(load),
+        };
         self.body.prescribed.iter().for_each(|&(dof, _)| r[dof] = 0.0);
         r.extend(self.split.rigid_part(&r));
         Ok(r)
@@ -214,8 +245,16 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         self.split.separate(state);
     }
 
+    fn distribution(&self) -> Option<&Distribution> {
+        self.distribution.as_deref()
+    }
+
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
-        Ok(self.join(u))
+        let own = self.join(u);
+        Ok(match &self.distribution {
+            None => own,
+            Some(distribution) => distribution.gather(&own, &[]),
+        })
     }
 
     fn carried(&self) -> &[f64] {

@@ -7,9 +7,11 @@
 
 use crate::fem::rigid::FreeMotion;
 use crate::linalg::{Csr, axpy, dot};
+use crate::model::Distribution;
+use std::rc::Rc;
 
 /// Orthogonal rigid motions that a body's supports leave free, with what they do at its contact rows.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct Split {
     /// R, one vector over the dofs each. Their lengths lie between 1 and 2: they are scaled by powers of two, which leaves a
     /// translation of a flat surface the same digits at all points, and few of them.
@@ -20,6 +22,8 @@ pub struct Split {
     traces: Vec<Vec<f64>>,
     /// R'f.
     work: Vec<f64>,
+    /// Where the dofs are dealt out over the ranks: how. R has the dofs of this rank then.
+    distribution: Option<Rc<Distribution>>,
 }
 
 impl Split {
@@ -48,6 +52,26 @@ impl Split {
         split
     }
 
+    /// The part of the rank that has these dofs. Forces on rigid motions belong to the rank that speaks for the body.
+    pub fn dealt_out(mut self, distribution: Rc<Distribution>) -> Self {
+        self.motions.iter_mut().for_each(|motion| *motion = distribution.scatter(motion));
+        if !distribution.leads {
+            self.work.fill(0.0);
+        }
+        self.distribution = Some(distribution);
+        self
+    }
+
+    /// A sum over dofs, from that over the dofs here.
+    fn sum(&self, here: f64) -> f64 {
+        self.distribution.as_ref().map_or(here, |distribution| distribution.sum(here))
+    }
+
+    /// Whether forces on rigid motions are this rank's.
+    fn leads(&self) -> bool {
+        self.distribution.as_ref().is_none_or(|distribution| distribution.leads)
+    }
+
     /// Number of motions: a state is this much longer than the dofs.
     pub fn count(&self) -> usize {
         self.motions.len()
@@ -67,7 +91,7 @@ impl Split {
     pub fn separate(&self, state: &mut [f64]) {
         let (dofs, rigid) = state.split_at_mut(state.len() - self.count());
         for ((motion, square), a) in self.motions.iter().zip(&self.squares).zip(rigid) {
-            let part = dot(motion, dofs) / square;
+            let part = self.sum(dot(motion, dofs)) / square;
             axpy(-part, motion, dofs);
             *a += part;
         }
@@ -81,13 +105,19 @@ impl Split {
         u
     }
 
-    /// t += B R a.
+    /// t += B R a, on the rank that speaks for the body.
     pub fn add_trace(&self, rigid: &[f64], t: &mut [f64]) {
+        if !self.leads() {
+            return;
+        }
         self.traces.iter().zip(rigid).for_each(|(trace, &a)| axpy(a, trace, t));
     }
 
-    /// y += (B R)' force, one entry a motion.
+    /// y += (B R)' force, one entry a motion, on the rank that speaks for the body.
     pub fn add_rows(&self, s: f64, force: &[f64], y: &mut [f64]) {
+        if !self.leads() {
+            return;
+        }
         self.traces.iter().zip(y).for_each(|(trace, y)| *y += s * dot(trace, force));
     }
 
@@ -105,7 +135,7 @@ impl Split {
     pub fn balance(&self, force: &mut [f64]) {
         let (dofs, rigid) = force.split_at_mut(force.len() - self.count());
         for ((motion, square), &a) in self.motions.iter().zip(&self.squares).zip(&*rigid) {
-            let off = (a - dot(motion, dofs)) / square;
+            let off = self.sum(a - dot(motion, dofs)) / square;
             axpy(off, motion, dofs);
         }
     }

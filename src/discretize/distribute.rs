@@ -1,0 +1,183 @@
+//! The dofs of all bodies over the ranks: a partition of their nodes, and what each rank knows of it.
+
+use super::draft::Draft;
+use crate::contact::ContactPair;
+use crate::fem::assemble::NodeGraph;
+use crate::linalg::Csr;
+use crate::model::{Distribution, Exchange};
+use std::rc::Rc;
+
+/// A graph whose nodes are to be dealt out: compressed rows of neighbours, both ways, without the node itself.
+pub struct Graph {
+    /// Row starts.
+    pub ptr: Vec<i32>,
+    /// Neighbours.
+    pub col: Vec<i32>,
+    /// Work of each node: the entries of its row of K, in blocks.
+    pub weight: Vec<i32>,
+}
+
+/// The nodes of all bodies, body by body, joined where K couples them, and at contact points.
+pub fn graph<const D: usize>(graphs: &[&NodeGraph], drafts: &[Draft], pairs: &[ContactPair]) -> Graph {
+    let mut first = vec![0];
+    graphs.iter().for_each(|graph| first.push(first[first.len() - 1] + graph.ptr.len() - 1));
+    // a contact point joins the first node on its one side with the first on the other
+    let mut ends: Vec<[Option<i32>; 2]> = Vec::new();
+    let mut begin = vec![0];
+    for pair in pairs {
+        ends.resize(ends.len() + pair.len(), [None; 2]);
+        begin.push(ends.len());
+    }
+    for (body, draft) in drafts.iter().enumerate() {
+        let mut row = 0;
+        for segment in &draft.segments {
+            for at in begin[segment.pair]..begin[segment.pair + 1] {
+                let node = draft.rows.row(row).next().map(|(dof, _)| (first[body] + dof / D) as i32);
+                ends[at][segment.side] = node;
+                row += 1;
+            }
+        }
+    }
+    let mut joined: Vec<(i32, i32)> = ends.into_iter().filter_map(|[a, b]| Some((a?, b?))).collect();
+    joined.extend(joined.clone().into_iter().map(|(a, b)| (b, a)));
+    joined.sort_unstable();
+    joined.dedup();
+    let mut joined = joined.into_iter().peekable();
+    let mut all = Graph { ptr: vec![0], col: Vec::new(), weight: Vec::new() };
+    for (graph, &first) in graphs.iter().zip(&first) {
+        for node in 0..graph.ptr.len() - 1 {
+            let neighbours = &graph.col[graph.ptr[node] as usize..graph.ptr[node + 1] as usize];
+            all.weight.push(neighbours.len() as i32);
+            let own = (first + node) as i32;
+            all.col.extend(neighbours.iter().map(|&other| first as i32 + other as i32).filter(|&other| other != own));
+            while let Some((_, other)) = joined.next_if(|edge| edge.0 == own) {
+                // in a body that touches itself K may couple the two, or they are one
+                let inside =
+                    u32::try_from(other - first as i32).is_ok_and(|other| neighbours.binary_search(&other).is_ok());
+                all.col.extend(Some(other).filter(|_| !inside));
+            }
+            all.ptr.push(all.col.len() as i32);
+        }
+    }
+    all
+}
+
+/// What rank `rank` knows of each body when `owner` has the rank of every node, body by body; and which node of each body it has at
+/// which place: own ones, then ghosts.
+pub fn distribute<const D: usize>(
+    graphs: &[&NodeGraph],
+    drafts: &[Draft],
+    owner: &[u32],
+    (rank, ranks): (usize, usize),
+    exchange: &Rc<dyn Exchange>,
+) -> Vec<(Distribution, Places)> {
+    // numbers of nodes in the matrix of all bodies: rank by rank, there body by body
+    let mut next = vec![0; ranks + 1];
+    owner.iter().for_each(|&owner| next[owner as usize + 1] += 1);
+    (0..ranks).for_each(|rank| next[rank + 1] += next[rank]);
+    let start = next[rank];
+    let number = |&owner: &u32| {
+        next[owner as usize] += 1;
+        next[owner as usize] - 1
+    };
+    let number: Vec<u32> = owner.iter().map(number).collect();
+    let mut begin = 0;
+    let mut all = Vec::new();
+    for (graph, draft) in graphs.iter().zip(drafts) {
+        let nodes = graph.ptr.len() - 1;
+        let (owner, number) = (&owner[begin..begin + nodes], &number[begin..begin + nodes]);
+        begin += nodes;
+        let own: Vec<usize> = (0..nodes).filter(|&node| owner[node] as usize == rank).collect();
+        let (mut ghosts, mut wanted) = (Vec::new(), Vec::new());
+        for (place, &node) in own.iter().enumerate() {
+            for &other in &graph.col[graph.ptr[node] as usize..graph.ptr[node + 1] as usize] {
+                let other = other as usize;
+                if owner[other] as usize != rank {
+                    ghosts.push((number[other], other));
+                    wanted.push((owner[other], place as u32));
+                }
+            }
+        }
+        ghosts.sort_unstable();
+        ghosts.dedup();
+        wanted.sort_unstable();
+        wanted.dedup();
+        let mut counts = [vec![0; ranks], vec![0; ranks]];
+        wanted.iter().for_each(|(to, _)| counts[0][*to as usize] += D as i32);
+        ghosts.iter().for_each(|&(_, node)| counts[1][owner[node] as usize] += D as i32);
+        let mut of_node = vec![-1; nodes];
+        own.iter()
+            .chain(ghosts.iter().map(|(_, node)| node))
+            .enumerate()
+            .for_each(|(i, &node)| of_node[node] = i as i32);
+        let dofs = |node: u32| (0..D as u32).map(move |c| D as u32 * node + c);
+        let mut share = vec![0; ranks];
+        owner.iter().for_each(|&owner| share[owner as usize] += 1);
+        // of equal ones the first
+        let most = (0..ranks).rev().max_by_key(|&rank| share[rank]).unwrap_or(0);
+        let mut rows = Csr::new(D * next[ranks - 1] as usize);
+        for q in 0..draft.rows.rows() {
+            rows.push_row(draft.rows.row(q).map(|(dof, value)| (D * number[dof / D] as usize + dof % D, value)));
+        }
+        let distribution = Distribution {
+            dofs: D * nodes,
+            first: D * own.first().map_or(start, |&node| number[node]) as usize,
+            start: D * start as usize,
+            own: own.iter().flat_map(|&node| dofs(node as u32)).collect(),
+            ghosts: ghosts.iter().flat_map(|&(number, _)| dofs(number)).map(|dof| dof as i32).collect(),
+            total: D * next[ranks - 1] as usize,
+            rows,
+            leads: most == rank,
+            wanted: wanted.iter().flat_map(|&(_, place)| dofs(place)).collect(),
+            counts,
+            exchange: exchange.clone(),
+        };
+        all.push((distribution, Places { of_node, leader: most }));
+    }
+    all
+}
+
+/// Where a rank has the nodes of a body.
+pub struct Places {
+    /// Place of each node: own ones, then ghosts; -1 for others.
+    of_node: Vec<i32>,
+    /// The rank that speaks for the body.
+    pub leader: usize,
+}
+
+impl Places {
+    /// Whether a node is an own one of `distribution`.
+    pub fn is_own<const D: usize>(&self, distribution: &Distribution, node: usize) -> bool {
+        (0..distribution.own.len() as i32 / D as i32).contains(&self.of_node[node])
+    }
+
+    /// Own rows of a matrix over the dofs of the body, whose other rows are empty, in columns of own dofs and ghosts.
+    pub fn rows<const D: usize>(&self, distribution: &Distribution, matrix: Csr) -> Csr {
+        let Csr { ptr, mut col, mut values, .. } = matrix;
+        let mut starts = vec![0];
+        let mut row = Vec::new();
+        for &dof in &distribution.own {
+            let range = ptr[dof as usize] as usize..ptr[dof as usize + 1] as usize;
+            let place = |&j: &i32| D as i32 * self.of_node[j as usize / D] + j % D as i32;
+            row.clear();
+            row.extend(col[range.clone()].iter().map(place).zip(values[range.clone()].iter().copied()));
+            row.sort_unstable_by_key(|entry| entry.0);
+            for (k, &(j, value)) in range.clone().zip(&row) {
+                (col[k], values[k]) = (j, value);
+            }
+            starts.push(range.end as i32);
+        }
+        Csr { columns: distribution.own.len() + distribution.ghosts.len(), ptr: starts, col, values }
+    }
+
+    /// Values (dof, value) at dofs of the body that are here, by their places, sorted.
+    pub fn entries<const D: usize>(&self, all: &[(usize, f64)]) -> Vec<(usize, f64)> {
+        let place = |&(dof, value): &(usize, f64)| {
+            let place = usize::try_from(self.of_node[dof / D]).ok()?;
+            Some((D * place + dof % D, value))
+        };
+        let mut here: Vec<_> = all.iter().filter_map(place).collect();
+        here.sort_unstable_by_key(|entry| entry.0);
+        here
+    }
+}

@@ -1,0 +1,69 @@
+//! What bodies need to become solvers, and who makes them.
+
+use super::distribute::Graph;
+use crate::error::Result;
+use crate::fem::ElasticBody;
+use crate::fem::assemble::NodeGraph;
+use crate::fem::rigid::{FreeMotion, RigidMotion};
+use crate::linalg::Csr;
+use crate::model::{Body, BodySlot, Distribution};
+
+/// What every rank knows of a body before its owner assembles it.
+pub struct Outline<'a> {
+    /// Name in the scene.
+    pub name: &'a str,
+    /// Space dimension: dofs of a node.
+    pub dimension: usize,
+    /// All contact rows of the body, pair by pair; columns: its dofs.
+    pub rows: &'a Csr,
+    /// Prescribed (dof, value), sorted by dof.
+    pub prescribed: &'a [(usize, f64)],
+    /// Rigid motions of the free body.
+    pub motions: &'a [RigidMotion],
+    /// Which of its nodes K couples, made when it is first asked for.
+    pub graph: &'a dyn Fn() -> &'a NodeGraph,
+}
+
+/// Gives bodies their inner solvers.
+pub trait Factory {
+    /// Decides on the solvers of all bodies, in the order of the scene: called once, on every rank.
+    ///
+    /// # Errors
+    /// Failures of PETSc's options.
+    fn plan(&mut self, outlines: &[Outline]) -> Result<()>;
+
+    /// Deals the nodes of all bodies out to the ranks if their solvers want that, after the plan: the rank of each node of `graph`, body
+    /// by body; none where bodies stay whole. Collective; the graph is made on one rank.
+    ///
+    /// # Errors
+    /// When the partitioner fails.
+    fn deal_out(&mut self, graph: &dyn Fn() -> Graph) -> Result<Option<Vec<u32>>>;
+
+    /// Makes a body, on the rank that owns it or a part of it, after its plan.
+    ///
+    /// # Errors
+    /// PETSc's refusal of a matrix or an option value.
+    fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>>;
+
+    /// A body of this name with the same K, f and contact rows, left by an earlier scene on the rank that owns it.
+    fn kept(&mut self, name: &str) -> Option<BodySlot>;
+}
+
+/// A body ready for its inner solver.
+pub struct Assembled {
+    /// Name in the scene.
+    pub name: String,
+    /// Space dimension: block size of the matrix.
+    pub dimension: usize,
+    /// K, f and supports: of all dofs, or of those of this rank.
+    pub body: ElasticBody,
+    /// How the dofs are dealt out, if they are.
+    pub distribution: Option<Distribution>,
+    /// All contact rows of the body, pair by pair.
+    pub rows: Csr,
+    /// Motions with hardly any strain in a few cells, for multigrid's near-null space: the rigid ones of the free body, in one of
+    /// revolution those of its meridian.
+    pub motions: Vec<RigidMotion>,
+    /// Those that its supports leave.
+    pub left: Vec<FreeMotion>,
+}

@@ -1,0 +1,76 @@
+//! How the dofs of a body are dealt out over the ranks, as one of them sees it.
+//!
+//! A state is (v, a): v has the dofs of this rank alone, the rigid motion a is the same on all. Of forces every rank has a part, also
+//! of those on the rigid motion, so that work is a sum over ranks.
+
+use super::Exchange;
+use crate::linalg::Csr;
+use std::rc::Rc;
+
+/// The dofs of a body that one rank owns, and those next to them.
+pub struct Distribution {
+    /// Number of dofs of the body.
+    pub dofs: usize,
+    /// Those of this rank, sorted.
+    pub own: Vec<u32>,
+    /// Number of the first of them in the matrix of all bodies; the others follow.
+    pub first: usize,
+    /// First row of that matrix on this rank.
+    pub start: usize,
+    /// Numbers in that matrix of the dofs of other ranks that own ones are coupled with, sorted.
+    pub ghosts: Vec<i32>,
+    /// Rows of that matrix.
+    pub total: usize,
+    /// All contact rows of the body; columns: rows of that matrix.
+    pub rows: Csr,
+    /// Whether this rank speaks for the body: one of those that own most of it.
+    pub leads: bool,
+    /// Own dofs that each rank wants, rank by rank: places among `own`.
+    pub wanted: Vec<u32>,
+    /// How many go to each rank, and how many ghosts come from each.
+    pub counts: [Vec<i32>; 2],
+    /// Connection to the other ranks.
+    pub exchange: Rc<dyn Exchange>,
+}
+
+impl Distribution {
+    /// Values at own dofs, then at ghosts. Collective.
+    pub fn with_ghosts(&self, own: &[f64]) -> Vec<f64> {
+        let wanted: Vec<f64> = self.wanted.iter().map(|&i| own[i as usize]).collect();
+        let ghosts = self.exchange.swap(&wanted, &self.counts[0], &self.counts[1]);
+        [own, &ghosts].concat()
+    }
+
+    /// Values at all dofs of the body, on every rank, with `rest` behind them. Collective.
+    pub fn gather(&self, own: &[f64], rest: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; self.dofs];
+        self.own.iter().zip(own).for_each(|(&dof, &value)| all[dof as usize] = value);
+        self.exchange.sum(&mut all);
+        all.extend(rest);
+        all
+    }
+
+    /// The values of own dofs among those of all, with what stands behind them.
+    pub fn scatter(&self, all: &[f64]) -> Vec<f64> {
+        let own = self.own.iter().map(|&dof| all[dof as usize]);
+        own.chain(all[self.dofs..].iter().copied()).collect()
+    }
+
+    /// Rows over all dofs of the body as rows over own ones.
+    pub fn of_rows(&self, rows: &Csr) -> Csr {
+        let mut here = Csr::new(self.own.len());
+        for q in 0..rows.rows() {
+            here.push_row(
+                rows.row(q).filter_map(|(dof, value)| Some((self.own.binary_search(&(dof as u32)).ok()?, value))),
+            );
+        }
+        here
+    }
+
+    /// The sum of a number over the ranks. Collective.
+    pub fn sum(&self, number: f64) -> f64 {
+        let mut sum = [number];
+        self.exchange.sum(&mut sum);
+        sum[0]
+    }
+}
