@@ -1,8 +1,8 @@
 //! One body of the scene on its mesh: space, supports, loads, stiffness.
 
-use super::distribute::Places;
 use super::elastic;
 use super::find::{Values, find_group, not_on_body, point, without_area};
+use super::places::Places;
 use super::springs;
 use super::supports::Held;
 use crate::contact;

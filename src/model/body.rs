@@ -1,6 +1,6 @@
 //! What the method asks of a body.
 
-use super::Distribution;
+use super::distribution::Distribution;
 use crate::error::Result;
 use crate::linalg::Csr;
 use serde::{Deserialize, Serialize};
