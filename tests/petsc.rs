@@ -5,7 +5,7 @@
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 use winkler::error::Result;
-use winkler::petsc::{ConvergedReason, Int, Ksp, Matrix, Schur, Session};
+use winkler::petsc::{ConvergedReason, Int, Ksp, Matrix, OwnedRows, Schur, Scope, Session};
 use winkler::solver::options::{Typed, UnreadKind, unread};
 
 /// After this, ranks that wait for each other are ended.
@@ -381,4 +381,64 @@ fn the_order_of_elimination_goes_with_the_size_and_not_into_the_complement() {
         Ok(())
     });
     expect_success(output);
+}
+
+/// A chain of springs on three ranks, of which the second has none: each solver finds the solution of the first matrix, and of the next one
+/// with values changed in place on both sides of the cut.
+#[test]
+fn a_matrix_of_several_ranks() {
+    let inside = || -> Result<()> {
+        let solvers = "-a_ksp_type cg -a_pc_type hypre -a_ksp_rtol 1e-12 -b_ksp_type cg -b_pc_type gamg -b_ksp_rtol 1e-12 \
+                       -c_ksp_type preonly -c_pc_type cholesky -c_pc_factor_mat_solver_type mumps";
+        let session = Session::start(&words(solvers))?;
+        let n = 60;
+        let first = [0, 40, 40, n];
+        let own = first[session.rank()]..first[session.rank() + 1];
+        let exact = |row: usize| ((row * row) % 7) as f64;
+        for prefix in ["a_", "b_", "c_"] {
+            let mut rows = OwnedRows { first: own.start, total: n, row_ptr: vec![0], ..OwnedRows::default() };
+            rows.other_row_ptr.push(0);
+            let mut others = 0;
+            for row in own.clone() {
+                for (column, value) in [(row.wrapping_sub(1), -1.0), (row, 2.0), (row + 1, -1.0)] {
+                    match column {
+                        _ if own.contains(&column) => {
+                            rows.columns.push((column - own.start) as Int);
+                            rows.values.push(value);
+                        }
+                        _ if column < n => {
+                            rows.other_columns.push(column as Int);
+                            others += 1;
+                        }
+                        _ => {}
+                    }
+                }
+                rows.row_ptr.push(rows.columns.len() as Int);
+                rows.other_row_ptr.push(rows.other_columns.len() as Int);
+            }
+            rows.values.extend(std::iter::repeat_n(-1.0, others));
+            let mut matrix = Matrix::from_owned_rows(&session, 1, rows)?;
+            matrix.set_spd()?;
+            matrix.set_near_null_space(&[vec![1.0; own.len()]])?;
+            assert_eq!((matrix.rows(), matrix.scope()), (own.len(), Scope::World));
+            assert!(Ksp::new(&session, prefix)?.set_operator(&matrix).is_err());
+            let mut ksp = Ksp::of(&session, Scope::World, prefix)?;
+            ksp.set_operator(&matrix)?;
+            ksp.set_from_options()?;
+            for scale in [1.0, 3.0] {
+                matrix.update(|values| values.iter_mut().for_each(|value| *value *= scale))?;
+                let at = |row: usize| if row < n { exact(row) } else { 0.0 };
+                let of = |row: usize| scale * (2.0 * at(row) - at(row.wrapping_sub(1)) - at(row + 1));
+                let b: Vec<f64> = own.clone().map(of).collect();
+                let (mut x, mut y) = (vec![0.0; own.len()], vec![0.0; own.len()]);
+                assert!(ksp.solve(&b, &mut x)?.reason.converged());
+                let error = own.clone().zip(&x).map(|(row, x)| (x - exact(row)).abs()).fold(0.0, f64::max);
+                assert!(error < 1e-8, "{prefix} {scale}: {error:e}");
+                matrix.multiply(&x, &mut y)?;
+                assert!(y.iter().zip(&b).all(|(y, b)| (y - b).abs() < 1e-7));
+            }
+        }
+        Ok(())
+    };
+    expect_success(alone("a_matrix_of_several_ranks", 3, &[], inside));
 }

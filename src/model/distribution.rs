@@ -66,11 +66,4 @@ impl Distribution {
         }
         here
     }
-
-    /// The sum of a number over the ranks. Collective.
-    pub fn sum(&self, number: f64) -> f64 {
-        let mut sum = [number];
-        self.exchange.sum(&mut sum);
-        sum[0]
-    }
 }

@@ -62,9 +62,13 @@ impl Split {
         self
     }
 
-    /// A sum over dofs, from that over the dofs here.
-    fn sum(&self, here: f64) -> f64 {
-        self.distribution.as_ref().map_or(here, |distribution| distribution.sum(here))
+    /// Sums over dofs, one a motion, from those over the dofs here; one message.
+    fn sums(&self, here: impl Iterator<Item = f64>) -> Vec<f64> {
+        let mut sums: Vec<f64> = here.collect();
+        if let Some(distribution) = &self.distribution {
+            distribution.exchange.sum(&mut sums);
+        }
+        sums
     }
 
     /// Whether forces on rigid motions are this rank's.
@@ -90,10 +94,10 @@ impl Split {
     /// Moves the rigid part of the dofs of a state to its end.
     pub fn separate(&self, state: &mut [f64]) {
         let (dofs, rigid) = state.split_at_mut(state.len() - self.count());
-        for ((motion, square), a) in self.motions.iter().zip(&self.squares).zip(rigid) {
-            let part = self.sum(dot(motion, dofs)) / square;
-            axpy(-part, motion, dofs);
-            *a += part;
+        let parts = self.sums(self.motions.iter().map(|motion| dot(motion, dofs)));
+        for (((motion, square), part), a) in self.motions.iter().zip(&self.squares).zip(parts).zip(rigid) {
+            axpy(-part / square, motion, dofs);
+            *a += part / square;
         }
     }
 
@@ -134,9 +138,9 @@ impl Split {
     /// Gives the dofs of a force the rigid part that its end says.
     pub fn balance(&self, force: &mut [f64]) {
         let (dofs, rigid) = force.split_at_mut(force.len() - self.count());
-        for ((motion, square), &a) in self.motions.iter().zip(&self.squares).zip(&*rigid) {
-            let off = self.sum(a - dot(motion, dofs)) / square;
-            axpy(off, motion, dofs);
+        let lacking = self.sums(self.motions.iter().zip(&*rigid).map(|(motion, a)| a - dot(motion, dofs)));
+        for ((motion, square), lacking) in self.motions.iter().zip(&self.squares).zip(lacking) {
+            axpy(lacking / square, motion, dofs);
         }
     }
 }

@@ -1,18 +1,24 @@
-//! Poisson's equation on the unit square by the five-point formula, with any solver of PETSc:
+//! Poisson's equation on the unit square by the five-point formula, with any solver of PETSc, on any number of ranks:
 //!
 //!     cargo run --example poisson -- -n 200 -ksp_type cg -pc_type gamg -ksp_monitor
+//!     mpiexec -n 2 target/debug/examples/poisson -n 200 -ksp_type cg -pc_type hypre
 //!
 //! The exact solution sin(pi x) sin(pi y) gives the right-hand side and the error, which falls as 1/n^2.
 
+use mpi::collective::SystemOperation;
+use mpi::traits::CommunicatorCollectives;
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::process::ExitCode;
 use winkler::error::{Error, Kind, Result};
-use winkler::petsc::{Int, Ksp, Matrix, Session};
+use winkler::petsc::{Int, Ksp, Matrix, OwnedRows, Scope, Session};
 
-/// Rows of the matrix on `n` by `n` inner points, scaled by the squared spacing: 4 in the middle, -1 for neighbours.
-fn laplace(session: &Session, n: usize) -> Result<Matrix> {
-    let (mut row_ptr, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
-    for row in 0..n * n {
+/// Some rows of the matrix on `n` by `n` inner points, scaled by the squared spacing: 4 in the middle, -1 for neighbours.
+fn laplace(session: &Session, n: usize, own: Range<usize>) -> Result<Matrix> {
+    let mut rows = OwnedRows { first: own.start, total: n * n, row_ptr: vec![0], ..OwnedRows::default() };
+    let mut others = Vec::new();
+    rows.other_row_ptr.push(0);
+    for row in own.clone() {
         let (i, j) = (row % n, row / n);
         let neighbours = [
             (j > 0, row.wrapping_sub(n), -1.0),
@@ -22,12 +28,19 @@ fn laplace(session: &Session, n: usize) -> Result<Matrix> {
             (j + 1 < n, row + n, -1.0),
         ];
         for (_, column, value) in neighbours.into_iter().filter(|(inside, ..)| *inside) {
-            columns.push(column as Int);
-            values.push(value);
+            if own.contains(&column) {
+                rows.columns.push((column - own.start) as Int);
+                rows.values.push(value);
+            } else {
+                rows.other_columns.push(column as Int);
+                others.push(value);
+            }
         }
-        row_ptr.push(columns.len() as Int);
+        rows.row_ptr.push(rows.columns.len() as Int);
+        rows.other_row_ptr.push(rows.other_columns.len() as Int);
     }
-    let mut matrix = Matrix::from_csr(session, 1, row_ptr, columns, values)?;
+    rows.values.append(&mut others);
+    let mut matrix = Matrix::from_owned_rows(session, 1, rows)?;
     matrix.set_spd()?;
     Ok(matrix)
 }
@@ -47,7 +60,10 @@ fn run(words: &[String]) -> Result<()> {
     options.mark_used("-n")?;
 
     let h = 1.0 / (n + 1) as f64;
-    let exact: Vec<f64> = (0..n * n)
+    let first = |rank: usize| n * n * rank / session.size();
+    let own = first(session.rank())..first(session.rank() + 1);
+    let exact: Vec<f64> = own
+        .clone()
         .map(|row| {
             let (x, y) = ((row % n + 1) as f64 * h, (row / n + 1) as f64 * h);
             (PI * x).sin() * (PI * y).sin()
@@ -55,15 +71,17 @@ fn run(words: &[String]) -> Result<()> {
         .collect();
     let b: Vec<f64> = exact.iter().map(|u| 2.0 * PI * PI * h * h * u).collect();
 
-    let matrix = laplace(&session, n)?;
-    let mut ksp = Ksp::new(&session, "")?;
+    let matrix = laplace(&session, n, own.clone())?;
+    let mut ksp = Ksp::of(&session, Scope::World, "")?;
     ksp.set_operator(&matrix)?;
     ksp.set_from_options()?;
     ksp.set_up()?;
-    let mut u = vec![0.0; n * n];
+    let mut u = vec![0.0; own.len()];
     let solved = ksp.solve(&b, &mut u)?;
 
-    let error = u.iter().zip(&exact).map(|(u, exact)| (u - exact).abs()).fold(0.0, f64::max);
+    let mine = u.iter().zip(&exact).map(|(u, exact)| (u - exact).abs()).fold(0.0, f64::max);
+    let mut error = 0.0;
+    session.world().all_reduce_into(&mine, &mut error, SystemOperation::max());
     if session.rank() == 0 {
         println!("PETSc {}, {}", session.petsc_version().unwrap_or_default(), session.blas_name());
         println!("{} unknowns, {} with {}", n * n, ksp.ksp_type(), ksp.pc_type());

@@ -1,0 +1,147 @@
+//! Newton's method is the same on any number of ranks: dofs are dealt out, or every rank solves for the contacts of condensed bodies.
+
+mod common;
+
+use common::{Run, case, solve, solve_on};
+use std::fs;
+
+/// Small meshes of scenes of every kind: held and floating bodies, in the plane, of revolution and in space, P1 and P2, on springs, with
+/// rigid surfaces and turned axes, many bodies.
+const SCENES: [(&str, &[&str]); 9] = [
+    ("groove", &["mesh.set.n=4"]),
+    ("groove3d", &["mesh.set.n=4"]),
+    ("stack", &["mesh.set.n=4"]),
+    ("bearing", &["mesh.set.n=2"]),
+    ("flange", &["mesh.set.n=2", "body.0.order=2", "body.1.order=2"]),
+    ("hertz-sphere", &["mesh.set.n=3", "body.0.order=1", "body.1.order=1"]),
+    ("sphere-layer", &[]),
+    ("wall", &["mesh.set.columns=3", "mesh.set.rows=4", "output.pairs=100"]),
+    ("coating", &["mesh.set.n=4"]),
+];
+
+/// Far below what is compared.
+const STOP: &str = "method.stop={residual=1e-11}";
+
+/// Pressures of all pairs.
+fn pressures(run: &Run) -> Vec<f64> {
+    let mut names: Vec<_> =
+        fs::read_dir(&run.folder).expect("results").flatten().map(|file| file.file_name()).collect();
+    names.sort();
+    let tables = names.iter().filter_map(|name| name.to_str()).filter(|name| name.starts_with("contact-"));
+    tables.filter(|name| name.ends_with(".csv")).flat_map(|name| run.table(name)["pressure"].to_vec()).collect()
+}
+
+/// Runs a scene with a solver on some ranks.
+fn run(ranks: usize, (scene, sets): (&str, &[&str]), solver: &str) -> Run {
+    let solver = format!("solver=\"{solver}\"");
+    let mut args = vec!["--method", "newton", "--set", STOP, "--set", &solver, "--set", "output.plots=false"];
+    sets.iter().for_each(|set| args.extend(["--set", set]));
+    match ranks {
+        1 => solve(case(scene), &args),
+        _ => solve_on(ranks, case(scene), &args),
+    }
+    .converged()
+}
+
+/// The pressures of one rank on several, to 1e-8 of the peak, and Newton's steps to one.
+fn same_on(ranks: &[usize], solver: &str) {
+    for scene in SCENES {
+        let serial = run(1, scene, solver);
+        let (expected, peak) = (pressures(&serial), pressures(&serial).into_iter().fold(0.0, f64::max));
+        assert!(peak > 0.0, "{}", scene.0);
+        for &ranks in ranks {
+            let parallel = run(ranks, scene, solver);
+            let found = pressures(&parallel);
+            assert_eq!(found.len(), expected.len(), "{} on {ranks}", scene.0);
+            let apart = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(apart <= 1e-8 * peak, "{} on {ranks}: {:e} apart", scene.0, apart / peak);
+            let steps = [&parallel, &serial].map(|run| run.count("iterations"));
+            assert!(steps[0].abs_diff(steps[1]) <= 1, "{} on {ranks}: {steps:?}", scene.0);
+            assert_eq!([&parallel, &serial].map(|run| run.text("method")), ["newton"; 2]);
+            assert_eq!(parallel.solvers(), serial.solvers());
+            assert_eq!(parallel.count("assemblies"), serial.count("assemblies"));
+        }
+    }
+}
+
+#[test]
+fn condensed_bodies() {
+    same_on(&[2, 5], "condensed");
+}
+
+#[test]
+fn one_factorisation() {
+    same_on(&[3], "mumps");
+}
+
+#[test]
+fn multigrid() {
+    same_on(&[2, 3], "hypre");
+}
+
+/// More ranks than nodes, most of which have nothing.
+#[test]
+fn ranks_without_nodes() {
+    let scene = ("groove", &["mesh.set.n=1"][..]);
+    let serial = run(1, scene, "mumps");
+    let parallel = run(24, scene, "mumps");
+    let apart = pressures(&serial).into_iter().zip(pressures(&parallel)).map(|(a, b)| (a - b).abs());
+    assert!(apart.fold(0.0, f64::max) <= 1e-8 * serial.number("pairs/0/peak_pressure"));
+    assert!(!parallel.warnings().contains("no body"), "{}", parallel.warnings());
+}
+
+/// What is recovered inside the bodies, their balance, and the estimate of the mesh's error are those of one rank.
+#[test]
+fn bodies_are_recovered_whole() {
+    let args = ["--method", "newton", "--set", "solver=hypre", "--set", STOP, "--estimate", "--vtu"];
+    let (serial, parallel) = (solve(case("manufactured-3d"), &args), solve_on(3, case("manufactured-3d"), &args));
+    let (serial, parallel) = (serial.converged(), parallel.converged());
+    let close = |path: &str, to: f64| {
+        let [a, b] = [&serial, &parallel].map(|run| run.number(path));
+        assert!((a - b).abs() <= to * a.abs(), "{path}: {a} {b}");
+    };
+    for body in 0..2 {
+        for key in ["max_von_mises", "max_von_mises_at/0", "error_l2", "error_energy", "balance/supports/0/force/2"] {
+            close(&format!("bodies/{body}/{key}"), 1e-9);
+        }
+        assert!(parallel.number(&format!("bodies/{body}/balance/force_imbalance")) < 1e-10);
+    }
+    close("discretization_error/energy", 1e-8);
+    close("discretization_error/nodal", 1e-2);
+    close("pairs/0/layer_energy", 1e-9);
+    let names = |run: &Run| run.report["files"].clone();
+    assert_eq!(names(&serial), names(&parallel));
+}
+
+/// Messages of a step of bodies that supports hold do not depend on the number of ranks: for each body its ghosts, for the residuals
+/// before and after the step; then the traces of the step with its energy, those of the iterate, and the sums of its measures.
+#[test]
+fn messages_are_few() {
+    let sets = ["--method", "newton", "--set", "mesh.set.n=4", "--set", "solver=hypre"];
+    let mut counts = Vec::new();
+    for (ranks, limit) in [(2, 1), (2, 3), (3, 3)] {
+        let stop = format!("method.stop={{residual=1e-14,iterations={limit}}}");
+        let run = solve_on(ranks, case("groove"), &[&sets[..], &["--set", &stop]].concat());
+        assert_eq!(run.count("iterations"), limit, "{}", run.said());
+        counts.push(run.count("messages"));
+    }
+    assert_eq!(counts[1] - counts[0], 2 * (2 * 2 + 3), "{counts:?}");
+    assert_eq!(counts[1], counts[2]);
+}
+
+/// A run that pauses on three ranks goes on on one and on two.
+#[test]
+fn states_go_from_some_ranks_to_others() {
+    let sets = ["--method", "newton", "--set", "mesh.set.n=4", "--set", "solver=hypre", "--set", STOP];
+    let whole = solve(case("groove"), &sets).converged();
+    let short = ["--set", "method.stop={residual=1e-11,iterations=2}", "--checkpoint", "1e-9"];
+    let paused = solve_on(3, case("groove"), &[&sets[..], &short].concat());
+    assert_eq!(paused.code, 1, "{}", paused.said());
+    let path = paused.folder.display().to_string();
+    for ranks in [1, 2] {
+        let rest = solve_on(ranks, case("groove"), &[&sets[..], &["--restart", &path]].concat()).converged();
+        assert_eq!(rest.count("iterations"), whole.count("iterations"), "{ranks}");
+        let apart = pressures(&rest).into_iter().zip(pressures(&whole)).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f64::max) <= 1e-8 * whole.number("pairs/0/peak_pressure"), "{ranks}");
+    }
+}
