@@ -1,5 +1,11 @@
 //! The `winkler` program.
 
+use winkler::petsc::{Heap, leave};
+
+/// Running out of memory ends a run with a message and its code.
+#[global_allocator]
+static HEAP: Heap = Heap;
+
 fn main() {
-    std::process::exit(winkler::cli::run(std::env::args_os().collect()));
+    leave(winkler::cli::run(std::env::args_os().collect()));
 }

@@ -267,6 +267,48 @@ fn a_killed_run_goes_on_to_the_same_end() {
     }
 }
 
+/// A rank that is killed at any moment ends the others within seconds.
+#[test]
+fn a_killed_rank_ends_all() {
+    let (scene, sets) = (case("groove3d"), ["--method", "newton", "--set", "solver=hypre", "--set", "mesh.set.n=10"]);
+    for wait in [30, 200, 500] {
+        let mut run = Working::start(&words(&scene, &sets), 3);
+        run.until("its ranks", |_| true);
+        std::thread::sleep(Duration::from_millis(wait));
+        let Some(&rank) = run.children().last() else { continue };
+        // it may have come to its end meanwhile
+        if !Command::new("kill").args(["-s", "KILL", &rank.to_string()]).status().expect("kill").success() {
+            continue;
+        }
+        let began = Instant::now();
+        let (status, _, said) = run.end();
+        assert!(!status.success() && began.elapsed() < Duration::from_secs(5), "{wait}: {said}");
+    }
+}
+
+/// Less and less memory: a run that does not get what it wants says so, with its code, and never hangs.
+#[test]
+fn memory_ends_with_a_message() {
+    let scene = case("patch-3d");
+    let mut told = 0;
+    for megabytes in (60..400).step_by(20) {
+        let mut command = Command::new("sh");
+        environment(&mut command);
+        let line = format!("ulimit -v {megabytes}000; exec \"$@\"");
+        command.args(["-c", &line, "sh", common::WINKLER, "check"]).arg(&scene);
+        command.args(["--set", "mesh.set={nl=24,nu=24}"]).env("OPENBLAS_NUM_THREADS", "1");
+        let (status, _, said) = output(command, Duration::from_secs(60));
+        if said.contains("out of memory") {
+            assert!(status.code() == Some(5) && said.matches("error:").count() == 1, "{megabytes}: {said}");
+            told += 1;
+        } else if told > 0 {
+            assert!(status.success(), "{megabytes}: {said}");
+            break;
+        }
+    }
+    assert!(told > 0);
+}
+
 /// What a run that is interrupted in a load step shows is the run with that share of the loads and of what supports prescribe. The upper
 /// block is carried by its supports as one.
 #[test]

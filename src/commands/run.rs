@@ -70,11 +70,14 @@ fn build_in<const D: usize>(
     clock: &mut Clock,
 ) -> Result<Built> {
     interrupt.hold();
+    let stage = session.stage("mesh");
     let mesh = mesh::<D>(session, &scene, interrupt)?;
     let mesh = agree(session, interrupt.release().and_then(|()| discretize::verify(&scene, &mesh)))?;
     let names: Vec<&str> = mesh.bodies.iter().map(|body| body.name.value.as_str()).collect();
     agree(session, scene_options(session, &scene, &names))?;
     clock.phase("mesh");
+    drop(stage);
+    let stage = session.stage("discretize");
     let mut inner = Inner::new(session, &scene, &names, kept)?;
     let ranks = (session.rank(), session.size());
     let exchange = Rc::new(Ranks::new(session));
@@ -87,6 +90,7 @@ fn build_in<const D: usize>(
     let gains = D == 3 && mesh.mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
     session.set_blas_threads(if gains { cores / session.size() } else { 1 });
     clock.phase("discretize");
+    drop(stage);
     let mut warnings = warnings(session, &discrete);
     warnings.extend(inner.applied_once());
     let (linear, whole) = (inner.linear(), inner.whole().clone());
@@ -195,6 +199,7 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
 /// # Errors
 /// Unknown PETSc options, a start that is not finite, failures of PETSc.
 pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clock) -> Result<Ready> {
+    let _stage = session.stage("set-up");
     let scene = built.scene.clone();
     let Begin { start, steps, earlier } = begin;
     let mut start = match start {

@@ -65,10 +65,14 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
             saved,
             failed: Vec::new(),
         };
+        let stage = session.stage("iterate");
         let mut done = run::iterate(ready, interrupt, &mut watchers, &mut clock)?;
+        drop(stage);
         done.warnings.append(&mut watchers.failed);
         saved = watchers.saved;
+        let stage = session.stage("estimate");
         let estimate = run::estimate(&mut done, &mut clock)?;
+        drop(stage);
         watchers.table.finish();
         let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
         let more = plan.goes_on(session, &done, estimate.as_ref(), &mut clock)?;

@@ -31,6 +31,7 @@ impl Writing<'_> {
     /// Writes tables, report, plots and fields in this order, and the report again with all of their names; what cannot be written
     /// keeps nothing else from it. The report, and the first failure. Collective.
     pub fn all(&self, clock: &mut Clock, change: impl Fn(&mut Report)) -> (Report, Result<()>) {
+        let _stage = self.session.stage("output");
         let Self { session, path, plan, done, estimate, .. } = *self;
         let recovered = results::recover(done);
         let make = |clock: &Clock| {

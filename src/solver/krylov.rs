@@ -109,7 +109,9 @@ impl InnerSolver for Krylov {
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         self.set_up()?;
+        let stage = self.session.stage("linear solve");
         let solved = self.with_options(|| self.ksp.solve(r, z))?;
+        drop(stage);
         let direct = self.ksp.ksp_type() == "preonly";
         if self.keeps && solved.iterations > FEW {
             // the next change of G brings a new preconditioner if this one is worn

@@ -1,0 +1,62 @@
+//! Ends of the process: when memory ends, one message and the code of a failing solver in place of an abort.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+unsafe extern "C" {
+    fn _exit(code: i32) -> !;
+}
+
+/// Ends the process with a code, past what libraries do at an end: a thread of OpenBLAS that was not given its memory is waited for
+/// without end there.
+pub fn leave(code: i32) -> ! {
+    // nothing can be done about an output that is closed
+    let _ = std::io::stdout().flush();
+    // SAFETY: a null file means all files of the C library; nothing of this program comes after that.
+    unsafe {
+        super::ffi::fflush(std::ptr::null_mut());
+        _exit(code)
+    }
+}
+
+/// The system's allocator, which ends the process with a message where there is no more memory. Under `mpiexec` the other ranks end
+/// with it.
+pub struct Heap;
+
+impl Heap {
+    fn given(memory: *mut u8, bytes: usize) -> *mut u8 {
+        static TOLD: AtomicBool = AtomicBool::new(false);
+        if memory.is_null() && !TOLD.swap(true, Ordering::SeqCst) {
+            // printing takes no memory
+            eprintln!("error: out of memory: {} MB more were wanted", bytes.div_ceil(1_000_000));
+            eprintln!("  = help: take more ranks on more machines, multigrid (--set solver=hypre), or a coarser mesh");
+            // SAFETY: it returns to nobody, and runs nothing that might want memory.
+            unsafe { _exit(crate::error::Kind::Solver.exit_code()) }
+        }
+        memory
+    }
+}
+
+// SAFETY: all work is the system allocator's.
+unsafe impl GlobalAlloc for Heap {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: the caller's promises are passed on.
+        Self::given(unsafe { System.alloc(layout) }, layout.size())
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: the caller's promises are passed on.
+        Self::given(unsafe { System.alloc_zeroed(layout) }, layout.size())
+    }
+
+    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // SAFETY: the caller's promises are passed on.
+        Self::given(unsafe { System.realloc(memory, layout, size) }, size)
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.dealloc(memory, layout) }
+    }
+}
