@@ -264,7 +264,7 @@ impl<'a> Inner<'a> {
         Ok(match self.whole.typed("pc_type") {
             Some("hypre") => Linear::Multigrid,
             Some("cholesky" | "lu") => Linear::Direct,
-            Some(_) if self.method == MethodName::Auto => Linear::Sweeps,
+            Some(_) if self.method == MethodName::Auto && !self.whole.has_own() => Linear::Sweeps,
             None if all(Preset::Condensed)
                 && !self.whole.asks_for_ksp()
                 && (in_space || dense <= DENSE || self.wanted.is_some()) =>
@@ -308,7 +308,8 @@ impl Factory for Inner<'_> {
         for (index, &Outline { name, dimension, rows, prescribed, motions, .. }) in outlines.iter().enumerate() {
             let (dofs, retained) = (rows.columns, Retained::new(dimension, rows, prescribed, motions));
             let chosen = self.typed.of(name);
-            let typed = chosen.asks_for_ksp();
+            // a KSP of all bodies together wants them whole
+            let typed = chosen.asks_for_ksp() || (self.may_join() && self.whole.asks_for_ksp());
             let condensable = (1..dofs).contains(&retained.dofs.len()) && !typed;
             let asked = self.asked_for(typed, condensable);
             open.push(asked.is_none());
@@ -343,7 +344,9 @@ impl Factory for Inner<'_> {
 
     fn deal_out(&mut self, graph: &dyn Fn() -> Graph) -> Result<Option<Vec<u32>>> {
         let ranks = self.session.size();
-        if ranks == 1 || !matches!(self.linear, Linear::Direct | Linear::Multigrid) {
+        // a condensed body lives on one rank, and all of them can have what is left of it
+        let is_whole = self.plans.iter().any(|plan| plan.preset == Preset::Condensed);
+        if ranks == 1 || is_whole || !matches!(self.linear, Linear::Direct | Linear::Multigrid) {
             return Ok(None);
         }
         let mut owner = Ok(Vec::new());

@@ -6,7 +6,7 @@ use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule
 use crate::ddm::{Coefficient, Method, Start, Sweeps, first_springs};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::Slab;
-use crate::model::{LinearStep, Model};
+use crate::model::{BodySlot, LinearStep, Model};
 use crate::petsc::Session;
 use crate::problem::method::{Gamma, Linear, MethodName};
 use crate::scene::Scene;
@@ -49,7 +49,8 @@ fn linear_step(
     }
     model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.reveal())?;
     // multigrid wants nodes, without numbers for rigid motions among them; so do rows that are dealt out
-    let nodes = linear == Linear::Multigrid || (linear == Linear::Direct && session.size() > 1);
+    let is_dealt_out = |slot: &BodySlot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some());
+    let nodes = linear == Linear::Multigrid || model.bodies.iter().any(is_dealt_out);
     let Some(union) = Union::of(model, !nodes)? else {
         return Err(Error::new(Kind::Solver, "a body has no matrices to be joined").help("choose newton-robin"));
     };

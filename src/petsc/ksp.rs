@@ -182,8 +182,16 @@ impl Ksp {
     /// # Errors
     /// When PETSc cannot use the matrix with the types chosen.
     pub fn set_up(&self) -> Result<()> {
-        let advise =
-            |error: Error| error.help(format!("choose other {0}ksp_type, {0}pc_type, ...", self.own_options()));
+        let own = self.own_options();
+        let advise = |error: Error| {
+            match self.scope {
+            Scope::Process => error.help(format!("choose other {own}ksp_type, {own}pc_type, ...")),
+            Scope::World => error.help(format!(
+                "several ranks have rows of this matrix: choose {own}pc_type hypre, {own}pc_type cholesky with mumps, or for a \
+                 solver of one rank {own}pc_type bjacobi {own}sub_pc_type icc"
+            )),
+        }
+        };
         self.recover()?;
         petsc!(KSPSetUp(self.ksp)).map_err(advise)?;
         // KSPSetUp leaves new values of a matrix it has seen before to the first application

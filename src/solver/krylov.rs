@@ -60,7 +60,7 @@ impl Krylov {
         let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", chosen.prefix()))?;
         ksp.set_operator(&matrix)?;
         chosen.lend(session, || ksp.set_from_options())?;
-        if ksp.pc_type() == "gamg" {
+        if ksp.pc_type() == "gamg" && !near_null_space.is_empty() {
             matrix.set_near_null_space(near_null_space)?;
         }
         let multigrid = matches!(ksp.pc_type().as_str(), "hypre" | "gamg" | "ml" | "mg") && ksp.ksp_type() != "preonly";
