@@ -80,6 +80,20 @@ fn every_solver_ends_at_the_same_answer() {
 }
 
 /// preonly never runs on a stale factor: the history is the same to rounding.
+/// What is typed for the matrix of all bodies reaches it, whatever the program would have chosen for them, and by `auto`, too.
+#[test]
+fn options_of_all_bodies_together() {
+    let expected = [("hypre", "cg + hypre"), ("gamg", "cg + gamg"), ("cholesky", "cg + cholesky by mumps")];
+    for (method, (pc, solver)) in ["auto", "newton"].into_iter().flat_map(|method| expected.map(|pair| (method, pair)))
+    {
+        let args = ["--method", method, "--set", "mesh.set.n=4", "-newton_ksp_type", "cg", "-newton_pc_type", pc];
+        for ranks in [1, 2] {
+            let run = solve_on(ranks, case("groove3d"), &args).converged();
+            assert_eq!((run.text("method"), run.solvers()), ("newton", vec![solver; 2]), "{method} {pc} {ranks}");
+        }
+    }
+}
+
 #[test]
 fn preonly_factors_anew_although_told_to_reuse() {
     let (fresh, told) = (tight("--set solver=mumps"), tight("-ksp_reuse_preconditioner"));
