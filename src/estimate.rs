@@ -10,6 +10,7 @@ use crate::ddm::{Discretisation, linear};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
 use crate::linalg::Csr;
+use crate::model::field::residual;
 use crate::model::{Field, Layer, LinearStep, Model};
 use std::rc::Rc;
 
@@ -121,14 +122,7 @@ pub fn estimate(
 
     let response = linear::respond(model, step, layer, &loads, ROUGH)?;
     let (nodal, squared) = response.map_err(|failure| Error::new(Kind::Solver, failure.reason))?;
-    let mut strain = [0.0];
-    for (slot, state) in model.bodies.iter_mut().zip(&iterate.states) {
-        if let Some(body) = &mut slot.local {
-            let mut rest = vec![0.0; body.len()];
-            let force = vec![0.0; slot.row_stiffness.len()];
-            strain[0] += body.residual(state, &force, &mut rest).strain;
-        }
-    }
+    let mut strain = [residual(model, iterate, &vec![0.0; model.points()]).1.strain];
     model.exchange.sum(&mut strain);
     let reference = strain[0] + layer.work;
     let relative = |squared: f64| if reference > 0.0 { (squared.max(0.0) / reference).sqrt() } else { 0.0 };

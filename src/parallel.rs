@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::model::Exchange;
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
-use mpi::datatype::{Partition, PartitionMut};
+use mpi::datatype::PartitionMut;
 use mpi::traits::CommunicatorCollectives;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -30,23 +30,6 @@ impl Exchange for Ranks {
             self.session.world().all_reduce_into(&mine[..], values, SystemOperation::sum());
             self.messages.set(self.messages.get() + 1);
         }
-    }
-
-    fn swap(&self, values: &[f64], to: &[i32], from: &[i32]) -> Vec<f64> {
-        let starts = |counts: &[i32]| {
-            let start = counts.iter().scan(0, |next, count| {
-                *next += count;
-                Some(*next - count)
-            });
-            start.collect::<Vec<i32>>()
-        };
-        let (send_starts, receive_starts) = (starts(to), starts(from));
-        let mut received = vec![0.0; from.iter().map(|&count| count as usize).sum()];
-        let send = Partition::new(values, to, &send_starts[..]);
-        let mut receive = PartitionMut::new(&mut received[..], from, &receive_starts[..]);
-        self.session.world().all_to_all_varcount_into(&send, &mut receive);
-        self.messages.set(self.messages.get() + 1);
-        received
     }
 
     fn ranks(&self) -> usize {

@@ -51,7 +51,8 @@ fn linear_step(
     // multigrid wants nodes, without numbers for rigid motions among them; so do rows that are dealt out
     let is_dealt_out = |slot: &BodySlot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some());
     let nodes = linear == Linear::Multigrid || model.bodies.iter().any(is_dealt_out);
-    let Some(union) = Union::of(model, !nodes)? else {
+    let union = if nodes { Union::of_nodes(model)? } else { Union::of(model)? };
+    let Some(union) = union else {
         return Err(Error::new(Kind::Solver, "a body has no matrices to be joined").help("choose newton-robin"));
     };
     let block = if nodes { scene.dimension.value } else { 1 };
@@ -60,7 +61,12 @@ fn linear_step(
             let dense = |stiffness: Slab| Ok(Dense::new(stiffness.rows(), stiffness.values));
             Box::new(Monolithic::new(union.without_zeros(), dense)?)
         }
-        _ => Box::new(Monolithic::new(union, |stiffness| Krylov::new(session, whole.clone(), block, stiffness, &[]))?),
+        _ => {
+            let krylov = |stiffness| Krylov::new(session, whole.clone(), block, stiffness, &[]);
+            let monolithic = Monolithic::new(union, krylov)?;
+            model.joint = nodes.then(|| monolithic.joint());
+            Box::new(monolithic)
+        }
     };
     if let Some(springs) = first_springs(model, start) {
         step.set_up(&springs)?;

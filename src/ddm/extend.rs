@@ -54,7 +54,7 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
         };
         body.robin(&springs)?;
         let mut u = body.rest();
-        let (mut r, mut z) = (vec![0.0; u.len()], vec![0.0; u.len()]);
+        let [mut r, mut z, mut product] = [(); 3].map(|()| vec![0.0; u.len()]);
         let mut rows = vec![0.0; springs.len()];
         let (mut multiplier, mut force) = (vec![0.0; springs.len()], vec![0.0; springs.len()]);
         let mut first = None;
@@ -74,7 +74,8 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
                 break;
             }
             first.get_or_insert(violation.max(f64::MIN_POSITIVE));
-            body.residual(&u, &force, &mut r);
+            body.apply_stiffness(&u, &mut product);
+            body.residual(&u, &product, &force, &mut r);
             let Solved { failure, .. } = body.solve(&r, &mut z)?;
             if let Some(reason) = failure {
                 failed[index] = 1.0;

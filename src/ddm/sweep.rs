@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::linalg::{axpy, dot};
 use crate::model::Model;
 use crate::model::body::{Energy, Solved};
-use crate::model::field::Field;
+use crate::model::field::{Field, residuals};
 use crate::model::layer::Layer;
 
 /// Numbers that a body adds to the message of a sweep: decrement, strain, potential, failed, skipped,
@@ -71,20 +71,12 @@ impl Sweeper {
         last: Option<(&Sweep, f64)>,
         asked: u8,
     ) -> Result<Sweep> {
-        let mut energies = Vec::new();
-        let mut open = Vec::new();
-        let mut residual = Vec::new();
-        for index in 0..model.bodies.len() {
-            let force = model.at_rows(index, &layer.force);
-            let springs = model.of_body(index, weight);
-            open.push(force.iter().chain(&springs).all(|&value| value == 0.0));
-            let mut r = vec![0.0; iterate.states[index].len()];
-            energies.push(match &mut model.bodies[index].local {
-                Some(body) => body.residual(&iterate.states[index], &force, &mut r),
-                None => Energy::default(),
-            });
-            residual.push(r);
-        }
+        let is_open = |index: usize| {
+            let (force, springs) = (model.at_rows(index, &layer.force), model.of_body(index, weight));
+            force.iter().chain(&springs).all(|&value| value == 0.0)
+        };
+        let open: Vec<bool> = (0..model.bodies.len()).map(is_open).collect();
+        let (residual, energies) = residuals(model, iterate, &layer.force);
         let known = |index: usize| {
             let (last, gamma) = last?;
             let same =

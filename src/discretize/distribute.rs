@@ -89,23 +89,14 @@ pub fn distribute<const D: usize>(
         let (owner, number) = (&owner[begin..begin + nodes], &number[begin..begin + nodes]);
         begin += nodes;
         let own: Vec<usize> = (0..nodes).filter(|&node| owner[node] as usize == rank).collect();
-        let (mut ghosts, mut wanted) = (Vec::new(), Vec::new());
-        for (place, &node) in own.iter().enumerate() {
-            for &other in &graph.col[graph.ptr[node] as usize..graph.ptr[node + 1] as usize] {
-                let other = other as usize;
-                if owner[other] as usize != rank {
-                    ghosts.push((number[other], other));
-                    wanted.push((owner[other], place as u32));
-                }
-            }
+        let mut ghosts = Vec::new();
+        for &node in &own {
+            let neighbours = &graph.col[graph.ptr[node] as usize..graph.ptr[node + 1] as usize];
+            let others = neighbours.iter().filter(|&&other| owner[other as usize] as usize != rank);
+            ghosts.extend(others.map(|&other| (number[other as usize], other as usize)));
         }
         ghosts.sort_unstable();
         ghosts.dedup();
-        wanted.sort_unstable();
-        wanted.dedup();
-        let mut counts = [vec![0; ranks], vec![0; ranks]];
-        wanted.iter().for_each(|(to, _)| counts[0][*to as usize] += D as i32);
-        ghosts.iter().for_each(|&(_, node)| counts[1][owner[node] as usize] += D as i32);
         let mut of_node = vec![-1; nodes];
         own.iter()
             .chain(ghosts.iter().map(|(_, node)| node))
@@ -129,8 +120,6 @@ pub fn distribute<const D: usize>(
             total: D * next[ranks - 1] as usize,
             rows,
             leads: most == rank,
-            wanted: wanted.iter().flat_map(|&(_, place)| dofs(place)).collect(),
-            counts,
             exchange: exchange.clone(),
         };
         all.push((distribution, Places { of_node, leader: most }));

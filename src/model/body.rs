@@ -113,12 +113,17 @@ pub trait Body {
     /// y += B' rows: forces at the contact rows as forces at the dofs.
     fn add_rows(&self, rows: &[f64], y: &mut [f64]);
 
-    /// r = f - K u - B' force, `force` = omega p at each row: the equilibrium residual (26). Also returns the
+    /// r = f - K u - B' force, `product` = K u, `force` = omega p at each row: the equilibrium residual (26). Also returns the
     /// energies of u.
-    fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy;
+    fn residual(&self, u: &[f64], product: &[f64], force: &[f64], r: &mut [f64]) -> Energy;
 
-    /// y = K u.
+    /// y = K u, for a body with K of its own.
     fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]);
+
+    /// Gives K away to a matrix of all bodies ([`Joint`](super::Joint)); none if the body needs it itself.
+    fn give_stiffness(&mut self) -> Option<Csr> {
+        None
+    }
 
     /// Makes G = K + B' diag(weight) B (37)-(38), `weight` = omega psi kappa at each row. Nothing happens if the weights
     /// are those of the last call.
@@ -204,7 +209,7 @@ pub trait Body {
     }
 
     /// How its dofs are dealt out over the ranks; none for a body of this rank alone. Of a body that is dealt out, `residual`,
-    /// `apply_stiffness`, `rounding`, `separate` and `recover` are collective.
+    /// `separate` and `recover` are collective.
     fn distribution(&self) -> Option<&Distribution> {
         None
     }

@@ -7,7 +7,7 @@ use super::exchange::Exchange;
 use crate::linalg::Csr;
 use std::rc::Rc;
 
-/// The dofs of a body that one rank owns, and those next to them.
+/// The dofs of a body that one rank owns, and the columns of their rows of K.
 pub struct Distribution {
     /// Number of dofs of the body.
     pub dofs: usize,
@@ -25,22 +25,11 @@ pub struct Distribution {
     pub rows: Csr,
     /// Whether this rank speaks for the body: one of those that own most of it.
     pub leads: bool,
-    /// Own dofs that each rank wants, rank by rank: places among `own`.
-    pub wanted: Vec<u32>,
-    /// How many go to each rank, and how many ghosts come from each.
-    pub counts: [Vec<i32>; 2],
     /// Connection to the other ranks.
     pub exchange: Rc<dyn Exchange>,
 }
 
 impl Distribution {
-    /// Values at own dofs, then at ghosts. Collective.
-    pub fn with_ghosts(&self, own: &[f64]) -> Vec<f64> {
-        let wanted: Vec<f64> = self.wanted.iter().map(|&i| own[i as usize]).collect();
-        let ghosts = self.exchange.swap(&wanted, &self.counts[0], &self.counts[1]);
-        [own, &ghosts].concat()
-    }
-
     /// Values at all dofs of the body, on every rank, with `rest` behind them. Collective.
     pub fn gather(&self, own: &[f64], rest: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; self.dofs];

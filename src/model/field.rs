@@ -77,8 +77,11 @@ pub fn local_dot(x: &[Vec<f64>], y: &[Vec<f64>]) -> f64 {
     x.iter().zip(y).map(|(x, y)| dot(x, y)).sum()
 }
 
-/// K v in every body that lives here.
+/// K v in every body that lives here. Collective where bodies have joined their matrices.
 pub fn apply_stiffness(model: &mut Model, v: &Field) -> Vec<Vec<f64>> {
+    if let Some(joint) = &model.joint {
+        return joint.borrow_mut().multiply(&v.states);
+    }
     let apply = |(slot, v): (&mut super::BodySlot, &Vec<f64>)| {
         let mut y = vec![0.0; v.len()];
         if let Some(body) = &mut slot.local {
@@ -91,19 +94,26 @@ pub fn apply_stiffness(model: &mut Model, v: &Field) -> Vec<Vec<f64>> {
 
 /// r = f - K u - B' `force` (26) in every body that lives here, for forces at the points (n), with the sum of the energies of u.
 pub fn residual(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Energy) {
+    let (all, energies) = residuals(model, u, force);
     let mut sum = Energy::default();
-    let mut all = Vec::with_capacity(u.states.len());
-    for (index, state) in u.states.iter().enumerate() {
-        let rows = model.at_rows(index, force);
-        let mut r = vec![0.0; state.len()];
-        if let Some(body) = &mut model.bodies[index].local {
-            let energy = body.residual(state, &rows, &mut r);
-            sum.strain += energy.strain;
-            sum.potential += energy.potential;
-        }
-        all.push(r);
+    for energy in energies {
+        sum.strain += energy.strain;
+        sum.potential += energy.potential;
     }
     (all, sum)
+}
+
+/// The same with the energies of each body.
+pub fn residuals(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Vec<Energy>) {
+    let products = apply_stiffness(model, u);
+    let of_body = |(index, (state, product)): (usize, (&Vec<f64>, Vec<f64>))| {
+        let rows = model.at_rows(index, force);
+        let mut r = vec![0.0; state.len()];
+        let body = model.bodies[index].local.as_ref();
+        let energy = body.map_or_else(Energy::default, |body| body.residual(state, &product, &rows, &mut r));
+        (r, energy)
+    };
+    u.states.iter().zip(products).enumerate().map(of_body).unzip()
 }
 
 /// y += B' `force` in every body that lives here, for forces at the points (n).

@@ -17,12 +17,13 @@ pub use distribution::Distribution;
 pub use exchange::{Exchange, Serial};
 pub use field::Field;
 pub use layer::Layer;
-pub use linear::{LinearStep, Solution};
+pub use linear::{Joint, LinearStep, Solution};
 pub use rigid::{Motions, Moved};
 
 use crate::contact::ContactPair;
 use crate::error::Result;
 use nalgebra::DMatrix;
+use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -104,6 +105,8 @@ pub struct Model {
     pub gap: Vec<f64>,
     /// Why there is no solution, where that is known beforehand.
     pub mechanism: Option<Mechanism>,
+    /// K of all bodies, if they have given theirs away.
+    pub joint: Option<Rc<RefCell<dyn Joint>>>,
     /// Connection to the other ranks.
     pub exchange: Rc<dyn Exchange>,
 }
@@ -116,7 +119,8 @@ impl Model {
             offset.push(offset[offset.len() - 1] + pair.len());
         }
         let weight = pairs.iter().flat_map(|pair| pair.weight.iter().copied()).collect();
-        let mut model = Self { bodies, pairs, offset, weight, gap: Vec::new(), mechanism: None, exchange };
+        let (gap, mechanism, joint) = (Vec::new(), None, None);
+        let mut model = Self { bodies, pairs, offset, weight, gap, mechanism, joint, exchange };
         model.scale_gaps(1.0);
         model
     }

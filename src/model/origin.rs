@@ -58,7 +58,8 @@ impl Origin {
             }
             // the residual at rest without contact is the load
             let mut load = vec![0.0; state.len()];
-            body.residual(&body.rest(), &vec![0.0; slot.row_stiffness.len()], &mut load);
+            // rigid motions strain nothing
+            body.residual(&body.rest(), &vec![0.0; state.len()], &vec![0.0; slot.row_stiffness.len()], &mut load);
             energy[0] -= dot(&load[deformation..], &state[deformation..]);
         }
         // one message: the energy, then the traces

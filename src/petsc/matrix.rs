@@ -287,6 +287,35 @@ impl Matrix {
         petsc!(MatMult(self.mat, x.vec(), y.vec()))
     }
 
+    /// `y = A x` for the values that `change` makes, which `restore` takes back to the bit: solvers of the matrix do not see it.
+    ///
+    /// ```
+    /// # use winkler::petsc::{Matrix, Session};
+    /// # let session = Session::start(&[])?;
+    /// let mut a = Matrix::from_csr(&session, 1, vec![0, 1, 2], vec![0, 1], vec![2.0, 3.0])?;
+    /// let mut y = [0.0; 2];
+    /// a.multiply_changed(|values| values[0] = 5.0, |values| values[0] = 2.0, &[1.0, 1.0], &mut y)?;
+    /// assert_eq!((y, a.values()), ([5.0, 3.0], &[2.0, 3.0][..]));
+    /// # Ok::<(), winkler::error::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When `x` or `y` has not one entry a row.
+    pub fn multiply_changed(
+        &mut self,
+        change: impl FnOnce(&mut [f64]),
+        restore: impl FnOnce(&mut [f64]),
+        x: &[f64],
+        y: &mut [f64],
+    ) -> Result<()> {
+        // SAFETY: PETSc uses the array in its own calls only, and `&mut self` excludes the slice of `values`.
+        change(unsafe { std::slice::from_raw_parts_mut(self.values, self.nonzeros) });
+        let product = self.multiply(x, y);
+        // SAFETY: as above.
+        restore(unsafe { std::slice::from_raw_parts_mut(self.values, self.nonzeros) });
+        product
+    }
+
     /// Number of updates so far, which goes on counting.
     pub(super) fn updates(&self) -> Rc<Cell<u64>> {
         self.updates.clone()

@@ -131,9 +131,9 @@ impl Body for CondensedBody {
         }
     }
 
-    fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
-        match &mut self.condensed {
-            Some(condensed) => condensed.body.residual(u, force, r),
+    fn residual(&self, u: &[f64], product: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
+        match &self.condensed {
+            Some(condensed) => condensed.body.residual(u, product, force, r),
             None => {
                 r.fill(f64::NAN);
                 Energy { strain: f64::NAN, potential: f64::NAN }

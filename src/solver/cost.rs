@@ -20,8 +20,8 @@ const MULTIGRID: f64 = 1.3e-6;
 /// Newton's steps of a scene there, which take 3 to 7: dense factorisations of all contacts together.
 const STEPS: f64 = 5.0;
 
-/// Bytes of multigrid for an entry of K: 12 each for K, G and hypre's copy of G, and half a copy for its levels.
-const LEVELS: f64 = 42.0;
+/// Bytes of multigrid for an entry of K: 12 each for G, which stands for K, and hypre's copy, and half a copy for its levels.
+const LEVELS: f64 = 30.0;
 
 /// What MUMPS takes over the entries of its factor, for fronts that wait and for pivots: 754 MB for two bodies with 31 million entries
 /// each, beside 150 MB for all else (two cubes of 24^3).

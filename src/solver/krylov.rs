@@ -1,7 +1,7 @@
 //! Any PETSc KSP and PC as inner solver.
 
-use super::InnerSolver;
 use super::options::Chosen;
+use super::{InnerSolver, Multiply};
 use crate::error::Result;
 use crate::linalg::Slab;
 use crate::model::Solved;
@@ -82,6 +82,18 @@ impl Krylov {
 #[allow(clippy::useless_conversion)]
 fn integers(part: Vec<i32>) -> Vec<Int> {
     part.into_iter().map(Int::from).collect()
+}
+
+impl Multiply for Krylov {
+    fn multiply(
+        &mut self,
+        change: &mut dyn FnMut(&mut [f64]),
+        restore: &mut dyn FnMut(&mut [f64]),
+        x: &[f64],
+        y: &mut [f64],
+    ) -> Result<()> {
+        self.matrix.multiply_changed(change, restore, x, y)
+    }
 }
 
 impl InnerSolver for Krylov {

@@ -28,6 +28,21 @@ pub use split::Split;
 use crate::error::Result;
 use crate::model::Solved;
 
+/// A solver whose matrix can be multiplied with.
+pub trait Multiply: InnerSolver {
+    /// y = A x for the matrix A that `change` makes of G; `restore` makes G again, to the bit, so that no preconditioner is made anew.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn multiply(
+        &mut self,
+        change: &mut dyn FnMut(&mut [f64]),
+        restore: &mut dyn FnMut(&mut [f64]),
+        x: &[f64],
+        y: &mut [f64],
+    ) -> Result<()>;
+}
+
 /// Owner of the matrix G with a way to solve G z = r.
 pub trait InnerSolver {
     /// Changes values of G (in the order of the pattern it was made with); the next solve uses the new matrix. `far` tells

@@ -4,15 +4,17 @@
 //! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Of bodies that are dealt out over ranks each
 //! rank has its rows; of bodies that live whole on several ranks, condensed ones, every rank has the matrix and solves for itself.
 
-use super::{InnerSolver, RobinMatrix};
+use super::{InnerSolver, Multiply, RobinMatrix};
 use crate::error::Result;
 use crate::linalg::{Csr, Slab, axpy, countable, dot};
 use crate::model::linear::{Failure, LinearStep, Solution, Solved, System};
-use crate::model::{Body, BodyCounts, BodySlot, Field, Matrices, Model};
+use crate::model::{Body, BodyCounts, BodySlot, Field, Joint, Matrices, Model};
 use crate::parallel::share;
 use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::Range;
+use std::rc::Rc;
 
 /// Stiffness matrices side by side and the rows that couple them, on the states of the bodies.
 ///
@@ -33,31 +35,43 @@ pub struct Union {
 }
 
 impl Union {
-    /// Of the bodies of a model; without `rigid` the rigid motions stay part of v: multigrid wants to see nodes only, and so do bodies
-    /// that are dealt out. `None` if a body has no matrices. Collective.
+    /// Of the bodies of a model, which keep what they have. `None` if one has no matrices. Collective.
     ///
     /// # Errors
     /// More entries than 32 bits can count.
-    pub fn of(model: &Model, rigid: bool) -> Result<Option<Self>> {
-        let here = |slot: &BodySlot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some());
-        if model.exchange.ranks() > 1 && !model.bodies.iter().any(here) {
+    pub fn of(model: &Model) -> Result<Option<Self>> {
+        if model.exchange.ranks() > 1 {
             let Some(copies) = copies(model) else { return Ok(None) };
-            let union = Self::new(model, copies.iter().map(Copy::matrices).collect(), rigid)?;
+            let union = Self::new(model, &copies.iter().map(Copy::matrices).collect::<Vec<_>>())?;
             return Ok(Some(Self { is_redundant: true, ..union }));
         }
         let parts = matrices(model).collect::<Option<Vec<_>>>();
-        parts.map(|parts| Self::new(model, parts, rigid)).transpose()
+        parts.map(|parts| Self::new(model, &parts)).transpose()
     }
 
-    fn new(model: &Model, mut parts: Vec<Matrices>, rigid: bool) -> Result<Self> {
-        if !rigid {
-            parts.iter_mut().for_each(|part| (part.motions, part.traces) = (&[], &[]));
-        }
+    /// Of the nodes of bodies, which give their K away; rigid motions stay part of v. Multigrid wants to see nodes only, and bodies that
+    /// are dealt out have nothing else. `None` if a body needs its K.
+    ///
+    /// # Errors
+    /// More entries than 32 bits can count.
+    pub fn of_nodes(model: &mut Model) -> Result<Option<Self>> {
+        let give = |slot: &mut BodySlot| slot.local.as_mut().and_then(|body| body.give_stiffness());
+        let given = model.bodies.iter_mut().map(give).collect::<Option<Vec<Csr>>>();
+        let Some(given) = given else { return Ok(None) };
+        let parts = given.iter().zip(matrices(model)).map(|(stiffness, rest)| {
+            let Matrices { rows, .. } = rest?;
+            Some(Matrices { stiffness, rows, motions: &[], traces: &[] })
+        });
+        let parts = parts.collect::<Option<Vec<_>>>();
+        parts.map(|parts| Self::new(model, &parts)).transpose()
+    }
+
+    fn new(model: &Model, parts: &[Matrices]) -> Result<Self> {
         let bodies: Vec<Option<&dyn Body>> = model.bodies.iter().map(|slot| slot.local.as_deref()).collect();
         let distribution = |body: usize| bodies[body].and_then(|body| body.distribution());
         let shared = (0..parts.len()).find_map(distribution);
         let mut offset = vec![0];
-        for part in &parts {
+        for part in parts {
             offset.push(offset[offset.len() - 1] + part.len());
         }
         let n = offset[parts.len()];
@@ -101,7 +115,7 @@ impl Union {
         stiffness.col.reserve_exact(room);
         stiffness.values.reserve_exact(room);
         let mut entries: Vec<(i32, f64)> = Vec::new();
-        for (body, (&begin, part)) in offset.iter().zip(&parts).enumerate() {
+        for (body, (&begin, part)) in offset.iter().zip(parts).enumerate() {
             let (own, pins) = (part.stiffness, pins(part.motions));
             for i in 0..part.len() {
                 let known = if i < own.rows() { own.range(i) } else { 0..0 };
@@ -168,11 +182,49 @@ impl Union {
 
 /// All bodies as one.
 pub struct Monolithic<S> {
+    joined: Rc<RefCell<Joined<S>>>,
+    /// Whether every rank has the whole matrix and some of the bodies.
+    is_redundant: bool,
+}
+
+/// The matrix of all bodies.
+struct Joined<S> {
     matrix: RobinMatrix<S>,
     rows: Csr,
     offset: Vec<usize>,
-    /// Whether every rank has the whole matrix and some of the bodies.
-    is_redundant: bool,
+}
+
+impl<S> Joined<S> {
+    /// Where each body's state is in that of all.
+    fn parts(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        self.offset.windows(2).map(|part| part[0]..part[1])
+    }
+
+    /// The states of all bodies as one, without rigid motions that it does not have; zero for bodies of other ranks.
+    fn whole(&self, states: &[Vec<f64>]) -> Vec<f64> {
+        let mut whole = vec![0.0; self.offset[self.offset.len() - 1]];
+        for (part, state) in self.parts().zip(states).filter(|(_, state)| !state.is_empty()) {
+            whole[part.clone()].copy_from_slice(&state[..part.len()]);
+        }
+        whole
+    }
+}
+
+impl<S: Multiply> Joint for Joined<S> {
+    fn multiply(&mut self, states: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let x = self.whole(states);
+        let mut y = vec![0.0; x.len()];
+        if self.matrix.multiply_stiffness(&self.rows, &x, &mut y).is_err() {
+            // the run ends with the first number that is none
+            y.fill(f64::NAN);
+        }
+        let of_body = |(part, state): (Range<usize>, &Vec<f64>)| {
+            let mut product = y[part].to_vec();
+            product.resize(state.len(), 0.0);
+            product
+        };
+        self.parts().zip(states).map(of_body).collect()
+    }
 }
 
 impl<S: InnerSolver> Monolithic<S> {
@@ -183,7 +235,14 @@ impl<S: InnerSolver> Monolithic<S> {
     pub fn new(union: Union, make: impl FnOnce(Slab) -> Result<S>) -> Result<Self> {
         let Union { stiffness, rows, offset, row_stiffness, is_redundant } = union;
         let matrix = RobinMatrix::new(stiffness, &rows, row_stiffness, make)?;
-        Ok(Self { matrix, rows, offset, is_redundant })
+        Ok(Self { joined: Rc::new(RefCell::new(Joined { matrix, rows, offset })), is_redundant })
+    }
+}
+
+impl<S: Multiply + 'static> Monolithic<S> {
+    /// K of all bodies, for a model whose bodies gave theirs away.
+    pub fn joint(&self) -> Rc<RefCell<dyn Joint>> {
+        self.joined.clone()
     }
 }
 
@@ -193,25 +252,23 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
     }
 
     fn set_up(&mut self, springs: &[f64]) -> Result<()> {
-        self.matrix.update(&self.rows, springs)?;
-        self.matrix.set_up()
+        let Joined { matrix, rows, .. } = &mut *self.joined.borrow_mut();
+        matrix.update(rows, springs)?;
+        matrix.set_up()
     }
 
     fn solve(&mut self, system: System) -> Result<Solved> {
         let System { model, springs, residual, reduction, .. } = system;
-        self.matrix.solver_mut().precision(reduction)?;
-        self.matrix.update(&self.rows, springs)?;
-        let parts = || self.offset.windows(2).map(|part| part[0]..part[1]);
-        let mut whole = vec![0.0; self.offset[self.offset.len() - 1]];
-        // bodies of other ranks have no residual here
-        for (part, r) in parts().zip(residual).filter(|(_, r)| !r.is_empty()) {
-            whole[part.clone()].copy_from_slice(&r[..part.len()]);
-        }
+        let joined = &mut *self.joined.borrow_mut();
+        let mut whole = joined.whole(residual);
         if self.is_redundant {
             model.exchange.sum(&mut whole);
         }
         let mut x = vec![0.0; whole.len()];
-        if let Some(reason) = self.matrix.apply(|solver| solver.solve(&whole, &mut x))?.failure {
+        let Joined { matrix, rows, .. } = joined;
+        matrix.solver_mut().precision(reduction)?;
+        matrix.update(rows, springs)?;
+        if let Some(reason) = matrix.apply(|solver| solver.solve(&whole, &mut x))?.failure {
             return Ok(Err(Failure { body: None, reason }));
         }
         let state = |(slot, part): (&BodySlot, Range<usize>)| {
@@ -221,7 +278,7 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
             body.separate(&mut state);
             state
         };
-        let states: Vec<Vec<f64>> = model.bodies.iter().zip(parts()).map(state).collect();
+        let states: Vec<Vec<f64>> = model.bodies.iter().zip(joined.parts()).map(state).collect();
         let energy: f64 = states.iter().zip(residual).map(|(x, r)| dot(x, r)).sum();
         let mut field = Field { states, trace: vec![0.0; 2 * model.points()] };
         // one message: traces, then the energy
@@ -229,16 +286,16 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
         field.trace.push(energy);
         model.exchange.sum(&mut field.trace);
         let energy = field.trace.pop().unwrap_or_default();
-        let accuracy = self.matrix.solver().accuracy();
+        let accuracy = joined.matrix.solver().accuracy();
         Ok(Ok(Solution { field, energy, error: accuracy * energy.max(0.0).sqrt(), is_exact: accuracy == 0.0 }))
     }
 
     fn counts(&self) -> BodyCounts {
-        self.matrix.counts()
+        self.joined.borrow().matrix.counts()
     }
 
     fn describe(&self) -> String {
-        self.matrix.solver().describe()
+        self.joined.borrow().matrix.solver().describe()
     }
 }
 

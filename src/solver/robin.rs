@@ -1,6 +1,6 @@
 //! The matrix of a linear system with springs at contact points, G = K + B' diag(d) B, and what solves it.
 
-use super::InnerSolver;
+use super::{InnerSolver, Multiply};
 use crate::error::Result;
 use crate::linalg::{Csr, Slab};
 use crate::model::{BodyCounts, Solved};
@@ -83,6 +83,18 @@ impl<S: InnerSolver> RobinMatrix<S> {
         done
     }
 
+    /// y = K x, by G with the springs taken out meanwhile.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn multiply_stiffness(&mut self, rows: &Csr, x: &[f64], y: &mut [f64]) -> Result<()>
+    where
+        S: Multiply,
+    {
+        let (coupling, weight) = (&self.coupling, &self.weight);
+        self.solver.multiply(&mut |g| coupling.reset(g), &mut |g| coupling.write(rows, weight, g), x, y)
+    }
+
     /// One solve, or one application of the preconditioner, counted and timed apart from the set-up it may need.
     ///
     /// # Errors
@@ -160,9 +172,14 @@ impl Coupling {
         Self { own, positions, touched, stiffness }
     }
 
+    /// Makes K of G.
+    fn reset(&self, g: &mut [f64]) {
+        self.touched.iter().zip(&self.stiffness).for_each(|(&at, stiffness)| g[at as usize] = *stiffness);
+    }
+
     /// Writes K + B' diag(d) B where it differs from K; the rest of G is K already.
     fn write(&self, rows: &Csr, weight: &[f64], g: &mut [f64]) {
-        self.touched.iter().zip(&self.stiffness).for_each(|(&at, stiffness)| g[at as usize] = *stiffness);
+        self.reset(g);
         let mut left = &self.positions[..];
         for (q, &weight) in weight.iter().enumerate() {
             let b = &rows.values[rows.range(q)];

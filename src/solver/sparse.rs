@@ -5,7 +5,6 @@ use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, Slab, dot};
 use crate::model::{Body, BodyCounts, Distribution, Energy, Matrices, Solved};
-use std::borrow::Cow;
 use std::rc::Rc;
 
 /// A body with assembled K and f, its contact rows B, and a solver for G = K + B' diag(d) B.
@@ -15,10 +14,11 @@ pub struct SparseBody<S> {
     body: ElasticBody,
     rows: Csr,
     split: Split,
-    /// Where its dofs are dealt out over the ranks: how. K and B have the dofs of this rank then, K with columns for its ghosts.
+    /// Where its dofs are dealt out over the ranks: how. K and B have the dofs of this rank then, K with columns for those that others have.
     distribution: Option<Rc<Distribution>>,
     robin: Lazy<S>,
-    product: Vec<f64>,
+    /// Diagonal and sum of magnitudes of each row of K, if it was given away.
+    sizes: Vec<[f64; 2]>,
 }
 
 /// G, made when something is first to be solved: a body that is only measured, or joined with others, needs none.
@@ -47,8 +47,7 @@ impl<S: InnerSolver> SparseBody<S> {
     ) -> Self {
         let robin = Lazy::Later { make: Some(Box::new(make)), words };
         let split = Split::new(free, &rows);
-        let product = vec![0.0; body.load.len()];
-        Self { body, rows, split, distribution: None, robin, product }
+        Self { body, rows, split, distribution: None, robin, sizes: Vec::new() }
     }
 
     /// The part of this rank of a body that has no solver of its own; `body` has the dofs of this rank, `rows` and `free` those of all.
@@ -61,16 +60,8 @@ impl<S: InnerSolver> SparseBody<S> {
     ) -> Self {
         let distribution = Rc::new(distribution);
         let split = Split::new(free, rows).dealt_out(distribution.clone());
-        let (rows, product) = (distribution.of_rows(rows), vec![0.0; body.load.len()]);
-        Self { body, rows, split, distribution: Some(distribution), robin: Lazy::Later { make: None, words }, product }
-    }
-
-    /// Values at all columns of K.
-    fn at_columns<'v>(&self, v: &'v [f64]) -> Cow<'v, [f64]> {
-        match &self.distribution {
-            None => Cow::Borrowed(v),
-            Some(distribution) => Cow::Owned(distribution.with_ghosts(v)),
-        }
+        let (rows, robin) = (distribution.of_rows(rows), Lazy::Later { make: None, words });
+        Self { body, rows, split, distribution: Some(distribution), robin, sizes: Vec::new() }
     }
 
     /// Displacements of all dofs for a state.
@@ -141,15 +132,14 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         self.split.add_rows(1.0, rows, rigid);
     }
 
-    fn residual(&mut self, u: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
+    fn residual(&self, u: &[f64], product: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
         let n = self.dofs();
         let (v, rigid) = u.split_at(n);
-        self.body.stiffness.multiply(&self.at_columns(v), &mut self.product);
         for i in 0..n {
-            r[i] = self.body.load[i] - self.product[i];
+            r[i] = self.body.load[i] - product[i];
         }
         let work = dot(&self.body.load, v) + dot(self.split.work(), rigid);
-        let quadratic = dot(v, &self.product);
+        let quadratic = dot(v, &product[..n]);
         self.rows.add_transpose(-1.0, force, &mut r[..n]);
         r[n..].copy_from_slice(self.split.work());
         self.split.add_rows(-1.0, force, &mut r[n..]);
@@ -162,8 +152,18 @@ impl<S: InnerSolver> Body for SparseBody<S> {
 
     fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
         let n = self.dofs();
-        self.body.stiffness.multiply(&self.at_columns(&u[..n]), &mut y[..n]);
+        self.body.stiffness.multiply(&u[..n], &mut y[..n]);
         y[n..].fill(0.0);
+    }
+
+    fn give_stiffness(&mut self) -> Option<Csr> {
+        if self.made().is_some() {
+            return None;
+        }
+        let k = std::mem::replace(&mut self.body.stiffness, Csr::new(0));
+        let sizes = |i: usize| [k.diagonal(i), k.row(i).map(|(_, a)| a.abs()).sum()];
+        self.sizes = (0..k.rows()).map(sizes).collect();
+        Some(k)
     }
 
     fn robin(&mut self, weight: &[f64]) -> Result<()> {
@@ -197,17 +197,24 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn rounding(&self, u: &[f64], force: &[f64]) -> f64 {
-        let (k, u) = (&self.body.stiffness, self.at_columns(&u[..self.dofs()]));
+        let k = &self.body.stiffness;
         let mut size: Vec<f64> = self.body.load.iter().map(|f| f.abs()).collect();
         for (i, size) in size.iter_mut().enumerate() {
-            *size += k.row(i).map(|(j, a)| (a * u[j]).abs()).sum::<f64>();
+            *size += match self.sizes.get(i) {
+                None => k.row(i).map(|(j, a)| (a * u[j]).abs()).sum::<f64>(),
+                // neighbours move by about as much
+                Some([_, row]) => row * u[i].abs(),
+            };
         }
         for q in 0..self.rows.rows() {
             for (i, b) in self.rows.row(q) {
                 size[i] += (b * force[q]).abs();
             }
         }
-        let diagonal = |i: usize| k.position(i, i).map_or(f64::INFINITY, |at| k.values[at]);
+        let diagonal = |i: usize| match self.sizes.get(i) {
+            None => k.position(i, i).map_or(f64::INFINITY, |at| k.values[at]),
+            Some([diagonal, _]) => *diagonal,
+        };
         let sum: f64 = size.iter().enumerate().map(|(i, size)| size * size / diagonal(i)).sum();
         sum * f64::EPSILON * f64::EPSILON
     }
