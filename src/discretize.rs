@@ -43,7 +43,7 @@ pub use factory::{Assembled, Factory, Outline};
 use fields::{ErrorMaker, FieldMaker};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
-use part::Part;
+use part::{Part, Supported};
 use std::cell::OnceCell;
 use std::rc::Rc;
 pub use surface::ContactSurface;
@@ -234,10 +234,10 @@ pub fn discretize<const D: usize>(
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
         let Draft { segments, rows, free, nodal_load, load } = draft;
-        let Supported { carried, prescribed } = supported;
+        let Supported { carried, prescribed } = &supported;
         let mut offset = vec![0.0; rows.rows()];
         if !carried.is_empty() {
-            rows.multiply(&carried, &mut offset);
+            rows.multiply(carried, &mut offset);
         }
         offsets.push(offset);
         let Loose { left, motions, sprung, unfelt } = loose;
@@ -258,13 +258,13 @@ pub fn discretize<const D: usize>(
             (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 || dealt[index].is_some() {
-            let left = rigid::free(&left, &prescribed, &load);
+            let left = rigid::free(&left, prescribed, &load);
             let mut graph = graph.into_inner().unwrap_or_else(|| part.graph(&rows));
             let dealt = dealt[index].take();
             if let Some((own, places)) = &dealt {
                 graph = graph.of(|node| places.is_own::<D>(own, node));
             }
-            let body = part.assemble(mesh, &graph, &elasticity, load, prescribed, carried, dealt.as_ref())?;
+            let body = part.assemble(mesh, &graph, &elasticity, load, supported, dealt.as_ref())?;
             drop(graph);
             let distribution = dealt.map(|(distribution, _)| distribution);
             if owner[index] == ranks.0 {
@@ -375,14 +375,6 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
     }
     axpy(-1.0, &discrete.carried, &mut trace);
     Ok(Some(trace))
-}
-
-/// What supports prescribe.
-struct Supported {
-    /// Displacement by which they move the body as one, one entry a dof; empty for none.
-    carried: Vec<f64>,
-    /// (dof, value) besides it, sorted by dof.
-    prescribed: Vec<(usize, f64)>,
 }
 
 /// What the supports of a body prescribe; `free` are the rigid motions of the free body.

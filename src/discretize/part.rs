@@ -29,6 +29,14 @@ pub struct Part<'a, const D: usize> {
     pub springs: Vec<Vec<NodalBlock<D>>>,
 }
 
+/// What supports prescribe.
+pub struct Supported {
+    /// Displacement by which they move the body as one, one entry a dof; empty for none.
+    pub carried: Vec<f64>,
+    /// (dof, value) besides it, sorted by dof.
+    pub prescribed: Vec<(usize, f64)>,
+}
+
 impl<'a, const D: usize> Part<'a, D> {
     /// Finds the body's cells in the mesh and applies its supports.
     ///
@@ -186,16 +194,14 @@ impl<'a, const D: usize> Part<'a, D> {
         NodeGraph::new(&self.space, &coupled, &self.held.frame)
     }
 
-    /// K on its graph, f and supports; `carried` is the rigid motion that was taken out of `prescribed`, if any. Of a body that is dealt
-    /// out over ranks, the rows of this one, which are all that the graph has.
+    /// K on its graph, f and supports. Of a body that is dealt out over ranks, the rows of this one, which are all that the graph has.
     pub fn assemble(
         &self,
         mesh: &Mesh<D>,
         graph: &NodeGraph,
         elasticity: &Elasticity,
         mut load: Vec<f64>,
-        mut prescribed: Vec<(usize, f64)>,
-        carried: Vec<f64>,
+        supported: Supported,
         dealt: Option<&(Distribution, Places)>,
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
@@ -214,6 +220,7 @@ impl<'a, const D: usize> Part<'a, D> {
         }
         self.springs.iter().for_each(|springs| assemble::add_blocks(graph, springs, &mut stiffness));
         self.held.frame.turn_matrix(&mut stiffness);
+        let Supported { carried, mut prescribed } = supported;
         let mut work = dot(&load, &carried);
         if let Some((own, places)) = dealt {
             stiffness = places.rows::<D>(own, stiffness);

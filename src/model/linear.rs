@@ -50,12 +50,6 @@ pub struct Failure {
 /// What a solver made of a system.
 pub type Solved = std::result::Result<Solution, Failure>;
 
-/// K of all bodies in the one matrix that serves the linear step: the bodies have none of their own.
-pub trait Joint {
-    /// K v in every body that lives here, for their states; nothing for rigid motions, which strain nothing. Collective.
-    fn multiply(&mut self, states: &[Vec<f64>]) -> Vec<Vec<f64>>;
-}
-
 /// A solver of the linear step.
 pub trait LinearStep {
     /// Name in the table and the report.

@@ -7,6 +7,7 @@ pub mod body;
 pub mod distribution;
 pub mod exchange;
 pub mod field;
+pub mod joint;
 pub mod layer;
 pub mod linear;
 pub mod origin;
@@ -16,8 +17,9 @@ pub use body::{Body, BodyCounts, Energy, Matrices, Solved};
 pub use distribution::Distribution;
 pub use exchange::{Exchange, Serial};
 pub use field::Field;
+pub use joint::Joint;
 pub use layer::Layer;
-pub use linear::{Joint, LinearStep, Solution};
+pub use linear::{LinearStep, Solution};
 pub use rigid::{Motions, Moved};
 
 use crate::contact::ContactPair;

@@ -244,9 +244,12 @@ fn words(said: &str, status: ExitStatus) -> String {
             found.push(text);
         }
     }
-    match (found.is_empty(), said.lines().rev().find(|line| !line.trim().is_empty())) {
+    let mut lines = said.lines().map(str::trim).filter(|line| line.contains(char::is_alphabetic));
+    // mpiexec begins what it says with a rule, and comes to the point at once
+    let line = if said.trim_start().starts_with("---") { lines.next() } else { lines.next_back() };
+    match (found.is_empty(), line) {
         (false, _) => found.join("; "),
-        (true, Some(last)) => format!("{status}: {}", last.trim()),
+        (true, Some(line)) => format!("{status}: {line}"),
         (true, None) => status.to_string(),
     }
 }
@@ -257,6 +260,11 @@ mod tests {
 
     #[test]
     fn refusals_are_told_in_their_words() {
+        let said = "-----\nmpiexec has detected an attempt to run as root.\n\nmore\n-----\n";
+        assert!(
+            words(said, ExitStatus::from_raw(1 << 8)).ends_with("1: mpiexec has detected an attempt to run as root.")
+        );
+        assert!(words("one\n  two\n---\n", ExitStatus::from_raw(1 << 8)).ends_with("1: two"));
         let said = "Title\nerror: PETSc knows no option -ksp_tpye\n |\n = help: did you mean -ksp_type?\n";
         let status = ExitStatus::from_raw(5 << 8);
         assert_eq!(words(said, status), "error: PETSc knows no option -ksp_tpye; help: did you mean -ksp_type?");
