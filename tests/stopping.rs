@@ -42,10 +42,13 @@ impl Working {
 
     fn start_in(scratch: TempDir, words: &[&str], ranks: usize, variables: &[(&str, &Path)]) -> Self {
         let winkler = env!("CARGO_BIN_EXE_winkler");
-        let mut command = Command::new(if ranks > 1 { "mpiexec" } else { winkler });
+        // tests may run under nohup, whose signals a program leaves ignored
+        let mut command = Command::new("env");
+        command.arg("--default-signal=HUP,INT,TERM");
         if ranks > 1 {
-            command.args(["--oversubscribe", "-n", &ranks.to_string(), winkler]);
+            command.args(["mpiexec", "--oversubscribe", "-n", &ranks.to_string()]);
         }
+        command.arg(winkler);
         environment(&mut command);
         command.args(words).arg("-o").arg(scratch.path().join("results")).current_dir(scratch.path());
         command.envs(variables.iter().copied()).env("OMPI_MCA_orte_tmpdir_base", scratch.path());
