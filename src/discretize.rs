@@ -14,7 +14,6 @@ mod mechanism;
 pub mod meshes;
 mod pairs;
 mod part;
-mod places;
 mod roster;
 mod springs;
 mod supports;
@@ -43,7 +42,7 @@ pub use factory::{Assembled, Factory, Outline};
 use fields::{ErrorMaker, FieldMaker};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
-use part::{Part, Supported};
+use part::Part;
 use std::cell::OnceCell;
 use std::rc::Rc;
 pub use surface::ContactSurface;
@@ -222,22 +221,22 @@ pub fn discretize<const D: usize>(
     factory.plan(&outlines.collect::<Vec<_>>())?;
     let all_graphs = || lazy.iter().map(|graph| graph()).collect::<Vec<&NodeGraph>>();
     let dealt = factory.deal_out(&|| distribute::graph::<D>(&all_graphs(), &drafts, &pairs))?;
-    let dealt = dealt.map(|dealt| distribute::distribute::<D>(&all_graphs(), &drafts, &dealt, ranks, &exchange));
-    let mut dealt: Vec<_> =
-        dealt.map_or_else(|| drafts.iter().map(|_| None).collect(), |all| all.into_iter().map(Some).collect());
-    for (owner, dealt) in owner.iter_mut().zip(&dealt) {
-        *owner = dealt.as_ref().map_or(*owner, |(_, places)| places.leader);
+    let dealt = dealt.map(|dealt| distribute::distribute::<D>(&drafts, &dealt, ranks, &exchange));
+    if let Some(dealt) = &dealt {
+        owner = dealt.iter().map(|dealt| dealt.leader).collect();
     }
+    let mut dealt = dealt.into_iter().flatten();
     let drafts = drafts.into_iter().zip(supported).zip(graphs);
     let known = gauged.into_iter().zip(loose);
     for (index, ((part, ((draft, supported), graph)), (gauged, loose))) in
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
         let Draft { segments, rows, free, nodal_load, load } = draft;
-        let Supported { carried, prescribed } = &supported;
+        let Supported { carried, prescribed } = supported;
+        let dealt = dealt.next();
         let mut offset = vec![0.0; rows.rows()];
         if !carried.is_empty() {
-            rows.multiply(carried, &mut offset);
+            rows.multiply(&carried, &mut offset);
         }
         offsets.push(offset);
         let Loose { left, motions, sprung, unfelt } = loose;
@@ -257,22 +256,23 @@ pub fn discretize<const D: usize>(
         if let Some(before) = factory.kept(&name) {
             (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             assemblies_avoided += 1;
-        } else if owner[index] == ranks.0 || dealt[index].is_some() {
-            let left = rigid::free(&left, prescribed, &load);
+        } else if owner[index] == ranks.0 || dealt.is_some() {
+            let left = rigid::free(&left, &prescribed, &load);
             let mut graph = graph.into_inner().unwrap_or_else(|| part.graph(&rows));
-            let dealt = dealt[index].take();
-            if let Some((own, places)) = &dealt {
-                graph = graph.of(|node| places.is_own::<D>(own, node));
+            if let Some(dealt) = &dealt {
+                graph = graph.of(|node| dealt.is_own::<D>(node));
             }
-            let body = part.assemble(mesh, &graph, &elasticity, load, supported, dealt.as_ref())?;
+            let mut body = part.assemble(mesh, &graph, &elasticity, load, prescribed, carried)?;
             drop(graph);
-            let distribution = dealt.map(|(distribution, _)| distribution);
             if owner[index] == ranks.0 {
                 assemblies += 1;
                 scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
             }
-            let own = distribution.as_ref().map(|distribution| distribution.of_rows(&rows));
-            row_stiffness = own.as_ref().unwrap_or(&rows).quadratic_diagonal(&body.stiffness);
+            row_stiffness = rows.quadratic_diagonal(&body.stiffness);
+            if let Some(dealt) = &dealt {
+                body = dealt.own::<D>(body);
+            }
+            let distribution = dealt.map(|dealt| dealt.distribution);
             local = Some(factory.make(Assembled {
                 name: name.clone(),
                 dimension: D,
@@ -375,6 +375,14 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
     }
     axpy(-1.0, &discrete.carried, &mut trace);
     Ok(Some(trace))
+}
+
+/// What supports prescribe.
+struct Supported {
+    /// Displacement by which they move the body as one, one entry a dof; empty for none.
+    carried: Vec<f64>,
+    /// (dof, value) besides it, sorted by dof.
+    prescribed: Vec<(usize, f64)>,
 }
 
 /// What the supports of a body prescribe; `free` are the rigid motions of the free body.

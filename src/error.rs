@@ -278,7 +278,7 @@ pub fn joined<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     groups.into_iter().map(group).collect::<Vec<_>>().join(" with ")
 }
 
-/// Most names in a sentence: as many as a person reads.
+/// Most names in a sentence: with ten letters each and their quotes, two lines of a terminal of 80 columns.
 const NAMES: usize = 12;
 
 /// The first of many names, and the number of others: of a few names all.

@@ -175,6 +175,10 @@ fn petsc_prints_what_it_is_asked_for() {
     assert!(count(&one) > 0 && 2 * count(&one) <= count(&monitor) + 4, "{}", one.stdout);
     let view = groove("-ksp_view -ksp_type preonly").converged();
     assert!(view.stdout.contains("KSP Object: (upper_)") && view.stdout.contains("mumps"), "{}", view.stdout);
+    let stages = groove("-log_view -ksp_type cg").converged().stdout;
+    for stage in ["mesh", "discretize", "set-up", "iterate", "linear solve", "output"] {
+        assert!(stages.contains(&format!("{stage}: ")), "{stage}: {stages}");
+    }
     let log = groove("-log_view").converged();
     assert!(log.stdout.contains("Performance Summary") || log.stdout.contains("MatCholFctrNum"), "{}", log.stdout);
     let reason = groove("-ksp_type cg -ksp_converged_reason").converged();

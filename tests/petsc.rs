@@ -5,7 +5,7 @@
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 use winkler::error::Result;
-use winkler::petsc::{ConvergedReason, Int, Ksp, Matrix, OwnedRows, Schur, Scope, Session};
+use winkler::petsc::{ConvergedReason, Int, Ksp, Matrix, Rows, Schur, Scope, Session};
 use winkler::solver::options::{Typed, UnreadKind, unread};
 
 /// After this, ranks that wait for each other are ended.
@@ -392,32 +392,21 @@ fn a_matrix_of_several_ranks() {
                        -c_ksp_type preonly -c_pc_type cholesky -c_pc_factor_mat_solver_type mumps";
         let session = Session::start(&words(solvers))?;
         let n = 60;
-        let first = [0, 40, 40, n];
+        let first: [usize; 4] = [0, 40, 40, n];
         let own = first[session.rank()]..first[session.rank() + 1];
         let exact = |row: usize| ((row * row) % 7) as f64;
         for prefix in ["a_", "b_", "c_"] {
-            let mut rows = OwnedRows { first: own.start, total: n, row_ptr: vec![0], ..OwnedRows::default() };
-            rows.other_row_ptr.push(0);
-            let mut others = 0;
+            let (mut row_ptr, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
             for row in own.clone() {
-                for (column, value) in [(row.wrapping_sub(1), -1.0), (row, 2.0), (row + 1, -1.0)] {
-                    match column {
-                        _ if own.contains(&column) => {
-                            rows.columns.push((column - own.start) as Int);
-                            rows.values.push(value);
-                        }
-                        _ if column < n => {
-                            rows.other_columns.push(column as Int);
-                            others += 1;
-                        }
-                        _ => {}
-                    }
+                let entries = [(row.wrapping_sub(1), -1.0), (row, 2.0), (row + 1, -1.0)];
+                for (column, value) in entries.into_iter().filter(|entry| entry.0 < n) {
+                    columns.push(column as Int);
+                    values.push(value);
                 }
-                rows.row_ptr.push(rows.columns.len() as Int);
-                rows.other_row_ptr.push(rows.other_columns.len() as Int);
+                row_ptr.push(columns.len() as Int);
             }
-            rows.values.extend(std::iter::repeat_n(-1.0, others));
-            let mut matrix = Matrix::from_owned_rows(&session, 1, rows)?;
+            let rows = Rows::of_process(own.start, n, row_ptr, columns, values)?;
+            let mut matrix = Matrix::new(&session, 1, rows)?;
             matrix.set_spd()?;
             matrix.set_near_null_space(&[vec![1.0; own.len()]])?;
             assert_eq!((matrix.rows(), matrix.scope()), (own.len(), Scope::World));

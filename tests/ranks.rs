@@ -79,6 +79,25 @@ fn multigrid() {
     same_on(&[2, 3], "hypre");
 }
 
+/// The matrix of all bodies has its rows on all ranks, and is not solved by each for itself.
+#[test]
+fn rows_are_dealt_out() {
+    for solver in ["hypre", "mumps"] {
+        let solver = format!("solver={solver}");
+        let args = ["--method", "newton", "--set", "mesh.set.n=4", "--set", &solver, "-newton_ksp_view"];
+        let run = solve_on(3, case("groove3d"), &args).converged();
+        let view = ["KSP Object: (newton_) 3 MPI processes", "type: mpiaij", "rows=1020, cols=1020"];
+        assert!(view.iter().all(|text| run.stdout.contains(text)), "{}", run.stdout);
+    }
+}
+
+/// What MUMPS takes on several ranks depends on when they answer: here its analysis foresees too little.
+#[test]
+fn mumps_gets_the_room_that_it_lacks() {
+    let run = solve_on(3, case("hertz-sphere"), &["--method", "newton", "--set", "solver=mumps"]).converged();
+    assert_eq!(run.solvers(), ["preonly + cholesky by mumps"; 2]);
+}
+
 /// More ranks than nodes, most of which have nothing.
 #[test]
 fn ranks_without_nodes() {

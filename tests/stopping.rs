@@ -274,6 +274,7 @@ fn a_killed_run_goes_on_to_the_same_end() {
 #[test]
 fn a_killed_rank_ends_all() {
     let (scene, sets) = (case("groove3d"), ["--method", "newton", "--set", "solver=hypre", "--set", "mesh.set.n=10"]);
+    let mut killed = 0;
     for wait in [30, 200, 500] {
         let mut run = Working::start(&words(&scene, &sets), 3);
         run.until("its ranks", |_| true);
@@ -286,7 +287,9 @@ fn a_killed_rank_ends_all() {
         let began = Instant::now();
         let (status, _, said) = run.end();
         assert!(!status.success() && began.elapsed() < Duration::from_secs(5), "{wait}: {said}");
+        killed += 1;
     }
+    assert!(killed > 0);
 }
 
 /// Less and less memory: a run that does not get what it wants says so, with its code, and never hangs.

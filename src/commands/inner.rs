@@ -9,7 +9,7 @@ use crate::error::{Error, Kind, Result};
 use crate::fem::assemble::NodeGraph;
 use crate::model::{Body, BodySlot};
 use crate::parallel::agree as agreed;
-use crate::petsc::{Session, partition};
+use crate::petsc::{Rows, Session, partition};
 use crate::problem::method::{Linear, MethodName};
 use crate::problem::solver::Preset;
 use crate::scene::Scene;
@@ -383,7 +383,7 @@ impl Factory for Inner<'_> {
         if let Some(distribution) = distribution {
             return Ok(Box::new(SparseBody::<Krylov>::dealt_out(body, &rows, &left, distribution, words)));
         }
-        let make = move |stiffness: crate::linalg::Slab| Krylov::new(&session, chosen, dimension, stiffness, &modes);
+        let make = move |stiffness: Rows| Krylov::new(&session, chosen, dimension, stiffness, &modes);
         Ok(Box::new(SparseBody::new(body, rows, &left, make, words)))
     }
 

@@ -5,8 +5,7 @@ use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
 use crate::ddm::{Coefficient, Method, Start, Sweeps, first_springs};
 use crate::error::{Error, Kind, Result};
-use crate::linalg::Slab;
-use crate::model::{BodySlot, LinearStep, Model};
+use crate::model::{LinearStep, Model};
 use crate::petsc::Session;
 use crate::problem::method::{Gamma, Linear, MethodName};
 use crate::scene::Scene;
@@ -49,18 +48,14 @@ fn linear_step(
     }
     model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.reveal())?;
     // multigrid wants nodes, without numbers for rigid motions among them; so do rows that are dealt out
-    let is_dealt_out = |slot: &BodySlot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some());
-    let nodes = linear == Linear::Multigrid || model.bodies.iter().any(is_dealt_out);
+    let nodes = linear == Linear::Multigrid || model.is_dealt_out();
     let union = if nodes { Union::of_nodes(model)? } else { Union::of(model)? };
     let Some(union) = union else {
         return Err(Error::new(Kind::Solver, "a body has no matrices to be joined").help("choose newton-robin"));
     };
     let block = if nodes { scene.dimension.value } else { 1 };
     let mut step: Box<dyn LinearStep> = match linear {
-        Linear::Dense => {
-            let dense = |stiffness: Slab| Ok(Dense::new(stiffness.rows(), stiffness.values));
-            Box::new(Monolithic::new(union.without_zeros(), dense)?)
-        }
+        Linear::Dense => Box::new(Monolithic::new(union.without_zeros(), |stiffness| Ok(Dense::new(stiffness)))?),
         _ => {
             let krylov = |stiffness| Krylov::new(session, whole.clone(), block, stiffness, &[]);
             let monolithic = Monolithic::new(union, krylov)?;

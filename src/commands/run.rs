@@ -134,8 +134,7 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
                 .to_owned(),
         );
     }
-    let is_dealt_out = |slot: &BodySlot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some());
-    if session.size() > discrete.bodies.len() && !discrete.model.bodies.iter().any(is_dealt_out) {
+    if session.size() > discrete.bodies.len() && !discrete.model.is_dealt_out() {
         warnings.push(format!(
             "{} of {} ranks have no body to solve",
             session.size() - discrete.bodies.len(),

@@ -1,8 +1,8 @@
 //! The dofs of all bodies over the ranks: a partition of their nodes, and what each rank knows of it.
 
 use super::draft::Draft;
-use super::places::Places;
 use crate::contact::ContactPair;
+use crate::fem::ElasticBody;
 use crate::fem::assemble::NodeGraph;
 use crate::linalg::Csr;
 use crate::model::{Distribution, Exchange};
@@ -63,66 +63,93 @@ pub fn graph<const D: usize>(graphs: &[&NodeGraph], drafts: &[Draft], pairs: &[C
     all
 }
 
-/// What rank `rank` knows of each body when `owner` has the rank of every node, body by body; and which node of each body it has at
-/// which place: own ones, then ghosts.
+/// A body that is dealt out, as one rank sees it.
+pub struct Dealt {
+    /// The dofs of this rank.
+    pub distribution: Distribution,
+    /// The rank that speaks for the body.
+    pub leader: usize,
+    /// Number of each node in the matrix of all bodies.
+    number: Vec<u32>,
+}
+
+/// What rank `rank` knows of each body when `owner` has the rank of every node, body by body.
 pub fn distribute<const D: usize>(
-    graphs: &[&NodeGraph],
     drafts: &[Draft],
     owner: &[u32],
     (rank, ranks): (usize, usize),
     exchange: &Rc<dyn Exchange>,
-) -> Vec<(Distribution, Places)> {
+) -> Vec<Dealt> {
     // numbers of nodes in the matrix of all bodies: rank by rank, there body by body
     let mut next = vec![0; ranks + 1];
     owner.iter().for_each(|&owner| next[owner as usize + 1] += 1);
     (0..ranks).for_each(|rank| next[rank + 1] += next[rank]);
-    let start = next[rank];
-    let number = |&owner: &u32| {
-        next[owner as usize] += 1;
-        next[owner as usize] - 1
-    };
-    let number: Vec<u32> = owner.iter().map(number).collect();
-    let mut begin = 0;
-    let mut all = Vec::new();
-    for (graph, draft) in graphs.iter().zip(drafts) {
-        let nodes = graph.ptr.len() - 1;
-        let (owner, number) = (&owner[begin..begin + nodes], &number[begin..begin + nodes]);
-        begin += nodes;
-        let own: Vec<usize> = (0..nodes).filter(|&node| owner[node] as usize == rank).collect();
-        let mut ghosts = Vec::new();
-        for &node in &own {
-            let neighbours = &graph.col[graph.ptr[node] as usize..graph.ptr[node + 1] as usize];
-            let others = neighbours.iter().filter(|&&other| owner[other as usize] as usize != rank);
-            ghosts.extend(others.map(|&other| (number[other as usize], other as usize)));
-        }
-        ghosts.sort_unstable();
-        ghosts.dedup();
-        let mut of_node = vec![-1; nodes];
-        own.iter()
-            .chain(ghosts.iter().map(|(_, node)| node))
-            .enumerate()
-            .for_each(|(i, &node)| of_node[node] = i as i32);
-        let dofs = |node: u32| (0..D as u32).map(move |c| D as u32 * node + c);
-        let mut share = vec![0; ranks];
-        owner.iter().for_each(|&owner| share[owner as usize] += 1);
+    let (start, total) = (D * next[rank] as usize, D * owner.len());
+    let mut owner = owner;
+    let of_body = |draft: &Draft| {
+        let nodes = draft.rows.columns / D;
+        let of_node;
+        (of_node, owner) = owner.split_at(nodes);
+        let number = of_node.iter().map(|&owner| {
+            next[owner as usize] += 1;
+            next[owner as usize] - 1
+        });
+        let number: Vec<u32> = number.collect();
+        let own: Vec<usize> = (0..nodes).filter(|&node| of_node[node] as usize == rank).collect();
+        let mut counts = vec![0; ranks];
+        of_node.iter().for_each(|&owner| counts[owner as usize] += 1);
         // of equal ones the first
-        let most = (0..ranks).rev().max_by_key(|&rank| share[rank]).unwrap_or(0);
-        let mut rows = Csr::new(D * next[ranks - 1] as usize);
+        let leader = (0..ranks).rev().max_by_key(|&rank| counts[rank]).unwrap_or(0);
+        let mut rows = Csr::new(total);
         for q in 0..draft.rows.rows() {
             rows.push_row(draft.rows.row(q).map(|(dof, value)| (D * number[dof / D] as usize + dof % D, value)));
         }
         let distribution = Distribution {
             dofs: D * nodes,
-            first: D * own.first().map_or(start, |&node| number[node]) as usize,
-            start: D * start as usize,
-            own: own.iter().flat_map(|&node| dofs(node as u32)).collect(),
-            ghosts: ghosts.iter().flat_map(|&(number, _)| dofs(number)).map(|dof| dof as i32).collect(),
-            total: D * next[ranks - 1] as usize,
+            first: own.first().map_or(start, |&node| D * number[node] as usize),
+            start,
+            own: own.into_iter().flat_map(|node| (D * node..D * (node + 1)).map(|dof| dof as u32)).collect(),
+            total,
             rows,
-            leads: most == rank,
+            leads: leader == rank,
             exchange: exchange.clone(),
         };
-        all.push((distribution, Places { of_node, leader: most }));
+        Dealt { distribution, leader, number }
+    };
+    drafts.iter().map(of_body).collect()
+}
+
+impl Dealt {
+    /// Whether a node is an own one.
+    pub fn is_own<const D: usize>(&self, node: usize) -> bool {
+        let Distribution { first, own, .. } = &self.distribution;
+        (*first..first + own.len()).contains(&(D * self.number[node] as usize))
     }
-    all
+
+    /// A body that was assembled for own nodes alone, in its own dofs; columns of K are those of the matrix of all bodies.
+    pub fn own<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
+        let own = &self.distribution.own;
+        let Csr { ptr, mut col, mut values, .. } = body.stiffness;
+        let mut starts = vec![0];
+        let mut row = Vec::new();
+        for &dof in own {
+            let range = ptr[dof as usize] as usize..ptr[dof as usize + 1] as usize;
+            let number = |&j: &i32| D as i32 * self.number[j as usize / D] as i32 + j % D as i32;
+            row.clear();
+            row.extend(col[range.clone()].iter().map(number).zip(values[range.clone()].iter().copied()));
+            row.sort_unstable_by_key(|entry| entry.0);
+            for (k, &(j, value)) in range.clone().zip(&row) {
+                (col[k], values[k]) = (j, value);
+            }
+            starts.push(range.end as i32);
+        }
+        let place = |&(dof, value): &(usize, f64)| Some((own.binary_search(&(dof as u32)).ok()?, value));
+        ElasticBody {
+            stiffness: Csr { columns: self.distribution.total, ptr: starts, col, values },
+            load: self.distribution.scatter(&body.load),
+            prescribed: body.prescribed.iter().filter_map(place).collect(),
+            lifting: if body.lifting.is_empty() { Vec::new() } else { self.distribution.scatter(&body.lifting) },
+            ..body
+        }
+    }
 }

@@ -2,7 +2,6 @@
 
 use super::elastic;
 use super::find::{Values, find_group, not_on_body, point, without_area};
-use super::places::Places;
 use super::springs;
 use super::supports::Held;
 use crate::contact;
@@ -12,7 +11,6 @@ use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
 use crate::linalg::{Csr, countable, dot};
 use crate::mesh::Mesh;
-use crate::model::Distribution;
 use crate::problem::body::{BodySpec, LoadKind};
 use crate::problem::elasticity::Plane;
 use nalgebra::DMatrix;
@@ -27,14 +25,6 @@ pub struct Part<'a, const D: usize> {
     pub held: Held<D>,
     /// Springs to the ground: for each of the scene, its stiffnesses between nodes.
     pub springs: Vec<Vec<NodalBlock<D>>>,
-}
-
-/// What supports prescribe.
-pub struct Supported {
-    /// Displacement by which they move the body as one, one entry a dof; empty for none.
-    pub carried: Vec<f64>,
-    /// (dof, value) besides it, sorted by dof.
-    pub prescribed: Vec<(usize, f64)>,
 }
 
 impl<'a, const D: usize> Part<'a, D> {
@@ -194,15 +184,16 @@ impl<'a, const D: usize> Part<'a, D> {
         NodeGraph::new(&self.space, &coupled, &self.held.frame)
     }
 
-    /// K on its graph, f and supports. Of a body that is dealt out over ranks, the rows of this one, which are all that the graph has.
+    /// K on its graph, f and supports; `carried` is the rigid motion that was taken out of `prescribed`, if any. The graph may have the
+    /// rows of some nodes only, and then so have K and f.
     pub fn assemble(
         &self,
         mesh: &Mesh<D>,
         graph: &NodeGraph,
         elasticity: &Elasticity,
         mut load: Vec<f64>,
-        supported: Supported,
-        dealt: Option<&(Distribution, Places)>,
+        prescribed: Vec<(usize, f64)>,
+        carried: Vec<f64>,
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
@@ -220,14 +211,9 @@ impl<'a, const D: usize> Part<'a, D> {
         }
         self.springs.iter().for_each(|springs| assemble::add_blocks(graph, springs, &mut stiffness));
         self.held.frame.turn_matrix(&mut stiffness);
-        let Supported { carried, mut prescribed } = supported;
-        let mut work = dot(&load, &carried);
-        if let Some((own, places)) = dealt {
-            stiffness = places.rows::<D>(own, stiffness);
-            prescribed = places.entries::<D>(&prescribed);
-            load = own.scatter(&load);
-            work = if own.leads { work } else { 0.0 };
-        }
+        // rows that other ranks have
+        (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
+        let work = dot(&load, &carried);
         let mut body = assemble::support(stiffness, load, prescribed);
         body.energy_constant -= work;
         body.carried = carried;

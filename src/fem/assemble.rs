@@ -183,8 +183,8 @@ pub enum Defect {
     Elasticity(usize, [f64; 3], Flaw),
 }
 
-/// Stiffness matrix of a space on a graph, which may have the rows of some nodes only. Where the elasticity varies within a cell, and in bodies of revolution, it is taken
-/// at the points of a rule of degree 2 (P1) or 5 (P2); all of these lie off the axis.
+/// Stiffness matrix of a space on a graph, which may have the rows of some nodes only. Where the elasticity varies within a cell, and
+/// in bodies of revolution, it is taken at the points of a rule of degree 2 (P1) or 5 (P2); all of these lie off the axis.
 ///
 /// # Errors
 /// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity.
@@ -321,11 +321,10 @@ pub fn interpolate<const D: usize>(x: &[[f64; D]], phi: &[f64]) -> [f64; D] {
 
 /// Takes prescribed dofs out of K and f, symmetrically, and keeps what energies need.
 ///
-/// `prescribed` holds (dof, value), sorted, without repetition. K may have the first rows alone, as many as f has entries; its columns
-/// behind them are dofs that live elsewhere.
+/// `prescribed` holds (dof, value), sorted, without repetition. Rows of K that are empty live elsewhere, with their energies.
 pub fn support(mut stiffness: Csr, mut load: Vec<f64>, mut prescribed: Vec<(usize, f64)>) -> ElasticBody {
     let n = load.len();
-    let mut value = vec![None; stiffness.columns];
+    let mut value = vec![None; n];
     for &(dof, u) in &prescribed {
         value[dof] = Some(u);
     }
@@ -338,6 +337,9 @@ pub fn support(mut stiffness: Csr, mut load: Vec<f64>, mut prescribed: Vec<(usiz
     let mut lifting = if moved { vec![0.0; n] } else { Vec::new() };
     let (mut energy_constant, mut strain_constant) = (0.0, 0.0);
     for i in 0..n {
+        if stiffness.range(i).is_empty() {
+            continue;
+        }
         for k in stiffness.range(i) {
             let j = stiffness.col[k] as usize;
             match (value[i], value[j]) {
@@ -362,7 +364,7 @@ pub fn support(mut stiffness: Csr, mut load: Vec<f64>, mut prescribed: Vec<(usiz
             load[i] -= lifting[i];
         }
     }
-    prescribed.retain(|entry| entry.0 < n);
+    prescribed.retain(|entry| !stiffness.range(entry.0).is_empty());
     energy_constant += 0.5 * strain_constant;
     strain_constant -= prescribed.iter().map(|(_, u)| scale * u * u).sum::<f64>();
     let carried = Vec::new();

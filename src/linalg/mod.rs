@@ -8,12 +8,10 @@ mod blocks;
 mod blocks_tests;
 mod degree;
 mod factor;
-mod slab;
 mod symbolic;
 
 pub use blocks::Blocks;
 pub use factor::{Factor, PART, TOLERANCE};
-pub use slab::Slab;
 pub use symbolic::{Work, factorisation};
 
 use crate::error::{Error, Kind, Result};

@@ -7,7 +7,7 @@ use super::exchange::Exchange;
 use crate::linalg::Csr;
 use std::rc::Rc;
 
-/// The dofs of a body that one rank owns, and the columns of their rows of K.
+/// The dofs of a body that one rank owns, and where they are in the matrix of all bodies, which has their rows of K.
 pub struct Distribution {
     /// Number of dofs of the body.
     pub dofs: usize,
@@ -17,8 +17,6 @@ pub struct Distribution {
     pub first: usize,
     /// First row of that matrix on this rank.
     pub start: usize,
-    /// Numbers in that matrix of the dofs of other ranks that own ones are coupled with, sorted.
-    pub ghosts: Vec<i32>,
     /// Rows of that matrix.
     pub total: usize,
     /// All contact rows of the body; columns: rows of that matrix.

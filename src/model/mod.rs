@@ -169,6 +169,11 @@ impl Model {
         all
     }
 
+    /// Whether the dofs of the bodies are dealt out over the ranks.
+    pub fn is_dealt_out(&self) -> bool {
+        self.bodies.iter().any(|slot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some()))
+    }
+
     /// Number of contact points of all pairs.
     pub fn points(&self) -> usize {
         self.weight.len()

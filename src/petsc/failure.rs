@@ -35,6 +35,12 @@ impl Ksp {
         if self.updates.get() == before {
             return Ok(());
         }
+        self.failed_at.set(None);
+        self.forget()
+    }
+
+    /// Forgets the preconditioner, and nothing else.
+    pub(super) fn forget(&self) -> Result<()> {
         let pc = self.pc()?;
         let (mut matrix, mut same) = (null_mut(), null_mut());
         petsc!(PCGetOperators(pc, &mut matrix, &mut same))?;
@@ -42,8 +48,22 @@ impl Ksp {
         petsc!(PetscObjectReference(matrix.cast()))?;
         let set = petsc!(PCReset(pc)).and_then(|()| petsc!(KSPSetOperators(self.ksp, matrix, matrix)));
         petsc!(PetscObjectDereference(matrix.cast()))?;
-        self.failed_at.set(None);
         set
+    }
+
+    /// Whether MUMPS' factorisation ran out of the space, or of the buffers for messages, that its analysis foresaw: what it takes on
+    /// several ranks depends on when they answer.
+    pub(super) fn lacks_room(&self) -> bool {
+        let info = || self.mumps_info(self.pc().ok()?);
+        self.failure().is_some() && info().is_some_and(|(first, _)| matches!(first, -8 | -9 | -17 | -20))
+    }
+
+    /// Gives the next factorisation, which is not begun, `percent` more space than MUMPS' analysis foresees.
+    pub(super) fn set_room(&self, percent: Int) -> Result<()> {
+        let (pc, mut factor) = (self.pc()?, null_mut());
+        petsc!(PCFactorSetUpMatSolverType(pc))?;
+        petsc!(PCFactorGetMatrix(pc, &mut factor))?;
+        petsc!(MatMumpsSetIcntl(factor, 14, percent))
     }
 
     /// Remembers with which matrix the preconditioner failed, if it did.

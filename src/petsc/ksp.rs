@@ -3,6 +3,7 @@
 use super::error::string;
 use super::library::petsc;
 use super::matrix::same;
+use super::mumps::ROOM;
 use super::table::text;
 use super::vector::Vector;
 use super::{ConvergedReason, FAMILIES, Int, Matrix, Scope, Session, ffi, print};
@@ -193,11 +194,23 @@ impl Ksp {
         }
         };
         self.recover()?;
-        petsc!(KSPSetUp(self.ksp)).map_err(advise)?;
-        // KSPSetUp leaves new values of a matrix it has seen before to the first application
         let pc = self.pc()?;
-        petsc!(PCSetUp(pc)).map_err(advise)?;
-        petsc!(KSPSetUpOnBlocks(self.ksp)).map_err(advise)?;
+        let make = || {
+            petsc!(KSPSetUp(self.ksp))?;
+            // KSPSetUp leaves new values of a matrix it has seen before to the first application
+            petsc!(PCSetUp(pc))?;
+            petsc!(KSPSetUpOnBlocks(self.ksp))
+        };
+        make().map_err(advise)?;
+        // the first is MUMPS' own
+        for &room in &ROOM[1..] {
+            if !self.lacks_room() {
+                break;
+            }
+            self.forget()?;
+            self.set_room(Int::from(room))?;
+            make().map_err(advise)?;
+        }
         self.note_failure()
     }
 

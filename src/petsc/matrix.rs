@@ -1,7 +1,7 @@
 //! Sparse matrices.
 
-use super::arrays::{Arrays, attach, check, check_rows, free};
 use super::library::petsc;
+use super::rows::{Rows, attach, free};
 use super::vector::Vector;
 use super::{Int, Scope, Session, ffi};
 use crate::error::{Error, Kind, Result};
@@ -10,25 +10,6 @@ use mpi::traits::CommunicatorCollectives;
 use std::cell::Cell;
 use std::ptr::null_mut;
 use std::rc::Rc;
-
-/// The rows of a square matrix that this process owns, one of several.
-#[derive(Debug, Clone, Default)]
-pub struct OwnedRows {
-    /// Number of the first of them among all.
-    pub first: usize,
-    /// Number of all rows.
-    pub total: usize,
-    /// Compressed rows in the columns of the same numbers: starts.
-    pub row_ptr: Vec<Int>,
-    /// Their columns, counted from `first`, increasing in each row.
-    pub columns: Vec<Int>,
-    /// The same rows in the columns of other processes: starts.
-    pub other_row_ptr: Vec<Int>,
-    /// Their columns, counted through all, increasing in each row.
-    pub other_columns: Vec<Int>,
-    /// Values: all in own columns, row by row, then all in the columns of others, row by row.
-    pub values: Vec<f64>,
-}
 
 /// A square sparse matrix (PETSc's AIJ, rows compressed) of this process, or of all with rows on each.
 ///
@@ -64,12 +45,10 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// Takes a matrix over from its compressed rows: row `i` has the columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in
-    /// increasing order, and the values at the same places. `block_size` dofs belong to one node (1 if unsure); it
-    /// divides the number of rows.
+    /// A matrix of this process from its compressed rows ([`Rows::all`]).
     ///
     /// # Errors
-    /// When the arrays are not those of a square matrix with sorted columns.
+    /// When the arrays are not those of a square matrix with sorted columns, or the block size does not divide it.
     pub fn from_csr(
         session: &Session,
         block_size: usize,
@@ -77,94 +56,56 @@ impl Matrix {
         columns: Vec<Int>,
         values: Vec<f64>,
     ) -> Result<Matrix> {
-        check(block_size, &row_ptr, &columns, values.len())?;
-        let (rows, nonzeros, scope) = (row_ptr.len() - 1, values.len(), Scope::Process);
-        let [x, y] = [Vector::new(session, scope, rows, block_size)?, Vector::new(session, scope, rows, block_size)?];
-        let (other_row_ptr, other_columns) = (Vec::new(), Vec::new());
-        let arrays = Box::into_raw(Box::new(Arrays { row_ptr, columns, other_row_ptr, other_columns, values }));
-        // SAFETY: the box was just made. Only raw pointers to its vectors are kept, so PETSc and we may both use them.
-        let (row_ptr, columns, values) =
-            unsafe { ((*arrays).row_ptr.as_mut_ptr(), (*arrays).columns.as_mut_ptr(), (*arrays).values.as_mut_ptr()) };
-        let comm = scope.comm(session);
-        let n = rows as Int;
-        let mut mat = null_mut();
-        if let Err(error) = petsc!(MatCreateSeqAIJWithArrays(comm, n, n, row_ptr, columns, values, &mut mat)) {
-            // SAFETY: PETSc did not take the arrays.
-            unsafe { free(arrays.cast()) };
-            return Err(error);
-        }
-        let (updates, session) = (Rc::default(), session.clone());
-        let matrix = Matrix { mat, scope, rows, nonzeros, block_size, values, updates, x, y, session };
-        attach(mat, arrays)?;
-        petsc!(MatSetBlockSize(mat, block_size as Int))?;
-        Ok(matrix)
+        Self::new(session, block_size, Rows::all(row_ptr, columns, values)?)
     }
 
-    /// Takes the rows of this process over into a matrix of all processes; collective. Rows follow each other in the order of
-    /// the processes, any of which may own none.
-    ///
-    /// ```
-    /// use winkler::petsc::{Matrix, OwnedRows, Session};
-    /// let session = Session::start(&[])?;
-    /// let (row_ptr, columns, values) = (vec![0, 2, 3], vec![0, 1, 1], vec![2.0, 1.0, 5.0]);
-    /// let rows = OwnedRows { total: 2, row_ptr, columns, other_row_ptr: vec![0; 3], values, ..OwnedRows::default() };
-    /// let mut a = Matrix::from_owned_rows(&session, 1, rows)?;
-    /// a.update(|values| values[2] = 3.0)?;
-    /// let mut y = [0.0; 2];
-    /// a.multiply(&[1.0, 2.0], &mut y)?;
-    /// assert_eq!(y, [4.0, 6.0]);
-    /// assert!(Matrix::from_owned_rows(&session, 1, OwnedRows::default()).is_err());
-    /// # Ok::<(), winkler::error::Error>(())
-    /// ```
+    /// Takes rows over; collective over those who have the others. `block_size` dofs belong to one node (1 if unsure).
     ///
     /// # Errors
-    /// When the arrays are not those of such rows.
-    pub fn from_owned_rows(session: &Session, block_size: usize, rows: OwnedRows) -> Result<Matrix> {
-        let OwnedRows { first, total, row_ptr, columns, other_row_ptr, other_columns, values } = rows;
-        check(block_size, &row_ptr, &columns, columns.len())?;
-        let (n, nonzeros, scope) = (row_ptr.len() - 1, values.len(), Scope::World);
-        same("other_row_ptr", other_row_ptr.len(), n + 1)?;
-        check_rows(block_size, &other_row_ptr, &other_columns, nonzeros - columns.len().min(nonzeros), total)?;
-        if first + n > total || other_columns.iter().any(|&j| (first..first + n).contains(&(j as usize))) {
-            return Err(Error::new(
-                Kind::Solver,
-                "the rows of a process are not those it says, or their columns its own",
-            ));
+    /// When the block size does not divide the number of rows.
+    pub fn new(session: &Session, block_size: usize, rows: Rows) -> Result<Matrix> {
+        let (scope, own, nonzeros) = (rows.scope, rows.own().len(), rows.values.len());
+        if block_size == 0 || own % block_size != 0 {
+            return Err(Error::new(Kind::Solver, format!("blocks of {block_size} do not divide {own} rows")));
         }
-        let [x, y] = [Vector::new(session, scope, n, block_size)?, Vector::new(session, scope, n, block_size)?];
-        let own = columns.len();
-        let arrays = Box::into_raw(Box::new(Arrays { row_ptr, columns, other_row_ptr, other_columns, values }));
-        // SAFETY: the box was just made. Only raw pointers to its vectors are kept, so PETSc and we may both use them; the values of
-        // other columns begin behind those of own ones, both of which were counted above.
-        let (i, j, oi, oj, values, other_values) = unsafe {
-            let all = &mut *arrays;
-            let values = all.values.as_mut_ptr();
-            let [i, j] = [all.row_ptr.as_mut_ptr(), all.columns.as_mut_ptr()];
-            (i, j, all.other_row_ptr.as_mut_ptr(), all.other_columns.as_mut_ptr(), values, values.add(own))
+        let [x, y] = [Vector::new(session, scope, own, block_size)?, Vector::new(session, scope, own, block_size)?];
+        let (comm, n, total, inside) = (scope.comm(session), own as Int, rows.total as Int, rows.columns.len());
+        let rows = Box::into_raw(Box::new(rows));
+        // SAFETY: the box was just made. Only raw pointers to its vectors are kept, so PETSc and we may both use them; the values in
+        // other columns begin behind those in own ones, of which there are as many as of these.
+        let (i, j, other_i, other_j, values, other_values) = unsafe {
+            let rows = &mut *rows;
+            let ([i, j], values) = ([&mut rows.row_ptr, &mut rows.columns], rows.values.as_mut_ptr());
+            let [other_i, other_j] = [&mut rows.other_row_ptr, &mut rows.other_columns];
+            let pointers = [i, j, other_i, other_j].map(|array| array.as_mut_ptr());
+            (pointers[0], pointers[1], pointers[2], pointers[3], values, values.add(inside))
         };
-        let (comm, n_here, n_all) = (scope.comm(session), n as Int, total as Int);
         let mut mat = null_mut();
-        if let Err(error) = petsc!(MatCreateMPIAIJWithSplitArrays(
-            comm,
-            n_here,
-            n_here,
-            n_all,
-            n_all,
-            i,
-            j,
-            values,
-            oi,
-            oj,
-            other_values,
-            &mut mat
-        )) {
+        let made = match scope {
+            Scope::Process => petsc!(MatCreateSeqAIJWithArrays(comm, n, n, i, j, values, &mut mat)),
+            Scope::World => petsc!(MatCreateMPIAIJWithSplitArrays(
+                comm,
+                n,
+                n,
+                total,
+                total,
+                i,
+                j,
+                values,
+                other_i,
+                other_j,
+                other_values,
+                &mut mat
+            )),
+        };
+        if let Err(error) = made {
             // SAFETY: PETSc did not take the arrays.
-            unsafe { free(arrays.cast()) };
+            unsafe { free(rows.cast()) };
             return Err(error);
         }
         let (updates, session) = (Rc::default(), session.clone());
-        let matrix = Matrix { mat, scope, rows: n, nonzeros, block_size, values, updates, x, y, session };
-        attach(mat, arrays)?;
+        let matrix = Matrix { mat, scope, rows: own, nonzeros, block_size, values, updates, x, y, session };
+        attach(mat, rows)?;
         petsc!(MatSetBlockSize(mat, block_size as Int))?;
         Ok(matrix)
     }
@@ -194,7 +135,7 @@ impl Matrix {
         &self.session
     }
 
-    /// The stored values, in the order they were given.
+    /// The stored values, in the order of [`Rows`].
     pub fn values(&self) -> &[f64] {
         // SAFETY: PETSc keeps the array while `self.mat` lives, and writes to it in no call that is made with `&self`
         // (the solver refuses -ksp_diagonal_scale, which would).

@@ -21,7 +21,6 @@
 //! # Ok::<(), winkler::error::Error>(())
 //! ```
 
-mod arrays;
 mod blas;
 mod error;
 mod failure;
@@ -38,6 +37,7 @@ mod print;
 mod reason;
 #[cfg(test)]
 mod requirements;
+mod rows;
 mod scope;
 mod session;
 mod stage;
@@ -50,11 +50,12 @@ pub use blas::{cholesky, cholesky_solve};
 pub use ffi::Int;
 pub use heap::{Heap, leave};
 pub use ksp::{Ksp, Solved};
-pub use matrix::{Matrix, OwnedRows};
+pub use matrix::Matrix;
 pub use metis::{nested_dissection, partition};
 pub use mumps::Schur;
 pub use options::{FAMILIES, Options};
 pub use reason::ConvergedReason;
+pub use rows::Rows;
 pub use scope::Scope;
 pub use session::Session;
 pub use stage::Stage;

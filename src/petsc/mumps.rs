@@ -7,7 +7,7 @@ use mpi::ffi::{MPI_Comm_c2f, RSMPI_COMM_SELF};
 use std::ptr::null_mut;
 
 /// Space beyond what the analysis expects, in per cent, tried one after the other.
-const ROOM: [i32; 4] = [20, 60, 200, 1000];
+pub(super) const ROOM: [i32; 4] = [20, 60, 200, 1000];
 
 /// Elimination orders, values of ICNTL(7): approximate minimum degree by MUMPS, and one that is given.
 const MINIMUM_DEGREE: Int = 0;

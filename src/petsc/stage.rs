@@ -1,15 +1,9 @@
 //! Stages of PETSc's log, which `-log_view` prints one by one.
 
+use super::Session;
 use super::library::{self, petsc};
-use super::{Int, Session};
+use super::table::text;
 use crate::error::Result;
-use std::cell::RefCell;
-use std::ffi::CString;
-
-thread_local! {
-    /// Stages by name, in the order in which they were first begun.
-    static STAGES: RefCell<Vec<(String, Int)>> = const { RefCell::new(Vec::new()) };
-}
 
 /// A stage, which lasts until this is dropped; the one around it goes on then.
 pub struct Stage {
@@ -35,16 +29,11 @@ impl Session {
 }
 
 fn begin(name: &str) -> Result<()> {
-    let known = STAGES.with_borrow(|stages| stages.iter().find(|stage| stage.0 == name).map(|stage| stage.1));
-    let stage = match known {
-        Some(stage) => stage,
-        None => {
-            let (mut stage, text) = (0, CString::new(name).unwrap_or_default());
-            petsc!(PetscLogStageRegister(text.as_ptr(), &mut stage))?;
-            STAGES.with_borrow_mut(|stages| stages.push((name.to_owned(), stage)));
-            stage
-        }
-    };
+    let (text, mut stage) = (text(name)?, -1);
+    petsc!(PetscLogStageGetId(text.as_ptr(), &mut stage))?;
+    if stage < 0 {
+        petsc!(PetscLogStageRegister(text.as_ptr(), &mut stage))?;
+    }
     petsc!(PetscLogStagePush(stage))
 }
 

@@ -9,9 +9,9 @@ use super::options::Chosen;
 use super::{Dense, Retained, SparseBody, memory};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
-use crate::linalg::{Csr, Slab, dot};
+use crate::linalg::{Csr, dot};
 use crate::model::{Body, BodyCounts, Energy, Matrices, Solved};
-use crate::petsc::{Schur, Session};
+use crate::petsc::{Rows, Schur, Session};
 use std::cell::RefCell;
 use std::time::Instant;
 
@@ -102,7 +102,7 @@ impl CondensedBody {
             lifting,
             carried: Vec::new(),
         };
-        let dense = move |stiffness: Slab| Ok(Dense::new(retained, stiffness.values));
+        let dense = |stiffness: Rows| Ok(Dense::new(stiffness));
         let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, dense, String::new());
         Ok(Condensed { kept: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
     }

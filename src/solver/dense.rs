@@ -3,7 +3,7 @@
 use super::InnerSolver;
 use crate::error::Result;
 use crate::model::Solved;
-use crate::petsc::{cholesky, cholesky_solve};
+use crate::petsc::{Rows, cholesky, cholesky_solve};
 
 /// G as a dense matrix, factored when it is first needed after a change.
 pub struct Dense {
@@ -17,8 +17,9 @@ pub struct Dense {
 }
 
 impl Dense {
-    /// Starts from all values of a symmetric matrix, row by row.
-    pub fn new(rows: usize, values: Vec<f64>) -> Self {
+    /// Starts from a symmetric matrix without holes.
+    pub fn new(matrix: Rows) -> Self {
+        let (rows, values) = (matrix.own().len(), matrix.into_values());
         Self { rows, factor: vec![0.0; values.len()], values, made: None, factorizations: 0 }
     }
 }

@@ -1,11 +1,10 @@
 //! Any PETSc KSP and PC as inner solver.
 
+use super::InnerSolver;
 use super::options::Chosen;
-use super::{InnerSolver, Multiply};
 use crate::error::Result;
-use crate::linalg::Slab;
 use crate::model::Solved;
-use crate::petsc::{Int, Ksp, Matrix, OwnedRows, Session};
+use crate::petsc::{Ksp, Matrix, Rows, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
 pub struct Krylov {
@@ -35,7 +34,7 @@ const WORN: f64 = 1.5;
 const FEW: usize = 12;
 
 impl Krylov {
-    /// Starts from G = K, with the options that were chosen; collective if K is shared. `near_null_space` are the
+    /// Starts from G = K, with the options that were chosen; collective if other ranks have rows of K. `near_null_space` are the
     /// rigid motions that algebraic multigrid (GAMG) wants to know, one entry a dof each.
     ///
     /// # Errors
@@ -44,18 +43,10 @@ impl Krylov {
         session: &Session,
         chosen: Chosen,
         dimension: usize,
-        stiffness: Slab,
+        stiffness: Rows,
         near_null_space: &[Vec<f64>],
     ) -> Result<Self> {
-        let Slab { first, total, is_shared, ptr, col, other_ptr, other_col, values } = stiffness;
-        let (row_ptr, columns) = (integers(ptr), integers(col));
-        let mut matrix = if is_shared {
-            let (other_row_ptr, other_columns) = (integers(other_ptr), integers(other_col));
-            let rows = OwnedRows { first, total, row_ptr, columns, other_row_ptr, other_columns, values };
-            Matrix::from_owned_rows(session, dimension, rows)?
-        } else {
-            Matrix::from_csr(session, dimension, row_ptr, columns, values)?
-        };
+        let mut matrix = Matrix::new(session, dimension, stiffness)?;
         matrix.set_spd()?;
         let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", chosen.prefix()))?;
         ksp.set_operator(&matrix)?;
@@ -71,28 +62,15 @@ impl Krylov {
         Ok(Self { session, chosen, matrix, ksp, free, changed, set_ups: 0, multigrid, keeps, stale, fresh: None })
     }
 
+    /// G, for products that leave it as it is.
+    pub fn matrix_mut(&mut self) -> &mut Matrix {
+        &mut self.matrix
+    }
+
     /// Some work of the solver that may read options: what the program chose is read by the set-up, but of the options of PETSc some are
     /// read in a solve (`-ksp_converged_reason`, all of a solver nested in another).
     fn with_options<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
         if self.chosen.has_typed() { self.chosen.lend(&self.session, work) } else { work() }
-    }
-}
-
-/// A pattern in PETSc's integers; where these have 32 bits, the array itself.
-#[allow(clippy::useless_conversion)]
-fn integers(part: Vec<i32>) -> Vec<Int> {
-    part.into_iter().map(Int::from).collect()
-}
-
-impl Multiply for Krylov {
-    fn multiply(
-        &mut self,
-        change: &mut dyn FnMut(&mut [f64]),
-        restore: &mut dyn FnMut(&mut [f64]),
-        x: &[f64],
-        y: &mut [f64],
-    ) -> Result<()> {
-        self.matrix.multiply_changed(change, restore, x, y)
     }
 }
 

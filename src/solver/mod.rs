@@ -26,21 +26,20 @@ pub use sparse::SparseBody;
 pub use split::Split;
 
 use crate::error::Result;
+use crate::linalg::Csr;
 use crate::model::Solved;
+use crate::petsc::{Int, Rows};
 
-/// A solver whose matrix can be multiplied with.
-pub trait Multiply: InnerSolver {
-    /// y = A x for the matrix A that `change` makes of G; `restore` makes G again, to the bit, so that no preconditioner is made anew.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    fn multiply(
-        &mut self,
-        change: &mut dyn FnMut(&mut [f64]),
-        restore: &mut dyn FnMut(&mut [f64]),
-        x: &[f64],
-        y: &mut [f64],
-    ) -> Result<()>;
+/// A whole matrix as PETSc's.
+fn rows(matrix: Csr) -> Result<Rows> {
+    let Csr { ptr, col, values, .. } = matrix;
+    Rows::all(integers(ptr), integers(col), values)
+}
+
+/// A pattern in PETSc's integers; where these have 32 bits, the array itself.
+#[allow(clippy::useless_conversion)]
+fn integers(part: Vec<i32>) -> Vec<Int> {
+    part.into_iter().map(Int::from).collect()
 }
 
 /// Owner of the matrix G with a way to solve G z = r.

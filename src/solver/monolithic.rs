@@ -4,12 +4,13 @@
 //! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Of bodies that are dealt out over ranks each
 //! rank has its rows; of bodies that live whole on several ranks, condensed ones, every rank has the matrix and solves for itself.
 
-use super::{InnerSolver, Multiply, RobinMatrix};
+use super::{InnerSolver, Krylov, RobinMatrix, integers};
 use crate::error::Result;
-use crate::linalg::{Csr, Slab, axpy, countable, dot};
+use crate::linalg::{Csr, axpy, countable, dot};
 use crate::model::linear::{Failure, LinearStep, Solution, Solved, System};
 use crate::model::{Body, BodyCounts, BodySlot, Field, Joint, Matrices, Model};
 use crate::parallel::share;
+use crate::petsc::Rows;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -23,11 +24,13 @@ use std::rc::Rc;
 /// it so. They carry no force, since the rows for a say that all forces are balanced without them.
 pub struct Union {
     /// Stiffness matrix of all bodies with these springs, with the pattern of B'B: the rows of this rank.
-    pub stiffness: Slab,
+    pub stiffness: Csr,
     /// One row a contact point, [B_a B_a R_a B_b B_b R_b]: all of them.
     pub rows: Csr,
     /// First entry here of each body's state, and the number of all.
     pub offset: Vec<usize>,
+    /// Number of the first row here, if other ranks have the others; columns are counted through all.
+    start: Option<usize>,
     /// b diag(K) b' of each row b.
     row_stiffness: Vec<f64>,
     /// Whether every rank has the whole matrix and some of the bodies.
@@ -41,8 +44,8 @@ impl Union {
     /// More entries than 32 bits can count.
     pub fn of(model: &Model) -> Result<Option<Self>> {
         if model.exchange.ranks() > 1 {
-            let Some(copies) = copies(model) else { return Ok(None) };
-            let union = Self::new(model, &copies.iter().map(Copy::matrices).collect::<Vec<_>>())?;
+            let Some(gathered) = gather(model) else { return Ok(None) };
+            let union = Self::new(model, &gathered.iter().map(Gathered::matrices).collect::<Vec<_>>())?;
             return Ok(Some(Self { is_redundant: true, ..union }));
         }
         let parts = matrices(model).collect::<Option<Vec<_>>>();
@@ -75,7 +78,8 @@ impl Union {
             offset.push(offset[offset.len() - 1] + part.len());
         }
         let n = offset[parts.len()];
-        let (first, total) = shared.map_or((0, n), |shared| (shared.start, shared.total));
+        let start = shared.map(|shared| shared.start);
+        let (first, total) = (start.unwrap_or(0), shared.map_or(n, |shared| shared.total));
         // the two rows of each contact point as (body, row of the body)
         let mut points = vec![[(0, 0); 2]; model.points()];
         for body in 0..parts.len() {
@@ -114,40 +118,27 @@ impl Union {
         stiffness.ptr.reserve_exact(n);
         stiffness.col.reserve_exact(room);
         stiffness.values.reserve_exact(room);
-        let mut entries: Vec<(i32, f64)> = Vec::new();
         for (body, (&begin, part)) in offset.iter().zip(parts).enumerate() {
             let (own, pins) = (part.stiffness, pins(part.motions));
+            // K of a body that is dealt out has the columns of the whole
+            let shift = if shared.is_some() { 0 } else { begin as i32 };
             for i in 0..part.len() {
                 let known = if i < own.rows() { own.range(i) } else { 0..0 };
-                let columns = own.col[known.clone()].iter();
-                let values = own.values[known].iter().copied();
-                entries.clear();
-                match distribution(body) {
-                    None => entries.extend(columns.map(|j| begin as i32 + j).zip(values)),
-                    Some(distribution) => {
-                        let (here, first) = (distribution.own.len(), distribution.first as i32);
-                        let number = |&j: &i32| match (j as usize).checked_sub(here) {
-                            None => first + j,
-                            Some(ghost) => distribution.ghosts[ghost],
-                        };
-                        entries.extend(columns.map(number).zip(values));
-                        entries.sort_unstable_by_key(|entry| entry.0);
-                    }
-                }
-                let mut known = entries.iter().copied().peekable();
+                let known = own.col[known.clone()].iter().map(|j| shift + j).zip(&own.values[known]);
+                let mut known = known.peekable();
                 // a rigid motion that no contact row feels has nothing but its diagonal
                 let (coupled, diagonal) = (coupled.remove(&(begin + i)), [(begin + i) as i32]);
                 for &j in coupled.as_deref().unwrap_or(if i < own.rows() { &[] } else { &diagonal }) {
                     while let Some((before, value)) = known.next_if(|entry| entry.0 < j) {
                         stiffness.col.push(before);
-                        stiffness.values.push(value);
+                        stiffness.values.push(*value);
                     }
                     stiffness.col.push(j);
-                    stiffness.values.push(known.next_if(|entry| entry.0 == j).map_or(0.0, |entry| entry.1));
+                    stiffness.values.push(known.next_if(|entry| entry.0 == j).map_or(0.0, |entry| *entry.1));
                 }
                 for (j, value) in known {
                     stiffness.col.push(j);
-                    stiffness.values.push(value);
+                    stiffness.values.push(*value);
                 }
                 stiffness.ptr.push(stiffness.col.len() as i32);
             }
@@ -163,8 +154,7 @@ impl Union {
         stiffness.values.shrink_to_fit();
         let (sides, points) = (model.row_stiffness(), model.points());
         let row_stiffness = (0..points).map(|q| sides[q] + sides[points + q]).collect();
-        let stiffness = if shared.is_some() { Slab::of_rows(stiffness, first) } else { Slab::from(stiffness) };
-        Ok(Self { stiffness, rows, offset, row_stiffness, is_redundant: false })
+        Ok(Self { stiffness, rows, offset, start, row_stiffness, is_redundant: false })
     }
 
     /// The same with all entries of K stored, row by row.
@@ -172,10 +162,9 @@ impl Union {
         let n = self.stiffness.rows();
         let mut values = vec![0.0; n * n];
         for i in 0..n {
-            let row = self.stiffness.ptr[i] as usize..self.stiffness.ptr[i + 1] as usize;
-            row.for_each(|k| values[i * n + self.stiffness.col[k] as usize] = self.stiffness.values[k]);
+            self.stiffness.row(i).for_each(|(j, value)| values[i * n + j] = value);
         }
-        self.stiffness = Csr::full(n, values).into();
+        self.stiffness = Csr::full(n, values);
         self
     }
 }
@@ -210,7 +199,7 @@ impl<S> Joined<S> {
     }
 }
 
-impl<S: Multiply> Joint for Joined<S> {
+impl Joint for Joined<Krylov> {
     fn multiply(&mut self, states: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let x = self.whole(states);
         let mut y = vec![0.0; x.len()];
@@ -232,14 +221,21 @@ impl<S: InnerSolver> Monolithic<S> {
     ///
     /// # Errors
     /// Those of `make`.
-    pub fn new(union: Union, make: impl FnOnce(Slab) -> Result<S>) -> Result<Self> {
-        let Union { stiffness, rows, offset, row_stiffness, is_redundant } = union;
+    pub fn new(union: Union, make: impl FnOnce(Rows) -> Result<S>) -> Result<Self> {
+        let Union { stiffness, rows, offset, start, row_stiffness, is_redundant } = union;
+        let stiffness = match start {
+            None => super::rows(stiffness)?,
+            Some(start) => {
+                let Csr { columns: total, ptr, col, values } = stiffness;
+                Rows::of_process(start, total, integers(ptr), integers(col), values)?
+            }
+        };
         let matrix = RobinMatrix::new(stiffness, &rows, row_stiffness, make)?;
         Ok(Self { joined: Rc::new(RefCell::new(Joined { matrix, rows, offset })), is_redundant })
     }
 }
 
-impl<S: Multiply + 'static> Monolithic<S> {
+impl Monolithic<Krylov> {
     /// K of all bodies, for a model whose bodies gave theirs away.
     pub fn joint(&self) -> Rc<RefCell<dyn Joint>> {
         self.joined.clone()
@@ -301,14 +297,14 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
 
 /// The matrices of a condensed body as every rank gets them: K without its values, which go apart.
 #[derive(Clone, Serialize, Deserialize)]
-struct Copy {
+struct Gathered {
     stiffness: Csr,
     rows: Csr,
     motions: Vec<Vec<f64>>,
     traces: Vec<Vec<f64>>,
 }
 
-impl Copy {
+impl Gathered {
     fn matrices(&self) -> Matrices<'_> {
         let Self { stiffness, rows, motions, traces } = self;
         Matrices { stiffness, rows, motions, traces }
@@ -321,17 +317,17 @@ fn matrices(model: &Model) -> impl Iterator<Item = Option<Matrices<'_>>> {
 }
 
 /// Gives every rank the matrices of all bodies, each of which lives on one; two messages. `None` if a body has none.
-fn copies(model: &Model) -> Option<Vec<Copy>> {
+fn gather(model: &Model) -> Option<Vec<Gathered>> {
     let here: Vec<Option<Matrices>> = matrices(model).collect();
     let mine = here.iter().map(|matrices| {
         let Matrices { stiffness, rows, motions, traces } = (*matrices)?;
         let stiffness = Csr { values: Vec::new(), ..stiffness.clone() };
-        Some(Copy { stiffness, rows: rows.clone(), motions: motions.to_vec(), traces: traces.to_vec() })
+        Some(Gathered { stiffness, rows: rows.clone(), motions: motions.to_vec(), traces: traces.to_vec() })
     });
-    let mine: Vec<Option<Copy>> = mine.collect();
+    let mine: Vec<Option<Gathered>> = mine.collect();
     let mut all = share(&*model.exchange, &mine);
     let of = |body: usize| all.iter_mut().find_map(|of_rank| of_rank.get_mut(body)?.take());
-    let mut copies: Vec<Copy> = (0..here.len()).map(of).collect::<Option<_>>()?;
+    let mut copies: Vec<Gathered> = (0..here.len()).map(of).collect::<Option<_>>()?;
     let mut values = Vec::new();
     for (copy, matrices) in copies.iter().zip(&here) {
         match matrices {

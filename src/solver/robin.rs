@@ -1,9 +1,10 @@
 //! The matrix of a linear system with springs at contact points, G = K + B' diag(d) B, and what solves it.
 
-use super::{InnerSolver, Multiply};
+use super::{InnerSolver, Krylov};
 use crate::error::Result;
-use crate::linalg::{Csr, Slab};
+use crate::linalg::Csr;
 use crate::model::{BodyCounts, Solved};
+use crate::petsc::Rows;
 use std::ops::Range;
 use std::time::Instant;
 
@@ -32,10 +33,10 @@ impl<S: InnerSolver> RobinMatrix<S> {
     /// # Errors
     /// Those of `make`.
     pub fn new(
-        stiffness: Slab,
+        stiffness: Rows,
         rows: &Csr,
         row_stiffness: Vec<f64>,
-        make: impl FnOnce(Slab) -> Result<S>,
+        make: impl FnOnce(Rows) -> Result<S>,
     ) -> Result<Self> {
         let weight = vec![0.0; rows.rows()];
         Ok(Self {
@@ -83,18 +84,6 @@ impl<S: InnerSolver> RobinMatrix<S> {
         done
     }
 
-    /// y = K x, by G with the springs taken out meanwhile.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    pub fn multiply_stiffness(&mut self, rows: &Csr, x: &[f64], y: &mut [f64]) -> Result<()>
-    where
-        S: Multiply,
-    {
-        let (coupling, weight) = (&self.coupling, &self.weight);
-        self.solver.multiply(&mut |g| coupling.reset(g), &mut |g| coupling.write(rows, weight, g), x, y)
-    }
-
     /// One solve, or one application of the preconditioner, counted and timed apart from the set-up it may need.
     ///
     /// # Errors
@@ -136,6 +125,18 @@ impl<S: InnerSolver> RobinMatrix<S> {
     }
 }
 
+impl RobinMatrix<Krylov> {
+    /// y = K x, by G with the springs taken out meanwhile.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn multiply_stiffness(&mut self, rows: &Csr, x: &[f64], y: &mut [f64]) -> Result<()> {
+        let (coupling, weight) = (&self.coupling, &self.weight);
+        let matrix = self.solver.matrix_mut();
+        matrix.multiply_changed(|g| coupling.reset(g), |g| coupling.write(rows, weight, g), x, y)
+    }
+}
+
 /// Where B' diag(d) B goes in the values of G.
 struct Coupling {
     /// Dofs of this rank.
@@ -149,8 +150,8 @@ struct Coupling {
 }
 
 impl Coupling {
-    fn new(stiffness: &Slab, rows: &Csr) -> Self {
-        let own = stiffness.first..stiffness.first + stiffness.rows();
+    fn new(stiffness: &Rows, rows: &Csr) -> Self {
+        let own = stiffness.own();
         let here = |q: usize| rows.row(q).map(|entry| entry.0).filter(|i| own.contains(i));
         let products = (0..rows.rows()).map(|q| here(q).count() * rows.range(q).len()).sum();
         let mut positions = Vec::with_capacity(products);
@@ -168,7 +169,7 @@ impl Coupling {
         touched.sort_unstable();
         touched.dedup();
         touched.shrink_to_fit();
-        let stiffness = touched.iter().map(|&at| stiffness.values[at as usize]).collect();
+        let stiffness = touched.iter().map(|&at| stiffness.values()[at as usize]).collect();
         Self { own, positions, touched, stiffness }
     }
 

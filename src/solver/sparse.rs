@@ -3,8 +3,9 @@
 use super::{InnerSolver, RobinMatrix, Split};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
-use crate::linalg::{Csr, Slab, dot};
+use crate::linalg::{Csr, dot};
 use crate::model::{Body, BodyCounts, Distribution, Energy, Matrices, Solved};
+use crate::petsc::Rows;
 use std::rc::Rc;
 
 /// A body with assembled K and f, its contact rows B, and a solver for G = K + B' diag(d) B.
@@ -14,7 +15,8 @@ pub struct SparseBody<S> {
     body: ElasticBody,
     rows: Csr,
     split: Split,
-    /// Where its dofs are dealt out over the ranks: how. K and B have the dofs of this rank then, K with columns for those that others have.
+    /// Where its dofs are dealt out over the ranks: how. K and B have the dofs of this rank then, K with the columns of the matrix of all
+    /// bodies.
     distribution: Option<Rc<Distribution>>,
     robin: Lazy<S>,
     /// Diagonal and sum of magnitudes of each row of K, if it was given away.
@@ -33,7 +35,7 @@ enum Lazy<S> {
 }
 
 /// Makes a solver of K.
-type Maker<S> = Box<dyn FnOnce(Slab) -> Result<S>>;
+type Maker<S> = Box<dyn FnOnce(Rows) -> Result<S>>;
 
 impl<S: InnerSolver> SparseBody<S> {
     /// Joins a body, its contact rows (columns: its dofs, none of them prescribed) and a solver that `make` makes of K, on a
@@ -42,7 +44,7 @@ impl<S: InnerSolver> SparseBody<S> {
         body: ElasticBody,
         rows: Csr,
         free: &[FreeMotion],
-        make: impl FnOnce(Slab) -> Result<S> + 'static,
+        make: impl FnOnce(Rows) -> Result<S> + 'static,
         words: String,
     ) -> Self {
         let robin = Lazy::Later { make: Some(Box::new(make)), words };
@@ -50,7 +52,8 @@ impl<S: InnerSolver> SparseBody<S> {
         Self { body, rows, split, distribution: None, robin, sizes: Vec::new() }
     }
 
-    /// The part of this rank of a body that has no solver of its own; `body` has the dofs of this rank, `rows` and `free` those of all.
+    /// The part of this rank of a body that has no solver of its own; `body` has the dofs of this rank ([`Distribution`]), `rows` and
+    /// `free` those of all.
     pub fn dealt_out(
         body: ElasticBody,
         rows: &Csr,
@@ -80,7 +83,7 @@ impl<S: InnerSolver> SparseBody<S> {
         {
             let stiffness = &self.body.stiffness;
             let row_stiffness = self.rows.quadratic_diagonal(stiffness);
-            let matrix = RobinMatrix::new(stiffness.clone().into(), &self.rows, row_stiffness, make)?;
+            let matrix = RobinMatrix::new(super::rows(stiffness.clone())?, &self.rows, row_stiffness, make)?;
             self.robin = Lazy::Now(Box::new(matrix));
         }
         match &mut self.robin {
@@ -161,7 +164,9 @@ impl<S: InnerSolver> Body for SparseBody<S> {
             return None;
         }
         let k = std::mem::replace(&mut self.body.stiffness, Csr::new(0));
-        let sizes = |i: usize| [k.diagonal(i), k.row(i).map(|(_, a)| a.abs()).sum()];
+        let first = self.distribution.as_ref().map_or(0, |distribution| distribution.first);
+        let diagonal = |i: usize| k.position(i, first + i).map_or(0.0, |at| k.values[at]);
+        let sizes = |i: usize| [diagonal(i), k.row(i).map(|(_, a)| a.abs()).sum()];
         self.sizes = (0..k.rows()).map(sizes).collect();
         Some(k)
     }

@@ -11,13 +11,11 @@ use std::f64::consts::PI;
 use std::ops::Range;
 use std::process::ExitCode;
 use winkler::error::{Error, Kind, Result};
-use winkler::petsc::{Int, Ksp, Matrix, OwnedRows, Scope, Session};
+use winkler::petsc::{Int, Ksp, Matrix, Rows, Scope, Session};
 
 /// Some rows of the matrix on `n` by `n` inner points, scaled by the squared spacing: 4 in the middle, -1 for neighbours.
 fn laplace(session: &Session, n: usize, own: Range<usize>) -> Result<Matrix> {
-    let mut rows = OwnedRows { first: own.start, total: n * n, row_ptr: vec![0], ..OwnedRows::default() };
-    let mut others = Vec::new();
-    rows.other_row_ptr.push(0);
+    let (mut row_ptr, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
     for row in own.clone() {
         let (i, j) = (row % n, row / n);
         let neighbours = [
@@ -28,19 +26,12 @@ fn laplace(session: &Session, n: usize, own: Range<usize>) -> Result<Matrix> {
             (j + 1 < n, row + n, -1.0),
         ];
         for (_, column, value) in neighbours.into_iter().filter(|(inside, ..)| *inside) {
-            if own.contains(&column) {
-                rows.columns.push((column - own.start) as Int);
-                rows.values.push(value);
-            } else {
-                rows.other_columns.push(column as Int);
-                others.push(value);
-            }
+            columns.push(column as Int);
+            values.push(value);
         }
-        rows.row_ptr.push(rows.columns.len() as Int);
-        rows.other_row_ptr.push(rows.other_columns.len() as Int);
+        row_ptr.push(columns.len() as Int);
     }
-    rows.values.append(&mut others);
-    let mut matrix = Matrix::from_owned_rows(session, 1, rows)?;
+    let mut matrix = Matrix::new(session, 1, Rows::of_process(own.start, n * n, row_ptr, columns, values)?)?;
     matrix.set_spd()?;
     Ok(matrix)
 }
