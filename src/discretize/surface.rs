@@ -84,6 +84,13 @@ impl ContactSurface {
         surface
     }
 
+    /// Kind of the facets, and the nodes of each that is paired.
+    pub fn facets(&self) -> (CellKind, impl Iterator<Item = Vec<[f64; 3]>> + '_) {
+        let nodes = self.connectivity.len() / self.cover.len().max(1);
+        let paired = self.connectivity.chunks_exact(nodes.max(1)).zip(&self.cover).filter(|(_, cover)| **cover > 0.0);
+        (self.cell, paired.map(|(nodes, _)| nodes.iter().map(|&node| self.points[node as usize]).collect()))
+    }
+
     /// The mesh with arrays of values at the contact points: name, components per point, values. Points of the mesh that no
     /// contact point serves get NaN; where values are extrapolated, they stay between those that they come from, so that
     /// a pressure is never negative nor above its peak.
