@@ -3,6 +3,8 @@
 mod common;
 
 use common::{Run, Scene, solve, solve_on, text_of, winkler};
+use serde_json::Value;
+use std::f64::consts::PI;
 use std::fs;
 use winkler::commands::checkpoint::settings_digest;
 use winkler::scene::load;
@@ -161,4 +163,99 @@ fn slips_in_data_are_pointed_at() {
         assert_eq!(run.code, 3, "{}", run.said());
         assert!(run.stderr.contains(words), "{words}: {}", run.said());
     }
+}
+
+/// What `check` says as JSON.
+fn checked(scene: &Scene, args: &[&str]) -> Value {
+    let run = winkler(&[&["check", &scene.path.display().to_string(), "--json"], args].concat());
+    assert_eq!(run.code, 0, "{}", run.said());
+    serde_json::from_str(&run.stdout).expect("JSON")
+}
+
+/// A wave of five facets: straight lines between its nodes leave out 1 - 4 (1 - cos t)/t^2 + (2 + cos t)/3 of its variance, t = 2 pi/5.
+#[test]
+fn what_the_mesh_cannot_follow_is_known() {
+    let text = text_of("patch").replace("layer =", "gap = \"1e-6*wave(x)\"\nlayer =");
+    let data = "[data.wave]\nfile = \"wave.csv\"\nspacing = 1.25e-3\noutside = \"periodic\"\ninterpolate = \"cubic\"\n";
+    let scene = Scene::new(text.replace("[[contact]]", &format!("{data}\n[[contact]]")));
+    let wave: String = (0..200).map(|k| format!("{}\n", (2.0 * PI * f64::from(k) / 200.0).cos())).collect();
+    fs::write(scene.path.parent().expect("a folder").join("wave.csv"), wave).expect("a file");
+    let found = checked(&scene, &["--set", "mesh.set={nl=20,nu=20}"]);
+    let number =
+        |path: &str| found.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {found:#}"));
+    let t = 2.0 * PI / 5.0;
+    let share = 1.0 - 4.0 * (1.0 - t.cos()) / (t * t) + (2.0 + t.cos()) / 3.0;
+    let near = |ours: f64, exact: f64, within: f64| assert!((ours / exact - 1.0).abs() < within, "{ours} {exact}");
+    near(number("/pairs/0/surface/gap_followed/variance_left_out"), share, 1e-2);
+    near(number("/pairs/0/surface/gap_followed/rms_height"), 1e-6 * 0.5_f64.sqrt(), 1e-3);
+    near(number("/pairs/0/surface/gap_followed/side"), 0.05, 1e-9);
+    near(number("/data/wave/rms_slope"), 8.0 * PI * 0.5_f64.sqrt(), 1e-3);
+    // ten facets a wave: nowhere a tenth of the height
+    let fine = checked(&scene, &["--set", "mesh.set={nl=80,nu=80}"]);
+    assert_eq!(fine.pointer("/pairs/0/surface/gap_followed/area_left_out").and_then(Value::as_f64), Some(0.0));
+    assert_eq!(number("/pairs/0/surface/gap_followed/area_left_out"), 1.0);
+    // nothing is drawn that nobody asked for
+    let folder = scene.path.parent().expect("a folder").join("pictures");
+    let run = winkler(&["check", &scene.path.display().to_string(), "-o", &folder.display().to_string()]);
+    assert!(run.stdout.contains("data wave: ") && run.stdout.contains("rms slope"), "{}", run.said());
+    let drawn: Vec<_> = fs::read_dir(&folder).expect("pictures").flatten().map(|file| file.file_name()).collect();
+    assert_eq!(drawn, ["data-wave.svg"]);
+    assert!(fs::read_to_string(folder.join("data-wave.svg")).expect("a picture").contains("</svg>"));
+}
+
+/// A layer of summits of one height is Hertz' law; those of data are counted by the program.
+#[test]
+fn layers_of_asperities() {
+    // 2 x 2 periods with one summit in each: cos x + cos y of amplitude 1e-3
+    let period = 0.1;
+    let (n, k) = (40, 2.0 * PI / period);
+    let wave = |i: usize| 1e-3 * (2.0 * PI * i as f64 / n as f64).cos();
+    let rows: String = (0..2 * n)
+        .map(|j| (0..2 * n).map(|i| (wave(i) + wave(j)).to_string()).collect::<Vec<_>>().join(" ") + "\n")
+        .collect();
+    let text = text_of("patch").replace(
+        "[[contact]]",
+        "[data.rough]\nfile = \"rough.txt\"\nspacing = 2.5e-3\noutside = \"periodic\"\n[[contact]]",
+    );
+    let scene = Scene::new(text);
+    fs::write(scene.path.parent().expect("a folder").join("rough.txt"), rows).expect("a file");
+    let set = ["--set", "contact.0.layer={asperities={data=\"rough\",modulus=1e5}}", "--set", "method={}"];
+    let table = solve(&scene, &set).converged().contact();
+    // curvature by differences
+    let half = PI / n as f64;
+    let radius = 1.0 / (1e-3 * (k * half.sin() / half).powi(2));
+    let stiffness = 4.0 / 3.0 * 1e5 * radius.sqrt() / (period * period);
+    for q in 0..table.rows() {
+        let exact = (table["pressure"][q] / stiffness).powf(2.0 / 3.0);
+        assert!((table["pressure"][q] / 10.0 - 1.0).abs() < 1e-6, "{}", table["pressure"][q]);
+        assert!((table["compression"][q] / exact - 1.0).abs() < 1e-4, "{} {exact}", table["compression"][q]);
+    }
+    // the same summits as numbers with hardly any spread, and what `check` says of them
+    let numbers = format!(
+        "contact.0.layer={{asperities={{density={},radius={radius},deviation=1e-9,modulus=1e5}}}}",
+        1.0 / (period * period)
+    );
+    let other = solve(&scene, &["--set", &numbers, "--set", "method={}"]).converged().contact();
+    let shift = other["compression"][0] - table["compression"][0];
+    assert!((shift / 4e-9 - 1.0).abs() < 0.05, "the highest is 4 deviations above the mean: {shift}");
+    let law = &checked(&scene, &set)["pairs"][0]["surface"]["law"];
+    assert_eq!(law.as_array().map(Vec::len), Some(8), "{law}");
+    for (layer, words) in [
+        ("{modulus=1e5}", "has no `deviation`"),
+        ("{data=\"rough\"}", "has no `modulus`"),
+        ("{data=\"ruogh\",modulus=1}", "did you mean `rough`?"),
+        ("{data=\"rough\",modulus=1,radius=2}", "has both `data` and `radius`"),
+        ("{data=\"rough\",modulus=-1}", "the modulus is -1"),
+        ("{density=1,radius=1,deviation=0,modulus=1}", "the deviation is 0"),
+        ("{density=1,radius=1,deviation=1,modulus=1,highest=-1}", "the highest summit is -1"),
+        ("{density=1,radius=1,deviation=1,modulus=1,hihgest=1}", "did you mean `highest`?"),
+        ("{density=\"x\",radius=1,deviation=1,modulus=1}", "expected a number"),
+        ("7", "expected a table"),
+    ] {
+        let run = solve(&scene, &["--set", &format!("contact.0.layer={{asperities={layer}}}")]);
+        assert_eq!(run.code, 3, "{}", run.said());
+        assert!(run.stderr.contains(words), "{words}: {}", run.said());
+    }
+    let flat = solve(&scene, &["--set", set[1], "--set", "data.rough.points=true"]);
+    assert!(flat.stderr.contains("80 numbers in a row"), "{}", flat.said());
 }

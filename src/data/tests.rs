@@ -250,7 +250,8 @@ fn roughness_of_waves_is_known() {
     let (a, n, period) = (0.3, 64, 2.0);
     let (spacing, k) = (period / n as f64, 2.0 * std::f64::consts::PI / period);
     let axis = |_| grid::Axis { origin: 0.0, spacing, count: 2 * n };
-    let wave = |at: usize| a * ((k * spacing * (at % (2 * n)) as f64).cos() + (k * spacing * (at / (2 * n)) as f64).cos());
+    let wave =
+        |at: usize| a * ((k * spacing * (at % (2 * n)) as f64).cos() + (k * spacing * (at / (2 * n)) as f64).cos());
     let values = (0..4 * n * n).map(wave).collect();
     let (interpolation, outside) = (Interpolation::Linear, Outside::Periodic);
     let surface = Grid { axes: [0, 1].map(axis), values, interpolation, outside };
