@@ -99,7 +99,7 @@ fn border(mut edge: Edge, place: [f64; 2]) -> Sample {
     let mut t = share(edge);
     let is_behind = t > 1.0;
     // at a corner the nearest place is beyond the end of one edge and before the start of the next
-    while t < 0.0 || t > 1.0 {
+    while !(0.0..=1.0).contains(&t) {
         let next = if is_behind { edge.next() } else { edge.prev() };
         let beyond = share(next);
         let is_corner = if is_behind { beyond < 0.0 } else { beyond > 1.0 };

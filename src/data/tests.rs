@@ -224,7 +224,8 @@ fn bad_files_are_refused_with_their_line() {
         assert_eq!(crate::error::caret(&error), "\"heights\"");
         error.message().to_owned()
     };
-    let cases: [(&str, &dyn Fn(&mut DataSpec), &str); 12] = [
+    type Case<'a> = (&'a str, &'a dyn Fn(&mut DataSpec), &'a str);
+    let cases: [Case; 12] = [
         ("", &|_| (), "has no numbers"),
         ("a,b\nc,d\n", &|_| (), "has no numbers"),
         ("7", &|_| (), "has one number"),

@@ -33,7 +33,7 @@ impl Asperities {
         // a single summit, or many of one height, are followed as far as they are wide
         let end = if end > 0.0 { end } else { spec.radius };
         let step = end / STEPS;
-        let next = |c: &f64| Some(c + step.min(SHARE * c)).filter(|c| *c <= end);
+        let next = |c: &f64| (*c < end).then(|| c + step.min(SHARE * c));
         let places = std::iter::successors(Some(LEAST * step), next);
         let stiffness = spec.modulus * spec.radius.sqrt() * spec.density;
         let point = |c: f64| {
