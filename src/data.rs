@@ -10,13 +10,14 @@ mod knots;
 mod npy;
 mod read;
 mod roughness;
+mod rows;
 mod rule;
 mod scattered;
 #[cfg(test)]
 mod tests;
 mod text;
 
-pub use function::{Data, DataSpec, Library};
+pub use function::{Data, Library};
 pub use grid::Grid;
 pub use roughness::{Roughness, Summits};
-pub use rule::{Interpolation, Outside, Sample};
+pub use rule::{DataSpec, Interpolation, Outside, Sample};

@@ -4,39 +4,21 @@ mod dual;
 mod grammar;
 mod operators;
 mod program;
+mod scope;
 mod slip;
 #[cfg(test)]
 mod tests;
 mod token;
 
 pub use dual::Differentiable;
+pub use scope::Scope;
 
 use crate::data::{Data, Library};
 use crate::error::{Error, Place, Result};
-use program::{Code, Number, Program};
+use program::{Code, MOST_VARIABLES, Number, Program, Values};
 use slip::Slip;
 use std::fmt;
 use std::sync::Arc;
-
-/// What the words of an expression can mean besides the common functions.
-#[derive(Clone, Copy)]
-pub struct Scope<'a> {
-    /// Names of the variables, at most four.
-    pub variables: &'a [&'static str],
-    /// Functions from files.
-    pub data: &'a Library,
-}
-
-impl<'a> Scope<'a> {
-    /// Variables alone.
-    pub fn of(variables: &'a [&'static str]) -> Self {
-        static NONE: Library = Library::new();
-        Self { variables, data: &NONE }
-    }
-}
-
-/// Values of the variables.
-type Values<T> = [T; MOST_VARIABLES];
 
 /// An expression such as `5e-4 * max(0, 1 - (x - 4)^2)^1.5`, parsed once and cheap to clone.
 ///
@@ -54,8 +36,6 @@ pub struct Expression {
 
 /// What a [`Field`] can depend on, in the order of its values.
 const COORDINATES: [&str; 4] = ["x", "y", "z", "k"];
-/// Most variables that an expression can use at once.
-const MOST_VARIABLES: usize = 4;
 
 impl Expression {
     /// Parses `text`, which stands at `place` (with or without the quotes of a TOML string). Refuses what the scope has not, pointing at

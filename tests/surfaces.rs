@@ -193,7 +193,8 @@ fn what_the_mesh_cannot_follow_is_known() {
     // ten facets a wave: nowhere a tenth of the height
     let fine = checked(&scene, &["--set", "mesh.set={nl=80,nu=80}"]);
     assert_eq!(fine.pointer("/pairs/0/surface/gap_followed/area_left_out").and_then(Value::as_f64), Some(0.0));
-    assert_eq!(number("/pairs/0/surface/gap_followed/area_left_out"), 1.0);
+    // of five facets two are around the wave's zeros, where it is nearly straight
+    near(number("/pairs/0/surface/gap_followed/area_left_out"), 0.6, 1e-9);
     // nothing is drawn that nobody asked for
     let folder = scene.path.parent().expect("a folder").join("pictures");
     let run = winkler(&["check", &scene.path.display().to_string(), "-o", &folder.display().to_string()]);

@@ -1,10 +1,9 @@
 //! From numbers in rows to a function of one place or two.
 
-use super::function::DataSpec;
 use super::grid::{Axis, Grid};
 use super::knots::Knots;
-use super::read::{Fault, Rows};
-use super::rule::{Interpolation, Outside};
+use super::rows::{Fault, Rows};
+use super::rule::{DataSpec, Interpolation, Outside};
 use super::scattered::Scattered;
 
 /// A function of a place.

@@ -3,37 +3,13 @@
 use super::arrange::{self, Shape};
 use super::grid::Grid;
 use super::read;
-use super::rule::{Interpolation, Outside, Sample};
+use super::rule::{DataSpec, Outside, Sample};
 use crate::error::{Error, Place, Result, shown};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 /// The data of a scene by name.
 pub type Library = BTreeMap<String, Arc<Data>>;
-
-/// What a scene says of a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DataSpec {
-    /// Name of the function.
-    pub name: String,
-    /// The file.
-    pub file: PathBuf,
-    /// Where it is named.
-    pub place: Place,
-    /// Whether each row is a place and a height, not a line of heights.
-    pub points: bool,
-    /// Place of the first height, or of the coordinates' origin.
-    pub origin: [f64; 2],
-    /// Distance of heights along a row and down the rows, or the length of one unit of the coordinates.
-    pub spacing: [f64; 2],
-    /// What a height of 1 in the file is.
-    pub unit: f64,
-    /// What is between the points.
-    pub interpolation: Interpolation,
-    /// What is beyond them.
-    pub outside: Outside,
-}
 
 /// A function given by a file, which is read when it is first asked for.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! Arrays of NumPy: `.npy`.
 
-use super::read::{Fault, Rows};
+use super::rows::{Fault, Rows};
 use npyz::{DType, Deserialize, NpyFile, NpyHeader, Order, TypeChar};
 
 const HELP: &str = "save the heights as they come from NumPy: np.save(\"surface.npy\", heights)";

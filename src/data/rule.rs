@@ -1,5 +1,8 @@
 //! What is asked of data, and what comes back.
 
+use crate::error::Place;
+use std::path::PathBuf;
+
 /// How values between the points are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Interpolation {
@@ -43,4 +46,27 @@ pub struct Sample {
 impl Sample {
     /// Where there is no value.
     pub const NONE: Self = Self { value: f64::NAN, gradient: [f64::NAN; 2] };
+}
+
+/// What a scene says of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DataSpec {
+    /// Name of the function.
+    pub name: String,
+    /// The file.
+    pub file: PathBuf,
+    /// Where it is named.
+    pub place: Place,
+    /// Whether each row is a place and a height, not a line of heights.
+    pub points: bool,
+    /// Place of the first height, or of the coordinates' origin.
+    pub origin: [f64; 2],
+    /// Distance of heights along a row and down the rows, or the length of one unit of the coordinates.
+    pub spacing: [f64; 2],
+    /// What a height of 1 in the file is.
+    pub unit: f64,
+    /// What is between the points.
+    pub interpolation: Interpolation,
+    /// What is beyond them.
+    pub outside: Outside,
 }

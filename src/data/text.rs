@@ -4,7 +4,7 @@
 //! alone: the first line). With the first two a decimal comma is read, too. Lines that begin with `#`, and lines before the first number,
 //! are skipped.
 
-use super::read::{Fault, Rows};
+use super::rows::{Fault, Rows};
 
 /// Reads a text.
 pub fn rows(bytes: &[u8]) -> Result<Rows, Fault> {

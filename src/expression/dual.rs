@@ -1,8 +1,9 @@
 //! Exact derivatives of expressions: the same text, evaluated on pairs of a value and its slope.
 
+use super::Expression;
 use super::operators::{and, compare, not, or, sign};
 use super::program::{Number, Program};
-use super::{Expression, Scope};
+use super::scope::Scope;
 use crate::data::Data;
 use crate::error::{Place, Result};
 use std::fmt;
@@ -161,6 +162,7 @@ impl fmt::Debug for Differentiable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::{DataSpec, Interpolation, Library, Outside};
     use crate::error::Source;
     use crate::expression::operators;
 
@@ -194,6 +196,43 @@ mod tests {
                     (slope - difference).abs() < 1e-7 * (1.0 + slope.abs()) + 1e-9 / c,
                     "{text} at {c}, {x}: {slope} {difference}"
                 );
+            }
+        }
+    }
+
+    /// Of data by the chain rule, whatever their places depend on.
+    #[test]
+    fn derivatives_of_data_agree_with_differences() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("heights.csv");
+        std::fs::write(&file, "1,3,2,7\n4,1,5,2\n0,2,6,3\n1,1,4,8\n").unwrap();
+        let source = Source { name: "scene.toml".into(), text: "\"f(c*x, 1 + x - 0.5*c)^2 + c*f(1, c)\"".into() };
+        let place = Place { span: 0..source.text.len(), source: Arc::new(source) };
+        let spec = DataSpec {
+            name: "f".into(),
+            file,
+            place: place.clone(),
+            points: false,
+            origin: [0.0; 2],
+            spacing: [0.5, 0.8],
+            unit: 1.0,
+            interpolation: Interpolation::Cubic,
+            outside: Outside::Error,
+        };
+        let library = Library::from([("f".to_owned(), Arc::new(Data::new(spec)))]);
+        let text = "f(c*x, 1 + x - 0.5*c)^2 + c*f(1, c)";
+        let law = Differentiable::parse(text, &place, Scope { variables: &["c", "x"], data: &library }).unwrap();
+        for values in [[0.7, 1.1], [1.2, 0.3]] {
+            for variable in 0..2 {
+                let (value, slope) = law.eval_by(variable, &values);
+                let h = 1e-6;
+                let [low, high] = [-h, h].map(|h| {
+                    let mut moved = values;
+                    moved[variable] += h;
+                    law.plain().eval(&moved)
+                });
+                assert_eq!(value, law.plain().eval(&values));
+                assert!((slope - (high - low) / (2.0 * h)).abs() < 1e-7 * (1.0 + slope.abs()), "{values:?}: {slope}");
             }
         }
     }

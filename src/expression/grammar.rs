@@ -2,9 +2,9 @@
 //!
 //! The steps come out in postfix order as the words are read, so that a long text costs no more than its length.
 
-use super::Scope;
 use super::operators::{self, BINARY, COMPARISON, INFIX, POWER, SIGN, UNARY};
 use super::program::Code;
+use super::scope::Scope;
 use super::slip::Slip;
 use super::token::{self, Token};
 use crate::data::Data;

@@ -1,8 +1,13 @@
 //! Expressions as programs for a stack of numbers: a loop over their steps, however long or deep the text is.
 
-use super::Values;
 use crate::data::Data;
 use std::sync::Arc;
+
+/// Most variables that an expression can use at once.
+pub(super) const MOST_VARIABLES: usize = 4;
+
+/// Values of the variables.
+pub(super) type Values<T> = [T; MOST_VARIABLES];
 
 /// A step of an expression in postfix order, for any kind of number.
 #[derive(Debug, Clone)]

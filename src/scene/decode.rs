@@ -39,8 +39,8 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     let dimension = dimension(&keys)?;
     let plane = plane(&keys, dimension.value)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let data = data::library(keys.get("data"), folder)?;
-    let decoder = Decoder { dimension: dimension.value, plane, folder, data };
+    let mut decoder = Decoder { dimension: dimension.value, plane, folder, data: Library::new() };
+    decoder.data = decoder.library(keys.get("data"))?;
     let title = match keys.get("title") {
         Some(node) => node.string()?.to_owned(),
         None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),

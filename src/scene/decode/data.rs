@@ -1,6 +1,6 @@
 //! `[data.NAME]`: files whose numbers are functions for expressions.
 
-use super::{choose, file};
+use super::{Decoder, choose, file};
 use crate::data::{Data, DataSpec, Interpolation, Library, Outside};
 use crate::error::{Error, Result};
 use crate::expression::names;
@@ -8,17 +8,19 @@ use crate::scene::read::{Entry, Keys, Node, Value};
 use std::path::Path;
 use std::sync::Arc;
 
-/// The data of a scene. Files are looked for, not read.
-pub(super) fn library(node: Option<&Node>, folder: &Path) -> Result<Library> {
-    const EXAMPLE: &str = "write [data.rough] and below it file = \"surface.csv\"";
-    let Some(node) = node else { return Ok(Library::new()) };
-    let Value::Table(entries) = &node.value else { return Err(node.expected("a table").help(EXAMPLE)) };
-    if let Some(Entry { key, key_place, .. }) =
-        entries.iter().find(|entry| !matches!(entry.node.value, Value::Table(_)))
-    {
-        return Err(Error::scene(key_place, format!("`{key}` in data without a name")).help(EXAMPLE));
+impl Decoder<'_> {
+    /// The data of a scene. Files are looked for, not read.
+    pub(super) fn library(&self, node: Option<&Node>) -> Result<Library> {
+        const EXAMPLE: &str = "write [data.rough] and below it file = \"surface.csv\"";
+        let Some(node) = node else { return Ok(Library::new()) };
+        let Value::Table(entries) = &node.value else { return Err(node.expected("a table").help(EXAMPLE)) };
+        if let Some(Entry { key, key_place, .. }) =
+            entries.iter().find(|entry| !matches!(entry.node.value, Value::Table(_)))
+        {
+            return Err(Error::scene(key_place, format!("`{key}` in data without a name")).help(EXAMPLE));
+        }
+        entries.iter().map(|entry| Ok((entry.key.clone(), Arc::new(Data::new(spec(entry, self.folder)?))))).collect()
     }
-    entries.iter().map(|entry| Ok((entry.key.clone(), Arc::new(Data::new(spec(entry, folder)?))))).collect()
 }
 
 fn spec(entry: &Entry, folder: &Path) -> Result<DataSpec> {
