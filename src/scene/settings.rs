@@ -26,6 +26,7 @@ impl Scene {
             let plane = Plane::ALL.iter().find(|(_, plane)| *plane == self.plane).map(|(name, _)| *name);
             settings.insert("plane".into(), json!(plane));
         }
+        insert(&mut settings, "units", self.units.as_ref().map(|units| json!(units.text())));
         settings.insert("mesh".into(), mesh(&self.mesh));
         let dimension = self.dimension.value;
         settings.insert("body".into(), self.bodies.iter().map(|item| body(item, dimension)).collect());
