@@ -1,7 +1,7 @@
 //! Any PETSc KSP and PC as inner solver.
 
+use super::InnerSolver;
 use super::options::Chosen;
-use super::{InnerSolver, preset};
 use crate::error::Result;
 use crate::fem::Interpolation;
 use crate::linalg::Csr;
@@ -169,6 +169,8 @@ impl InnerSolver for Krylov {
     }
 
     fn describe(&self) -> String {
-        preset::in_words(&self.chosen)
+        let coarse = || self.chosen.get("mg_coarse_pc_type").map(str::to_owned);
+        let inside = self.ksp.factor_package().or_else(coarse).map_or(String::new(), |name| format!(" by {name}"));
+        format!("{} + {}{inside}", self.ksp.ksp_type(), self.ksp.pc_type())
     }
 }
