@@ -126,7 +126,7 @@ impl Checkpoint {
 
     fn other(&self, what: &str) -> Error {
         Error::new(Kind::Scene, format!("{} is of another {what}", self.path.display())).help(
-            "a run goes on with the scene and the overrides that it began with; only `title`, `[output]` and \
+            "a run goes on with the scene and the overrides that it began with; only `title`, `units`, `[output]` and \
                    `method.stop` may change. Or begin anew, without `--restart`",
         )
     }
@@ -217,7 +217,7 @@ fn from_numbers(numbers: &[f64]) -> Option<Row> {
 /// when it ends.
 pub fn settings_digest(scene: &Scene) -> String {
     let mut settings = scene.settings();
-    ["scene", "title", "output"].iter().for_each(|key| settings[*key] = Value::Null);
+    ["scene", "title", "units", "output"].iter().for_each(|key| settings[*key] = Value::Null);
     settings["method"]["stop"] = Value::Null;
     if let Some(mesh) = settings["mesh"].as_object_mut() {
         ["geo", "msh", "timeout", "memory"].iter().for_each(|key| drop(mesh.remove(*key)));

@@ -9,11 +9,9 @@ pub mod folder;
 mod format;
 pub mod history;
 mod largest;
-mod look;
 pub mod plot;
 pub mod report;
 pub mod table;
-mod ticks;
 pub mod vtu;
 
 /// Prints a line to standard output. A reader that has gone is no reason to stop.
@@ -40,7 +38,7 @@ pub use contacts::PairRow;
 pub use folder::{Folder, safe_name, write_whole};
 pub use format::{sci, seconds};
 pub use history::HistoryWriter;
-pub use plot::{Axis, Color, ConvergenceSeries, Plot, PressureSeries, Series, Style};
+pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
     PairReport, Report, RoundReport, StepPairReport, StepReport, busiest,

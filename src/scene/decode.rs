@@ -15,6 +15,7 @@ use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::pattern::Pattern;
 use crate::problem::solver::{Preset, SolverSpec};
+use crate::problem::units::Units;
 use crate::scene::{AdaptSpec, OutputSpec, Scene};
 use std::path::{Path, PathBuf};
 
@@ -24,6 +25,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         "title",
         "dimension",
         "plane",
+        "units",
         "mesh",
         "data",
         "body",
@@ -45,6 +47,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         Some(node) => node.string()?.to_owned(),
         None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
     };
+    let units = keys.get("units").map(units).transpose()?;
     let (contacts, auto) = decoder.contacts(&keys)?;
     let method = decoder.method(keys.get("method"))?;
     if let (Some(adapt), false) = (keys.get("adapt"), method.steps.is_empty()) {
@@ -55,6 +58,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     Ok(Scene {
         path: path.to_owned(),
         title,
+        units,
         plane,
         mesh: decoder.mesh(keys.require("mesh")?, trust(tree, &keys)?)?,
         bodies: decoder.bodies(&keys)?,
@@ -68,6 +72,10 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         output: output(keys.get("output"))?,
         dimension,
     })
+}
+
+fn units(node: &Node) -> Result<Units> {
+    Units::parse(node.string()?).map_err(|(message, advice)| node.refuse(message).help(advice))
 }
 
 /// What the meaning of values depends on.

@@ -27,6 +27,7 @@ impl Scene {
             let plane = Plane::ALL.iter().find(|(_, plane)| *plane == self.plane).map(|(name, _)| *name);
             settings.insert("plane".into(), json!(plane));
         }
+        insert(&mut settings, "units", self.units.as_ref().map(|units| json!(units.text())));
         settings.insert("mesh".into(), mesh(&self.mesh));
         let data: Map<_, _> = self.data.values().map(|data| (data.spec.name.clone(), function(&data.spec))).collect();
         insert(&mut settings, "data", (!data.is_empty()).then(|| data.into()));

@@ -8,6 +8,7 @@ use crate::problem::elasticity::Plane;
 use crate::problem::mesh::MeshSource;
 use crate::problem::method::MethodSpec;
 use crate::problem::solver::SolverSpec;
+use crate::problem::units::Units;
 use std::path::PathBuf;
 
 /// A checked scene.
@@ -21,6 +22,8 @@ pub struct Scene {
     pub dimension: Located<usize>,
     /// Plane strain (default), plane stress or bodies of revolution; plane problems only.
     pub plane: Plane,
+    /// Units of its numbers, if it names them: words for labels.
+    pub units: Option<Units>,
     /// Where the mesh comes from.
     pub mesh: MeshSource,
     /// Functions from files, by name; those that no expression uses are not read.
