@@ -1,6 +1,6 @@
 //! The command line: words -> request -> command -> exit code.
 
-use crate::commands::{bench, check, mesh, solve, sweep};
+use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::say;
@@ -8,10 +8,12 @@ use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::report;
 use crate::solver::options;
+use anstream::{AutoStream, ColorChoice};
 use clap::error::ContextKind;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
 use std::ffi::OsString;
-use std::io::{ErrorKind, IsTerminal};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition on PETSc.
@@ -21,6 +23,8 @@ use std::path::{Path, PathBuf};
 #[derive(Parser)]
 #[command(name = "winkler", version, after_help = EXIT_CODES)]
 struct Cli {
+    #[command(flatten)]
+    color: colorchoice_clap::Color,
     #[command(subcommand)]
     command: Command,
 }
@@ -65,6 +69,27 @@ enum Command {
         /// File to write [default: WHAT.svg in the folder]
         #[arg(short, value_name = "FILE")]
         output: Option<PathBuf>,
+    },
+    /// Write a small scene that works, with its script and comments, to begin from
+    New {
+        /// Folder for it; its last word names the scene
+        #[arg(value_name = "NAME")]
+        folder: PathBuf,
+        /// Two blocks in space instead of the plane
+        #[arg(long)]
+        space: bool,
+    },
+    /// Print a script that completes commands and options in a shell
+    Completions {
+        /// bash, zsh, fish, elvish or powershell
+        #[arg(value_name = "SHELL")]
+        shell: Shell,
+    },
+    /// Write man pages, one a command
+    Man {
+        /// Folder for them
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
     },
 }
 
@@ -300,7 +325,14 @@ pub fn run(words: Vec<OsString>) -> i32 {
         Ok(interrupt) => interrupt,
         Err(error) => return complain(&error),
     };
+    cli.color.write_global();
     let alone = match cli.command {
+        Command::New { folder, space } => new::new(&folder, space),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "winkler", &mut std::io::stdout());
+            Ok(0)
+        }
+        Command::Man { folder } => manual(&folder),
         Command::Bench(arguments) => bench::bench(&interrupt, &arguments.request(petsc)),
         Command::Mesh { scene, output, json } => {
             let (scene, overrides) = (scene.scene.clone(), scene.overrides());
@@ -317,6 +349,13 @@ pub fn run(words: Vec<OsString>) -> i32 {
         Command::Solving(command) => return with_session(&petsc, &interrupt, command),
     };
     alone.unwrap_or_else(|error| complain(&error))
+}
+
+/// Writes a man page of the program and one of each command.
+fn manual(folder: &Path) -> Result<i32> {
+    let wrong = |cause: std::io::Error| Error::file(folder, "write man pages to", &cause);
+    std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder)).map_err(wrong)?;
+    Ok(0)
 }
 
 /// Runs a command that solves.
@@ -370,7 +409,9 @@ fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Resul
 }
 
 fn complain(error: &Error) -> i32 {
-    eprintln!("{}", error.render(std::io::stderr().is_terminal()));
+    // NO_COLOR, CLICOLOR_FORCE and `--color` decide, and else whether this is a terminal
+    let color = AutoStream::choice(&std::io::stderr()) != ColorChoice::Never;
+    eprintln!("{}", error.render(color));
     if error.kind() == Kind::Usage {
         eprintln!("`winkler --help` shows the command line");
     }

@@ -95,7 +95,7 @@ fn a_plane_run_has_a_page_of_its_own() {
     assert!(command.contains("solve") && command.contains("mesh.set.n=4"));
     // both bodies in two pictures, from the first colour to the last
     assert_eq!(page.matches("<title>upper</title>").count(), 2);
-    assert!(page.contains("fill=\"#440154\" d=\"M") && page.contains("fill=\"#fde725\" d=\"M"), "all colours");
+    assert!(page.contains("fill=\"#440154\" d=\"M") && page.contains("fill=\"#fee825\" d=\"M"), "all colours");
     assert!(run.report["memory"]["iterate"].as_f64().expect("memory") > 1.0);
     if let Some(dom) = opened(&run.folder.join("report.html")) {
         assert!(dom.contains("Run it again"));

@@ -13,6 +13,8 @@ pub mod inner;
 pub mod keep;
 pub mod mesh;
 pub mod method;
+pub mod new;
+mod plan;
 pub mod preflight;
 pub mod report;
 pub mod results;

@@ -95,7 +95,8 @@ fn build_in<const D: usize>(
     warnings.extend(inner.applied_once());
     let (linear, whole) = (inner.linear(), inner.whole().clone());
     let (choice, condensed) = (inner.reason(), inner.condensed());
-    Ok(Built { scene, discrete, linear, whole, choice, condensed, warnings })
+    let interpolation = inner.interpolation();
+    Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, warnings })
 }
 
 /// PETSc options of the scene, weaker than typed ones.

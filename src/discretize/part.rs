@@ -7,6 +7,7 @@ use super::supports::Held;
 use crate::contact;
 use crate::error::{Error, Result};
 use crate::fem::assemble::{self, NodalBlock};
+use crate::fem::interpolation::{Interpolation, coarse_nodes, from_vertices};
 use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
 use crate::linalg::{Csr, countable, dot};
@@ -182,6 +183,16 @@ impl<'a, const D: usize> Part<'a, D> {
             .filter(|nodes| nodes.len() > 1)
             .collect();
         NodeGraph::new(&self.space, &coupled, &self.held.frame)
+    }
+
+    /// The nodes that linear displacements have, sorted.
+    pub fn coarse_nodes(&self) -> Vec<u32> {
+        coarse_nodes(&self.space, &self.held.frame)
+    }
+
+    /// Interpolation of the dofs from those at these nodes.
+    pub fn interpolation(&self, coarse: &[u32]) -> Interpolation {
+        from_vertices(&self.space, &self.held.frame, |dof| self.held.prescribed.contains_key(&dof), coarse)
     }
 
     /// K on its graph, f and supports; `carried` is the rigid motion that was taken out of `prescribed`, if any. The graph may have the
