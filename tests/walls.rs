@@ -16,6 +16,7 @@ const ROOMS: [&str; 22] = [
     "interrupt",
     "linalg",
     "petsc",
+    "data",
     "expression",
     "problem",
     "mesh",
