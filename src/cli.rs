@@ -3,8 +3,10 @@
 use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
+use crate::output::say;
 use crate::parallel::agree;
 use crate::petsc::Session;
+use crate::report;
 use crate::solver::options;
 use anstream::{AutoStream, ColorChoice};
 use clap::error::ContextKind;
@@ -47,6 +49,27 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Write a page with pictures and tables of a run, from its files alone: one HTML file
+    Report {
+        /// Folder of results
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        /// File to write [default: report.html in the folder]
+        #[arg(short, value_name = "FILE")]
+        output: Option<PathBuf>,
+    },
+    /// Draw one picture of a run as SVG
+    Plot {
+        /// Folder of results
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        /// What to draw: stress, displacement, pressure or convergence
+        #[arg(value_name = "WHAT")]
+        what: String,
+        /// File to write [default: WHAT.svg in the folder]
+        #[arg(short, value_name = "FILE")]
+        output: Option<PathBuf>,
+    },
     /// Write a small scene that works, with its script and comments, to begin from
     New {
         /// Folder for it; its last word names the scene
@@ -83,6 +106,9 @@ enum Solving {
         /// Write displacements and stresses of the bodies for ParaView (short for --set output.vtu=true)
         #[arg(long)]
         vtu: bool,
+        /// Write a page with pictures and tables of the run, report.html (short for --set output.report=true)
+        #[arg(long)]
+        report: bool,
         /// Minutes between checkpoints (short for --set output.checkpoint=T)
         #[arg(long, value_name = "T", allow_hyphen_values = true)]
         checkpoint: Option<String>,
@@ -240,7 +266,8 @@ impl SceneArgs {
 }
 
 /// Flags of the program that begin with two dashes: with one they look like PETSc's.
-const TWO_DASHES: [&str; 15] = [
+const TWO_DASHES: [&str; 16] = [
+    "-report",
     "-trust-geo",
     "-set",
     "-json",
@@ -314,6 +341,14 @@ pub fn run(words: Vec<OsString>) -> i32 {
             let (scene, overrides) = (scene.scene.clone(), scene.overrides());
             mesh::mesh(&interrupt, &mesh::Request { scene, overrides, output, json })
         }
+        Command::Report { folder, output } => report::save(&folder, output.as_deref()).and_then(|path| {
+            say(path.display())?;
+            Ok(0)
+        }),
+        Command::Plot { folder, what, output } => report::draw(&folder, &what, output.as_deref()).and_then(|paths| {
+            paths.iter().try_for_each(|path| say(path.display()))?;
+            Ok(0)
+        }),
         Command::Solving(command) => return with_session(&petsc, &interrupt, command),
     };
     alone.unwrap_or_else(|error| complain(&error))
@@ -353,9 +388,10 @@ fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i3
 
 fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Result<i32> {
     match command {
-        Solving::Solve { scene, output, vtu, checkpoint, restart } => {
+        Solving::Solve { scene, output, vtu, report, checkpoint, restart } => {
             let mut overrides = scene.overrides();
             overrides.extend(vtu.then(|| "--vtu".to_owned()));
+            overrides.extend(report.then(|| "--report".to_owned()));
             overrides.extend(checkpoint.map(|minutes| format!("--checkpoint {minutes}")));
             let request = solve::Request { scene: scene.scene, folder: output, restart, overrides, json: scene.json };
             solve::solve(session, interrupt, request)

@@ -28,5 +28,6 @@ pub mod parallel;
 #[allow(unsafe_code)]
 pub mod petsc;
 pub mod problem;
+pub mod report;
 pub mod scene;
 pub mod solver;

@@ -148,10 +148,23 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
             })
             .collect(),
         times: clock.times.clone(),
+        memory: clock.memory.clone(),
+        command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect(),
+        directory: std::env::current_dir().map_or(String::new(), |path| path.display().to_string()),
+        petsc_options: petsc_options(session),
         warnings: built.warnings.clone(),
         settings: scene.settings(),
         ..Report::default()
     }
+}
+
+/// PETSc options as they are typed, from wherever they come; those that PETSc cannot list are no reason to stop.
+fn petsc_options(session: &Session) -> Vec<String> {
+    let option = |(name, value): (String, Option<String>)| match value {
+        Some(value) => format!("-{name} {value}"),
+        None => format!("-{name}"),
+    };
+    session.options().all().unwrap_or_default().into_iter().map(option).collect()
 }
 
 /// What only the owner of a body knows: counts over all bodies and the inner solver of each in words.

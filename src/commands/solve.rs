@@ -12,7 +12,7 @@ use crate::ddm::{Observer, Row, Status};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::output::{Folder, HistoryWriter, IterationTable, Verbosity, say};
-use crate::parallel::agree;
+use crate::parallel::{agree, share};
 use crate::petsc::Session;
 use std::path::{Path, PathBuf};
 
@@ -97,6 +97,10 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
             report.message = format!("the error asked for is not reached: {limit}");
         }
     });
+    let written = match plan.scene.output.report {
+        true => written.and(page(&done, path, first)),
+        false => written,
+    };
     let code = if plan.limit.is_some() { 1 } else { report::exit_code(&done) };
     if first {
         let file = path.join(checkpoint::FILE);
@@ -120,6 +124,12 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     }
     failed.and(written)?;
     Ok(code)
+}
+
+/// Writes the page of the results when all ranks have written their fields. Collective.
+fn page(done: &Done, path: &Path, first: bool) -> Result<()> {
+    share(&*done.model().exchange, &());
+    if first { crate::report::save(path, None).map(|_| ()) } else { Ok(()) }
 }
 
 fn history(folder: &Folder, built: &Built) -> Result<HistoryWriter> {

@@ -116,6 +116,9 @@ impl Writing<'_> {
         let own = folder.files();
         let mut names: Vec<String> =
             own.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned()).collect();
+        if fields && self.done.built.scene.output.report {
+            names.push(crate::report::FILE.to_owned());
+        }
         if fields {
             names.extend(self.done.built.discrete.bodies.iter().map(|body| format!("{}.vtu", body.name)));
         }

@@ -55,7 +55,15 @@ impl Plot {
     /// # Errors
     /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(self.svg().map_err(io::Error::other)?.as_bytes())
+        out.write_all(self.text()?.as_bytes())
+    }
+
+    /// The SVG text that [`Self::write`] writes.
+    ///
+    /// # Errors
+    /// None that is known: those of drawing to memory.
+    pub fn text(&self) -> io::Result<String> {
+        self.svg().map_err(io::Error::other)
     }
 
     /// The SVG text.

@@ -327,9 +327,10 @@ fn adapt(node: &Node) -> Result<AdaptSpec> {
 fn output(node: Option<&Node>) -> Result<OutputSpec> {
     let default = OutputSpec::default();
     let Some(node) = node else { return Ok(default) };
-    let keys = Keys::open(node, "[output]", &["dir", "vtu", "plots", "pairs", "checkpoint"])?;
+    let keys = Keys::open(node, "[output]", &["dir", "vtu", "report", "plots", "pairs", "checkpoint"])?;
     Ok(OutputSpec {
         dir: keys.get("dir").map(|dir| dir.name().map(|name| name.value.into())).transpose()?,
+        report: keys.get("report").map_or(Ok(default.report), Node::boolean)?,
         vtu: keys.get("vtu").map_or(Ok(default.vtu), Node::boolean)?,
         plots: keys.get("plots").map_or(Ok(default.plots), Node::boolean)?,
         pairs: keys.get("pairs").map(pairs).transpose()?,

@@ -55,6 +55,7 @@ impl Scene {
         let mut output = Map::new();
         insert(&mut output, "dir", self.output.dir.as_ref().map(|dir| json!(dir.display().to_string())));
         output.insert("vtu".into(), json!(self.output.vtu));
+        output.insert("report".into(), json!(self.output.report));
         output.insert("plots".into(), json!(self.output.plots));
         let pairs = |&most: &usize| if most == usize::MAX { json!("all") } else { json!(most) };
         insert(&mut output, "pairs", self.output.pairs.as_ref().map(pairs));

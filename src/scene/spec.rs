@@ -66,6 +66,8 @@ pub struct OutputSpec {
     pub dir: Option<PathBuf>,
     /// Whether to write `<body>.vtu` and the `.pvd`; default false.
     pub vtu: bool,
+    /// Whether to write the page of the run, `report.html`; default false.
+    pub report: bool,
     /// Whether to draw the SVG plots; default true.
     pub plots: bool,
     /// Most pairs with tables and plots of their own; by default as many as a person looks through.
@@ -76,6 +78,6 @@ pub struct OutputSpec {
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { dir: None, vtu: false, plots: true, pairs: None, checkpoint: None }
+        Self { dir: None, vtu: false, report: false, plots: true, pairs: None, checkpoint: None }
     }
 }
