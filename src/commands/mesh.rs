@@ -58,7 +58,7 @@ fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request)
 fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Result<Value> {
     let mesh = &loaded.mesh;
     let verified = crate::discretize::verify(scene, mesh)?;
-    let mut checked = verified.checked.into_iter();
+    let mut checked = verified.checked.iter();
     let mut bodies = Vec::new();
     for body in &verified.bodies {
         let name = &body.name.value;

@@ -63,6 +63,7 @@ impl<const D: usize> Held<D> {
                 for &(direction, field) in &held_here {
                     let value =
                         field.eval_finite("the displacement of this support", pad(space.nodes[node as usize]))?;
+                    let value = fix.factor * value;
                     let support = Some(support);
                     conditions.entry(held.frame.node(node)).or_default().push(Condition { direction, value, support });
                 }

@@ -12,6 +12,7 @@ mod largest;
 mod look;
 pub mod plot;
 pub mod report;
+pub mod steps;
 pub mod table;
 mod ticks;
 pub mod vtu;
@@ -43,7 +44,8 @@ pub use history::HistoryWriter;
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, PressureSeries, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
-    PairReport, Report, RoundReport, StepPairReport, StepReport, busiest,
+    PairReport, Report, RoundReport, busiest,
 };
+pub use steps::{ReactionReport, StepPairReport, StepReport, StepTable};
 pub use table::{IterationTable, Verbosity};
 pub use vtu::{BodyField, CellKind, Grid};

@@ -81,11 +81,6 @@ pub struct BodyField {
 }
 
 impl BodyField {
-    /// `<name>.vtu`.
-    pub fn file_name(&self) -> String {
-        vtu_name(&self.name)
-    }
-
     /// Writes VTK's XML format with binary (base64) data: point arrays `displacement` (3 components), `stress` (6),
     /// `von_mises` (1) and `principal` (3).
     ///
@@ -215,25 +210,32 @@ pub fn pvd_name(title: &str) -> String {
     format!("{}.pvd", if title.is_empty() { "bodies".into() } else { safe_name(title) })
 }
 
-/// Writes the collection that opens the `.vtu` files of all bodies and contact surfaces at once: one part each, at time 0.
+/// A file of a collection: a body or a contact surface at a time.
+pub struct Entry<'a> {
+    /// Time.
+    pub time: f64,
+    /// Number of the body or surface.
+    pub part: usize,
+    /// Its name.
+    pub name: &'a str,
+    /// File, relative to the collection.
+    pub file: String,
+}
+
+/// Writes the collection that opens the `.vtu` files of all bodies and contact surfaces at once, over time.
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write_pvd<S: AsRef<str>>(bodies: &[S], out: &mut dyn Write) -> io::Result<()> {
+pub fn write_pvd(entries: &[Entry], out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(out, r#"<VTKFile type="Collection" version="1.0">"#)?;
     writeln!(out, "  <Collection>")?;
-    for (part, body) in bodies.iter().enumerate() {
-        let file = escape(&vtu_name(body.as_ref()));
-        let name = escape(body.as_ref());
-        writeln!(out, r#"    <DataSet timestep="0" group="" part="{part}" name="{name}" file="{file}"/>"#)?;
+    for Entry { time, part, name, file } in entries {
+        let (file, name) = (escape(file), escape(name));
+        writeln!(out, r#"    <DataSet timestep="{time}" group="" part="{part}" name="{name}" file="{file}"/>"#)?;
     }
     writeln!(out, "  </Collection>")?;
     writeln!(out, "</VTKFile>")
-}
-
-fn vtu_name(body: &str) -> String {
-    format!("{}.vtu", safe_name(body))
 }
 
 fn escape(text: &str) -> String {
@@ -356,9 +358,12 @@ mod tests {
     #[test]
     fn the_collection_names_every_body() {
         let mut bytes = Vec::new();
-        write_pvd(&["upper", "a<b"], &mut bytes).unwrap();
+        let piece =
+            |(part, name, file): (usize, &'static str, &str)| Entry { time: 0.5, part, name, file: file.into() };
+        let entries: Vec<_> = [(0, "upper", "upper.vtu"), (1, "a<b", "a_b.vtu")].into_iter().map(piece).collect();
+        write_pvd(&entries, &mut bytes).unwrap();
         let text = String::from_utf8(bytes).unwrap();
-        assert!(text.contains(r#"timestep="0" group="" part="0" name="upper" file="upper.vtu""#));
+        assert!(text.contains(r#"timestep="0.5" group="" part="0" name="upper" file="upper.vtu""#));
         assert!(text.contains(r#"part="1" name="a&lt;b" file="a_b.vtu""#), "{text}");
         assert_eq!(pvd_name("Two blocks / a"), "Two_blocks___a.pvd");
         assert_eq!(pvd_name(" "), "bodies.pvd");

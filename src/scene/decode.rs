@@ -3,6 +3,7 @@
 mod body;
 mod contact;
 mod elasticity;
+mod history;
 mod layer;
 mod method;
 
@@ -41,18 +42,20 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
     };
     let (contacts, auto) = decoder.contacts(&keys)?;
-    let method = decoder.method(keys.get("method"))?;
+    let mut method = decoder.method(keys.get("method"))?;
     if let (Some(adapt), false) = (keys.get("adapt"), method.steps.is_empty()) {
         return Err(adapt
             .refuse("an adapted mesh and load steps in one scene")
             .help("leave `adapt` or `method.steps` away"));
     }
+    let bodies = decoder.bodies(&keys)?;
+    decoder.join(&mut method.steps, &bodies)?;
     Ok(Scene {
         path: path.to_owned(),
         title,
         plane,
         mesh: decoder.mesh(keys.require("mesh")?, trust(tree, &keys)?)?,
-        bodies: decoder.bodies(&keys)?,
+        bodies,
         contacts,
         auto,
         method,
