@@ -4,6 +4,7 @@ use crate::error::{Error, Kind, Result};
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
 use crate::mesh::{Loaded, Origin};
+use crate::output::vtu::Encoding;
 use crate::output::{CellKind, Grid, say, write_whole};
 use crate::problem::order::Order;
 use crate::scene::Scene;
@@ -139,7 +140,7 @@ fn write<const D: usize>(path: &Path, loaded: &Loaded<D>) -> Result<()> {
         }
         Some("vtu") => {
             let grid = grid(loaded);
-            write_whole(path, |out| grid.write(out))
+            write_whole(path, |out| grid.write(Encoding::default(), out))
         }
         _ => Err(Error::new(Kind::Usage, format!("`{}` names no kind of mesh file", path.display()))
             .help("end it with .msh or .vtu")),

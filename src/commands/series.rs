@@ -4,7 +4,7 @@ use super::results::{All, Recovered};
 use super::stages::Done;
 use super::{report, shown};
 use crate::error::Result;
-use crate::output::vtu::{Entry, pvd_name, write_pvd};
+use crate::output::collection::{Entry, write_pvd};
 use crate::output::{Folder, safe_name};
 
 /// Folder of the files of steps but the last.
@@ -43,14 +43,15 @@ pub fn write_last(done: &Done, recovered: &All, folder: &Folder, first: bool) ->
 }
 
 fn fields(done: &Done, recovered: &All, folder: &Folder, first: bool, file: &dyn Fn(&str) -> String) -> Result<()> {
+    let encoding = done.built.scene.output.encoding;
     for (info, recovered) in done.built.discrete.bodies.iter().zip(recovered) {
         if let Some(Ok(recovered)) = recovered {
             let recovered: &Recovered = recovered;
-            folder.write(&file(&info.name), |out| recovered.field(info).clone().write(out))?;
+            folder.write(&file(&info.name), |out| recovered.field(info).clone().write(encoding, out))?;
         }
     }
     for (i, name) in shown::stems(done).into_iter().enumerate().filter(|_| first) {
-        folder.write(&file(&name), |out| report::contact_surface(&name, done, i).write(out))?;
+        folder.write(&file(&name), |out| report::contact_surface(&name, done, i).write(encoding, out))?;
     }
     Ok(())
 }
@@ -73,5 +74,5 @@ fn collection(done: &Done, folder: &Folder, ended: bool) -> Result<()> {
             }
         }
     }
-    folder.write(&pvd_name("bodies"), |out| write_pvd(&entries, out)).map(|_| ())
+    folder.write("bodies.pvd", |out| write_pvd(&entries, out)).map(|_| ())
 }

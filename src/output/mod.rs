@@ -3,6 +3,7 @@
 //! Nothing here knows the space dimension: points and vectors have three components, z = 0 in the plane.
 
 mod chart;
+pub mod collection;
 pub mod contact;
 pub mod contacts;
 pub mod folder;
@@ -14,6 +15,7 @@ pub mod plot;
 pub mod report;
 pub mod steps;
 pub mod table;
+mod tags;
 mod ticks;
 pub mod vtu;
 

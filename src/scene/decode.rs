@@ -10,6 +10,7 @@ mod method;
 use super::read::{Keys, Node, Value};
 use crate::error::{Error, Located, Place, Result, nearest, shown};
 use crate::expression::{Differentiable, Field};
+use crate::output::vtu::Encoding;
 use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::pattern::Pattern;
@@ -315,10 +316,17 @@ fn adapt(node: &Node) -> Result<AdaptSpec> {
 fn output(node: Option<&Node>) -> Result<OutputSpec> {
     let default = OutputSpec::default();
     let Some(node) = node else { return Ok(default) };
-    let keys = Keys::open(node, "[output]", &["dir", "vtu", "plots", "pairs", "checkpoint"])?;
+    let usual = default.encoding;
+    let keys = Keys::open(node, "[output]", &["dir", "vtu", "precision", "compress", "plots", "pairs", "checkpoint"])?;
     Ok(OutputSpec {
         dir: keys.get("dir").map(|dir| dir.name().map(|name| name.value.into())).transpose()?,
         vtu: keys.get("vtu").map_or(Ok(default.vtu), Node::boolean)?,
+        encoding: Encoding {
+            single: keys
+                .get("precision")
+                .map_or(Ok(usual.single), |node| choose(node, "precision", &[("double", false), ("single", true)]))?,
+            compress: keys.get("compress").map_or(Ok(usual.compress), Node::boolean)?,
+        },
         plots: keys.get("plots").map_or(Ok(default.plots), Node::boolean)?,
         pairs: keys.get("pairs").map(pairs).transpose()?,
         checkpoint: keys.get("checkpoint").map(|minutes| minutes.positive("the time in minutes")).transpose()?,

@@ -52,6 +52,9 @@ impl Scene {
         let mut output = Map::new();
         insert(&mut output, "dir", self.output.dir.as_ref().map(|dir| json!(dir.display().to_string())));
         output.insert("vtu".into(), json!(self.output.vtu));
+        let encoding = self.output.encoding;
+        output.insert("precision".into(), json!(if encoding.single { "single" } else { "double" }));
+        output.insert("compress".into(), json!(encoding.compress));
         output.insert("plots".into(), json!(self.output.plots));
         let pairs = |&most: &usize| if most == usize::MAX { json!("all") } else { json!(most) };
         insert(&mut output, "pairs", self.output.pairs.as_ref().map(pairs));

@@ -1,6 +1,7 @@
 //! What the user asked for, checked: a problem, and what to do with it.
 
 use crate::error::{Located, Place};
+use crate::output::vtu::Encoding;
 use crate::problem::body::BodySpec;
 use crate::problem::contact::{AutoContact, ContactSpec};
 use crate::problem::elasticity::Plane;
@@ -60,6 +61,8 @@ pub struct OutputSpec {
     pub dir: Option<PathBuf>,
     /// Whether to write `<body>.vtu` and the `.pvd`; default false.
     pub vtu: bool,
+    /// How they are written.
+    pub encoding: Encoding,
     /// Whether to draw the SVG plots; default true.
     pub plots: bool,
     /// Most pairs with tables and plots of their own; by default as many as a person looks through.
@@ -70,6 +73,6 @@ pub struct OutputSpec {
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { dir: None, vtu: false, plots: true, pairs: None, checkpoint: None }
+        Self { dir: None, vtu: false, encoding: Encoding::default(), plots: true, pairs: None, checkpoint: None }
     }
 }
