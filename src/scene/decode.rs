@@ -49,13 +49,14 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
             .refuse("an adapted mesh and load steps in one scene")
             .help("leave `adapt` or `method.steps` away"));
     }
+    let mesh = decoder.mesh(keys.require("mesh")?, trust(tree, &keys)?)?;
     let bodies = decoder.bodies(&keys)?;
     decoder.join(&mut method.steps, &bodies)?;
     Ok(Scene {
         path: path.to_owned(),
         title,
         plane,
-        mesh: decoder.mesh(keys.require("mesh")?, trust(tree, &keys)?)?,
+        mesh,
         bodies,
         contacts,
         auto,
