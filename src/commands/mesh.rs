@@ -1,5 +1,6 @@
 //! `winkler mesh`: makes the mesh of a scene, or finds it, and says what is in it.
 
+use super::run::in_parts;
 use crate::error::{Error, Kind, Result};
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
@@ -94,6 +95,7 @@ fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Res
         "dimension": D,
         "order": mesh.order.degree(),
         "nodes": mesh.points.len(),
+        "split": mesh.split,
         "bodies": bodies,
         "groups": groups,
     }))
@@ -122,6 +124,9 @@ fn print(facts: &Value) -> Result<()> {
             number(&body["quality"]["least"]),
             number(&body["quality"]["mean"])
         ))?;
+    }
+    if let Some(warning) = in_parts(facts["split"].as_u64().unwrap_or_default() as usize) {
+        say(format_args!("  warning: {warning}"))?;
     }
     let cells = facts["dimension"].clone();
     for group in list("groups").iter().filter(|group| group["dimension"] != cells) {

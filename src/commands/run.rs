@@ -127,6 +127,7 @@ impl<const D: usize> Source<D> {
         clock.phase("discretize");
         drop(stage);
         let mut warnings = warnings(session, &discrete);
+        warnings.extend(in_parts(mesh.split));
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear(), inner.whole().clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());
@@ -196,6 +197,12 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// Elements that were split, as a warning.
+pub fn in_parts(split: usize) -> Option<String> {
+    let what = "quadrangles, hexahedra, prisms or pyramids of the mesh were split into triangles or tetrahedra";
+    (split > 0).then(|| format!("{split} {what}"))
 }
 
 /// Facets that a pair leaves out as a warning.

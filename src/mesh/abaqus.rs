@@ -203,7 +203,8 @@ impl Model {
                 let mut members = Vec::new();
                 if generate {
                     let [first, last] = [count::<u64>(words[0])?, count(words.get(1).copied().unwrap_or_default())?];
-                    let step = words.get(2).filter(|word| !word.is_empty()).map_or(Ok(1), |word| count::<usize>(word))?;
+                    let step =
+                        words.get(2).filter(|word| !word.is_empty()).map_or(Ok(1), |word| count::<usize>(word))?;
                     members.extend((first..=last).step_by(step.max(1)));
                 } else {
                     for word in words.iter().filter(|word| !word.is_empty()) {
@@ -237,7 +238,10 @@ impl Model {
         for (set, tags) in &self.element_sets {
             let mut of_dimension: BTreeMap<usize, Vec<(u8, Vec<u64>)>> = BTreeMap::new();
             for tag in tags {
-                let (kind, nodes) = self.elements.get(tag).ok_or_else(|| format!("`{set}` has an element {tag}, which is not there"))?;
+                let (kind, nodes) = self
+                    .elements
+                    .get(tag)
+                    .ok_or_else(|| format!("`{set}` has an element {tag}, which is not there"))?;
                 let kind = &self.kinds[*kind];
                 let mut nodes = nodes.clone();
                 if kind.number == 11 {
@@ -254,10 +258,15 @@ impl Model {
             let mut facets = Vec::new();
             let mut dimension = 0;
             for &(tag, face) in faces {
-                let (kind, nodes) =
-                    self.elements.get(&tag).ok_or_else(|| format!("`{surface}` has a face of element {tag}, which is not there"))?;
+                let (kind, nodes) = self
+                    .elements
+                    .get(&tag)
+                    .ok_or_else(|| format!("`{surface}` has a face of element {tag}, which is not there"))?;
                 let kind = &self.kinds[*kind];
-                let face = kind.faces.get(face - 1).ok_or_else(|| format!("element {tag} in `{surface}` has no face S{face}"))?;
+                let face = kind
+                    .faces
+                    .get(face - 1)
+                    .ok_or_else(|| format!("element {tag} in `{surface}` has no face S{face}"))?;
                 dimension = kind.dimension - 1;
                 facets.push((kind.facet(face.len()), face.iter().map(|&at| nodes[at]).collect()));
             }
@@ -290,7 +299,10 @@ impl Model {
                 let _ = write!(text, "{number} {kind} 2 {0} {0}", tag + 1);
                 for node in nodes {
                     if !self.nodes.contains_key(node) {
-                        return Err(format!("an element of `{}` has the node {node}, which is not there", groups[tag].1));
+                        return Err(format!(
+                            "an element of `{}` has the node {node}, which is not there",
+                            groups[tag].1
+                        ));
                     }
                     let _ = write!(text, " {node}");
                 }

@@ -27,6 +27,10 @@ pub struct Task<'a> {
     pub set: &'a [(String, f64)],
     /// How many times as large elements are to be as the script asks for.
     pub times: f64,
+    /// Largest size of elements, if there is one.
+    pub size: Option<f64>,
+    /// Whether the script is a mesh already, which is only to be written in another form.
+    pub is_mesh: bool,
     /// Dimension of the cells.
     pub dimension: usize,
     /// Order of the elements.
@@ -67,18 +71,17 @@ impl Gmsh {
     pub fn run(&self, task: &Task, output: &Path, home: &Path) -> Result<()> {
         let bytes = guard::bytes(task.guard);
         let mut command = guard::command(&self.program, bytes);
-        command.arg(format!("-{}", task.dimension));
-        command.args([
-            "-order",
-            if task.order == Order::P1 { "1" } else { "2" },
-            "-format",
-            "msh41",
-            "-bin",
-            "-v",
-            "2",
-        ]);
+        let order = if task.order == Order::P1 { "1" } else { "2" };
+        match task.is_mesh {
+            true => command.arg("-save"),
+            false => command.arg(format!("-{}", task.dimension)).args(["-order", order]),
+        };
+        command.args(["-format", "msh41", "-bin", "-v", "2"]);
         if let Some(threads) = task.guard.threads {
             command.args(["-algo", "hxt", "-nt", &threads.to_string()]);
+        }
+        if let Some(size) = task.size {
+            command.args(["-clmax", &size.to_string()]);
         }
         if task.times != 1.0 {
             command.args(["-clscale", &task.times.to_string()]);

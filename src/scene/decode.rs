@@ -10,6 +10,7 @@ mod method;
 use super::read::{Keys, Node, Value};
 use crate::error::{Error, Located, Place, Result, nearest, shown};
 use crate::expression::{Differentiable, Field};
+use crate::mesh::is_shape;
 use crate::output::vtu::Encoding;
 use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
@@ -135,7 +136,7 @@ impl Decoder<'_> {
     fn mesh(&self, node: &Node, trusted: bool) -> Result<MeshSource> {
         if let Value::String(name) = &node.value {
             let file = self.file(node)?;
-            return Ok(match name.ends_with(".geo") {
+            return Ok(match name.ends_with(".geo") || is_shape(&file.value) {
                 true => {
                     let guard = Guard { trusted, ..Guard::default() };
                     MeshSource::Geo { file, set: Vec::new(), places: Vec::new(), sizes: None, guard }
@@ -146,22 +147,33 @@ impl Decoder<'_> {
         if !matches!(node.value, Value::Table(_)) {
             return Err(node.expected("a file name or a table"));
         }
-        let keys = Keys::open(node, "the mesh", &["geo", "msh", "set", "threads", "timeout", "memory"])?;
+        let keys = Keys::open(node, "the mesh", &["geo", "msh", "set", "size", "threads", "timeout", "memory"])?;
         keys.exclude("geo", "msh")?;
         if let Some(file) = keys.get("msh") {
-            return match ["set", "threads", "timeout", "memory"].iter().find_map(|key| keys.entry(key)) {
-                None => Ok(MeshSource::Msh { file: self.file(file)? }),
+            let path = self.file(file)?;
+            if is_shape(&path.value) {
+                return Err(file
+                    .refuse("this is the shape of bodies, and no mesh")
+                    .help("mesh = { geo = \"...\", size = 0.1 }"));
+            }
+            return match ["set", "size", "threads", "timeout", "memory"].iter().find_map(|key| keys.entry(key)) {
+                None => Ok(MeshSource::Msh { file: path }),
                 Some(entry) => Err(Error::scene(&entry.key_place, format!("`{}` for a finished mesh", entry.key))
                     .help("it is for Gmsh, which makes meshes from scripts: mesh = { geo = \"...\" }")),
             };
         }
         let file = self.file(keys.require("geo")?)?;
+        if let (Some(entry), false) = (keys.entry("size"), is_shape(&file.value)) {
+            return Err(Error::scene(&entry.key_place, "`size` for a script, which has sizes of its own")
+                .help("it is for shapes (.step, .iges, .brep, .stl): give scripts numbers by set = { n = 32 }"));
+        }
         let set = keys.get("set").map_or(Ok(Vec::new()), numbers)?;
         let (places, set) = set.into_iter().map(|(place, name, value)| (place, (name, value))).unzip();
         let usual = Guard::default();
         let guard = Guard {
             seconds: keys.get("timeout").map_or(Ok(usual.seconds), |node| node.positive("the timeout"))?,
             gigabytes: keys.get("memory").map(|node| node.positive("the memory")).transpose()?,
+            size: keys.get("size").map(|node| node.positive("the size")).transpose()?,
             threads: keys.get("threads").map(threads).transpose()?,
             trusted,
         };

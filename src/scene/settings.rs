@@ -88,6 +88,9 @@ fn mesh(mesh: &MeshSource) -> Value {
             let set: Map<_, _> = set.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
             let (file, timeout, memory) = (file.value.display().to_string(), guard.seconds, guard.gigabytes);
             let mut mesh = json!({ "geo": file, "set": set, "timeout": timeout });
+            if let Some(size) = guard.size {
+                mesh["size"] = json!(size);
+            }
             if let Some(threads) = guard.threads {
                 mesh["threads"] = json!(threads);
             }
