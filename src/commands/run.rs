@@ -14,7 +14,7 @@ use crate::discretize::{self, ContactInfo, Discrete, Verified};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
-use crate::mesh::{Checked, Mesh};
+use crate::mesh::{Checked, Mesh, is_other};
 use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
@@ -158,7 +158,11 @@ fn mesh<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt)
     if session.size() == 1 {
         return load();
     }
-    if matches!(scene.mesh, MeshSource::Geo { .. }) {
+    let needs_gmsh = match &scene.mesh {
+        MeshSource::Geo { .. } => true,
+        MeshSource::Msh { file } => is_other(&file.value),
+    };
+    if needs_gmsh {
         agree(session, if session.rank() == 0 { load().map(|_| ()) } else { Ok(()) })?;
     }
     agree(session, load())

@@ -123,19 +123,9 @@ fn converted<const D: usize>(
     let workshop = Workshop::open(folders)?;
     let (script, made) = (foreign::mesh(file, bytes, workshop.path())?, workshop.path().join(&name));
     let guard = &Guard::default();
-    let (set, size, times, is_mesh) = (&[], None, 1.0, true);
-    let task = Task {
-        script: &script,
-        shown: path,
-        set,
-        size,
-        times,
-        is_mesh,
-        dimension: D,
-        order: Order::P1,
-        guard,
-        interrupt,
-    };
+    let (set, times, is_mesh) = (&[], 1.0, true);
+    let task =
+        Task { script: &script, shown: path, set, times, is_mesh, dimension: D, order: Order::P1, guard, interrupt };
     let ran = gmsh.run(&task, &made, workshop.path());
     let read = ran.and_then(|()| std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause)));
     let mesh = read.and_then(|bytes| parse(&bytes)).map_err(|error| workshop.blame(error).at(&file.place))?;
@@ -175,7 +165,7 @@ pub(super) fn from_script<const D: usize>(
     let workshop = Workshop::open(folders)?;
     let made = workshop.path().join(&name);
     let drawn = match is_shape {
-        true => Some(foreign::script(path, &script.files[0], D, workshop.path())?),
+        true => Some(foreign::script(path, &script.files[0], D, guard.size, workshop.path())?),
         false => None,
     };
     let own = drawn.as_ref().map_or(file.clone(), |drawn| Located::new(drawn.clone(), file.place.clone()));
@@ -185,18 +175,7 @@ pub(super) fn from_script<const D: usize>(
         None => (ended(&own.value, &script, workshop.path())?, 1.0),
     };
     let script = sized.as_deref().unwrap_or(&own.value);
-    let task = Task {
-        script,
-        shown: path,
-        set,
-        size: guard.size,
-        times,
-        is_mesh: false,
-        dimension: D,
-        order,
-        guard,
-        interrupt,
-    };
+    let task = Task { script, shown: path, set, times, is_mesh: false, dimension: D, order, guard, interrupt };
     let ran = gmsh.run(&task, &made, workshop.path());
     let read = ran.and_then(|()| std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause)));
     // half a file is no fault of the script

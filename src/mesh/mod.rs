@@ -26,9 +26,10 @@ mod split;
 mod tests;
 mod tokens;
 mod trust;
+mod unv;
 
 pub use check::{Asked, Checked, Duty, Parts};
-pub use foreign::is_shape;
+pub use foreign::{is_other, is_shape};
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, load_unless, recall_final};
 pub use msh::{Maker, parse, read};
