@@ -56,8 +56,8 @@ fn patch() -> std::path::PathBuf {
 fn meshes_of_other_formats_give_the_same_answer() {
     let whole = solved("a.msh", &made(&patch(), &["-3", "-format", "msh41"], "a.msh"), "\"a.msh\"", &NAMED).converged();
     let same = |run: &Run, told: &str| {
-        // fields of eight characters
-        let size = if told == "bdf" { 1e-7 } else { 1e-9 };
+        // coordinates in eight characters have six digits
+        let size = if told == "bdf" { 1e-5 } else { 1e-9 };
         assert_eq!(run.count("dofs"), whole.count("dofs"), "{told}");
         assert!(
             (run.number("pairs/0/peak_pressure") / whole.number("pairs/0/peak_pressure") - 1.0).abs() < size,
