@@ -1,15 +1,19 @@
 //! The command line: words -> request -> command -> exit code.
 
-use crate::commands::{bench, check, mesh, solve, sweep};
+use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
+use crate::output::say;
 use crate::parallel::agree;
 use crate::petsc::Session;
+use crate::report;
 use crate::solver::options;
+use anstream::{AutoStream, ColorChoice};
 use clap::error::ContextKind;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
 use std::ffi::OsString;
-use std::io::{ErrorKind, IsTerminal};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition on PETSc.
@@ -19,6 +23,8 @@ use std::path::{Path, PathBuf};
 #[derive(Parser)]
 #[command(name = "winkler", version, after_help = EXIT_CODES)]
 struct Cli {
+    #[command(flatten)]
+    color: colorchoice_clap::Color,
     #[command(subcommand)]
     command: Command,
 }
@@ -43,6 +49,48 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Write a page with pictures and tables of a run, from its files alone: one HTML file
+    Report {
+        /// Folder of results
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        /// File to write [default: report.html in the folder]
+        #[arg(short, value_name = "FILE")]
+        output: Option<PathBuf>,
+    },
+    /// Draw one picture of a run as SVG
+    Plot {
+        /// Folder of results
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        /// What to draw: stress, displacement, pressure or convergence
+        #[arg(value_name = "WHAT")]
+        what: String,
+        /// File to write [default: WHAT.svg in the folder]
+        #[arg(short, value_name = "FILE")]
+        output: Option<PathBuf>,
+    },
+    /// Write a small scene that works, with its script and comments, to begin from
+    New {
+        /// Folder for it; its last word names the scene
+        #[arg(value_name = "NAME")]
+        folder: PathBuf,
+        /// Two blocks in space instead of the plane
+        #[arg(long)]
+        space: bool,
+    },
+    /// Print a script that completes commands and options in a shell
+    Completions {
+        /// bash, zsh, fish, elvish or powershell
+        #[arg(value_name = "SHELL")]
+        shell: Shell,
+    },
+    /// Write man pages, one a command
+    Man {
+        /// Folder for them
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+    },
 }
 
 /// The commands that need MPI and PETSc.
@@ -58,6 +106,9 @@ enum Solving {
         /// Write displacements and stresses of the bodies for ParaView (short for --set output.vtu=true)
         #[arg(long)]
         vtu: bool,
+        /// Write a page with pictures and tables of the run, report.html (short for --set output.report=true)
+        #[arg(long)]
+        report: bool,
         /// Minutes between checkpoints (short for --set output.checkpoint=T)
         #[arg(long, value_name = "T", allow_hyphen_values = true)]
         checkpoint: Option<String>,
@@ -69,6 +120,9 @@ enum Solving {
     Check {
         #[command(flatten)]
         scene: SceneArgs,
+        /// Folder for pictures of measured surfaces and layers of asperities [default: none are drawn]
+        #[arg(short, value_name = "DIR")]
+        output: Option<PathBuf>,
     },
     /// Solve a scene for every combination of values of its keys
     Sweep {
@@ -212,7 +266,8 @@ impl SceneArgs {
 }
 
 /// Flags of the program that begin with two dashes: with one they look like PETSc's.
-const TWO_DASHES: [&str; 15] = [
+const TWO_DASHES: [&str; 16] = [
+    "-report",
     "-trust-geo",
     "-set",
     "-json",
@@ -273,15 +328,37 @@ pub fn run(words: Vec<OsString>) -> i32 {
         Ok(interrupt) => interrupt,
         Err(error) => return complain(&error),
     };
+    cli.color.write_global();
     let alone = match cli.command {
+        Command::New { folder, space } => new::new(&folder, space),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "winkler", &mut std::io::stdout());
+            Ok(0)
+        }
+        Command::Man { folder } => manual(&folder),
         Command::Bench(arguments) => bench::bench(&interrupt, &arguments.request(petsc)),
         Command::Mesh { scene, output, json } => {
             let (scene, overrides) = (scene.scene.clone(), scene.overrides());
             mesh::mesh(&interrupt, &mesh::Request { scene, overrides, output, json })
         }
+        Command::Report { folder, output } => report::save(&folder, output.as_deref()).and_then(|path| {
+            say(path.display())?;
+            Ok(0)
+        }),
+        Command::Plot { folder, what, output } => report::draw(&folder, &what, output.as_deref()).and_then(|paths| {
+            paths.iter().try_for_each(|path| say(path.display()))?;
+            Ok(0)
+        }),
         Command::Solving(command) => return with_session(&petsc, &interrupt, command),
     };
     alone.unwrap_or_else(|error| complain(&error))
+}
+
+/// Writes a man page of the program and one of each command.
+fn manual(folder: &Path) -> Result<i32> {
+    let wrong = |cause: std::io::Error| Error::file(folder, "write man pages to", &cause);
+    std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder)).map_err(wrong)?;
+    Ok(0)
 }
 
 /// Runs a command that solves.
@@ -311,16 +388,17 @@ fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i3
 
 fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Result<i32> {
     match command {
-        Solving::Solve { scene, output, vtu, checkpoint, restart } => {
+        Solving::Solve { scene, output, vtu, report, checkpoint, restart } => {
             let mut overrides = scene.overrides();
             overrides.extend(vtu.then(|| "--vtu".to_owned()));
+            overrides.extend(report.then(|| "--report".to_owned()));
             overrides.extend(checkpoint.map(|minutes| format!("--checkpoint {minutes}")));
             let request = solve::Request { scene: scene.scene, folder: output, restart, overrides, json: scene.json };
             solve::solve(session, interrupt, request)
         }
-        Solving::Check { scene } => {
+        Solving::Check { scene, output } => {
             let overrides = scene.overrides();
-            check::check(session, interrupt, scene.scene, overrides, scene.json)
+            check::check(session, interrupt, scene.scene, overrides, scene.json, output)
         }
         Solving::Sweep { scene, output, over } => {
             let overrides = scene.overrides();
@@ -334,7 +412,9 @@ fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Resul
 }
 
 fn complain(error: &Error) -> i32 {
-    eprintln!("{}", error.render(std::io::stderr().is_terminal()));
+    // NO_COLOR, CLICOLOR_FORCE and `--color` decide, and else whether this is a terminal
+    let color = AutoStream::choice(&std::io::stderr()) != ColorChoice::Never;
+    eprintln!("{}", error.render(color));
     if error.kind() == Kind::Usage {
         eprintln!("`winkler --help` shows the command line");
     }

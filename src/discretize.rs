@@ -15,6 +15,7 @@ mod mechanism;
 pub mod meshes;
 mod pairs;
 mod part;
+pub mod resolution;
 mod roster;
 mod springs;
 mod supports;
@@ -222,6 +223,7 @@ pub fn discretize<const D: usize>(
     let outlines = outlines.map(|(((part, draft), supported), graph)| Outline {
         name: &part.spec.name.value,
         dimension: D,
+        order: part.space.order,
         rows: &draft.rows,
         prescribed: &supported.prescribed,
         motions: &draft.free,
@@ -230,7 +232,9 @@ pub fn discretize<const D: usize>(
     factory.plan(&outlines.collect::<Vec<_>>())?;
     let all_graphs = || lazy.iter().map(|graph| graph()).collect::<Vec<&NodeGraph>>();
     let dealt = factory.deal_out(&|| distribute::graph::<D>(&all_graphs(), &drafts, &pairs))?;
-    let dealt = dealt.map(|dealt| distribute::distribute::<D>(&drafts, &dealt, ranks, &exchange));
+    let coarse = |_: &Vec<u32>| parts.iter().map(Part::coarse_nodes).collect::<Vec<_>>();
+    let coarse = dealt.as_ref().map(coarse).unwrap_or_default();
+    let dealt = dealt.map(|dealt| distribute::distribute::<D>(&drafts, &coarse, &dealt, ranks, &exchange));
     if let Some(dealt) = &dealt {
         owner = dealt.iter().map(|dealt| dealt.leader).collect();
     }
@@ -281,7 +285,11 @@ pub fn discretize<const D: usize>(
             if let Some(dealt) = &dealt {
                 body = dealt.own::<D>(body);
             }
-            let distribution = dealt.map(|dealt| dealt.distribution);
+            let interpolation = || match &dealt {
+                None => part.interpolation(&part.coarse_nodes()),
+                Some(dealt) => dealt.interpolation::<D>(&part.interpolation(&coarse[index])),
+            };
+            let distribution = dealt.as_ref().map(|dealt| dealt.distribution.clone());
             local = Some(factory.make(Assembled {
                 name: name.clone(),
                 dimension: D,
@@ -290,6 +298,7 @@ pub fn discretize<const D: usize>(
                 rows,
                 motions: part.smooth(free),
                 left,
+                interpolation: &interpolation,
             })?);
         }
         let outer = approach::outer_maker(&part, mesh)?;

@@ -11,6 +11,7 @@
 pub mod cli;
 pub mod commands;
 pub mod contact;
+pub mod data;
 pub mod ddm;
 pub mod discretize;
 pub mod error;
@@ -27,5 +28,6 @@ pub mod parallel;
 #[allow(unsafe_code)]
 pub mod petsc;
 pub mod problem;
+pub mod report;
 pub mod scene;
 pub mod solver;

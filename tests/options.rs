@@ -262,3 +262,34 @@ fn options_that_cannot_end_well_are_refused() {
     let run = groove("-log_view :results/log.txt").converged();
     assert!(fs::read_to_string(run.folder.join("log.txt")).expect("a log").contains("Performance Summary"));
 }
+
+/// Quadratic elements have a level of their own: half of the iterations, fewer with each, for the same pressures. What is typed for hypre
+/// means hypre for all nodes.
+#[test]
+fn multigrid_of_quadratic_elements_has_two_levels() {
+    let run = |options: &str| {
+        let words = "--set mesh.set.n=2 --set mesh.set.edge=4 --set method.stop={residual=1e-8} --set solver=hypre";
+        let words: Vec<&str> = words.split_whitespace().chain(options.split_whitespace()).collect();
+        solve(case("hertz-sphere"), &words).converged()
+    };
+    let plain = run("-pc_type hypre");
+    let inner = |run: &Run| run.count("inner_iterations");
+    for (options, solver) in [
+        ("", "cg + mg by hypre"),
+        ("-newton_pc_type mg", "cg + mg by hypre"),
+        ("-newton_mg_coarse_pc_type gamg", "cg + mg by gamg"),
+        ("--method newton-robin", "cg + mg by hypre"),
+    ] {
+        let two = run(options);
+        assert!(two.solvers().iter().all(|name| *name == solver), "{options}: {:?}", two.solvers());
+        assert!(distance(&two.contact()["pressure"], &plain.contact()["pressure"]) < 1e-7, "{options}");
+        if options.is_empty() || options.ends_with("mg") {
+            let counts = [&two, &plain].map(inner);
+            assert!(3 * counts[0] < 2 * counts[1], "{options}: {counts:?}");
+        }
+    }
+    let typed = run("-newton_pc_hypre_boomeramg_strong_threshold 0.5");
+    assert!(typed.solvers().iter().all(|name| *name == "cg + hypre"), "{:?}", typed.solvers());
+    // linear elements have one level
+    assert!(run("--set body.0.order=1 --set body.1.order=1").solvers().iter().all(|name| *name == "cg + hypre"));
+}

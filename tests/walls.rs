@@ -10,12 +10,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms from the ground up; each may use those below it.
-const ROOMS: [&str; 21] = [
+const ROOMS: [&str; 22] = [
     "error",
     "file",
     "interrupt",
     "linalg",
     "petsc",
+    "data",
     "expression",
     "problem",
     "mesh",
@@ -26,6 +27,7 @@ const ROOMS: [&str; 21] = [
     "solver",
     "ddm",
     "output",
+    "report",
     "scene",
     "discretize",
     "estimate",

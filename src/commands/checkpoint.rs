@@ -126,7 +126,7 @@ impl Checkpoint {
 
     fn other(&self, what: &str) -> Error {
         Error::new(Kind::Scene, format!("{} is of another {what}", self.path.display())).help(
-            "a run goes on with the scene and the overrides that it began with; only `title`, `[output]` and \
+            "a run goes on with the scene and the overrides that it began with; only `title`, `units`, `[output]` and \
                    `method.stop` may change. Or begin anew, without `--restart`",
         )
     }
@@ -217,7 +217,7 @@ fn from_numbers(numbers: &[f64]) -> Option<Row> {
 /// when it ends.
 pub fn settings_digest(scene: &Scene) -> String {
     let mut settings = scene.settings();
-    ["scene", "title", "output"].iter().for_each(|key| settings[*key] = Value::Null);
+    ["scene", "title", "units", "output"].iter().for_each(|key| settings[*key] = Value::Null);
     settings["method"]["stop"] = Value::Null;
     if let Some(steps) = settings["method"].get_mut("steps").and_then(Value::as_object_mut) {
         steps.remove("table");
@@ -225,7 +225,13 @@ pub fn settings_digest(scene: &Scene) -> String {
     if let Some(mesh) = settings["mesh"].as_object_mut() {
         ["geo", "msh", "timeout", "memory"].iter().for_each(|key| drop(mesh.remove(*key)));
     }
-    hex(Sha256::new().chain_update(settings.to_string()))
+    // of data the contents count, wherever they are
+    for (_, data) in settings["data"].as_object_mut().into_iter().flatten() {
+        data["file"] = Value::Null;
+    }
+    let mut digest = Sha256::new().chain_update(settings.to_string());
+    scene.data.values().flat_map(|data| data.numbers()).for_each(|number| digest.update(number.to_le_bytes()));
+    hex(digest)
 }
 
 /// Digest of the bodies' sizes and of all contact points.

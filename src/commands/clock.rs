@@ -10,12 +10,14 @@ pub struct Clock {
     last: Instant,
     /// Seconds by phase.
     pub times: BTreeMap<String, f64>,
+    /// Largest resident memory of this process so far, 10^6 bytes, at the end of each phase; empty where the system does not say.
+    pub memory: BTreeMap<String, f64>,
 }
 
 impl Default for Clock {
     fn default() -> Self {
         let now = Instant::now();
-        Self { began: now, last: now, times: BTreeMap::new() }
+        Self { began: now, last: now, times: BTreeMap::new(), memory: BTreeMap::new() }
     }
 }
 
@@ -25,6 +27,7 @@ impl Clock {
         let now = Instant::now();
         *self.times.entry(name.to_owned()).or_default() += (now - self.last).as_secs_f64();
         self.last = now;
+        self.memory.extend(peak_memory().map(|memory| (name.to_owned(), memory)));
     }
 
     /// Seconds since the run began, noted as `total`.
@@ -33,4 +36,12 @@ impl Clock {
         self.times.insert("total".to_owned(), total);
         total
     }
+}
+
+/// Largest resident memory of this process so far, 10^6 bytes.
+fn peak_memory() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kibibytes * 1024.0 / 1e6)
 }

@@ -3,14 +3,18 @@
 //! Newton's method joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
 //! bodies then need no solver of their own. Else every body has one, and sweeps solve the linear steps.
 
+use super::plan::{DENSE, Plan, agree};
 use super::words::in_words;
 use crate::discretize::{Assembled, Factory, Graph, Outline};
 use crate::error::{Error, Kind, Result};
+use crate::fem::Interpolation;
 use crate::fem::assemble::NodeGraph;
+use crate::linalg::Csr;
 use crate::model::{Body, BodySlot};
 use crate::parallel::agree as agreed;
 use crate::petsc::{Rows, Session, partition};
 use crate::problem::method::{Linear, MethodName};
+use crate::problem::order::Order;
 use crate::problem::solver::Preset;
 use crate::scene::Scene;
 use crate::solver::cost::{self, Candidate, Comparison, Step};
@@ -23,9 +27,6 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Prefix of the PETSc options of the matrix of all bodies.
 pub const WHOLE: &str = "newton";
-
-/// Dofs of all condensed bodies up to which their dense matrix is factored: 0.2 s and 250 MB.
-const DENSE: usize = 3000;
 
 /// Chooses and makes the inner solvers of a scene's bodies.
 pub struct Inner<'a> {
@@ -43,33 +44,13 @@ pub struct Inner<'a> {
     typed: Typed,
     /// Options of the matrix of all bodies.
     whole: Chosen,
+    /// Its interpolation from linear displacements, where bodies have quadratic ones and multigrid.
+    interpolation: Option<Interpolation>,
     plans: Vec<Plan>,
     /// Place of each body in `plans`.
     places: HashMap<String, usize>,
     /// Condensed bodies that an earlier scene has left; `local` is there on the rank that owns it.
     kept: HashMap<String, BodySlot>,
-}
-
-/// The choice for a body.
-struct Plan {
-    name: String,
-    /// Its PETSc options.
-    chosen: Chosen,
-    preset: Preset,
-    reason: String,
-    dimension: usize,
-    dofs: usize,
-    /// Whether it could be condensed.
-    condensable: bool,
-    /// For a condensed body, until it is made.
-    retained: Option<Retained>,
-}
-
-impl Plan {
-    /// Dofs that a condensed body would keep.
-    fn on_contact(&self) -> usize {
-        self.retained.as_ref().map_or(0, |retained| retained.dofs.len())
-    }
 }
 
 impl<'a> Inner<'a> {
@@ -93,6 +74,7 @@ impl<'a> Inner<'a> {
             wanted: scene.method.linear,
             linear: Linear::Sweeps,
             whole: typed.of(WHOLE),
+            interpolation: None,
             typed,
             plans: Vec::new(),
             places: HashMap::new(),
@@ -124,6 +106,16 @@ impl<'a> Inner<'a> {
     /// Options of the matrix of all bodies.
     pub fn whole(&self) -> &Chosen {
         &self.whole
+    }
+
+    /// Interpolation of all bodies from linear displacements, if the matrix of all bodies wants it.
+    pub fn interpolation(&mut self) -> Option<Interpolation> {
+        self.interpolation.take()
+    }
+
+    /// Highest order of the bodies.
+    fn order(&self) -> Order {
+        self.plans.iter().map(|plan| plan.order).max().unwrap_or(Order::P1)
     }
 
     /// The solvers that apply a preconditioner once instead of solving, as a warning each kind.
@@ -210,7 +202,7 @@ impl<'a> Inner<'a> {
             let candidates = plans.iter().zip(outlines).map(|(plan, outline)| {
                 let NodeGraph { ptr, col, .. } = (outline.graph)();
                 let retained = plan.retained.as_ref().filter(|_| plan.condensable);
-                Candidate { dofs: plan.dofs, retained, ptr, col }
+                Candidate { dofs: plan.dofs, order: plan.order, retained, ptr, col }
             });
             let step = match self.method {
                 _ if joined => Step::Joined,
@@ -263,6 +255,7 @@ impl<'a> Inner<'a> {
         let in_space = self.plans.iter().all(|plan| plan.dimension == 3);
         Ok(match self.whole.typed("pc_type") {
             Some("hypre") => Linear::Multigrid,
+            Some("mg") if self.order() == Order::P2 => Linear::Multigrid,
             Some("cholesky" | "lu") => Linear::Direct,
             Some(_) if self.method == MethodName::Auto && !self.whole.has_own() => Linear::Sweeps,
             None if all(Preset::Condensed)
@@ -282,30 +275,12 @@ impl<'a> Inner<'a> {
     }
 }
 
-/// Gives all bodies what Newton's method can join: multigrid if one of them needs it; in the plane one factorisation if together
-/// they have too much contact for one dense matrix.
-fn agree(plans: &mut [Plan]) {
-    let dense: usize = plans.iter().filter(|plan| plan.preset == Preset::Condensed).map(Plan::on_contact).sum();
-    let needs = plans.iter().find(|plan| plan.preset == Preset::Hypre).map(|plan| plan.name.clone());
-    let (preset, why) = match needs {
-        Some(first) => (Preset::Hypre, format!("`{first}` has it, and Newton's method joins the bodies")),
-        None if dense > DENSE && plans.iter().any(|plan| plan.dimension == 2) => {
-            (Preset::Mumps, format!("{dense} of all bodies are on the contact: too many to join by dense algebra"))
-        }
-        None => return,
-    };
-    for plan in plans.iter_mut().filter(|plan| plan.preset != preset) {
-        plan.preset = preset;
-        plan.reason = format!("{} dofs; {why}", plan.dofs);
-    }
-}
-
 impl Factory for Inner<'_> {
     fn plan(&mut self, outlines: &[Outline]) -> Result<()> {
         let mut plans = Vec::new();
         // bodies for which the program is to choose
         let mut open = Vec::new();
-        for (index, &Outline { name, dimension, rows, prescribed, motions, .. }) in outlines.iter().enumerate() {
+        for (index, &Outline { name, dimension, order, rows, prescribed, motions, .. }) in outlines.iter().enumerate() {
             let (dofs, retained) = (rows.columns, Retained::new(dimension, rows, prescribed, motions));
             let chosen = self.typed.of(name);
             // a KSP of all bodies together wants them whole
@@ -317,7 +292,7 @@ impl Factory for Inner<'_> {
                 asked.map_or((Preset::Mumps, String::new()), |(preset, why)| (preset, why.to_owned()));
             let (name, retained) = (name.to_owned(), Some(retained));
             self.places.insert(name.clone(), index);
-            plans.push(Plan { name, chosen, preset, reason, dimension, dofs, condensable, retained });
+            plans.push(Plan { name, chosen, preset, reason, dimension, order, dofs, condensable, retained });
         }
         let (mut plans_open, outlines_open): (Vec<&mut Plan>, Vec<&Outline>) =
             plans.iter_mut().zip(outlines).zip(open).filter_map(|(both, open)| open.then_some(both)).unzip();
@@ -330,14 +305,17 @@ impl Factory for Inner<'_> {
         for plan in &mut self.plans {
             plan.retained = plan.retained.take().filter(|_| plan.preset == Preset::Condensed);
         }
+        let order = self.order();
         match self.linear {
             Linear::Dense => {}
-            Linear::Direct => preset::apply(&mut self.whole, Preset::Mumps),
+            Linear::Direct => preset::apply(&mut self.whole, Preset::Mumps, order),
             Linear::Multigrid => {
                 preset::made_often(&mut self.whole);
-                preset::apply(&mut self.whole, Preset::Hypre);
+                preset::apply(&mut self.whole, Preset::Hypre, order);
             }
-            Linear::Sweeps => self.plans.iter_mut().for_each(|plan| preset::apply(&mut plan.chosen, plan.preset)),
+            Linear::Sweeps => {
+                self.plans.iter_mut().for_each(|plan| preset::apply(&mut plan.chosen, plan.preset, plan.order))
+            }
         }
         Ok(())
     }
@@ -364,7 +342,8 @@ impl Factory for Inner<'_> {
     }
 
     fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>> {
-        let Assembled { name, dimension, body, distribution, rows, motions, left } = assembled;
+        let order = self.order();
+        let Assembled { name, dimension, body, distribution, rows, motions, left, interpolation } = assembled;
         let Some(plan) = self.places.get(&name).map(|&place| &mut self.plans[place]) else {
             return Err(Error::new(Kind::Solver, format!("no solver is planned for body `{name}`")));
         };
@@ -376,6 +355,19 @@ impl Factory for Inner<'_> {
             Linear::Sweeps => preset::in_words(&chosen),
             _ => preset::in_words(&self.whole),
         };
+        let mut levels = None;
+        let has_levels = |chosen: &Chosen, order: Order| chosen.get("pc_type") == Some("mg") && order == Order::P2;
+        match self.linear {
+            Linear::Multigrid if has_levels(&self.whole, order) => {
+                let empty = || Interpolation { rows: Csr::new(0), own: 0 };
+                let whole = self.interpolation.get_or_insert_with(empty);
+                // columns are those of all bodies where dofs are dealt out
+                let first = if distribution.is_some() { 0 } else { whole.rows.columns };
+                whole.append(&interpolation(), first);
+            }
+            Linear::Sweeps if has_levels(&chosen, plan.order) => levels = Some(interpolation()),
+            _ => {}
+        }
         let modes: Vec<Vec<f64>> = match self.linear {
             Linear::Sweeps => motions.into_iter().map(|motion| motion.displacement).collect(),
             _ => Vec::new(),
@@ -383,68 +375,11 @@ impl Factory for Inner<'_> {
         if let Some(distribution) = distribution {
             return Ok(Box::new(SparseBody::<Krylov>::dealt_out(body, &rows, &left, distribution, words)));
         }
-        let make = move |stiffness: Rows| Krylov::new(&session, chosen, dimension, stiffness, &modes);
+        let make = move |stiffness: Rows| Krylov::new(&session, chosen, dimension, stiffness, &modes, levels);
         Ok(Box::new(SparseBody::new(body, rows, &left, make, words)))
     }
 
     fn kept(&mut self, name: &str) -> Option<BodySlot> {
         self.kept.remove(name).filter(|slot| slot.local.is_some())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::linalg::Csr;
-
-    /// A body in space whose contact rows are `contact` dofs.
-    fn plan(name: &str, preset: Preset, contact: usize) -> Plan {
-        let mut rows = Csr::new(30_000);
-        (0..contact).for_each(|i| rows.push_row([(3 * i, 1.0)]));
-        let prescribed: Vec<(usize, f64)> = (29_000..30_000).map(|dof| (dof, 0.0)).collect();
-        let retained = Some(Retained::new(3, &rows, &prescribed, &[]));
-        let chosen = Typed::default().of(name);
-        Plan {
-            name: name.to_owned(),
-            chosen,
-            preset,
-            reason: "its own".to_owned(),
-            dimension: 3,
-            dofs: 30_000,
-            condensable: true,
-            retained,
-        }
-    }
-
-    fn presets(plans: &[Plan]) -> Vec<Preset> {
-        plans.iter().map(|plan| plan.preset).collect()
-    }
-
-    #[test]
-    fn bodies_agree_on_multigrid_alone() {
-        let mut direct = [plan("a", Preset::Condensed, 10), plan("b", Preset::Mumps, 10)];
-        agree(&mut direct);
-        assert_eq!(presets(&direct), [Preset::Condensed, Preset::Mumps]);
-        let mut mixed = [plan("a", Preset::Condensed, 10), plan("b", Preset::Hypre, 10), plan("c", Preset::Mumps, 10)];
-        agree(&mut mixed);
-        assert_eq!(presets(&mixed), [Preset::Hypre; 3]);
-        assert_eq!(mixed[1].reason, "its own");
-        assert!(mixed[2].reason.contains("30000 dofs; `b` has it"), "{}", mixed[2].reason);
-    }
-
-    /// In the plane two contacts of 1500 dofs are joined by dense algebra, with one dof more by one factorisation.
-    #[test]
-    fn wide_contacts_in_the_plane_are_joined_by_a_factorisation() {
-        let pair = |more: usize| {
-            let mut pair = [plan("a", Preset::Condensed, 1500), plan("b", Preset::Condensed, 1500 + more)];
-            pair.iter_mut().for_each(|plan| plan.dimension = 2);
-            pair
-        };
-        let mut narrow = pair(0);
-        agree(&mut narrow);
-        assert_eq!(presets(&narrow), [Preset::Condensed; 2]);
-        let mut flat = pair(1);
-        agree(&mut flat);
-        assert_eq!(presets(&flat), [Preset::Mumps; 2]);
     }
 }

@@ -5,6 +5,7 @@ use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
 use crate::ddm::{Coefficient, Method, Start, Sweeps, first_springs};
 use crate::error::{Error, Kind, Result};
+use crate::fem::Interpolation;
 use crate::model::{LinearStep, Model};
 use crate::petsc::Session;
 use crate::problem::method::{Gamma, Linear, MethodName};
@@ -18,12 +19,19 @@ use crate::solver::{Dense, Krylov, Monolithic, Union};
 /// # Errors
 /// Failures of PETSc.
 pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<Method> {
-    let Built { scene, discrete, linear, whole, .. } = built;
+    let Built { scene, discrete, linear, whole, interpolation, .. } = built;
     let model = &mut discrete.model;
     let coefficient = || Coefficient::new(scene.method.psi.clone(), scene.method.robin);
     let acceleration: Box<dyn Acceleration> = match scene.method.name {
         MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => {
-            return Ok(Method::Newton(linear_step(session, scene, model, (*linear, whole), coefficient(), start)?));
+            return Ok(Method::Newton(linear_step(
+                session,
+                scene,
+                model,
+                (*linear, whole, interpolation.take()),
+                coefficient(),
+                start,
+            )?));
         }
         MethodName::Robin => Box::new(Relaxed::new(rule(&scene.method.gamma))),
         MethodName::Ncg => Box::new(Conjugate::default()),
@@ -33,12 +41,12 @@ pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<M
     Ok(Method::Sweeps { acceleration, coefficient: coefficient(), linear: Box::new(Sweeps::carried()) })
 }
 
-/// What solves the linear steps of Newton's method: how, and the options of the matrix of all bodies.
+/// What solves the linear steps of Newton's method: how, with the options of the matrix of all bodies and its interpolation.
 fn linear_step(
     session: &Session,
     scene: &Scene,
     model: &mut Model,
-    (linear, whole): (Linear, &Chosen),
+    (linear, whole, interpolation): (Linear, &Chosen, Option<Interpolation>),
     coefficient: Coefficient,
     start: &mut Start,
 ) -> Result<Box<dyn LinearStep>> {
@@ -57,7 +65,7 @@ fn linear_step(
     let mut step: Box<dyn LinearStep> = match linear {
         Linear::Dense => Box::new(Monolithic::new(union.without_zeros(), |stiffness| Ok(Dense::new(stiffness)))?),
         _ => {
-            let krylov = |stiffness| Krylov::new(session, whole.clone(), block, stiffness, &[]);
+            let krylov = |stiffness| Krylov::new(session, whole.clone(), block, stiffness, &[], interpolation);
             let monolithic = Monolithic::new(union, krylov)?;
             model.joint = nodes.then(|| monolithic.joint());
             Box::new(monolithic)

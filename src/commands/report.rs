@@ -14,14 +14,16 @@ use crate::discretize::Discrete;
 use crate::error::{Kind, few};
 use crate::estimate::Estimate;
 use crate::model::BodyCounts;
-use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::sci;
 use crate::output::vtu::Grid;
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, InnerTimes, IntervalReport, LISTED, PairReport, PairRow, Report,
+    BodyReport, Color, ContactTable, ConvergenceSeries, EstimateReport, InnerTimes, IntervalReport, LISTED, PairReport,
+    PairRow, Plot, Report, Series, Style,
 };
 use crate::parallel::share;
 use crate::petsc::Session;
+use crate::problem::units::label;
+use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -147,10 +149,23 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
             })
             .collect(),
         times: clock.times.clone(),
+        memory: clock.memory.clone(),
+        command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect(),
+        directory: std::env::current_dir().map_or(String::new(), |path| path.display().to_string()),
+        petsc_options: petsc_options(session),
         warnings: built.warnings.clone(),
         settings: scene.settings(),
         ..Report::default()
     }
+}
+
+/// PETSc options as they are typed, from wherever they come; those that PETSc cannot list are no reason to stop.
+fn petsc_options(session: &Session) -> Vec<String> {
+    let option = |(name, value): (String, Option<String>)| match value {
+        Some(value) => format!("-{name} {value}"),
+        None => format!("-{name}"),
+    };
+    session.options().all().unwrap_or_default().into_iter().map(option).collect()
 }
 
 /// What only the owner of a body knows: counts over all bodies and the inner solver of each in words.
@@ -310,29 +325,28 @@ pub fn convergence(label: &str, outcome: &Outcome) -> ConvergenceSeries {
     ConvergenceSeries { label: label.to_owned(), rows }
 }
 
-/// Pressure of pair `i` along its surface (the coordinate that varies most), and the scene's reference for it.
-pub fn pressure(label: &str, done: &Done, i: usize) -> PressureSeries {
+/// Pressure of pair `i` along its surface (the coordinate that varies most).
+pub fn pressure(label: &str, done: &Done, i: usize) -> Series {
     let model = done.model();
     let (axis, _) = main_axis(&model.pairs[i]);
-    PressureSeries {
-        label: label.to_owned(),
-        s: model.pairs[i].position.iter().map(|x| x[axis]).collect(),
-        p: done.outcome.layer.pressure[model.range(i)].to_vec(),
-        dashed: false,
-    }
+    let pressure = &done.outcome.layer.pressure[model.range(i)];
+    let points = model.pairs[i].position.iter().zip(pressure).map(|(x, &p)| (x[axis], p)).collect();
+    Series::new(label, points, Style::Line)
 }
 
-/// The scene's reference pressure of pair `i`, drawn dashed.
-pub fn reference(discrete: &Discrete, i: usize) -> Option<PressureSeries> {
+/// The scene's reference pressure of pair `i`.
+pub fn reference(discrete: &Discrete, i: usize) -> Option<Series> {
     let field = discrete.contacts[i].spec.reference.as_ref()?;
     let (axis, _) = main_axis(&discrete.model.pairs[i]);
-    let position = &discrete.model.pairs[i].position;
-    Some(PressureSeries {
-        label: "reference".to_owned(),
-        s: position.iter().map(|x| x[axis]).collect(),
-        p: position.iter().map(|&x| field.eval(x)).collect(),
-        dashed: true,
-    })
+    let points = discrete.model.pairs[i].position.iter().map(|&x| (x[axis], field.eval(x))).collect();
+    Some(Series::new("reference", points, Style::Dashed).color(Color::Grey))
+}
+
+/// The plot of pressures along pair `i`, in the units of the scene.
+pub fn pressure_plot(title: &str, scene: &Scene, pair: &ContactPair, curves: Vec<Series>) -> Plot {
+    let units = scene.units.as_ref();
+    let x = label(main_axis(pair).1, units.map(|units| units.length));
+    Plot::pressure(title, &x, &label("contact pressure", units.map(|units| units.stress)), curves)
 }
 
 /// The coordinate along which a pair's points spread most, and its name.

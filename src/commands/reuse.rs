@@ -48,7 +48,7 @@ pub fn build(
 fn settings(scene: &Scene, without: &[&str]) -> Value {
     let mut settings = scene.settings();
     if let Value::Object(map) = &mut settings {
-        ["title", "method", "output"].iter().for_each(|key| drop(map.remove(*key)));
+        ["title", "units", "method", "output"].iter().for_each(|key| drop(map.remove(*key)));
     }
     let contacts = settings.get_mut("contact").and_then(Value::as_array_mut).into_iter().flatten();
     for contact in contacts.filter_map(Value::as_object_mut) {

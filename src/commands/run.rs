@@ -131,8 +131,9 @@ impl<const D: usize> Source<D> {
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear(), inner.whole().clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());
+        let interpolation = inner.interpolation();
         let scene = scene.clone();
-        Ok(Built { scene, discrete, linear, whole, choice, condensed, warnings, again: None })
+        Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, warnings, again: None })
     }
 }
 

@@ -12,7 +12,7 @@ use crate::ddm::{Observer, Row, Status};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::output::{Folder, HistoryWriter, IterationTable, StepTable, Verbosity, say};
-use crate::parallel::agree;
+use crate::parallel::{agree, share};
 use crate::petsc::Session;
 use std::path::{Path, PathBuf};
 
@@ -100,6 +100,10 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
             report.message = format!("the error asked for is not reached: {limit}");
         }
     });
+    let written = match plan.scene.output.report {
+        true => written.and(page(&done, path, first)),
+        false => written,
+    };
     let code = if plan.limit.is_some() { 1 } else { report::exit_code(&done) };
     if first {
         let file = path.join(checkpoint::FILE);
@@ -123,6 +127,12 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     }
     failed.and(written)?;
     Ok(code)
+}
+
+/// Writes the page of the results when all ranks have written their fields. Collective.
+fn page(done: &Done, path: &Path, first: bool) -> Result<()> {
+    share(&*done.model().exchange, &());
+    if first { crate::report::save(path, None).map(|_| ()) } else { Ok(()) }
 }
 
 fn history(folder: &Folder, built: &Built) -> Result<HistoryWriter> {
@@ -192,7 +202,7 @@ impl Keep for Watchers<'_> {
     fn state(&mut self, done: &Done) {
         let Status::Paused { asked } = done.outcome.status else { return };
         let is_due = signal(asked).is_some() || !is_snapshot(asked);
-        let Some(head) = self.plan.head().filter(|_| is_due) else { return };
+        let Some(head) = is_due.then(|| self.plan.head()).flatten() else { return };
         let written = Checkpoint::write(self.path, head, done, self.session.rank() == 0);
         self.saved |= written.is_ok();
         self.note_failure("a checkpoint", written);

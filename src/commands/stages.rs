@@ -5,6 +5,7 @@ use crate::ddm::{Discretisation, Method, Outcome, Row, Start};
 use crate::discretize::Discrete;
 use crate::error::Result;
 use crate::estimate::Nodal;
+use crate::fem::Interpolation;
 use crate::model::{BodySlot, Model};
 use crate::output::StepReport;
 use crate::problem::method::Linear;
@@ -22,6 +23,8 @@ pub struct Built {
     pub linear: Linear,
     /// PETSc options of the matrix of all bodies.
     pub whole: Chosen,
+    /// Interpolation of all bodies from linear displacements, until multigrid has it.
+    pub interpolation: Option<Interpolation>,
     /// Why the inner solver is what it is where no PETSc option was typed.
     pub choice: String,
     /// Names of the condensed bodies, with which another run can go on.

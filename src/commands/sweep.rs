@@ -10,9 +10,8 @@ use super::{folder_of, measure, report, results, reuse};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
-use crate::output::plot::{ConvergenceSeries, PressureSeries};
 use crate::output::steps::{vector_columns, vector_fields};
-use crate::output::{Folder, LISTED, Plot, Report, busiest, say, sci};
+use crate::output::{ConvergenceSeries, Folder, LISTED, Plot, Report, Series, busiest, say, sci};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use std::collections::BTreeMap;
@@ -89,8 +88,8 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         let pairs = &done.model().pairs;
         let shown = shown.get_or_insert_with(|| busiest(&report.pairs, scenes[0].output.pairs.unwrap_or(LISTED)));
         for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
-            let curve = (report::main_axis(&pairs[i]).1, report::pressure(&label, &done, i));
-            pressures.entry(i).or_default().push(curve);
+            let empty = || report::pressure_plot(&scene.title, scene, &pairs[i], Vec::new());
+            pressures.entry(i).or_insert_with(empty).series.push(report::pressure(&label, &done, i));
             if let Some(curve) = report::reference(&done.built.discrete, i) {
                 reference.get_or_insert((i, curve));
             }
@@ -103,7 +102,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     }
     if first {
         if scenes[0].output.plots {
-            plots(&folder, &scenes[0].title, histories, pressures, reference)?;
+            plots(&folder, &scenes[0].title, &histories, pressures, reference)?;
         }
         if request.json {
             let list = serde_json::to_string_pretty(&reports).map_err(|cause| {
@@ -232,24 +231,23 @@ fn row(table: &mut csv::Writer<std::fs::File>, folder: &Folder, fields: Vec<Stri
     written.map_err(|cause| Error::file(&folder.path().join("sweep.csv"), "write", &cause))
 }
 
-/// The pressures of all runs along each pair, with the name of the coordinate.
-type Pressures = BTreeMap<usize, Vec<(&'static str, PressureSeries)>>;
+/// The pressures of all runs along each pair.
+type Pressures = BTreeMap<usize, Plot>;
 
 fn plots(
     folder: &Folder,
     title: &str,
-    histories: Vec<ConvergenceSeries>,
+    histories: &[ConvergenceSeries],
     pressures: Pressures,
-    reference: Option<(usize, PressureSeries)>,
+    reference: Option<(usize, Series)>,
 ) -> Result<()> {
-    let convergence = Plot::convergence(title, &histories);
+    let convergence = Plot::convergence(title, histories);
     folder.write("convergence.svg", |out| convergence.write(out))?;
     let names = shown::numbered(pressures.iter().map(|_| "pressure".to_owned()));
     for ((pair, of_pair), name) in pressures.into_iter().zip(names) {
-        let axis = of_pair.first().map_or("x", |(axis, _)| axis);
-        let mut curves: Vec<PressureSeries> = of_pair.into_iter().map(|(_, curve)| curve).collect();
+        let mut curves = of_pair.series;
         curves.extend(reference.iter().filter(|(index, _)| *index == pair).map(|(_, curve)| curve.clone()));
-        let plot = Plot::pressure(title, axis, &curves);
+        let plot = Plot::pressure(title, &of_pair.x.label, &of_pair.y.label, curves);
         folder.write(&format!("{name}.svg"), |out| plot.write(out))?;
     }
     Ok(())

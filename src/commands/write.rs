@@ -102,6 +102,9 @@ impl Writing<'_> {
             .filter_map(|path| path.strip_prefix(folder.path()).ok())
             .map(|name| name.to_string_lossy().into_owned())
             .collect();
+        if fields && self.done.built.scene.output.report {
+            names.push(crate::report::FILE.to_owned());
+        }
         if fields {
             names.extend(self.done.built.discrete.bodies.iter().map(|body| format!("{}.vtu", body.name)));
         }
@@ -166,13 +169,12 @@ impl Plots {
         for &(i, ref file) in &self.plotted {
             let mut curves = vec![report::pressure("pressure", done, i)];
             curves.extend(report::reference(&done.built.discrete, i));
-            let (_, axis) = report::main_axis(&model.pairs[i]);
             // with more plots than pairs that a person knows by heart, each says whose it is
             let title = match model.pairs.len() {
                 ..=LISTED => scene.title.clone(),
                 _ => format!("{}: {} - {}", scene.title, model.pairs[i].surfaces[0], model.pairs[i].surfaces[1]),
             };
-            let plot = Plot::pressure(&title, axis, &curves);
+            let plot = report::pressure_plot(&title, scene, &model.pairs[i], curves);
             folder.write(file, |out| plot.write(out))?;
         }
         Ok(())

@@ -166,10 +166,6 @@ impl Run<'_> {
         {
             return Ok(Some(Status::Converged));
         }
-        let closed = places.compression.iter().map(|&c| c > 0.0);
-        if let Some(period) = self.memory.cycle.period(&u.trace, closed, worst, measured.f1) {
-            return Ok(Some(Status::Cycle { period }));
-        }
         if self.memory.floor.is_reached(worst) {
             let floor = rounding(self.model, u, places).sqrt();
             let reference = self.scale.energy(measured.strain + places.work).sqrt();

@@ -2,8 +2,8 @@
 
 use super::draft::Draft;
 use crate::contact::ContactPair;
-use crate::fem::ElasticBody;
 use crate::fem::assemble::NodeGraph;
+use crate::fem::{ElasticBody, Interpolation};
 use crate::linalg::Csr;
 use crate::model::{Distribution, Exchange};
 use std::rc::Rc;
@@ -66,27 +66,41 @@ pub fn graph<const D: usize>(graphs: &[&NodeGraph], drafts: &[Draft], pairs: &[C
 /// A body that is dealt out, as one rank sees it.
 pub struct Dealt {
     /// The dofs of this rank.
-    pub distribution: Distribution,
+    pub distribution: Rc<Distribution>,
     /// The rank that speaks for the body.
     pub leader: usize,
     /// Number of each node in the matrix of all bodies.
     number: Vec<u32>,
+    /// The same of its coarse nodes among all of these.
+    coarse: Vec<u32>,
+    /// Coarse nodes of all bodies, and those of this body that this rank has.
+    coarse_nodes: [usize; 2],
 }
 
-/// What rank `rank` knows of each body when `owner` has the rank of every node, body by body.
+/// What rank `rank` knows of each body when `owner` has the rank of every node, body by body; `coarse` are the coarse nodes of each.
 pub fn distribute<const D: usize>(
     drafts: &[Draft],
+    coarse: &[Vec<u32>],
     owner: &[u32],
     (rank, ranks): (usize, usize),
     exchange: &Rc<dyn Exchange>,
 ) -> Vec<Dealt> {
     // numbers of nodes in the matrix of all bodies: rank by rank, there body by body
-    let mut next = vec![0; ranks + 1];
-    owner.iter().for_each(|&owner| next[owner as usize + 1] += 1);
-    (0..ranks).for_each(|rank| next[rank + 1] += next[rank]);
+    let starts = |owners: &mut dyn Iterator<Item = u32>| {
+        let mut starts = vec![0; ranks + 1];
+        owners.for_each(|owner| starts[owner as usize + 1] += 1);
+        (0..ranks).for_each(|rank| starts[rank + 1] += starts[rank]);
+        starts
+    };
+    let mut next = starts(&mut owner.iter().copied());
+    let first = drafts.iter().scan(0, |first, draft| Some(std::mem::replace(first, *first + draft.rows.columns / D)));
+    let of_coarse =
+        coarse.iter().zip(first).flat_map(|(nodes, first)| nodes.iter().map(move |&node| owner[first + node as usize]));
+    let mut next_coarse = starts(&mut of_coarse.clone());
+    let coarse_total = next_coarse[ranks] as usize;
     let (start, total) = (D * next[rank] as usize, D * owner.len());
     let mut owner = owner;
-    let of_body = |draft: &Draft| {
+    let of_body = |(draft, coarse): (&Draft, &Vec<u32>)| {
         let nodes = draft.rows.columns / D;
         let of_node;
         (of_node, owner) = owner.split_at(nodes);
@@ -104,6 +118,14 @@ pub fn distribute<const D: usize>(
         for q in 0..draft.rows.rows() {
             rows.push_row(draft.rows.row(q).map(|(dof, value)| (D * number[dof / D] as usize + dof % D, value)));
         }
+        let mut coarse_here = 0;
+        let number_coarse = |&node: &u32| {
+            let owner = of_node[node as usize] as usize;
+            coarse_here += usize::from(owner == rank);
+            next_coarse[owner] += 1;
+            next_coarse[owner] - 1
+        };
+        let coarse = coarse.iter().map(number_coarse).collect();
         let distribution = Distribution {
             dofs: D * nodes,
             first: own.first().map_or(start, |&node| D * number[node] as usize),
@@ -114,16 +136,27 @@ pub fn distribute<const D: usize>(
             leads: leader == rank,
             exchange: exchange.clone(),
         };
-        Dealt { distribution, leader, number }
+        Dealt { distribution: Rc::new(distribution), leader, number, coarse, coarse_nodes: [coarse_total, coarse_here] }
     };
-    drafts.iter().map(of_body).collect()
+    drafts.iter().zip(coarse).map(of_body).collect()
 }
 
 impl Dealt {
     /// Whether a node is an own one.
     pub fn is_own<const D: usize>(&self, node: usize) -> bool {
-        let Distribution { first, own, .. } = &self.distribution;
+        let Distribution { first, own, .. } = &*self.distribution;
         (*first..first + own.len()).contains(&(D * self.number[node] as usize))
+    }
+
+    /// The rows of own dofs of an interpolation; columns are those of all bodies.
+    pub fn interpolation<const D: usize>(&self, whole: &Interpolation) -> Interpolation {
+        let [all, own] = self.coarse_nodes;
+        let mut rows = Csr::new(D * all);
+        for &dof in &self.distribution.own {
+            let number = |j: usize| D * self.coarse[j / D] as usize + j % D;
+            rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
+        }
+        Interpolation { rows, own: D * own }
     }
 
     /// A body that was assembled for own nodes alone, in its own dofs; columns of K are those of the matrix of all bodies.

@@ -2,11 +2,13 @@
 
 use super::distribute::Graph;
 use crate::error::Result;
-use crate::fem::ElasticBody;
 use crate::fem::assemble::NodeGraph;
 use crate::fem::rigid::{FreeMotion, RigidMotion};
+use crate::fem::{ElasticBody, Interpolation};
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot, Distribution};
+use crate::problem::order::Order;
+use std::rc::Rc;
 
 /// What every rank knows of a body before its owner assembles it.
 pub struct Outline<'a> {
@@ -14,6 +16,8 @@ pub struct Outline<'a> {
     pub name: &'a str,
     /// Space dimension: dofs of a node.
     pub dimension: usize,
+    /// Order of its elements.
+    pub order: Order,
     /// All contact rows of the body, pair by pair; columns: its dofs.
     pub rows: &'a Csr,
     /// Prescribed (dof, value), sorted by dof.
@@ -50,7 +54,7 @@ pub trait Factory {
 }
 
 /// A body ready for its inner solver.
-pub struct Assembled {
+pub struct Assembled<'a> {
     /// Name in the scene.
     pub name: String,
     /// Space dimension: block size of the matrix.
@@ -58,7 +62,7 @@ pub struct Assembled {
     /// K, f and supports: of all dofs, or of those of this rank.
     pub body: ElasticBody,
     /// How the dofs are dealt out, if they are.
-    pub distribution: Option<Distribution>,
+    pub distribution: Option<Rc<Distribution>>,
     /// All contact rows of the body, pair by pair.
     pub rows: Csr,
     /// Motions with hardly any strain in a few cells, for multigrid's near-null space: the rigid ones of the free body, in one of
@@ -66,4 +70,7 @@ pub struct Assembled {
     pub motions: Vec<RigidMotion>,
     /// Those that its supports leave.
     pub left: Vec<FreeMotion>,
+    /// Interpolation of its displacements from linear ones, for multigrid: made when it is asked for. Rows: the dofs of `body`; columns: of
+    /// this body alone, or of all where dofs are dealt out.
+    pub interpolation: &'a dyn Fn() -> Interpolation,
 }

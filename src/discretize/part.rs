@@ -7,6 +7,7 @@ use super::supports::Held;
 use crate::contact;
 use crate::error::{Error, Result};
 use crate::fem::assemble::{self, NodalBlock};
+use crate::fem::interpolation::{Interpolation, coarse_nodes, from_vertices};
 use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
 use crate::linalg::{Csr, countable, dot};
@@ -114,7 +115,7 @@ impl<'a, const D: usize> Part<'a, D> {
             self.add_load(spec, spec.factor, mesh, &mut load)?;
         }
         if let Some(fields) = &self.spec.force {
-            let values = Values::of("this body force");
+            let values = Values::of("this body force", &name.value);
             let density = |x: [f64; D]| std::array::from_fn(|c| self.spec.force_factor * values.at(&fields[c], x));
             assemble::body_force(&self.space, &density, &mut load);
             values.refused()?;
@@ -138,7 +139,7 @@ impl<'a, const D: usize> Part<'a, D> {
         if area == 0.0 {
             return Err(without_area(&spec.on, self.spec));
         }
-        let values = Values::of("this load");
+        let values = Values::of("this load", &name.value);
         surface::surface_load(
             &self.space,
             &facets,
@@ -205,6 +206,16 @@ impl<'a, const D: usize> Part<'a, D> {
             .filter(|nodes| nodes.len() > 1)
             .collect();
         NodeGraph::new(&self.space, &coupled, &self.held.frame)
+    }
+
+    /// The nodes that linear displacements have, sorted.
+    pub fn coarse_nodes(&self) -> Vec<u32> {
+        coarse_nodes(&self.space, &self.held.frame)
+    }
+
+    /// Interpolation of the dofs from those at these nodes.
+    pub fn interpolation(&self, coarse: &[u32]) -> Interpolation {
+        from_vertices(&self.space, &self.held.frame, |dof| self.held.prescribed.contains_key(&dof), coarse)
     }
 
     /// K on its graph, f and supports; `carried` is the rigid motion that was taken out of `prescribed`, if any. The graph may have the

@@ -66,6 +66,9 @@ impl Kind {
 /// An element: its kind, and its nodes.
 type Element = (usize, Vec<u64>);
 
+/// The same with Gmsh's number of its kind.
+type Numbered = (u8, Vec<u64>);
+
 /// What a file holds.
 #[derive(Default)]
 struct Model {
@@ -234,9 +237,9 @@ impl Model {
 
     /// All groups, each a physical one on an entity of its own: what is in several groups is written for each.
     fn write(&self) -> Said<String> {
-        let mut groups: Vec<(usize, &str, Vec<(u8, Vec<u64>)>)> = Vec::new();
+        let mut groups: Vec<(usize, &str, Vec<Numbered>)> = Vec::new();
         for (set, tags) in &self.element_sets {
-            let mut of_dimension: BTreeMap<usize, Vec<(u8, Vec<u64>)>> = BTreeMap::new();
+            let mut of_dimension: BTreeMap<usize, Vec<Numbered>> = BTreeMap::new();
             for tag in tags {
                 let (kind, nodes) = self
                     .elements

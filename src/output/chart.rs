@@ -1,43 +1,53 @@
-//! Drawing of a [`Plot`] as SVG: axes by plotters, curves, legend.
+//! Drawing of a [`Plot`] as SVG by plotters: axes, ticks, curves, and a legend beside the axes, where it covers nothing.
 
-use super::folder::write_whole;
-use super::format::{shorten, superscript, text_width};
-use super::look::{Area, FINE, GREY, Look, Place, SAMPLE, fine, looks};
-use super::plot::{Axis, Plot, Series};
-use super::ticks::{Scale, drawable};
-use crate::error::Result;
-use plotters::chart::ChartBuilder;
-use plotters::element::Rectangle;
-use plotters::prelude::{IntoDrawingArea, SVGBackend};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{BLACK, Color, FontFamily, FontStyle, RGBColor, TextStyle, WHITE};
+use super::format::superscript;
+use super::plot::{Axis, Color, Plot, Series, Style};
+use plotters::chart::{ChartBuilder, SeriesLabelPosition};
+use plotters::coord::Shift;
+use plotters::coord::combinators::LogCoord;
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
+use plotters::element::{DashedPathElement, DynElement, IntoDynElement, PathElement, Polygon};
+use plotters::prelude::{DrawingArea, IntoDrawingArea, IntoLogRange, SVGBackend};
+use plotters::style::{Color as _, FontFamily, FontStyle, RGBColor, ShapeStyle, TextStyle, WHITE};
 use std::io::{self, Write};
 use std::ops::Range;
-use std::path::Path;
 
-/// Width and height of a picture, in pixels.
-const SIZE: (f64, f64) = (900.0, 560.0);
-
-const TITLE_SIZE: f64 = 17.0;
-const LABEL_SIZE: f64 = 14.0;
-const TICK_SIZE: f64 = 12.5;
+/// Width and height of a picture in pixels.
+const SIZE: (u32, u32) = (900, 560);
+/// plotters rounds to whole units: drawn 20 times larger and shown smaller, curves stay smooth.
+const FINE: f64 = 20.0;
 /// Labels that an axis has at most, about.
 const TICKS: usize = 8;
+/// Labels for which plotters divides a decade by all its numbers.
+const DIVIDED: usize = 12;
+/// Names that a legend has room for.
+const NAMES: usize = 24;
 
-const LEGEND_SIZE: f64 = 13.0;
-/// Height of a line of the legend.
-const LINE: f64 = 20.0;
-const PADDING: f64 = 9.0;
-/// Distance of the legend from the axes.
-const APART: f64 = 12.0;
-/// Widest label of a legend.
-const WIDEST: f64 = 230.0;
-/// Most entries of a legend that stands inside the axes.
-const INSIDE: usize = 4;
+/// Colours of Okabe and Ito that stand out on white: colour-blind readers can tell them apart.
+const PALETTE: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+];
+const GREY: RGBColor = RGBColor(90, 90, 90);
+/// Corners of the marks in pixels from their middle.
+const MARKS: [&[(f64, f64)]; 4] = [
+    &[(-1.6, -3.7), (1.6, -3.7), (3.7, -1.6), (3.7, 1.6), (1.6, 3.7), (-1.6, 3.7), (-3.7, 1.6), (-3.7, -1.6)],
+    &[(-3.5, -3.5), (3.5, -3.5), (3.5, 3.5), (-3.5, 3.5)],
+    &[(0.0, -5.0), (4.6, 3.4), (-4.6, 3.4)],
+    &[(0.0, -5.2), (4.4, 0.0), (0.0, 5.2), (-4.4, 0.0)],
+];
 
-const FRAME: RGBColor = RGBColor(60, 60, 60);
-const GRID: RGBColor = RGBColor(222, 222, 222);
-const FINE_GRID: RGBColor = RGBColor(241, 241, 241);
+/// What plotters reports; drawing to memory has no failure that is known.
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+/// A place on the picture in units of plotters.
+type At = (i32, i32);
 
 impl Plot {
     /// Writes the plot as SVG, 900 by 560 pixels, on white.
@@ -45,190 +55,286 @@ impl Plot {
     /// # Errors
     /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(draw(self)?.as_bytes())
+        out.write_all(self.text()?.as_bytes())
     }
 
-    /// Writes the plot as an SVG file, the whole file or nothing.
+    /// The SVG text that [`Self::write`] writes.
     ///
     /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) when it cannot be written.
-    pub fn save(&self, path: &Path) -> Result<()> {
-        write_whole(path, |out| self.write(out))
+    /// None that is known: those of drawing to memory.
+    pub fn text(&self) -> io::Result<String> {
+        self.svg().map_err(io::Error::other)
     }
-}
 
-/// Draws a plot and returns the SVG text.
-///
-/// # Errors
-/// Those of plotters; drawing to memory has none that are known.
-fn draw(plot: &Plot) -> io::Result<String> {
-    let legend = Legend::new(plot);
-    match picture(plot, &legend, false)? {
-        Some(text) => Ok(text),
-        None => Ok(picture(plot, &legend, true)?.unwrap_or_default()),
+    /// The SVG text.
+    fn svg(&self) -> Result<String, Failure> {
+        let mut text = String::new();
+        let [width, height] = [SIZE.0, SIZE.1].map(|size| size * FINE as u32);
+        self.draw(&SVGBackend::with_string(&mut text, (width, height)).into_drawing_area())?;
+        let shown = format!("width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"", SIZE.0, SIZE.1);
+        Ok(text.replacen(&format!("width=\"{width}\" height=\"{height}\""), &shown, 1))
     }
-}
 
-/// The SVG text with the legend beside the axes, or inside them; none if it would cover a curve there.
-fn picture(plot: &Plot, legend: &Legend, beside: bool) -> io::Result<Option<String>> {
-    let mut text = String::new();
-    {
-        let area = SVGBackend::with_string(&mut text, (fine(SIZE.0) as u32, fine(SIZE.1) as u32)).into_drawing_area();
-        area.fill(&WHITE).map_err(io::Error::other)?;
-        let (curves, frame) = draw_axes(plot, &area, if beside { legend.width() + APART } else { 0.0 })?;
-        let corner = match beside {
-            true => Some((frame.0.end + fine(APART), frame.1.start)),
-            false => legend.corner(&frame, &curves),
+    fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), Failure> {
+        area.fill(&WHITE)?;
+        // a point that one axis cannot show must not stretch the other
+        let shown = |(x, y): &&(f64, f64)| drawable(*x, self.x.log) && drawable(*y, self.y.log);
+        let points = || self.series.iter().flat_map(|series| &series.points).filter(shown);
+        let [xs, ys] = [|point: &(f64, f64)| point.0, |point: &(f64, f64)| point.1];
+        let (x, y) = (Scale::new(points().map(xs), self.x.log), Scale::new(points().map(ys), self.y.log));
+        let counts = [x.labels(points().map(xs)), y.labels(points().map(ys))];
+        let titles = [x.title(&self.x, 70), y.title(&self.y, 60)];
+        let named: Vec<(String, Look)> = self
+            .series
+            .iter()
+            .zip(looks(&self.series))
+            .map(|(series, look)| (cut(&series.label, 36), look))
+            .filter(|(label, _)| !label.is_empty() && self.series.len() > 1)
+            .collect();
+        let legend = match named.iter().map(|(label, _)| label.chars().count()).max() {
+            Some(longest) => 56.0 + 7.6 * longest as f64,
+            None => 0.0,
         };
-        let Some(corner) = corner else { return Ok(None) };
-        for (pieces, look) in curves.iter().zip(looks(&plot.series)) {
-            pieces.iter().try_for_each(|piece| look.draw(&area, piece))?;
+
+        let (left, right) = area.split_horizontally(fine(f64::from(SIZE.0) - legend));
+        let mut builder = ChartBuilder::on(&left);
+        builder.margin(fine(12.0)).margin_right(fine(24.0));
+        builder.x_label_area_size(fine(48.0)).y_label_area_size(fine(68.0));
+        if !self.title.is_empty() {
+            let mut style = font(17.0);
+            style.font = style.font.style(FontStyle::Bold);
+            builder.caption(cut(&self.title, 90), style);
         }
-        if curves.iter().all(Vec::is_empty) {
-            let middle = ((frame.0.start + frame.0.end) / 2, (frame.1.start + frame.1.end) / 2);
-            let style = font(LABEL_SIZE).pos(Pos::new(HPos::Center, VPos::Center)).color(&GREY);
-            area.draw_text("nothing to show", &style, middle).map_err(io::Error::other)?;
+        let mut chart = builder.build_cartesian_2d(x, y)?;
+        let mut mesh = chart.configure_mesh();
+        mesh.x_desc(&titles[0]).y_desc(&titles[1]).x_labels(counts[0]).y_labels(counts[1]);
+        let [across, up] = counts.map(|count| if count == DIVIDED { 1 } else { 10 });
+        mesh.x_max_light_lines(across).y_max_light_lines(up);
+        mesh.label_style(font(12.5)).axis_desc_style(font(14.0)).set_all_tick_mark_size(fine(5.0));
+        let grey = |level: u8, width: f64| RGBColor(level, level, level).stroke_width(fine(width) as u32);
+        mesh.axis_style(grey(60, 1.0)).bold_line_style(grey(222, 0.9)).light_line_style(grey(243, 0.8)).draw()?;
+
+        for (series, look) in self.series.iter().zip(looks(&self.series)) {
+            let place = |point: &(f64, f64)| shown(&point).then(|| chart.backend_coord(point));
+            let places: Vec<Option<At>> = series.points.iter().map(place).collect();
+            for piece in places.split(Option::is_none).filter(|piece| !piece.is_empty()) {
+                let piece: Vec<At> = piece.iter().flatten().copied().collect();
+                look.elements(&piece).iter().try_for_each(|element| area.draw(element))?;
+            }
         }
-        legend.draw(&area, corner, frame.1.end)?;
-        area.present().map_err(io::Error::other)?;
+
+        // a legend stands on a chart: this one has nothing else
+        let mut chart = ChartBuilder::on(&right).build_cartesian_2d(0.0..1.0, 0.0..1.0)?;
+        let nothing = || std::iter::empty::<PathElement<(f64, f64)>>();
+        for (label, look) in named.iter().take(NAMES).cloned() {
+            chart.draw_series(nothing())?.label(label).legend(move |at| look.sample(at));
+        }
+        if named.len() > NAMES {
+            chart.draw_series(nothing())?.label(format!("and {} more", named.len() - NAMES));
+        }
+        let mut labels = chart.configure_series_labels();
+        labels.position(SeriesLabelPosition::Coordinate(0, fine(30.0))).margin(0).legend_area_size(fine(38.0));
+        labels.label_font(font(13.0)).draw()?;
+        Ok(area.present()?)
     }
-    // plotters' outer element takes the fine size for the shown one: put ours around the content
-    let content = text.find('>').zip(text.rfind("</svg>")).and_then(|(head, tail)| text.get(head + 1..tail));
-    let content = content.ok_or_else(|| io::Error::other("plotters wrote no SVG element"))?;
-    let (width, height) = SIZE;
-    Ok(Some(format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {} {}\" \
-         stroke-linejoin=\"round\">{content}</svg>\n",
-        fine(width),
-        fine(height)
-    )))
 }
 
-/// For each series its pieces between gaps.
-type Curves = Vec<Vec<Vec<Place>>>;
+/// An axis of plotters.
+enum Scale {
+    /// Of values in units of this power of ten.
+    Linear(RangedCoordf64, i32),
+    Log(LogCoord<f64>),
+}
 
-/// Rectangle of the axes.
-type Frame = (Range<i32>, Range<i32>);
-
-/// Draws title and axes, with room of some pixels at the right; where the curves and the axes are.
-fn draw_axes(plot: &Plot, area: &Area, room: f64) -> io::Result<(Curves, Frame)> {
-    // a point that one axis cannot show must not stretch the other
-    let shown = |(x, y): &&(f64, f64)| drawable(*x, plot.x.log) && drawable(*y, plot.y.log);
-    let points = || plot.series.iter().flat_map(|series| &series.points).filter(shown);
-    let y = Scale::new(points().map(|point| point.1), plot.y.log, TICKS);
-    let left = 44.0 + y.widest_label(TICK_SIZE);
-    let width = SIZE.0 - left - 32.0 - room;
-    // long numbers get fewer ticks
-    let x_scale = |ticks| Scale::new(points().map(|point| point.0), plot.x.log, ticks);
-    let fits = |x: &Scale| x.widest_label(TICK_SIZE) + 14.0 < x.spacing() * width;
-    let x = [TICKS, 6, 4].map(x_scale).into_iter().find(fits).unwrap_or_else(|| x_scale(2));
-
-    let mut builder = ChartBuilder::on(area);
-    builder.margin_top(fine(12.0)).margin_left(fine(8.0)).margin_right(fine(24.0 + room));
-    builder.x_label_area_size(fine(54.0)).y_label_area_size(fine(left));
-    if !plot.title.is_empty() {
-        let mut style = font(TITLE_SIZE);
-        style.font = style.font.style(FontStyle::Bold);
-        // bold letters are wider
-        builder.caption(shorten(&printable(&plot.title), 1.12 * TITLE_SIZE, SIZE.0 - 24.0), style);
+impl Scale {
+    /// An axis that shows all these values; a logarithmic one begins at a power of ten.
+    fn new(values: impl Iterator<Item = f64>, log: bool) -> Self {
+        let bounds = values.fold(None, |bounds: Option<(f64, f64)>, value| {
+            let (low, high) = bounds.unwrap_or((value, value));
+            Some((low.min(value), high.max(value)))
+        });
+        if log {
+            let (low, high) = bounds.map_or((0.0, 1.0), |(low, high)| (low.log10().floor(), high.log10()));
+            let power = high.floor();
+            let high = match high - low {
+                // with fewer labels than three, other numbers than powers have one
+                decades if decades < 2.0 => power + (10f64.powf(high - power).floor() + 1.0).log10(),
+                _ => high.ceil(),
+            };
+            // ticks at both ends in spite of rounding
+            return Self::Log((10f64.powf(low) * (1.0 - 1e-9)..10f64.powf(high) * (1.0 + 1e-9)).log_scale().into());
+        }
+        let (low, high) = bounds.unwrap_or((0.0, 1.0));
+        let size = low.abs().max(high.abs());
+        let width = high - low;
+        let (low, high) = if width <= 1e-9 * size || size < TINY {
+            // one value only: room on both sides
+            let room = if size < TINY { 1.0 } else { 0.5 * size };
+            (low - room, high + room)
+        } else {
+            // data that begins near zero shows zero, and nothing beyond
+            let pad = 0.03 * width;
+            let low = if low >= 0.0 && low < 0.25 * width { 0.0 } else { low - pad };
+            (low, if high <= 0.0 && -high < 0.25 * width { 0.0 } else { high + pad })
+        };
+        let power = match low.abs().max(high.abs()) {
+            size if (0.01..1e5).contains(&size) => 0,
+            size => size.log10().floor() as i32,
+        };
+        let unit = 10f64.powi(power);
+        Self::Linear((low / unit..high / unit).into(), power)
     }
-    let mut chart = builder.build_cartesian_2d(x.clone(), y.clone()).map_err(io::Error::other)?;
-    let described = |axis: &Axis, scale: &Scale, room: f64| {
-        let power = if scale.power == 0 { String::new() } else { format!(" (×10{})", superscript(scale.power)) };
-        shorten(&printable(&axis.label), LABEL_SIZE, room) + &power
+
+    /// Labels to ask for; whole numbers have no ticks between them.
+    fn labels(&self, mut values: impl Iterator<Item = f64>) -> usize {
+        match self {
+            Self::Log(axis) if axis.range().end < 99.0 * axis.range().start => DIVIDED,
+            Self::Log(_) => TICKS,
+            Self::Linear(axis, 0) if values.all(|value| value.fract() == 0.0) => {
+                let range = axis.range();
+                TICKS.min((range.end.floor() - range.start.ceil()) as usize + 1)
+            }
+            Self::Linear(..) => TICKS,
+        }
+    }
+
+    /// What the axis shows, with the power of ten that its labels leave out.
+    fn title(&self, axis: &Axis, most: usize) -> String {
+        let label = cut(&axis.label, most);
+        match self {
+            Self::Linear(_, power) if *power != 0 => format!("{label} (×10{})", superscript(*power)),
+            _ => label,
+        }
+    }
+}
+
+impl Ranged for Scale {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        match self {
+            Self::Linear(axis, power) => axis.map(&(value / 10f64.powi(*power)), limit),
+            Self::Log(axis) => axis.map(value, limit),
+        }
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        match self {
+            Self::Linear(axis, power) => axis.key_points(hint).iter().map(|key| key * 10f64.powi(*power)).collect(),
+            Self::Log(axis) => {
+                // plotters has the last number of a decade and the first of the next one
+                let mut keys = axis.key_points(hint);
+                keys.dedup_by(|a, b| *a <= *b * (1.0 + 1e-6));
+                keys
+            }
+        }
+    }
+
+    fn range(&self) -> Range<f64> {
+        match self {
+            Self::Linear(axis, power) => {
+                let unit = 10f64.powi(*power);
+                axis.range().start * unit..axis.range().end * unit
+            }
+            Self::Log(axis) => axis.range(),
+        }
+    }
+}
+
+impl ValueFormatter<f64> for Scale {
+    fn format_ext(&self, value: &f64) -> String {
+        match self {
+            Self::Linear(axis, power) => {
+                let width = axis.range().end - axis.range().start;
+                // key points carry errors of rounding
+                let digits = (9.0 - width.log10()).clamp(0.0, 15.0) as usize;
+                let text = format!("{:.digits$}", value / 10f64.powi(*power));
+                let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+                if text == "-0" { "0".to_owned() } else { text.replace('-', "−") }
+            }
+            Self::Log(_) => {
+                let power = (value.log10() + 1e-6).floor();
+                let exponent = superscript(power as i32);
+                match (value / 10f64.powf(power)).round() as i32 {
+                    1 => format!("10{exponent}"),
+                    digit @ (2 | 5) => format!("{digit}·10{exponent}"),
+                    _ => String::new(),
+                }
+            }
+        }
+    }
+}
+
+/// How a series is drawn, with its colour and mark chosen.
+#[derive(Clone, Copy)]
+struct Look {
+    style: Style,
+    color: RGBColor,
+    mark: &'static [(f64, f64)],
+}
+
+/// Colours and marks of all series.
+fn looks(series: &[Series]) -> Vec<Look> {
+    let mut next = 0;
+    let look = |(place, series): (usize, &Series)| {
+        let (color, number) = match series.color {
+            Color::Grey => (GREY, place),
+            Color::Palette(number) => (PALETTE[number % PALETTE.len()], number),
+            Color::Next => {
+                next += 1;
+                (PALETTE[(next - 1) % PALETTE.len()], next - 1)
+            }
+        };
+        Look { style: series.style, color, mark: MARKS[number % MARKS.len()] }
     };
-    let mut mesh = chart.configure_mesh();
-    mesh.x_desc(described(&plot.x, &x, 0.8 * width)).y_desc(described(&plot.y, &y, 0.8 * SIZE.1));
-    mesh.label_style(font(TICK_SIZE)).axis_desc_style(font(LABEL_SIZE)).set_all_tick_mark_size(fine(5.0));
-    let line = |color: RGBColor, width: f64| color.stroke_width(fine(width) as u32);
-    mesh.axis_style(line(FRAME, 1.0)).bold_line_style(line(GRID, 0.9)).light_line_style(line(FINE_GRID, 0.8));
-    mesh.draw().map_err(io::Error::other)?;
-
-    let place = |&(u, v): &(f64, f64)| Some(chart.backend_coord(&(x.at(u)?, y.at(v)?)));
-    let pieces = |series: &Series| {
-        let places: Vec<Option<Place>> = series.points.iter().map(place).collect();
-        let pieces = places.split(Option::is_none).map(|piece| piece.iter().flatten().copied());
-        pieces.map(Iterator::collect).filter(|piece: &Vec<_>| !piece.is_empty()).map(thin).collect()
-    };
-    Ok((plot.series.iter().map(pieces).collect(), chart.plotting_area().get_pixel_range()))
+    series.iter().enumerate().map(look).collect()
 }
 
-/// Keeps first, lowest, highest and last point of every half pixel of a curve that runs to the right: the picture
-/// stays the same, the file small.
-fn thin(points: Vec<Place>) -> Vec<Place> {
-    if points.len() < 2000 || points.windows(2).any(|pair| pair[1].0 < pair[0].0) {
-        return points;
+impl Look {
+    /// The elements of one unbroken piece of a series; a point on its own becomes a mark.
+    fn elements<'a>(&self, points: &[At]) -> Vec<DynElement<'static, SVGBackend<'a>, At>> {
+        let line = |width: f64| ShapeStyle::from(self.color).stroke_width(fine(width) as u32);
+        let mut elements = match self.style {
+            Style::Line | Style::LineMarkers => vec![PathElement::new(points, line(1.9)).into_dyn()],
+            Style::Dashed => vec![DashedPathElement::new(points.to_vec(), fine(6.4), fine(4.2), line(1.6)).into_dyn()],
+            Style::Markers => Vec::new(),
+        };
+        let marked = matches!(self.style, Style::Markers | Style::LineMarkers);
+        for &(x, y) in points.iter().filter(|_| marked || points.len() == 1) {
+            let corners: Vec<At> = self.mark.iter().map(|(u, v)| (x + fine(*u), y + fine(*v))).collect();
+            elements.push(Polygon::new(corners, self.color.filled()).into_dyn());
+        }
+        elements
     }
-    let column = |point: &Place| point.0 / fine(0.5);
-    let mut thinned = Vec::new();
-    for group in points.chunk_by(|a, b| column(a) == column(b)) {
-        let extremes = [group.iter().min_by_key(|point| point.1), group.iter().max_by_key(|point| point.1)];
-        let mut kept: Vec<Place> = group.first().into_iter().chain(group.last()).copied().collect();
-        extremes.into_iter().flatten().for_each(|&point| kept.insert(1, point));
-        kept.sort_by_key(|point| point.0);
-        thinned.extend(kept);
+
+    /// A sample for the legend: a line to the right, its mark in the middle; both as one area.
+    fn sample<'a>(&self, (x, y): At) -> DynElement<'static, SVGBackend<'a>, At> {
+        if self.style == Style::Dashed {
+            let style = ShapeStyle::from(self.color).stroke_width(fine(1.6) as u32);
+            return DashedPathElement::new(vec![(x, y), (x + fine(30.0), y)], fine(6.4), fine(4.2), style).into_dyn();
+        }
+        let half = if self.style == Style::Markers { 0.0 } else { 0.95 };
+        let line = [(15.0, half), (0.0, half), (0.0, -half), (30.0, -half), (30.0, half), (15.0, half)];
+        let marked = self.style != Style::Line;
+        let mark = self.mark.iter().chain(self.mark.first()).filter(|_| marked).map(|(u, v)| (15.0 + u, *v));
+        let corners = line.into_iter().chain(mark).map(|(u, v)| (x + fine(u), y + fine(v)));
+        Polygon::new(corners.collect::<Vec<At>>(), self.color.filled()).into_dyn()
     }
-    thinned
 }
 
-/// The named series.
-struct Legend(Vec<(String, Look)>);
+/// Numbers and ranges below it count as zero.
+const TINY: f64 = 1e-290;
 
-impl Legend {
-    fn new(plot: &Plot) -> Self {
-        let named = plot.series.iter().zip(looks(&plot.series)).filter(|(series, _)| !series.label.is_empty());
-        Self(named.map(|(series, look)| (shorten(&printable(&series.label), LEGEND_SIZE, WIDEST), look)).collect())
-    }
+/// Whether a value has a place on an axis.
+fn drawable(value: f64, log: bool) -> bool {
+    // far from overflow, so that differences are finite, and on a logarithmic axis quotients, too
+    if log { (1e-150..1e150).contains(&value) } else { value.abs() < 1e290 }
+}
 
-    /// Width in pixels.
-    fn width(&self) -> f64 {
-        let widest = self.0.iter().map(|(label, _)| text_width(label, LEGEND_SIZE)).fold(0.0, f64::max);
-        widest + SAMPLE + 3.0 * PADDING
-    }
-
-    fn height(&self, entries: usize) -> f64 {
-        entries as f64 * LINE + PADDING
-    }
-
-    /// Top left of the legend in a corner of the axes where it covers no curve, if there is one.
-    fn corner(&self, (across, down): &Frame, curves: &Curves) -> Option<Place> {
-        let (width, height) = (fine(self.width()), fine(self.height(self.0.len())));
-        let (left, right) = (across.start + fine(APART), across.end - fine(APART) - width);
-        let (top, bottom) = (down.start + fine(APART), down.end - fine(APART) - height);
-        let covers = |(x, y): Place, (u, v): Place| (x..x + width).contains(&u) && (y..y + height).contains(&v);
-        // curves are looked at every few pixels
-        let between = |(a, b): (Place, Place), k: i32| (a.0 + k * (b.0 - a.0) / 64, a.1 + k * (b.1 - a.1) / 64);
-        let meets = |piece: &Vec<Place>, at: Place| {
-            let lines = piece.windows(2).flat_map(|ends| (0..64).map(move |k| between((ends[0], ends[1]), k)));
-            lines.chain(piece.last().copied()).any(|place| covers(at, place))
-        };
-        let free = |&at: &Place| !curves.iter().flatten().any(|piece| meets(piece, at));
-        let corners = [(right, top), (left, top), (right, bottom), (left, bottom)];
-        corners.into_iter().filter(|_| self.0.len() <= INSIDE).find(free)
-    }
-
-    /// Draws the legend with its top left at a place, down to `bottom`; entries without room are counted.
-    fn draw(&self, area: &Area, (x, y): Place, bottom: i32) -> io::Result<()> {
-        if self.0.is_empty() {
-            return Ok(());
-        }
-        let room = (f64::from(bottom - y) / FINE / LINE) as usize;
-        let shown = if self.0.len() > room { room.saturating_sub(1) } else { self.0.len() };
-        let more = self.0.len() - shown;
-        let height = self.height(shown + usize::from(more > 0));
-        let corners = [(x, y), (x + fine(self.width()), y + fine(height))];
-        area.draw(&Rectangle::new(corners, WHITE.filled())).map_err(io::Error::other)?;
-        let style = font(LEGEND_SIZE).pos(Pos::new(HPos::Left, VPos::Center)).color(&BLACK);
-        let middle = |line: usize| y + fine(PADDING / 2.0 + (line as f64 + 0.5) * LINE);
-        let write = |text: &str, line: usize| {
-            area.draw_text(text, &style, (x + fine(2.0 * PADDING + SAMPLE), middle(line))).map_err(io::Error::other)
-        };
-        for (line, (label, look)) in self.0.iter().take(shown).enumerate() {
-            look.sample(area, (x + fine(PADDING), middle(line)))?;
-            write(label, line)?;
-        }
-        if more > 0 { write(&format!("and {more} more"), shown) } else { Ok(()) }
-    }
+/// A length in pixels in plotters' units.
+fn fine(length: f64) -> i32 {
+    (length * FINE).round() as i32
 }
 
 /// A sans-serif font; the SVG backend divides its size by 1.24.
@@ -236,14 +342,17 @@ fn font(size: f64) -> TextStyle<'static> {
     TextStyle::from((FontFamily::SansSerif, size * FINE * 1.24))
 }
 
-/// A text without control characters, which XML does not allow.
-fn printable(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control()).collect()
+/// A text without control characters, which XML does not allow, of at most so many letters.
+fn cut(text: &str, most: usize) -> String {
+    let printable = || text.chars().filter(|c| !c.is_control());
+    match printable().count() {
+        count if count <= most => printable().collect(),
+        _ => printable().take(most - 1).chain(['…']).collect(),
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::plot::{Axis, ConvergenceSeries, Style};
     use super::*;
 
     fn plot(points: Vec<(f64, f64)>, log: bool) -> Plot {
@@ -255,46 +364,81 @@ mod tests {
         }
     }
 
-    fn axes(plot: &Plot) -> (Curves, Frame) {
-        let mut text = String::new();
-        let area = SVGBackend::with_string(&mut text, (18000, 11200)).into_drawing_area();
-        draw_axes(plot, &area, 0.0).unwrap()
+    /// The labels of the vertical axis from below, then those of the horizontal one.
+    fn labels(values: &[f64], log: bool) -> String {
+        let points: Vec<(f64, f64)> = values.iter().map(|&value| (0.0, value)).collect();
+        let svg = plot(points, log).svg().unwrap();
+        let texts = svg.split("</text>").filter_map(|part| part.rsplit_once(">\n")).map(|(_, text)| text.trim());
+        texts.filter(|text| !text.is_empty()).collect::<Vec<_>>().join(" ")
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        for (values, log, expected) in [
+            (&[0.0, 0.7, 1.0][..], false, "0 0.2 0.4 0.6 0.8 1"),
+            (&[-1.0, 0.1, 1.0], false, "−1 −0.5 0 0.5 1"),
+            (&[0.0, 2.1e6], false, "(×10⁶) 0 0.5 1 1.5 2"),
+            (&[0.0, 4e-6], false, "(×10⁻⁶) 0 1 2 3 4"),
+            (&[1.0, 2e-3, f64::NAN, 0.0, -1.0], true, "10⁻³ 10⁻² 10⁻¹ 10⁰"),
+            (&[1.0, 1e-16], true, "10⁻¹⁴ 10⁻¹² 10⁻¹⁰ 10⁻⁸ 10⁻⁶ 10⁻⁴ 10⁻² 10⁰"),
+            (&[3.0, 15.0], true, "10⁰ 2·10⁰ 5·10⁰ 10¹ 2·10¹"),
+        ] {
+            assert_eq!(labels(values, log), format!("{expected} −1 0 1"));
+        }
+    }
+
+    #[test]
+    fn every_scale_covers_its_values_and_has_ticks() {
+        for (a, b) in [
+            (1.0, 1.0),
+            (0.0, 0.0),
+            (-3.0, -1e-3),
+            (1e-12, 1e12),
+            (5.0, 5.1),
+            (1e-280, 1e280),
+            (0.0, 5e-324),
+            (-1e280, 1e280),
+        ] {
+            for log in [false, true] {
+                let values = || [a, b].into_iter().filter(|&value| drawable(value, log));
+                let scale = Scale::new(values(), log);
+                let range = scale.range();
+                assert!(values().all(|value| range.contains(&value)), "{a} {b} {log} {range:?}");
+                let ticks = scale.key_points(TICKS).into_iter().filter(|tick| range.contains(tick)).count();
+                assert!((1..=TICKS + 1).contains(&ticks), "{a} {b} {log} {ticks}");
+            }
+        }
+    }
+
+    /// Numbers of points of the curves of a picture.
+    fn curves(plot: &Plot) -> Vec<Vec<At>> {
+        let svg = plot.svg().unwrap();
+        let lines = svg.split("<polyline").filter(|line| line.contains("#0072B2"));
+        let points = lines.filter_map(|line| line.split("points=\"").nth(1)?.split('"').next().map(str::to_owned));
+        let place = |text: &str| text.split_once(',').map(|(x, y)| (x.parse().unwrap(), y.parse().unwrap()));
+        points.map(|text| text.split_whitespace().filter_map(place).collect()).collect()
     }
 
     #[test]
     fn values_that_cannot_be_shown_leave_gaps() {
         let heights = [1.0, f64::NAN, 0.1, 0.01, 0.0, -1.0, 0.1, f64::INFINITY];
         let points = heights.iter().enumerate().map(|(k, &v)| (k as f64, v)).collect();
-        let lengths: Vec<_> = axes(&plot(points, true)).0[0].iter().map(Vec::len).collect();
-        assert_eq!(lengths, [1, 2, 1]);
+        assert_eq!(curves(&plot(points, true)).iter().map(Vec::len).collect::<Vec<_>>(), [1, 2, 1]);
     }
 
     #[test]
-    fn thinning_keeps_ends_and_spikes() {
-        // waves within every column, so that its ends are not its extremes
-        let wave = |k: i32| f64::from((k + 3) % 12 - 6).abs() / 3.0;
-        let mut points: Vec<_> = (0..100_000).map(|k| (f64::from(k), wave(k))).collect();
-        points[43_210].1 = 7.0;
-        points[56_789].1 = -7.0;
-        let few = vec![points[0], points[43_210], points[56_789], points[99_999]];
-        let thinned = axes(&plot(points, false)).0.remove(0).remove(0);
-        let few = axes(&plot(few, false)).0.remove(0).remove(0);
-        assert!(thinned.len() < 8000, "{}", thinned.len());
-        assert_eq!(thinned.iter().map(|p| p.1).min(), Some(few[1].1));
-        assert_eq!(thinned.iter().map(|p| p.1).max(), Some(few[2].1));
-        assert_eq!((thinned.first(), thinned.last()), (few.first(), few.last()));
-    }
-
-    #[test]
-    fn the_legend_leaves_the_axes_when_curves_fill_them() {
-        let inside = |curve: fn(i32) -> f64| {
-            let mut plot = plot((0..400).map(|k| (f64::from(k), curve(k))).collect(), false);
-            plot.series[0].label = "a curve".into();
-            let text = draw(&plot).unwrap();
-            assert!(text.contains("a curve"));
-            picture(&plot, &Legend::new(&plot), false).unwrap().is_some()
-        };
-        assert!(inside(f64::from) && !inside(|k| f64::from(k % 2)));
+    fn the_legend_stands_beside_the_axes() {
+        let mut plot = plot((0..400).map(|k| (f64::from(k), f64::from(k % 2))).collect(), false);
+        plot.series[0].label = "a curve with a long name".into();
+        plot.series.push(Series::new("marks", vec![(1.0, 0.5)], Style::LineMarkers));
+        let right = curves(&plot).iter().flatten().map(|point| point.0).max().unwrap();
+        let svg = plot.svg().unwrap();
+        let before = svg.split("a curve with").next().unwrap().rsplit("<text x=\"").next().unwrap();
+        let at: i32 = before.split('"').next().unwrap().parse().unwrap();
+        assert!(at > right, "{at} {right}");
+        // one series needs no legend
+        plot.series.pop();
+        assert!(!plot.svg().unwrap().contains("a curve with"));
     }
 
     #[test]
@@ -302,23 +446,13 @@ mod tests {
         let mut plot = plot(vec![(0.0, 1.0), (2.1e6, 2.0)], false);
         plot.title = "a < b & \u{1}c".into();
         plot.x.label = "places".into();
-        let text = draw(&plot).unwrap();
-        assert!(text.starts_with("<svg xmlns=") && text.ends_with("</svg>\n"));
+        let text = plot.svg().unwrap();
+        assert!(text.starts_with("<svg ") && text.trim_end().ends_with("</svg>"));
         assert_eq!(text.matches("<svg").count(), 1);
-        assert!(text.contains("width=\"900\" height=\"560\" viewBox=\"0 0 18000 11200\""));
+        assert!(
+            text.contains("width=\"900\" height=\"560\"") && text.contains("viewBox=\"0 0 18000 11200\""),
+            "{text}"
+        );
         assert!(text.contains("a &lt; b &amp; c") && text.contains("places (×10⁶)"), "{text}");
-    }
-
-    #[test]
-    fn a_file_is_written_and_a_missing_folder_told() {
-        let base = tempfile::tempdir().unwrap();
-        let path = base.path().join("convergence.svg");
-        let rows = vec![(0, 1.0, f64::NAN), (1, 0.1, 0.5), (2, 0.0, 0.05)];
-        let plot = Plot::convergence("Two blocks", &[ConvergenceSeries { label: String::new(), rows }]);
-        plot.save(&path).unwrap();
-        let text = std::fs::read_to_string(&path).unwrap();
-        assert!(text.contains("Two blocks") && text.contains("10⁻¹"), "{text}");
-        let error = plot.save(&base.path().join("no/x.svg")).unwrap_err();
-        assert!(error.message().contains("x.svg"));
     }
 }

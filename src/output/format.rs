@@ -49,37 +49,6 @@ pub(super) fn superscript(value: i32) -> String {
         .collect()
 }
 
-/// Width of a text in a usual sans-serif font, in pixels, on the safe side: no font is at hand to measure with.
-pub(super) fn text_width(text: &str, size: f64) -> f64 {
-    let em: f64 = text
-        .chars()
-        .map(|c| match c {
-            'i' | 'j' | 'l' | '.' | ',' | ':' | ';' | '|' | '\'' | '!' | ' ' | '·' => 0.33,
-            'f' | 't' | 'r' | 'I' | '(' | ')' | '[' | ']' | '/' | '-' => 0.41,
-            '⁻' | '⁰' | '¹' | '²' | '³' | '⁴'..='⁹' => 0.42,
-            'm' | 'w' | 'M' | 'W' | '@' | '%' | '−' => 0.92,
-            c if c.is_uppercase() => 0.72,
-            _ => 0.62,
-        })
-        .sum();
-    em * size
-}
-
-/// A text cut to a width, with an ellipsis where something is missing.
-pub(super) fn shorten(text: &str, size: f64, width: f64) -> String {
-    if text_width(text, size) <= width {
-        return text.into();
-    }
-    let mut short = String::new();
-    for c in text.chars() {
-        if text_width(&short, size) + text_width("m…", size) > width {
-            break;
-        }
-        short.push(c);
-    }
-    short.trim_end().to_owned() + "…"
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,12 +77,5 @@ mod tests {
     fn superscripts() {
         assert_eq!(superscript(-1203), "⁻¹²⁰³");
         assert_eq!(superscript(456_789), "⁴⁵⁶⁷⁸⁹");
-    }
-
-    #[test]
-    fn long_texts_are_cut() {
-        assert_eq!(shorten("short", 10.0, 100.0), "short");
-        let short = shorten(&"long text ".repeat(20), 10.0, 100.0);
-        assert!(short.ends_with('…') && text_width(&short, 10.0) <= 100.0, "{short}");
     }
 }

@@ -10,13 +10,11 @@ pub mod folder;
 mod format;
 pub mod history;
 mod largest;
-mod look;
 pub mod plot;
 pub mod report;
 pub mod steps;
 pub mod table;
 mod tags;
-mod ticks;
 pub mod vtu;
 
 /// Prints a line to standard output. A reader that has gone is no reason to stop.
@@ -43,7 +41,7 @@ pub use contacts::PairRow;
 pub use folder::{Folder, safe_name, write_whole};
 pub use format::{sci, seconds};
 pub use history::HistoryWriter;
-pub use plot::{Axis, Color, ConvergenceSeries, Plot, PressureSeries, Series, Style};
+pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
     PairReport, Report, RoundReport, busiest,

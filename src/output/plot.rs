@@ -82,19 +82,6 @@ pub struct ConvergenceSeries {
     pub rows: Vec<(usize, f64, f64)>,
 }
 
-/// A pressure along a surface, for [`Plot::pressure`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct PressureSeries {
-    /// Name in the legend.
-    pub label: String,
-    /// Place along the surface, in any order.
-    pub s: Vec<f64>,
-    /// Pressure there.
-    pub p: Vec<f64>,
-    /// A reference: dashed and grey.
-    pub dashed: bool,
-}
-
 impl Plot {
     /// Residual (solid) and increment (dashed) of one or more runs against the iteration, on a logarithmic axis.
     pub fn convergence(title: &str, runs: &[ConvergenceSeries]) -> Self {
@@ -117,10 +104,7 @@ impl Plot {
                 series.push(Series::new(label, Vec::new(), style).color(Color::Grey));
             }
         }
-        let y = match (has_increments, runs.len()) {
-            (false, _) => "relative residual",
-            (true, _) => "relative residual, increment",
-        };
+        let y = if has_increments { "relative residual, increment" } else { "relative residual" };
         Self {
             title: title.into(),
             x: Axis { label: "iteration".into(), log: false },
@@ -141,24 +125,12 @@ impl Plot {
         }
     }
 
-    /// Contact pressure along a surface; references dashed and grey, on top.
-    pub fn pressure(title: &str, x_label: &str, curves: &[PressureSeries]) -> Self {
-        let (references, results): (Vec<_>, Vec<_>) = curves.iter().partition(|curve| curve.dashed);
-        let series = results.into_iter().chain(references).map(|curve| {
-            let mut points: Vec<_> = curve.s.iter().copied().zip(curve.p.iter().copied()).collect();
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let (style, color) = match curve.dashed {
-                true => (Style::Dashed, Color::Grey),
-                false => (Style::Line, Color::Next),
-            };
-            Series::new(&curve.label, points, style).color(color)
-        });
-        Self {
-            title: title.into(),
-            x: Axis { label: x_label.into(), log: false },
-            y: Axis { label: "contact pressure".into(), log: false },
-            series: series.collect(),
-        }
+    /// Contact pressure along a surface from curves of (place, pressure) in any order; dashed references on top.
+    pub fn pressure(title: &str, x: &str, y: &str, mut series: Vec<Series>) -> Self {
+        series.iter_mut().for_each(|series| series.points.sort_by(|a, b| a.0.total_cmp(&b.0)));
+        series.sort_by_key(|series| series.style == Style::Dashed);
+        let axis = |label: &str| Axis { label: label.into(), log: false };
+        Self { title: title.into(), x: axis(x), y: axis(y), series }
     }
 }
 
@@ -187,9 +159,8 @@ mod tests {
 
     #[test]
     fn references_come_last_and_points_in_order() {
-        let curve =
-            |label: &str, dashed| PressureSeries { label: label.into(), s: vec![1.0, 0.0], p: vec![5.0, 7.0], dashed };
-        let plot = Plot::pressure("", "x, m", &[curve("exact", true), curve("run", false)]);
+        let curve = |label: &str, style| Series::new(label, vec![(1.0, 5.0), (0.0, 7.0)], style);
+        let plot = Plot::pressure("", "x", "p", vec![curve("exact", Style::Dashed), curve("run", Style::Line)]);
         assert_eq!(plot.series[0].label, "run");
         assert_eq!(plot.series[0].points, [(0.0, 7.0), (1.0, 5.0)]);
         assert_eq!(plot.series[1].style, Style::Dashed);

@@ -78,6 +78,12 @@ pub struct Report {
     /// Functional F1 (25).
     #[serde(rename = "F1")]
     pub f1: Option<f64>,
+    /// Words of the command line.
+    pub command: Vec<String>,
+    /// The folder in which the command was typed.
+    pub directory: String,
+    /// PETSc options, as typed.
+    pub petsc_options: Vec<String>,
     /// Degrees of freedom of all bodies.
     pub dofs: usize,
     /// Bodies in the order of the scene.
@@ -86,6 +92,8 @@ pub struct Report {
     pub pairs: Vec<PairReport>,
     /// Wall seconds of each phase.
     pub times: BTreeMap<String, f64>,
+    /// Largest resident memory of the first rank at the end of each phase, 10^6 bytes.
+    pub memory: BTreeMap<String, f64>,
     /// Wall seconds of the inner solvers, summed over the bodies; they lie within the phases `set-up` and `iterate`.
     pub inner_times: InnerTimes,
     /// What a user should know.

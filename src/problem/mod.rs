@@ -15,3 +15,4 @@ pub mod pattern;
 pub mod robin;
 pub mod solver;
 pub mod stop;
+pub mod units;

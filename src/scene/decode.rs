@@ -2,20 +2,23 @@
 
 mod body;
 mod contact;
+mod data;
 mod elasticity;
 mod history;
 mod layer;
 mod method;
 
 use super::read::{Keys, Node, Value};
+use crate::data::Library;
 use crate::error::{Error, Located, Place, Result, nearest, shown};
-use crate::expression::{Differentiable, Field};
+use crate::expression::{Differentiable, Field, Scope};
 use crate::mesh::is_shape;
 use crate::output::vtu::Encoding;
 use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::pattern::Pattern;
 use crate::problem::solver::{Preset, SolverSpec};
+use crate::problem::units::Units;
 use crate::scene::{AdaptSpec, OutputSpec, Scene};
 use std::path::{Path, PathBuf};
 
@@ -25,7 +28,9 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         "title",
         "dimension",
         "plane",
+        "units",
         "mesh",
+        "data",
         "body",
         "contact",
         "method",
@@ -38,11 +43,14 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     let keys = Keys::open(tree, "the scene", KEYS)?;
     let dimension = dimension(&keys)?;
     let plane = plane(&keys, dimension.value)?;
-    let decoder = Decoder { dimension: dimension.value, plane, folder: path.parent().unwrap_or(Path::new("")) };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut decoder = Decoder { dimension: dimension.value, plane, folder, data: Library::new() };
+    decoder.data = decoder.library(keys.get("data"))?;
     let title = match keys.get("title") {
         Some(node) => node.string()?.to_owned(),
         None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
     };
+    let units = keys.get("units").map(units).transpose()?;
     let (contacts, auto) = decoder.contacts(&keys)?;
     let mut method = decoder.method(keys.get("method"))?;
     if let (Some(adapt), false) = (keys.get("adapt"), method.steps.is_empty()) {
@@ -56,18 +64,24 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     Ok(Scene {
         path: path.to_owned(),
         title,
+        units,
         plane,
         mesh,
         bodies,
         contacts,
         auto,
         method,
+        data: decoder.data,
         solver: solver(keys.get("solver"))?,
         estimate: keys.get("estimate").map_or(Ok(false), Node::boolean)?,
         adapt: keys.get("adapt").map(adapt).transpose()?,
         output: output(keys.get("output"))?,
         dimension,
     })
+}
+
+fn units(node: &Node) -> Result<Units> {
+    Units::parse(node.string()?).map_err(|(message, advice)| node.refuse(message).help(advice))
 }
 
 /// What the meaning of values depends on.
@@ -78,6 +92,8 @@ struct Decoder<'a> {
     plane: Plane,
     /// Folder of the scene file.
     folder: &'a Path,
+    /// Functions from files.
+    data: Library,
 }
 
 impl Decoder<'_> {
@@ -95,7 +111,7 @@ impl Decoder<'_> {
     fn field(&self, node: &Node) -> Result<Field> {
         match &node.value {
             Value::Integer(_) | Value::Float(_) => Ok(Field::Constant(node.number()?)),
-            Value::String(text) => Field::parse(text, &node.place, self.dimension, false),
+            Value::String(text) => Field::parse(text, &node.place, self.dimension, false, &self.data),
             _ => Err(node.expected("a number or an expression")),
         }
     }
@@ -111,12 +127,12 @@ impl Decoder<'_> {
 
     /// A vector that can be differentiated.
     fn smooth_vector(&self, node: &Node) -> Result<Vec<Differentiable>> {
-        let variables = &["x", "y", "z"][..self.dimension];
+        let scope = Scope { variables: &["x", "y", "z"][..self.dimension], data: &self.data };
         let component = |item: &Node| match &item.value {
             Value::Integer(_) | Value::Float(_) => {
-                Differentiable::parse(&item.number()?.to_string(), &item.place, variables)
+                Differentiable::parse(&item.number()?.to_string(), &item.place, scope)
             }
-            Value::String(text) => Differentiable::parse(text, &item.place, variables),
+            Value::String(text) => Differentiable::parse(text, &item.place, scope),
             _ => Err(item.expected("a number or an expression")),
         };
         self.components(node)?.iter().map(component).collect()
@@ -135,7 +151,7 @@ impl Decoder<'_> {
 
     fn mesh(&self, node: &Node, trusted: bool) -> Result<MeshSource> {
         if let Value::String(name) = &node.value {
-            let file = self.file(node)?;
+            let file = file(self.folder, node)?;
             return Ok(match name.ends_with(".geo") || is_shape(&file.value) {
                 true => {
                     let guard = Guard { trusted, ..Guard::default() };
@@ -149,10 +165,10 @@ impl Decoder<'_> {
         }
         let keys = Keys::open(node, "the mesh", &["geo", "msh", "set", "size", "threads", "timeout", "memory"])?;
         keys.exclude("geo", "msh")?;
-        if let Some(file) = keys.get("msh") {
-            let path = self.file(file)?;
+        if let Some(msh) = keys.get("msh") {
+            let path = file(self.folder, msh)?;
             if is_shape(&path.value) {
-                return Err(file
+                return Err(msh
                     .refuse("this is the shape of bodies, and no mesh")
                     .help("mesh = { geo = \"...\", size = 0.1 }"));
             }
@@ -162,7 +178,7 @@ impl Decoder<'_> {
                     .help("it is for Gmsh, which makes meshes from scripts: mesh = { geo = \"...\" }")),
             };
         }
-        let file = self.file(keys.require("geo")?)?;
+        let file = file(self.folder, keys.require("geo")?)?;
         if let (Some(entry), false) = (keys.entry("size"), is_shape(&file.value)) {
             return Err(Error::scene(&entry.key_place, "`size` for a script, which has sizes of its own")
                 .help("it is for shapes (.step, .iges, .brep, .stl): give scripts numbers by set = { n = 32 }"));
@@ -179,29 +195,28 @@ impl Decoder<'_> {
         };
         Ok(MeshSource::Geo { file, set, places, sizes: None, guard })
     }
+}
 
-    /// The path of a file that must exist, joined with the folder of the scene.
-    fn file(&self, node: &Node) -> Result<Located<PathBuf>> {
-        let name = node.name()?.value;
-        let path = self.folder.join(&name);
-        match std::fs::metadata(&path) {
-            Ok(found) if found.is_file() => Ok(Located::new(path, node.place.clone())),
-            Ok(_) => Err(node.refuse(format!("{} is not a file", path.display()))),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-                let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
-                let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
-                let wanted = path.file_name().unwrap_or_default().to_string_lossy();
-                Err(node.refuse(format!("there is no file {}", path.display())).label("not there").help(match nearest(
-                    &wanted,
-                    names.iter().map(String::as_str),
-                ) {
+/// The path of a file that must exist, joined with the folder of the scene.
+fn file(folder: &Path, node: &Node) -> Result<Located<PathBuf>> {
+    let name = node.name()?.value;
+    let path = folder.join(&name);
+    match std::fs::metadata(&path) {
+        Ok(found) if found.is_file() => Ok(Located::new(path, node.place.clone())),
+        Ok(_) => Err(node.refuse(format!("{} is not a file", path.display()))),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+            let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
+            let wanted = path.file_name().unwrap_or_default().to_string_lossy();
+            Err(node.refuse(format!("there is no file {}", path.display())).label("not there").help(
+                match nearest(&wanted, names.iter().map(String::as_str)) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => "paths are relative to the folder of the scene file".to_owned(),
-                }))
-            }
-            Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
+                },
+            ))
         }
+        Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
     }
 }
 
@@ -330,9 +345,14 @@ fn output(node: Option<&Node>) -> Result<OutputSpec> {
     let default = OutputSpec::default();
     let Some(node) = node else { return Ok(default) };
     let usual = default.encoding;
-    let keys = Keys::open(node, "[output]", &["dir", "vtu", "precision", "compress", "plots", "pairs", "checkpoint"])?;
+    let keys = Keys::open(
+        node,
+        "[output]",
+        &["dir", "vtu", "report", "precision", "compress", "plots", "pairs", "checkpoint"],
+    )?;
     Ok(OutputSpec {
         dir: keys.get("dir").map(|dir| dir.name().map(|name| name.value.into())).transpose()?,
+        report: keys.get("report").map_or(Ok(default.report), Node::boolean)?,
         vtu: keys.get("vtu").map_or(Ok(default.vtu), Node::boolean)?,
         encoding: Encoding {
             single: keys

@@ -207,7 +207,7 @@ const USUAL: [(&str, &str); 6] =
     [("nu", "poisson"), ("E", "young"), ("e", "young"), ("modulus", "young"), ("dim", "dimension"), ("bc", "fix")];
 
 /// Keys of the whole scene that are values, which TOML gives to the table before them.
-const TOP: [&str; 7] = ["title", "dimension", "plane", "mesh", "solver", "estimate", "adapt"];
+const TOP: [&str; 8] = ["title", "dimension", "plane", "units", "mesh", "solver", "estimate", "adapt"];
 
 /// A table whose keys are all known.
 pub(super) struct Keys<'a> {

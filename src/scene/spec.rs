@@ -1,5 +1,6 @@
 //! What the user asked for, checked: a problem, and what to do with it.
 
+use crate::data::Library;
 use crate::error::{Located, Place};
 use crate::output::vtu::Encoding;
 use crate::problem::body::BodySpec;
@@ -8,6 +9,7 @@ use crate::problem::elasticity::Plane;
 use crate::problem::mesh::MeshSource;
 use crate::problem::method::MethodSpec;
 use crate::problem::solver::SolverSpec;
+use crate::problem::units::Units;
 use std::path::PathBuf;
 
 /// A checked scene.
@@ -21,8 +23,12 @@ pub struct Scene {
     pub dimension: Located<usize>,
     /// Plane strain (default), plane stress or bodies of revolution; plane problems only.
     pub plane: Plane,
+    /// Units of its numbers, if it names them: words for labels.
+    pub units: Option<Units>,
     /// Where the mesh comes from.
     pub mesh: MeshSource,
+    /// Functions from files, by name; those that no expression uses are not read.
+    pub data: Library,
     /// The tables of bodies, in the order of the file; the name of one may be a pattern, and so may those of groups.
     pub bodies: Vec<BodySpec>,
     /// The pairs of contact surfaces, in the order of the file.
@@ -63,6 +69,8 @@ pub struct OutputSpec {
     pub vtu: bool,
     /// How they are written.
     pub encoding: Encoding,
+    /// Whether to write the page of the run, `report.html`; default false.
+    pub report: bool,
     /// Whether to draw the SVG plots; default true.
     pub plots: bool,
     /// Most pairs with tables and plots of their own; by default as many as a person looks through.
@@ -73,6 +81,14 @@ pub struct OutputSpec {
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { dir: None, vtu: false, encoding: Encoding::default(), plots: true, pairs: None, checkpoint: None }
+        Self {
+            dir: None,
+            vtu: false,
+            encoding: Encoding::default(),
+            report: false,
+            plots: true,
+            pairs: None,
+            checkpoint: None,
+        }
     }
 }

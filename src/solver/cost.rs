@@ -8,6 +8,7 @@ use super::Retained;
 use crate::error::Result;
 use crate::linalg::factorisation;
 use crate::petsc::nested_dissection;
+use crate::problem::order::Order;
 
 /// Operations in a second of one core: the twelve factored runs of docs/solvers.md ("The choice") that take half a second or more
 /// took -25 % to +60 % beside what it says.
@@ -17,12 +18,19 @@ const RATE: f64 = 1.1e10;
 /// and P2, 5000 to 216 000 dofs, which took -30 % to +80 % beside what it says.
 const MULTIGRID: f64 = 1.3e-6;
 
+/// The same of quadratic elements, which have a level of their own: the middle one of the three P2 scenes there.
+const MULTIGRID_P2: f64 = 8e-7;
+
 /// Newton's steps of a scene there, which take 3 to 7: dense factorisations of all contacts together.
 const STEPS: f64 = 5.0;
 
 /// Bytes of multigrid for an entry of K: 12 each for G, which stands for K, and hypre's copy, and half a copy for its levels. For two
 /// cubes of 48^3 that is 922 MB; the run took 1153, with 50 for the process and 180 for mesh, spaces and vectors.
 const LEVELS: f64 = 30.0;
+
+/// The same of quadratic elements: one copy, and a fifth of it for the linear ones with their levels and for the blocks of Gauss-Seidel. For
+/// `flange` with 65 004 dofs that is 72 MB; the run took 143, with 50 for the process and 18 for mesh, spaces and vectors.
+const LEVELS_P2: f64 = 15.0;
 
 /// What MUMPS takes over the entries of its factor, for fronts that wait and for pivots: 754 MB for two bodies with 31 million entries
 /// each, beside 150 MB for all else (two cubes of 24^3).
@@ -55,6 +63,8 @@ impl Step {
 pub struct Candidate<'a> {
     /// Its dofs.
     pub dofs: usize,
+    /// Order of its elements.
+    pub order: Order,
     /// Those that it retains if it is condensed; none where every factorisation is of the whole body.
     pub retained: Option<&'a Retained>,
     /// Which of its nodes K couples: row i is `col[ptr[i]..ptr[i + 1]]`, with i itself.
@@ -101,8 +111,7 @@ impl Comparison {
 /// The order of elimination is asked for only where the answer depends on it: no body needs more operations than a cube of as
 /// many dofs, and the dense algebra on the contact is known.
 pub fn compare(bodies: &[Candidate], step: Step) -> Comparison {
-    let entries: f64 = bodies.iter().map(|body| 9.0 * body.col.len() as f64).sum();
-    let multigrid = Cost { seconds: MULTIGRID * entries * step.times(), bytes: LEVELS * entries };
+    let multigrid = bodies.iter().fold(Cost::default(), |sum, body| sum.and(body.multigrid(step)));
     let retained = bodies.iter().map(|body| body.retained.map_or(0, |retained| retained.dofs.len()));
     let retained = if step == Step::Joined { retained.sum() } else { retained.max().unwrap_or(0) } as f64;
     let dense = Cost { seconds: STEPS * retained.powi(3) / 3.0 / RATE, bytes: 36.0 * retained * retained };
@@ -122,6 +131,16 @@ impl Cost {
 }
 
 impl Candidate<'_> {
+    /// By multigrid.
+    fn multigrid(&self, step: Step) -> Cost {
+        let entries = 9.0 * self.col.len() as f64;
+        let [seconds, bytes] = match self.order {
+            Order::P1 => [MULTIGRID, LEVELS],
+            Order::P2 => [MULTIGRID_P2, LEVELS_P2],
+        };
+        Cost { seconds: seconds * entries * step.times(), bytes: bytes * entries }
+    }
+
     /// How often it is factored.
     fn times(&self) -> f64 {
         if self.retained.is_some() { 1.0 } else { STEPS }
@@ -178,6 +197,7 @@ mod tests {
         let bodies: Vec<_> = sizes.iter().map(|&size| body(size)).collect();
         let candidates = bodies.iter().map(|(ptr, col, retained)| Candidate {
             dofs: 3 * (ptr.len() - 1),
+            order: Order::P1,
             retained: Some(retained),
             ptr,
             col,

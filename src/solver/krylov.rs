@@ -3,7 +3,10 @@
 use super::InnerSolver;
 use super::options::Chosen;
 use crate::error::Result;
+use crate::fem::Interpolation;
+use crate::linalg::Csr;
 use crate::model::Solved;
+use crate::petsc;
 use crate::petsc::{Ksp, Matrix, Rows, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
@@ -35,7 +38,8 @@ const FEW: usize = 12;
 
 impl Krylov {
     /// Starts from G = K, with the options that were chosen; collective if other ranks have rows of K. `near_null_space` are the
-    /// rigid motions that algebraic multigrid (GAMG) wants to know, one entry a dof each.
+    /// rigid motions that algebraic multigrid (GAMG) wants to know, one entry a dof each. With an `interpolation` from a coarse level, PETSc's
+    /// `mg` has two levels.
     ///
     /// # Errors
     /// PETSc's refusal of a matrix or an option value.
@@ -45,11 +49,21 @@ impl Krylov {
         dimension: usize,
         stiffness: Rows,
         near_null_space: &[Vec<f64>],
+        interpolation: Option<Interpolation>,
     ) -> Result<Self> {
         let mut matrix = Matrix::new(session, dimension, stiffness)?;
         matrix.set_spd()?;
         let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", chosen.prefix()))?;
         ksp.set_operator(&matrix)?;
+        if let Some(interpolation) = interpolation {
+            let Interpolation { rows: Csr { ptr, col, values, .. }, own } = interpolation;
+            ksp.set_interpolation(petsc::Interpolation {
+                row_ptr: super::integers(ptr),
+                columns: super::integers(col),
+                values,
+                own_columns: own,
+            })?;
+        }
         chosen.lend(session, || ksp.set_from_options())?;
         if ksp.pc_type() == "gamg" && !near_null_space.is_empty() {
             matrix.set_near_null_space(near_null_space)?;
@@ -58,8 +72,19 @@ impl Krylov {
         let keeps = multigrid && chosen.get("ksp_reuse_preconditioner").is_none();
         let free = ksp.ksp_type() != "preonly" && chosen.typed("ksp_rtol").is_none();
         let session = session.clone();
-        let (changed, stale) = (true, true);
-        Ok(Self { session, chosen, matrix, ksp, free, changed, set_ups: 0, multigrid, keeps, stale, fresh: None })
+        Ok(Self {
+            session,
+            chosen,
+            matrix,
+            ksp,
+            free,
+            changed: true,
+            set_ups: 0,
+            multigrid,
+            keeps,
+            stale: true,
+            fresh: None,
+        })
     }
 
     /// G, for products that leave it as it is.
@@ -144,7 +169,8 @@ impl InnerSolver for Krylov {
     }
 
     fn describe(&self) -> String {
-        let package = self.ksp.factor_package().map_or(String::new(), |package| format!(" by {package}"));
-        format!("{} + {}{package}", self.ksp.ksp_type(), self.ksp.pc_type())
+        let coarse = || self.chosen.get("mg_coarse_pc_type").map(str::to_owned);
+        let inside = self.ksp.factor_package().or_else(coarse).map_or(String::new(), |name| format!(" by {name}"));
+        format!("{} + {}{inside}", self.ksp.ksp_type(), self.ksp.pc_type())
     }
 }

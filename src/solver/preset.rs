@@ -2,6 +2,7 @@
 
 use super::memory;
 use super::options::Chosen;
+use crate::problem::order::Order;
 use crate::problem::solver::Preset;
 
 /// Options of algebraic multigrid by hypre for elasticity with many solves a set-up; docs/solvers.md has the
@@ -22,6 +23,16 @@ const MADE_OFTEN: [(&str, &str); 4] = [
     ("pc_hypre_boomeramg_interp_type", "ext+i"),
     ("pc_hypre_boomeramg_agg_nl", "1"),
     ("pc_hypre_boomeramg_nodal_coarsen", "6"),
+];
+
+/// Two levels of multigrid for quadratic elements: Gauss-Seidel there and back for all nodes, algebraic multigrid for the linear elements
+/// with the same vertices. Of the work and memory of algebraic multigrid for all nodes it needs half.
+const QUADRATIC: [(&str, &str); 5] = [
+    ("mg_levels_ksp_type", "richardson"),
+    ("mg_levels_ksp_max_it", "1"),
+    ("mg_levels_pc_type", "sor"),
+    ("mg_coarse_ksp_type", "preonly"),
+    ("mg_coarse_pc_type", "hypre"),
 ];
 
 /// Relative tolerance of an inner Krylov solve: relative to the outer residual, because corrections are solved.
@@ -90,17 +101,20 @@ pub fn made_often(chosen: &mut Chosen) {
 
 /// The solver that the options in force make, in words.
 pub fn in_words(chosen: &Chosen) -> String {
-    let package = chosen.get("pc_factor_mat_solver_type").map_or(String::new(), |package| format!(" by {package}"));
     let word = |name: &str| chosen.get(name).unwrap_or_default();
-    format!("{} + {}{package}", word("ksp_type"), word("pc_type"))
+    let inside = ["pc_factor_mat_solver_type", "mg_coarse_pc_type"].map(word).into_iter().find(|word| !word.is_empty());
+    let inside = inside.map_or(String::new(), |word| format!(" by {word}"));
+    format!("{} + {}{inside}", word("ksp_type"), word("pc_type"))
 }
 
 /// Sets the defaults of a solver: after the typed options, and only for the KSP and PC in force. A condensed body has no KSP and no
-/// defaults.
-pub fn apply(chosen: &mut Chosen, preset: Preset) {
+/// defaults. With elements of second `order` multigrid has a level for them, unless the user speaks of hypre.
+pub fn apply(chosen: &mut Chosen, preset: Preset, order: Order) {
+    let levels = order == Order::P2 && !chosen.has_typed_of("pc_hypre_");
     let pc = match preset {
         Preset::Condensed => return,
         Preset::Mumps => "cholesky",
+        Preset::Hypre if levels => "mg",
         Preset::Hypre => "hypre",
         Preset::Gamg => "gamg",
         Preset::Icc => "icc",
@@ -109,6 +123,9 @@ pub fn apply(chosen: &mut Chosen, preset: Preset) {
     let is = |chosen: &Chosen, name: &str, values: &[&str]| values.contains(&chosen.get(name).unwrap_or_default());
     let direct = is(chosen, "pc_type", &["cholesky", "lu"]);
     chosen.set_default("ksp_type", if direct { "preonly" } else { "cg" });
+    if is(chosen, "pc_type", &["mg"]) && order == Order::P2 {
+        QUADRATIC.iter().for_each(|(name, value)| chosen.set_default(name, value));
+    }
     chosen.prefer_mumps();
     if !is(chosen, "ksp_type", &["preonly"]) {
         chosen.set_default("ksp_rtol", TOLERANCE);
@@ -117,8 +134,11 @@ pub fn apply(chosen: &mut Chosen, preset: Preset) {
             chosen.set_default("ksp_norm_type", "natural");
         }
     }
-    if is(chosen, "pc_type", &["hypre"]) && is(chosen, "pc_hypre_type", &["", "boomeramg"]) {
-        HYPRE.iter().for_each(|(name, value)| chosen.set_default(name, value));
+    for nest in ["", "mg_coarse_"] {
+        let of = |name: &str| format!("{nest}{name}");
+        if is(chosen, &of("pc_type"), &["hypre"]) && is(chosen, &of("pc_hypre_type"), &["", "boomeramg"]) {
+            HYPRE.iter().for_each(|(name, value)| chosen.set_default(&of(name), value));
+        }
     }
     if is(chosen, "pc_type", &["icc"]) && preset == Preset::Icc {
         chosen.set_default("pc_factor_levels", "1");

@@ -1,6 +1,6 @@
 //! `steps` of the method: shares of all loads, or a table of factors.
 
-use super::Decoder;
+use super::{Decoder, file};
 use crate::error::{Error, Kind, Located, Place, Result, Source, joined, nearest};
 use crate::problem::body::BodySpec;
 use crate::problem::history::{COMMON, History, Step, has_common, paths};
@@ -29,7 +29,7 @@ impl Decoder<'_> {
             }
             Value::Table(_) => {
                 let keys = Keys::open(node, "the load steps", &["table"])?;
-                read(self.file(keys.require("table")?)?)
+                read(file(self.folder, keys.require("table")?)?)
             }
             _ => match usize::try_from(node.whole()?) {
                 Ok(count) if (1..=MOST_STEPS).contains(&count) => {

@@ -126,6 +126,11 @@ impl Chosen {
         self.choices.values().any(|choice| choice.origin == Origin::Own)
     }
 
+    /// Whether the user wrote an option whose name begins so.
+    pub fn has_typed_of(&self, family: &str) -> bool {
+        self.choices.iter().any(|(name, choice)| choice.origin != Origin::Default && name.starts_with(family))
+    }
+
     /// Whether the user wrote an option that this solver has.
     pub fn has_typed(&self) -> bool {
         self.choices.values().any(|choice| choice.origin != Origin::Default)

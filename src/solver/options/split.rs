@@ -36,7 +36,7 @@ pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<Strin
 
 /// A scene file or a command: never meant as the value of an option.
 fn is_ours(word: &str) -> bool {
-    word.ends_with(".toml") || ["solve", "check", "sweep", "bench", "mesh"].contains(&word)
+    word.ends_with(".toml") || ["solve", "check", "sweep", "bench", "mesh", "new", "completions", "man"].contains(&word)
 }
 
 /// One dash, then two or more signs of which the first is a letter; a whole string of options (for `bench --solver`) is

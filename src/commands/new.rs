@@ -1,0 +1,42 @@
+//! `winkler new`: a small scene that works, with its script, to begin from.
+
+use crate::error::{Error, Kind, Result};
+use crate::output::say;
+use std::fs::{OpenOptions, create_dir_all};
+use std::io::Write;
+use std::path::Path;
+
+const PLANE: [&str; 2] = [include_str!("new/plane.toml"), include_str!("new/plane.geo")];
+const SPACE: [&str; 2] = [include_str!("new/space.toml"), include_str!("new/space.geo")];
+
+/// Writes a scene and its script into the folder `folder`, whose last word names the scene; returns the exit code. Files that are there
+/// stay as they are.
+///
+/// # Errors
+/// A folder without a name or with one that is no file name, files that are there or cannot be written.
+pub fn new(folder: &Path, in_space: bool) -> Result<i32> {
+    let name = folder.file_name().and_then(|name| name.to_str()).filter(|name| !name.contains(['"', '\\']));
+    let Some(name) = name else {
+        let message = format!("`{}` does not end with a name for a scene", folder.display());
+        return Err(Error::new(Kind::Usage, message).help("for example `winkler new blocks`"));
+    };
+    let [scene, script] = if in_space { SPACE } else { PLANE };
+    let files = [("scene.toml".to_owned(), scene), (format!("{name}.geo"), script)];
+    create_dir_all(folder).map_err(|cause| Error::file(folder, "make", &cause))?;
+    if let Some((file, _)) = files.iter().find(|(file, _)| folder.join(file).exists()) {
+        let message = format!("`{}` is there already", folder.join(file).display());
+        return Err(Error::new(Kind::File, message).help("choose another name, or move it away"));
+    }
+    for (file, text) in &files {
+        let path = folder.join(file);
+        let write = || {
+            let mut file = OpenOptions::new().write(true).create_new(true).open(&path)?;
+            file.write_all(text.replace("NAME", name).as_bytes())
+        };
+        write().map_err(|cause| Error::file(&path, "write", &cause))?;
+    }
+    let scene = folder.join("scene.toml");
+    let scene = scene.display();
+    say(format_args!("{scene} and {name}.geo are there. Next:\n  winkler check {scene}\n  winkler solve {scene}"))?;
+    Ok(0)
+}

@@ -1,0 +1,156 @@
+//! Triangles of bodies and contact surfaces from `.vtu` files: all cells in the plane, the surface in space.
+
+use crate::error::{Error, Kind, Result};
+use std::collections::HashMap;
+use std::path::Path;
+use vtkio::model::{Attribute, CellType, DataSet, Piece, UnstructuredGridPiece, Vtk};
+
+/// A body or a contact surface as triangles.
+pub struct Part {
+    /// Name.
+    pub name: String,
+    /// Points before deformation.
+    pub points: Vec<[f64; 3]>,
+    /// Corners of the triangles, numbers of points.
+    pub triangles: Vec<[u32; 3]>,
+    /// Displacement at each point; zero for contact surfaces.
+    pub displacement: Vec<[f64; 3]>,
+    /// Von Mises stress at each point, or the contact pressure; NaN where there is none.
+    pub value: Vec<f64>,
+    /// Whether its cells fill space, so that the triangles are its surface.
+    pub is_solid: bool,
+}
+
+/// Parts of a quadratic triangle (corners, then mid-edges 01 12 02).
+const QUADRATIC: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
+/// Faces of a tetrahedron with the mid-edges that a quadratic one has.
+const FACES: [[usize; 6]; 4] = [[0, 1, 2, 4, 5, 6], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 2, 3, 6, 9, 7]];
+
+impl Part {
+    /// Reads a file with the array `value` at its points, as float32 or float64, compressed or not.
+    ///
+    /// # Errors
+    /// [`Kind::File`] when the file is not there, is no VTU file or lacks the array.
+    pub fn read(path: &Path, name: &str, value: &str) -> Result<Self> {
+        let refuse = |cause: String| {
+            Error::new(Kind::File, format!("{} cannot be read as VTU", path.display()))
+                .because(cause)
+                .help("solve the scene again with --vtu")
+        };
+        let bytes = crate::file::read(path)?;
+        let vtk = Vtk::parse_xml(bytes.as_slice()).map_err(|cause| refuse(cause.to_string()))?;
+        let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
+            return Err(refuse("it has no unstructured grid".to_owned()));
+        };
+        let Some(Piece::Inline(piece)) = pieces.into_iter().next() else {
+            return Err(refuse("it has no piece".to_owned()));
+        };
+        Self::from_piece(*piece, name, value).map_err(refuse)
+    }
+
+    fn from_piece(piece: UnstructuredGridPiece, name: &str, value: &str) -> std::result::Result<Self, String> {
+        let array = |name: &str| {
+            piece.data.point.iter().find_map(|attribute| match attribute {
+                Attribute::DataArray(array) if array.name == name => array.data.cast_into::<f64>(),
+                _ => None,
+            })
+        };
+        let points = piece.points.cast_into::<f64>().ok_or("its points are no numbers")?;
+        let points: Vec<[f64; 3]> = points.as_chunks().0.to_vec();
+        let value = array(value).ok_or_else(|| format!("it has no array `{value}` at its points"))?;
+        let displacement = array("displacement").map_or(vec![[0.0; 3]; points.len()], |all| all.as_chunks().0.to_vec());
+        if value.len() != points.len() || displacement.len() != points.len() {
+            return Err(format!("{} points, but {} values", points.len(), value.len()));
+        }
+        let is_solid = piece.cells.types.iter().any(|kind| matches!(kind, CellType::Tetra | CellType::QuadraticTetra));
+        let types = piece.cells.types;
+        let (connectivity, offsets) = piece.cells.cell_verts.into_xml();
+        let mut triangles: Vec<[usize; 3]> = Vec::new();
+        let mut faces: HashMap<[usize; 3], Option<Vec<usize>>> = HashMap::new();
+        let mut start = 0;
+        for (kind, &end) in types.iter().zip(&offsets) {
+            let nodes = connectivity.get(start..end as usize).ok_or("a cell ends beyond the list of cells")?;
+            let cell: Vec<usize> = nodes.iter().map(|&node| node as usize).collect();
+            if cell.iter().any(|&node| node >= points.len()) {
+                return Err("a cell has a point that is not there".to_owned());
+            }
+            start = end as usize;
+            match (kind, cell.len()) {
+                (CellType::Triangle, 3) => triangles.push([cell[0], cell[1], cell[2]]),
+                (CellType::QuadraticTriangle, 6) => triangles.extend(QUADRATIC.map(|corners| corners.map(|k| cell[k]))),
+                (CellType::Tetra, 4) | (CellType::QuadraticTetra, 10) => {
+                    for face in FACES {
+                        let face: Vec<usize> =
+                            face[..if cell.len() == 4 { 3 } else { 6 }].iter().map(|&k| cell[k]).collect();
+                        let mut key = [face[0], face[1], face[2]];
+                        key.sort_unstable();
+                        // a face of two cells lies inside
+                        faces.entry(key).and_modify(|known| *known = None).or_insert(Some(face));
+                    }
+                }
+                // lines are contact surfaces of the plane
+                _ => {}
+            }
+        }
+        let mut outer: Vec<Vec<usize>> = faces.into_values().flatten().collect();
+        outer.sort_unstable();
+        for face in outer {
+            match face[..] {
+                [a, b, c] => triangles.push([a, b, c]),
+                _ => triangles.extend(QUADRATIC.map(|corners| corners.map(|k| face[k]))),
+            }
+        }
+        Ok(Self { name: name.to_owned(), points, triangles: Vec::new(), displacement, value, is_solid }
+            .with(&triangles))
+    }
+
+    /// The part with these triangles and the points that they have.
+    fn with(self, triangles: &[[usize; 3]]) -> Self {
+        let mut number = vec![u32::MAX; self.points.len()];
+        let mut kept = Vec::new();
+        let mut renumber = |node: usize| {
+            if number[node] == u32::MAX {
+                number[node] = kept.len() as u32;
+                kept.push(node);
+            }
+            number[node]
+        };
+        let triangles = triangles.iter().map(|corners| corners.map(&mut renumber)).collect();
+        let points = kept.iter().map(|&node| self.points[node]).collect();
+        let displacement = kept.iter().map(|&node| self.displacement[node]).collect();
+        let value = kept.iter().map(|&node| self.value[node]).collect();
+        Self { points, triangles, displacement, value, ..self }
+    }
+
+    /// Points moved by so many times the displacement.
+    pub fn moved(&self, scale: f64) -> Vec<[f64; 3]> {
+        let moved = |(x, u): (&[f64; 3], &[f64; 3])| std::array::from_fn(|k| x[k] + scale * u[k]);
+        self.points.iter().zip(&self.displacement).map(moved).collect()
+    }
+
+    /// Length of the displacement at each point.
+    pub fn travel(&self) -> Vec<f64> {
+        self.displacement.iter().map(|u| u.iter().map(|u| u * u).sum::<f64>().sqrt()).collect()
+    }
+}
+
+/// Low and high corner of a box around points.
+pub fn bounds<'a>(points: impl Iterator<Item = &'a [f64; 3]>) -> [[f64; 3]; 2] {
+    points.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], x| {
+        [std::array::from_fn(|k| low[k].min(x[k])), std::array::from_fn(|k| high[k].max(x[k]))]
+    })
+}
+
+/// The largest of 1, 2, 5 times a power of ten by which displacements can be multiplied so that none is longer than a
+/// twentieth of the diagonal of all bodies: what is seen to move, and still looks like the bodies. At least 1.
+pub fn magnification(parts: &[Part]) -> f64 {
+    let [low, high] = bounds(parts.iter().flat_map(|part| &part.points));
+    let size = (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt();
+    let most = parts.iter().flat_map(Part::travel).fold(0.0, f64::max);
+    let wish = 0.05 * size / most;
+    if !wish.is_finite() || wish <= 1.0 {
+        return 1.0;
+    }
+    let unit = 10f64.powf(wish.log10().floor());
+    unit * [5.0, 2.0].into_iter().find(|factor| factor * unit <= wish).unwrap_or(1.0)
+}

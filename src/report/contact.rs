@@ -1,0 +1,112 @@
+//! Pressures of pairs of surfaces from their tables: curves in the plane, maps in space.
+
+use super::bands::{BANDS, colors, range};
+use super::body::bounds;
+use crate::error::{Error, Kind, Result};
+use crate::output::{Plot, Series, Style};
+use crate::problem::units::{Units, label};
+use minijinja::{Environment, context};
+use serde::Serialize;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// A picture of the pressure of a pair.
+#[derive(Serialize)]
+pub struct Picture {
+    /// `plot` or `map`.
+    pub kind: &'static str,
+    /// The picture.
+    pub svg: String,
+    /// What it leaves out.
+    pub note: Option<String>,
+}
+
+/// Most points of a map.
+const POINTS: usize = 8000;
+
+/// Rows of a table by the names of their columns; none if the file is not there.
+///
+/// # Errors
+/// [`Kind::File`] when it is no CSV file.
+pub fn rows(path: &Path) -> Result<Vec<HashMap<String, String>>> {
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    let bytes = crate::file::read(path)?;
+    let all = csv::Reader::from_reader(bytes.as_slice()).deserialize().collect::<std::result::Result<_, csv::Error>>();
+    all.map_err(|cause| Error::new(Kind::File, format!("{} is no table", path.display())).because(cause.to_string()))
+}
+
+/// A number of a row; NaN if it has none.
+pub fn value(row: &HashMap<String, String>, column: &str) -> f64 {
+    row.get(column).and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)
+}
+
+/// The pressures of all pairs that have a table and touch, by the rows of `contacts.csv`.
+///
+/// # Errors
+/// Those of [`rows`], and of the templates.
+pub fn pictures(folder: &Path, is_space: bool, units: Option<&Units>, alone: bool) -> Result<Vec<Picture>> {
+    let pairs = rows(&folder.join("contacts.csv"))?;
+    let touching = |pair: &&HashMap<String, String>| value(pair, "peak_pressure") > 0.0;
+    let mut pictures = Vec::new();
+    for pair in pairs.iter().filter(touching) {
+        let Some(table) = pair.get("table").filter(|table| !table.is_empty()) else { continue };
+        let points = rows(&folder.join(table))?;
+        let places: Vec<[f64; 3]> = points.iter().map(|row| ["x", "y", "z"].map(|axis| value(row, axis))).collect();
+        let pressures: Vec<f64> = points.iter().map(|row| value(row, "pressure")).collect();
+        let name = |column: &str| pair.get(column).map_or("", String::as_str);
+        let title = format!("{} – {}", name("a"), name("b"));
+        let [low, high] = bounds(places.iter());
+        let mut axes = [0, 1, 2];
+        axes.sort_by(|&i, &j| (high[j] - low[j]).total_cmp(&(high[i] - low[i])).then(i.cmp(&j)));
+        let pressure = label("contact pressure", units.map(|units| units.stress));
+        if !is_space {
+            let along = label(["x", "y", "z"][axes[0]], units.map(|units| units.length));
+            let curve = places.iter().zip(&pressures).map(|(x, &p)| (x[axes[0]], p)).collect();
+            let plot = Plot::pressure(&title, &along, &pressure, vec![Series::new("", curve, Style::Line)]);
+            pictures.push(Picture { kind: "plot", svg: plot.text().map_err(failed)?, note: None });
+            continue;
+        }
+        // the two longest directions, in the order of their names
+        let (across, up) = (axes[0].min(axes[1]), axes[0].max(axes[1]));
+        let title = format!("{title}: {pressure}");
+        pictures.push(map(&title, &places, &pressures, [across, up], [low, high], alone)?);
+    }
+    Ok(pictures)
+}
+
+/// A map of points coloured by the pressure; grey without any.
+fn map(
+    title: &str,
+    places: &[[f64; 3]],
+    pressures: &[f64],
+    axes: [usize; 2],
+    [low, high]: [[f64; 3]; 2],
+    alone: bool,
+) -> Result<Picture> {
+    let size = axes.map(|k| high[k] - low[k]);
+    let pixel = (size[0] / 400.0).max(size[1] / 400.0).max(f64::MIN_POSITIVE);
+    let [width, height] = size.map(|size| size / pixel);
+    let [_, most] = range(pressures.iter());
+    let every = places.len().div_ceil(POINTS).max(1);
+    let point = |(x, &p): (&[f64; 3], &f64)| {
+        let band = if p > 0.0 { ((p / most * BANDS as f64) as i64).min(BANDS as i64 - 1) } else { -1 };
+        ((x[axes[0]] - low[axes[0]]) / pixel, (high[axes[1]] - x[axes[1]]) / pixel, band)
+    };
+    let points: Vec<_> = places.iter().zip(pressures).step_by(every).map(point).collect();
+    // discs that cover their share of the box
+    let radius = (width.max(1.0) * height.max(1.0) / points.len() as f64).sqrt().clamp(1.0, 12.0) * 0.62;
+    let mut environment = Environment::new();
+    environment.add_filter("num", super::words::number_of);
+    let levels: Vec<f64> = (0..=BANDS).map(|band| most * band as f64 / BANDS as f64).collect();
+    let context = context! { title, alone, points, radius, width, height, levels, colors => colors().to_vec() };
+    let svg = environment.render_named_str("map.svg.html", include_str!("map.svg"), context).map_err(failed)?;
+    let note = (every > 1).then(|| format!("One of {every} contact points; the table has all."));
+    Ok(Picture { kind: "map", svg, note })
+}
+
+/// A picture that cannot be drawn.
+pub fn failed(cause: impl std::fmt::Display) -> Error {
+    Error::new(Kind::File, "a picture cannot be drawn").because(cause.to_string())
+}

@@ -1,0 +1,12 @@
+//! Results of a run for the eye, made from its files alone: one page, and single pictures.
+
+pub mod bands;
+pub mod body;
+mod contact;
+mod figure;
+pub mod page;
+mod space;
+mod words;
+
+pub use figure::draw;
+pub use page::{FILE, save};

@@ -1,0 +1,202 @@
+//! The page of a run: one HTML file with all that is in its folder, without anything from elsewhere.
+
+use super::body::{Part, magnification};
+use super::contact::{Picture, failed, pictures, rows, value};
+use super::{bands, space, words};
+use crate::error::{Error, Kind, Result};
+use crate::output::{Axis, Plot, Series, Style, safe_name, write_whole};
+use crate::problem::units::{Units, label};
+use minijinja::{Environment, UndefinedBehavior, context};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Name of the page in the folder of results.
+pub const FILE: &str = "report.html";
+
+/// Writes the page of the results in `folder` to `out`, or to [`FILE`] in the folder; returns its path.
+///
+/// # Errors
+/// [`Kind::File`] when the folder has no readable `report.json`, or a file that it names is broken.
+pub fn save(folder: &Path, out: Option<&Path>) -> Result<PathBuf> {
+    let text = Results::read(folder)?.page()?;
+    let path = out.map_or_else(|| folder.join(FILE), Path::to_owned);
+    write_whole(&path, |out| out.write_all(text.as_bytes()))?;
+    Ok(path)
+}
+
+/// What a folder of results has.
+pub struct Results {
+    folder: PathBuf,
+    report: Value,
+    /// Units of the scene, if it names them.
+    pub units: Option<Units>,
+}
+
+impl Results {
+    /// Reads `report.json` of a folder.
+    ///
+    /// # Errors
+    /// [`Kind::File`] when it is not there or no report.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join("report.json");
+        if !path.exists() {
+            return Err(Error::new(Kind::File, format!("{} has no report.json", folder.display()))
+                .help("name a folder of results of `winkler solve`"));
+        }
+        let refuse = |cause: String| {
+            Error::new(Kind::File, format!("{} is no report of a run", path.display()))
+                .because(cause)
+                .help("solve the scene again")
+        };
+        let report: Value =
+            serde_json::from_slice(&crate::file::read(&path)?).map_err(|cause| refuse(cause.to_string()))?;
+        for key in ["status", "bodies", "pairs", "settings", "files", "times", "inner_times"] {
+            if report.get(key).is_none() {
+                return Err(refuse(format!("it has no `{key}`")));
+            }
+        }
+        let units = report["settings"]["units"].as_str().and_then(|text| Units::parse(text).ok());
+        Ok(Self { folder: folder.to_owned(), report, units })
+    }
+
+    /// Whether the scene is in space.
+    fn is_space(&self) -> bool {
+        self.report["settings"]["dimension"] == 3
+    }
+
+    /// The bodies, if the run wrote their fields.
+    ///
+    /// # Errors
+    /// Those of [`Part::read`].
+    pub fn bodies(&self) -> Result<Vec<Part>> {
+        let names = self.names("bodies", |body| body["name"].as_str().map(str::to_owned));
+        let parts = names.iter().filter_map(|name| Some((name, self.file(&[&safe_name(name), name])?)));
+        parts.map(|(name, path)| Part::read(&path, name, "von_mises")).collect()
+    }
+
+    /// The contact surfaces, if the run wrote them.
+    ///
+    /// # Errors
+    /// Those of [`Part::read`].
+    pub fn surfaces(&self) -> Result<Vec<Part>> {
+        let files = self.names("files", |file| Some(file.as_str()?.strip_suffix(".vtu")?.to_owned()));
+        let surfaces = files.iter().filter(|name| name.starts_with("contact-"));
+        let paths = surfaces.filter_map(|name| Some((name, self.file(&[name])?)));
+        paths.map(|(name, path)| Part::read(&path, name, "pressure")).collect()
+    }
+
+    fn names(&self, key: &str, name: impl Fn(&Value) -> Option<String>) -> Vec<String> {
+        self.report[key].as_array().into_iter().flatten().filter_map(name).collect()
+    }
+
+    /// The first VTU file of these names that the run wrote.
+    fn file(&self, stems: &[&str]) -> Option<PathBuf> {
+        let files = self.report["files"].as_array()?;
+        let written = |name: &String| files.iter().any(|file| file == name);
+        // the name of a file is no path that leads elsewhere
+        let stems = stems.iter().map(|stem| format!("{stem}.vtu")).filter(|name| !name.contains('/'));
+        let path = stems.filter(written).map(|name| self.folder.join(name)).next();
+        path.filter(|path| path.exists())
+    }
+
+    /// A label with the unit of a length or a stress.
+    pub fn label(&self, what: &str, unit: fn(&Units) -> &str) -> String {
+        label(what, self.units.as_ref().map(unit))
+    }
+
+    /// Residual, error and increment of each iteration; none without iterations.
+    ///
+    /// # Errors
+    /// Those of [`rows`].
+    pub fn convergence(&self) -> Result<Option<Plot>> {
+        let rows = rows(&self.folder.join("history.csv"))?;
+        // load steps begin to count anew
+        let place = |k: usize| if rows[k].contains_key("step") { k as f64 + 1.0 } else { value(&rows[k], "iteration") };
+        let curve = |name: &str, column: &str, style| {
+            let points: Vec<_> = (0..rows.len()).map(|k| (place(k), value(&rows[k], column))).collect();
+            points.iter().any(|point| point.1 > 0.0).then(|| Series::new(name, points, style))
+        };
+        let error = if self.report["error_bound"].is_null() { "estimated error" } else { "bound of the error" };
+        let series = [
+            curve("residual", "residual", Style::Line),
+            curve(error, "error", Style::LineMarkers),
+            curve("increment", "increment", Style::Dashed),
+        ];
+        let series: Vec<Series> = series.into_iter().flatten().collect();
+        let axis = |label: &str, log| Axis { label: label.to_owned(), log };
+        let title = String::new();
+        Ok((!series.is_empty()).then(|| Plot { title, x: axis("iteration", false), y: axis("relative", true), series }))
+    }
+
+    /// A picture of the pressure of each pair that touches and has a table.
+    ///
+    /// # Errors
+    /// Those of the tables.
+    pub fn pressures(&self, alone: bool) -> Result<Vec<Picture>> {
+        pictures(&self.folder, self.is_space(), self.units.as_ref(), alone)
+    }
+
+    /// A picture of the stress, or else the displacement, on deformed bodies of the plane.
+    ///
+    /// # Errors
+    /// Those of the template.
+    pub fn bands(&self, bodies: &[Part], stress: bool, alone: bool) -> Result<String> {
+        let values: Vec<Vec<f64>> =
+            bodies.iter().map(|part| if stress { part.value.clone() } else { part.travel() }).collect();
+        let title = match stress {
+            true => self.label("von Mises stress", |units| units.stress),
+            false => self.label("displacement", |units| units.length),
+        };
+        bands::svg(bodies, &values, stress, &title, magnification(bodies), alone).map_err(failed)
+    }
+
+    /// The text of the page.
+    fn page(&self) -> Result<String> {
+        let report = &self.report;
+        let bodies = self.bodies()?;
+        let (mut view, mut drawn) = (None, Vec::new());
+        if bodies.iter().any(|part| part.is_solid) {
+            view = Some(space::view(&bodies, &self.surfaces()?, magnification(&bodies)));
+        } else if !bodies.is_empty() {
+            drawn = vec![self.bands(&bodies, true, false)?, self.bands(&bodies, false, false)?];
+        }
+        let convergence = self.convergence()?.map(|plot| plot.text().map_err(failed)).transpose()?;
+        let unit = |unit: fn(&Units) -> &str| self.label("", unit);
+        let phases = ["mesh", "discretize", "set-up", "iterate", "estimate", "output"];
+        let timed = |phase: &&str| report["times"].get(*phase).is_some();
+        let words_of = |key: &str| -> Vec<&str> {
+            report[key].as_array().into_iter().flatten().filter_map(Value::as_str).collect()
+        };
+        let command = words_of("command").into_iter().map(|word| shlex::try_quote(word).unwrap_or(word.into()));
+        let command = command.collect::<Vec<_>>().join(" ");
+        let folder = report["directory"].as_str().filter(|_| !command.is_empty());
+        let command = match folder.map(|folder| shlex::try_quote(folder).unwrap_or(folder.into())) {
+            Some(folder) => format!("cd {folder}\n{command}"),
+            None => command,
+        };
+        let mut environment = Environment::new();
+        // reports of other versions may lack keys
+        environment.set_undefined_behavior(UndefinedBehavior::Chainable);
+        environment.add_filter("num", words::number_of);
+        environment.add_filter("words", words::words_of);
+        environment.add_filter("without", words::without);
+        let known = context! {
+            report,
+            units => self.units.as_ref().map(|u| context! { length => u.length, stress => u.stress, force => u.force }),
+            stress_unit => unit(|units| units.stress),
+            length_unit => unit(|units| units.length),
+            force_unit => if self.is_space() { unit(|units| &units.force) } else { String::new() },
+            view,
+            pictures => drawn,
+            pressures => self.pressures(false)?,
+            convergence,
+            phases => phases.into_iter().filter(timed).chain(["total"]).collect::<Vec<_>>(),
+            command,
+            settings => serde_json::to_string_pretty(&report["settings"]).unwrap_or_default(),
+            style => include_str!("style.css"),
+            library => include_str!("vendor/twgl.min.js"),
+            viewer => include_str!("viewer.js"),
+        };
+        environment.render_named_str("page.html", include_str!("page.html"), known).map_err(failed)
+    }
+}

@@ -1,0 +1,47 @@
+//! Surfaces in space for the view that turns.
+
+use super::body::{Part, bounds};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
+
+/// Marks points without a value.
+const NONE: u16 = u16::MAX;
+
+/// Numbers of a view: of each part points and displacements (float32), triangles (uint32), and its value (uint16 between
+/// `low` and `high`, 65535 for none), little endian in base64.
+pub fn view(bodies: &[Part], surfaces: &[Part], scale: f64) -> Value {
+    let [low, high] = bounds(bodies.iter().chain(surfaces).flat_map(|part| &part.points));
+    json!({
+        "bodies": parts(bodies),
+        "surfaces": parts(surfaces),
+        "travel": super::bands::range(bodies.iter().flat_map(Part::travel).collect::<Vec<_>>().iter()),
+        "stress": super::bands::range(bodies.iter().flat_map(|part| &part.value)),
+        "pressure": super::bands::range(surfaces.iter().flat_map(|part| &part.value)),
+        "low": low,
+        "high": high,
+        "scale": scale,
+        "colors": super::bands::colors().to_vec(),
+    })
+}
+
+fn parts(parts: &[Part]) -> Vec<Value> {
+    let [low, high] = super::bands::range(parts.iter().flat_map(|part| &part.value));
+    let short = |value: &f64| match value.is_finite() {
+        true => ((value - low) / (high - low) * f64::from(NONE - 1)).round() as u16,
+        false => NONE,
+    };
+    let floats = |points: &[[f64; 3]]| -> Vec<u8> {
+        points.as_flattened().iter().flat_map(|&x| (x as f32).to_le_bytes()).collect()
+    };
+    let part = |part: &Part| {
+        json!({
+            "name": part.name,
+            "points": STANDARD.encode(floats(&part.points)),
+            "displacement": STANDARD.encode(floats(&part.displacement)),
+            "value": STANDARD.encode(part.value.iter().map(short).flat_map(u16::to_le_bytes).collect::<Vec<_>>()),
+            "triangles": STANDARD.encode(part.triangles.as_flattened().iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>()),
+        })
+    };
+    parts.iter().map(part).collect()
+}

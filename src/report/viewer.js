@@ -1,0 +1,120 @@
+// Bodies in space: drag turns, shift or right button moves, wheel or two fingers zoom.
+(() => {
+  const data = JSON.parse(document.getElementById("view").textContent);
+  const figure = document.getElementById("space"), canvas = figure.querySelector("canvas");
+  const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+  if (!gl) {
+    canvas.replaceWith("This browser shows no WebGL 2. ParaView opens bodies.pvd in the folder of results.");
+    return;
+  }
+  const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
+  const program = twgl.createProgramInfo(gl, [`#version 300 es
+    in vec3 point, displacement; in float value;
+    uniform mat4 view; uniform float scale, travels; uniform vec2 travel;
+    out float shade; out vec3 place;
+    void main() {
+      place = point + scale * displacement;
+      shade = travels > 0.5 ? (length(displacement) - travel.x) / (travel.y - travel.x) : value * 65535.0 / 65534.0;
+      gl_Position = view * vec4(place, 1.0);
+    }`, `#version 300 es
+    precision highp float;
+    in float shade; in vec3 place; out vec4 color;
+    uniform vec3 colors[12], toward; uniform float squares;
+    void main() {
+      vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
+      float light = 0.55 + 0.45 * abs(dot(normal, toward));
+      int band = clamp(int((squares > 0.5 ? sqrt(max(shade, 0.0)) : shade) * 12.0), 0, 11);
+      vec3 paint = shade > 1.00001 ? vec3(0.72) : colors[band];
+      color = vec4(paint * light, 1.0);
+    }`]);
+  const part = (part, kind) => {
+    const arrays = {
+      point: { numComponents: 3, data: new Float32Array(bytes(part.points)) },
+      displacement: { numComponents: 3, data: new Float32Array(bytes(part.displacement)) },
+      value: { numComponents: 1, data: new Uint16Array(bytes(part.value)), normalize: true },
+      indices: new Uint32Array(bytes(part.triangles)),
+    };
+    return { kind, name: part.name, shown: true, buffer: twgl.createBufferInfoFromArrays(gl, arrays) };
+  };
+  const parts = [...data.bodies.map(b => part(b, "body")), ...data.surfaces.map(s => part(s, "surface"))];
+  const middle = data.low.map((low, k) => (low + data.high[k]) / 2);
+  const size = Math.hypot(...data.low.map((low, k) => data.high[k] - low)) || 1;
+  const colors = data.colors.flatMap(c => [1, 3, 5].map(k => parseInt(c.slice(k, k + 2), 16) / 255));
+  const eye = {};
+  const reset = () => Object.assign(eye, { turn: -0.9, rise: 0.45, zoom: 1, right: 0, up: 0 });
+  const what = figure.querySelector("select"), scale = figure.querySelector("input[type=range]");
+  const shown = figure.querySelector("output"), bar = figure.querySelector(".bar");
+  const factor = () => scale.value / 50 * data.scale;
+  const number = v => Number(v.toPrecision(3)).toString();
+
+  let waiting = false;
+  const redraw = () => { if (!waiting) { waiting = true; requestAnimationFrame(draw); } };
+  function draw() {
+    waiting = false;
+    twgl.resizeCanvasToDisplaySize(canvas, window.devicePixelRatio || 1);
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    const m4 = twgl.m4, aspect = canvas.width / canvas.height, half = 0.42 * size / eye.zoom;
+    const [w, h] = aspect > 1 ? [half * aspect, half] : [half, half / aspect];
+    const toward = [Math.cos(eye.rise) * Math.cos(eye.turn), Math.cos(eye.rise) * Math.sin(eye.turn), Math.sin(eye.rise)];
+    const camera = m4.lookAt(middle.map((x, k) => x + 2 * size * toward[k]), middle, [0, 0, 1]);
+    const flat = m4.ortho(eye.right - w, eye.right + w, eye.up - h, eye.up + h, -20 * size, 40 * size);
+    gl.useProgram(program.program);
+    const pressure = what.value === "pressure";
+    const lit = { view: m4.multiply(flat, m4.inverse(camera)), toward, colors, scale: factor(), travel: data.travel };
+    for (const part of parts) {
+      if (!part.shown || pressure !== (part.kind === "surface")) continue;
+      twgl.setBuffersAndAttributes(gl, program, part.buffer);
+      twgl.setUniforms(program, { ...lit, travels: what.value === "travel" ? 1 : 0, squares: what.value === "stress" ? 1 : 0 });
+      twgl.drawBufferInfo(gl, part.buffer);
+    }
+    shown.textContent = "× " + number(factor());
+  }
+  function legend() {
+    const [low, high] = data[what.value];
+    bar.replaceChildren(...data.colors.map((color, k) => {
+      const cell = document.createElement("span");
+      cell.style.background = color;
+      const share = what.value === "stress" ? (k / 12) ** 2 : k / 12;
+      cell.textContent = k % 3 ? "" : number(low + (high - low) * share);
+      return cell;
+    }), "to " + number(high));
+    redraw();
+  }
+
+  const fingers = new Map();
+  canvas.addEventListener("pointerdown", e => { fingers.set(e.pointerId, e); canvas.setPointerCapture(e.pointerId); });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, e => fingers.delete(e.pointerId));
+  canvas.addEventListener("pointermove", e => {
+    const before = fingers.get(e.pointerId);
+    if (!before) return;
+    const [dx, dy] = [e.clientX - before.clientX, e.clientY - before.clientY];
+    if (fingers.size === 2) {
+      const [other] = [...fingers.values()].filter(f => f.pointerId !== e.pointerId);
+      const apart = f => Math.hypot(f.clientX - other.clientX, f.clientY - other.clientY) || 1;
+      eye.zoom *= apart(e) / apart(before);
+    } else if (e.shiftKey || e.buttons & 2) {
+      const pixel = 0.84 * size / eye.zoom / Math.min(canvas.clientWidth, canvas.clientHeight);
+      eye.right -= dx * pixel;
+      eye.up += dy * pixel;
+    } else {
+      eye.turn -= dx * 0.01;
+      eye.rise = Math.max(-1.55, Math.min(1.55, eye.rise + dy * 0.01));
+    }
+    fingers.set(e.pointerId, e);
+    redraw();
+  });
+  canvas.addEventListener("wheel", e => { e.preventDefault(); eye.zoom *= Math.exp(-e.deltaY * 0.001); redraw(); }, { passive: false });
+  canvas.addEventListener("contextmenu", e => e.preventDefault());
+  what.addEventListener("change", legend);
+  scale.addEventListener("input", redraw);
+  figure.querySelector("button").addEventListener("click", () => { reset(); redraw(); });
+  for (const box of figure.querySelectorAll("input[type=checkbox]"))
+    box.addEventListener("change", () => { parts[box.value].shown = box.checked; redraw(); });
+  new ResizeObserver(redraw).observe(canvas);
+  reset();
+  legend();
+  draw();
+})();

@@ -1,0 +1,81 @@
+//! Values of a report as words and numbers for people.
+
+use minijinja::Value;
+use minijinja::value::{Rest, ValueKind};
+
+/// A number with five digits; a dash for what is none.
+pub fn number(value: &Value) -> String {
+    let Ok(value) = f64::try_from(value.clone()) else { return "–".to_owned() };
+    match value.abs() {
+        0.0 => "0".to_owned(),
+        size if !(1e-3..1e6).contains(&size) => {
+            let text = format!("{value:.3e}");
+            let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+            format!("{}e{power}", trimmed(digits)).replace('-', "−")
+        }
+        size => {
+            let digits = (4.0 - size.log10().floor()).clamp(0.0, 7.0) as usize;
+            trimmed(&format!("{value:.digits$}")).replace('-', "−")
+        }
+    }
+}
+
+/// [`number`] as a filter of templates.
+pub fn number_of(value: Value) -> String {
+    number(&value)
+}
+
+/// [`words`] as a filter of templates.
+pub fn words_of(value: Value) -> String {
+    words(&value)
+}
+
+/// Without zeros at the end of a fraction.
+fn trimmed(text: &str) -> &str {
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
+}
+
+/// A table as `key = value, ...`, a list as `(a, b)`; numbers as [`number`] has them.
+pub fn words(value: &Value) -> String {
+    let list = || value.try_iter().into_iter().flatten();
+    match value.kind() {
+        ValueKind::Map => {
+            let item = |key: Value| {
+                let of = value.get_item(&key).unwrap_or_default();
+                match of.kind() {
+                    ValueKind::Map => format!("{key}: {}", words(&of)),
+                    _ => format!("{key} = {}", words(&of)),
+                }
+            };
+            list().map(item).collect::<Vec<_>>().join(", ")
+        }
+        ValueKind::Seq => format!("({})", list().map(|item| words(&item)).collect::<Vec<_>>().join(", ")),
+        ValueKind::Number => number(value),
+        _ => value.to_string(),
+    }
+}
+
+/// A table without some of its keys.
+pub fn without(value: Value, keys: Rest<String>) -> Value {
+    let kept =
+        value.try_iter().into_iter().flatten().filter(|key| !keys.iter().any(|other| key.as_str() == Some(other)));
+    kept.map(|key| (key.to_string(), value.get_item(&key).unwrap_or_default())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_short() {
+        let number = |value: f64| number(&Value::from(value));
+        assert_eq!(
+            [0.0, 1.0, 93.108797, -5e-7, 2.1e5, 1e6, 0.05].map(number),
+            ["0", "1", "93.109", "−5e−7", "210000", "1e6", "0.05"]
+        );
+        assert_eq!(super::number(&Value::from(())), "–");
+        let value = Value::from_serialize(serde_json::json!({ "power": { "B": 1e-3, "a": 0.5 }, "at": [1, 2.5] }));
+        assert_eq!(words(&without(value.clone(), Rest(vec!["at".into()]))), "power: B = 0.001, a = 0.5");
+        assert_eq!(words(&value.get_attr("at").unwrap()), "(1, 2.5)");
+    }
+}
