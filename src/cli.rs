@@ -120,6 +120,9 @@ enum Solving {
     Check {
         #[command(flatten)]
         scene: SceneArgs,
+        /// Folder for pictures of measured surfaces and layers of asperities [default: none are drawn]
+        #[arg(short, value_name = "DIR")]
+        output: Option<PathBuf>,
     },
     /// Solve a scene for every combination of values of its keys
     Sweep {
@@ -393,9 +396,9 @@ fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Resul
             let request = solve::Request { scene: scene.scene, folder: output, restart, overrides, json: scene.json };
             solve::solve(session, interrupt, request)
         }
-        Solving::Check { scene } => {
+        Solving::Check { scene, output } => {
             let overrides = scene.overrides();
-            check::check(session, interrupt, scene.scene, overrides, scene.json)
+            check::check(session, interrupt, scene.scene, overrides, scene.json, output)
         }
         Solving::Sweep { scene, output, over } => {
             let overrides = scene.overrides();

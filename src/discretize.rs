@@ -14,6 +14,7 @@ mod mechanism;
 pub mod meshes;
 mod pairs;
 mod part;
+pub mod resolution;
 mod roster;
 mod springs;
 mod supports;

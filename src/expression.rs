@@ -3,16 +3,19 @@
 mod dual;
 mod grammar;
 mod operators;
+mod program;
+mod scope;
 mod slip;
 #[cfg(test)]
 mod tests;
 mod token;
 
 pub use dual::Differentiable;
+pub use scope::Scope;
 
+use crate::data::{Data, Library};
 use crate::error::{Error, Place, Result};
-use exmex::{Express, FlatEx, NumberMatcher};
-use operators::Operators;
+use program::{Code, MOST_VARIABLES, Number, Program, Values};
 use slip::Slip;
 use std::fmt;
 use std::sync::Arc;
@@ -23,9 +26,9 @@ use std::sync::Arc;
 /// a^b^c is a^(b^c). Comparisons give 1 or 0. A value outside the domain of a function is NaN and stays one.
 #[derive(Clone)]
 pub struct Expression {
-    flat: Arc<FlatEx<f64, Operators, NumberMatcher>>,
-    /// Which entry of the values each variable of `flat` takes.
-    slots: Arc<[usize]>,
+    program: Arc<Program<f64>>,
+    /// Which entries of the values it uses.
+    uses: Arc<[usize]>,
     variables: Arc<[&'static str]>,
     text: Arc<str>,
     place: Place,
@@ -33,46 +36,69 @@ pub struct Expression {
 
 /// What a [`Field`] can depend on, in the order of its values.
 const COORDINATES: [&str; 4] = ["x", "y", "z", "k"];
-/// Most variables that an expression can use at once.
-const MOST_VARIABLES: usize = 4;
 
 impl Expression {
-    /// Parses `text`, which stands at `place` (with or without the quotes of a TOML string) and may use up to four
-    /// `variables`. Refuses anything else, pointing at the word that is wrong.
-    pub fn parse(text: &str, place: &Place, variables: &[&'static str]) -> Result<Self> {
-        debug_assert!(variables.len() <= MOST_VARIABLES);
-        let refuse = |slip: Slip| slip.into_error(text, place);
-        let explicit = grammar::parse(text, variables).map_err(refuse)?;
-        let flat = FlatEx::<f64, Operators, NumberMatcher>::parse(&explicit)
-            .map_err(|error| refuse(Slip::new(0..text.len(), error.to_string())))?;
-        let slot = |name: &String| variables.iter().position(|known| *known == name.as_str());
-        Ok(Self {
-            slots: flat.var_names().iter().filter_map(slot).collect(),
-            flat: Arc::new(flat),
-            variables: variables.into(),
+    /// Parses `text`, which stands at `place` (with or without the quotes of a TOML string). Refuses what the scope has not, pointing at
+    /// the word that is wrong; files of data are read when the first expression asks for them.
+    ///
+    /// # Errors
+    /// Texts that are no expression, and data that cannot be read.
+    pub fn parse(text: &str, place: &Place, scope: Scope) -> Result<Self> {
+        Self::made(text, place, scope, |slot| slot).map(|(expression, _)| expression)
+    }
+
+    /// The same with another program for a second kind of number.
+    fn with<T: Number>(text: &str, place: &Place, scope: Scope) -> Result<(Self, Program<T>)> {
+        let (expression, code) = Self::made(text, place, scope, |slot| slot)?;
+        Ok((expression, linked(&code, text, place)?))
+    }
+
+    /// An expression with its code; `slot` says which value each variable of the scope takes.
+    fn made(text: &str, place: &Place, scope: Scope, slot: impl Fn(usize) -> usize) -> Result<(Self, Vec<Code>)> {
+        debug_assert!(scope.variables.len() <= MOST_VARIABLES);
+        let mut code = grammar::parse(text, scope).map_err(|slip| slip.into_error(text, place))?;
+        let mut uses = Vec::new();
+        for step in &mut code {
+            if let Code::Variable(variable) = step {
+                *variable = slot(*variable);
+                uses.push(*variable);
+            }
+        }
+        let expression = Self {
+            program: Arc::new(linked(&code, text, place)?),
+            uses: uses.into(),
+            variables: scope.variables.into(),
             text: text.into(),
             place: place.clone(),
-        })
+        };
+        Ok((expression, code))
     }
 
     /// Value for the values of the variables, in the order given to [`Expression::parse`]; NaN where it is not
     /// defined. Values beyond the variables are not used.
     pub fn eval(&self, values: &[f64]) -> f64 {
-        let mut used = [f64::NAN; MOST_VARIABLES];
-        for (used, slot) in used.iter_mut().zip(self.slots.iter()) {
-            *used = values.get(*slot).copied().unwrap_or(f64::NAN);
-        }
-        self.flat.eval(&used[..self.slots.len()]).unwrap_or(f64::NAN)
+        self.program.eval(&full(values))
     }
 
     /// Whether the expression uses no variable.
     pub fn is_constant(&self) -> bool {
-        self.slots.is_empty()
+        self.uses.is_empty()
     }
 
     /// Whether it depends on no variable but the first.
     pub fn uses_only_first(&self) -> bool {
-        self.slots.iter().all(|&slot| slot == 0)
+        self.uses.iter().all(|&slot| slot == 0)
+    }
+
+    /// The data that it asks.
+    pub fn data(&self) -> impl Iterator<Item = &Arc<Data>> {
+        self.program.data()
+    }
+
+    /// The refusal of values outside of data, if that is why there is none; `what` names the quantity.
+    pub fn outside(&self, what: &str, values: &[f64]) -> Option<Error> {
+        let (data, place) = self.program.outside(&full(values))?;
+        Some(data.outside(&self.place, what, &place))
     }
 
     /// The text as the user wrote it.
@@ -104,7 +130,7 @@ pub enum Field {
 impl Field {
     /// Parses an expression in x, y, in space also z, and with `iteration` also k; see [`Expression::parse`]. One
     /// without variables becomes a constant, and is refused if that is not finite.
-    pub fn parse(text: &str, place: &Place, dimension: usize, iteration: bool) -> Result<Self> {
+    pub fn parse(text: &str, place: &Place, dimension: usize, iteration: bool, data: &Library) -> Result<Self> {
         let names: Vec<_> = COORDINATES
             .into_iter()
             .filter(|name| match *name {
@@ -113,16 +139,17 @@ impl Field {
                 _ => true,
             })
             .collect();
-        let mut expression = Expression::parse(text, place, &names)?;
-        if expression.is_constant() {
-            let value = expression.eval(&[]);
-            return match value.is_finite() {
-                true => Ok(Field::Constant(value)),
-                false => Err(Error::scene(place, format!("the expression is not a finite number but {value}"))),
-            };
+        let slot = |variable: usize| coordinate(names[variable]).unwrap_or(variable);
+        let (expression, _) = Expression::made(text, place, Scope { variables: &names, data }, slot)?;
+        if !expression.is_constant() {
+            return Ok(Field::Expression(expression));
         }
-        expression.slots = expression.flat.var_names().iter().filter_map(|name| coordinate(name)).collect();
-        Ok(Field::Expression(expression))
+        match expression.eval(&[]) {
+            value if value.is_finite() => Ok(Field::Constant(value)),
+            value => Err(expression
+                .outside("the expression", &[])
+                .unwrap_or_else(|| Error::scene(place, format!("the expression is not a finite number but {value}")))),
+        }
     }
 
     /// Value at a point (z = 0 in plane problems); NaN or infinite where the expression is not defined, or if it
@@ -160,6 +187,16 @@ impl Field {
         if value.is_nan() { Err(self.refuse(what, &[x[0], x[1], x[2], k as f64], value)) } else { Ok(value > 0.0) }
     }
 
+    /// The data that it asks.
+    pub fn data(&self) -> impl Iterator<Item = &Arc<Data>> {
+        match self {
+            Field::Constant(_) => None,
+            Field::Expression(expression) => Some(expression.data()),
+        }
+        .into_iter()
+        .flatten()
+    }
+
     /// Whether it is the constant zero.
     pub fn is_zero(&self) -> bool {
         matches!(self, Field::Constant(0.0))
@@ -185,6 +222,9 @@ impl Field {
         let Field::Expression(expression) = self else {
             return Error::new(crate::error::Kind::Scene, format!("{what} is {value}"));
         };
+        if let Some(error) = expression.outside(what, values) {
+            return error;
+        }
         let given = |name: &&str| Some(format!("{name} = {}", values.get(coordinate(name)?)?));
         let point: Vec<_> = expression.variables.iter().filter_map(given).collect();
         Error::scene(&expression.place, format!("{what} is not a finite number at {}", point.join(", ")))
@@ -195,4 +235,20 @@ impl Field {
 
 fn coordinate(name: &str) -> Option<usize> {
     COORDINATES.iter().position(|known| *known == name)
+}
+
+fn full(values: &[f64]) -> Values<f64> {
+    std::array::from_fn(|slot| values.get(slot).copied().unwrap_or(f64::NAN))
+}
+
+fn linked<T: Number>(code: &[Code], text: &str, place: &Place) -> Result<Program<T>> {
+    // the grammar makes no code that cannot be linked
+    let refuse = || Slip::new(0..text.len(), "this is no expression").into_error(text, place);
+    Program::link(code).ok_or_else(refuse)
+}
+
+/// Names that have a meaning in every expression.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    // c is the compression in a layer's law
+    operators::functions().chain(COORDINATES).chain(["c", "pi"])
 }

@@ -11,6 +11,7 @@
 pub mod cli;
 pub mod commands;
 pub mod contact;
+pub mod data;
 pub mod ddm;
 pub mod discretize;
 pub mod error;

@@ -10,12 +10,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms from the ground up; each may use those below it.
-const ROOMS: [&str; 22] = [
+const ROOMS: [&str; 23] = [
     "error",
     "file",
     "interrupt",
     "linalg",
     "petsc",
+    "data",
     "expression",
     "problem",
     "mesh",

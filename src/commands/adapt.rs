@@ -42,7 +42,8 @@ pub struct Plan {
     finer: Option<Rc<Scene>>,
     /// Where the first round goes on.
     resumed: Option<Checkpoint>,
-    settings: String,
+    /// The scene as it was asked for.
+    asked: Rc<Scene>,
     purpose: String,
     carried: Vec<ContactTable>,
     seconds: f64,
@@ -66,7 +67,7 @@ impl Plan {
         ["output", "solver", "method"].iter().for_each(|key| settings[*key] = serde_json::Value::Null);
         let mut plan = Self {
             purpose: settings.to_string(),
-            settings: settings_digest(&scene),
+            asked: scene.clone(),
             scene,
             rounds: resumed.as_ref().map_or(Vec::new(), |checkpoint| checkpoint.head.rounds.clone()),
             resumed,
@@ -143,8 +144,8 @@ impl Plan {
             MeshSource::Geo { sizes: Some(Sizing::View(view)), .. } => Some(view.to_string()),
             _ => None,
         };
-        let (settings, rounds) = (self.settings.clone(), self.rounds.clone());
-        self.finer.is_none().then(|| Head { settings, rounds, sizes, ..Head::default() })
+        let rounds = self.rounds.clone();
+        self.finer.is_none().then(|| Head { settings: settings_digest(&self.asked), rounds, sizes, ..Head::default() })
     }
 
     /// The start of this round, if an earlier one gives it.

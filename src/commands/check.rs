@@ -5,28 +5,29 @@ use super::preflight::Coupling;
 use super::run;
 use super::stages::Built;
 use super::words::in_words;
-use super::{load, preflight, report};
+use super::{load, preflight, report, surfaces};
 use crate::contact::{ContactPair, Left};
 use crate::discretize::BodyInfo;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::output::report::warning_lines;
-use crate::output::{LISTED, say, sci};
+use crate::output::{Folder, LISTED, say, sci};
 use crate::petsc::Session;
 use serde_json::json;
 use std::path::PathBuf;
 
 /// Builds a scene's problem and prints bodies, dofs, surfaces, gaps and the rigid motions left to each body; returns the
-/// exit code.
+/// exit code. With a folder it draws the measured surfaces and the layers of asperities in it.
 ///
 /// # Errors
-/// Refusals of scene and mesh.
+/// Refusals of scene and mesh; pictures that cannot be written.
 pub fn check(
     session: &Session,
     interrupt: &Interrupt,
     path: PathBuf,
     overrides: Vec<String>,
     as_json: bool,
+    folder: Option<PathBuf>,
 ) -> Result<i32> {
     let mut clock = Clock::default();
     let scene = load(session, &path, &overrides)?;
@@ -35,6 +36,9 @@ pub fn check(
     let shared = report::Shared::gather(&built.discrete);
     if session.rank() != 0 {
         return Ok(0);
+    }
+    if let Some(folder) = folder {
+        surfaces::draw(&built, &Folder::create(folder)?)?;
     }
     if as_json {
         let mut value = json!(report::headline(session, &built, &shared.solvers, &clock));
@@ -46,6 +50,11 @@ pub fn check(
             value["bodies"][body]["rigid_motions_unconstrained"] = json!(info.left_by_all);
         }
         value["pairs"] = pairs(&built);
+        let (data, of_pairs) = surfaces::json(&built);
+        value["data"] = data;
+        for (pair, of_pair) in of_pairs.into_iter().enumerate() {
+            value["pairs"][pair]["surface"] = of_pair;
+        }
         say(format_args!("{value:#}"))?;
     } else {
         print(&built, &report::solvers_in_words(&shared.solvers))?;
@@ -87,7 +96,7 @@ fn print(built: &Built, solvers: &str) -> Result<()> {
         ..=LISTED => each_body(built),
         _ => all_bodies(built),
     };
-    let lines = lines.into_iter().chain(match built.discrete.model.pairs.len() {
+    let lines = lines.into_iter().chain(surfaces::lines(built)).chain(match built.discrete.model.pairs.len() {
         ..=LISTED => each_pair(built),
         _ => all_pairs(built),
     });
@@ -165,6 +174,7 @@ fn each_pair(built: &Built) -> Vec<String> {
             }
             false => format!("    mean pressure {}, {}", sci(coupling.pressure, 3), expected(&coupling)),
         });
+        lines.extend(surfaces::of_pair(built, i));
     }
     lines
 }

@@ -222,7 +222,13 @@ pub fn settings_digest(scene: &Scene) -> String {
     if let Some(mesh) = settings["mesh"].as_object_mut() {
         ["geo", "msh", "timeout", "memory"].iter().for_each(|key| drop(mesh.remove(*key)));
     }
-    hex(Sha256::new().chain_update(settings.to_string()))
+    // of data the contents count, wherever they are
+    for (_, data) in settings["data"].as_object_mut().into_iter().flatten() {
+        data["file"] = Value::Null;
+    }
+    let mut digest = Sha256::new().chain_update(settings.to_string());
+    scene.data.values().flat_map(|data| data.numbers()).for_each(|number| digest.update(number.to_le_bytes()));
+    hex(digest)
 }
 
 /// Digest of the bodies' sizes and of all contact points.

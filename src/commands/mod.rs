@@ -24,6 +24,7 @@ mod shown;
 pub mod solve;
 pub mod stages;
 pub mod steps;
+pub mod surfaces;
 pub mod sweep;
 pub mod verdict;
 mod words;

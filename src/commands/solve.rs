@@ -185,7 +185,7 @@ impl Keep for Watchers<'_> {
     fn state(&mut self, done: &Done) {
         let Status::Paused { asked } = done.outcome.status else { return };
         let is_due = signal(asked).is_some() || !is_snapshot(asked);
-        let Some(head) = self.plan.head().filter(|_| is_due) else { return };
+        let Some(head) = is_due.then(|| self.plan.head()).flatten() else { return };
         let written = Checkpoint::write(self.path, head, done, self.session.rank() == 0);
         self.saved |= written.is_ok();
         self.note_failure("a checkpoint", written);

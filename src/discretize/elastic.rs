@@ -1,6 +1,6 @@
 //! Elasticity of the bodies of a scene: constants, regions, and refusals that name body and place.
 
-use super::find::{find_group, not_on_body, point};
+use super::find::{find_group, not_on_body, of_body, point};
 use crate::contact::pad;
 use crate::error::{Error, Result, shown};
 use crate::fem::Space;
@@ -46,7 +46,7 @@ pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw)
     let fields = elasticity.fields();
     // a value that does not exist makes every other complaint
     if let Some(error) = x.and_then(|x| fields.iter().find_map(|(name, field)| field.eval_finite(name, x).err())) {
-        return error;
+        return error.because(of_body(&spec.name.value));
     }
     let at = x.map(|x| format!(" at {}", point(x))).unwrap_or_default();
     let name = &spec.name.value;

@@ -58,21 +58,22 @@ pub fn earlier(on: &Located<String>) -> String {
 }
 
 /// Values of fields at many points, of which the first that does not exist is refused afterwards.
-pub struct Values {
+pub struct Values<'a> {
     what: &'static str,
+    body: &'a str,
     refused: RefCell<Option<Error>>,
 }
 
-impl Values {
-    /// Of the quantity `what`, in words.
-    pub fn of(what: &'static str) -> Self {
-        Self { what, refused: RefCell::new(None) }
+impl<'a> Values<'a> {
+    /// Of the quantity `what` of a body, in words.
+    pub fn of(what: &'static str, body: &'a str) -> Self {
+        Self { what, body, refused: RefCell::new(None) }
     }
 
     /// The value at a point; zero where there is none.
     pub fn at<const D: usize>(&self, field: &Field, x: [f64; D]) -> f64 {
         field.eval_finite(self.what, contact::pad(x)).unwrap_or_else(|error| {
-            self.refused.borrow_mut().get_or_insert(error);
+            self.refused.borrow_mut().get_or_insert_with(|| error.because(of_body(self.body)));
             0.0
         })
     }
@@ -82,6 +83,11 @@ impl Values {
     pub fn refused(self) -> Result<()> {
         self.refused.into_inner().map_or(Ok(()), Err)
     }
+}
+
+/// Whose expression has no value somewhere, for a refusal that points at the expression: tables of bodies may be for many.
+pub fn of_body(name: &str) -> String {
+    format!("it is for body `{name}`")
 }
 
 /// A point as text.

@@ -104,16 +104,23 @@ fn make_pair<const D: usize>(
             .help("move a body, give a larger gap, or let the layer take it: overlap = \"compress\""));
     }
     if let Some(field) = &spec.reference {
-        pair.position.iter().try_for_each(|&x| field.eval_finite("the reference", x).map(drop))?;
+        let value = |&x: &[f64; 3]| field.eval_finite("the reference", x).map(drop);
+        pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(&spec)))?;
     }
     let surface = ContactSurface::new(&a, &pair);
     let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap));
     Ok(Contact { spec, pair, fine, swapped, surface })
 }
 
+/// Whose expression has no value somewhere: tables of contacts may be for many pairs.
+fn of_pair(spec: &ContactSpec) -> String {
+    let [a, b] = spec.between.each_ref().map(|name| &name.value);
+    format!("it is for the contact of `{a}` and `{b}`")
+}
+
 fn refuse(spec: &ContactSpec, fault: Fault) -> Error {
     match fault {
-        Fault::Law(error) => error,
+        Fault::Law(error) => error.because(of_pair(spec)),
         Fault::NoPartner => {
             let names = [&spec.between[0].value, &spec.between[1].value];
             Error::scene(
@@ -122,10 +129,12 @@ fn refuse(spec: &ContactSpec, fault: Fault) -> Error {
             )
             .help("a pair needs surfaces whose outer normals point at each other; look at the mesh with `gmsh`")
         }
-        Fault::Gap(x) => spec.gap.eval_finite("the gap", x).err().unwrap_or_else(|| {
-            let message = format!("the gap is beyond the range of numbers at {}", point(x));
-            Error::scene(&spec.between[0].place, message)
-        }),
+        Fault::Gap(x) => {
+            spec.gap.eval_finite("the gap", x).err().map(|error| error.because(of_pair(spec))).unwrap_or_else(|| {
+                let message = format!("the gap is beyond the range of numbers at {}", point(x));
+                Error::scene(&spec.between[0].place, message)
+            })
+        }
     }
 }
 

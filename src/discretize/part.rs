@@ -121,7 +121,7 @@ impl<'a, const D: usize> Part<'a, D> {
             if area == 0.0 {
                 return Err(without_area(&spec.on, self.spec));
             }
-            let values = Values::of("this load");
+            let values = Values::of("this load", &name.value);
             surface::surface_load(
                 &self.space,
                 &facets,
@@ -143,7 +143,7 @@ impl<'a, const D: usize> Part<'a, D> {
             }
         }
         if let Some(fields) = &self.spec.force {
-            let values = Values::of("this body force");
+            let values = Values::of("this body force", &name.value);
             let density = |x: [f64; D]| std::array::from_fn(|c| values.at(&fields[c], x));
             assemble::body_force(&self.space, &density, &mut load);
             values.refused()?;

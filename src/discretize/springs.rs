@@ -1,6 +1,6 @@
 //! Springs of a body to the ground: per area on surfaces, each at the points of point groups.
 
-use super::find::{find_group, not_on_body, without_area};
+use super::find::{find_group, not_on_body, of_body, without_area};
 use crate::contact::pad;
 use crate::error::{Error, Result, shown};
 use crate::expression::Field;
@@ -25,7 +25,7 @@ pub fn blocks<const D: usize>(
     let value = |field: &Field, x: [f64; D]| match stiffness(field, spring, pad(x)) {
         Ok(value) => value,
         Err(error) => {
-            fault.borrow_mut().get_or_insert(error);
+            fault.borrow_mut().get_or_insert(error.because(of_body(&spec.name.value)));
             0.0
         }
     };

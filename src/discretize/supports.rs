@@ -1,6 +1,6 @@
 //! Supports of a body: conditions on its nodes, the axes in which they are prescribed dofs, and rigid surfaces.
 
-use super::find::{earlier, find_group, not_on_body, point};
+use super::find::{earlier, find_group, not_on_body, of_body, point};
 use crate::contact::pad;
 use crate::error::{Error, Place, Result};
 use crate::fem::{Facets, Frame, Space};
@@ -61,8 +61,9 @@ impl<const D: usize> Held<D> {
             }
             for node in nodes {
                 for &(direction, field) in &held_here {
-                    let value =
-                        field.eval_finite("the displacement of this support", pad(space.nodes[node as usize]))?;
+                    let value = field
+                        .eval_finite("the displacement of this support", pad(space.nodes[node as usize]))
+                        .map_err(|error| error.because(of_body(&spec.name.value)))?;
                     let support = Some(support);
                     conditions.entry(held.frame.node(node)).or_default().push(Condition { direction, value, support });
                 }

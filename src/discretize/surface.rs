@@ -1,6 +1,6 @@
 //! A contact surface of a pair; its mesh for output: the facets of side a, and where their values come from.
 
-use crate::contact::{ContactPair, Side, pad};
+use crate::contact::{Carriers, ContactPair, Side, pad};
 use crate::fem::{Facets, element};
 use crate::output::vtu::{CellKind, Grid};
 use crate::problem::order::Order;
@@ -24,6 +24,8 @@ pub struct ContactSurface {
     /// For each point of the mesh the contact points that its values come from, with their shares; none where nothing is
     /// known.
     sources: Vec<Vec<(usize, f64)>>,
+    /// Which nodes of each facet are contact points; none where it is not paired.
+    carriers: Vec<Option<Carriers>>,
     /// Share of each facet that is paired.
     cover: Vec<f64>,
     /// Why it is not paired as a whole: the number of the reason.
@@ -46,6 +48,7 @@ impl ContactSurface {
             },
             connectivity: Vec::new(),
             sources: Vec::new(),
+            carriers: pair.cover.iter().map(|cover| cover.carriers).collect(),
             cover: Vec::new(),
             left: Vec::new(),
         };
@@ -82,6 +85,13 @@ impl ContactSurface {
             }
         }
         surface
+    }
+
+    /// Kind of the facets; of each that is paired the nodes, and which of them are contact points.
+    pub fn facets(&self) -> (CellKind, impl Iterator<Item = (Vec<[f64; 3]>, Carriers)> + '_) {
+        let nodes = self.connectivity.chunks_exact(self.cell.stride()).zip(&self.carriers);
+        let points = |nodes: &[u32]| nodes.iter().map(|&node| self.points[node as usize]).collect();
+        (self.cell, nodes.filter_map(move |(nodes, carriers)| Some((points(nodes), (*carriers)?))))
     }
 
     /// The mesh with arrays of values at the contact points: name, components per point, values. Points of the mesh that no

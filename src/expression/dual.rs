@@ -1,13 +1,12 @@
 //! Exact derivatives of expressions: the same text, evaluated on pairs of a value and its slope.
-//!
-//! The derivatives that `exmex` forms on its own know neither `min`, `max` nor `abs`, and take a comparison for its own derivative.
 
+use super::Expression;
 use super::operators::{and, compare, not, or, sign};
-use super::{Expression, MOST_VARIABLES, grammar};
+use super::program::{Number, Program};
+use super::scope::Scope;
+use crate::data::Data;
 use crate::error::{Place, Result};
-use exmex::{BinOp, Express, FlatEx, MakeOperators, NumberMatcher, Operator};
 use std::fmt;
-use std::str::FromStr;
 use std::sync::Arc;
 
 /// A value and its derivative.
@@ -39,14 +38,6 @@ fn times(derivative: f64, slope: f64) -> f64 {
     if slope == 0.0 { 0.0 } else { derivative * slope }
 }
 
-impl FromStr for Dual {
-    type Err = <f64 as FromStr>::Err;
-
-    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
-        Ok(Dual { value: text.parse()?, slope: 0.0 })
-    }
-}
-
 type Unary = fn(Dual) -> Dual;
 type Binary = fn(Dual, Dual) -> Dual;
 
@@ -69,6 +60,7 @@ const UNARY: &[(&str, Unary)] = &[
     ("tan", |a| a.then(a.value.tan(), 1.0 + a.value.tan().powi(2))),
     ("tanh", |a| a.then(a.value.tanh(), 1.0 - a.value.tanh().powi(2))),
     ("!", |a| Dual::truth(not(a.value))),
+    ("-", |a| a.then(-a.value, -1.0)),
 ];
 
 const BINARY: &[(&str, Binary)] = &[
@@ -100,19 +92,25 @@ const BINARY: &[(&str, Binary)] = &[
     }),
 ];
 
-/// The operators of expressions on pairs.
-#[derive(Debug, Clone)]
-struct DualOperators;
+impl Number for Dual {
+    fn constant(value: f64) -> Self {
+        Dual { value, slope: 0.0 }
+    }
 
-impl MakeOperators<Dual> for DualOperators {
-    fn make<'a>() -> Vec<Operator<'a, Dual>> {
-        let binary = |apply| BinOp { apply, prio: 0, is_commutative: false };
-        let mut operators: Vec<_> = UNARY.iter().map(|(name, apply)| Operator::make_unary(name, *apply)).collect();
-        operators.extend(BINARY.iter().map(|(symbol, apply)| match *symbol {
-            "-" => Operator::make_bin_unary(symbol, binary(*apply), |a| a.then(-a.value, -1.0)),
-            _ => Operator::make_bin(symbol, binary(*apply)),
-        }));
-        operators
+    fn unary(name: &str) -> Option<Unary> {
+        UNARY.iter().find(|(known, _)| *known == name).map(|(_, apply)| *apply)
+    }
+
+    fn binary(name: &str) -> Option<Binary> {
+        BINARY.iter().find(|(known, _)| *known == name).map(|(_, apply)| *apply)
+    }
+
+    fn data(data: &Data, place: &[Dual]) -> Self {
+        let mut values = [0.0; 2];
+        values.iter_mut().zip(place).for_each(|(value, dual)| *value = dual.value);
+        let sample = data.sample(&values[..place.len()]);
+        let slope = place.iter().zip(sample.gradient).map(|(dual, by)| times(by, dual.slope)).sum();
+        Dual { value: sample.value, slope }
     }
 }
 
@@ -120,7 +118,7 @@ impl MakeOperators<Dual> for DualOperators {
 #[derive(Clone)]
 pub struct Differentiable {
     plain: Expression,
-    dual: Arc<FlatEx<Dual, DualOperators, NumberMatcher>>,
+    dual: Arc<Program<Dual>>,
 }
 
 impl Differentiable {
@@ -128,12 +126,8 @@ impl Differentiable {
     ///
     /// # Errors
     /// Those of [`Expression::parse`].
-    pub fn parse(text: &str, place: &Place, variables: &[&'static str]) -> Result<Self> {
-        let plain = Expression::parse(text, place, variables)?;
-        let refuse = |slip: super::Slip| slip.into_error(text, place);
-        let explicit = grammar::parse(text, variables).map_err(refuse)?;
-        let dual = FlatEx::parse(&explicit)
-            .map_err(|error| refuse(super::Slip::new(0..text.len(), format!("no derivative: {error}"))))?;
+    pub fn parse(text: &str, place: &Place, scope: Scope) -> Result<Self> {
+        let (plain, dual) = Expression::with(text, place, scope)?;
         Ok(Self { plain, dual: Arc::new(dual) })
     }
 
@@ -150,15 +144,12 @@ impl Differentiable {
 
     /// The same with the derivative by the variable of this number.
     pub fn eval_by(&self, variable: usize, values: &[f64]) -> (f64, f64) {
-        let mut used = [Dual::default(); MOST_VARIABLES];
-        for (used, &slot) in used.iter_mut().zip(self.plain.slots.iter()) {
+        let dual = |slot: usize| {
             let value = values.get(slot).copied().unwrap_or(f64::NAN);
-            *used = Dual { value, slope: if slot == variable { 1.0 } else { 0.0 } };
-        }
-        match self.dual.eval(&used[..self.plain.slots.len()]) {
-            Ok(Dual { value, slope }) => (value, slope),
-            Err(_) => (f64::NAN, f64::NAN),
-        }
+            Dual { value, slope: if slot == variable { 1.0 } else { 0.0 } }
+        };
+        let Dual { value, slope } = self.dual.eval(&std::array::from_fn(dual));
+        (value, slope)
     }
 }
 
@@ -171,13 +162,14 @@ impl fmt::Debug for Differentiable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::{DataSpec, Interpolation, Library, Outside};
     use crate::error::Source;
     use crate::expression::operators;
 
     fn parse(text: &str) -> Differentiable {
         let source = Source { name: "scene.toml".into(), text: format!("pressure = \"{text}\"\n") };
         let place = Place { span: 11..13 + text.len(), source: Arc::new(source) };
-        Differentiable::parse(text, &place, &["c", "x"]).unwrap_or_else(|error| panic!("{error}"))
+        Differentiable::parse(text, &place, Scope::of(&["c", "x"])).unwrap_or_else(|error| panic!("{error}"))
     }
 
     #[test]
@@ -204,6 +196,43 @@ mod tests {
                     (slope - difference).abs() < 1e-7 * (1.0 + slope.abs()) + 1e-9 / c,
                     "{text} at {c}, {x}: {slope} {difference}"
                 );
+            }
+        }
+    }
+
+    /// Of data by the chain rule, whatever their places depend on.
+    #[test]
+    fn derivatives_of_data_agree_with_differences() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("heights.csv");
+        std::fs::write(&file, "1,3,2,7\n4,1,5,2\n0,2,6,3\n1,1,4,8\n").unwrap();
+        let source = Source { name: "scene.toml".into(), text: "\"f(c*x, 1 + x - 0.5*c)^2 + c*f(1, c)\"".into() };
+        let place = Place { span: 0..source.text.len(), source: Arc::new(source) };
+        let spec = DataSpec {
+            name: "f".into(),
+            file,
+            place: place.clone(),
+            points: false,
+            origin: [0.0; 2],
+            spacing: [0.5, 0.8],
+            unit: 1.0,
+            interpolation: Interpolation::Cubic,
+            outside: Outside::Error,
+        };
+        let library = Library::from([("f".to_owned(), Arc::new(Data::new(spec)))]);
+        let text = "f(c*x, 1 + x - 0.5*c)^2 + c*f(1, c)";
+        let law = Differentiable::parse(text, &place, Scope { variables: &["c", "x"], data: &library }).unwrap();
+        for values in [[0.7, 1.1], [1.2, 0.3]] {
+            for variable in 0..2 {
+                let (value, slope) = law.eval_by(variable, &values);
+                let h = 1e-6;
+                let [low, high] = [-h, h].map(|h| {
+                    let mut moved = values;
+                    moved[variable] += h;
+                    law.plain().eval(&moved)
+                });
+                assert_eq!(value, law.plain().eval(&values));
+                assert!((slope - (high - low) / (2.0 * h)).abs() < 1e-7 * (1.0 + slope.abs()), "{values:?}: {slope}");
             }
         }
     }

@@ -1,29 +1,29 @@
 //! Grammar of expressions: operator precedence, function calls, and where a slip stands.
 //!
-//! `exmex` evaluates, but its parser reads -x^2 as (-x)^2, does not nest calls of `min` and `max`, and knows no
-//! positions. So the grammar is ours, and `exmex` is handed a text in which every operation has parentheses
-//! and `max(a, b)` is `(a max b)`.
+//! The steps come out in postfix order as the words are read, so that a long text costs no more than its length.
 
-use super::operators::{BINARY, COMPARISON, INFIX, POWER, SIGN, UNARY};
+use super::operators::{self, BINARY, COMPARISON, INFIX, POWER, SIGN, UNARY};
+use super::program::Code;
+use super::scope::Scope;
 use super::slip::Slip;
 use super::token::{self, Token};
+use crate::data::Data;
 use crate::error::nearest;
 use std::ops::Range;
 
-/// Deepest nesting (it bounds the recursion here), and most operations.
+/// Deepest nesting: it bounds the recursion here.
 const DEEPEST: usize = 60;
-const LONGEST: usize = 500;
 
-/// Parses a whole text and gives it back in the form for `exmex`.
-pub(super) fn parse(text: &str, variables: &[&'static str]) -> Result<String, Slip> {
+/// Parses a whole text.
+pub(super) fn parse(text: &str, scope: Scope) -> Result<Vec<Code>, Slip> {
     let (token, span) = token::next(text, 0)?;
     if token == Token::End {
         return Err(Slip::new(0..text.len(), "the expression is empty"));
     }
-    let mut parser = Parser { text, variables, token, span, depth: 0, operations: 0 };
-    let tree = parser.expression(0)?;
+    let mut parser = Parser { text, scope, token, span, depth: 0, code: Vec::new() };
+    parser.expression(0)?;
     match parser.token {
-        Token::End => Ok(tree),
+        Token::End => Ok(parser.code),
         Token::Symbol(")") => Err(Slip::new(parser.span, "`)` without `(`")),
         Token::Symbol(",") => Err(Slip::new(parser.span, "`,` outside a function")
             .help("a decimal point is a point; commas part the values of a function: max(x, y)")),
@@ -33,11 +33,11 @@ pub(super) fn parse(text: &str, variables: &[&'static str]) -> Result<String, Sl
 
 struct Parser<'a> {
     text: &'a str,
-    variables: &'a [&'static str],
+    scope: Scope<'a>,
     token: Token<'a>,
     span: Range<usize>,
     depth: usize,
-    operations: usize,
+    code: Vec<Code>,
 }
 
 impl<'a> Parser<'a> {
@@ -48,12 +48,12 @@ impl<'a> Parser<'a> {
     }
 
     /// Operands joined by operators that bind at least as tightly as `least`.
-    fn expression(&mut self, least: u8) -> Result<String, Slip> {
+    fn expression(&mut self, least: u8) -> Result<(), Slip> {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err(Slip::new(self.span.clone(), "the expression is nested too deeply"));
         }
-        let mut left = self.operand()?;
+        self.operand()?;
         let mut compared = false;
         while let Token::Symbol(symbol) = self.token
             && let Some((_, power, _)) = INFIX.iter().find(|(known, ..)| *known == symbol)
@@ -63,30 +63,32 @@ impl<'a> Parser<'a> {
             if *power == COMPARISON && std::mem::replace(&mut compared, true) {
                 return Err(Slip::new(span, "comparisons do not chain").help("write 0 < x && x < 1"));
             }
-            let right = self.expression(if *power == POWER { SIGN } else { power + 1 })?;
-            left = self.made(format!("({left} {symbol} {right})"), &span)?;
+            self.expression(if *power == POWER { SIGN } else { power + 1 })?;
+            self.apply_two(symbol);
         }
         self.depth -= 1;
-        Ok(left)
+        Ok(())
     }
 
     /// A number, a variable, a call, a parenthesis, or one of these with a sign.
-    fn operand(&mut self) -> Result<String, Slip> {
+    fn operand(&mut self) -> Result<(), Slip> {
         let (token, span) = self.step()?;
         match token {
-            // Display writes all digits and no exponent, which `exmex` would not read.
-            Token::Number(value) => Ok(value.to_string()),
+            Token::Number(value) => {
+                self.code.push(Code::Number(value));
+                Ok(())
+            }
             Token::Name(name) if self.token == Token::Symbol("(") => self.call(name, span),
             Token::Name(name) => self.variable(name, span),
             Token::Symbol("(") => {
-                let inner = self.expression(0)?;
-                self.close(&span)?;
-                Ok(inner)
+                self.expression(0)?;
+                self.close(&span)
             }
             Token::Symbol("+") => self.expression(SIGN),
             Token::Symbol(sign @ ("-" | "!")) => {
-                let operand = self.expression(SIGN)?;
-                self.made(format!("({sign}({operand}))"), &span)
+                self.expression(SIGN)?;
+                self.apply_one(sign);
+                Ok(())
             }
             Token::Symbol(symbol) => Err(Slip::new(span, format!("expected a value before `{symbol}`"))),
             Token::End => {
@@ -99,53 +101,77 @@ impl<'a> Parser<'a> {
     }
 
     /// A function of the values in parentheses; the name was read, `(` comes next.
-    fn call(&mut self, name: &str, span: Range<usize>) -> Result<String, Slip> {
+    fn call(&mut self, name: &str, span: Range<usize>) -> Result<(), Slip> {
         let unary = UNARY.iter().find(|(known, _)| *known == name).map(|(known, _)| *known);
         let binary = BINARY.iter().find(|(known, _)| *known == name).map(|(known, _)| *known);
-        let Some(function) = unary.or(binary) else {
-            return Err(self.unknown_function(name, span));
+        let data = self.scope.data.get(name).cloned();
+        let arguments = match (unary, binary, &data) {
+            (Some(_), ..) => 1..=1,
+            (_, Some("min" | "max"), _) => 2..=usize::MAX,
+            (_, Some(_), _) => 2..=2,
+            (.., Some(data)) => {
+                data.load()?;
+                data.arguments()..=data.arguments()
+            }
+            _ => return Err(self.unknown_function(name, span)),
         };
         let (_, open) = self.step()?;
-        let mut values = Vec::new();
+        let mut given = 0;
         if self.token != Token::Symbol(")") {
-            values.push(self.expression(0)?);
-            while self.token == Token::Symbol(",") {
+            loop {
+                self.expression(0)?;
+                given += 1;
+                // of many values the first two are one value before the third is read
+                if let Some(function) = binary.filter(|_| given > 1 && arguments.contains(&given)) {
+                    self.apply_two(function);
+                }
+                if self.token != Token::Symbol(",") {
+                    break;
+                }
                 self.step()?;
-                values.push(self.expression(0)?);
             }
         }
         self.close(&open)?;
-        let wanted = match function {
-            "min" | "max" => "2 or more values",
-            _ if binary.is_some() => "2 values",
-            _ => "1 value",
-        };
-        let fits = match wanted {
-            "1 value" => values.len() == 1,
-            "2 values" => values.len() == 2,
-            _ => values.len() >= 2,
-        };
-        if !fits {
-            return Err(Slip::new(span, format!("`{name}` takes {wanted}, not {}", values.len())));
+        if !arguments.contains(&given) {
+            return Err(miscounted(name, *arguments.start(), *arguments.end() > 2, given, data.as_deref(), span));
         }
-        if unary.is_some() {
-            return self.made(format!("({function}({}))", values[0]), &span);
+        match (unary, data) {
+            (Some(function), _) => self.apply_one(function),
+            (None, Some(data)) if binary.is_none() => self.code.push(Code::Data(data)),
+            _ => {}
         }
-        let mut result = values[0].clone();
-        for value in &values[1..] {
-            result = self.made(format!("({result} {function} {value})"), &span)?;
-        }
-        Ok(result)
+        Ok(())
     }
 
-    fn variable(&self, name: &str, span: Range<usize>) -> Result<String, Slip> {
+    /// Applies an operator of one value to what was read last; of a number it makes a number.
+    fn apply_one(&mut self, name: &'static str) {
+        match (self.code.last_mut(), operators::unary(name)) {
+            (Some(Code::Number(value)), Some(apply)) => *value = apply(*value),
+            _ => self.code.push(Code::Unary(name)),
+        }
+    }
+
+    /// Applies an operator to the last two values; of two numbers it makes one.
+    fn apply_two(&mut self, name: &'static str) {
+        match (&self.code[..], operators::binary(name)) {
+            (&[.., Code::Number(left), Code::Number(right)], Some(apply)) => {
+                self.code.truncate(self.code.len() - 2);
+                self.code.push(Code::Number(apply(left, right)));
+            }
+            _ => self.code.push(Code::Binary(name)),
+        }
+    }
+
+    fn variable(&mut self, name: &str, span: Range<usize>) -> Result<(), Slip> {
         if name == "pi" {
-            return Ok(std::f64::consts::PI.to_string());
+            self.code.push(Code::Number(std::f64::consts::PI));
+            return Ok(());
         }
-        if self.variables.contains(&name) {
-            return Ok(name.to_owned());
+        if let Some(place) = self.scope.variables.iter().position(|known| *known == name) {
+            self.code.push(Code::Variable(place));
+            return Ok(());
         }
-        if functions().any(|known| known == name) {
+        if self.functions().any(|known| known == name) {
             return Err(
                 Slip::new(span, format!("`{name}` needs its value in parentheses")).help(format!("write {name}(...)"))
             );
@@ -160,11 +186,11 @@ impl<'a> Parser<'a> {
     }
 
     fn unknown_function(&self, name: &str, span: Range<usize>) -> Slip {
-        if self.variables.contains(&name) || name == "pi" {
+        if self.scope.variables.contains(&name) || name == "pi" {
             return Slip::new(span, format!("`{name}` is not a function")).help("write `*` to multiply");
         }
         let slip = Slip::new(span, format!("unknown function `{name}`")).label("not known here");
-        match (name, nearest(name, functions())) {
+        match (name, nearest(name, self.functions())) {
             ("ln", _) => slip.help("the natural logarithm is log(x)"),
             (_, Some(known)) => slip.help(format!("did you mean `{known}`?")),
             (_, None) => slip.help(self.known()),
@@ -173,8 +199,8 @@ impl<'a> Parser<'a> {
 
     /// All names that an expression may use here.
     fn known(&self) -> String {
-        let functions: Vec<_> = functions().collect();
-        format!("known are {}, pi, and the functions {}", self.variables.join(", "), functions.join(", "))
+        let functions: Vec<_> = self.functions().collect();
+        format!("known are {}, pi, and the functions {}", self.scope.variables.join(", "), functions.join(", "))
     }
 
     fn close(&mut self, open: &Range<usize>) -> Result<(), Slip> {
@@ -190,9 +216,9 @@ impl<'a> Parser<'a> {
         let found = &self.text[self.span.clone()];
         let after_number = self.text[..self.span.start].trim_end().ends_with(|c: char| c.is_ascii_digit() || c == '.');
         let unit = found.starts_with(char::is_alphabetic)
-            && !self.variables.contains(&found)
+            && !self.scope.variables.contains(&found)
             && found != "pi"
-            && !functions().any(|known| known == found);
+            && !self.functions().any(|known| known == found);
         if after_number && unit {
             return Slip::new(self.span.clone(), format!("`{found}` is neither a variable nor an operator")).help(
                 "numbers stand without their unit: choose units that fit each other, and give every value in them",
@@ -201,16 +227,21 @@ impl<'a> Parser<'a> {
         Slip::new(self.span.clone(), format!("expected an operator before `{found}`")).help("write `*` to multiply")
     }
 
-    /// Counts an operation.
-    fn made(&mut self, text: String, span: &Range<usize>) -> Result<String, Slip> {
-        self.operations += 1;
-        match self.operations <= LONGEST {
-            true => Ok(text),
-            false => Err(Slip::new(span.clone(), format!("the expression has more than {LONGEST} operations"))),
-        }
+    /// Names of all functions.
+    fn functions(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        let data = self.scope.data.keys().map(String::as_str);
+        operators::functions().map(|name| -> &'a str { name }).chain(data)
     }
 }
 
-fn functions() -> impl Iterator<Item = &'static str> {
-    UNARY.iter().map(|(name, _)| *name).chain(BINARY.iter().map(|(name, _)| *name))
+/// The refusal of a call with too few values, or too many.
+fn miscounted(name: &str, wanted: usize, more: bool, given: usize, data: Option<&Data>, span: Range<usize>) -> Slip {
+    let plural = if wanted == 1 && !more { "" } else { "s" };
+    let more = if more { " or more" } else { "" };
+    let slip = Slip::new(span, format!("`{name}` takes {wanted}{more} value{plural}, not {given}"));
+    match data {
+        None => slip,
+        Some(_) if wanted == 1 => slip.help("its file is a profile, heights along one line: write the place along it"),
+        Some(_) => slip.help("its file is a surface: write the places along a row of the file and down its rows"),
+    }
 }

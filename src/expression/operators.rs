@@ -3,7 +3,8 @@
 //! Truth is a number: comparisons give 1 or 0, and a number > 0 is true. Nothing hides a NaN, so that a value
 //! outside the domain of a function can be refused where it is used.
 
-use exmex::{BinOp, MakeOperators, Operator};
+use super::program::Number;
+use crate::data::Data;
 
 type Unary = fn(f64) -> f64;
 type Binary = fn(f64, f64) -> f64;
@@ -56,23 +57,45 @@ pub(super) const SIGN: u8 = 6;
 /// Binding power of `^`, which groups to the right.
 pub(super) const POWER: u8 = 7;
 
-/// Makes the operators for `exmex`. It gets every operation in parentheses, so priorities mean nothing here.
-#[derive(Debug, Clone)]
-pub(super) struct Operators;
+/// Signs: what they make of a value.
+const SIGNS: [(&str, Unary); 2] = [("-", |a| -a), ("!", not)];
 
-impl MakeOperators<f64> for Operators {
-    fn make<'a>() -> Vec<Operator<'a, f64>> {
-        let binary = |apply| BinOp { apply, prio: 0, is_commutative: false };
-        let mut operators: Vec<_> = UNARY.iter().map(|(name, apply)| Operator::make_unary(name, *apply)).collect();
-        operators.extend(BINARY.iter().map(|(name, apply)| Operator::make_bin(name, binary(*apply))));
-        operators.extend(INFIX.iter().map(|(symbol, _, apply)| match *symbol {
-            "-" => Operator::make_bin_unary(symbol, binary(*apply), |a| -a),
-            _ => Operator::make_bin(symbol, binary(*apply)),
-        }));
-        operators.push(Operator::make_unary("!", not));
-        // Derivatives by exmex are written with `ln`.
-        operators.push(Operator::make_unary("ln", f64::ln));
-        operators
+/// The sign or function of one value that has a name.
+pub(super) fn unary(name: &str) -> Option<Unary> {
+    UNARY.iter().chain(&SIGNS).find(|(known, _)| *known == name).map(|(_, apply)| *apply)
+}
+
+/// The operator or function of two values that has a name.
+pub(super) fn binary(name: &str) -> Option<Binary> {
+    let infix = INFIX.iter().map(|(symbol, _, apply)| (symbol, apply));
+    BINARY
+        .iter()
+        .map(|(known, apply)| (known, apply))
+        .chain(infix)
+        .find(|(known, _)| **known == name)
+        .map(|found| *found.1)
+}
+
+/// Names of the functions.
+pub(super) fn functions() -> impl Iterator<Item = &'static str> {
+    UNARY.iter().map(|(name, _)| *name).chain(BINARY.iter().map(|(name, _)| *name))
+}
+
+impl Number for f64 {
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    fn unary(name: &str) -> Option<Unary> {
+        unary(name)
+    }
+
+    fn binary(name: &str) -> Option<Binary> {
+        binary(name)
+    }
+
+    fn data(data: &Data, place: &[f64]) -> f64 {
+        data.sample(place).value
     }
 }
 

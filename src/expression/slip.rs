@@ -10,11 +10,19 @@ pub(super) struct Slip {
     message: String,
     label: String,
     help: Option<String>,
+    /// An error that has its own words and place.
+    whole: Option<Error>,
+}
+
+impl From<Error> for Slip {
+    fn from(error: Error) -> Self {
+        Self { whole: Some(error), ..Self::new(0..0, "") }
+    }
 }
 
 impl Slip {
     pub fn new(span: Range<usize>, message: impl Into<String>) -> Self {
-        Self { span, message: message.into(), label: String::new(), help: None }
+        Self { span, message: message.into(), label: String::new(), help: None, whole: None }
     }
 
     pub fn label(mut self, label: &str) -> Self {
@@ -29,6 +37,9 @@ impl Slip {
 
     /// The error, with the caret inside the string where its text is verbatim in the source (no escapes).
     pub fn into_error(self, text: &str, place: &Place) -> Error {
+        if let Some(error) = self.whole {
+            return error;
+        }
         let written = place.source.text.get(place.span.clone()).unwrap_or_default();
         let exact = written.find(text).filter(|_| !text.is_empty()).map(|offset| {
             let start = place.span.start + offset;

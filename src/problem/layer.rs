@@ -1,6 +1,7 @@
 //! Laws of layers: their forms and parameters.
 
 use crate::expression::{Differentiable, Field};
+use std::sync::Arc;
 
 /// Law of a Winkler layer.
 #[derive(Debug, Clone)]
@@ -14,6 +15,8 @@ pub enum LayerSpec {
     },
     /// Monotone cubic curve through points (c, p), both increasing from (0, 0), which is not among them.
     Table(Vec<[f64; 2]>),
+    /// Summits of a rough surface.
+    Asperities(AsperitySpec),
     /// An expression p(c), which may also use the coordinates.
     Pressure {
         /// The expression; its first variable is c.
@@ -21,6 +24,35 @@ pub enum LayerSpec {
         /// Compression beyond which p goes on linearly, if given.
         up_to: Option<f64>,
     },
+}
+
+/// Summits of one radius at different heights, after Greenwood and Williamson.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AsperitySpec {
+    /// Number per area.
+    pub density: f64,
+    /// Their radius.
+    pub radius: f64,
+    /// E* of both bodies: 1/E* is the sum of (1 - nu^2)/E.
+    pub modulus: f64,
+    /// How far they lie below the highest.
+    pub depths: Depths,
+    /// Name of the data that they are from, if they are measured.
+    pub data: Option<String>,
+}
+
+/// How summits are distributed below the highest one.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Depths {
+    /// A normal distribution of heights.
+    Normal {
+        /// Its standard deviation.
+        deviation: f64,
+        /// Height of the highest summit above the mean; none lies above.
+        highest: f64,
+    },
+    /// Each summit of a measured surface, from 0 on and increasing.
+    Measured(Arc<[f64]>),
 }
 
 /// Forms of laws with a few parameters.

@@ -2,13 +2,15 @@
 
 mod body;
 mod contact;
+mod data;
 mod elasticity;
 mod layer;
 mod method;
 
 use super::read::{Keys, Node, Value};
+use crate::data::Library;
 use crate::error::{Error, Located, Place, Result, nearest, shown};
-use crate::expression::{Differentiable, Field};
+use crate::expression::{Differentiable, Field, Scope};
 use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::pattern::Pattern;
@@ -25,6 +27,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         "plane",
         "units",
         "mesh",
+        "data",
         "body",
         "contact",
         "method",
@@ -37,7 +40,9 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     let keys = Keys::open(tree, "the scene", KEYS)?;
     let dimension = dimension(&keys)?;
     let plane = plane(&keys, dimension.value)?;
-    let decoder = Decoder { dimension: dimension.value, plane, folder: path.parent().unwrap_or(Path::new("")) };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut decoder = Decoder { dimension: dimension.value, plane, folder, data: Library::new() };
+    decoder.data = decoder.library(keys.get("data"))?;
     let title = match keys.get("title") {
         Some(node) => node.string()?.to_owned(),
         None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
@@ -60,6 +65,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         contacts,
         auto,
         method,
+        data: decoder.data,
         solver: solver(keys.get("solver"))?,
         estimate: keys.get("estimate").map_or(Ok(false), Node::boolean)?,
         adapt: keys.get("adapt").map(adapt).transpose()?,
@@ -80,6 +86,8 @@ struct Decoder<'a> {
     plane: Plane,
     /// Folder of the scene file.
     folder: &'a Path,
+    /// Functions from files.
+    data: Library,
 }
 
 impl Decoder<'_> {
@@ -97,7 +105,7 @@ impl Decoder<'_> {
     fn field(&self, node: &Node) -> Result<Field> {
         match &node.value {
             Value::Integer(_) | Value::Float(_) => Ok(Field::Constant(node.number()?)),
-            Value::String(text) => Field::parse(text, &node.place, self.dimension, false),
+            Value::String(text) => Field::parse(text, &node.place, self.dimension, false, &self.data),
             _ => Err(node.expected("a number or an expression")),
         }
     }
@@ -113,12 +121,12 @@ impl Decoder<'_> {
 
     /// A vector that can be differentiated.
     fn smooth_vector(&self, node: &Node) -> Result<Vec<Differentiable>> {
-        let variables = &["x", "y", "z"][..self.dimension];
+        let scope = Scope { variables: &["x", "y", "z"][..self.dimension], data: &self.data };
         let component = |item: &Node| match &item.value {
             Value::Integer(_) | Value::Float(_) => {
-                Differentiable::parse(&item.number()?.to_string(), &item.place, variables)
+                Differentiable::parse(&item.number()?.to_string(), &item.place, scope)
             }
-            Value::String(text) => Differentiable::parse(text, &item.place, variables),
+            Value::String(text) => Differentiable::parse(text, &item.place, scope),
             _ => Err(item.expected("a number or an expression")),
         };
         self.components(node)?.iter().map(component).collect()
@@ -137,7 +145,7 @@ impl Decoder<'_> {
 
     fn mesh(&self, node: &Node, trusted: bool) -> Result<MeshSource> {
         if let Value::String(name) = &node.value {
-            let file = self.file(node)?;
+            let file = file(self.folder, node)?;
             return Ok(match name.ends_with(".geo") {
                 true => {
                     let guard = Guard { trusted, ..Guard::default() };
@@ -151,14 +159,14 @@ impl Decoder<'_> {
         }
         let keys = Keys::open(node, "the mesh", &["geo", "msh", "set", "threads", "timeout", "memory"])?;
         keys.exclude("geo", "msh")?;
-        if let Some(file) = keys.get("msh") {
+        if let Some(msh) = keys.get("msh") {
             return match ["set", "threads", "timeout", "memory"].iter().find_map(|key| keys.entry(key)) {
-                None => Ok(MeshSource::Msh { file: self.file(file)? }),
+                None => Ok(MeshSource::Msh { file: file(self.folder, msh)? }),
                 Some(entry) => Err(Error::scene(&entry.key_place, format!("`{}` for a finished mesh", entry.key))
                     .help("it is for Gmsh, which makes meshes from scripts: mesh = { geo = \"...\" }")),
             };
         }
-        let file = self.file(keys.require("geo")?)?;
+        let file = file(self.folder, keys.require("geo")?)?;
         let set = keys.get("set").map_or(Ok(Vec::new()), numbers)?;
         let (places, set) = set.into_iter().map(|(place, name, value)| (place, (name, value))).unzip();
         let usual = Guard::default();
@@ -170,29 +178,28 @@ impl Decoder<'_> {
         };
         Ok(MeshSource::Geo { file, set, places, sizes: None, guard })
     }
+}
 
-    /// The path of a file that must exist, joined with the folder of the scene.
-    fn file(&self, node: &Node) -> Result<Located<PathBuf>> {
-        let name = node.name()?.value;
-        let path = self.folder.join(&name);
-        match std::fs::metadata(&path) {
-            Ok(found) if found.is_file() => Ok(Located::new(path, node.place.clone())),
-            Ok(_) => Err(node.refuse(format!("{} is not a file", path.display()))),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-                let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
-                let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
-                let wanted = path.file_name().unwrap_or_default().to_string_lossy();
-                Err(node.refuse(format!("there is no file {}", path.display())).label("not there").help(match nearest(
-                    &wanted,
-                    names.iter().map(String::as_str),
-                ) {
+/// The path of a file that must exist, joined with the folder of the scene.
+fn file(folder: &Path, node: &Node) -> Result<Located<PathBuf>> {
+    let name = node.name()?.value;
+    let path = folder.join(&name);
+    match std::fs::metadata(&path) {
+        Ok(found) if found.is_file() => Ok(Located::new(path, node.place.clone())),
+        Ok(_) => Err(node.refuse(format!("{} is not a file", path.display()))),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+            let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
+            let wanted = path.file_name().unwrap_or_default().to_string_lossy();
+            Err(node.refuse(format!("there is no file {}", path.display())).label("not there").help(
+                match nearest(&wanted, names.iter().map(String::as_str)) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => "paths are relative to the folder of the scene file".to_owned(),
-                }))
-            }
-            Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
+                },
+            ))
         }
+        Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
     }
 }
 

@@ -1,10 +1,11 @@
 //! The scene echoed with all defaults filled in, for the report.
 
+use crate::data::{DataSpec, Interpolation, Outside};
 use crate::expression::Field;
 use crate::problem::body::{BodySpec, LoadKind, SpringKind};
 use crate::problem::contact::{ContactSpec, Overlap};
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, Plane};
-use crate::problem::layer::LayerSpec;
+use crate::problem::layer::{AsperitySpec, Depths, LayerSpec};
 use crate::problem::mesh::MeshSource;
 use crate::problem::method::{Gamma, MethodName, MethodSpec, Start};
 use crate::problem::order::Order;
@@ -28,6 +29,8 @@ impl Scene {
         }
         insert(&mut settings, "units", self.units.as_ref().map(|units| json!(units.text())));
         settings.insert("mesh".into(), mesh(&self.mesh));
+        let data: Map<_, _> = self.data.values().map(|data| (data.spec.name.clone(), function(&data.spec))).collect();
+        insert(&mut settings, "data", (!data.is_empty()).then(|| data.into()));
         let dimension = self.dimension.value;
         settings.insert("body".into(), self.bodies.iter().map(|item| body(item, dimension)).collect());
         let auto = self.auto.iter().map(|auto| {
@@ -95,6 +98,19 @@ fn mesh(mesh: &MeshSource) -> Value {
             mesh
         }
     }
+}
+
+fn function(data: &DataSpec) -> Value {
+    let word = |list: &[(&'static str, bool)]| list.iter().find(|(_, is)| *is).map(|(name, _)| *name);
+    json!({
+        "file": data.file.display().to_string(),
+        "points": data.points,
+        "origin": data.origin,
+        "spacing": data.spacing,
+        "unit": data.unit,
+        "interpolate": word(&Interpolation::ALL.map(|(name, known)| (name, known == data.interpolation))),
+        "outside": word(&Outside::ALL.map(|(name, known)| (name, known == data.outside))),
+    })
 }
 
 fn body(body: &BodySpec, dimension: usize) -> Value {
@@ -177,6 +193,7 @@ fn contact(contact: &ContactSpec) -> Value {
             json!({ form.name: values })
         }
         LayerSpec::Table(points) => json!({ "table": points }),
+        LayerSpec::Asperities(spec) => json!({ "asperities": asperities(spec) }),
         LayerSpec::Pressure { law, up_to } => {
             let mut map = Map::new();
             map.insert("pressure".into(), json!(law.plain().text()));
@@ -194,6 +211,21 @@ fn contact(contact: &ContactSpec) -> Value {
     map.insert("layer".into(), layer);
     insert(&mut map, "reference", contact.reference.as_ref().map(field));
     map.into()
+}
+
+fn asperities(spec: &AsperitySpec) -> Value {
+    let AsperitySpec { density, radius, modulus, depths, data } = spec;
+    let mut map = json!({ "density": density, "radius": radius, "modulus": modulus });
+    if let Some(data) = data {
+        map["data"] = json!(data);
+    }
+    match depths {
+        Depths::Normal { deviation, highest } => {
+            (map["deviation"], map["highest"]) = (json!(deviation), json!(highest));
+        }
+        Depths::Measured(depths) => map["summits"] = json!(depths.len()),
+    }
+    map
 }
 
 fn method(method: &MethodSpec) -> Value {

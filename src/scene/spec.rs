@@ -1,5 +1,6 @@
 //! What the user asked for, checked: a problem, and what to do with it.
 
+use crate::data::Library;
 use crate::error::{Located, Place};
 use crate::problem::body::BodySpec;
 use crate::problem::contact::{AutoContact, ContactSpec};
@@ -25,6 +26,8 @@ pub struct Scene {
     pub units: Option<Units>,
     /// Where the mesh comes from.
     pub mesh: MeshSource,
+    /// Functions from files, by name; those that no expression uses are not read.
+    pub data: Library,
     /// The tables of bodies, in the order of the file; the name of one may be a pattern, and so may those of groups.
     pub bodies: Vec<BodySpec>,
     /// The pairs of contact surfaces, in the order of the file.

@@ -7,6 +7,7 @@ mod bearing;
 mod flange;
 mod hertz;
 mod ring;
+mod rough;
 mod spheres;
 mod walls;
 mod westergaard;

@@ -1,6 +1,6 @@
 //! The law that a scene asks for, at the points of a pair.
 
-use super::{Cubic, Exponential, LayerLaw, Linear, PerPoint, Power, Table, Typed};
+use super::{Asperities, Cubic, Exponential, LayerLaw, Linear, PerPoint, Power, Table, Typed};
 use crate::error::{Error, Kind, Result, shown};
 use crate::expression::Field;
 use crate::problem::layer::{LawForm, LawKind, LayerSpec};
@@ -19,6 +19,7 @@ pub fn make(spec: &LayerSpec, position: &[[f64; 3]]) -> Result<Box<dyn LayerLaw>
             LawKind::Exponential => formed(form, values, position, |v| Exponential::new(v[0], v[1])),
             LawKind::Cubic => formed(form, values, position, |v| Cubic { k1: v[0], k3: v[1] }),
         },
+        LayerSpec::Asperities(spec) => Ok(Box::new(Asperities::new(spec))),
         LayerSpec::Table(points) => Ok(Box::new(Table::new(points))),
         LayerSpec::Pressure { law, up_to } => {
             let size = extent(position);

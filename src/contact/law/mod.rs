@@ -10,6 +10,7 @@
 //! open layer and the ends of the range; a law implements the methods named `loaded`, if it has a better way than the
 //! common search.
 
+mod asperities;
 mod cubic;
 mod exponential;
 mod gap;
@@ -24,6 +25,7 @@ mod table;
 mod tests;
 mod typed;
 
+pub use asperities::Asperities;
 pub use cubic::Cubic;
 pub use exponential::Exponential;
 pub use linear::Linear;

@@ -37,12 +37,30 @@ impl Table {
     pub fn new(points: &[[f64; 2]]) -> Self {
         let mut knots = vec![Knot::default()];
         knots.extend(points.iter().map(|&[c, pressure]| Knot { c, pressure, ..Knot::default() }));
-        let secants: Vec<f64> =
-            knots.windows(2).map(|two| (two[1].pressure - two[0].pressure) / (two[1].c - two[0].c)).collect();
+        let secants = secants(&knots);
         let last = secants.len() - 1;
         for (i, knot) in knots.iter_mut().enumerate() {
             knot.slope = 0.5 * (secants[i.saturating_sub(1)] + secants[i.min(last)]);
         }
+        Self::through(knots, &secants)
+    }
+
+    /// The curve of a known function with p(0) = p'(0) = 0: points (c, p, p'), c and p increasing. Its error is of fourth order in their
+    /// distance.
+    pub fn with_slopes(points: impl Iterator<Item = [f64; 3]>) -> Self {
+        let mut knots = vec![Knot::default()];
+        // pressures that no number tells apart are one point
+        for [c, pressure, slope] in points {
+            if knots.last().is_some_and(|last| pressure > last.pressure) {
+                knots.push(Knot { c, pressure, slope, ..Knot::default() });
+            }
+        }
+        let secants = secants(&knots);
+        Self::through(knots, &secants)
+    }
+
+    /// The curve through knots with slopes, which are cut down where p would fall.
+    fn through(mut knots: Vec<Knot>, secants: &[f64]) -> Self {
         for (i, secant) in secants.iter().enumerate() {
             let size = (knots[i].slope / secant).hypot(knots[i + 1].slope / secant);
             if size > STEEPEST {
@@ -55,6 +73,10 @@ impl Table {
         }
         Self { knots }
     }
+}
+
+fn secants(knots: &[Knot]) -> Vec<f64> {
+    knots.windows(2).map(|two| (two[1].pressure - two[0].pressure) / (two[1].c - two[0].c)).collect()
 }
 
 impl Knot {

@@ -33,6 +33,7 @@ impl Typed {
     pub fn new(law: &Differentiable, place: [f64; 3], end: Option<f64>, size: f64) -> Result<Self> {
         let mut typed = Self { law: law.clone(), place, end: f64::INFINITY, at_end: Response::default() };
         let top = end.unwrap_or(size);
+        typed.refuse_outside(0.0)?;
         let (first, first_slope) = typed.value(0.0);
         let least = typed.value(top * 10f64.powi(-DECADES)).0;
         let largest = typed.value(top * 1e-3).0.abs();
@@ -67,6 +68,7 @@ impl Typed {
                 ),
             };
             if !(pressure.is_finite() && slope.is_finite()) {
+                typed.refuse_outside(c).map_err(|error| error.help(advice.clone()))?;
                 return Err(
                     typed.refuse(format!("p is {} and p' {} at c = {c:.3e}", shown(pressure), shown(slope)), &advice)
                 );
@@ -93,6 +95,12 @@ impl Typed {
     fn curve(&self, c: f64) -> f64 {
         let [x, y, z] = self.place;
         self.law.plain().eval(&[c, x, y, z])
+    }
+
+    /// Refuses a compression for which data have no value.
+    fn refuse_outside(&self, c: f64) -> Result<()> {
+        let [x, y, z] = self.place;
+        self.law.plain().outside("the pressure of the layer", &[c, x, y, z]).map_or(Ok(()), Err)
     }
 
     fn refuse(&self, what: String, advice: &str) -> Error {

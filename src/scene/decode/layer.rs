@@ -1,15 +1,16 @@
 //! `layer` of a contact: a form with parameters, a table, or an expression.
 
 use super::Decoder;
-use crate::error::{Error, Result, shown};
-use crate::expression::{Differentiable, Field};
-use crate::problem::layer::{FORMS, LawForm, LayerSpec};
+use crate::data::{Grid, Summits};
+use crate::error::{Error, Result, nearest, shown};
+use crate::expression::{Differentiable, Field, Scope};
+use crate::problem::layer::{AsperitySpec, Depths, FORMS, LawForm, LayerSpec};
 use crate::scene::read::{Keys, Node};
 
 impl Decoder<'_> {
     pub(super) fn layer(&self, node: &Node) -> Result<LayerSpec> {
         const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
-        let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure"]).collect();
+        let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure", "asperities"]).collect();
         let known: Vec<&str> = laws.iter().copied().chain(["up_to"]).collect();
         let keys = Keys::open(node, "the layer", &known).map_err(|error| match error.advice() {
             Some(advice) if advice.starts_with("did") => error,
@@ -25,9 +26,13 @@ impl Decoder<'_> {
         if let Some(points) = keys.get("table") {
             return table(points);
         }
+        if let Some(summits) = keys.get("asperities") {
+            return self.asperities(summits);
+        }
         if let Some(law) = keys.get("pressure") {
             let names: &[&'static str] = if self.dimension == 3 { &["c", "x", "y", "z"] } else { &["c", "x", "y"] };
-            let law = Differentiable::parse(law.string()?, &law.place, names)?;
+            let scope = Scope { variables: names, data: &self.data };
+            let law = Differentiable::parse(law.string()?, &law.place, scope)?;
             let up_to = keys.get("up_to").map(|end| end.positive("the end of the law")).transpose()?;
             return Ok(LayerSpec::Pressure { law, up_to });
         }
@@ -60,6 +65,57 @@ impl Decoder<'_> {
             values.push(field);
         }
         Ok(LayerSpec::Form { form, values })
+    }
+}
+
+/// Standard deviations from the mean to the highest summit, if nobody says it: a share of 3e-5 of a normal distribution lies above.
+const HIGHEST: f64 = 4.0;
+
+impl Decoder<'_> {
+    /// Summits, by numbers or of data.
+    fn asperities(&self, node: &Node) -> Result<LayerSpec> {
+        let keys = Keys::open(
+            node,
+            "the layer of asperities",
+            &["modulus", "data", "density", "radius", "deviation", "highest"],
+        )?;
+        let positive = |key: &str| {
+            let missing = |error: Error| {
+                error.help(
+                    "give modulus = E* and data = \"NAME\", or modulus, density, radius and deviation of the summits",
+                )
+            };
+            keys.require(key).map_err(missing)?.positive(&format!("the {key}"))
+        };
+        let modulus = positive("modulus")?;
+        let Some(named) = keys.get("data") else {
+            let deviation = positive("deviation")?;
+            let highest =
+                keys.get("highest").map_or(Ok(HIGHEST * deviation), |node| node.positive("the highest summit"))?;
+            let depths = Depths::Normal { deviation, highest };
+            let (density, radius) = (positive("density")?, positive("radius")?);
+            return Ok(LayerSpec::Asperities(AsperitySpec { density, radius, modulus, depths, data: None }));
+        };
+        for own in ["density", "radius", "deviation", "highest"] {
+            keys.exclude("data", own)?;
+        }
+        let name = named.string()?;
+        let Some(data) = self.data.get(name) else {
+            let error = named.refuse(format!("there are no data `{name}`"));
+            return Err(match nearest(name, self.data.keys().map(String::as_str)) {
+                Some(near) => error.help(format!("did you mean `{near}`?")),
+                None => error.help(format!("write [data.{name}] and below it file = \"surface.csv\"")),
+            });
+        };
+        data.load()?;
+        let Some(summits) = data.grid().and_then(Grid::summits) else {
+            return Err(named
+                .refuse(format!("data `{name}` have no summits"))
+                .help("summits are points of a regular grid that are higher than the eight around them"));
+        };
+        let Summits { density, radius, heights } = summits;
+        let depths = Depths::Measured(heights.iter().map(|height| heights[0] - height).collect());
+        Ok(LayerSpec::Asperities(AsperitySpec { density, radius, modulus, depths, data: Some(name.to_owned()) }))
     }
 }
 

@@ -84,7 +84,7 @@ impl Decoder<'_> {
                 None => error.help("psi is none, full, active, or a condition such as \"x > 1 && k < 5\""),
             });
         }
-        Field::parse(text, &node.place, self.dimension, true).map(Zone::Subset)
+        Field::parse(text, &node.place, self.dimension, true, &self.data).map(Zone::Subset)
     }
 
     fn start(&self, node: &Node) -> Result<Start> {

@@ -1,0 +1,210 @@
+//! What `check` says of measured surfaces and of the layers made of them.
+
+use super::shown::numbered;
+use super::stages::Built;
+use crate::data::{Data, Roughness};
+use crate::discretize::resolution::{Resolution, resolution};
+use crate::error::Result;
+use crate::output::{Axis, Folder, LISTED, Plot, Series, Style, safe_name, sci};
+use crate::problem::contact::ContactSpec;
+use crate::problem::layer::{AsperitySpec, Depths, LayerSpec};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Data in the gap of a contact, or in its layer.
+fn of_contact(built: &Built, spec: &ContactSpec) -> Vec<Arc<Data>> {
+    let mut data: Vec<Arc<Data>> = spec.gap.data().cloned().collect();
+    match &spec.layer {
+        LayerSpec::Form { values, .. } => data.extend(values.iter().flat_map(|field| field.data().cloned())),
+        LayerSpec::Pressure { law, .. } => data.extend(law.plain().data().cloned()),
+        LayerSpec::Asperities(spec) => {
+            data.extend(spec.data.iter().filter_map(|name| built.scene.data.get(name).cloned()));
+        }
+        LayerSpec::Table(_) => {}
+    }
+    data
+}
+
+/// Data of all contacts, each once, by name.
+fn in_contacts(built: &Built) -> BTreeMap<String, Arc<Data>> {
+    let contacts = built.discrete.contacts.iter();
+    let data = contacts.flat_map(|info| of_contact(built, &info.spec));
+    data.map(|data| (data.spec.name.clone(), data)).collect()
+}
+
+/// Lines on the data of contacts.
+pub fn lines(built: &Built) -> Vec<String> {
+    in_contacts(built).values().flat_map(|data| of_data(data)).collect()
+}
+
+fn of_data(data: &Data) -> Vec<String> {
+    let (name, file) = (&data.spec.name, data.spec.file.display());
+    let Some(grid) = data.grid() else { return vec![format!("  data {name}: {file}, points on no regular grid")] };
+    let counts: Vec<String> =
+        grid.axes.iter().filter(|axis| axis.count > 1).map(|axis| axis.count.to_string()).collect();
+    let ranges: Vec<String> = grid.axes[..counts.len()]
+        .iter()
+        .map(|axis| {
+            let [from, to] = axis.range();
+            format!("{} to {}", sci(from, 4), sci(to, 4))
+        })
+        .collect();
+    let Roughness { range: [low, high], height, slope, curvature } = grid.roughness();
+    let mut lines = vec![
+        format!("  data {name}: {file}, {} points for {}", counts.join(" x "), ranges.join(" and ")),
+        format!(
+            "    heights {} to {}, rms height {}, rms slope {}, rms curvature {}",
+            sci(low, 3),
+            sci(high, 3),
+            sci(height, 3),
+            sci(slope, 3),
+            sci(curvature, 3)
+        ),
+    ];
+    lines.extend(grid.summits().map(|summits| {
+        format!(
+            "    {} summits, {} in a unit of area, mean radius {}",
+            summits.heights.len(),
+            sci(summits.density, 3),
+            sci(summits.radius, 3)
+        )
+    }));
+    lines
+}
+
+/// How the mesh follows the gap of a pair; none where no data are in it.
+fn followed(built: &Built, pair: usize) -> Option<Resolution> {
+    let info = &built.discrete.contacts[pair];
+    let spacing = |data: &Arc<Data>| {
+        let axes = data.grid().map_or(&[][..], |grid| &grid.axes);
+        axes.iter().filter(|axis| axis.count > 1).map(|axis| axis.spacing).fold(f64::INFINITY, f64::min)
+    };
+    let detail = info.spec.gap.data().map(spacing).reduce(f64::min)?;
+    Some(resolution(&info.surface, &info.spec.gap, detail))
+}
+
+/// Lines on a pair: what its mesh leaves out of a measured gap, and its layer if that is made of asperities.
+pub fn of_pair(built: &Built, pair: usize) -> Vec<String> {
+    let mut lines = Vec::new();
+    lines.extend(followed(built, pair).map(|Resolution { height, variance, area, side }| {
+        format!(
+            "    the gap has an rms height of {}; facets with sides of {} leave out {:.1} % of its variance, and more than a tenth of \
+             the rms height on {:.1} % of the surface",
+            sci(height, 3),
+            sci(side, 3),
+            100.0 * variance,
+            100.0 * area
+        )
+    }));
+    if let LayerSpec::Asperities(spec) = &built.discrete.contacts[pair].spec.layer {
+        lines.push(format!("    layer of asperities: {}; law:", described(spec)));
+        lines.push("      compression  pressure     tangent".to_owned());
+        lines.extend(
+            law(built, pair, spec, SHOWN)
+                .into_iter()
+                .map(|[c, p, tangent]| format!("      {:<11}  {:<11}  {}", sci(c, 3), sci(p, 3), sci(tangent, 3))),
+        );
+    }
+    lines
+}
+
+/// Rows of a law that are printed.
+const SHOWN: usize = 8;
+/// Points of a law that are drawn.
+const DRAWN: usize = 200;
+
+fn described(spec: &AsperitySpec) -> String {
+    let heights = match &spec.depths {
+        Depths::Normal { deviation, highest } => {
+            format!("standard deviation {}, the highest {} above the mean", sci(*deviation, 3), sci(*highest, 3))
+        }
+        Depths::Measured(depths) => format!("{} measured summits", depths.len()),
+    };
+    format!(
+        "{} in a unit of area, radius {}, E* {}, {heights}",
+        sci(spec.density, 3),
+        sci(spec.radius, 3),
+        sci(spec.modulus, 3)
+    )
+}
+
+/// Compressions, pressures and tangents of a pair's law up to that where the mean plane of the summits is met.
+fn law(built: &Built, pair: usize, spec: &AsperitySpec, count: usize) -> Vec<[f64; 3]> {
+    let law = &built.discrete.model.pairs[pair].law;
+    let end = match &spec.depths {
+        Depths::Normal { highest, .. } => *highest,
+        Depths::Measured(depths) => depths.iter().sum::<f64>() / depths.len() as f64,
+    };
+    let end = if end > 0.0 { end } else { spec.radius };
+    let at = |k: usize| {
+        let c = end * k as f64 / count as f64;
+        let response = law.response(0, c);
+        [c, response.pressure, response.tangent]
+    };
+    (1..=count).map(at).collect()
+}
+
+/// All of it for `--json`: of the data, and of each pair.
+pub fn json(built: &Built) -> (Value, Vec<Value>) {
+    let data = in_contacts(built);
+    let data = data.values().filter_map(|data| {
+        let Roughness { range, height, slope, curvature } = data.grid()?.roughness();
+        let value = json!({ "range": range, "rms_height": height, "rms_slope": slope, "rms_curvature": curvature });
+        Some((data.spec.name.clone(), value))
+    });
+    let pair = |pair: usize| {
+        let followed = followed(built, pair).map(|Resolution { height, variance, area, side }| {
+            json!({ "rms_height": height, "variance_left_out": variance, "area_left_out": area, "side": side })
+        });
+        let table = match &built.discrete.contacts[pair].spec.layer {
+            LayerSpec::Asperities(spec) => Some(law(built, pair, spec, SHOWN)),
+            _ => None,
+        };
+        json!({ "gap_followed": followed, "law": table })
+    };
+    (Value::Object(data.collect()), (0..built.discrete.contacts.len()).map(pair).collect())
+}
+
+/// Draws the data of contacts and their laws into a folder.
+///
+/// # Errors
+/// Files that cannot be written.
+pub fn draw(built: &Built, folder: &Folder) -> Result<()> {
+    for (name, data) in in_contacts(built) {
+        if let Some(plot) = profiles(&data) {
+            folder.write(&format!("data-{}.svg", safe_name(&name)), |out| plot.write(out))?;
+        }
+    }
+    let pairs = &built.discrete.model.pairs;
+    let stems: Vec<String> = numbered(pairs.iter().map(|pair| {
+        let [a, b] = &pair.surfaces;
+        format!("layer-{}-{}", safe_name(a), safe_name(b))
+    }));
+    for (pair, stem) in stems.iter().enumerate().take(LISTED) {
+        if let LayerSpec::Asperities(spec) = &built.discrete.contacts[pair].spec.layer {
+            let points = law(built, pair, spec, DRAWN).into_iter().map(|[c, p, _]| (c, p)).collect();
+            let axis = |label: &str| Axis { label: label.to_owned(), log: false };
+            let series = vec![Series::new("", points, Style::Line)];
+            let plot = Plot { title: described(spec), x: axis("compression"), y: axis("pressure"), series };
+            folder.write(&format!("{stem}.svg"), |out| plot.write(out))?;
+        }
+    }
+    Ok(())
+}
+
+/// Heights along the lines through the middle of a grid.
+fn profiles(data: &Data) -> Option<Plot> {
+    let grid = data.grid()?;
+    let [columns, rows] = grid.axes.map(|axis| axis.count);
+    let place = |axis: usize, k: usize| grid.axes[axis].origin + grid.axes[axis].spacing * k as f64;
+    let along = (0..columns).map(|i| (place(0, i), grid.values[i + columns * (rows / 2)])).collect();
+    let label = if rows > 1 { "middle row, along the first argument" } else { "" };
+    let mut series = vec![Series::new(label, along, Style::Line)];
+    if rows > 1 {
+        let down = (0..rows).map(|j| (place(1, j), grid.values[columns / 2 + columns * j])).collect();
+        series.push(Series::new("middle column, along the second", down, Style::Line));
+    }
+    let axis = |label: &str| Axis { label: label.to_owned(), log: false };
+    Some(Plot { title: format!("Data {}", data.spec.name), x: axis("place"), y: axis("height"), series })
+}

@@ -1,0 +1,160 @@
+//! From numbers in rows to a function of one place or two.
+
+use super::grid::{Axis, Grid};
+use super::knots::Knots;
+use super::rows::{Fault, Rows};
+use super::rule::{DataSpec, Interpolation, Outside};
+use super::scattered::Scattered;
+
+/// A function of a place.
+#[derive(Debug, Clone)]
+pub enum Shape {
+    /// Of points at equal distances.
+    Grid(Grid),
+    /// Of one coordinate, at any distances.
+    Knots(Knots),
+    /// Of two coordinates, anywhere.
+    Scattered(Scattered, [[f64; 2]; 2]),
+}
+
+/// Points farther from those of a regular grid than this share of the spacing are not on it. Written coordinates are rounded; a place that is
+/// wrong by so much changes a height by as small a share of its difference to the next one.
+const ROUNDED: f64 = 1e-2;
+
+/// Arranges the numbers of a file.
+pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Shape, Fault> {
+    match (spec.points, rows.columns) {
+        _ if rows.values.is_empty() => Err(Fault::new("has no numbers", "write heights in rows")),
+        (false, _) => matrix(spec, rows),
+        (true, 2) => profile(spec, &rows),
+        (true, 3) => surface(spec, &rows),
+        (true, columns) => Err(Fault::new(
+            format!("has {columns} numbers in a row"),
+            "a point is x and a height, or x, y and a height; for heights in rows and columns leave `points` away",
+        )),
+    }
+}
+
+/// Heights in rows and columns; a single row or column is a profile.
+fn matrix(spec: &DataSpec, rows: Rows) -> Result<Shape, Fault> {
+    let mut counts = [rows.columns, rows.count()];
+    if counts[0] == 1 {
+        counts.swap(0, 1);
+    }
+    if counts[0] < 2 {
+        return Err(Fault::new("has one number", "two points or more make a function"));
+    }
+    let values = rows.values.iter().map(|value| spec.unit * value).collect();
+    let axes = [0, 1].map(|d| Axis { origin: spec.origin[d], spacing: spec.spacing[d], count: counts[d] });
+    grid(spec, axes, values)
+}
+
+fn grid(spec: &DataSpec, axes: [Axis; 2], values: Vec<f64>) -> Result<Shape, Fault> {
+    let thin = |axis: &Axis| axis.count != 1 && axis.count < 3;
+    if spec.interpolation == Interpolation::Cubic && axes.iter().any(thin) {
+        return Err(Fault::new("has two points in a direction", "cubic interpolation needs three: take \"linear\""));
+    }
+    Ok(Shape::Grid(Grid { axes, values, interpolation: spec.interpolation, outside: spec.outside }))
+}
+
+/// Points (x, height) in any order.
+fn profile(spec: &DataSpec, rows: &Rows) -> Result<Shape, Fault> {
+    let points = rows.values.chunks_exact(2).map(|point| placed(spec, [point[0], 0.0], point[1]));
+    let points: Vec<[f64; 3]> = points.collect();
+    refuse_twins(&points, rows)?;
+    if points.len() < 2 {
+        return Err(Fault::new("has one point", "two points or more make a function"));
+    }
+    if let Some(axis) = regular(points.iter().map(|point| point[0])).filter(|axis| axis.count == points.len()) {
+        let mut values = vec![0.0; axis.count];
+        points.iter().for_each(|point| values[nearest(&axis, point[0])] = point[2]);
+        return grid(spec, [axis, Axis { origin: 0.0, spacing: 1.0, count: 1 }], values);
+    }
+    only_linear(spec)?;
+    let mut knots: Vec<[f64; 2]> = points.iter().map(|&[x, _, height]| [x, height]).collect();
+    knots.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    Ok(Shape::Knots(Knots(knots)))
+}
+
+/// Points (x, y, height) in any order.
+fn surface(spec: &DataSpec, rows: &Rows) -> Result<Shape, Fault> {
+    let points = rows.values.chunks_exact(3).map(|point| placed(spec, [point[0], point[1]], point[2]));
+    let points: Vec<[f64; 3]> = points.collect();
+    refuse_twins(&points, rows)?;
+    let axes = [0, 1].map(|d| regular(points.iter().map(|point| point[d])));
+    if let [Some(across), Some(down)] = axes
+        && across.count.checked_mul(down.count) == Some(points.len())
+        && across.count.min(down.count) > 1
+    {
+        let mut values = vec![f64::NAN; points.len()];
+        points.iter().for_each(|&[x, y, height]| {
+            values[nearest(&across, x) + across.count * nearest(&down, y)] = height;
+        });
+        if values.iter().all(|value| !value.is_nan()) {
+            return grid(spec, [across, down], values);
+        }
+    }
+    only_linear(spec)?;
+    let range = [0, 1].map(|d| {
+        let along = || points.iter().map(|point| point[d]);
+        [along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max)]
+    });
+    match Scattered::new(&points) {
+        Some(scattered) => Ok(Shape::Scattered(scattered, range)),
+        None => Err(Fault::new("has points on one line alone", "a surface needs three points that make a triangle")),
+    }
+}
+
+/// A point of the file in the lengths and heights of the scene.
+fn placed(spec: &DataSpec, place: [f64; 2], height: f64) -> [f64; 3] {
+    let [x, y] = [0, 1].map(|d| spec.origin[d] + spec.spacing[d] * place[d]);
+    [x, y, spec.unit * height]
+}
+
+/// What only a regular grid has.
+fn only_linear(spec: &DataSpec) -> Result<(), Fault> {
+    const HELP: &str = "scattered points have interpolate = \"linear\" and outside = \"clamp\" or \"error\"; or resample them on a grid";
+    match (spec.interpolation, spec.outside) {
+        (Interpolation::Cubic, _) => {
+            Err(Fault::new("has points that are on no regular grid: no cubic interpolation", HELP))
+        }
+        (_, Outside::Periodic) => Err(Fault::new("has points that are on no regular grid: no period", HELP)),
+        _ => Ok(()),
+    }
+}
+
+/// Two points at one place have no height there.
+fn refuse_twins(points: &[[f64; 3]], rows: &Rows) -> Result<(), Fault> {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    let compare = |&a: &usize, &b: &usize| {
+        let (a, b) = (points[a], points[b]);
+        a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
+    };
+    order.sort_by(compare);
+    match order.windows(2).find(|two| compare(&two[0], &two[1]).is_eq()) {
+        None => Ok(()),
+        Some(two) => {
+            let (first, second) = (two[0].min(two[1]), two[0].max(two[1]));
+            let what = format!("{} is at the place of {}", rows.line(second), rows.line(first));
+            Err(Fault::new(what, "every point needs a place of its own"))
+        }
+    }
+}
+
+/// The regular axis that coordinates lie on, many of them perhaps on one point; none if they do not.
+fn regular(coordinates: impl Iterator<Item = f64>) -> Option<Axis> {
+    let mut sorted: Vec<f64> = coordinates.collect();
+    sorted.sort_by(f64::total_cmp);
+    let (first, last) = (*sorted.first()?, *sorted.last()?);
+    // between points of the axis there is about a spacing, within one only rounding
+    let widest = sorted.windows(2).map(|two| two[1] - two[0]).fold(0.0, f64::max);
+    let steps = sorted.windows(2).filter(|two| two[1] - two[0] > 0.5 * widest).count();
+    let axis = Axis { origin: first, spacing: (last - first) / steps as f64, count: steps + 1 };
+    let is_on = |&x: &f64| (x - axis.origin - axis.spacing * nearest(&axis, x) as f64).abs() <= ROUNDED * axis.spacing;
+    (axis.spacing > 0.0 && axis.spacing.is_finite() && sorted.iter().all(is_on)).then_some(axis)
+}
+
+/// The point of an axis that is nearest to a coordinate.
+fn nearest(axis: &Axis, x: f64) -> usize {
+    ((x - axis.origin) / axis.spacing).round().clamp(0.0, (axis.count - 1) as f64) as usize
+}

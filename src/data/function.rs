@@ -1,0 +1,111 @@
+//! Data of a scene as a function of places.
+
+use super::arrange::{self, Shape};
+use super::grid::Grid;
+use super::read;
+use super::rule::{DataSpec, Outside, Sample};
+use crate::error::{Error, Place, Result, shown};
+use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
+
+/// The data of a scene by name.
+pub type Library = BTreeMap<String, Arc<Data>>;
+
+/// A function given by a file, which is read when it is first asked for.
+#[derive(Debug)]
+pub struct Data {
+    /// What the scene says of it.
+    pub spec: DataSpec,
+    shape: OnceLock<Shape>,
+}
+
+impl Data {
+    /// A function whose file is still to be read.
+    pub fn new(spec: DataSpec) -> Self {
+        Self { spec, shape: OnceLock::new() }
+    }
+
+    /// Reads the file, unless that was done.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is no surface and no profile; the refusal names its line.
+    pub fn load(&self) -> Result<()> {
+        if self.shape.get().is_some() {
+            return Ok(());
+        }
+        let DataSpec { name, file, place, .. } = &self.spec;
+        let rows = read::rows(file).map_err(|error| error.at(place))?;
+        let shape = rows.and_then(|rows| arrange::shape(&self.spec, rows)).map_err(|fault| {
+            let error = Error::scene(place, format!("data `{name}`: {} {}", file.display(), fault.what));
+            if fault.help.is_empty() { error } else { error.help(fault.help) }
+        })?;
+        self.shape.get_or_init(|| shape);
+        Ok(())
+    }
+
+    /// Number of coordinates that it takes: 1 for a profile, 2 for a surface.
+    pub fn arguments(&self) -> usize {
+        match self.shape.get() {
+            Some(Shape::Grid(grid)) if grid.axes[1].count > 1 => 2,
+            Some(Shape::Scattered(..)) => 2,
+            _ => 1,
+        }
+    }
+
+    /// Value and gradient at a place of as many coordinates.
+    pub fn sample(&self, place: &[f64]) -> Sample {
+        let at = [place.first(), place.get(1)].map(|x| x.copied().unwrap_or(0.0));
+        let holds = self.spec.outside == Outside::Clamp;
+        match self.shape.get() {
+            Some(Shape::Grid(grid)) => grid.sample(at),
+            Some(Shape::Knots(knots)) => knots.sample(at[0], holds),
+            Some(Shape::Scattered(scattered, _)) => scattered.sample(at, holds),
+            None => Sample::NONE,
+        }
+    }
+
+    /// All its numbers in a fixed order; none if nothing has asked for them.
+    pub fn numbers(&self) -> Box<dyn Iterator<Item = f64> + '_> {
+        match self.shape.get() {
+            Some(Shape::Grid(Grid { axes, values, .. })) => {
+                let counts = axes.iter().flat_map(|axis| [axis.origin, axis.spacing, axis.count as f64]);
+                Box::new(counts.chain(values.iter().copied()))
+            }
+            Some(Shape::Knots(knots)) => Box::new(knots.0.iter().flatten().copied()),
+            Some(Shape::Scattered(scattered, _)) => Box::new(scattered.numbers()),
+            None => Box::new(std::iter::empty()),
+        }
+    }
+
+    /// The regular grid, if its file was read and has one.
+    pub fn grid(&self) -> Option<&Grid> {
+        match self.shape.get() {
+            Some(Shape::Grid(grid)) => Some(grid),
+            _ => None,
+        }
+    }
+
+    /// The refusal of a place where it has no value; `what` names what the value was for, in an expression at `here`.
+    pub fn outside(&self, here: &Place, what: &str, place: &[f64]) -> Error {
+        let join = |coordinates: &[f64]| coordinates.iter().map(|&x| shown(x)).collect::<Vec<_>>().join(", ");
+        let range = match self.shape.get() {
+            Some(Shape::Grid(grid)) => grid.axes.map(|axis| axis.range()),
+            Some(Shape::Knots(knots)) => [knots.range(); 2],
+            Some(Shape::Scattered(_, range)) => *range,
+            None => [[f64::NAN; 2]; 2],
+        };
+        let range: Vec<String> = range[..place.len().min(2)]
+            .iter()
+            .map(|[from, to]| format!("{} to {}", shown(*from), shown(*to)))
+            .collect();
+        let advice = match self.grid() {
+            Some(_) => "\"clamp\" or \"periodic\"",
+            None => "\"clamp\"",
+        };
+        let name = &self.spec.name;
+        Error::scene(here, format!("{what}: data `{name}` have no value at ({})", join(place)))
+            .label("asked for it")
+            .because(format!("`{name}` has values for {}", range.join(" and ")))
+            .help(format!("move them by `origin` and `spacing`, or say what is beyond: outside = {advice}"))
+    }
+}

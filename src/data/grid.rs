@@ -1,0 +1,132 @@
+//! Values at the points of a regular grid, in one direction or two; a lookup takes the same few operations whatever the size.
+
+use super::rule::{Interpolation, Outside, Sample};
+
+/// A direction of a grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    /// Place of the first point.
+    pub origin: f64,
+    /// Distance of neighbours, greater than 0.
+    pub spacing: f64,
+    /// Number of points; one where values do not depend on this direction.
+    pub count: usize,
+}
+
+impl Axis {
+    /// First and last place that have values: half a spacing beyond the points, since a measured height is the mean over a cell around its
+    /// point.
+    pub fn range(&self) -> [f64; 2] {
+        [-0.5, self.count as f64 - 0.5].map(|steps| self.origin + self.spacing * steps)
+    }
+}
+
+/// A function on a regular grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// Along a row, and from row to row.
+    pub axes: [Axis; 2],
+    /// Row by row.
+    pub values: Vec<f64>,
+    /// What is between the points.
+    pub interpolation: Interpolation,
+    /// What is beyond them.
+    pub outside: Outside,
+}
+
+/// The points along an axis that a value comes from, with their weights and the derivatives of these; weights of zero fill up.
+#[derive(Clone, Copy, Default)]
+struct Stencil {
+    at: [usize; 4],
+    weight: [f64; 4],
+    slope: [f64; 4],
+}
+
+impl Grid {
+    /// Value and gradient at a place; of a profile the second coordinate counts nothing.
+    pub fn sample(&self, place: [f64; 2]) -> Sample {
+        let [Some(across), Some(down)] = [0, 1].map(|axis| self.stencil(axis, place[axis])) else {
+            return Sample::NONE;
+        };
+        let mut sample = Sample { value: 0.0, gradient: [0.0; 2] };
+        for j in 0..4 {
+            if down.weight[j] == 0.0 && down.slope[j] == 0.0 {
+                continue;
+            }
+            let row = &self.values[down.at[j] * self.axes[0].count..];
+            let (mut value, mut slope) = (0.0, 0.0);
+            for i in 0..4 {
+                value += across.weight[i] * row[across.at[i]];
+                slope += across.slope[i] * row[across.at[i]];
+            }
+            sample.value += down.weight[j] * value;
+            sample.gradient[0] += down.weight[j] * slope;
+            sample.gradient[1] += down.slope[j] * value;
+        }
+        sample
+    }
+
+    /// Where a coordinate lies on an axis; none where there are no values.
+    fn stencil(&self, axis: usize, x: f64) -> Option<Stencil> {
+        let Axis { origin, spacing, count } = self.axes[axis];
+        if count == 1 {
+            return Some(Stencil { weight: [1.0, 0.0, 0.0, 0.0], ..Stencil::default() });
+        }
+        let steps = (x - origin) / spacing;
+        let last = (count - 1) as f64;
+        let (steps, is_held) = match self.outside {
+            _ if !steps.is_finite() => return None,
+            Outside::Periodic => (steps.rem_euclid(count as f64), false),
+            Outside::Error if !(-0.5..=last + 0.5).contains(&steps) => return None,
+            _ => (steps.clamp(0.0, last), !(0.0..=last).contains(&steps)),
+        };
+        // the last cell of a periodic grid ends at the first point; of another the last point ends the last cell
+        let cells = if self.outside == Outside::Periodic { count } else { count - 1 };
+        let cell = (steps as usize).min(cells - 1);
+        let mut stencil = match self.interpolation {
+            Interpolation::Linear => linear(steps - cell as f64),
+            Interpolation::Cubic => cubic(steps - cell as f64),
+        };
+        if self.outside == Outside::Periodic {
+            stencil.at = [count - 1, 0, 1, 2].map(|step| (cell + step) % count);
+        } else {
+            if cell == 0 {
+                stencil.fold(0, [1, 2, 3]);
+            }
+            if cell == cells - 1 {
+                stencil.fold(3, [2, 1, 0]);
+            }
+            stencil.at = [0, 1, 2, 3].map(|step: usize| (cell + step).saturating_sub(1).min(count - 1));
+        }
+        let scale = if is_held { 0.0 } else { 1.0 / spacing };
+        stencil.slope.iter_mut().for_each(|slope| *slope *= scale);
+        Some(stencil)
+    }
+}
+
+impl Stencil {
+    /// Takes a point beyond the end from the three next to it, f = 3 f1 - 3 f2 + f3: Keys' condition, which keeps the third order.
+    fn fold(&mut self, beyond: usize, next: [usize; 3]) {
+        for weights in [&mut self.weight, &mut self.slope] {
+            let weight = std::mem::take(&mut weights[beyond]);
+            next.iter().zip([3.0, -3.0, 1.0]).for_each(|(&k, factor)| weights[k] += factor * weight);
+        }
+    }
+}
+
+/// Weights at t from 0 to 1 between the second and the third point.
+fn linear(t: f64) -> Stencil {
+    Stencil { weight: [0.0, 1.0 - t, t, 0.0], slope: [0.0, -1.0, 1.0, 0.0], ..Stencil::default() }
+}
+
+/// The same for cubic convolution.
+fn cubic(t: f64) -> Stencil {
+    let weight = [
+        t * (-0.5 + t * (1.0 - 0.5 * t)),
+        1.0 + t * t * (-2.5 + 1.5 * t),
+        t * (0.5 + t * (2.0 - 1.5 * t)),
+        t * t * (-0.5 + 0.5 * t),
+    ];
+    let slope = [-0.5 + t * (2.0 - 1.5 * t), t * (-5.0 + 4.5 * t), 0.5 + t * (4.0 - 4.5 * t), t * (-1.0 + 1.5 * t)];
+    Stencil { weight, slope, ..Stencil::default() }
+}

@@ -1,0 +1,69 @@
+//! Texts of numbers, as profilometers and spreadsheets write them.
+//!
+//! Fields are parted by `;`, tabs, commas or blanks, whichever of these, in this order, the last line has (of a number
+//! alone: the first line). With the first two a decimal comma is read, too. Lines that begin with `#`, and lines before the first number,
+//! are skipped.
+
+use super::rows::{Fault, Rows};
+
+/// Reads a text.
+pub fn rows(bytes: &[u8]) -> Result<Rows, Fault> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    if bytes.contains(&0) {
+        return Err(Fault::new("is neither text nor a file of NumPy", "export the heights as CSV or text in UTF-8"));
+    }
+    let is_row = |line: &&[u8]| !line.is_empty() && !line.starts_with(b"#");
+    let is_end = |byte: &u8| *byte == b'\n';
+    let last = bytes.rsplit(is_end).map(<[u8]>::trim_ascii).find(is_row).unwrap_or_default();
+    // a number alone does not say what parts others
+    let first = || bytes.split(is_end).map(<[u8]>::trim_ascii).find(is_row).unwrap_or_default();
+    let separator = separator(last).or_else(|| separator(first())).unwrap_or(b' ');
+    let mut rows = Rows::default();
+    let lines = bytes.split(is_end).map(<[u8]>::trim_ascii).zip(1..);
+    for (text, line) in lines.filter(|(text, _)| is_row(text)) {
+        // a separator at the end of a line ends it, and many blanks are one
+        let text = text.strip_suffix(&[separator]).unwrap_or(text);
+        let fields = || {
+            let fields = text.split(|&byte| byte == separator).map(<[u8]>::trim_ascii);
+            fields.filter(|field| separator != b' ' || !field.is_empty())
+        };
+        if rows.columns == 0 && fields().all(|field| number(field, separator).is_none()) {
+            continue;
+        }
+        let before = rows.values.len();
+        for field in fields() {
+            let value = number(field, separator).ok_or_else(|| {
+                let what = match field.is_empty() {
+                    true => format!("line {line} lacks a number between two separators"),
+                    false => format!("line {line}: `{}` is not a number", String::from_utf8_lossy(field)),
+                };
+                Fault::new(what, "lines that are no data begin with #; decimal commas need fields parted by ; or tabs")
+            })?;
+            rows.values.push(value);
+        }
+        let found = rows.values.len() - before;
+        if rows.columns == 0 {
+            rows.columns = found;
+        }
+        if found != rows.columns {
+            let what = format!("line {line} has {found} numbers, lines before it {}", rows.columns);
+            return Err(Fault::new(what, "every row needs as many"));
+        }
+        rows.lines.push(line);
+    }
+    Ok(rows)
+}
+
+/// What parts the fields of a line, if there are several.
+fn separator(line: &[u8]) -> Option<u8> {
+    b";\t, ".iter().copied().find(|separator| line.contains(separator))
+}
+
+/// The number that a field is.
+fn number(field: &[u8], separator: u8) -> Option<f64> {
+    let text = std::str::from_utf8(field).ok()?;
+    match matches!(separator, b';' | b'\t') && text.contains(',') {
+        true => text.replace(',', ".").parse().ok(),
+        false => text.parse().ok(),
+    }
+}
