@@ -68,6 +68,7 @@ impl Writing<'_> {
         clock.phase("output");
         clock.total();
         report.times.clone_from(&clock.times);
+        report.memory.clone_from(&clock.memory);
         if first {
             written = written.and(self.report(&folder, &mut report, fields));
         }
