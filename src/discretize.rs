@@ -1,5 +1,6 @@
 //! Scene and mesh -> [`Model`]: the one place where geometry ends. Nothing below it knows the dimension.
 
+mod approach;
 mod auto;
 mod balance;
 mod carried;
@@ -35,6 +36,7 @@ use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
 use crate::problem::method::Start;
 use crate::scene::Scene;
+use approach::OuterMaker;
 use balance::Forces;
 pub use balance::{Balance, Resultant};
 pub use distribute::Graph;
@@ -105,6 +107,7 @@ pub struct BodyInfo {
     nodal: NodalMaker,
     balance: BalanceMaker,
     errors: Option<ErrorMaker>,
+    outer: OuterMaker,
 }
 
 /// State of all dofs -> displacements of all nodes.
@@ -129,6 +132,12 @@ impl BodyInfo {
     /// Forces on the body in a state of all dofs, under the forces omega p of its contact rows.
     pub fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
         (self.balance)(&(self.nodal)(v), force)
+    }
+
+    /// Mean displacement of where the body is loaded along a direction, else of where it is held along it, else of all of it; from a
+    /// state of all dofs.
+    pub fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3] {
+        (self.outer)(&(self.nodal)(v), direction)
     }
 
     /// Errors against the scene's known displacements over the norms of these, if the scene has them: L2 norm, H1 seminorm,
@@ -187,7 +196,7 @@ pub fn discretize<const D: usize>(
 ) -> Result<Discrete> {
     let Verified { mesh, bodies, checked } = verified;
     let mut parts = bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
-    parts.iter().zip(checked).try_for_each(|(part, checked)| verify::held(part, &checked.parts, mesh))?;
+    parts.iter().zip(&**checked).try_for_each(|(part, checked)| verify::held(part, &checked.parts, mesh))?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
     for found in pairs::all(scene, mesh, cut, &parts, keep)? {
@@ -292,6 +301,7 @@ pub fn discretize<const D: usize>(
                 interpolation: &interpolation,
             })?);
         }
+        let outer = approach::outer_maker(&part, mesh)?;
         let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
         infos.push(BodyInfo {
             name: name.clone(),
@@ -322,6 +332,7 @@ pub fn discretize<const D: usize>(
                 Box::new(move |u, force| forces.balance(u, force))
             },
             errors: fields::error_maker(part.spec, &space, &elasticity)?,
+            outer,
             field: fields::field_maker(name.clone(), space.clone(), elasticity.clone()),
         });
         shapes.push(Shape { space, elasticity, modulus, held });

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use winkler::mesh::{Asked, Duty, Mesh, parse};
+use winkler::mesh::{Asked, Duty, Maker, Mesh, parse};
 use winkler::problem::order::Order;
 
 /// The mesh of a script as Gmsh writes it.
@@ -181,7 +181,7 @@ fn one_facet(found: &Used, known: &Used) -> bool {
 
 /// Reads a mesh as the patch asks for it.
 fn kind(bytes: &[u8], good: &Mesh<2>, known: &Used) -> Kind {
-    let Ok(mesh) = parse::<2>(Path::new("a.msh"), bytes, false) else { return Kind::Refused };
+    let Ok(mesh) = parse::<2>(Path::new("a.msh"), bytes, Maker::User) else { return Kind::Refused };
     if good.groups.iter().any(|group| mesh.group(&group.name).is_none()) {
         return Kind::Named;
     }
@@ -229,7 +229,7 @@ const SECTIONS: [&str; 5] = ["$MeshFormat", "$PhysicalNames", "$Entities", "$Nod
 fn one_bit_changes() {
     for arguments in [&[][..], &["-bin"], &["-bin", "-order", "2"]] {
         let bytes = gmsh(&script(), arguments);
-        let good = parse::<2>(Path::new("a.msh"), &bytes, false).expect("a mesh");
+        let good = parse::<2>(Path::new("a.msh"), &bytes, Maker::User).expect("a mesh");
         assert_eq!(good.order == Order::P2, arguments.len() == 3);
         let known = used(&good);
         assert_eq!(kind(&bytes, &good, &known), Kind::Same);

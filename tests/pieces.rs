@@ -118,7 +118,7 @@ impl Surface {
             connectivity: simplices.concat(),
         };
         let groups = vec![group("body", D, cells), group("face", D - 1, facets)].into();
-        Mesh { path: "random".into(), points, order: self.order, groups }
+        Mesh { path: "random".into(), points, order: self.order, groups, split: 0 }
     }
 }
 

@@ -218,8 +218,7 @@ fn damaged_meshes() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| folder.path().join(name);
     gmsh(&["-format", "msh22"], &file("old.msh"));
-    let run = solve(patch_with(&file("old.msh")), &[]);
-    refused(&run, MESH, &["old.msh:2:", "2.2", "4.1", "gmsh", "-format msh41"]);
+    solve(patch_with(&file("old.msh")), &["--set", "method.stop.residual=1e-3"]).converged();
     for (name, format) in [("text.msh", &["-format", "msh41"][..]), ("binary.msh", &["-format", "msh41", "-bin"])] {
         gmsh(format, &file(name));
         let whole = patch_with(&file(name));

@@ -415,6 +415,46 @@ fn an_interrupted_run_goes_on_with_other_ranks() {
     }
 }
 
+/// A run that ends in a later direction of its loads goes on there, with the rows of all steps before.
+#[test]
+fn a_history_goes_on_in_its_step() {
+    let text = text_of("groove")
+        .replace("on = \"lower_face\", pressure = 10", "on = \"lower_face\", pressure = 10, path = \"low\"");
+    assert!(text.contains("path"));
+    let scene = Scene::new(text.split_once("[method]").expect("a method").0);
+    fs::write(scene.path.with_file_name("path.csv"), "low,factor\n0,0\n1,1\n0.5,1\n1,0.5\n").expect("a table");
+    let method = |most: usize| {
+        let stop = format!("stop={{residual=1e-12,iterations={most}}}");
+        format!("method={{name=\"robin\",gamma=1e-4,steps={{table=\"path.csv\"}},{stop}}}")
+    };
+    let endless = ["--set", &method(100_000_000), "--set", "mesh.set.n=8"];
+    let mut run = Working::start(&words(&scene.path, &endless), 1);
+    run.until_rows(8);
+    run.signal("TERM");
+    let (status, scratch, said) = run.end();
+    assert_eq!(status.code(), Some(143), "{said}");
+    let stopped = report(&scratch.path().join("results"));
+    let rows = |folder: &Path| -> Vec<String> {
+        let text = fs::read_to_string(folder.join("steps.csv")).expect("a table of steps");
+        text.lines().map(str::to_owned).collect()
+    };
+    let before = rows(&scratch.path().join("results"));
+    assert_eq!([stopped["steps"].as_array().map(Vec::len), Some(before.len())], [Some(2), Some(3)], "{stopped}");
+    assert!(before[2].contains("interrupted"), "{before:?}");
+    let done = stopped["iterations"].as_u64().expect("a number") as usize;
+    let limited = ["--set", &method(done + 3), "--set", "mesh.set.n=8"];
+    let (again, whole) = (restart(&scratch, 2, &scene.path, &limited), solve(&scene, &limited));
+    let (ours, theirs) = (rows(&again.folder), rows(&whole.folder));
+    assert_eq!((ours.len(), &ours[1]), (5, &before[1]));
+    assert!(ours[2..].iter().all(|row| row.contains("iteration-limit")), "{ours:?}");
+    for (ours, theirs) in ours[1..].iter().zip(&theirs[1..]) {
+        let numbers = |row: &str| row.split(',').filter_map(|word| word.parse::<f64>().ok()).collect::<Vec<_>>();
+        let (ours, theirs) = (numbers(ours), numbers(theirs));
+        assert!(ours.iter().zip(&theirs).all(|(x, y)| (x - y).abs() < 1e-8), "{ours:?}\n{theirs:?}");
+    }
+    assert!(distance(&again.contact()["pressure"], &whole.contact()["pressure"]) < 1e-8);
+}
+
 #[test]
 fn a_checkpoint_of_something_else_is_refused() {
     let scene = case("groove");

@@ -1,4 +1,4 @@
-//! The walls between the rooms, held by reading the sources.
+//! The walls between the modules, held by reading the sources.
 
 #[path = "walls/circles.rs"]
 mod circles;
@@ -9,8 +9,8 @@ use common::root;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The rooms from the ground up; each may use those below it.
-const ROOMS: [&str; 23] = [
+/// The modules from the ground up; each may use those below it.
+const MODULES: [&str; 23] = [
     "error",
     "file",
     "interrupt",
@@ -36,7 +36,7 @@ const ROOMS: [&str; 23] = [
     "main",
 ];
 
-/// Rooms that may use less than what lies below them.
+/// Modules that may use less than what lies below them.
 const NARROW: [(&str, &[&str]); 4] = [
     ("model", &["error", "linalg", "contact"]),
     ("ddm", &["error", "linalg", "contact", "problem", "model"]),
@@ -47,7 +47,7 @@ const NARROW: [(&str, &[&str]); 4] = [
     ),
 ];
 
-/// Files that may know the space dimension: those of the first rooms, and the one that picks it.
+/// Files that may know the space dimension: those of the first modules, and the one that picks it.
 const SPATIAL: [&str; 7] = ["scene", "mesh", "fem", "contact", "discretize", "commands/run.rs", "commands/mesh.rs"];
 
 /// Lines that a file may have.
@@ -64,14 +64,14 @@ struct Source {
 }
 
 impl Source {
-    fn room(&self) -> &str {
+    fn module(&self) -> &str {
         let first = self.path.split('/').next().unwrap_or_default();
         first.strip_suffix(".rs").unwrap_or(first)
     }
 
-    /// Whether it lies in a room or is a file of that path.
+    /// Whether it lies in a module or is a file of that path.
     fn is_in(&self, place: &str) -> bool {
-        self.room() == place || self.path == place
+        self.module() == place || self.path == place
     }
 
     fn at(&self, line: usize) -> String {
@@ -157,9 +157,9 @@ fn end(code: &[char], i: usize, sign: &[char]) -> usize {
     found.map_or(code.len() + 1, |k| k + sign.len())
 }
 
-/// Rooms that a file names in paths from the root, with the lines: `crate::a::b` and `crate::{a::b, c}`; examples and the
+/// Modules that a file names in paths from the root, with the lines: `crate::a::b` and `crate::{a::b, c}`; examples and the
 /// main program say `winkler` for `crate`.
-fn rooms_used(source: &Source) -> Vec<(usize, String)> {
+fn modules_used(source: &Source) -> Vec<(usize, String)> {
     let word = |i: usize| source.words.get(i).map_or("", |(_, word)| word.as_str());
     let mut used = Vec::new();
     for i in 0..source.words.len() {
@@ -196,7 +196,7 @@ fn none(breaches: Vec<String>) {
 #[test]
 fn unsafe_stays_in_petsc() {
     let mut breaches = Vec::new();
-    for source in sources().iter().filter(|source| source.room() != "petsc") {
+    for source in sources().iter().filter(|source| source.module() != "petsc") {
         breaches.extend(source.words.iter().filter(|(_, word)| word == "unsafe").map(|(line, _)| source.at(*line)));
         // and nobody else is let off
         let allowed = source.text.matches("allow(unsafe_code)").count();
@@ -215,7 +215,7 @@ fn unsafe_stays_in_petsc() {
 fn the_method_knows_no_mesh_no_element_no_petsc() {
     let forbidden = ["petsc", "mesh", "fem", "const", "mpi", "Session", "Ksp", "element", "simplex", "dimension"];
     let mut breaches = Vec::new();
-    for source in sources().iter().filter(|source| source.room() == "ddm") {
+    for source in sources().iter().filter(|source| source.module() == "ddm") {
         for (k, (line, word)) in source.words.iter().enumerate() {
             // constants and const functions are no dimensions
             let generic = word == "const" && source.words.get(k + 1).is_some_and(|(_, next)| next == "D");
@@ -244,25 +244,25 @@ fn few_rooms_know_the_dimension() {
 }
 
 #[test]
-fn rooms_use_only_lower_rooms() {
-    let floor = |room: &str| ROOMS.iter().position(|known| *known == room);
+fn modules_use_only_lower_modules() {
+    let floor = |module: &str| MODULES.iter().position(|known| *known == module);
     let mut breaches = Vec::new();
     let mut uses = 0;
-    for source in sources().iter().filter(|source| source.room() != "lib") {
-        let room = source.room();
-        let Some(own) = floor(room) else {
-            breaches.push(format!("src/{}: the room `{room}` has no floor", source.path));
+    for source in sources().iter().filter(|source| source.module() != "lib") {
+        let module = source.module();
+        let Some(own) = floor(module) else {
+            breaches.push(format!("src/{}: the module `{module}` has no floor", source.path));
             continue;
         };
-        for (line, other) in rooms_used(source).into_iter().filter(|(_, other)| other != room) {
+        for (line, other) in modules_used(source).into_iter().filter(|(_, other)| other != module) {
             uses += 1;
-            let narrow = NARROW.iter().find(|(name, _)| *name == room);
+            let narrow = NARROW.iter().find(|(name, _)| *name == module);
             let allowed = match narrow {
                 Some((_, below)) => below.contains(&other.as_str()),
                 None => floor(&other).is_some_and(|other| other < own),
             };
             if !allowed {
-                breaches.push(format!("{}: `{room}` uses `{other}`", source.at(line)));
+                breaches.push(format!("{}: `{module}` uses `{other}`", source.at(line)));
             }
         }
     }
@@ -306,12 +306,12 @@ fn planted_circles_are_found() {
     // a re-export leads on, also by another name, and is no use itself
     let a = ("r/a.rs", "use super::{Other, X};");
     let b = ("r/b.rs", "use super::a; pub struct B; impl B { fn f() -> a::A {} }");
-    let room = ("r/mod.rs", "mod a; mod b; pub use b::B as X; pub struct Other;");
-    assert_eq!(found(&[a, b, room]), ["r/a.rs r/b.rs"]);
-    assert!(found(&[a, ("r/b.rs", "use super::Other;"), room]).is_empty());
+    let module = ("r/mod.rs", "mod a; mod b; pub use b::B as X; pub struct Other;");
+    assert_eq!(found(&[a, b, module]), ["r/a.rs r/b.rs"]);
+    assert!(found(&[a, ("r/b.rs", "use super::Other;"), module]).is_empty());
     // unless the file itself says the name
-    let room = ("r/mod.rs", "mod b; pub use b::B; pub struct Other(B);");
-    assert_eq!(found(&[("r/b.rs", "use super::Other; pub struct B;"), room]), ["r/b.rs r/mod.rs"]);
+    let module = ("r/mod.rs", "mod b; pub use b::B; pub struct Other(B);");
+    assert_eq!(found(&[("r/b.rs", "use super::Other; pub struct B;"), module]), ["r/b.rs r/mod.rs"]);
     // by all names at once, by the name of a module, from a module within the file, and around three
     let a = ("r/a.rs", "pub fn f() {} mod tests { use super::super::c; fn g() { c::h() } }");
     let b = ("r/b.rs", "use super::f;");
@@ -327,10 +327,10 @@ fn planted_circles_are_found() {
 /// The binding is a product of its own: it knows errors, and nothing else of the program.
 #[test]
 fn the_binding_stands_alone() {
-    let binding = sources().into_iter().filter(|source| source.room() == "petsc");
+    let binding = sources().into_iter().filter(|source| source.module() == "petsc");
     let others = binding.flat_map(|source| {
-        let used = rooms_used(&source).into_iter().filter(|(_, room)| room != "petsc" && room != "error");
-        used.map(|(line, room)| format!("{}: {room}", source.at(line))).collect::<Vec<_>>()
+        let used = modules_used(&source).into_iter().filter(|(_, module)| module != "petsc" && module != "error");
+        used.map(|(line, module)| format!("{}: {module}", source.at(line))).collect::<Vec<_>>()
     });
     none(others.collect());
 }
@@ -349,6 +349,6 @@ fn words_are_those_outside_comments_and_texts() {
     assert_eq!(found, ["1a", "1::", "1b", "3&", "3'", "3c", "3d"]);
     let text = "use crate::{mesh::{A, B}, fem}; crate::ddm::X".to_owned();
     let source = Source { path: "x.rs".into(), words: words(&text), text };
-    let used: Vec<String> = rooms_used(&source).into_iter().map(|(_, room)| room).collect();
+    let used: Vec<String> = modules_used(&source).into_iter().map(|(_, module)| module).collect();
     assert_eq!(used, ["mesh", "fem", "ddm"]);
 }

@@ -78,6 +78,9 @@ impl Plan {
             seconds: 0.0,
         };
         if plan.goal.is_none() && !nested {
+            if let Some(checkpoint) = plan.resumed.as_ref().filter(|checkpoint| !checkpoint.head.steps.is_empty()) {
+                Rc::make_mut(&mut plan.scene).method.steps.begun = checkpoint.head.steps.len();
+            }
             return Ok(plan);
         }
         agree(session, plan.refuse_finished_mesh())?;

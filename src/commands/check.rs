@@ -15,6 +15,7 @@ use crate::output::{Folder, LISTED, say, sci};
 use crate::petsc::Session;
 use serde_json::json;
 use std::path::PathBuf;
+use std::rc::Rc;
 
 /// Builds a scene's problem and prints bodies, dofs, surfaces, gaps and the rigid motions left to each body; returns the
 /// exit code. With a folder it draws the measured surfaces and the layers of asperities in it.
@@ -30,7 +31,11 @@ pub fn check(
     folder: Option<PathBuf>,
 ) -> Result<i32> {
     let mut clock = Clock::default();
-    let scene = load(session, &path, &overrides)?;
+    let mut scene = load(session, &path, &overrides)?;
+    let settings = scene.settings();
+    if scene.method.steps.is_table() {
+        Rc::make_mut(&mut scene).method.steps = scene.method.steps.heaviest();
+    }
     let built = run::build(session, scene, interrupt, &mut clock)?;
     clock.total();
     let shared = report::Shared::gather(&built.discrete);
@@ -42,6 +47,7 @@ pub fn check(
     }
     if as_json {
         let mut value = json!(report::headline(session, &built, &shared.solvers, &clock));
+        value["settings"] = settings;
         value["status"] = json!("checked");
         value["message"] = json!(built.choice);
         for (info, body) in built.discrete.bodies.iter().zip(0..) {

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file in the folder of results.
 pub const FILE: &str = "checkpoint";
 
-const FORMAT: &str = "winkler checkpoint 1";
+const FORMAT: &str = "winkler checkpoint 2";
 
 /// Bytes of the digest at the end.
 const DIGEST: usize = 32;
@@ -219,6 +219,9 @@ pub fn settings_digest(scene: &Scene) -> String {
     let mut settings = scene.settings();
     ["scene", "title", "units", "output"].iter().for_each(|key| settings[*key] = Value::Null);
     settings["method"]["stop"] = Value::Null;
+    if let Some(steps) = settings["method"].get_mut("steps").and_then(Value::as_object_mut) {
+        steps.remove("table");
+    }
     if let Some(mesh) = settings["mesh"].as_object_mut() {
         ["geo", "msh", "timeout", "memory"].iter().for_each(|key| drop(mesh.remove(*key)));
     }

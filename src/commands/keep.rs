@@ -10,6 +10,9 @@ pub trait Keep: Observer {
     /// Keeps the state of a run, or of its load step, from which it can go on.
     fn state(&mut self, _done: &Done) {}
 
+    /// Keeps the results of a load step that has ended, the last of [`Done::steps`], in the units of the scene.
+    fn step(&mut self, _done: &Done) {}
+
     /// Keeps the results so far, and leaves the run as it is.
     fn results(&mut self, _done: &mut Done) {}
 }

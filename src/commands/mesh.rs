@@ -1,9 +1,11 @@
 //! `winkler mesh`: makes the mesh of a scene, or finds it, and says what is in it.
 
+use super::run::in_parts;
 use crate::error::{Error, Kind, Result};
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
 use crate::mesh::{Loaded, Origin};
+use crate::output::vtu::Encoding;
 use crate::output::{CellKind, Grid, say, write_whole};
 use crate::problem::order::Order;
 use crate::scene::Scene;
@@ -58,7 +60,7 @@ fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request)
 fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Result<Value> {
     let mesh = &loaded.mesh;
     let verified = crate::discretize::verify(scene, mesh)?;
-    let mut checked = verified.checked.into_iter();
+    let mut checked = verified.checked.iter();
     let mut bodies = Vec::new();
     for body in &verified.bodies {
         let name = &body.name.value;
@@ -93,6 +95,7 @@ fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Res
         "dimension": D,
         "order": mesh.order.degree(),
         "nodes": mesh.points.len(),
+        "split": mesh.split,
         "bodies": bodies,
         "groups": groups,
     }))
@@ -122,6 +125,9 @@ fn print(facts: &Value) -> Result<()> {
             number(&body["quality"]["mean"])
         ))?;
     }
+    if let Some(warning) = in_parts(facts["split"].as_u64().unwrap_or_default() as usize) {
+        say(format_args!("  warning: {warning}"))?;
+    }
     let cells = facts["dimension"].clone();
     for group in list("groups").iter().filter(|group| group["dimension"] != cells) {
         let kind = ["points", "lines", "triangles"][number(&group["dimension"]) as usize];
@@ -139,7 +145,7 @@ fn write<const D: usize>(path: &Path, loaded: &Loaded<D>) -> Result<()> {
         }
         Some("vtu") => {
             let grid = grid(loaded);
-            write_whole(path, |out| grid.write(out))
+            write_whole(path, |out| grid.write(Encoding::default(), out))
         }
         _ => Err(Error::new(Kind::Usage, format!("`{}` names no kind of mesh file", path.display()))
             .help("end it with .msh or .vtu")),

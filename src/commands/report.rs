@@ -3,11 +3,11 @@
 use super::asking;
 use super::balance;
 use super::clock::Clock;
+use super::measure;
 use super::preflight;
 use super::results;
 use super::stages::{Built, Done};
-use super::steps;
-use super::verdict::{forecast, message, status_name};
+use super::verdict::{self, forecast, message, status_name};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{Outcome, Status};
 use crate::discretize::Discrete;
@@ -30,7 +30,7 @@ use std::collections::BTreeMap;
 /// Exit code of a run that ended like this.
 pub fn exit_code(done: &Done) -> i32 {
     match done.outcome.status {
-        Status::Converged | Status::RoundoffLimited if steps::warnings(&done.steps).is_empty() => 0,
+        Status::Converged | Status::RoundoffLimited if verdict::of_steps(&done.steps).is_empty() => 0,
         Status::Paused { asked } => asking::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
@@ -63,14 +63,14 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
         factorizations: counts.factorizations + joint.factorizations,
         inner_times: InnerTimes {
             factor: counts.factor_seconds + joint.factor_seconds,
-            first: counts.first_seconds,
+            first: counts.first_seconds + joint.first_seconds,
             solve: counts.solve_seconds + joint.solve_seconds,
         },
         symbolic_factorizations: counts.symbolic + joint.symbolic,
-        body_solves: counts.solves,
+        body_solves: counts.solves + joint.solves,
         inner_iterations: counts.inner_iterations + joint.inner_iterations,
-        robin_updates: counts.robin_updates,
-        robin_updates_skipped: counts.robin_skipped,
+        robin_updates: counts.robin_updates + joint.robin_updates,
+        robin_updates_skipped: counts.robin_skipped + joint.robin_skipped,
         dense_factorizations: counts.dense_factorizations + joint.dense_factorizations,
         assemblies: shared.assemblies,
         assemblies_avoided: shared.assemblies_avoided,
@@ -81,11 +81,12 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
         residual: finite(last.map(|row| row.residual)),
         increment: finite(last.map(|row| row.increment)),
         f1: finite(last.map(|row| row.energy)),
-        pairs: (0..model.pairs.len()).map(|i| pair_report(done, i)).collect(),
         ..headline(session, &done.built, &shared.solvers, clock)
     };
-    report.warnings.extend(done.warnings.iter().cloned().chain(steps::warnings(&done.steps)));
+    report.warnings.extend(done.warnings.iter().cloned().chain(verdict::of_steps(&done.steps)));
     results::fill(discrete, recovered, &mut report.bodies);
+    let approaches = measure::approaches(done, recovered);
+    report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = balance::gather(done, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
     if let Some(message) = lost(done) {
@@ -170,7 +171,8 @@ fn petsc_options(session: &Session) -> Vec<String> {
 /// What only the owner of a body knows: counts over all bodies and the inner solver of each in words.
 #[derive(Default, Serialize, Deserialize)]
 pub struct Shared {
-    counts: BodyCounts,
+    /// What the bodies did, all together.
+    pub counts: BodyCounts,
     assemblies: usize,
     assemblies_avoided: usize,
     /// Inner solver of each body.
@@ -228,7 +230,7 @@ pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
     }
 }
 
-fn pair_report(done: &Done, i: usize) -> PairReport {
+fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
@@ -253,6 +255,7 @@ fn pair_report(done: &Done, i: usize) -> PairReport {
         layer_energy: layer.energy[i],
         force: sides.map(|side| sum(&pair.resultant[side])),
         moment: sides.map(|side| sum(&pair.moment[side])),
+        approach,
         peak_pressure: p[peak],
         peak_at: pair.position[peak],
         contact_length: length(|c| c > 0.0),

@@ -1,10 +1,11 @@
 //! What the displacements of a body say: fields for output, largest stresses with their places, errors against a known answer.
 
 use super::stages::Done;
-use crate::discretize::Discrete;
+use crate::discretize::{BodyInfo, Discrete};
 use crate::error::Result;
 use crate::output::BodyReport;
 use crate::output::vtu::BodyField;
+use std::cell::OnceCell;
 
 /// The end of a run in one body that this rank speaks for.
 pub struct Recovered {
@@ -12,8 +13,14 @@ pub struct Recovered {
     pub state: Vec<f64>,
     /// The same without the rigid motions that supports leave or carry the body by, which strain nothing.
     pub bent: Vec<f64>,
-    /// Displacements and stresses at the nodes.
-    pub field: BodyField,
+    field: OnceCell<BodyField>,
+}
+
+impl Recovered {
+    /// Displacements and stresses at the nodes, made when they are first asked for.
+    pub fn field(&self, info: &BodyInfo) -> &BodyField {
+        self.field.get_or_init(|| info.field(&self.state, &self.bent))
+    }
 }
 
 /// The end of a run in every body: none for those of other ranks, and the failure of a solver that should have found the
@@ -22,10 +29,9 @@ pub type All = Vec<Option<Result<Recovered>>>;
 
 /// Recovers the bodies that this rank speaks for. Collective.
 pub fn recover(done: &Done) -> All {
-    let bodies = done.built.discrete.bodies.iter().zip(&done.model().bodies);
+    let bodies = done.model().bodies.iter().zip(&done.outcome.iterate.states);
     bodies
-        .zip(&done.outcome.iterate.states)
-        .map(|((info, slot), state)| {
+        .map(|(slot, state)| {
             let body = slot.local.as_ref()?;
             // what springs hold is strain, too
             let rigid = if slot.sprung.is_some() { 0 } else { body.rigid() };
@@ -43,16 +49,11 @@ pub fn recover(done: &Done) -> All {
                 }
                 state.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
                 bent.iter_mut().chain(&mut state).for_each(|u| *u *= done.share);
-                Ok(Some(Recovered { field: info.field(&state, &bent), state, bent }))
+                Ok(Some(Recovered { state, bent, field: OnceCell::new() }))
             };
             recover().transpose()
         })
         .collect()
-}
-
-/// The bodies left as they are, for a report of which nobody reads what is inside them.
-pub fn skipped(done: &Done) -> All {
-    done.model().bodies.iter().map(|_| None).collect()
 }
 
 /// Numbers of a body in the message.
@@ -66,14 +67,15 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) {
         match recovered {
             None => {}
             Some(Err(_)) => mine.fill(f64::NAN),
-            Some(Ok(Recovered { state, field, .. })) => {
+            Some(Ok(recovered)) => {
+                let field = recovered.field(info);
                 let von_mises = &field.von_mises;
                 let largest = (0..von_mises.len()).max_by(|&i, &j| von_mises[i].total_cmp(&von_mises[j])).unwrap_or(0);
                 mine[0] = von_mises[largest];
                 mine[1..4].copy_from_slice(&field.points[largest]);
                 mine[4] = field.principal.iter().map(|s| s[0]).fold(f64::NEG_INFINITY, f64::max);
                 mine[5] = field.principal.iter().map(|s| s[2]).fold(f64::INFINITY, f64::min);
-                mine[6..].copy_from_slice(&info.errors(state).unwrap_or([f64::NAN; 3]));
+                mine[6..].copy_from_slice(&info.errors(&recovered.state).unwrap_or([f64::NAN; 3]));
             }
         }
     }

@@ -25,7 +25,9 @@ pub fn build(
     clock: &mut Clock,
 ) -> Result<Built> {
     let Some(Done { built: mut last, .. }) = before else { return run::build(session, scene, interrupt, clock) };
-    let same = |without: &[&str]| settings(&last.scene, without) == settings(&scene, without);
+    // tables of factors change the loads of bodies
+    let is_full = !last.scene.method.steps.is_table() && !scene.method.steps.is_table();
+    let same = |without: &[&str]| is_full && settings(&last.scene, without) == settings(&scene, without);
     let condensed = last.condensed.len() == last.discrete.bodies.len();
     // an estimate of the error needs the meshes, which are kept only for it
     let meshes = |scene: &Scene| scene.estimate || scene.method.stop.balanced;

@@ -10,13 +10,15 @@ use super::words::in_words;
 use crate::contact::pieces::{self, Cut};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{self, Outcome, Start, Status};
-use crate::discretize::{self, ContactInfo, Discrete};
+use crate::discretize::{self, ContactInfo, Discrete, Verified};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
+use crate::mesh::{Checked, Mesh, is_other};
 use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
+use crate::problem::body::BodySpec;
 use crate::problem::mesh::MeshSource;
 use crate::problem::method::Linear;
 use crate::problem::order::Order;
@@ -72,31 +74,67 @@ fn build_in<const D: usize>(
     interrupt.hold();
     let stage = session.stage("mesh");
     let mesh = mesh::<D>(session, &scene, interrupt)?;
-    let mesh = agree(session, interrupt.release().and_then(|()| discretize::verify(&scene, &mesh)))?;
-    let names: Vec<&str> = mesh.bodies.iter().map(|body| body.name.value.as_str()).collect();
-    agree(session, scene_options(session, &scene, &names))?;
+    let verified = agree(session, interrupt.release().and_then(|()| discretize::verify(&scene, &mesh)))?;
     clock.phase("mesh");
     drop(stage);
-    let stage = session.stage("discretize");
-    let mut inner = Inner::new(session, &scene, &names, kept)?;
-    let ranks = (session.rank(), session.size());
-    let exchange = Rc::new(Ranks::new(session));
-    let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
-    let discrete = discretize::discretize(&scene, &mesh, cut, ranks, keep, exchange, &mut inner);
-    let mut discrete = agree(session, discrete)?;
-    discrete.share();
-    // small fronts and several ranks lose by BLAS threads, and the short vectors of a Krylov method do; large factorisations gain
-    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-    let gains = D == 3 && mesh.mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
-    session.set_blas_threads(if gains { cores / session.size() } else { 1 });
-    clock.phase("discretize");
-    drop(stage);
-    let mut warnings = warnings(session, &discrete);
-    warnings.extend(inner.applied_once());
-    let (linear, whole) = (inner.linear(), inner.whole().clone());
-    let (choice, condensed) = (inner.reason(), inner.condensed());
-    let interpolation = inner.interpolation();
-    Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, warnings })
+    let Verified { bodies, checked, .. } = verified;
+    let source = Source { session: session.clone(), scene, mesh, bodies, checked, cut };
+    let history = &source.scene.method.steps;
+    let begun = history.begun;
+    let mut built = source.build(begun, kept, clock)?;
+    if begun < history.steps.len() && history.leg(begun) != (0..history.steps.len()) {
+        built.again = Some(Rc::new(move |step, begin, clock| {
+            options::withdraw(&source.session)?;
+            set_up(&source.session, source.build(step, Vec::new(), clock)?, begin, clock)
+        }));
+    }
+    Ok(built)
+}
+
+/// A scene with its mesh: what discrete problems are made of.
+struct Source<const D: usize> {
+    session: Session,
+    scene: Rc<Scene>,
+    mesh: Mesh<D>,
+    /// Bodies under their full loads.
+    bodies: Vec<BodySpec>,
+    checked: Rc<[Checked]>,
+    cut: Cut<D>,
+}
+
+impl<const D: usize> Source<D> {
+    /// The problem under the loads of a step of the scene's history, or the full ones. Collective.
+    fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
+        let Self { session, scene, mesh, checked, cut, .. } = self;
+        let stage = session.stage("discretize");
+        let mut bodies = self.bodies.clone();
+        scene.method.steps.apply(step, &mut bodies);
+        let names: Vec<String> = bodies.iter().map(|body| body.name.value.clone()).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let verified = Verified { mesh, bodies, checked: checked.clone() };
+        agree(session, scene_options(session, scene, &names))?;
+        let mut inner = Inner::new(session, scene, &names, kept)?;
+        let ranks = (session.rank(), session.size());
+        let exchange = Rc::new(Ranks::new(session));
+        let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
+        let discrete = discretize::discretize(scene, &verified, *cut, ranks, keep, exchange, &mut inner);
+        let mut discrete = agree(session, discrete)?;
+        discrete.share();
+        // small fronts and several ranks lose by BLAS threads, and the short vectors of a Krylov method do; large factorisations gain
+        let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
+        let gains = D == 3 && mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
+        session.set_blas_threads(if gains { cores / session.size() } else { 1 });
+        clock.phase("discretize");
+        drop(stage);
+        let mut warnings = warnings(session, &discrete);
+        warnings.extend(in_parts(mesh.split));
+        warnings.extend(inner.applied_once());
+        let (linear, whole) = (inner.linear(), inner.whole().clone());
+        let (choice, condensed) = (inner.reason(), inner.condensed());
+        let interpolation = inner.interpolation();
+        let scene = scene.clone();
+        Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, warnings, again: None })
+    }
 }
 
 /// PETSc options of the scene, weaker than typed ones.
@@ -115,13 +153,17 @@ fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()
 }
 
 /// The mesh: one rank lets Gmsh work, then every rank reads.
-fn mesh<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<crate::mesh::Mesh<D>> {
+fn mesh<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<Mesh<D>> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
     let load = || crate::mesh::load_unless::<D>(&scene.mesh, order, interrupt).map(|loaded| loaded.mesh);
     if session.size() == 1 {
         return load();
     }
-    if matches!(scene.mesh, MeshSource::Geo { .. }) {
+    let needs_gmsh = match &scene.mesh {
+        MeshSource::Geo { .. } => true,
+        MeshSource::Msh { file } => is_other(&file.value),
+    };
+    if needs_gmsh {
         agree(session, if session.rank() == 0 { load().map(|_| ()) } else { Ok(()) })?;
     }
     agree(session, load())
@@ -160,6 +202,12 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// Elements that were split, as a warning.
+pub fn in_parts(split: usize) -> Option<String> {
+    let what = "quadrangles, hexahedra, prisms or pyramids of the mesh were split into triangles or tetrahedra";
+    (split > 0).then(|| format!("{split} {what}"))
 }
 
 /// Facets that a pair leaves out as a warning.
@@ -272,7 +320,7 @@ pub fn iterate(ready: Ready, interrupt: &Interrupt, keep: &mut dyn Keep, clock: 
     interrupt.hold();
     let done = match ready.built.scene.method.steps.is_empty() {
         true => keep::solve(ready, true, keep)?,
-        false => steps::iterate(ready, keep)?,
+        false => steps::iterate(ready, keep, clock)?,
     };
     clock.phase("iterate");
     Ok(done)

@@ -5,13 +5,13 @@ use super::asking::{Asking, is_snapshot, signal};
 use super::checkpoint::{self, Checkpoint};
 use super::clock::Clock;
 use super::keep::Keep;
-use super::stages::{Built, Done};
+use super::stages::{Built, Done, Ready};
 use super::write::{Writing, to_json};
-use super::{folder_of, load, report, run};
+use super::{folder_of, load, measure, report, results, run, series};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
-use crate::output::{Folder, HistoryWriter, IterationTable, Verbosity, say};
+use crate::output::{Folder, HistoryWriter, IterationTable, StepTable, Verbosity, say};
 use crate::parallel::{agree, share};
 use crate::petsc::Session;
 use std::path::{Path, PathBuf};
@@ -57,6 +57,8 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         let mut watchers = Watchers {
             table: IterationTable::new(verbosity, &run::targets(&plan.scene)),
             history: if first { Some(history(&folder, &ready.built)?) } else { None },
+            steps: if first { steps(&folder, &ready)? } else { None },
+            folder: &folder,
             asking: &asking,
             session,
             path,
@@ -75,6 +77,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         drop(stage);
         watchers.table.finish();
         let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
+        let failed = failed.and(watchers.steps.map_or(Ok(()), |steps| steps.finish().map(|_| ())));
         let more = plan.goes_on(session, &done, estimate.as_ref(), &mut clock)?;
         if !more {
             break (done, estimate, failed);
@@ -137,10 +140,24 @@ fn history(folder: &Folder, built: &Built) -> Result<HistoryWriter> {
     HistoryWriter::create(folder, &names, !built.scene.method.steps.is_empty())
 }
 
+/// The table of load steps, if there are any, with those of another process.
+fn steps(folder: &Folder, ready: &Ready) -> Result<Option<StepTable>> {
+    let (built, history) = (&ready.built, &ready.built.scene.method.steps);
+    if history.is_empty() {
+        return Ok(None);
+    }
+    let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
+    let mut table = StepTable::create(folder, &history.names, &pairs, &reactions, built.scene.dimension.value)?;
+    ready.steps.iter().for_each(|step| table.row(&history.names, step));
+    Ok(Some(table))
+}
+
 /// Table and file of the iterations of a round, what is asked meanwhile, and its checkpoints and snapshots.
 struct Watchers<'a> {
     table: IterationTable,
     history: Option<HistoryWriter>,
+    steps: Option<StepTable>,
+    folder: &'a Folder,
     asking: &'a Asking,
     session: &'a Session,
     path: &'a Path,
@@ -189,6 +206,20 @@ impl Keep for Watchers<'_> {
         let written = Checkpoint::write(self.path, head, done, self.session.rank() == 0);
         self.saved |= written.is_ok();
         self.note_failure("a checkpoint", written);
+    }
+
+    fn step(&mut self, done: &Done) {
+        let scene = &done.built.scene;
+        let history = &scene.method.steps;
+        if let (Some(table), Some(step)) = (&mut self.steps, done.steps.last()) {
+            table.row(&history.names, step);
+        }
+        let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
+        if scene.output.vtu && !ends {
+            let recovered = results::recover(done);
+            let written = series::write(done, &recovered, self.folder, self.session.rank() == 0);
+            self.note_failure("a field of a load step", written);
+        }
     }
 
     fn results(&mut self, done: &mut Done) {

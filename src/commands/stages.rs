@@ -1,7 +1,9 @@
 //! The stages of a run, each made from the one before: [`Scene`], [`Built`], [`Ready`], [`Done`].
 
+use super::clock::Clock;
 use crate::ddm::{Discretisation, Method, Outcome, Row, Start};
 use crate::discretize::Discrete;
+use crate::error::Result;
 use crate::estimate::Nodal;
 use crate::fem::Interpolation;
 use crate::model::{BodySlot, Model};
@@ -29,7 +31,12 @@ pub struct Built {
     pub condensed: Vec<String>,
     /// What the user should know of it.
     pub warnings: Vec<String>,
+    /// The way to the other legs of a history; none if this problem serves all its steps.
+    pub again: Option<Again>,
 }
+
+/// Makes a problem with the loads of another leg of a history: first step of the leg, where it begins. Collective.
+pub type Again = Rc<dyn Fn(usize, Begin, &mut Clock) -> Result<Ready>>;
 
 /// What another mesh or another process gives a run.
 #[derive(Default)]

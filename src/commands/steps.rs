@@ -1,60 +1,63 @@
-//! Load steps: one solution after another, each at a share of the loads and started from the one before.
+//! Load steps: one solution after another, each started from the one before.
 //!
-//! At a share s of all loads and prescribed displacements, u/s solves the problem of the full loads with the gap d/s and the layer
-//! p(s c)/s. So a step changes gaps and laws alone: no body is assembled, reduced or factored anew.
+//! At a share s of all loads and prescribed displacements, u/s solves the problem of these loads with the gap d/s and the layer
+//! p(s c)/s. So on a leg of a history, where all loads are in proportion, a step changes gaps and laws alone: no body is
+//! assembled, reduced or factored anew. Another leg is another problem on the same mesh.
 
+use super::clock::Clock;
 use super::keep::{self, Keep};
-use super::stages::{Done, Ready};
+use super::measure;
+use super::report::Shared;
+use super::stages::{Begin, Done, Ready};
 use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
-use crate::ddm::{Method, Observer, Outcome, Row, Start, Status};
-use crate::discretize::{self, Discrete};
+use crate::ddm::{Method, Observer, Row, Start, Status};
+use crate::discretize;
 use crate::error::Result;
-use crate::model::{Field, Layer, Model};
-use crate::output::{StepPairReport, StepReport};
+use crate::model::{BodyCounts, Field, Layer, Model};
+use crate::problem::history::History;
+use crate::scene::Scene;
 use std::rc::Rc;
 
-/// Runs the steps of a scene, the last of which is its full load, and reports each. The outcome is that of the last one with the
-/// counts and the history of all. A step that ends badly leaves its start to the next one; one that a signal ends is the last.
+/// Runs the steps of a scene and reports each. The outcome is that of the last one with the counts and the history of all. A step that
+/// ends badly leaves its start to the next one; one that a signal ends is the last.
 ///
 /// # Errors
-/// Failures of the solver library.
-pub fn iterate(mut ready: Ready, keep: &mut dyn Keep) -> Result<Done> {
+/// Failures of the solver library, and loads that a body cannot have.
+pub fn iterate(mut ready: Ready, keep: &mut dyn Keep, clock: &mut Clock) -> Result<Done> {
     let scene = ready.built.scene.clone();
-    let factors = &scene.method.steps;
+    let history = &scene.method.steps;
     let mut all = Steps::new(keep, &ready);
     loop {
-        let (before, factor) = (all.factor, factors[all.step]);
-        (all.step, all.factor) = (all.step + 1, factor);
-        let last = all.step == factors.len();
-        let discrete = &mut ready.built.discrete;
-        load(&mut discrete.model, &all.laws, factor);
-        ready.start = match ready.start {
-            Start::Resume(field) => {
-                if let Method::Sweeps { acceleration, .. } = &mut ready.method {
-                    acceleration.restart();
-                }
-                Start::Resume(rescaled(&discrete.model, field, before / factor))
-            }
-            paused @ Start::Continue(_) => paused,
-            _ => discretize::start(&scene, discrete, factor)?.into(),
-        };
+        let before = all.factor;
+        all.factor = history.share(all.step);
+        all.step += 1;
+        let (last, share) = (all.step == history.steps.len(), all.factor);
+        load(&mut ready.built.discrete.model, &all.laws, share);
+        ready.start = start(ready.start, &mut ready.method, &ready.built.discrete, &scene, [before, share])?;
         let mut done = keep::solve(ready, last, &mut all)?;
         let interrupted = matches!(done.outcome.status, Status::Paused { .. });
         if interrupted && !last {
+            let (step, count) = (all.step, history.steps.len());
             done.warnings.push(format!(
-                "interrupted in load step {} of {}: pressures and displacements are those of {factor} of the loads",
-                all.step,
-                factors.len()
+                "interrupted in load step {step} of {count}: pressures and displacements are those of this step"
             ));
         }
+        let of_step = done.outcome.clone();
+        all.complete(&mut done);
+        all.keep.step(&done);
         if last || interrupted {
-            all.complete(&mut done);
             return Ok(done);
         }
-        all.end_step(&mut done);
-        let usable = done.outcome.status.is_solved() || done.outcome.status == Status::IterationLimit;
-        ready = done.go_on(|outcome| if usable { Start::Resume(outcome.iterate) } else { Start::Automatic });
+        let usable = measure::is_usable(&of_step.status);
+        if history.leg(all.step).contains(&(all.step - 1)) {
+            all.end_step(&mut done, &of_step);
+            (done.outcome, done.share) = (of_step, 1.0);
+            load(&mut done.built.discrete.model, &all.laws, share);
+            ready = done.go_on(|outcome| if usable { Start::Resume(outcome.iterate) } else { Start::Automatic });
+        } else {
+            ready = all.end_leg(done, &of_step, usable, clock)?;
+        }
     }
 }
 
@@ -67,6 +70,27 @@ fn load(model: &mut Model, laws: &[Rc<dyn LayerLaw>], factor: f64) {
     }
 }
 
+/// Where a step begins, whose share of the loads follows another one.
+fn start(
+    start: Start,
+    method: &mut Method,
+    discrete: &discretize::Discrete,
+    scene: &Scene,
+    [before, share]: [f64; 2],
+) -> Result<Start> {
+    Ok(match start {
+        Start::Resume(field) => {
+            if let Method::Sweeps { acceleration, .. } = method {
+                acceleration.restart();
+            }
+            Start::Resume(rescaled(&discrete.model, field, before / share))
+        }
+        paused @ Start::Continue(_) => paused,
+        Start::Pressure(pressure) => Start::Pressure(pressure.into_iter().map(|p| p / share).collect()),
+        _ => discretize::start(scene, discrete, share)?.into(),
+    })
+}
+
 /// The same displacements in other shares: what supports prescribe is a part of a state that stays.
 fn rescaled(model: &Model, mut field: Field, ratio: f64) -> Field {
     let rest = Field::rest(model);
@@ -75,43 +99,13 @@ fn rescaled(model: &Model, mut field: Field, ratio: f64) -> Field {
     field
 }
 
-/// What the report says of a step.
-fn report(discrete: &Discrete, outcome: &Outcome, factor: f64) -> StepReport {
-    let model = &discrete.model;
-    let pair = |i: usize| {
-        let range = model.range(i);
-        let (layer, resultant) = (&outcome.layer, &model.pairs[i].resultant[discrete.sides(i)[0]]);
-        StepPairReport {
-            force: std::array::from_fn(|k| {
-                range.clone().zip(resultant).fold(0.0, |sum, (q, row)| sum - factor * layer.force[q] * row[k])
-            }),
-            peak_pressure: factor * layer.pressure[range.clone()].iter().copied().fold(0.0, f64::max),
-            closed: layer.compression[range].iter().filter(|&&c| c > 0.0).count(),
-        }
-    };
-    StepReport {
-        factor,
-        status: status_name(&outcome.status).to_owned(),
-        message: message(outcome, model),
-        iterations: outcome.iterations,
-        residual: outcome.rows.last().map(|row| row.residual).filter(|residual| residual.is_finite()),
-        pairs: (0..model.pairs.len()).map(pair).collect(),
-    }
-}
-
-/// Warnings of the steps before the last one that were not solved.
-pub fn warnings(steps: &[StepReport]) -> Vec<String> {
-    let solved = [Status::Converged, Status::RoundoffLimited].map(|status| status_name(&status));
-    let before = steps.iter().take(steps.len().saturating_sub(1)).enumerate();
-    let bad = before.filter(|(_, step)| !solved.contains(&step.status.as_str()));
-    bad.map(|(i, step)| format!("load step {} (factor {}): {}", i + 1, step.factor, step.message)).collect()
-}
-
 /// Passes rows and results on in the units of the scene, numbered through.
 struct Steps<'a> {
     keep: &'a mut dyn Keep,
+    history: History,
     /// Laws at the full load.
     laws: Vec<Rc<dyn LayerLaw>>,
+    /// Loads of the step over those of its leg.
     factor: f64,
     /// Steps begun.
     step: usize,
@@ -120,6 +114,8 @@ struct Steps<'a> {
     sweeps: usize,
     skipped: usize,
     seconds: f64,
+    /// What bodies of the legs before did.
+    counts: BodyCounts,
 }
 
 impl<'a> Steps<'a> {
@@ -128,8 +124,18 @@ impl<'a> Steps<'a> {
         ready.earlier.iter().for_each(|row| keep.row(row));
         let (sweeps, seconds) = ready.earlier.last().map_or((0, 0.0), |row| (row.sweeps, row.seconds));
         let iterations = ready.steps.iter().map(|step| step.iterations).sum();
-        let laws = ready.built.discrete.model.pairs.iter().map(|pair| pair.law.clone()).collect();
-        Self { keep, laws, factor: 1.0, step: ready.steps.len(), iterations, sweeps, skipped: 0, seconds }
+        Self {
+            keep,
+            history: ready.built.scene.method.steps.clone(),
+            laws: laws(&ready.built.discrete.model),
+            factor: 1.0,
+            step: ready.steps.len(),
+            iterations,
+            sweeps,
+            skipped: 0,
+            seconds,
+            counts: BodyCounts::default(),
+        }
     }
 
     /// A row of this step in the units of the scene.
@@ -139,29 +145,63 @@ impl<'a> Steps<'a> {
         row.iteration += self.iterations;
         row.sweeps += self.sweeps;
         row.seconds += self.seconds;
+        row.factorizations += self.counts.factorizations;
+        row.inner_iterations += self.counts.inner_iterations;
         row.energy *= self.factor * self.factor;
         row
     }
 
-    /// Leaves a step for the next one.
-    fn end_step(&mut self, done: &mut Done) {
-        let Done { built, outcome, steps, earlier, .. } = done;
-        steps.push(report(&built.discrete, outcome, self.factor));
-        earlier.extend(outcome.rows.iter().map(|row| self.whole(row)));
-        self.iterations += outcome.iterations;
-        self.sweeps += outcome.sweeps;
-        self.skipped += outcome.solves_skipped;
-        self.seconds += outcome.rows.last().map_or(0.0, |row| row.seconds);
+    /// Leaves a step, which ended like this, for the next one.
+    fn end_step(&mut self, done: &mut Done, of_step: &crate::ddm::Outcome) {
+        done.earlier.extend(of_step.rows.iter().map(|row| self.whole(row)));
+        self.iterations += of_step.iterations;
+        self.sweeps += of_step.sweeps;
+        self.skipped += of_step.solves_skipped;
+        self.seconds += of_step.rows.last().map_or(0.0, |row| row.seconds);
+    }
+
+    /// Leaves a leg for the next one: another problem, which begins with the pressures of this one. Collective.
+    fn end_leg(
+        &mut self,
+        mut done: Done,
+        of_step: &crate::ddm::Outcome,
+        usable: bool,
+        clock: &mut Clock,
+    ) -> Result<Ready> {
+        clock.phase("iterate");
+        self.end_step(&mut done, of_step);
+        self.counts += Shared::gather(&done.built.discrete).counts;
+        self.counts += of_step.joint;
+        let assemblies = done.built.discrete.assemblies;
+        let Done { built, method, outcome, steps, earlier, mut warnings, .. } = done;
+        // without loads any pressure is infinitely far
+        let start = (usable && !self.history.is_at_rest(self.step)).then_some(Start::Pressure(outcome.layer.pressure));
+        let (again, mut known) = (built.again.clone(), built.warnings.clone());
+        drop((built, method));
+        let Some(again) = again else { unreachable!("a history of several legs comes with the way to them") };
+        let mut ready = again(self.step, Begin { start, steps, earlier }, clock)?;
+        ready.built.again = Some(again);
+        ready.built.discrete.assemblies += assemblies;
+        self.laws = laws(&ready.built.discrete.model);
+        for (all, new) in [(&mut known, &mut ready.built.warnings), (&mut warnings, &mut ready.warnings)] {
+            new.retain(|warning| !all.contains(warning));
+            all.append(new);
+        }
+        (ready.built.warnings, ready.warnings) = (known, warnings);
+        Ok(ready)
     }
 
     /// Brings what this step has found, and the model, to the units of the scene, with the counts and the history of all steps.
+    /// Collective.
     fn complete(&self, done: &mut Done) {
-        let Done { built, outcome, share, steps, earlier, .. } = done;
+        let Done { built, outcome, share, earlier, .. } = &mut *done;
         *share = self.factor;
-        steps.push(report(&built.discrete, outcome, self.factor));
+        let iterations = outcome.iterations;
+        let (status, message) = (status_name(&outcome.status), message(outcome, &built.discrete.model));
         outcome.iterations += self.iterations;
         outcome.sweeps += self.sweeps;
         outcome.solves_skipped += self.skipped;
+        outcome.joint += self.counts;
         outcome.rows = earlier.iter().cloned().chain(outcome.rows.iter().map(|row| self.whole(row))).collect();
         if self.factor != 1.0 {
             load(&mut built.discrete.model, &self.laws, 1.0);
@@ -169,7 +209,13 @@ impl<'a> Steps<'a> {
             let compression = outcome.layer.compression.iter().map(|c| self.factor * c).collect();
             outcome.layer = Layer::new(&built.discrete.model, compression);
         }
+        let step = measure::step(done, &self.history, self.step - 1, iterations, status, message);
+        done.steps.push(step);
     }
+}
+
+fn laws(model: &Model) -> Vec<Rc<dyn LayerLaw>> {
+    model.pairs.iter().map(|pair| pair.law.clone()).collect()
 }
 
 impl Observer for Steps<'_> {

@@ -5,11 +5,12 @@ use super::clock::Clock;
 use super::keep::Keep;
 use super::run;
 use super::shown;
-use super::stages::Begin;
-use super::{folder_of, report, results, reuse};
+use super::stages::{Begin, Built};
+use super::{folder_of, measure, report, results, reuse};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
+use crate::output::steps::{vector_columns, vector_fields};
 use crate::output::{ConvergenceSeries, Folder, LISTED, Plot, Report, Series, busiest, say, sci};
 use crate::parallel::agree;
 use crate::petsc::Session;
@@ -60,9 +61,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
         let done = run::iterate(ready, interrupt, &mut watched, &mut clock)?;
         clock.total();
-        // the table has nothing from inside the bodies
-        let recovered = if request.json { results::recover(&done) } else { results::skipped(&done) };
-        let report = report::report(session, &done, &recovered, &clock);
+        let report = report::report(session, &done, &results::recover(&done), &clock);
         exit = exit.max(report::exit_code(&done));
         let interrupted = matches!(done.outcome.status, Status::Paused { .. });
         if !first {
@@ -74,9 +73,9 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         }
         let label = label(&axes, values);
         if reports.is_empty() {
-            row(&mut table, &folder, header(&axes, &report))?;
+            row(&mut table, &folder, header(&axes, &done.built))?;
         }
-        row(&mut table, &folder, line(values, &report))?;
+        row(&mut table, &folder, line(values, &report, scene.dimension.value))?;
         if !request.json {
             say(format_args!(
                 "{label}: {}, {} iterations, residual {}",
@@ -179,7 +178,9 @@ fn label(axes: &[(String, Vec<String>)], values: &[String]) -> String {
     parts.collect::<Vec<_>>().join(", ")
 }
 
-fn header(axes: &[(String, Vec<String>)], report: &Report) -> Vec<String> {
+fn header(axes: &[(String, Vec<String>)], built: &Built) -> Vec<String> {
+    let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
+    let dimension = built.scene.dimension.value;
     let mut header: Vec<String> = axes.iter().map(|(key, _)| key.clone()).collect();
     let columns = [
         "status",
@@ -195,14 +196,16 @@ fn header(axes: &[(String, Vec<String>)], report: &Report) -> Vec<String> {
         "seconds",
     ];
     header.extend(columns.map(str::to_owned));
-    for pair in &report.pairs {
-        let name = format!("{}-{}", pair.bodies[0], pair.bodies[1]);
-        header.extend(["peak_pressure", "contact_length", "layer_energy"].map(|what| format!("{what} {name}")));
+    for pair in &pairs {
+        header.extend(["peak_pressure", "contact_length", "layer_energy"].map(|what| format!("{what} {pair}")));
+        header.extend(vector_columns("force", pair, dimension));
+        header.push(format!("approach {pair}"));
     }
+    header.extend(reactions.iter().flat_map(|name| vector_columns("reaction", name, dimension)));
     header
 }
 
-fn line(values: &[String], report: &Report) -> Vec<String> {
+fn line(values: &[String], report: &Report, dimension: usize) -> Vec<String> {
     let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
     let mut line = values.to_vec();
     line.push(report.status.clone());
@@ -214,7 +217,11 @@ fn line(values: &[String], report: &Report) -> Vec<String> {
     line.push(number(report.times.get("total").copied()));
     for pair in &report.pairs {
         line.extend([pair.peak_pressure, pair.contact_length, pair.layer_energy].map(|value| format!("{value:?}")));
+        line.extend(vector_fields(&pair.force[0], dimension));
+        line.push(number(pair.approach));
     }
+    let reactions = measure::reported(&report.bodies);
+    line.extend(reactions.iter().flat_map(|reaction| vector_fields(&reaction.force, dimension)));
     line
 }
 

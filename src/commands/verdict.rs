@@ -5,7 +5,7 @@ use super::words::in_words;
 use crate::ddm::forecast::{best_factor, best_gamma};
 use crate::ddm::{Outcome, Status};
 use crate::model::{Mechanism, Model, Moved};
-use crate::output::{ForecastReport, sci};
+use crate::output::{ForecastReport, StepReport, sci};
 
 /// Name of a status in `report.json`.
 pub fn status_name(status: &Status) -> &'static str {
@@ -132,4 +132,16 @@ fn advice(outcome: &Outcome) -> Option<String> {
     // near one the digits that matter are those of the difference
     let factor = if factor > 0.99 { format!("1 - {}", sci(1.0 - factor, 1)) } else { format!("{factor:.3}") };
     Some(format!("--method auto; the best number for method.gamma is {gamma:.2}, a factor of {factor} an iteration"))
+}
+
+/// Warnings of the steps before the last one that were not solved.
+pub fn of_steps(steps: &[StepReport]) -> Vec<String> {
+    let solved = [Status::Converged, Status::RoundoffLimited].map(|status| status_name(&status));
+    let before = steps.iter().take(steps.len().saturating_sub(1)).enumerate();
+    let bad = before.filter(|(_, step)| !solved.contains(&step.status.as_str()));
+    let told = |(i, step): (usize, &StepReport)| {
+        let factors: Vec<String> = step.factors.iter().map(|(name, factor)| format!("{name} {factor}")).collect();
+        format!("load step {} ({}): {}", i + 1, factors.join(", "), step.message)
+    };
+    bad.map(told).collect()
 }

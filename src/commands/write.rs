@@ -1,13 +1,13 @@
 //! All files of a run: what is small comes first, so that a full disk takes fields and not results.
 
 use super::clock::Clock;
-use super::results::{self, Recovered};
-use super::shown;
+use super::results;
 use super::stages::Done;
-use super::{adapt::Plan, report};
+use super::{adapt::Plan, measure, report};
+use super::{series, shown};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
-use crate::output::{Folder, LISTED, PairRow, Plot, Report, busiest, contacts, vtu};
+use crate::output::{Folder, LISTED, PairRow, Plot, Report, StepReport, busiest, contacts};
 use crate::petsc::Session;
 use std::path::Path;
 
@@ -63,11 +63,12 @@ impl Writing<'_> {
             written = written.and(plots.write(done, &folder));
         }
         if fields {
-            written = written.and(self.fields(&recovered, &folder));
+            written = written.and(series::write_last(done, &recovered, &folder, first));
         }
         clock.phase("output");
         clock.total();
         report.times.clone_from(&clock.times);
+        report.memory.clone_from(&clock.memory);
         if first {
             written = written.and(self.report(&folder, &mut report, fields));
         }
@@ -80,7 +81,7 @@ impl Writing<'_> {
         let mut rows: Vec<PairRow> = (0..report.pairs.len()).map(|i| report::pair_row(self.done, i)).collect();
         let stems = shown::stems(self.done);
         shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));
-        plots.0.iter().for_each(|(i, file)| rows[*i].plot.clone_from(file));
+        plots.plotted.iter().for_each(|(i, file)| rows[*i].plot.clone_from(file));
         let save = |&i: &usize| {
             let table = report::contact_table(self.done, self.estimate, i);
             folder.write(&rows[i].table, |out| table.write(out)).map(|_| ())
@@ -94,28 +95,14 @@ impl Writing<'_> {
         folder.write("report.json", |out| out.write_all(json.as_bytes())).map(|_| ())
     }
 
-    /// Fields: each rank its bodies; the first one the contact surfaces.
-    fn fields(&self, recovered: &results::All, folder: &Folder) -> Result<()> {
-        let done = self.done;
-        for Recovered { field, .. } in recovered.iter().flatten().flatten() {
-            folder.write(&field.file_name(), |out| field.clone().write(out))?;
-        }
-        if self.session.rank() != 0 {
-            return Ok(());
-        }
-        let mut names: Vec<String> = done.built.discrete.bodies.iter().map(|body| body.name.clone()).collect();
-        for (i, name) in shown::stems(done).into_iter().enumerate() {
-            folder.write(&format!("{name}.vtu"), |out| report::contact_surface(&name, done, i).write(out))?;
-            names.push(name);
-        }
-        folder.write(&vtu::pvd_name("bodies"), |out| vtu::write_pvd(&names, out)).map(|_| ())
-    }
-
     /// Names of the files of a run, those of other ranks included.
     fn names(&self, folder: &Folder, fields: bool) -> Vec<String> {
         let own = folder.files();
-        let mut names: Vec<String> =
-            own.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned()).collect();
+        let mut names: Vec<String> = own
+            .iter()
+            .filter_map(|path| path.strip_prefix(folder.path()).ok())
+            .map(|name| name.to_string_lossy().into_owned())
+            .collect();
         if fields && self.done.built.scene.output.report {
             names.push(crate::report::FILE.to_owned());
         }
@@ -123,6 +110,7 @@ impl Writing<'_> {
             names.extend(self.done.built.discrete.bodies.iter().map(|body| format!("{}.vtu", body.name)));
         }
         names.extend(["history.csv", "report.json"].map(str::to_owned));
+        names.extend(Some("steps.csv".to_owned()).filter(|_| !self.done.steps.is_empty()));
         names.sort();
         names.dedup();
         names
@@ -139,8 +127,22 @@ pub fn to_json(report: &Report) -> Result<String> {
         .map_err(|cause| Error::new(Kind::File, "the report cannot be written as JSON").because(cause.to_string()))
 }
 
-/// The pairs that have a plot of their pressure, with its file.
-struct Plots(Vec<(usize, String)>);
+/// Approach and force of pair `i` in each step.
+fn approach(steps: &[StepReport], i: usize) -> Vec<(f64, f64)> {
+    let of_step = |step: &StepReport| {
+        let pair = &step.pairs[i];
+        (pair.approach.unwrap_or(f64::NAN), pair.force.iter().map(|f| f * f).sum::<f64>().sqrt())
+    };
+    steps.iter().map(of_step).collect()
+}
+
+/// The plots of a run.
+struct Plots {
+    /// Pairs that are shown.
+    shown: Vec<usize>,
+    /// Those that have a plot of their pressure, with its file.
+    plotted: Vec<(usize, String)>,
+}
 
 impl Plots {
     /// Only along curves: points of a surface over one coordinate would be a cloud.
@@ -148,7 +150,8 @@ impl Plots {
         let has_plot = |i: &usize| done.built.scene.output.plots && done.model().pairs[*i].along_curve;
         let plotted: Vec<usize> = shown.iter().copied().filter(has_plot).collect();
         let files = shown::numbered(plotted.iter().map(|_| "pressure".to_owned()));
-        Self(plotted.into_iter().zip(files.into_iter().map(|name| format!("{name}.svg"))).collect())
+        let plotted = plotted.into_iter().zip(files.into_iter().map(|name| format!("{name}.svg"))).collect();
+        Self { shown: shown.to_vec(), plotted }
     }
 
     fn write(&self, done: &Done, folder: &Folder) -> Result<()> {
@@ -158,7 +161,13 @@ impl Plots {
         }
         let convergence = Plot::convergence(&scene.title, &[report::convergence("", &done.outcome)]);
         folder.write("convergence.svg", |out| convergence.write(out))?;
-        for &(i, ref file) in &self.0 {
+        if done.steps.len() > 1 {
+            let names = measure::pair_names(&done.built);
+            let curves = self.shown.iter().map(|&i| (names[i].as_str(), approach(&done.steps, i)));
+            let plot = Plot::approach(&scene.title, curves);
+            folder.write("force-approach.svg", |out| plot.write(out))?;
+        }
+        for &(i, ref file) in &self.plotted {
             let mut curves = vec![report::pressure("pressure", done, i)];
             curves.extend(report::reference(&done.built.discrete, i));
             // with more plots than pairs that a person knows by heart, each says whose it is

@@ -66,20 +66,25 @@ pub struct Floor {
 }
 
 impl Floor {
-    /// Of a method that reduces the error in so many iterations at least once.
+    /// Largest error that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
+    const BELIEVABLE: f64 = 1e-4;
+    /// Share of the best error that an iterate must reach to be progress.
+    const FALLS: f64 = 0.9;
+
+    /// Of a method that reduces the error to nine tenths at least in so many iterations.
     pub fn new(patience: usize) -> Self {
         Self { best: f64::INFINITY, since: 0, patience }
     }
 
     /// Notes an error; true when it is time to compare it with the rounding errors.
     pub fn is_reached(&mut self, error: f64) -> bool {
-        if error < self.best {
+        if error < Self::FALLS * self.best {
             self.best = error;
             self.since = 0;
         } else {
             self.since += 1;
         }
-        self.since > 0 && self.since.is_multiple_of(self.patience)
+        self.since > 0 && self.since.is_multiple_of(self.patience) && error <= Self::BELIEVABLE
     }
 }
 
@@ -225,8 +230,10 @@ mod tests {
         let reached: Vec<usize> = (1..=60).filter(|_| floor.is_reached(1e-5)).collect();
         assert_eq!(reached, [20, 40, 60]);
         assert!((1..20).all(|_| !floor.is_reached(1e-5)) && !floor.is_reached(1e-11));
-        // as much as the best is no progress, less is
+        // nine tenths of the best are no progress, less is
         let mut near = Floor::new(1);
-        assert_eq!([1e-5, 1e-5, 0.99e-5].map(|error| near.is_reached(error)), [false, true, false]);
+        assert_eq!([1e-5, 0.9 * 1e-5, 0.89e-5].map(|error| near.is_reached(error)), [false, true, false]);
+        let mut far = Floor::new(2);
+        assert!((0..9).all(|_| !far.is_reached(1.1e-4)));
     }
 }

@@ -12,7 +12,7 @@ use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
 use crate::linalg::{Csr, countable, dot};
 use crate::mesh::Mesh;
-use crate::problem::body::{BodySpec, LoadKind};
+use crate::problem::body::{BodySpec, Load, LoadKind};
 use crate::problem::elasticity::Plane;
 use nalgebra::DMatrix;
 
@@ -112,39 +112,11 @@ impl<'a, const D: usize> Part<'a, D> {
         let name = &self.spec.name;
         let mut load = vec![0.0; self.space.dofs()];
         for spec in &self.spec.load {
-            let group = find_group(mesh, &spec.on, &[D - 1], "load")?;
-            let facets = self.space.facets(group);
-            if facets.count() == 0 {
-                return Err(not_on_body(&spec.on, &name.value));
-            }
-            let area = surface::measure(&self.space, &facets);
-            if area == 0.0 {
-                return Err(without_area(&spec.on, self.spec));
-            }
-            let values = Values::of("this load", &name.value);
-            surface::surface_load(
-                &self.space,
-                &facets,
-                &|x, n| match &spec.kind {
-                    LoadKind::Pressure(field) => {
-                        let pressure = values.at(field, x);
-                        n.map(|n| -pressure * n)
-                    }
-                    LoadKind::Traction(fields) => std::array::from_fn(|c| values.at(&fields[c], x)),
-                    LoadKind::Force { rigid: true, .. } => [0.0; D],
-                    LoadKind::Force { total, .. } => std::array::from_fn(|c| total[c] / area),
-                },
-                &mut load,
-            );
-            values.refused()?;
-            if load.iter().any(|f| !f.is_finite()) {
-                return Err(Error::scene(&spec.on.place, format!("body `{}`: the load is too large", name.value))
-                    .label("its forces are beyond the range of numbers"));
-            }
+            self.add_load(spec, spec.factor, mesh, &mut load)?;
         }
         if let Some(fields) = &self.spec.force {
             let values = Values::of("this body force", &name.value);
-            let density = |x: [f64; D]| std::array::from_fn(|c| values.at(&fields[c], x));
+            let density = |x: [f64; D]| std::array::from_fn(|c| self.spec.force_factor * values.at(&fields[c], x));
             assemble::body_force(&self.space, &density, &mut load);
             values.refused()?;
             if load.iter().any(|f| !f.is_finite()) {
@@ -155,11 +127,62 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(load)
     }
 
+    /// Adds `factor` times a load of the scene to nodal forces, unless its surface is rigid.
+    fn add_load(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, load: &mut [f64]) -> Result<()> {
+        let name = &self.spec.name;
+        let group = find_group(mesh, &spec.on, &[D - 1], "load")?;
+        let facets = self.space.facets(group);
+        if facets.count() == 0 {
+            return Err(not_on_body(&spec.on, &name.value));
+        }
+        let area = surface::measure(&self.space, &facets);
+        if area == 0.0 {
+            return Err(without_area(&spec.on, self.spec));
+        }
+        let values = Values::of("this load", &name.value);
+        surface::surface_load(
+            &self.space,
+            &facets,
+            &|x, n| match &spec.kind {
+                LoadKind::Pressure(field) => {
+                    let pressure = factor * values.at(field, x);
+                    n.map(|n| -pressure * n)
+                }
+                LoadKind::Traction(fields) => std::array::from_fn(|c| factor * values.at(&fields[c], x)),
+                LoadKind::Force { rigid: true, .. } => [0.0; D],
+                LoadKind::Force { total, .. } => std::array::from_fn(|c| factor * total[c] / area),
+            },
+            load,
+        );
+        values.refused()?;
+        if load.iter().any(|f| !f.is_finite()) {
+            return Err(Error::scene(&spec.on.place, format!("body `{}`: the load is too large", name.value))
+                .label("its forces are beyond the range of numbers"));
+        }
+        Ok(())
+    }
+
+    /// Sum of the nodal forces of a load of the scene at its full value, unless its surface is rigid.
+    ///
+    /// # Errors
+    /// Those of [`Part::load`].
+    pub fn resultant(&self, spec: &Load, mesh: &Mesh<D>) -> Result<[f64; 3]> {
+        let mut load = vec![0.0; self.space.dofs()];
+        self.add_load(spec, 1.0, mesh, &mut load)?;
+        let mut sum = [0.0; 3];
+        let forces = load.chunks_exact(D).map(|f| self.space.net_force(std::array::from_fn(|c| f[c])));
+        forces.for_each(|force| contact::add(&mut sum, force));
+        Ok(sum)
+    }
+
     /// Forces on rigid surfaces: a node of each, and the force (x, y, z).
     pub fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; 3])> + '_ {
-        self.held.rigid.iter().filter_map(|(index, nodes)| match self.spec.load[*index].kind {
-            LoadKind::Force { total, .. } => Some((*nodes.first()?, total)),
-            _ => None,
+        self.held.rigid.iter().filter_map(|(index, nodes)| {
+            let load = &self.spec.load[*index];
+            match load.kind {
+                LoadKind::Force { total, .. } => Some((*nodes.first()?, total.map(|f| load.factor * f))),
+                _ => None,
+            }
         })
     }
 

@@ -64,6 +64,7 @@ impl<const D: usize> Held<D> {
                     let value = field
                         .eval_finite("the displacement of this support", pad(space.nodes[node as usize]))
                         .map_err(|error| error.because(of_body(&spec.name.value)))?;
+                    let value = fix.factor * value;
                     let support = Some(support);
                     conditions.entry(held.frame.node(node)).or_default().push(Condition { direction, value, support });
                 }

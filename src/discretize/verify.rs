@@ -10,6 +10,7 @@ use crate::fem::rigid::{self, RigidMotion};
 use crate::mesh::{Asked, Checked, Duty, Mesh, Parts};
 use crate::problem::body::BodySpec;
 use crate::scene::Scene;
+use std::rc::Rc;
 
 /// A mesh that holds what bodies must be.
 #[derive(Debug)]
@@ -19,7 +20,7 @@ pub struct Verified<'a, const D: usize> {
     /// The bodies of the scene, each with a name of its own.
     pub bodies: Vec<BodySpec>,
     /// What was found of each body, in the same order; bodies that the mesh does not have are missing.
-    pub checked: Vec<Checked>,
+    pub checked: Rc<[Checked]>,
 }
 
 /// Finds the bodies of a scene and checks its mesh once: see [`roster::bodies`] and [`Mesh::check`].
@@ -31,7 +32,7 @@ pub fn verify<'a, const D: usize>(scene: &Scene, mesh: &'a Mesh<D>) -> Result<Ve
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
     let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty())?;
-    Ok(Verified { mesh, bodies, checked })
+    Ok(Verified { mesh, bodies, checked: checked.into() })
 }
 
 /// A body with the groups that serve it.

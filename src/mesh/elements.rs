@@ -4,16 +4,21 @@ use super::cursor::Cursor;
 use super::nodes::Nodes;
 use super::physical::Physical;
 use super::simplex::{self, Kind, THINGS};
+use super::split::Split;
 use crate::error::Result;
 use crate::problem::order::Order;
 use std::collections::HashSet;
 
-/// Reads the section's contents into the groups; gives the order of the elements, if there is one but points.
+/// Reads the section's contents into the groups; gives the order of the elements, if there is one but points, and how many were split.
 ///
 /// # Errors
 /// Malformed text, elements in a group that are no simplices of order 1 or 2 or mix both, nodes that do not exist,
 /// degenerate simplices, nodes off the plane if `D` is 2.
-pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut Physical) -> Result<Option<Order>> {
+pub fn read<const D: usize>(
+    cursor: &mut Cursor,
+    nodes: &Nodes,
+    physical: &mut Physical,
+) -> Result<(Option<Order>, usize)> {
     cursor.begin();
     let start = cursor.position();
     let blocks = cursor.count(4, 20)?;
@@ -22,7 +27,7 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
     cursor.size()?;
     cursor.end()?;
     let mut seen: usize = 0;
-    let mut common_order = None;
+    let (mut common_order, mut in_parts) = (None, 0);
     let (mut heads, mut again) = (HashSet::new(), None);
     for _ in 0..blocks {
         cursor.begin();
@@ -58,7 +63,9 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
             continue;
         };
         let name = &physical.groups[*first].name;
-        let Some(kind) = Kind::of_type(number).filter(|kind| kind.dimension == dimension) else {
+        let split = Split::of_type(number).filter(|split| split.dimension == dimension);
+        let whole = Kind::of_type(number).filter(|kind| kind.dimension == dimension);
+        let Some(kind) = whole.or(split.map(|split| Kind::linear(split.dimension))) else {
             let message = format!("group `{name}` has {shape} elements of {stride} nodes (Gmsh's type {number})");
             return Err(cursor.error_at(head, message).help(SIMPLICES));
         };
@@ -66,8 +73,9 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
             let message = format!("group `{name}` is of another order than the elements before it");
             return Err(cursor.error_at(head, message).help("save all elements with one order: gmsh -order 1 or 2"));
         }
-        let (connectivity, tags) = Block { kind, count, name }.read::<D>(cursor, nodes)?;
-        physical.extend(dimension, tag, stride, &connectivity, &tags);
+        let (connectivity, tags) = Block { kind, split, count, name }.read::<D>(cursor, nodes)?;
+        in_parts += if split.is_some() { count } else { 0 };
+        physical.extend(dimension, tag, kind.stride, &connectivity, &tags);
     }
     if seen != total {
         let message = format!("$Elements announces {total} elements and holds {seen}");
@@ -82,15 +90,18 @@ pub fn read<const D: usize>(cursor: &mut Cursor, nodes: &Nodes, physical: &mut P
         let message = format!("elements of {thing} {tag} stand in two blocks, and those of {thing} {without} in none");
         return Err(cursor.error_at(head, message).help("the file is damaged: save the mesh again with Gmsh"));
     }
-    Ok(common_order)
+    Ok((common_order, in_parts))
 }
 
 /// What to do about elements that are not simplices of order 1 or 2.
-const SIMPLICES: &str = "use triangles and tetrahedra of order 1 or 2: no `Recombine`, `gmsh -order 1` or `2`";
+const SIMPLICES: &str = "use triangles and tetrahedra of order 1 or 2, or quadrangles, hexahedra, prisms and pyramids of order 1: `gmsh -order 1`";
 
 /// The elements of one entity, all of one kind.
 struct Block<'a> {
+    /// What the simplices are.
     kind: Kind,
+    /// How the elements are split into them, if they are none.
+    split: Option<Split>,
     count: usize,
     /// Name of a group it belongs to, for messages.
     name: &'a str,
@@ -100,16 +111,16 @@ impl Block<'_> {
     /// Reads the elements: our point numbers in our order, cells turned to positive volume; and their tags.
     fn read<const D: usize>(&self, cursor: &mut Cursor, nodes: &Nodes) -> Result<(Vec<u32>, Vec<u64>)> {
         let Kind { dimension, stride, .. } = self.kind;
-        let mut connectivity = vec![0; self.count * stride];
+        let mut connectivity = Vec::with_capacity(self.count * stride);
         let mut tags = Vec::with_capacity(self.count);
         let mut vertices = [[0.0; 3]; 4];
         let vertices = &mut vertices[..dimension + 1];
-        for points in connectivity.chunks_exact_mut(stride) {
+        let mut points = vec![0; self.split.map_or(stride, |split| split.stride)];
+        for _ in 0..self.count {
             cursor.begin();
             let start = cursor.position();
             let tag = cursor.size()?;
-            tags.push(tag);
-            for point in &mut *points {
+            for point in &mut points {
                 let node = cursor.size()?;
                 *point = nodes.number(node).ok_or_else(|| {
                     let message =
@@ -119,20 +130,35 @@ impl Block<'_> {
             }
             cursor.end()?;
             if D == 2 {
-                self.check_plane(cursor, nodes, points)?;
+                self.check_plane(cursor, nodes, &points)?;
             }
-            simplex::from_gmsh_order(points);
-            for (vertex, point) in vertices.iter_mut().zip(&*points) {
-                *vertex = nodes.points[*point as usize];
-            }
-            let measure = simplex::measure(vertices, D);
-            if simplex::is_degenerate(vertices, measure) {
-                let size = ["", "length", "area", "volume"][dimension];
-                let message = format!("element {tag} of group `{}` has zero {size}", self.name);
-                return Err(cursor.error_at(start, message).help("mend the geometry there, or mesh it again"));
-            }
-            if dimension == D && measure < 0.0 {
-                simplex::mirror(points);
+            let mut parts;
+            let simplices = match self.split {
+                Some(split) => {
+                    parts = split.simplices(&points);
+                    &mut parts[..]
+                }
+                None => {
+                    simplex::from_gmsh_order(&mut points);
+                    &mut points[..]
+                }
+            };
+            for points in simplices.chunks_exact_mut(stride) {
+                for (vertex, point) in vertices.iter_mut().zip(&*points) {
+                    *vertex = nodes.points[*point as usize];
+                }
+                let measure = simplex::measure(vertices, D);
+                if simplex::is_degenerate(vertices, measure) {
+                    let size = ["", "length", "area", "volume"][dimension];
+                    let part = if self.split.is_some() { "a part of " } else { "" };
+                    let message = format!("{part}element {tag} of group `{}` has zero {size}", self.name);
+                    return Err(cursor.error_at(start, message).help("mend the geometry there, or mesh it again"));
+                }
+                if dimension == D && measure < 0.0 {
+                    simplex::mirror(points);
+                }
+                connectivity.extend_from_slice(points);
+                tags.push(tag);
             }
         }
         Ok((connectivity, tags))

@@ -27,6 +27,8 @@ pub struct Task<'a> {
     pub set: &'a [(String, f64)],
     /// How many times as large elements are to be as the script asks for.
     pub times: f64,
+    /// Whether the script is a mesh already, which is only to be written in another form.
+    pub is_mesh: bool,
     /// Dimension of the cells.
     pub dimension: usize,
     /// Order of the elements.
@@ -67,16 +69,12 @@ impl Gmsh {
     pub fn run(&self, task: &Task, output: &Path, home: &Path) -> Result<()> {
         let bytes = guard::bytes(task.guard);
         let mut command = guard::command(&self.program, bytes);
-        command.arg(format!("-{}", task.dimension));
-        command.args([
-            "-order",
-            if task.order == Order::P1 { "1" } else { "2" },
-            "-format",
-            "msh41",
-            "-bin",
-            "-v",
-            "2",
-        ]);
+        let order = if task.order == Order::P1 { "1" } else { "2" };
+        match task.is_mesh {
+            true => command.arg("-save"),
+            false => command.arg(format!("-{}", task.dimension)).args(["-order", order]),
+        };
+        command.args(["-format", "msh41", "-bin", "-v", "2"]);
         if let Some(threads) = task.guard.threads {
             command.args(["-algo", "hxt", "-nt", &threads.to_string()]);
         }
@@ -129,11 +127,16 @@ impl Gmsh {
             return Err(refuse(format!("Gmsh needs more memory for this script than it may take{most}"))
                 .help("ask for fewer elements; to give it more set `memory`, in GB, in `mesh`"));
         }
-        let error = refuse(match status.success() {
-            true => "Gmsh ran this script to its end but wrote no mesh".to_owned(),
-            false => format!("Gmsh cannot mesh this script ({status})"),
+        let error = refuse(match (status.success(), task.is_mesh) {
+            (true, false) => "Gmsh ran this script to its end but wrote no mesh".to_owned(),
+            (true, true) => "Gmsh finds no mesh in this file".to_owned(),
+            (false, false) => format!("Gmsh cannot mesh this script ({status})"),
+            (false, true) => format!("Gmsh cannot read this mesh ({status})"),
         });
-        let again = format!("gmsh -{} {}", task.dimension, task.shown.display());
+        let again = match task.is_mesh {
+            true => format!("gmsh {}", task.shown.display()),
+            false => format!("gmsh -{} {}", task.dimension, task.shown.display()),
+        };
         let causes = complaints(&said);
         Err(if causes.is_empty() { error.help(format!("see what it says: {again}")) } else { because(error, &causes) })
     }

@@ -2,8 +2,9 @@
 
 use super::cache::{Key, Workshop, folders};
 use super::gmsh::{Gmsh, Task};
+use super::msh::Maker;
 use super::script::Script;
-use super::{Mesh, msh};
+use super::{Mesh, foreign, msh};
 use crate::error::{Error, Located, Result};
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::{Guard, MeshSource, Sizing};
@@ -51,13 +52,18 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<
 pub fn load_unless<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes, guard } => {
-            let script = Script::read(&file.value).map_err(|error| error.at(&file.place))?;
-            for ((name, _), place) in set.iter().zip(places) {
+            if let (true, Some(place)) = (foreign::is_shape(&file.value), places.first()) {
+                return Err(Error::scene(place, "numbers for a shape of another program, which has none")
+                    .help("give sizes of elements by mesh = { geo = \"...\", size = 0.1 }, or a script (.geo) that merges the file"));
+            }
+            let script = (!set.is_empty()).then(|| Script::read(&file.value)).transpose();
+            let script = script.map_err(|error| error.at(&file.place))?;
+            for (script, ((name, _), place)) in script.iter().cycle().zip(set.iter().zip(places)) {
                 script.check(name, &Located::new(file.value.clone(), place.clone()))?;
             }
             from_script(file, set, sizes.as_ref(), order, (guard, interrupt), &folders())?
         }
-        MeshSource::Msh { file } => from_file(file, order)?,
+        MeshSource::Msh { file } => from_file(file, order, interrupt)?,
     };
     if D == 3 {
         loaded.mesh.sort_cells();
@@ -65,12 +71,15 @@ pub fn load_unless<const D: usize>(source: &MeshSource, order: Order, interrupt:
     Ok(loaded)
 }
 
-fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order) -> Result<Loaded<D>> {
+fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let path = &file.value;
     let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
-    let mesh = msh::parse(path, &bytes, false)?;
-    let mesh = match (mesh.order, order) {
-        (Order::P2, Order::P1) => mesh.lower_order(),
+    let mut loaded = match foreign::is_mesh(path, &bytes) {
+        true => converted(file, &bytes, interrupt, &folders())?,
+        false => Loaded { mesh: msh::parse(path, &bytes, Maker::User)?, origin: Origin::File, file: path.clone() },
+    };
+    loaded.mesh = match (loaded.mesh.order, order) {
+        (Order::P2, Order::P1) => loaded.mesh.lower_order(),
         (Order::P1, Order::P2) => {
             let help = format!(
                 "set `order = 1`, or save it anew: gmsh {} -order 2 -{D} -format msh41 -o new.msh",
@@ -79,9 +88,48 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order) -> Result<Lo
             let error = Error::mesh(path, None, "the mesh is of order 1, the scene asks for order 2");
             return Err(error.at(&file.place).help(help));
         }
-        _ => mesh,
+        _ => loaded.mesh,
     };
-    Ok(Loaded { mesh, origin: Origin::File, file: path.clone() })
+    Ok(loaded)
+}
+
+/// A mesh of another program, or of another version of Gmsh's format, as Gmsh writes it; with the cache in one of `folders`.
+fn converted<const D: usize>(
+    file: &Located<PathBuf>,
+    bytes: &[u8],
+    interrupt: &Interrupt,
+    folders: &[PathBuf],
+) -> Result<Loaded<D>> {
+    let path = &file.value;
+    let gmsh = Gmsh::find()?;
+    let mut key = Key::new();
+    [&b"converted"[..], gmsh.identity().as_bytes(), path.extension().unwrap_or_default().as_encoded_bytes(), bytes]
+        .iter()
+        .for_each(|piece| key.add(piece));
+    let name = key.file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
+    let parse = |bytes: &[u8]| {
+        msh::parse(path, bytes, Maker::Other).map_err(|error| match error.advice() {
+            // what helps a script helps nobody here
+            Some(advice) if !advice.contains("Physical") => error,
+            _ => error.help(format!("see what Gmsh makes of it: gmsh {}", path.display())),
+        })
+    };
+    for folder in folders {
+        let cached = folder.join(&name);
+        if let Some(mesh) = std::fs::read(&cached).ok().and_then(|bytes| parse(&bytes).ok()) {
+            return Ok(Loaded { mesh, origin: Origin::Cache, file: cached });
+        }
+    }
+    let workshop = Workshop::open(folders)?;
+    let (script, made) = (foreign::mesh(file, bytes, workshop.path())?, workshop.path().join(&name));
+    let guard = &Guard::default();
+    let (set, times, is_mesh) = (&[], 1.0, true);
+    let task =
+        Task { script: &script, shown: path, set, times, is_mesh, dimension: D, order: Order::P1, guard, interrupt };
+    let ran = gmsh.run(&task, &made, workshop.path());
+    let read = ran.and_then(|()| std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause)));
+    let mesh = read.and_then(|bytes| parse(&bytes)).map_err(|error| workshop.blame(error).at(&file.place))?;
+    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })
 }
 
 /// Meshes a script, with the cache in one of `folders`.
@@ -94,7 +142,9 @@ pub(super) fn from_script<const D: usize>(
     folders: &[PathBuf],
 ) -> Result<Loaded<D>> {
     let path = &file.value;
-    let script = Script::read(path).map_err(|error| error.at(&file.place))?;
+    let is_shape = foreign::is_shape(path);
+    let script = if is_shape { Script::of_shape(path) } else { Script::read(path) };
+    let script = script.map_err(|error| error.at(&file.place))?;
     if !guard.trusted {
         script.judge(file)?;
     }
@@ -102,7 +152,7 @@ pub(super) fn from_script<const D: usize>(
         script.check(name, file)?;
     }
     let gmsh = Gmsh::find()?;
-    let name = file_name::<D>(path, &script, set, sizes, order, guard.threads, &gmsh);
+    let name = file_name::<D>(path, &script, set, sizes, order, guard, &gmsh);
 
     // A file of the cache that cannot be read or is damaged is as good as none.
     for folder in folders {
@@ -114,13 +164,18 @@ pub(super) fn from_script<const D: usize>(
     }
     let workshop = Workshop::open(folders)?;
     let made = workshop.path().join(&name);
-    let (sized, times) = match sizes {
-        Some(Sizing::View(view)) => (Some(super::sizes::script(file, &script, view, workshop.path())?), 1.0),
-        Some(Sizing::Times(times)) => (ended(path, &script, workshop.path())?, *times),
-        None => (ended(path, &script, workshop.path())?, 1.0),
+    let drawn = match is_shape {
+        true => Some(foreign::script(path, &script.files[0], D, guard.size, workshop.path())?),
+        false => None,
     };
-    let script = sized.as_deref().unwrap_or(path);
-    let task = Task { script, shown: path, set, times, dimension: D, order, guard, interrupt };
+    let own = drawn.as_ref().map_or(file.clone(), |drawn| Located::new(drawn.clone(), file.place.clone()));
+    let (sized, times) = match sizes {
+        Some(Sizing::View(view)) => (Some(super::sizes::script(&own, &script, view, workshop.path())?), 1.0),
+        Some(Sizing::Times(times)) => (ended(&own.value, &script, workshop.path())?, *times),
+        None => (ended(&own.value, &script, workshop.path())?, 1.0),
+    };
+    let script = sized.as_deref().unwrap_or(&own.value);
+    let task = Task { script, shown: path, set, times, is_mesh: false, dimension: D, order, guard, interrupt };
     let ran = gmsh.run(&task, &made, workshop.path());
     let read = ran.and_then(|()| std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause)));
     // half a file is no fault of the script
@@ -170,14 +225,15 @@ fn file_name<const D: usize>(
     set: &[(String, f64)],
     sizes: Option<&Sizing>,
     order: Order,
-    threads: Option<usize>,
+    guard: &Guard,
     gmsh: &Gmsh,
 ) -> String {
     let mut key = Key::new();
     key.add(gmsh.identity().as_bytes());
     key.add(&[D as u8, order as u8]);
     // one thread or many: the same algorithm
-    key.add(&[u8::from(threads.is_some())]);
+    key.add(&[u8::from(guard.threads.is_some())]);
+    guard.size.iter().for_each(|size| key.add(&size.to_le_bytes()));
     for (name, value) in set {
         key.add(name.as_bytes());
         key.add(&value.to_le_bytes());
@@ -198,7 +254,7 @@ fn file_name<const D: usize>(
 
 /// The mesh in bytes that Gmsh made from a script, of the order asked for.
 fn checked<const D: usize>(path: &Path, bytes: &[u8], order: Order) -> Result<Mesh<D>> {
-    let mesh: Mesh<D> = msh::parse(path, bytes, true)?;
+    let mesh: Mesh<D> = msh::parse(path, bytes, Maker::Script)?;
     if mesh.order == order {
         return Ok(mesh);
     }

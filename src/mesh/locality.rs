@@ -76,6 +76,7 @@ mod tests {
                 tags: vec![7, 8, 9, 10],
             }]
             .into(),
+            split: 0,
         };
         mesh.sort_cells();
         let first: Vec<f64> = mesh.groups[0].simplices().map(|cell| mesh.points[cell[0] as usize][0]).collect();

@@ -1,12 +1,14 @@
 //! Simplicial meshes with named groups, from Gmsh.
 //!
-//! [`load`] is the way in: a `.geo` script is meshed by Gmsh, once, and kept in a cache; a `.msh` file (format 4.1,
-//! text or binary) is read as it is. Everything downstream sees a [`Mesh`] only.
+//! [`load`] is the way in: a `.geo` script or a file of another program's geometry is meshed by Gmsh, once, and kept in a cache; so is a
+//! mesh of another format, which Gmsh converts; a `.msh` file (format 4.1, text or binary) is read as it is. Everything downstream sees a [`Mesh`] only.
 
+mod abaqus;
 mod cache;
 mod check;
 mod cursor;
 mod elements;
+mod foreign;
 mod gmsh;
 mod groups;
 mod guard;
@@ -19,15 +21,18 @@ mod quality;
 mod script;
 mod simplex;
 mod sizes;
+mod split;
 #[cfg(test)]
 mod tests;
 mod tokens;
 mod trust;
+mod unv;
 
 pub use check::{Asked, Checked, Duty, Parts};
+pub use foreign::{is_other, is_shape};
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, load_unless, recall_final};
-pub use msh::{parse, read};
+pub use msh::{Maker, parse, read};
 pub use quality::Quality;
 pub use sizes::{follows, unstructured, view};
 pub use trust::{Breach, breach};
@@ -53,6 +58,8 @@ pub struct Mesh<const D: usize> {
     pub order: Order,
     /// Named groups, in the order of the file.
     pub groups: Groups,
+    /// Quadrangles, hexahedra, prisms and pyramids in them that were split into simplices.
+    pub split: usize,
 }
 
 impl<const D: usize> Mesh<D> {
@@ -75,6 +82,6 @@ impl<const D: usize> Mesh<D> {
             group.stride = vertices;
         }
         let points = groups::compact(&mut groups, self.points.len()).map(|old| self.points[old]).collect();
-        Mesh { path: self.path.clone(), points, order: Order::P1, groups }
+        Mesh { path: self.path.clone(), points, order: Order::P1, groups, split: self.split }
     }
 }

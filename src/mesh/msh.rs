@@ -9,6 +9,17 @@ use crate::error::{Error, Result};
 use crate::problem::order::Order;
 use std::path::Path;
 
+/// Who made the bytes of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Maker {
+    /// The user: lines in them mean something, and groups have names.
+    User,
+    /// Gmsh, from a script.
+    Script,
+    /// Gmsh, from a file of another program, which may have no names.
+    Other,
+}
+
 /// Reads a `.msh` file.
 ///
 /// # Errors
@@ -16,18 +27,20 @@ use std::path::Path;
 /// error with the line or byte and a way out.
 pub fn read<const D: usize>(path: &Path) -> Result<Mesh<D>> {
     let bytes = crate::file::read(path)?;
-    parse(path, &bytes, false)
+    parse(path, &bytes, Maker::User)
 }
 
-/// Reads the bytes of a `.msh` file; `path` stands in messages, and `made` says that it is the script that Gmsh made
-/// the bytes from.
-pub fn parse<const D: usize>(path: &Path, bytes: &[u8], made: bool) -> Result<Mesh<D>> {
+/// Reads the bytes of a `.msh` file; `path` stands in messages: what `maker` made the bytes from.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<Mesh<D>> {
     const { assert!(D == 2 || D == 3) };
-    let cursor = &mut Cursor::new(path, bytes, made);
+    let cursor = &mut Cursor::new(path, bytes, maker != Maker::User);
     read_format(cursor)?;
-    let mut physical = Physical::default();
+    let mut physical = Physical::new(maker == Maker::Other);
     let mut nodes: Option<Nodes> = None;
-    let mut order = None;
+    let (mut order, mut split) = (None, 0);
     let mut seen: Vec<&str> = Vec::new();
     while !cursor.at_end() {
         let start = cursor.position();
@@ -57,7 +70,7 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], made: bool) -> Result<Me
             ("Entities", _) => physical.read_entities(cursor)?,
             ("Nodes", _) => nodes = Some(Nodes::read(cursor)?),
             (_, Some(nodes)) if seen.contains(&"Entities") => {
-                order = elements::read::<D>(cursor, nodes, &mut physical)?;
+                (order, split) = elements::read::<D>(cursor, nodes, &mut physical)?;
             }
             _ => {
                 let error = cursor.error_at(start, "$Elements needs $Entities and $Nodes before it");
@@ -67,7 +80,7 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], made: bool) -> Result<Me
         cursor.leave()?;
     }
     match nodes {
-        Some(nodes) if seen.contains(&"Elements") => finish(path, physical.groups, nodes, order),
+        Some(nodes) if seen.contains(&"Elements") => finish(path, physical.finished(D), nodes, order, split),
         _ => {
             let error = Error::mesh(path, None, "there are no elements");
             Err(error.help("the file was cut short, or nothing was meshed"))
@@ -92,8 +105,8 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
             _ => {
                 let message = "this is not a mesh file of Gmsh: it does not begin with $MeshFormat";
                 return Err(cursor.error_at(start, message).help(
-                    "winkler reads scripts (.geo) and Gmsh's meshes (.msh, format 4.1): turn others into one of these first, \
-                     by Gmsh if it can open the file, or by a converter such as meshio",
+                    "winkler reads scripts (.geo), meshes (.msh, .unv, .bdf, .inp, .mesh) and shapes (.step, .iges, .brep, .stl) by the \
+                     ends of their names: docs/meshes.md has them all",
                 ));
             }
         }
@@ -128,7 +141,13 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
 }
 
 /// The mesh, once all sections are read.
-fn finish<const D: usize>(path: &Path, mut groups: Vec<Group>, nodes: Nodes, order: Option<Order>) -> Result<Mesh<D>> {
+fn finish<const D: usize>(
+    path: &Path,
+    mut groups: Vec<Group>,
+    nodes: Nodes,
+    order: Option<Order>,
+    split: usize,
+) -> Result<Mesh<D>> {
     let fail = |message: String| Error::mesh(path, None, message);
     let (thing, cells) = (THINGS[D], THINGS[D].to_lowercase());
     let example = format!("name the bodies and their boundaries: Physical {thing}(\"lower\") = {{1}};");
@@ -146,5 +165,5 @@ fn finish<const D: usize>(path: &Path, mut groups: Vec<Group>, nodes: Nodes, ord
     let points = groups::compact(&mut groups, nodes.points.len())
         .map(|old| std::array::from_fn(|k| nodes.points[old][k]))
         .collect();
-    Ok(Mesh { path: path.to_owned(), points, order, groups: groups.into() })
+    Ok(Mesh { path: path.to_owned(), points, order, groups: groups.into(), split })
 }

@@ -4,6 +4,7 @@ use super::Group;
 use super::cursor::Cursor;
 use super::simplex::THINGS;
 use crate::error::Result;
+use crate::problem::body::is_in_name;
 use std::collections::{HashMap, HashSet};
 
 /// The groups of a file, and who belongs to them.
@@ -15,9 +16,16 @@ pub struct Physical {
     group_of: HashMap<(usize, i32), usize>,
     /// From dimension and tag of an entity of the geometry to the groups it belongs to.
     entities: HashMap<(usize, i32), Vec<usize>>,
+    /// Whether groups without a name are called by their kind and number, and where a dimension has none each entity is one.
+    named_by_number: bool,
 }
 
 impl Physical {
+    /// No groups yet; `named_by_number` if groups without a name are called by their kind and number.
+    pub fn new(named_by_number: bool) -> Self {
+        Self { named_by_number, ..Self::default() }
+    }
+
     /// Places in `groups` of those that an entity belongs to; `None` if the file does not list the entity.
     pub fn members(&self, dimension: usize, tag: i32) -> Option<&[usize]> {
         self.entities.get(&(dimension, tag)).map(Vec::as_slice)
@@ -86,8 +94,32 @@ impl Physical {
         Ok(())
     }
 
+    /// A group called by its kind and number; its place.
+    fn call(&mut self, dimension: usize, number: i32) -> usize {
+        let name = format!("{}_{number}", THINGS[dimension].to_lowercase());
+        let group = Group { name, dimension, stride: dimension + 1, connectivity: Vec::new(), tags: Vec::new() };
+        self.groups.push(group);
+        self.group_of.insert((dimension, number), self.groups.len() - 1);
+        self.groups.len() - 1
+    }
+
+    /// The groups. Other programs leave groups empty, and give groups of cells names that no body can have.
+    pub fn finished(self, space: usize) -> Vec<Group> {
+        let mut groups = self.groups;
+        if self.named_by_number {
+            groups.retain(|group| !group.is_empty());
+            groups
+                .iter_mut()
+                .filter(|group| group.dimension == space)
+                .for_each(|group| group.name = of_body(&group.name));
+        }
+        groups
+    }
+
     /// `$Entities`: which physical groups each point, curve, surface and volume of the geometry belongs to.
     pub fn read_entities(&mut self, cursor: &mut Cursor) -> Result<()> {
+        let named: [bool; 4] =
+            std::array::from_fn(|dimension| self.groups.iter().any(|group| group.dimension == dimension));
         cursor.begin();
         let mut counts = [0; 4];
         for (dimension, count) in counts.iter_mut().enumerate() {
@@ -107,6 +139,9 @@ impl Physical {
                 for _ in 0..cursor.count(1, 4)? {
                     // The sign is an orientation.
                     let physical = i32::try_from(cursor.int()?.unsigned_abs()).unwrap_or(i32::MAX);
+                    if self.named_by_number && !self.group_of.contains_key(&(dimension, physical)) {
+                        self.call(dimension, physical);
+                    }
                     let Some(group) = self.group_of.get(&(dimension, physical)) else {
                         let thing = THINGS[dimension];
                         let message = format!("physical {} {physical} has no name", thing.to_lowercase());
@@ -116,6 +151,9 @@ impl Physical {
                     if !members.contains(group) {
                         members.push(*group);
                     }
+                }
+                if members.is_empty() && self.named_by_number && !named[dimension] {
+                    members.push(self.call(dimension, tag));
                 }
                 if dimension > 0 {
                     for _ in 0..cursor.count(1, 4)? {
@@ -131,4 +169,11 @@ impl Physical {
         }
         Ok(())
     }
+}
+
+/// A name as bodies have it.
+fn of_body(name: &str) -> String {
+    let small = name.to_ascii_lowercase();
+    let word: String = small.chars().map(|c| if is_in_name(c) { c } else { '_' }).collect();
+    if word.starts_with(|c: char| c.is_ascii_lowercase()) { word } else { format!("body_{word}") }
 }

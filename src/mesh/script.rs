@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A script and all files that it reads.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Script {
     /// The contents of the script itself and of every file it names, in the order they are met.
     pub files: Vec<Vec<u8>>,
@@ -32,14 +32,7 @@ impl Script {
     /// # Errors
     /// A script that cannot be read. Included files that do not exist are left to Gmsh to report.
     pub fn read(path: &Path) -> Result<Script> {
-        let mut script = Script {
-            files: Vec::new(),
-            settable: BTreeSet::new(),
-            aliases: Vec::new(),
-            assigned: BTreeSet::new(),
-            mentioned: BTreeSet::new(),
-            breach: None,
-        };
+        let mut script = Script::default();
         // Canonical paths, since scripts may include each other along ever longer ones.
         let canonical = path.canonicalize().map_err(|cause| Error::file(path, "read", &cause))?;
         let home = canonical.parent().unwrap_or(Path::new("")).to_owned();
@@ -69,6 +62,14 @@ impl Script {
             script.files.push(bytes);
         }
         Ok(script)
+    }
+
+    /// The shape of another program, which Gmsh reads as data: what is in it is no script.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn of_shape(path: &Path) -> Result<Script> {
+        Ok(Script { files: vec![crate::file::read(path)?], ..Script::default() })
     }
 
     /// Whether its last line is ended. Gmsh leaves the last command out else, without a word, unless another script includes it.

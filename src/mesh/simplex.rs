@@ -31,6 +31,11 @@ impl Kind {
         };
         Some(Kind { dimension, order, stride })
     }
+
+    /// The linear simplex of a dimension from 1 on.
+    pub fn linear(dimension: usize) -> Kind {
+        Kind { dimension, order: Some(Order::P1), stride: dimension + 1 }
+    }
 }
 
 /// What Gmsh calls an element type and its number of nodes, for types 1 to 31.

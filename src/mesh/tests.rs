@@ -64,7 +64,7 @@ fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
 }
 
 fn parse<const D: usize>(bytes: &[u8]) -> crate::error::Result<Mesh<D>> {
-    msh::parse(Path::new("a.msh"), bytes, false)
+    msh::parse(Path::new("a.msh"), bytes, msh::Maker::User)
 }
 
 /// Sum of the measures of a group, times the factorial of its dimension.

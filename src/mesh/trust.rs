@@ -125,7 +125,7 @@ fn reads(command: &str, after: &[Spot], path: &Path, home: &Path) -> Option<Stri
 }
 
 /// Whether the name of a file ends in one of these, in small letters or in capitals: Gmsh knows no mixture.
-fn is_kind(path: &Path, kinds: &[&str]) -> bool {
+pub fn is_kind(path: &Path, kinds: &[&str]) -> bool {
     let end = path.extension().unwrap_or_default();
     kinds.iter().any(|kind| end == *kind || end == kind.to_ascii_uppercase().as_str())
 }

@@ -69,6 +69,17 @@ impl Folder {
         Ok((path, file))
     }
 
+    /// Makes a folder in it, or takes the one that is there.
+    ///
+    /// # Errors
+    /// [`Kind::File`](crate::error::Kind::File) with the path and the cause.
+    pub fn subfolder(&self, name: &str) -> Result<()> {
+        let path = self.path.join(name);
+        fs::create_dir_all(&path).map_err(|cause| Error::file(&path, "create the folder", &cause))?;
+        remove_parts(&path);
+        Ok(())
+    }
+
     fn add(&self, path: &Path) {
         if self.known.borrow_mut().insert(path.to_owned()) {
             self.files.borrow_mut().push(path.to_owned());

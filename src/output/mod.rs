@@ -3,6 +3,7 @@
 //! Nothing here knows the space dimension: points and vectors have three components, z = 0 in the plane.
 
 mod chart;
+pub mod collection;
 pub mod contact;
 pub mod contacts;
 pub mod folder;
@@ -11,7 +12,9 @@ pub mod history;
 mod largest;
 pub mod plot;
 pub mod report;
+pub mod steps;
 pub mod table;
+mod tags;
 pub mod vtu;
 
 /// Prints a line to standard output. A reader that has gone is no reason to stop.
@@ -41,7 +44,8 @@ pub use history::HistoryWriter;
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
-    PairReport, Report, RoundReport, StepPairReport, StepReport, busiest,
+    PairReport, Report, RoundReport, busiest,
 };
+pub use steps::{ReactionReport, StepPairReport, StepReport, StepTable};
 pub use table::{IterationTable, Verbosity};
 pub use vtu::{BodyField, CellKind, Grid};

@@ -113,6 +113,18 @@ impl Plot {
         }
     }
 
+    /// Contact force of pairs over their approach, step by step; a curve without a name if there is one.
+    pub fn approach<'a>(title: &str, pairs: impl ExactSizeIterator<Item = (&'a str, Vec<(f64, f64)>)>) -> Self {
+        let one = pairs.len() == 1;
+        let curve = |(name, points)| Series::new(if one { "" } else { name }, points, Style::LineMarkers);
+        Self {
+            title: title.into(),
+            x: Axis { label: "approach".into(), log: false },
+            y: Axis { label: "contact force".into(), log: false },
+            series: pairs.map(curve).collect(),
+        }
+    }
+
     /// Contact pressure along a surface from curves of (place, pressure) in any order; dashed references on top.
     pub fn pressure(title: &str, x: &str, y: &str, mut series: Vec<Series>) -> Self {
         series.iter_mut().for_each(|series| series.points.sort_by(|a, b| a.0.total_cmp(&b.0)));

@@ -2,6 +2,7 @@
 
 use super::format::{sci, seconds};
 use super::largest::largest;
+use super::steps::StepReport;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -129,34 +130,6 @@ pub struct IntervalReport {
     pub lower: f64,
     /// D_Phi: and at most this times G.
     pub upper: f64,
-}
-
-/// A load step.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct StepReport {
-    /// Share of all loads and prescribed displacements.
-    pub factor: f64,
-    /// How it ended, as [`Report::status`].
-    pub status: String,
-    /// The status in words.
-    pub message: String,
-    /// Updates of the iterate in it.
-    pub iterations: usize,
-    /// Relative residual at its end.
-    pub residual: Option<f64>,
-    /// Its pairs in the order of the scene.
-    pub pairs: Vec<StepPairReport>,
-}
-
-/// A pair of surfaces at the end of a load step.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct StepPairReport {
-    /// Contact force on the side that stands first in the scene (x, y, z).
-    pub force: [f64; 3],
-    /// Largest pressure.
-    pub peak_pressure: f64,
-    /// Points with c > 0.
-    pub closed: usize,
 }
 
 /// Wall seconds of the inner solvers.
@@ -300,6 +273,8 @@ pub struct PairReport {
     pub force: [[f64; 3]; 2],
     /// Moment of that about the origin (x, y, z).
     pub moment: [[f64; 3]; 2],
+    /// How far the bodies come nearer to each other along the mean normal; null where normals cancel.
+    pub approach: Option<f64>,
     /// Largest pressure.
     pub peak_pressure: f64,
     /// Where it is (x, y, z).
@@ -371,9 +346,10 @@ impl Report {
                     format!("{count} pairs, peak pressure {}, {closed} points closed", readable(peak, 6))
                 }
             };
-            let factor = readable(step.factor, 4);
+            let factors = step.factors.iter().map(|(name, factor)| format!("{name} {}", readable(*factor, 4)));
+            let factors = factors.collect::<Vec<_>>().join(", ");
             let (number, k) = (index + 1, step.iterations);
-            lines.push(format!("  step {number}, factor {factor}: {k} iterations, {}: {pairs}", step.status));
+            lines.push(format!("  step {number}, {factors}: {k} iterations, {}: {pairs}", step.status));
         }
         lines.extend(self.left_out.iter().map(|left_out| format!("  {left_out}")));
         for pair in busiest(&self.pairs, LISTED).into_iter().map(|i| &self.pairs[i]) {

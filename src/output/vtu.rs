@@ -1,11 +1,12 @@
-//! `<body>.vtu` and the `.pvd` that gathers them, for ParaView.
+//! `<body>.vtu`, for ParaView.
 
-use super::folder::safe_name;
+use super::tags::Whole;
 use std::io::{self, Write};
 use vtkio::model::{
-    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, ElementType, UnstructuredGridPiece, Version,
-    VertexNumbers, Vtk,
+    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, ElementType, IOBuffer,
+    UnstructuredGridPiece, Version, VertexNumbers, Vtk,
 };
+use vtkio::xml::Compressor;
 
 /// Kind of the cells of a body; local numbering of the points is VTK's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +60,24 @@ impl CellKind {
     }
 }
 
+/// How numbers are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Encoding {
+    /// Whether numbers have four bytes instead of eight.
+    pub single: bool,
+    /// Whether they are compressed (zlib).
+    pub compress: bool,
+}
+
+impl Default for Encoding {
+    fn default() -> Self {
+        Self { single: false, compress: true }
+    }
+}
+
+/// Level of zlib from 1, fast, to 9: more than 1 takes four times as long for some per cent, as the last digits of numbers are random.
+const LEVEL: u32 = 1;
+
 /// The mesh of one body and the fields at its points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodyField {
@@ -81,17 +100,12 @@ pub struct BodyField {
 }
 
 impl BodyField {
-    /// `<name>.vtu`.
-    pub fn file_name(&self) -> String {
-        vtu_name(&self.name)
-    }
-
     /// Writes VTK's XML format with binary (base64) data: point arrays `displacement` (3 components), `stress` (6),
     /// `von_mises` (1) and `principal` (3).
     ///
     /// # Errors
     /// Those of `out`, and `InvalidInput` when the arrays do not fit each other.
-    pub fn write(self, out: &mut dyn Write) -> io::Result<()> {
+    pub fn write(self, encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         self.check().map_err(|what| io::Error::new(io::ErrorKind::InvalidInput, what))?;
         let grid = Grid {
             title: self.name,
@@ -106,7 +120,7 @@ impl BodyField {
             ],
             at_cells: Vec::new(),
         };
-        grid.write(out)
+        grid.write(encoding, out)
     }
 
     /// Says what does not fit: ParaView would crash on it, or show another body's values.
@@ -149,17 +163,20 @@ impl Grid {
     ///
     /// # Errors
     /// Those of `out`.
-    pub fn write(self, out: &mut dyn Write) -> io::Result<()> {
+    pub fn write(self, encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
+        let numbers = |data: Vec<f64>| -> IOBuffer {
+            if encoding.single { data.into_iter().map(|x| x as f32).collect::<Vec<_>>().into() } else { data.into() }
+        };
         let stride = self.cell.stride();
         let cells = self.connectivity.len() / stride;
         let arrays = |list: Vec<(String, u32, Vec<f64>)>| {
             let array = |(name, components, data): (String, u32, Vec<f64>)| {
-                Attribute::DataArray(DataArray { name, elem: ElementType::Generic(components), data: data.into() })
+                Attribute::DataArray(DataArray { name, elem: ElementType::Generic(components), data: numbers(data) })
             };
             list.into_iter().map(array).collect()
         };
         let piece = UnstructuredGridPiece {
-            points: self.points.into_flattened().into(),
+            points: numbers(self.points.into_flattened()),
             cells: Cells {
                 cell_verts: VertexNumbers::XML {
                     connectivity: self.connectivity.into_iter().map(u64::from).collect(),
@@ -177,73 +194,20 @@ impl Grid {
             file_path: None,
         };
         writeln!(out, r#"<?xml version="1.0"?>"#)?;
-        let mut whole = Whole { out, failure: None };
-        let written = vtk.write_xml(&mut whole);
-        match whole.failure {
+        let mut whole = Whole::new(out);
+        let compressor = if encoding.compress { Compressor::ZLib } else { Compressor::None };
+        let written = vtk.try_into_xml_format(compressor, LEVEL).and_then(|file| file.write(&mut whole));
+        match whole.failure() {
             Some(failure) => Err(failure),
             None => written.map_err(io::Error::other),
         }
     }
 }
 
-/// Passes all bytes on and keeps the first failure: vtkio 0.7.0-rc2 ignores short writes, and failures of its last
-/// flush, which on a full disk would leave half a file without a word.
-struct Whole<'a> {
-    out: &'a mut dyn Write,
-    failure: Option<io::Error>,
-}
-
-impl Write for Whole<'_> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.failure.is_none() {
-            self.failure = self.out.write_all(bytes).err();
-        }
-        match &self.failure {
-            None => Ok(bytes.len()),
-            Some(failure) => Err(failure.kind().into()),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.out.flush()
-    }
-}
-
-/// `<title>.pvd`, safe as a file name; `bodies.pvd` without a title.
-pub fn pvd_name(title: &str) -> String {
-    let title = title.trim();
-    format!("{}.pvd", if title.is_empty() { "bodies".into() } else { safe_name(title) })
-}
-
-/// Writes the collection that opens the `.vtu` files of all bodies and contact surfaces at once: one part each, at time 0.
-///
-/// # Errors
-/// Those of `out`.
-pub fn write_pvd<S: AsRef<str>>(bodies: &[S], out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, r#"<?xml version="1.0"?>"#)?;
-    writeln!(out, r#"<VTKFile type="Collection" version="1.0">"#)?;
-    writeln!(out, "  <Collection>")?;
-    for (part, body) in bodies.iter().enumerate() {
-        let file = escape(&vtu_name(body.as_ref()));
-        let name = escape(body.as_ref());
-        writeln!(out, r#"    <DataSet timestep="0" group="" part="{part}" name="{name}" file="{file}"/>"#)?;
-    }
-    writeln!(out, "  </Collection>")?;
-    writeln!(out, "</VTKFile>")
-}
-
-fn vtu_name(body: &str) -> String {
-    format!("{}.vtu", safe_name(body))
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vtkio::model::{IOBuffer, Piece};
+    use vtkio::model::Piece;
 
     /// One cell of a kind, with a different value in every place.
     fn body(cell: CellKind) -> BodyField {
@@ -271,9 +235,10 @@ mod tests {
             (CellKind::Tetra, CellType::Tetra),
             (CellKind::QuadraticTetra, CellType::QuadraticTetra),
         ] {
+            let encoding = Encoding { single: false, compress: cell.stride() % 2 == 0 };
             let body = body(cell);
             let mut bytes = Vec::new();
-            body.clone().write(&mut bytes).unwrap();
+            body.clone().write(encoding, &mut bytes).unwrap();
             let DataSet::UnstructuredGrid { pieces, .. } = Vtk::parse_xml(bytes.as_slice()).unwrap().data else {
                 panic!("not an unstructured grid")
             };
@@ -308,6 +273,45 @@ mod tests {
         }
     }
 
+    /// Blocks of 32 KiB, full ones among them, in both precisions; other programs have read such files.
+    #[test]
+    fn long_arrays_read_back_whatever_their_encoding() {
+        for points in [4096, 5000, 8192] {
+            let value = |i: usize| (i as f64).sin();
+            let grid = || Grid {
+                title: String::new(),
+                points: (0..points).map(|i| [value(i), value(i + 1), 0.0]).collect(),
+                cell: CellKind::Line,
+                connectivity: (0..points as u32).collect(),
+                at_points: vec![("stress".to_owned(), 6, (0..6 * points).map(value).collect())],
+                at_cells: Vec::new(),
+            };
+            let mut sizes = Vec::new();
+            for (single, compress) in [(false, false), (false, true), (true, false), (true, true)] {
+                let mut bytes = Vec::new();
+                grid().write(Encoding { single, compress }, &mut bytes).unwrap();
+                sizes.push(bytes.len());
+                let text = String::from_utf8_lossy(&bytes);
+                assert_eq!(text.contains("vtkZLibDataCompressor"), compress);
+                let tag = text.split("<DataArray ").find(|tag| tag.contains("\"stress\"")).unwrap();
+                let tag = tag.split('>').next().unwrap();
+                for (i, name) in ["xx", "yy", "zz", "xy", "yz", "xz"].iter().enumerate() {
+                    assert!(tag.contains(&format!(" ComponentName{i}=\"{name}\"")), "{tag}");
+                }
+                let DataSet::UnstructuredGrid { pieces, .. } = Vtk::parse_xml(&bytes[..]).unwrap().data else {
+                    panic!()
+                };
+                let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
+                let Attribute::DataArray(stress) = &piece.data.point[0] else { panic!("a field") };
+                assert_eq!((stress.num_comp(), matches!(stress.data, IOBuffer::F32(_))), (6, single));
+                let read: Vec<f64> = stress.data.cast_into().unwrap();
+                let size = if single { 1e-7 } else { 0.0 };
+                assert!(read.iter().enumerate().all(|(i, x)| (x - value(i)).abs() <= size) && read.len() == 6 * points);
+            }
+            assert!(sizes[1] < sizes[0] && sizes[3] < sizes[2] && sizes[2] < sizes[1], "{sizes:?}");
+        }
+    }
+
     #[test]
     fn arrays_that_do_not_fit_are_refused() {
         let mut short = body(CellKind::Tetra);
@@ -319,7 +323,7 @@ mod tests {
         let mut few = body(CellKind::Tetra);
         few.principal.pop();
         for bad in [short, cut, wild, few] {
-            let error = bad.write(&mut Vec::new()).unwrap_err();
+            let error = bad.write(Encoding::default(), &mut Vec::new()).unwrap_err();
             assert_eq!(error.kind(), io::ErrorKind::InvalidInput);
         }
     }
@@ -345,22 +349,11 @@ mod tests {
     #[test]
     fn a_full_disk_is_an_error() {
         let mut bytes = Vec::new();
-        body(CellKind::Tetra).write(&mut bytes).unwrap();
+        body(CellKind::Tetra).write(Encoding::default(), &mut bytes).unwrap();
         for room in [0, 50, bytes.len() / 2, bytes.len() - 1] {
-            let error = body(CellKind::Tetra).write(&mut Disk(room)).unwrap_err();
+            let error = body(CellKind::Tetra).write(Encoding::default(), &mut Disk(room)).unwrap_err();
             assert_eq!(error.kind(), io::ErrorKind::StorageFull, "{room} of {}", bytes.len());
         }
-        body(CellKind::Tetra).write(&mut Disk(bytes.len())).unwrap();
-    }
-
-    #[test]
-    fn the_collection_names_every_body() {
-        let mut bytes = Vec::new();
-        write_pvd(&["upper", "a<b"], &mut bytes).unwrap();
-        let text = String::from_utf8(bytes).unwrap();
-        assert!(text.contains(r#"timestep="0" group="" part="0" name="upper" file="upper.vtu""#));
-        assert!(text.contains(r#"part="1" name="a&lt;b" file="a_b.vtu""#), "{text}");
-        assert_eq!(pvd_name("Two blocks / a"), "Two_blocks___a.pvd");
-        assert_eq!(pvd_name(" "), "bodies.pvd");
+        body(CellKind::Tetra).write(Encoding::default(), &mut Disk(bytes.len())).unwrap();
     }
 }

@@ -26,6 +26,8 @@ pub struct BodySpec {
     pub spring: Vec<SpringSpec>,
     /// Body force density (x, y, z), if any.
     pub force: Option<[Field; 3]>,
+    /// Factor of the body force at a step of a history; 1 without one.
+    pub force_factor: f64,
     /// A known displacement to compare with, if any: as many components as the scene has dimensions, of x, y (z).
     pub exact: Option<Vec<Differentiable>>,
 }
@@ -39,6 +41,10 @@ pub struct Support {
     pub value: [Option<Field>; 3],
     /// Prescribed displacement along the outer normal of a plane surface.
     pub normal: Option<Field>,
+    /// Name of its factor in a history.
+    pub path: Option<Located<String>>,
+    /// Factor of its values at a step of a history; 1 without one.
+    pub factor: f64,
 }
 
 /// Springs to the ground on a named boundary (per area) or at points.
@@ -66,6 +72,10 @@ pub struct Load {
     pub on: Located<String>,
     /// What acts there.
     pub kind: LoadKind,
+    /// Name of its factor in a history.
+    pub path: Option<Located<String>>,
+    /// Its factor at a step of a history; 1 without one.
+    pub factor: f64,
 }
 
 /// Kinds of boundary load.

@@ -20,6 +20,8 @@ pub struct Guard {
     pub seconds: f64,
     /// Gigabytes that it may take; what is free when it starts if `None`.
     pub gigabytes: Option<f64>,
+    /// Largest size of elements in a shape of another program.
+    pub size: Option<f64>,
     /// Threads of Gmsh's parallel algorithm for free meshes in space (HXT); the algorithm of the script if `None`.
     pub threads: Option<usize>,
     /// Whether the user trusts the script as a program.
@@ -29,16 +31,16 @@ pub struct Guard {
 impl Default for Guard {
     /// A script that nobody trusts, and ten times what Gmsh takes for a million tetrahedra.
     fn default() -> Self {
-        Self { seconds: 1000.0, gigabytes: None, threads: None, trusted: false }
+        Self { seconds: 1000.0, gigabytes: None, size: None, threads: None, trusted: false }
     }
 }
 
 /// Where the mesh comes from; paths are relative to the scene file's folder and already joined with it.
 #[derive(Debug, Clone)]
 pub enum MeshSource {
-    /// A Gmsh geometry script and the numbers set in it (`gmsh -setnumber NAME VALUE`), sorted by name.
+    /// A Gmsh geometry script and the numbers set in it (`gmsh -setnumber NAME VALUE`), sorted by name; or a shape of another program.
     Geo {
-        /// The script.
+        /// The script, or the file of the shape.
         file: Located<PathBuf>,
         /// Names and numbers, sorted by name.
         set: Vec<(String, f64)>,
@@ -49,7 +51,7 @@ pub enum MeshSource {
         /// What it may take and do.
         guard: Guard,
     },
-    /// A mesh file, format 4.1, text or binary.
+    /// A mesh file: Gmsh's format 4.1, text or binary, or one that Gmsh converts.
     Msh {
         /// The mesh file.
         file: Located<PathBuf>,

@@ -1,5 +1,6 @@
 //! The outer iteration: methods and their settings by name.
 
+use super::history::History;
 use super::robin::{RobinRule, Zone};
 use super::stop::StopRule;
 use crate::expression::Field;
@@ -24,8 +25,8 @@ pub struct MethodSpec {
     pub linear: Option<Linear>,
     /// Start of the iteration.
     pub start: Start,
-    /// Shares of the loads, one after another and 1 at last; none are no steps.
-    pub steps: Vec<f64>,
+    /// Load steps.
+    pub steps: History,
     /// When to stop.
     pub stop: StopRule,
 }
@@ -41,7 +42,7 @@ impl Default for MethodSpec {
             depth: 5,
             linear: None,
             start: Start::Auto,
-            steps: Vec::new(),
+            steps: History::default(),
             stop: StopRule::default(),
         }
     }

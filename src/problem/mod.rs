@@ -6,6 +6,7 @@
 pub mod body;
 pub mod contact;
 pub mod elasticity;
+pub mod history;
 pub mod layer;
 pub mod mesh;
 pub mod method;

@@ -65,7 +65,7 @@ pub fn pictures(folder: &Path, is_space: bool, units: Option<&Units>, alone: boo
             let along = label(["x", "y", "z"][axes[0]], units.map(|units| units.length));
             let curve = places.iter().zip(&pressures).map(|(x, &p)| (x[axes[0]], p)).collect();
             let plot = Plot::pressure(&title, &along, &pressure, vec![Series::new("", curve, Style::Line)]);
-            pictures.push(Picture { kind: "plot", svg: plot.text().map_err(failed)?, note: None });
+            pictures.push(Picture { kind: "plot", svg: plot.svg().map_err(failed)?, note: None });
             continue;
         }
         // the two longest directions, in the order of their names

@@ -32,7 +32,7 @@ pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf
     let pictures: Vec<String> = match what {
         "pressure" => results.pressures(true)?.into_iter().map(|picture| picture.svg).collect(),
         "convergence" => {
-            results.convergence()?.map(|plot| plot.text().map_err(failed)).transpose()?.into_iter().collect()
+            results.convergence()?.map(|plot| plot.svg().map_err(failed)).transpose()?.into_iter().collect()
         }
         _ => {
             let bodies = results.bodies()?;

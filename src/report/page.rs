@@ -160,7 +160,7 @@ impl Results {
         } else if !bodies.is_empty() {
             drawn = vec![self.bands(&bodies, true, false)?, self.bands(&bodies, false, false)?];
         }
-        let convergence = self.convergence()?.map(|plot| plot.text().map_err(failed)).transpose()?;
+        let convergence = self.convergence()?.map(|plot| plot.svg().map_err(failed)).transpose()?;
         let unit = |unit: fn(&Units) -> &str| self.label("", unit);
         let phases = ["mesh", "discretize", "set-up", "iterate", "estimate", "output"];
         let timed = |phase: &&str| report["times"].get(*phase).is_some();

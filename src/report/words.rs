@@ -51,6 +51,7 @@ pub fn words(value: &Value) -> String {
         }
         ValueKind::Seq => format!("({})", list().map(|item| words(&item)).collect::<Vec<_>>().join(", ")),
         ValueKind::Number => number(value),
+        ValueKind::Bool => if value.is_true() { "true" } else { "false" }.to_owned(),
         _ => value.to_string(),
     }
 }
@@ -74,6 +75,7 @@ mod tests {
             ["0", "1", "93.109", "−5e−7", "210000", "1e6", "0.05"]
         );
         assert_eq!(super::number(&Value::from(())), "–");
+        assert_eq!(words(&Value::from(false)), "false");
         let value = Value::from_serialize(serde_json::json!({ "power": { "B": 1e-3, "a": 0.5 }, "at": [1, 2.5] }));
         assert_eq!(words(&without(value.clone(), Rest(vec!["at".into()]))), "power: B = 0.001, a = 0.5");
         assert_eq!(words(&value.get_attr("at").unwrap()), "(1, 2.5)");

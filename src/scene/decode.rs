@@ -4,6 +4,7 @@ mod body;
 mod contact;
 mod data;
 mod elasticity;
+mod history;
 mod layer;
 mod method;
 
@@ -11,6 +12,8 @@ use super::read::{Keys, Node, Value};
 use crate::data::Library;
 use crate::error::{Error, Located, Place, Result, nearest, shown};
 use crate::expression::{Differentiable, Field, Scope};
+use crate::mesh::is_shape;
+use crate::output::vtu::Encoding;
 use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::pattern::Pattern;
@@ -49,19 +52,22 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     };
     let units = keys.get("units").map(units).transpose()?;
     let (contacts, auto) = decoder.contacts(&keys)?;
-    let method = decoder.method(keys.get("method"))?;
+    let mut method = decoder.method(keys.get("method"))?;
     if let (Some(adapt), false) = (keys.get("adapt"), method.steps.is_empty()) {
         return Err(adapt
             .refuse("an adapted mesh and load steps in one scene")
             .help("leave `adapt` or `method.steps` away"));
     }
+    let mesh = decoder.mesh(keys.require("mesh")?, trust(tree, &keys)?)?;
+    let bodies = decoder.bodies(&keys)?;
+    decoder.join(&mut method.steps, &bodies)?;
     Ok(Scene {
         path: path.to_owned(),
         title,
         units,
         plane,
-        mesh: decoder.mesh(keys.require("mesh")?, trust(tree, &keys)?)?,
-        bodies: decoder.bodies(&keys)?,
+        mesh,
+        bodies,
         contacts,
         auto,
         method,
@@ -146,7 +152,7 @@ impl Decoder<'_> {
     fn mesh(&self, node: &Node, trusted: bool) -> Result<MeshSource> {
         if let Value::String(name) = &node.value {
             let file = file(self.folder, node)?;
-            return Ok(match name.ends_with(".geo") {
+            return Ok(match name.ends_with(".geo") || is_shape(&file.value) {
                 true => {
                     let guard = Guard { trusted, ..Guard::default() };
                     MeshSource::Geo { file, set: Vec::new(), places: Vec::new(), sizes: None, guard }
@@ -157,22 +163,33 @@ impl Decoder<'_> {
         if !matches!(node.value, Value::Table(_)) {
             return Err(node.expected("a file name or a table"));
         }
-        let keys = Keys::open(node, "the mesh", &["geo", "msh", "set", "threads", "timeout", "memory"])?;
+        let keys = Keys::open(node, "the mesh", &["geo", "msh", "set", "size", "threads", "timeout", "memory"])?;
         keys.exclude("geo", "msh")?;
         if let Some(msh) = keys.get("msh") {
-            return match ["set", "threads", "timeout", "memory"].iter().find_map(|key| keys.entry(key)) {
-                None => Ok(MeshSource::Msh { file: file(self.folder, msh)? }),
+            let path = file(self.folder, msh)?;
+            if is_shape(&path.value) {
+                return Err(msh
+                    .refuse("this is the shape of bodies, and no mesh")
+                    .help("mesh = { geo = \"...\", size = 0.1 }"));
+            }
+            return match ["set", "size", "threads", "timeout", "memory"].iter().find_map(|key| keys.entry(key)) {
+                None => Ok(MeshSource::Msh { file: path }),
                 Some(entry) => Err(Error::scene(&entry.key_place, format!("`{}` for a finished mesh", entry.key))
                     .help("it is for Gmsh, which makes meshes from scripts: mesh = { geo = \"...\" }")),
             };
         }
         let file = file(self.folder, keys.require("geo")?)?;
+        if let (Some(entry), false) = (keys.entry("size"), is_shape(&file.value)) {
+            return Err(Error::scene(&entry.key_place, "`size` for a script, which has sizes of its own")
+                .help("it is for shapes (.step, .iges, .brep, .stl): give scripts numbers by set = { n = 32 }"));
+        }
         let set = keys.get("set").map_or(Ok(Vec::new()), numbers)?;
         let (places, set) = set.into_iter().map(|(place, name, value)| (place, (name, value))).unzip();
         let usual = Guard::default();
         let guard = Guard {
             seconds: keys.get("timeout").map_or(Ok(usual.seconds), |node| node.positive("the timeout"))?,
             gigabytes: keys.get("memory").map(|node| node.positive("the memory")).transpose()?,
+            size: keys.get("size").map(|node| node.positive("the size")).transpose()?,
             threads: keys.get("threads").map(threads).transpose()?,
             trusted,
         };
@@ -327,11 +344,22 @@ fn adapt(node: &Node) -> Result<AdaptSpec> {
 fn output(node: Option<&Node>) -> Result<OutputSpec> {
     let default = OutputSpec::default();
     let Some(node) = node else { return Ok(default) };
-    let keys = Keys::open(node, "[output]", &["dir", "vtu", "report", "plots", "pairs", "checkpoint"])?;
+    let usual = default.encoding;
+    let keys = Keys::open(
+        node,
+        "[output]",
+        &["dir", "vtu", "report", "precision", "compress", "plots", "pairs", "checkpoint"],
+    )?;
     Ok(OutputSpec {
         dir: keys.get("dir").map(|dir| dir.name().map(|name| name.value.into())).transpose()?,
         report: keys.get("report").map_or(Ok(default.report), Node::boolean)?,
         vtu: keys.get("vtu").map_or(Ok(default.vtu), Node::boolean)?,
+        encoding: Encoding {
+            single: keys
+                .get("precision")
+                .map_or(Ok(usual.single), |node| choose(node, "precision", &[("double", false), ("single", true)]))?,
+            compress: keys.get("compress").map_or(Ok(usual.compress), Node::boolean)?,
+        },
         plots: keys.get("plots").map_or(Ok(default.plots), Node::boolean)?,
         pairs: keys.get("pairs").map(pairs).transpose()?,
         checkpoint: keys.get("checkpoint").map(|minutes| minutes.positive("the time in minutes")).transpose()?,

@@ -5,6 +5,7 @@ use crate::expression::Field;
 use crate::problem::body::{BodySpec, LoadKind, SpringKind};
 use crate::problem::contact::{ContactSpec, Overlap};
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, Plane};
+use crate::problem::history::History;
 use crate::problem::layer::{AsperitySpec, Depths, LayerSpec};
 use crate::problem::mesh::MeshSource;
 use crate::problem::method::{Gamma, MethodName, MethodSpec, Start};
@@ -56,6 +57,9 @@ impl Scene {
         insert(&mut output, "dir", self.output.dir.as_ref().map(|dir| json!(dir.display().to_string())));
         output.insert("vtu".into(), json!(self.output.vtu));
         output.insert("report".into(), json!(self.output.report));
+        let encoding = self.output.encoding;
+        output.insert("precision".into(), json!(if encoding.single { "single" } else { "double" }));
+        output.insert("compress".into(), json!(encoding.compress));
         output.insert("plots".into(), json!(self.output.plots));
         let pairs = |&most: &usize| if most == usize::MAX { json!("all") } else { json!(most) };
         insert(&mut output, "pairs", self.output.pairs.as_ref().map(pairs));
@@ -89,6 +93,9 @@ fn mesh(mesh: &MeshSource) -> Value {
             let set: Map<_, _> = set.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
             let (file, timeout, memory) = (file.value.display().to_string(), guard.seconds, guard.gigabytes);
             let mut mesh = json!({ "geo": file, "set": set, "timeout": timeout });
+            if let Some(size) = guard.size {
+                mesh["size"] = json!(size);
+            }
             if let Some(threads) = guard.threads {
                 mesh["threads"] = json!(threads);
             }
@@ -121,16 +128,22 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
             insert(&mut map, axis, value.as_ref().map(field));
         }
         insert(&mut map, "normal", support.normal.as_ref().map(field));
+        insert(&mut map, "path", support.path.as_ref().map(|path| json!(path.value)));
         Value::Object(map)
     });
-    let load = body.load.iter().map(|load| match &load.kind {
-        LoadKind::Pressure(pressure) => json!({ "on": load.on.value, "pressure": field(pressure) }),
-        LoadKind::Traction(traction) => {
-            json!({ "on": load.on.value, "traction": vector(traction, dimension) })
+    let load = body.load.iter().map(|load| {
+        let mut map = json!({ "on": load.on.value });
+        match &load.kind {
+            LoadKind::Pressure(pressure) => map["pressure"] = field(pressure),
+            LoadKind::Traction(traction) => map["traction"] = vector(traction, dimension),
+            LoadKind::Force { total, rigid } => {
+                (map["force"], map["rigid"]) = (json!(total[..dimension]), json!(rigid));
+            }
         }
-        LoadKind::Force { total, rigid } => {
-            json!({ "on": load.on.value, "force": total[..dimension], "rigid": rigid })
+        if let Some(path) = &load.path {
+            map["path"] = json!(path.value);
         }
+        map
     });
     let spring = body.spring.iter().map(|spring| match &spring.kind {
         SpringKind::Vector(fields) => json!({ "on": spring.on.value, "stiffness": vector(fields, dimension) }),
@@ -270,7 +283,7 @@ fn method(method: &MethodSpec) -> Value {
         }
     }
     if !method.steps.is_empty() {
-        map["steps"] = json!(method.steps);
+        map["steps"] = history(&method.steps);
     }
     if let Some(linear) = method.linear {
         map["linear"] = json!(linear.name());
@@ -279,6 +292,15 @@ fn method(method: &MethodSpec) -> Value {
         map["depth"] = json!(method.depth);
     }
     map
+}
+
+fn history(history: &History) -> Value {
+    let column = |place: usize| history.steps.iter().map(|step| step.factors[place]).collect::<Vec<_>>();
+    let Some(table) = &history.table else { return json!(column(0)) };
+    let mut columns = Map::new();
+    columns.insert("time".into(), history.steps.iter().map(|step| json!(step.time)).collect());
+    columns.extend(history.names.iter().enumerate().map(|(place, name)| (name.clone(), json!(column(place)))));
+    json!({ "table": table.value.display().to_string(), "columns": columns })
 }
 
 fn solver(solver: &SolverSpec) -> Value {

@@ -2,6 +2,7 @@
 
 use crate::data::Library;
 use crate::error::{Located, Place};
+use crate::output::vtu::Encoding;
 use crate::problem::body::BodySpec;
 use crate::problem::contact::{AutoContact, ContactSpec};
 use crate::problem::elasticity::Plane;
@@ -66,6 +67,8 @@ pub struct OutputSpec {
     pub dir: Option<PathBuf>,
     /// Whether to write `<body>.vtu` and the `.pvd`; default false.
     pub vtu: bool,
+    /// How they are written.
+    pub encoding: Encoding,
     /// Whether to write the page of the run, `report.html`; default false.
     pub report: bool,
     /// Whether to draw the SVG plots; default true.
@@ -78,6 +81,14 @@ pub struct OutputSpec {
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { dir: None, vtu: false, report: false, plots: true, pairs: None, checkpoint: None }
+        Self {
+            dir: None,
+            vtu: false,
+            encoding: Encoding::default(),
+            report: false,
+            plots: true,
+            pairs: None,
+            checkpoint: None,
+        }
     }
 }

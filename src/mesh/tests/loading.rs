@@ -126,7 +126,7 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
     let message = refuse(&format!("{SQUARE}Mesh.ElementOrder = 1;"), &[], Order::P2);
     assert!(message.contains("remove `Mesh.ElementOrder`"), "{message}");
     // Its lines and bytes mean nothing to someone who wrote a script.
-    let message = refuse(&format!("{SQUARE}Recombine Surface{{1}};"), &[], Order::P1);
+    let message = refuse(&format!("{SQUARE}Recombine Surface{{1}};"), &[], Order::P2);
     assert!(
         message.contains("a.geo: group `soft rock` has quadrangle elements") && !message.contains("byte"),
         "{message}"

@@ -49,12 +49,13 @@ impl Decoder<'_> {
             load: items("load")?.iter().map(|item| self.load(item)).collect::<Result<_>>()?,
             spring: items("spring")?.iter().map(|item| self.spring(item)).collect::<Result<_>>()?,
             force: keys.get("force").map(|force| self.vector(force)).transpose()?,
+            force_factor: 1.0,
             exact: keys.get("exact").map(|exact| self.smooth_vector(exact)).transpose()?,
         })
     }
 
     fn support(&self, node: &Node) -> Result<Support> {
-        let keys = Keys::open(node, "a support", &["on", "x", "y", "z", "normal", "symmetry"])?;
+        let keys = Keys::open(node, "a support", &["on", "x", "y", "z", "normal", "symmetry", "path"])?;
         for axis in AXES {
             keys.exclude(axis, "normal")?;
             keys.exclude(axis, "symmetry")?;
@@ -81,7 +82,8 @@ impl Decoder<'_> {
                 .refuse(format!("the support on `{}` holds no component", on.value))
                 .help(format!("give the displacement in some of {}: x = 0; or symmetry = true", axes.join(", "))));
         }
-        Ok(Support { on, value, normal })
+        let path = keys.get("path").map(Node::name).transpose()?;
+        Ok(Support { on, value, normal, path, factor: 1.0 })
     }
 
     fn spring(&self, node: &Node) -> Result<SpringSpec> {
@@ -113,7 +115,7 @@ impl Decoder<'_> {
     }
 
     fn load(&self, node: &Node) -> Result<Load> {
-        let keys = Keys::open(node, "a load", &["on", "pressure", "traction", "force", "rigid"])?;
+        let keys = Keys::open(node, "a load", &["on", "pressure", "traction", "force", "rigid", "path"])?;
         let on = pattern(keys.require("on")?)?;
         for (one, other) in [("pressure", "traction"), ("pressure", "force"), ("traction", "force")] {
             keys.exclude(one, other)?;
@@ -134,7 +136,8 @@ impl Decoder<'_> {
                 return Err(node.refuse(format!("the load on `{}` has no component", on.value)).help(advice));
             }
         };
-        Ok(Load { on, kind })
+        let path = keys.get("path").map(Node::name).transpose()?;
+        Ok(Load { on, kind, path, factor: 1.0 })
     }
 }
 

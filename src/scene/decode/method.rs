@@ -43,7 +43,7 @@ impl Decoder<'_> {
             depth: keys.get("depth").map_or(Ok(default.depth), depth)?,
             linear: keys.get("linear").map(|linear| self.linear(linear, name)).transpose()?,
             start,
-            steps: steps.map_or(Ok(default.steps), load_steps)?,
+            steps: steps.map_or(Ok(default.steps), |steps| self.history(steps))?,
             stop: keys.get("stop").map_or(Ok(default.stop), stop)?,
         })
     }
@@ -124,25 +124,6 @@ fn depth(node: &Node) -> Result<usize> {
     match usize::try_from(node.whole()?) {
         Ok(depth) if (1..=50).contains(&depth) => Ok(depth),
         _ => Err(node.refuse("the depth must lie between 1 and 50")),
-    }
-}
-
-/// Most steps that a number may stand for.
-const MOST_STEPS: usize = 1000;
-
-fn load_steps(node: &Node) -> Result<Vec<f64>> {
-    if let Value::List(items) = &node.value {
-        let factors: Vec<f64> = items.iter().map(|item| item.positive("the factor")).collect::<Result<_>>()?;
-        return match factors.last() {
-            Some(1.0) => Ok(factors),
-            _ => Err(node.refuse("the last load step is not the full load").help("end the list with 1")),
-        };
-    }
-    match usize::try_from(node.whole()?) {
-        Ok(count) if (1..=MOST_STEPS).contains(&count) => {
-            Ok((1..=count).map(|step| step as f64 / count as f64).collect())
-        }
-        _ => Err(node.refuse(format!("the number of load steps must lie between 1 and {MOST_STEPS}"))),
     }
 }
 

@@ -1,0 +1,127 @@
+//! What is measured of a result: forces, approach and contact of each pair, reactions of each body.
+
+use super::results::{All, Recovered};
+use super::shown::numbered;
+use super::stages::{Built, Done};
+use super::{balance, results};
+use crate::ddm::Status;
+use crate::model::Model;
+use crate::output::{BalanceReport, BodyReport, ReactionReport, StepPairReport, StepReport};
+use crate::problem::history::History;
+
+/// Share of the weights below which the normals of a pair cancel, so that it has no mean normal.
+const CANCELS: f64 = 1e-3;
+
+/// Names of the pairs in the order of the scene, each once.
+pub fn pair_names(built: &Built) -> Vec<String> {
+    let model = &built.discrete.model;
+    let names = (0..model.pairs.len()).map(|i| {
+        let [a, b] = built.discrete.sides(i).map(|side| &model.bodies[model.pairs[i].bodies[side]].name);
+        format!("{a}-{b}")
+    });
+    numbered(names)
+}
+
+/// Names of what holds the bodies, each once: supports, springs, rigid surfaces, body by body.
+pub fn reaction_names(built: &Built) -> Vec<String> {
+    numbered(built.discrete.bodies.iter().flat_map(|body| {
+        let all = body.supports.iter().chain(&body.springs).chain(&body.rigid);
+        all.map(|on| format!("{}:{on}", body.name))
+    }))
+}
+
+/// What holds the bodies, in the order of [`reaction_names`].
+fn reactions<'a>(bodies: impl Iterator<Item = (&'a String, BalanceReport)>) -> Vec<ReactionReport> {
+    let of_body = |(name, balance): (&String, BalanceReport)| {
+        let BalanceReport { supports, springs, rigid, .. } = balance;
+        let all = supports.into_iter().chain(springs).chain(rigid);
+        all.map(|part| ReactionReport { body: name.clone(), on: part.on, force: part.force }).collect::<Vec<_>>()
+    };
+    bodies.flat_map(of_body).collect()
+}
+
+/// The reactions in the reports of bodies, in the order of [`reaction_names`].
+pub fn reported(bodies: &[BodyReport]) -> Vec<ReactionReport> {
+    reactions(bodies.iter().map(|body| (&body.name, body.balance.clone())))
+}
+
+/// What the report says of the step that has ended, `number` of a history. Collective.
+pub fn step(
+    done: &Done,
+    history: &History,
+    number: usize,
+    iterations: usize,
+    status: &str,
+    message: String,
+) -> StepReport {
+    let recovered = results::recover(done);
+    let approaches = approaches(done, &recovered);
+    let balances = balance::gather(done, &recovered);
+    let names = done.built.discrete.bodies.iter().map(|body| &body.name);
+    let last = done.outcome.rows.last();
+    let step = &history.steps[number];
+    StepReport {
+        time: step.time,
+        factors: history.names.iter().cloned().zip(step.factors.iter().copied()).collect(),
+        status: status.to_owned(),
+        message,
+        iterations,
+        residual: last.map(|row| row.residual).filter(|residual| residual.is_finite()),
+        pairs: approaches.into_iter().enumerate().map(|(i, approach)| pair(done, i, approach)).collect(),
+        reactions: reactions(names.zip(balances)),
+    }
+}
+
+/// Forces and contact of pair `i`.
+pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
+    let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
+    let (pair, range) = (&model.pairs[i], model.range(i));
+    let (c, force) = (&layer.compression[range.clone()], &layer.force[range.clone()]);
+    let rows = &pair.resultant[discrete.sides(i)[0]];
+    let closed = || (0..pair.len()).filter(|&q| c[q] > 0.0);
+    StepPairReport {
+        force: std::array::from_fn(|k| (0..pair.len()).fold(0.0, |sum, q| sum - force[q] * rows[q][k])),
+        approach,
+        contact_length: closed().fold(0.0, |sum, q| sum + pair.weight[q]),
+        peak_pressure: layer.pressure[range].iter().copied().fold(0.0, f64::max),
+        closed: closed().count(),
+    }
+}
+
+/// How far the bodies of each pair come nearer to each other along its mean normal; collective, one message.
+pub fn approaches(done: &Done, recovered: &All) -> Vec<Option<f64>> {
+    let (discrete, model) = (&done.built.discrete, done.model());
+    let directions: Vec<Option<[f64; 3]>> = (0..model.pairs.len()).map(|i| direction(model, i)).collect();
+    let mut message = vec![0.0; model.pairs.len()];
+    for (i, &n) in directions.iter().enumerate() {
+        let Some(n) = n else { continue };
+        for (side, sign) in [(0, 1.0), (1, -1.0)] {
+            let body = model.pairs[i].bodies[side];
+            message[i] += match &recovered[body] {
+                None => 0.0,
+                Some(Err(_)) => f64::NAN,
+                Some(Ok(Recovered { state, .. })) => {
+                    let u = discrete.bodies[body].outer(state, n);
+                    sign * (0..3).map(|k| u[k] * n[k]).sum::<f64>()
+                }
+            };
+        }
+    }
+    model.exchange.sum(&mut message);
+    let finite = |(n, value): (Option<[f64; 3]>, f64)| n.map(|_| value).filter(|value| value.is_finite());
+    directions.into_iter().zip(message).map(finite).collect()
+}
+
+/// The mean normal of pair `i` from side a to side b.
+fn direction(model: &Model, i: usize) -> Option<[f64; 3]> {
+    let pair = &model.pairs[i];
+    let points = || pair.weight.iter().zip(&pair.resultant[0]);
+    let sum: [f64; 3] = std::array::from_fn(|k| points().map(|(weight, n)| weight * n[k]).sum());
+    let (size, total) = (sum.iter().map(|n| n * n).sum::<f64>().sqrt(), pair.weight.iter().sum::<f64>());
+    (size > CANCELS * total).then(|| sum.map(|n| n / size))
+}
+
+/// Whether a run that ended like this is a start for the next step.
+pub fn is_usable(status: &Status) -> bool {
+    status.is_solved() || *status == Status::IterationLimit
+}

@@ -1,0 +1,136 @@
+//! How a body moves as seen from its contact: the mean displacement of where it is loaded or held.
+
+use super::find::find_group;
+use super::part::Part;
+use crate::contact::{add, pad};
+use crate::error::Result;
+use crate::fem::{Facets, Space, assemble, surface};
+use crate::mesh::Mesh;
+use crate::problem::body::{LoadKind, SpringKind};
+
+/// Displacements of all nodes, a direction -> mean displacement of the body.
+pub type OuterMaker = Box<dyn Fn(&[f64], [f64; 3]) -> [f64; 3]>;
+
+/// Share of a force or a held direction that must point along the contact's normal for the place to count.
+const ALONG: f64 = 0.5;
+
+/// A surface or a set of nodes on which the body is loaded or held.
+struct Place {
+    /// Unit vectors: the force, or the directions that are held.
+    directions: Vec<[f64; 3]>,
+    /// Nodes with the integrals of their shape functions over the surface; 1 each where there is no surface.
+    weights: Vec<(u32, f64)>,
+    /// Whether it is a surface.
+    has_area: bool,
+}
+
+impl Place {
+    /// The nodes of a group.
+    fn new<const D: usize>(space: &Space<D>, group: &crate::mesh::Group, directions: Vec<[f64; 3]>) -> Self {
+        let facets = if group.dimension + 1 == D { Some(space.facets(group)) } else { None };
+        let areas = facets.map_or(Vec::new(), |facets| areas(space, &facets));
+        let has_area = !areas.is_empty();
+        let nodes = || space.nodes_on(group).into_iter().map(|node| (node, 1.0)).collect();
+        Self { directions, weights: if has_area { areas } else { nodes() }, has_area }
+    }
+
+    fn acts_along(&self, n: [f64; 3]) -> bool {
+        self.directions.iter().any(|d| dot(*d, n).abs() >= ALONG)
+    }
+}
+
+/// Finds where a body is loaded, and where it is held. The mean is over all surfaces with loads that push along the direction; without
+/// them over supports and springs that hold it; without these over the whole body.
+///
+/// # Errors
+/// Groups that are not there.
+pub fn outer_maker<const D: usize>(part: &Part<D>, mesh: &Mesh<D>) -> Result<OuterMaker> {
+    let (space, spec) = (&part.space, part.spec);
+    let (mut loaded, mut held) = (Vec::new(), Vec::new());
+    for load in &spec.load {
+        let group = find_group(mesh, &load.on, &[D - 1], "load")?;
+        let force = match load.kind {
+            LoadKind::Force { total, .. } => total,
+            _ => part.resultant(load, mesh)?,
+        };
+        loaded.push(Place::new(space, group, unit(force).into_iter().collect()));
+    }
+    let axes = |c: usize| std::array::from_fn(|k| if k == c { 1.0 } else { 0.0 });
+    for fix in &spec.fix {
+        let group = find_group(mesh, &fix.on, &(0..=D).rev().collect::<Vec<_>>(), "support")?;
+        let components = (0..D).filter(|&c| fix.value[c].is_some()).map(axes);
+        let normal = fix.normal.as_ref().and_then(|_| normal(space, group));
+        held.push(Place::new(space, group, components.chain(normal).collect()));
+    }
+    for spring in &spec.spring {
+        let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
+        let directions = match &spring.kind {
+            SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axes).collect(),
+            SpringKind::Normal(_) => normal(space, group).into_iter().collect(),
+        };
+        held.push(Place::new(space, group, directions));
+    }
+    let whole = if loaded.is_empty() && held.is_empty() { Some(volumes(space)) } else { None };
+    let nodes = space.nodes.len() as u32;
+    Ok(Box::new(move |u, n| {
+        let chosen = |places: &[Place]| {
+            let along = || places.iter().filter(|place| place.acts_along(n));
+            let surfaces = along().any(|place| place.has_area);
+            let chosen = along().filter(|place| place.has_area || !surfaces);
+            mean::<D>(u, chosen.flat_map(|place| place.weights.iter().copied()))
+        };
+        let whole = || match &whole {
+            Some(weights) => mean::<D>(u, weights.iter().copied()),
+            None => mean::<D>(u, (0..nodes).map(|node| (node, 1.0))),
+        };
+        chosen(&loaded).or_else(|| chosen(&held)).or_else(whole).unwrap_or_default()
+    }))
+}
+
+/// A mean of nodal displacements; none without nodes.
+fn mean<const D: usize>(u: &[f64], weights: impl Iterator<Item = (u32, f64)>) -> Option<[f64; 3]> {
+    let (mut sum, mut total) = ([0.0; 3], 0.0);
+    for (node, weight) in weights {
+        add(&mut sum, pad(std::array::from_fn::<f64, D, _>(|c| weight * u[D * node as usize + c])));
+        total += weight;
+    }
+    (total > 0.0).then(|| sum.map(|sum| sum / total))
+}
+
+/// Integrals of the shape functions over a surface.
+fn areas<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> Vec<(u32, f64)> {
+    let mut all = vec![0.0; space.dofs()];
+    surface::surface_load(space, facets, &|_, _| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }), &mut all);
+    first_components::<D>(&all)
+}
+
+/// Integrals of the shape functions over the body.
+fn volumes<const D: usize>(space: &Space<D>) -> Vec<(u32, f64)> {
+    let mut all = vec![0.0; space.dofs()];
+    assemble::body_force(space, &|_| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }), &mut all);
+    first_components::<D>(&all)
+}
+
+fn first_components<const D: usize>(all: &[f64]) -> Vec<(u32, f64)> {
+    let numbers = all.iter().step_by(D).enumerate().filter(|(_, weight)| **weight != 0.0);
+    numbers.map(|(node, &weight)| (node as u32, weight)).collect()
+}
+
+/// Mean normal of a surface.
+fn normal<const D: usize>(space: &Space<D>, group: &crate::mesh::Group) -> Option<[f64; 3]> {
+    if group.dimension + 1 != D {
+        return None;
+    }
+    let mut sum = [0.0; 3];
+    space.facets(group).normals(space).into_iter().for_each(|n| add(&mut sum, pad(n)));
+    unit(sum)
+}
+
+fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
+    let size = dot(v, v).sqrt();
+    (size > 0.0).then(|| v.map(|v| v / size))
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|c| a[c] * b[c]).sum()
+}

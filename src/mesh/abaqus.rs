@@ -1,0 +1,318 @@
+//! Input files of Abaqus and CalculiX (`.inp`) as Gmsh's format 2.2, which Debian's Gmsh reads: nodes, elements, and named sets.
+//!
+//! Element sets become groups of cells or facets, surfaces (`*SURFACE, TYPE=ELEMENT`) groups of facets, and node sets groups of points.
+//! Names are written small, with `_` for what no name has. All other keywords are passed over.
+
+use crate::error::{Error, Result};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
+
+/// What is known of a kind of element: Gmsh's number, and the vertices of its faces S1, S2, ... in the order of Abaqus.
+struct Kind {
+    number: u8,
+    nodes: usize,
+    dimension: usize,
+    faces: &'static [&'static [usize]],
+}
+
+const TRIANGLE: &[&[usize]] = &[&[0, 1], &[1, 2], &[2, 0]];
+const TRIANGLE_2: &[&[usize]] = &[&[0, 1, 3], &[1, 2, 4], &[2, 0, 5]];
+const QUADRANGLE: &[&[usize]] = &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]];
+const TETRAHEDRON: &[&[usize]] = &[&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0]];
+const TETRAHEDRON_2: &[&[usize]] =
+    &[&[0, 1, 2, 4, 5, 6], &[0, 3, 1, 7, 8, 4], &[1, 3, 2, 8, 9, 5], &[2, 3, 0, 9, 7, 6]];
+const PRISM: &[&[usize]] = &[&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]];
+const HEXAHEDRON: &[&[usize]] =
+    &[&[0, 1, 2, 3], &[4, 7, 6, 5], &[0, 4, 5, 1], &[1, 5, 6, 2], &[2, 6, 7, 3], &[3, 7, 4, 0]];
+
+impl Kind {
+    /// The kind that a TYPE names, if it can be used.
+    fn of(name: &str) -> Option<Kind> {
+        let kind = |number, nodes, dimension, faces| Some(Kind { number, nodes, dimension, faces });
+        let (family, digits) = match name.find(|c: char| c.is_ascii_digit()) {
+            // C3D8R, M3D4: the number of nodes stands behind the D
+            _ if name.starts_with("C3D") || name.starts_with("M3D") || name.starts_with("SFM3D") => {
+                name.split_at(name.find('D')? + 1)
+            }
+            Some(at) => name.split_at(at),
+            None => return None,
+        };
+        let nodes: String = digits.chars().take_while(char::is_ascii_digit).collect();
+        match (family, nodes.as_str()) {
+            ("C3D", "4") => kind(4, 4, 3, TETRAHEDRON),
+            ("C3D", "10") => kind(11, 10, 3, TETRAHEDRON_2),
+            ("C3D", "6") => kind(6, 6, 3, PRISM),
+            ("C3D", "8") => kind(5, 8, 3, HEXAHEDRON),
+            ("CPS" | "CPE" | "CAX" | "S" | "M3D" | "SFM3D" | "STRI", "3") => kind(2, 3, 2, TRIANGLE),
+            ("CPS" | "CPE" | "CAX" | "S" | "M3D" | "SFM3D", "6") | ("STRI", "65") => kind(9, 6, 2, TRIANGLE_2),
+            ("CPS" | "CPE" | "CAX" | "S" | "M3D" | "SFM3D", "4") => kind(3, 4, 2, QUADRANGLE),
+            _ => None,
+        }
+    }
+
+    /// Gmsh's number for a face of so many nodes.
+    fn facet(&self, nodes: usize) -> u8 {
+        match (self.dimension, nodes) {
+            (2, 2) => 1,
+            (2, _) => 8,
+            (_, 3) => 2,
+            (_, 4) => 3,
+            _ => 9,
+        }
+    }
+}
+
+/// An element: its kind, and its nodes.
+type Element = (usize, Vec<u64>);
+
+/// The same with Gmsh's number of its kind.
+type Numbered = (u8, Vec<u64>);
+
+/// What a file holds.
+#[derive(Default)]
+struct Model {
+    nodes: BTreeMap<u64, [f64; 3]>,
+    elements: BTreeMap<u64, Element>,
+    kinds: Vec<Kind>,
+    /// Elements, nodes, and faces (element or set, face) by the names of their sets.
+    element_sets: BTreeMap<String, Vec<u64>>,
+    node_sets: BTreeMap<String, Vec<u64>>,
+    surfaces: BTreeMap<String, Vec<(u64, usize)>>,
+}
+
+/// The data lines that follow a keyword.
+enum Data {
+    Nodes(Option<String>),
+    Elements { kind: usize, set: Option<String>, open: Vec<u64> },
+    Set { name: String, nodes: bool, generate: bool },
+    Surface(String),
+    Other,
+}
+
+/// The file in Gmsh's format 2.2.
+///
+/// # Errors
+/// Lines that are none of Abaqus, parts and assemblies, elements of other kinds, sets of what is not there; with the line.
+pub fn convert(path: &Path, text: &str) -> Result<String> {
+    let mut model = Model::default();
+    let mut data = Data::Other;
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with("**") {
+            continue;
+        }
+        let refuse = |message: String| Error::mesh(path, Some(number + 1), message);
+        data = match line.strip_prefix('*') {
+            Some(keyword) => model.begin(keyword).map_err(refuse)?,
+            None => model.read(data, line).map_err(refuse)?,
+        };
+    }
+    if model.nodes.is_empty() || model.elements.is_empty() {
+        return Err(Error::mesh(path, None, "this file has no nodes or no elements")
+            .help("an input file of Abaqus or CalculiX has them under *NODE and *ELEMENT"));
+    }
+    model.write().map_err(|message| Error::mesh(path, None, message))
+}
+
+/// A name as groups have it.
+fn name(word: &str) -> String {
+    let small = word.trim().trim_matches('"').to_ascii_lowercase();
+    small.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+}
+
+fn count<T: std::str::FromStr>(word: &str) -> std::result::Result<T, String> {
+    word.trim().parse().map_err(|_| format!("`{}` is no number", word.trim()))
+}
+
+type Said<T> = std::result::Result<T, String>;
+
+impl Model {
+    /// Opens a keyword.
+    fn begin(&mut self, line: &str) -> Said<Data> {
+        let mut words = line.split(',').map(str::trim);
+        let keyword = words.next().unwrap_or_default().to_ascii_uppercase();
+        let options: Vec<(String, String)> = words
+            .map(|word| word.split_once('=').unwrap_or((word, "")))
+            .map(|(key, value)| (key.trim().to_ascii_uppercase(), value.trim().to_owned()))
+            .collect();
+        let option = |key: &str| options.iter().find(|(known, _)| known == key).map(|(_, value)| value.as_str());
+        let set = |key: &str| option(key).map(name).ok_or_else(|| format!("*{keyword} has no {key}"));
+        Ok(match keyword.as_str() {
+            "NODE" => Data::Nodes(option("NSET").map(name)),
+            "ELEMENT" => {
+                let kind = option("TYPE").unwrap_or_default().to_ascii_uppercase();
+                let known = Kind::of(&kind).ok_or_else(|| {
+                    format!(
+                        "elements of type `{kind}` cannot be used: solids of order 1, and triangles and tetrahedra of order 2, \
+                         of CPS, CPE, CAX and C3D can"
+                    )
+                })?;
+                self.kinds.push(known);
+                Data::Elements { kind: self.kinds.len() - 1, set: option("ELSET").map(name), open: Vec::new() }
+            }
+            "NSET" | "ELSET" => {
+                let generate = option("GENERATE").is_some();
+                Data::Set { name: set(&keyword)?, nodes: keyword == "NSET", generate }
+            }
+            "SURFACE" if option("TYPE").is_none_or(|kind| kind.eq_ignore_ascii_case("ELEMENT")) => {
+                Data::Surface(set("NAME")?)
+            }
+            "PART" | "INSTANCE" | "ASSEMBLY" | "INCLUDE" | "NGEN" | "ELGEN" => {
+                return Err(format!(
+                    "*{keyword} is not read: write a flat file of *NODE, *ELEMENT and sets (in Abaqus/CAE: do not use parts and \
+                     assemblies in input files)"
+                ));
+            }
+            _ => Data::Other,
+        })
+    }
+
+    /// Reads a data line.
+    fn read(&mut self, data: Data, line: &str) -> Said<Data> {
+        let continues = line.ends_with(',');
+        let words: Vec<&str> = line.trim_end_matches(',').split(',').map(str::trim).collect();
+        match data {
+            Data::Nodes(set) => {
+                let tag = count(words[0])?;
+                let mut x = [0.0; 3];
+                for (x, word) in x.iter_mut().zip(&words[1..]) {
+                    *x = if word.is_empty() { 0.0 } else { count(word)? };
+                }
+                self.nodes.insert(tag, x);
+                set.iter().for_each(|set| self.node_sets.entry(set.clone()).or_default().push(tag));
+                Ok(Data::Nodes(set))
+            }
+            Data::Elements { kind, set, mut open } => {
+                for word in &words {
+                    open.push(count(word)?);
+                }
+                let nodes = self.kinds[kind].nodes;
+                if open.len() < nodes + 1 && continues {
+                    return Ok(Data::Elements { kind, set, open });
+                }
+                if open.len() != nodes + 1 {
+                    return Err(format!("an element has {nodes} nodes here, not {}", open.len() - 1));
+                }
+                let tag = open.remove(0);
+                set.iter().for_each(|set| self.element_sets.entry(set.clone()).or_default().push(tag));
+                if self.elements.insert(tag, (kind, open)).is_some() {
+                    return Err(format!("the element {tag} stands twice"));
+                }
+                Ok(Data::Elements { kind, set, open: Vec::new() })
+            }
+            Data::Set { name: set, nodes, generate } => {
+                let sets = if nodes { &mut self.node_sets } else { &mut self.element_sets };
+                let mut members = Vec::new();
+                if generate {
+                    let [first, last] = [count::<u64>(words[0])?, count(words.get(1).copied().unwrap_or_default())?];
+                    let step =
+                        words.get(2).filter(|word| !word.is_empty()).map_or(Ok(1), |word| count::<usize>(word))?;
+                    members.extend((first..=last).step_by(step.max(1)));
+                } else {
+                    for word in words.iter().filter(|word| !word.is_empty()) {
+                        match word.parse() {
+                            Ok(tag) => members.push(tag),
+                            Err(_) => members.extend(sets.get(&name(word)).ok_or(format!("there is no set `{word}`"))?),
+                        }
+                    }
+                }
+                sets.entry(set.clone()).or_default().extend(members);
+                Ok(Data::Set { name: set, nodes, generate })
+            }
+            Data::Surface(surface) => {
+                let face = words.get(1).and_then(|word| word.strip_prefix(['S', 's'])?.parse::<usize>().ok());
+                let Some(face) = face.filter(|face| (1..=6).contains(face)) else {
+                    return Err(format!("`{line}` is no face of elements such as `12, S1`"));
+                };
+                let one = words[0].parse().map(|tag| vec![tag]).ok();
+                let all = one.or_else(|| self.element_sets.get(&name(words[0])).cloned());
+                let all = all.ok_or_else(|| format!("there is no element set `{}`", words[0]))?;
+                self.surfaces.entry(surface.clone()).or_default().extend(all.into_iter().map(|tag| (tag, face)));
+                Ok(Data::Surface(surface))
+            }
+            Data::Other => Ok(Data::Other),
+        }
+    }
+
+    /// All groups, each a physical one on an entity of its own: what is in several groups is written for each.
+    fn write(&self) -> Said<String> {
+        let mut groups: Vec<(usize, &str, Vec<Numbered>)> = Vec::new();
+        for (set, tags) in &self.element_sets {
+            let mut of_dimension: BTreeMap<usize, Vec<Numbered>> = BTreeMap::new();
+            for tag in tags {
+                let (kind, nodes) = self
+                    .elements
+                    .get(tag)
+                    .ok_or_else(|| format!("`{set}` has an element {tag}, which is not there"))?;
+                let kind = &self.kinds[*kind];
+                let mut nodes = nodes.clone();
+                if kind.number == 11 {
+                    nodes.swap(8, 9);
+                }
+                of_dimension.entry(kind.dimension).or_default().push((kind.number, nodes));
+            }
+            if of_dimension.len() > 1 {
+                return Err(format!("the element set `{set}` has elements of several dimensions"));
+            }
+            groups.extend(of_dimension.into_iter().map(|(dimension, elements)| (dimension, set.as_str(), elements)));
+        }
+        for (surface, faces) in &self.surfaces {
+            let mut facets = Vec::new();
+            let mut dimension = 0;
+            for &(tag, face) in faces {
+                let (kind, nodes) = self
+                    .elements
+                    .get(&tag)
+                    .ok_or_else(|| format!("`{surface}` has a face of element {tag}, which is not there"))?;
+                let kind = &self.kinds[*kind];
+                let face = kind
+                    .faces
+                    .get(face - 1)
+                    .ok_or_else(|| format!("element {tag} in `{surface}` has no face S{face}"))?;
+                dimension = kind.dimension - 1;
+                facets.push((kind.facet(face.len()), face.iter().map(|&at| nodes[at]).collect()));
+            }
+            groups.push((dimension, surface, facets));
+        }
+        for (set, nodes) in &self.node_sets {
+            groups.push((0, set, nodes.iter().map(|&node| (15, vec![node])).collect()));
+        }
+        groups.retain(|(.., elements)| !elements.is_empty());
+        let mut used: Vec<&str> = groups.iter().map(|(_, name, _)| *name).collect();
+        used.sort_unstable();
+        // an element set and a node set may have one name: cells first
+        let is_twice = |name: &str| used.windows(2).any(|pair| pair[0] == name && pair[1] == name);
+        let mut text = String::from("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n");
+        let _ = writeln!(text, "$PhysicalNames\n{}", groups.len());
+        for (tag, (dimension, name, _)) in groups.iter().enumerate() {
+            let suffix = if *dimension == 0 && is_twice(name) { "_nodes" } else { "" };
+            let _ = writeln!(text, "{dimension} {} \"{name}{suffix}\"", tag + 1);
+        }
+        let _ = writeln!(text, "$EndPhysicalNames\n$Nodes\n{}", self.nodes.len());
+        for (tag, [x, y, z]) in &self.nodes {
+            let _ = writeln!(text, "{tag} {x:?} {y:?} {z:?}");
+        }
+        let total: usize = groups.iter().map(|(.., elements)| elements.len()).sum();
+        let _ = writeln!(text, "$EndNodes\n$Elements\n{total}");
+        let mut number = 0;
+        for (tag, (.., elements)) in groups.iter().enumerate() {
+            for (kind, nodes) in elements {
+                number += 1;
+                let _ = write!(text, "{number} {kind} 2 {0} {0}", tag + 1);
+                for node in nodes {
+                    if !self.nodes.contains_key(node) {
+                        return Err(format!(
+                            "an element of `{}` has the node {node}, which is not there",
+                            groups[tag].1
+                        ));
+                    }
+                    let _ = write!(text, " {node}");
+                }
+                text.push('\n');
+            }
+        }
+        text.push_str("$EndElements\n");
+        Ok(text)
+    }
+}

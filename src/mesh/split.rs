@@ -1,0 +1,147 @@
+//! Quadrangles, hexahedra, prisms and pyramids as triangles and tetrahedra.
+//!
+//! Every cell is the cone from its vertex of the smallest number over the faces without that vertex, and a quadrangle the cone from its
+//! smallest vertex over the edges without it. Which diagonal a quadrangle gets depends on the numbers of its vertices alone, so that
+//! cells of any kind agree on the faces that they share.
+
+/// Vertices of a face, or of an edge of a quadrangle.
+type Face = &'static [usize];
+
+/// A kind of cell that is made of simplices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Split {
+    /// Dimension, 2 or 3.
+    pub dimension: usize,
+    /// Vertices.
+    pub stride: usize,
+    faces: &'static [Face],
+}
+
+const EDGES: [Face; 4] = [&[0, 1], &[1, 2], &[2, 3], &[3, 0]];
+
+const HEXAHEDRON: [Face; 6] =
+    [&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
+
+const PRISM: [Face; 5] = [&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]];
+
+const PYRAMID: [Face; 5] = [&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
+
+impl Split {
+    /// The cells that an element type number of Gmsh stands for, if they are linear and no simplices.
+    pub fn of_type(number: i32) -> Option<Split> {
+        let (dimension, stride, faces): (_, _, &[Face]) = match number {
+            3 => (2, 4, &EDGES),
+            5 => (3, 8, &HEXAHEDRON),
+            6 => (3, 6, &PRISM),
+            7 => (3, 5, &PYRAMID),
+            _ => return None,
+        };
+        Some(Split { dimension, stride, faces })
+    }
+
+    /// The simplices of a cell, `dimension + 1` vertices each, oriented anyhow. Those of vertices that were drawn into one are left out.
+    pub fn simplices(&self, cell: &[u32]) -> Vec<u32> {
+        let corners: Vec<Vec<u32>> = self.faces.iter().map(|face| face.iter().map(|&at| cell[at]).collect()).collect();
+        cone(cell, &corners).into_iter().filter(|simplex| all_differ(simplex)).flatten().collect()
+    }
+}
+
+/// The cone from the smallest vertex of a cell over its faces without it.
+fn cone(cell: &[u32], faces: &[Vec<u32>]) -> Vec<Vec<u32>> {
+    let Some(&apex) = cell.iter().min() else { return Vec::new() };
+    let mut simplices = Vec::new();
+    for face in faces.iter().filter(|face| !face.contains(&apex)) {
+        let parts = if face.len() == 4 {
+            let edges: Vec<Vec<u32>> = EDGES.iter().map(|edge| edge.iter().map(|&at| face[at]).collect()).collect();
+            cone(face, &edges)
+        } else {
+            vec![face.clone()]
+        };
+        simplices.extend(parts.into_iter().map(|part| [&[apex][..], &part].concat()));
+    }
+    simplices
+}
+
+fn all_differ(simplex: &[u32]) -> bool {
+    simplex.iter().enumerate().all(|(at, vertex)| !simplex[..at].contains(vertex))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::simplex::measure;
+    use std::collections::BTreeMap;
+
+    /// Corners of the unit cube in Gmsh's order.
+    const CUBE: [[f64; 3]; 8] = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [1.0, 0.0, 1.0],
+        [1.0, 1.0, 1.0],
+        [0.0, 1.0, 1.0],
+    ];
+
+    /// Six times the volume of the pieces, and how often each triangle is a face of one.
+    fn pieces(kind: i32, cell: &[u32], points: &[[f64; 3]]) -> (f64, BTreeMap<Vec<u32>, usize>) {
+        let (mut volume, mut faces) = (0.0, BTreeMap::new());
+        for tetrahedron in Split::of_type(kind).unwrap().simplices(cell).chunks_exact(4) {
+            volume += measure(&[0, 1, 2, 3].map(|at| points[tetrahedron[at] as usize]), 3).abs();
+            for left in 0..4 {
+                let mut face: Vec<u32> = tetrahedron.iter().copied().filter(|v| *v != tetrahedron[left]).collect();
+                face.sort_unstable();
+                *faces.entry(face).or_insert(0) += 1;
+            }
+        }
+        (volume, faces)
+    }
+
+    /// However the vertices are numbered, the pieces fill the cell, and those of two cells share the triangles of their common face.
+    #[test]
+    fn pieces_fill_cells_and_fit_across_faces() {
+        let mut seed = 7_u64;
+        for _ in 0..500 {
+            let mut order: Vec<u32> = (0..12).collect();
+            for at in (1..12).rev() {
+                seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                order.swap(at, (seed >> 33) as usize % (at + 1));
+            }
+            // a cube, and beside its face x = 1 a prism of vertices 1 2 6 5 8 9
+            let mut points = vec![[0.0; 3]; 12];
+            let named = [&CUBE[..], &[[2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [3.0, 0.5, 0.5], [0.0; 3]]].concat();
+            order.iter().zip(named).for_each(|(&at, x)| points[at as usize] = x);
+            let of = |vertices: &[usize]| vertices.iter().map(|&v| order[v]).collect::<Vec<_>>();
+            let (cube, of_cube) = pieces(5, &of(&[0, 1, 2, 3, 4, 5, 6, 7]), &points);
+            assert!((cube - 6.0).abs() < 1e-12);
+            let (prism, of_prism) = pieces(6, &of(&[1, 8, 5, 2, 9, 6]), &points);
+            assert!((prism - 3.0).abs() < 1e-12);
+            let (pyramid, of_pyramid) = pieces(7, &of(&[1, 2, 6, 5, 10]), &points);
+            assert!((pyramid - 4.0).abs() < 1e-12);
+            let common = of(&[1, 2, 5, 6]);
+            let shared = |faces: &BTreeMap<Vec<u32>, usize>| -> Vec<Vec<u32>> {
+                faces.keys().filter(|face| face.iter().all(|v| common.contains(v))).cloned().collect()
+            };
+            assert_eq!((shared(&of_cube).len(), shared(&of_cube)), (2, shared(&of_prism)));
+            assert_eq!(shared(&of_cube), shared(&of_pyramid));
+            // inside every triangle has two sides, on the boundary one: 12 triangles of a cube
+            assert_eq!(of_cube.values().filter(|&&count| count == 1).count(), 12);
+            assert!(of_cube.values().all(|&count| count <= 2));
+            // and a quadrangle of the surface has the same diagonal
+            let triangles = Split::of_type(3).unwrap().simplices(&of(&[1, 2, 6, 5]));
+            for triangle in triangles.chunks_exact(3) {
+                let mut triangle = triangle.to_vec();
+                triangle.sort_unstable();
+                assert!(shared(&of_cube).contains(&triangle));
+            }
+        }
+    }
+
+    #[test]
+    fn a_hexahedron_with_an_edge_drawn_into_a_point_is_a_prism() {
+        let points = [&CUBE[..]].concat();
+        let (volume, _) = pieces(5, &[0, 1, 2, 2, 4, 5, 6, 6], &points);
+        assert!((volume - 3.0).abs() < 1e-12);
+    }
+}

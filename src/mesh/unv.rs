@@ -1,0 +1,99 @@
+//! Universal files (`.unv`) as Gmsh 4.8 can read them: it passes over groups of dataset 2467, which most programs write, and crashes on
+//! members of groups that are no elements of the file.
+
+use std::collections::HashSet;
+use std::fmt::Write;
+
+/// Datasets of groups with four numbers a member; Gmsh reads the second.
+const GROUPS: [&str; 5] = ["2467", "2477", "2452", "2435", "2432"];
+
+/// Kinds of elements with one more line: beams.
+const BEAMS: [&str; 5] = ["11", "21", "22", "23", "24"];
+
+/// Code of members that are elements.
+const ELEMENT: &str = "8";
+
+/// The file with groups of elements that are there, and no others.
+pub fn readable(text: &str) -> String {
+    let lines: Vec<&str> = text.lines().collect();
+    let mut elements = HashSet::new();
+    for dataset in datasets(&lines).filter(|dataset| dataset.first().map(|line| line.trim()) == Some("2412")) {
+        let mut at = 1;
+        while let Some(words) = dataset.get(at).map(|line| line.split_whitespace().collect::<Vec<_>>()) {
+            let (Some(label), Some(kind)) = (words.first(), words.get(1)) else { break };
+            let nodes: usize = words.get(5).and_then(|word| word.parse().ok()).unwrap_or(0);
+            elements.insert((*label).to_owned());
+            at += 1 + usize::from(BEAMS.contains(kind)) + nodes.div_ceil(8);
+        }
+    }
+    let mut made = String::with_capacity(text.len());
+    for dataset in datasets(&lines) {
+        made += "    -1\n";
+        match dataset.split_first() {
+            Some((number, groups)) if GROUPS.contains(&number.trim()) => {
+                made += "  2477\n";
+                write_groups(groups, &elements, &mut made);
+            }
+            _ => dataset.iter().for_each(|line| {
+                made += line;
+                made.push('\n');
+            }),
+        }
+        made += "    -1\n";
+    }
+    made
+}
+
+/// Lines between each two of `-1`.
+fn datasets<'a>(lines: &'a [&'a str]) -> impl Iterator<Item = &'a [&'a str]> {
+    lines.split(|line| line.trim() == "-1").filter(|dataset| dataset.iter().any(|line| !line.trim().is_empty()))
+}
+
+/// Groups with the members that are elements of the file.
+fn write_groups(mut lines: &[&str], elements: &HashSet<String>, made: &mut String) {
+    while let [head, name, rest @ ..] = lines {
+        let head: Vec<&str> = head.split_whitespace().collect();
+        let (Some(number), Some(count)) = (head.first(), head.last().and_then(|word| word.parse::<usize>().ok()))
+        else {
+            return;
+        };
+        let (members, after) = rest.split_at(count.div_ceil(2).min(rest.len()));
+        lines = after;
+        let words: Vec<&str> = members.iter().flat_map(|line| line.split_whitespace()).collect();
+        let known: Vec<&str> = words
+            .chunks(4)
+            .filter(|member| member[0] == ELEMENT && member.get(1).is_some_and(|tag| elements.contains(*tag)))
+            .map(|member| member[1])
+            .collect();
+        if known.is_empty() {
+            continue;
+        }
+        let _ = writeln!(made, "{number:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}", 0, 0, 0, 0, 0, 0, known.len());
+        let _ = writeln!(made, "{}", name.trim());
+        for pair in known.chunks(2) {
+            pair.iter().for_each(|tag| {
+                let _ = write!(made, "{ELEMENT:>10}{tag:>10}{:>10}{:>10}", 0, 0);
+            });
+            made.push('\n');
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::readable;
+
+    #[test]
+    fn groups_keep_the_elements_that_are_there() {
+        let text = "    -1\n  2412\n         1        11         0         1         7         2\n 0 1 1\n 1 2\n\
+                    \x20        2        41         2         1         7         3\n 1 2 3\n    -1\n    -1\n  2467\n\
+                    \x201 0 0 0 0 0 0 3\nLow\n 8 2 0 0 7 1 0 0\n 8 9 0 0\n 2 0 0 0 0 0 0 1\nNodes\n 7 1 0 0\n\
+                    \x203 0 0 0 0 0 0 1\nBeam\n 8 1 0 0\n    -1\n";
+        let made = readable(text);
+        assert!(made.contains("  2477\n") && !made.contains("2467") && !made.contains("Nodes"), "{made}");
+        let groups: Vec<&str> = made.lines().skip_while(|line| line.trim() != "2477").skip(1).collect();
+        assert_eq!(groups.len(), 7, "{made}");
+        assert_eq!([groups[1], groups[4]], ["Low", "Beam"]);
+        assert_eq!(groups[2].split_whitespace().collect::<Vec<_>>(), ["8", "2", "0", "0"]);
+    }
+}

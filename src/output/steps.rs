@@ -1,0 +1,137 @@
+//! `steps.csv`: one row a load step, written as it ends; and the columns of forces that other tables share.
+
+use super::folder::{Folder, failed};
+use super::format::field;
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::PathBuf;
+
+/// A load step.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct StepReport {
+    /// Time in the history.
+    pub time: f64,
+    /// Factors of loads and prescribed displacements by name.
+    pub factors: BTreeMap<String, f64>,
+    /// How it ended, as [`Report::status`](super::Report::status).
+    pub status: String,
+    /// The status in words.
+    pub message: String,
+    /// Updates of the iterate in it.
+    pub iterations: usize,
+    /// Relative residual at its end.
+    pub residual: Option<f64>,
+    /// Its pairs in the order of the scene.
+    pub pairs: Vec<StepPairReport>,
+    /// Forces of supports, springs and rigid surfaces, body by body.
+    pub reactions: Vec<ReactionReport>,
+}
+
+/// A pair of surfaces at the end of a load step.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct StepPairReport {
+    /// Contact force on the side that stands first in the scene (x, y, z).
+    pub force: [f64; 3],
+    /// How far the bodies come nearer to each other; none where normals cancel.
+    pub approach: Option<f64>,
+    /// Length (area) with c > 0.
+    pub contact_length: f64,
+    /// Largest pressure.
+    pub peak_pressure: f64,
+    /// Points with c > 0.
+    pub closed: usize,
+}
+
+/// The force of a support, a spring or a rigid surface on its body.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReactionReport {
+    /// Name of the body.
+    pub body: String,
+    /// Physical group.
+    pub on: String,
+    /// The force (x, y, z).
+    pub force: [f64; 3],
+}
+
+/// Names of the components of a vector: `what_x name` and so on, as many as the scene has dimensions.
+pub fn vector_columns(what: &str, name: &str, dimension: usize) -> Vec<String> {
+    ["x", "y", "z"][..dimension].iter().map(|axis| format!("{what}_{axis} {name}")).collect()
+}
+
+/// Its fields.
+pub fn vector_fields(vector: &[f64; 3], dimension: usize) -> impl Iterator<Item = String> {
+    vector[..dimension].iter().map(|&value| field(value))
+}
+
+/// Writes one line of `steps.csv` for each load step. Every line reaches the file at once.
+pub struct StepTable {
+    path: PathBuf,
+    csv: csv::Writer<File>,
+    dimension: usize,
+    rows: usize,
+    failure: Option<Error>,
+}
+
+impl StepTable {
+    /// Opens `steps.csv` and writes its header: names of `factors`, of `pairs`, and of `reactions`, each once.
+    ///
+    /// # Errors
+    /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
+    pub fn create(
+        folder: &Folder,
+        factors: &[String],
+        pairs: &[String],
+        reactions: &[String],
+        dimension: usize,
+    ) -> Result<Self> {
+        let (path, file) = folder.open("steps.csv")?;
+        let csv = csv::Writer::from_writer(file);
+        let mut header = vec!["step".to_owned(), "time".to_owned()];
+        header.extend_from_slice(factors);
+        header.extend(["status", "iterations", "residual"].map(str::to_owned));
+        for pair in pairs {
+            header.extend(vector_columns("force", pair, dimension));
+            let numbers = ["approach", "contact_length", "peak_pressure", "closed"];
+            header.extend(numbers.map(|what| format!("{what} {pair}")));
+        }
+        header.extend(reactions.iter().flat_map(|name| vector_columns("reaction", name, dimension)));
+        let mut table = Self { path, csv, dimension, rows: 0, failure: None };
+        table.line(&header);
+        table.failure.take().map_or(Ok(table), Err)
+    }
+
+    /// Writes a step; `names` are those of its factors in the order of the header.
+    pub fn row(&mut self, names: &[String], step: &StepReport) {
+        self.rows += 1;
+        let number = |value: Option<f64>| value.map_or(String::new(), field);
+        let mut line = vec![self.rows.to_string(), field(step.time)];
+        line.extend(names.iter().map(|name| number(step.factors.get(name).copied())));
+        line.extend([step.status.clone(), step.iterations.to_string(), number(step.residual)]);
+        for pair in &step.pairs {
+            line.extend(vector_fields(&pair.force, self.dimension));
+            line.extend([number(pair.approach), field(pair.contact_length), field(pair.peak_pressure)]);
+            line.push(pair.closed.to_string());
+        }
+        line.extend(step.reactions.iter().flat_map(|reaction| vector_fields(&reaction.force, self.dimension)));
+        self.line(&line);
+    }
+
+    /// Ends the file and returns its path.
+    ///
+    /// # Errors
+    /// The first failure to write a row: later rows were dropped then.
+    pub fn finish(self) -> Result<PathBuf> {
+        self.failure.map_or(Ok(self.path), Err)
+    }
+
+    fn line(&mut self, fields: &[String]) {
+        // after a failure the file ends with whole rows
+        if self.failure.is_some() {
+            return;
+        }
+        let written = self.csv.write_record(fields).map_err(Into::into).and_then(|()| self.csv.flush());
+        self.failure = written.err().map(|cause| failed(&self.path, &cause));
+    }
+}
