@@ -228,7 +228,7 @@ fn a_hundred_thousand_triangles_take_less_than_five_megabytes() {
     };
     let folder = tempfile::tempdir().expect("a folder");
     let mut file = fs::File::create(folder.path().join("slab.vtu")).expect("a file");
-    field.write(&mut file).expect("a grid");
+    field.write(Default::default(), &mut file).expect("a grid");
     let report = json!({
         "title": "slab", "status": "converged", "message": "", "settings": { "dimension": 3, "body": [], "contact": [] }, "pairs": [],
         "bodies": [{ "name": "slab" }], "files": ["slab.vtu"], "times": { "total": 1.0 }, "inner_times": {},
