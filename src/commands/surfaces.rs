@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::output::{Axis, Folder, LISTED, Plot, Series, Style, safe_name, sci};
 use crate::problem::contact::ContactSpec;
 use crate::problem::layer::{AsperitySpec, Depths, LayerSpec};
+use crate::problem::units::label;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -172,7 +173,7 @@ pub fn json(built: &Built) -> (Value, Vec<Value>) {
 /// Files that cannot be written.
 pub fn draw(built: &Built, folder: &Folder) -> Result<()> {
     for (name, data) in in_contacts(built) {
-        if let Some(plot) = profiles(&data) {
+        if let Some(plot) = profiles(&data, built) {
             folder.write(&format!("data-{}.svg", safe_name(&name)), |out| plot.write(out))?;
         }
     }
@@ -184,9 +185,13 @@ pub fn draw(built: &Built, folder: &Folder) -> Result<()> {
     for (pair, stem) in stems.iter().enumerate().take(LISTED) {
         if let LayerSpec::Asperities(spec) = &built.discrete.contacts[pair].spec.layer {
             let points = law(built, pair, spec, DRAWN).into_iter().map(|[c, p, _]| (c, p)).collect();
-            let axis = |label: &str| Axis { label: label.to_owned(), log: false };
-            let series = vec![Series::new("", points, Style::Line)];
-            let plot = Plot { title: described(spec), x: axis("compression"), y: axis("pressure"), series };
+            let units = built.scene.units.as_ref();
+            let plot = Plot {
+                title: format!("Layer of asperities of {}", pairs[pair].surfaces.join(" - ")),
+                x: Axis { label: label("compression", units.map(|units| units.length)), log: false },
+                y: Axis { label: label("pressure", units.map(|units| units.stress)), log: false },
+                series: vec![Series::new("", points, Style::Line)],
+            };
             folder.write(&format!("{stem}.svg"), |out| plot.write(out))?;
         }
     }
@@ -194,17 +199,19 @@ pub fn draw(built: &Built, folder: &Folder) -> Result<()> {
 }
 
 /// Heights along the lines through the middle of a grid.
-fn profiles(data: &Data) -> Option<Plot> {
+fn profiles(data: &Data, built: &Built) -> Option<Plot> {
     let grid = data.grid()?;
     let [columns, rows] = grid.axes.map(|axis| axis.count);
     let place = |axis: usize, k: usize| grid.axes[axis].origin + grid.axes[axis].spacing * k as f64;
     let along = (0..columns).map(|i| (place(0, i), grid.values[i + columns * (rows / 2)])).collect();
-    let label = if rows > 1 { "middle row, along the first argument" } else { "" };
-    let mut series = vec![Series::new(label, along, Style::Line)];
+    let name = if rows > 1 { "middle row" } else { "" };
+    let mut series = vec![Series::new(name, along, Style::Line)];
     if rows > 1 {
         let down = (0..rows).map(|j| (place(1, j), grid.values[columns / 2 + columns * j])).collect();
-        series.push(Series::new("middle column, along the second", down, Style::Line));
+        series.push(Series::new("middle column", down, Style::Line));
     }
-    let axis = |label: &str| Axis { label: label.to_owned(), log: false };
-    Some(Plot { title: format!("Data {}", data.spec.name), x: axis("place"), y: axis("height"), series })
+    // data can be heights, moduli or loads
+    let (x, y) = (label("place", built.scene.units.as_ref().map(|units| units.length)), data.spec.name.clone());
+    let axis = |label: String| Axis { label, log: false };
+    Some(Plot { title: format!("Data {y}"), x: axis(x), y: axis(y), series })
 }
