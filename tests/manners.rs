@@ -21,7 +21,7 @@ fn a_new_scene_works() {
         let force = run.forces(0)[0][dimension - 1];
         assert!((force.abs() - load).abs() < 1e-6 * load, "{flag:?}: {force}");
         let pressure = &run.contact()["pressure"];
-        assert!(pressure.iter().any(|p| *p == 0.0) && pressure.iter().any(|p| *p > 10.0), "{flag:?}");
+        assert!(pressure.contains(&0.0) && pressure.iter().any(|p| *p > 10.0), "{flag:?}");
         // what is there stays as it is
         let again = winkler(&words);
         assert_eq!(again.code, 6, "{}", again.said());
