@@ -41,7 +41,7 @@ fn base64(text: &str) -> Vec<u8> {
 
 /// Solves a scene with MUMPS in each sweep and condensed: the histories and all results must agree to rounding.
 fn agree(scene: impl AsRef<std::path::Path>, args: &[&str]) -> [Run; 2] {
-    let args = [args, &["--vtu"]].concat();
+    let args = [args, &["--vtu", "--set", "output.compress=false"]].concat();
     let run = |solver: &str| solve(&scene, &[&args[..], &["--set", &format!("solver={solver}")]].concat()).converged();
     let (sparse, condensed) = (run("mumps"), run("condensed"));
     for solver in condensed.solvers() {
