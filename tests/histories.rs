@@ -118,8 +118,8 @@ fn the_approach_is_that_of_the_far_faces() {
     let geo = root().join("meshes/stack/stack.geo");
     let block = |name: &str, more: &str| format!("[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0\n{more}\n",);
     let left = |name: &str| format!("{{ on = \"{name}_left\", x = 0 }}");
-    let scene = |upper: &str| {
-        let lower = format!("fix = [{{ on = \"b1_bottom\", y = 0 }}, {}]", left("b1"));
+    let scene = |below: f64, upper: &str| {
+        let lower = format!("fix = [{{ on = \"b1_bottom\", y = {below} }}, {}]", left("b1"));
         Scene::new(format!(
             "dimension = 2\nmesh = {{ geo = \"{}\", set = {{ rows = 2, n1 = 2, n2 = 3 }} }}\n{}{}[[contact]]\n\
              between = [\"b2_bottom\", \"b1_top\"]\ngap = 0.002\nlayer = {{ linear = {{ stiffness = 300 }} }}\n[method]\nsteps = 4\n",
@@ -134,9 +134,9 @@ fn the_approach_is_that_of_the_far_faces() {
         "fix = [{}]\nload = [{{ on = \"b2_top\", pressure = 2 }}, {{ on = \"b2_right\", pressure = 0.0 }}]",
         left("b2")
     );
-    let table = steps(&solve(scene(&pressed), &[]).converged().folder);
-    let moved = format!("fix = [{}, {{ on = \"b2_top\", y = -0.01 }}]", left("b2"));
-    let other = steps(&solve(scene(&moved), &[]).converged().folder);
+    let table = steps(&solve(scene(0.0, &pressed), &[]).converged().folder);
+    let moved = format!("fix = [{}, {{ on = \"b2_top\", y = -0.006 }}]", left("b2"));
+    let other = steps(&solve(scene(0.004, &moved), &[]).converged().folder);
     for step in 0..4 {
         let share = (step + 1) as f64 / 4.0;
         near(table["approach b2-b1"][step], 0.002 + 2.0 * share * soft, 1e-9, "pressed");
