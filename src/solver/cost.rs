@@ -19,7 +19,7 @@ const RATE: f64 = 1.1e10;
 const MULTIGRID: f64 = 1.3e-6;
 
 /// The same of quadratic elements, which have a level of their own: the middle one of the three P2 scenes there.
-const MULTIGRID_P2: f64 = 8e-7;
+const MULTIGRID_P2: f64 = 1e-6;
 
 /// Newton's steps of a scene there, which take 3 to 7: dense factorisations of all contacts together.
 const STEPS: f64 = 5.0;
