@@ -232,9 +232,15 @@ pub fn discretize<const D: usize>(
     factory.plan(&outlines.collect::<Vec<_>>())?;
     let all_graphs = || lazy.iter().map(|graph| graph()).collect::<Vec<&NodeGraph>>();
     let dealt = factory.deal_out(&|| distribute::graph::<D>(&all_graphs(), &drafts, &pairs))?;
-    let coarse = |_: &Vec<u32>| parts.iter().map(Part::coarse_nodes).collect::<Vec<_>>();
-    let coarse = dealt.as_ref().map(coarse).unwrap_or_default();
-    let dealt = dealt.map(|dealt| distribute::distribute::<D>(&drafts, &coarse, &dealt, ranks, &exchange));
+    let mut coarse = Vec::new();
+    if let Some(owner) = &dealt
+        && parts.iter().any(|part| factory.wants_interpolation(&part.spec.name.value))
+    {
+        let sizes: Vec<usize> = parts.iter().map(|part| part.space.nodes.len()).collect();
+        coarse = distribute::distribute_coarse(parts.iter().map(Part::coarse_nodes).collect(), &sizes, owner, ranks);
+    }
+    let mut coarse = coarse.into_iter();
+    let dealt = dealt.map(|dealt| distribute::distribute::<D>(&drafts, &dealt, ranks, &exchange));
     if let Some(dealt) = &dealt {
         owner = dealt.iter().map(|dealt| dealt.leader).collect();
     }
@@ -246,7 +252,7 @@ pub fn discretize<const D: usize>(
     {
         let Draft { segments, rows, free, nodal_load, load } = draft;
         let Supported { carried, prescribed } = supported;
-        let dealt = dealt.next();
+        let (dealt, coarse) = (dealt.next(), coarse.next());
         let mut offset = vec![0.0; rows.rows()];
         if !carried.is_empty() {
             rows.multiply(&carried, &mut offset);
@@ -285,11 +291,11 @@ pub fn discretize<const D: usize>(
             if let Some(dealt) = &dealt {
                 body = dealt.own::<D>(body);
             }
-            let interpolation = || match &dealt {
-                None => part.interpolation(&part.coarse_nodes()),
-                Some(dealt) => dealt.interpolation::<D>(&part.interpolation(&coarse[index])),
-            };
-            let distribution = dealt.as_ref().map(|dealt| dealt.distribution.clone());
+            let distribution = dealt.map(|dealt| dealt.distribution);
+            let interpolation = factory.wants_interpolation(&name).then(|| match (coarse, &distribution) {
+                (Some(coarse), Some(dealt)) => coarse.own::<D>(&part.interpolation(&coarse.nodes), &dealt.own),
+                _ => part.interpolation(&part.coarse_nodes()),
+            });
             local = Some(factory.make(Assembled {
                 name: name.clone(),
                 dimension: D,
@@ -298,7 +304,7 @@ pub fn discretize<const D: usize>(
                 rows,
                 motions: part.smooth(free),
                 left,
-                interpolation: &interpolation,
+                interpolation,
             })?);
         }
         let outer = approach::outer_maker(&part, mesh)?;

@@ -234,6 +234,21 @@ fn sweeps_have_forces_and_reactions() {
     }
 }
 
+/// A row with other columns is refused before its run, and leaves those that are there.
+#[test]
+fn a_sweep_over_supports_keeps_its_rows() {
+    let scene = groove("");
+    let folder = scene.path.with_file_name("out");
+    let one = "[{on='lower_axis',x=0},{on='lower_face',y=0}]";
+    let over = format!("body.0.fix={one},{}", one.replace(']', ",{on='lower_end',x=0}]"));
+    let (scene, out) = (scene.path.to_str().expect("a path"), folder.to_str().expect("a path"));
+    let run = winkler(&["sweep", scene, "--over", &over, "-o", out]);
+    assert!(run.code == 2 && run.stderr.contains("other contacts or supports"), "{}", run.said());
+    assert!(run.stderr.contains("lower_end"), "{}", run.stderr);
+    let text = fs::read_to_string(folder.join("sweep.csv")).expect("a table");
+    assert_eq!(text.lines().count(), 2, "{text}");
+}
+
 #[test]
 fn tables_that_are_none_are_refused_with_their_line() {
     let refused = |table: &str, words: &[&str]| {

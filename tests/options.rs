@@ -267,11 +267,12 @@ fn options_that_cannot_end_well_are_refused() {
 /// means hypre for all nodes.
 #[test]
 fn multigrid_of_quadratic_elements_has_two_levels() {
-    let run = |options: &str| {
+    let run_on = |ranks: usize, options: &str| {
         let words = "--set mesh.set.n=2 --set mesh.set.edge=4 --set method.stop={residual=1e-8} --set solver=hypre";
         let words: Vec<&str> = words.split_whitespace().chain(options.split_whitespace()).collect();
-        solve(case("hertz-sphere"), &words).converged()
+        solve_on(ranks, case("hertz-sphere"), &words).converged()
     };
+    let run = |options: &str| run_on(1, options);
     let plain = run("-pc_type hypre");
     let inner = |run: &Run| run.count("inner_iterations");
     for (options, solver) in [
@@ -287,6 +288,14 @@ fn multigrid_of_quadratic_elements_has_two_levels() {
             let counts = [&two, &plain].map(inner);
             assert!(3 * counts[0] < 2 * counts[1], "{options}: {counts:?}");
         }
+    }
+    // another smoother, as good
+    let one = inner(&run(""));
+    for ranks in [3, 5] {
+        let dealt = run_on(ranks, "");
+        assert!(distance(&dealt.contact()["pressure"], &plain.contact()["pressure"]) < 1e-7, "{ranks} ranks");
+        assert!(5 * inner(&dealt) < 6 * one, "{ranks} ranks: {} and {one}", inner(&dealt));
+        assert_eq!(dealt.solvers(), ["cg + mg by hypre"; 2]);
     }
     let typed = run("-newton_pc_hypre_boomeramg_strong_threshold 0.5");
     assert!(typed.solvers().iter().all(|name| *name == "cg + hypre"), "{:?}", typed.solvers());

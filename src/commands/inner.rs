@@ -19,7 +19,7 @@ use crate::problem::solver::Preset;
 use crate::scene::Scene;
 use crate::solver::cost::{self, Candidate, Comparison, Step};
 use crate::solver::options::{Chosen, Typed};
-use crate::solver::preset::{self, Size};
+use crate::solver::preset::{self, Size, Smoother};
 use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory};
 use mpi::collective::SystemOperation;
 use mpi::traits::{Communicator, CommunicatorCollectives, Root};
@@ -113,9 +113,9 @@ impl<'a> Inner<'a> {
         self.interpolation.take()
     }
 
-    /// Highest order of the bodies.
-    fn order(&self) -> Order {
-        self.plans.iter().map(|plan| plan.order).max().unwrap_or(Order::P1)
+    /// Whether a body has quadratic elements.
+    fn is_quadratic(&self) -> bool {
+        self.plans.iter().any(|plan| plan.order == Order::P2)
     }
 
     /// The solvers that apply a preconditioner once instead of solving, as a warning each kind.
@@ -255,7 +255,7 @@ impl<'a> Inner<'a> {
         let in_space = self.plans.iter().all(|plan| plan.dimension == 3);
         Ok(match self.whole.typed("pc_type") {
             Some("hypre") => Linear::Multigrid,
-            Some("mg") if self.order() == Order::P2 => Linear::Multigrid,
+            Some("mg") if self.is_quadratic() => Linear::Multigrid,
             Some("cholesky" | "lu") => Linear::Direct,
             Some(_) if self.method == MethodName::Auto && !self.whole.has_own() => Linear::Sweeps,
             None if all(Preset::Condensed)
@@ -305,16 +305,20 @@ impl Factory for Inner<'_> {
         for plan in &mut self.plans {
             plan.retained = plan.retained.take().filter(|_| plan.preset == Preset::Condensed);
         }
-        let order = self.order();
+        let is_quadratic = self.is_quadratic();
         match self.linear {
             Linear::Dense => {}
-            Linear::Direct => preset::apply(&mut self.whole, Preset::Mumps, order),
+            Linear::Direct => preset::apply(&mut self.whole, Preset::Mumps, None),
             Linear::Multigrid => {
                 preset::made_often(&mut self.whole);
-                preset::apply(&mut self.whole, Preset::Hypre, order);
+                let smoother = if self.session.size() > 1 { Smoother::Chebyshev } else { Smoother::GaussSeidel };
+                preset::apply(&mut self.whole, Preset::Hypre, Some(smoother).filter(|_| is_quadratic));
             }
             Linear::Sweeps => {
-                self.plans.iter_mut().for_each(|plan| preset::apply(&mut plan.chosen, plan.preset, plan.order))
+                for plan in &mut self.plans {
+                    let smoother = Some(Smoother::GaussSeidel).filter(|_| plan.order == Order::P2);
+                    preset::apply(&mut plan.chosen, plan.preset, smoother);
+                }
             }
         }
         Ok(())
@@ -341,8 +345,19 @@ impl Factory for Inner<'_> {
         Ok(Some(owner))
     }
 
+    fn wants_interpolation(&self, name: &str) -> bool {
+        let has_levels = |chosen: &Chosen| chosen.get("pc_type") == Some("mg");
+        match self.linear {
+            Linear::Multigrid => self.is_quadratic() && has_levels(&self.whole),
+            Linear::Sweeps => self.places.get(name).is_some_and(|&place| {
+                let Plan { preset, order, chosen, .. } = &self.plans[place];
+                *preset != Preset::Condensed && *order == Order::P2 && has_levels(chosen)
+            }),
+            _ => false,
+        }
+    }
+
     fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>> {
-        let order = self.order();
         let Assembled { name, dimension, body, distribution, rows, motions, left, interpolation } = assembled;
         let Some(plan) = self.places.get(&name).map(|&place| &mut self.plans[place]) else {
             return Err(Error::new(Kind::Solver, format!("no solver is planned for body `{name}`")));
@@ -355,18 +370,15 @@ impl Factory for Inner<'_> {
             Linear::Sweeps => preset::in_words(&chosen),
             _ => preset::in_words(&self.whole),
         };
-        let mut levels = None;
-        let has_levels = |chosen: &Chosen, order: Order| chosen.get("pc_type") == Some("mg") && order == Order::P2;
-        match self.linear {
-            Linear::Multigrid if has_levels(&self.whole, order) => {
-                let empty = || Interpolation { rows: Csr::new(0), own: 0 };
-                let whole = self.interpolation.get_or_insert_with(empty);
-                // columns are those of all bodies where dofs are dealt out
-                let first = if distribution.is_some() { 0 } else { whole.rows.columns };
-                whole.append(&interpolation(), first);
-            }
-            Linear::Sweeps if has_levels(&chosen, plan.order) => levels = Some(interpolation()),
-            _ => {}
+        let mut levels = interpolation;
+        if self.linear == Linear::Multigrid
+            && let Some(next) = levels.take()
+        {
+            let empty = || Interpolation { rows: Csr::new(0), own: 0 };
+            let whole = self.interpolation.get_or_insert_with(empty);
+            // columns are those of all bodies where dofs are dealt out
+            let first = if distribution.is_some() { 0 } else { whole.rows.columns };
+            whole.append(&next, first);
         }
         let modes: Vec<Vec<f64>> = match self.linear {
             Linear::Sweeps => motions.into_iter().map(|motion| motion.displacement).collect(),

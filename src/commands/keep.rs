@@ -1,6 +1,7 @@
 //! Runs that pause: who watches them and keeps what they have, and how they go on.
 
 use super::asking;
+use super::results::All;
 use super::stages::{Done, Ready};
 use crate::ddm::{self, Observer, Settings, Silent, Start, Status};
 use crate::error::Result;
@@ -10,8 +11,9 @@ pub trait Keep: Observer {
     /// Keeps the state of a run, or of its load step, from which it can go on.
     fn state(&mut self, _done: &Done) {}
 
-    /// Keeps the results of a load step that has ended, the last of [`Done::steps`], in the units of the scene.
-    fn step(&mut self, _done: &Done) {}
+    /// Keeps the results of a load step that has ended, the last of [`Done::steps`], in the units of the scene, with
+    /// its bodies.
+    fn step(&mut self, _done: &Done, _recovered: &All) {}
 
     /// Keeps the results so far, and leaves the run as it is.
     fn results(&mut self, _done: &mut Done) {}

@@ -235,9 +235,6 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
     let length = |is: fn(f64) -> bool| (0..pair.len()).filter(|&q| is(c[q])).fold(0.0, |sum, q| sum + pair.weight[q]);
-    let sum = |rows: &[[f64; 3]]| -> [f64; 3] {
-        std::array::from_fn(|k| (0..pair.len()).fold(0.0, |sum, q| sum - force[q] * rows[q][k]))
-    };
     let sides = discrete.sides(i);
     let coupling = preflight::coupling(&done.built, i);
     let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
@@ -253,8 +250,8 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         facets_far: pair.left(Left::Far),
         facets_averaged: pair.averaged(),
         layer_energy: layer.energy[i],
-        force: sides.map(|side| sum(&pair.resultant[side])),
-        moment: sides.map(|side| sum(&pair.moment[side])),
+        force: sides.map(|side| measure::resultant(force, &pair.resultant[side])),
+        moment: sides.map(|side| measure::resultant(force, &pair.moment[side])),
         approach,
         peak_pressure: p[peak],
         peak_at: pair.position[peak],

@@ -5,9 +5,10 @@ use super::asking::{Asking, is_snapshot, signal};
 use super::checkpoint::{self, Checkpoint};
 use super::clock::Clock;
 use super::keep::Keep;
+use super::results::All;
 use super::stages::{Built, Done, Ready};
 use super::write::{Writing, to_json};
-use super::{folder_of, load, measure, report, results, run, series};
+use super::{folder_of, load, measure, report, run, series};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
@@ -208,7 +209,7 @@ impl Keep for Watchers<'_> {
         self.note_failure("a checkpoint", written);
     }
 
-    fn step(&mut self, done: &Done) {
+    fn step(&mut self, done: &Done, recovered: &All) {
         let scene = &done.built.scene;
         let history = &scene.method.steps;
         if let (Some(table), Some(step)) = (&mut self.steps, done.steps.last()) {
@@ -216,8 +217,7 @@ impl Keep for Watchers<'_> {
         }
         let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
         if scene.output.vtu && !ends {
-            let recovered = results::recover(done);
-            let written = series::write(done, &recovered, self.folder, self.session.rank() == 0);
+            let written = series::write(done, recovered, self.folder, self.session.rank() == 0);
             self.note_failure("a field of a load step", written);
         }
     }

@@ -8,6 +8,7 @@ use super::clock::Clock;
 use super::keep::{self, Keep};
 use super::measure;
 use super::report::Shared;
+use super::results::{self, All};
 use super::stages::{Begin, Done, Ready};
 use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
@@ -44,8 +45,9 @@ pub fn iterate(mut ready: Ready, keep: &mut dyn Keep, clock: &mut Clock) -> Resu
             ));
         }
         let of_step = done.outcome.clone();
-        all.complete(&mut done);
-        all.keep.step(&done);
+        let recovered = all.complete(&mut done);
+        all.keep.step(&done, &recovered);
+        drop(recovered);
         if last || interrupted {
             return Ok(done);
         }
@@ -192,8 +194,8 @@ impl<'a> Steps<'a> {
     }
 
     /// Brings what this step has found, and the model, to the units of the scene, with the counts and the history of all steps.
-    /// Collective.
-    fn complete(&self, done: &mut Done) {
+    /// Gives its bodies. Collective.
+    fn complete(&self, done: &mut Done) -> All {
         let Done { built, outcome, share, earlier, .. } = &mut *done;
         *share = self.factor;
         let iterations = outcome.iterations;
@@ -209,8 +211,10 @@ impl<'a> Steps<'a> {
             let compression = outcome.layer.compression.iter().map(|c| self.factor * c).collect();
             outcome.layer = Layer::new(&built.discrete.model, compression);
         }
-        let step = measure::step(done, &self.history, self.step - 1, iterations, status, message);
+        let recovered = results::recover(done);
+        let step = measure::step(done, &recovered, &self.history, self.step - 1, iterations, status, message);
         done.steps.push(step);
+        recovered
     }
 }
 

@@ -110,9 +110,9 @@ pub fn of_pair(built: &Built, pair: usize) -> Vec<String> {
     lines
 }
 
-/// Rows of a law that are printed.
+/// Rows of a law that are printed: for a look, beside the other lines of a pair.
 const SHOWN: usize = 8;
-/// Points of a law that are drawn.
+/// Points of a law that are drawn: straight pieces of four pixels look like a curve.
 const DRAWN: usize = 200;
 
 fn described(spec: &AsperitySpec) -> String {

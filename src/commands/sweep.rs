@@ -11,7 +11,7 @@ use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::steps::{vector_columns, vector_fields};
-use crate::output::{ConvergenceSeries, Folder, LISTED, Plot, Report, Series, busiest, say, sci};
+use crate::output::{ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, busiest, say, sci};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use std::collections::BTreeMap;
@@ -48,7 +48,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     let scenes = agree(session, runs.iter().map(|values| load(values)).collect::<Result<Vec<_>>>())?;
     let folder = agree(session, Folder::create(folder_of(&scenes[0], request.folder.clone())))?;
     let first = session.rank() == 0;
-    let mut table = csv::Writer::from_writer(folder.open("sweep.csv")?.1);
+    let (mut table, mut columns) = (None, None);
     let mut exit = 0;
     let (mut reports, mut histories, mut pressures, mut reference) = (Vec::new(), Vec::new(), Pressures::new(), None);
     // the same pairs of all runs
@@ -58,6 +58,8 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     for (scene, values) in scenes.iter().zip(&runs) {
         let mut clock = Clock::default();
         let built = reuse::build(session, scene.clone(), before.take(), interrupt, &mut clock)?;
+        let header = header(&axes, &built);
+        agree(session, same(columns.get_or_insert_with(|| header.clone()), &header, &label(&axes, values)))?;
         let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
         let done = run::iterate(ready, interrupt, &mut watched, &mut clock)?;
         clock.total();
@@ -72,10 +74,12 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
             continue;
         }
         let label = label(&axes, values);
-        if reports.is_empty() {
-            row(&mut table, &folder, header(&axes, &done.built))?;
-        }
-        row(&mut table, &folder, line(values, &report, scene.dimension.value))?;
+        let table = match &mut table {
+            Some(table) => table,
+            None => table.insert(RowFile::create(&folder, "sweep.csv", &header)?),
+        };
+        table.push(&line(values, &report, scene.dimension.value));
+        table.check()?;
         if !request.json {
             say(format_args!(
                 "{label}: {}, {} iterations, residual {}",
@@ -225,10 +229,14 @@ fn line(values: &[String], report: &Report, dimension: usize) -> Vec<String> {
     line
 }
 
-/// Writes a row at once: what was computed is kept whatever comes next.
-fn row(table: &mut csv::Writer<std::fs::File>, folder: &Folder, fields: Vec<String>) -> Result<()> {
-    let written = table.write_record(&fields).map_err(std::io::Error::from).and_then(|()| table.flush());
-    written.map_err(|cause| Error::file(&folder.path().join("sweep.csv"), "write", &cause))
+/// Refuses a run, called by its values, whose row would have other columns than those before.
+fn same(columns: &[String], header: &[String], run: &str) -> Result<()> {
+    if columns == header {
+        return Ok(());
+    }
+    Err(Error::new(Kind::Usage, format!("with {run} the scene has other contacts or supports than in the runs before"))
+        .because("all rows of sweep.csv have the same columns")
+        .help("sweep over values that leave them as they are; the rows so far are kept"))
 }
 
 /// The pressures of all runs along each pair.

@@ -18,7 +18,7 @@ pub enum Shape {
 }
 
 /// Points farther from those of a regular grid than this share of the spacing are not on it. Written coordinates are rounded; a place that is
-/// wrong by so much changes a height by as small a share of its difference to the next one.
+/// wrong by so much changes a height by as small a share of its difference to the next one, a hundredth.
 const ROUNDED: f64 = 1e-2;
 
 /// Arranges the numbers of a file.

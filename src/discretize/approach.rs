@@ -5,13 +5,15 @@ use super::part::Part;
 use crate::contact::{add, pad};
 use crate::error::Result;
 use crate::fem::{Facets, Space, assemble, surface};
+use crate::linalg::dot;
 use crate::mesh::Mesh;
 use crate::problem::body::{LoadKind, SpringKind};
 
 /// Displacements of all nodes, a direction -> mean displacement of the body.
 pub type OuterMaker = Box<dyn Fn(&[f64], [f64; 3]) -> [f64; 3]>;
 
-/// Share of a force or a held direction that must point along the contact's normal for the place to count.
+/// Cosine of the largest angle between a force or a held direction and the contact's normal at which the place counts: the 60 degrees up to
+/// which facets are pairs without the key `angle`.
 const ALONG: f64 = 0.5;
 
 /// A surface or a set of nodes on which the body is loaded or held.
@@ -35,7 +37,7 @@ impl Place {
     }
 
     fn acts_along(&self, n: [f64; 3]) -> bool {
-        self.directions.iter().any(|d| dot(*d, n).abs() >= ALONG)
+        self.directions.iter().any(|d| dot(d, &n).abs() >= ALONG)
     }
 }
 
@@ -127,10 +129,6 @@ fn normal<const D: usize>(space: &Space<D>, group: &crate::mesh::Group) -> Optio
 }
 
 fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
-    let size = dot(v, v).sqrt();
+    let size = dot(&v, &v).sqrt();
     (size > 0.0).then(|| v.map(|v| v / size))
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|c| a[c] * b[c]).sum()
 }

@@ -66,49 +66,29 @@ pub fn graph<const D: usize>(graphs: &[&NodeGraph], drafts: &[Draft], pairs: &[C
 /// A body that is dealt out, as one rank sees it.
 pub struct Dealt {
     /// The dofs of this rank.
-    pub distribution: Rc<Distribution>,
+    pub distribution: Distribution,
     /// The rank that speaks for the body.
     pub leader: usize,
     /// Number of each node in the matrix of all bodies.
     number: Vec<u32>,
-    /// The same of its coarse nodes among all of these.
-    coarse: Vec<u32>,
-    /// Coarse nodes of all bodies, and those of this body that this rank has.
-    coarse_nodes: [usize; 2],
 }
 
-/// What rank `rank` knows of each body when `owner` has the rank of every node, body by body; `coarse` are the coarse nodes of each.
+/// What rank `rank` knows of each body when `owner` has the rank of every node, body by body.
 pub fn distribute<const D: usize>(
     drafts: &[Draft],
-    coarse: &[Vec<u32>],
     owner: &[u32],
     (rank, ranks): (usize, usize),
     exchange: &Rc<dyn Exchange>,
 ) -> Vec<Dealt> {
-    // numbers of nodes in the matrix of all bodies: rank by rank, there body by body
-    let starts = |owners: &mut dyn Iterator<Item = u32>| {
-        let mut starts = vec![0; ranks + 1];
-        owners.for_each(|owner| starts[owner as usize + 1] += 1);
-        (0..ranks).for_each(|rank| starts[rank + 1] += starts[rank]);
-        starts
-    };
-    let mut next = starts(&mut owner.iter().copied());
-    let first = drafts.iter().scan(0, |first, draft| Some(std::mem::replace(first, *first + draft.rows.columns / D)));
-    let of_coarse =
-        coarse.iter().zip(first).flat_map(|(nodes, first)| nodes.iter().map(move |&node| owner[first + node as usize]));
-    let mut next_coarse = starts(&mut of_coarse.clone());
-    let coarse_total = next_coarse[ranks] as usize;
-    let (start, total) = (D * next[rank] as usize, D * owner.len());
-    let mut owner = owner;
-    let of_body = |(draft, coarse): (&Draft, &Vec<u32>)| {
+    let (number, starts) = numbered(owner, ranks);
+    let (start, total) = (D * starts[rank] as usize, D * owner.len());
+    let (mut owner, mut number) = (owner, &number[..]);
+    let of_body = |draft: &Draft| {
         let nodes = draft.rows.columns / D;
-        let of_node;
+        let (of_node, numbers);
         (of_node, owner) = owner.split_at(nodes);
-        let number = of_node.iter().map(|&owner| {
-            next[owner as usize] += 1;
-            next[owner as usize] - 1
-        });
-        let number: Vec<u32> = number.collect();
+        (numbers, number) = number.split_at(nodes);
+        let number = numbers.to_vec();
         let own: Vec<usize> = (0..nodes).filter(|&node| of_node[node] as usize == rank).collect();
         let mut counts = vec![0; ranks];
         of_node.iter().for_each(|&owner| counts[owner as usize] += 1);
@@ -118,14 +98,6 @@ pub fn distribute<const D: usize>(
         for q in 0..draft.rows.rows() {
             rows.push_row(draft.rows.row(q).map(|(dof, value)| (D * number[dof / D] as usize + dof % D, value)));
         }
-        let mut coarse_here = 0;
-        let number_coarse = |&node: &u32| {
-            let owner = of_node[node as usize] as usize;
-            coarse_here += usize::from(owner == rank);
-            next_coarse[owner] += 1;
-            next_coarse[owner] - 1
-        };
-        let coarse = coarse.iter().map(number_coarse).collect();
         let distribution = Distribution {
             dofs: D * nodes,
             first: own.first().map_or(start, |&node| D * number[node] as usize),
@@ -136,27 +108,77 @@ pub fn distribute<const D: usize>(
             leads: leader == rank,
             exchange: exchange.clone(),
         };
-        Dealt { distribution: Rc::new(distribution), leader, number, coarse, coarse_nodes: [coarse_total, coarse_here] }
+        Dealt { distribution, leader, number }
     };
-    drafts.iter().zip(coarse).map(of_body).collect()
+    drafts.iter().map(of_body).collect()
+}
+
+/// Numbers of things that `owner` deals out: rank by rank, there in their order; and the first number of each rank.
+fn numbered(owner: &[u32], ranks: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut starts = vec![0; ranks + 1];
+    owner.iter().for_each(|&owner| starts[owner as usize + 1] += 1);
+    (0..ranks).for_each(|rank| starts[rank + 1] += starts[rank]);
+    let mut next = starts.clone();
+    let number = owner.iter().map(|&owner| {
+        next[owner as usize] += 1;
+        next[owner as usize] - 1
+    });
+    (number.collect(), starts)
+}
+
+/// The coarse nodes of a body that is dealt out.
+pub struct DealtCoarse {
+    /// Which nodes these are.
+    pub nodes: Vec<u32>,
+    /// Their numbers among the coarse nodes of all bodies.
+    number: Vec<u32>,
+    /// How many all bodies have, and this one on this rank.
+    counts: [usize; 2],
+}
+
+/// The coarse `nodes` of each body when `owner` has the rank of every node, body by body; bodies have so many nodes.
+pub fn distribute_coarse(
+    nodes: Vec<Vec<u32>>,
+    sizes: &[usize],
+    owner: &[u32],
+    (rank, ranks): (usize, usize),
+) -> Vec<DealtCoarse> {
+    let mut first = 0;
+    let of_body = |(nodes, size): (&Vec<u32>, &usize)| {
+        let owner = &owner[first..first + size];
+        first += size;
+        nodes.iter().map(|&node| owner[node as usize]).collect()
+    };
+    let owners: Vec<Vec<u32>> = nodes.iter().zip(sizes).map(of_body).collect();
+    let (number, _) = numbered(&owners.concat(), ranks);
+    let mut rest = &number[..];
+    let of_body = |(nodes, owners): (Vec<u32>, Vec<u32>)| {
+        let own = owners.iter().filter(|&&owner| owner as usize == rank).count();
+        let (here, others) = rest.split_at(nodes.len());
+        rest = others;
+        DealtCoarse { nodes, number: here.to_vec(), counts: [number.len(), own] }
+    };
+    nodes.into_iter().zip(owners).map(of_body).collect()
+}
+
+impl DealtCoarse {
+    /// The rows of these dofs of an interpolation; columns are counted through all bodies.
+    pub fn own<const D: usize>(&self, whole: &Interpolation, dofs: &[u32]) -> Interpolation {
+        let [all, own] = self.counts;
+        let mut rows = Csr::new(D * all);
+        for &dof in dofs {
+            let number = |j: usize| D * self.number[j / D] as usize + j % D;
+            rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
+        }
+        Interpolation { rows, own: D * own }
+    }
 }
 
 impl Dealt {
     /// Whether a node is an own one.
     pub fn is_own<const D: usize>(&self, node: usize) -> bool {
-        let Distribution { first, own, .. } = &*self.distribution;
+        let Distribution { first, own, .. } = &self.distribution;
         (*first..first + own.len()).contains(&(D * self.number[node] as usize))
-    }
-
-    /// The rows of own dofs of an interpolation; columns are those of all bodies.
-    pub fn interpolation<const D: usize>(&self, whole: &Interpolation) -> Interpolation {
-        let [all, own] = self.coarse_nodes;
-        let mut rows = Csr::new(D * all);
-        for &dof in &self.distribution.own {
-            let number = |j: usize| D * self.coarse[j / D] as usize + j % D;
-            rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
-        }
-        Interpolation { rows, own: D * own }
     }
 
     /// A body that was assembled for own nodes alone, in its own dofs; columns of K are those of the matrix of all bodies.

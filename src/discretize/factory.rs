@@ -8,7 +8,6 @@ use crate::fem::{ElasticBody, Interpolation};
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot, Distribution};
 use crate::problem::order::Order;
-use std::rc::Rc;
 
 /// What every rank knows of a body before its owner assembles it.
 pub struct Outline<'a> {
@@ -43,6 +42,9 @@ pub trait Factory {
     /// When the partitioner fails.
     fn deal_out(&mut self, graph: &dyn Fn() -> Graph) -> Result<Option<Vec<u32>>>;
 
+    /// Whether the interpolation of a body from linear displacements is wanted, after the plan.
+    fn wants_interpolation(&self, name: &str) -> bool;
+
     /// Makes a body, on the rank that owns it or a part of it, after its plan.
     ///
     /// # Errors
@@ -54,7 +56,7 @@ pub trait Factory {
 }
 
 /// A body ready for its inner solver.
-pub struct Assembled<'a> {
+pub struct Assembled {
     /// Name in the scene.
     pub name: String,
     /// Space dimension: block size of the matrix.
@@ -62,7 +64,7 @@ pub struct Assembled<'a> {
     /// K, f and supports: of all dofs, or of those of this rank.
     pub body: ElasticBody,
     /// How the dofs are dealt out, if they are.
-    pub distribution: Option<Rc<Distribution>>,
+    pub distribution: Option<Distribution>,
     /// All contact rows of the body, pair by pair.
     pub rows: Csr,
     /// Motions with hardly any strain in a few cells, for multigrid's near-null space: the rigid ones of the free body, in one of
@@ -70,7 +72,7 @@ pub struct Assembled<'a> {
     pub motions: Vec<RigidMotion>,
     /// Those that its supports leave.
     pub left: Vec<FreeMotion>,
-    /// Interpolation of its displacements from linear ones, for multigrid: made when it is asked for. Rows: the dofs of `body`; columns: of
-    /// this body alone, or of all where dofs are dealt out.
-    pub interpolation: &'a dyn Fn() -> Interpolation,
+    /// Interpolation of its displacements from linear ones, if it was wanted. Rows: the dofs of `body`; columns: of this body alone, or of
+    /// all where dofs are dealt out.
+    pub interpolation: Option<Interpolation>,
 }

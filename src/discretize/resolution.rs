@@ -21,7 +21,8 @@ pub struct Resolution {
     pub side: f64,
 }
 
-/// Places to look at in all; facets are looked at less closely beyond.
+/// Places to look at in all: a second of one core (two faces with 1024 x 1024 heights took 0.5 to 0.8 s). Facets are looked at less closely
+/// beyond.
 const MOST: usize = 4_000_000;
 /// Sub-intervals of a side at least: a wave of the length of a facet shows in each of four.
 const LEAST: usize = 4;

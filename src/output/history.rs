@@ -1,21 +1,18 @@
 //! `history.csv`: the iteration history, written as it comes.
 
-use super::folder::{Folder, failed};
+use super::folder::Folder;
 use super::format::field;
+use super::rows::RowFile;
 use crate::ddm::{Observer, Row};
-use crate::error::{Error, Result};
-use std::fs::File;
+use crate::error::Result;
 use std::path::PathBuf;
 
-/// Writes one line of `history.csv` for each row. Every line reaches the file at once, so that a run that is
-/// killed keeps all rows it had computed.
+/// Writes one line of `history.csv` for each row.
 pub struct HistoryWriter {
-    path: PathBuf,
-    csv: csv::Writer<File>,
+    rows: RowFile,
     bodies: usize,
     /// Whether rows have the column of load steps.
     steps: bool,
-    failure: Option<Error>,
 }
 
 impl HistoryWriter {
@@ -25,8 +22,6 @@ impl HistoryWriter {
     /// # Errors
     /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
     pub fn create<S: AsRef<str>>(folder: &Folder, bodies: &[S], steps: bool) -> Result<Self> {
-        let (path, file) = folder.open("history.csv")?;
-        let csv = csv::Writer::from_writer(file);
         let mut header: Vec<String> = if steps { vec!["step".into()] } else { Vec::new() };
         header.extend(["iteration", "residual", "error", "increment"].map(String::from));
         header.extend(bodies.iter().map(|body| format!("increment_{}", body.as_ref())));
@@ -34,9 +29,7 @@ impl HistoryWriter {
             ["gamma", "energy", "closed", "points", "sweeps", "factorizations", "inner_iterations", "seconds"]
                 .map(String::from),
         );
-        let mut history = Self { path, csv, bodies: bodies.len(), steps, failure: None };
-        history.line(&header);
-        history.failure.take().map_or(Ok(history), Err)
+        Ok(Self { rows: RowFile::create(folder, "history.csv", &header)?, bodies: bodies.len(), steps })
     }
 
     /// Ends the file and returns its path.
@@ -44,16 +37,7 @@ impl HistoryWriter {
     /// # Errors
     /// The first failure to write a row: later rows were dropped then.
     pub fn finish(self) -> Result<PathBuf> {
-        self.failure.map_or(Ok(self.path), Err)
-    }
-
-    fn line(&mut self, fields: &[String]) {
-        // After a failure the file ends with whole rows; going on would leave a hole.
-        if self.failure.is_some() {
-            return;
-        }
-        let written = self.csv.write_record(fields).map_err(Into::into).and_then(|()| self.csv.flush());
-        self.failure = written.err().map(|cause| failed(&self.path, &cause));
+        self.rows.finish()
     }
 }
 
@@ -70,7 +54,7 @@ impl Observer for HistoryWriter {
                 .map(|count| count.to_string()),
         );
         fields.push(field(row.seconds));
-        self.line(&fields);
+        self.rows.push(&fields);
     }
 }
 
@@ -123,23 +107,5 @@ mod tests {
         );
         assert_eq!(history.finish().unwrap(), base.path().join("history.csv"));
         assert_eq!(folder.files().len(), 1);
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn a_full_disk_is_told_once_at_the_end() {
-        let file = File::options().write(true).open("/dev/full").unwrap();
-        let mut history = HistoryWriter {
-            path: "history.csv".into(),
-            csv: csv::Writer::from_writer(file),
-            bodies: 0,
-            steps: false,
-            failure: None,
-        };
-        history.row(&Row::default());
-        history.row(&Row::default());
-        let error = history.finish().unwrap_err();
-        assert!(error.message().contains("history.csv"), "{error}");
-        assert!(error.advice().unwrap().contains("space"), "{error}");
     }
 }

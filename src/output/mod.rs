@@ -12,6 +12,7 @@ pub mod history;
 mod largest;
 pub mod plot;
 pub mod report;
+pub mod rows;
 pub mod steps;
 pub mod table;
 mod tags;
@@ -46,6 +47,7 @@ pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
     PairReport, Report, RoundReport, busiest,
 };
+pub use rows::RowFile;
 pub use steps::{ReactionReport, StepPairReport, StepReport, StepTable};
 pub use table::{IterationTable, Verbosity};
 pub use vtu::{BodyField, CellKind, Grid};

@@ -1,11 +1,11 @@
 //! `steps.csv`: one row a load step, written as it ends; and the columns of forces that other tables share.
 
-use super::folder::{Folder, failed};
+use super::folder::Folder;
 use super::format::field;
-use crate::error::{Error, Result};
+use super::rows::RowFile;
+use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::PathBuf;
 
 /// A load step.
@@ -65,13 +65,11 @@ pub fn vector_fields(vector: &[f64; 3], dimension: usize) -> impl Iterator<Item 
     vector[..dimension].iter().map(|&value| field(value))
 }
 
-/// Writes one line of `steps.csv` for each load step. Every line reaches the file at once.
+/// Writes one line of `steps.csv` for each load step.
 pub struct StepTable {
-    path: PathBuf,
-    csv: csv::Writer<File>,
+    rows: RowFile,
     dimension: usize,
-    rows: usize,
-    failure: Option<Error>,
+    count: usize,
 }
 
 impl StepTable {
@@ -86,8 +84,6 @@ impl StepTable {
         reactions: &[String],
         dimension: usize,
     ) -> Result<Self> {
-        let (path, file) = folder.open("steps.csv")?;
-        let csv = csv::Writer::from_writer(file);
         let mut header = vec!["step".to_owned(), "time".to_owned()];
         header.extend_from_slice(factors);
         header.extend(["status", "iterations", "residual"].map(str::to_owned));
@@ -97,16 +93,14 @@ impl StepTable {
             header.extend(numbers.map(|what| format!("{what} {pair}")));
         }
         header.extend(reactions.iter().flat_map(|name| vector_columns("reaction", name, dimension)));
-        let mut table = Self { path, csv, dimension, rows: 0, failure: None };
-        table.line(&header);
-        table.failure.take().map_or(Ok(table), Err)
+        Ok(Self { rows: RowFile::create(folder, "steps.csv", &header)?, dimension, count: 0 })
     }
 
     /// Writes a step; `names` are those of its factors in the order of the header.
     pub fn row(&mut self, names: &[String], step: &StepReport) {
-        self.rows += 1;
+        self.count += 1;
         let number = |value: Option<f64>| value.map_or(String::new(), field);
-        let mut line = vec![self.rows.to_string(), field(step.time)];
+        let mut line = vec![self.count.to_string(), field(step.time)];
         line.extend(names.iter().map(|name| number(step.factors.get(name).copied())));
         line.extend([step.status.clone(), step.iterations.to_string(), number(step.residual)]);
         for pair in &step.pairs {
@@ -115,7 +109,7 @@ impl StepTable {
             line.push(pair.closed.to_string());
         }
         line.extend(step.reactions.iter().flat_map(|reaction| vector_fields(&reaction.force, self.dimension)));
-        self.line(&line);
+        self.rows.push(&line);
     }
 
     /// Ends the file and returns its path.
@@ -123,15 +117,6 @@ impl StepTable {
     /// # Errors
     /// The first failure to write a row: later rows were dropped then.
     pub fn finish(self) -> Result<PathBuf> {
-        self.failure.map_or(Ok(self.path), Err)
-    }
-
-    fn line(&mut self, fields: &[String]) {
-        // after a failure the file ends with whole rows
-        if self.failure.is_some() {
-            return;
-        }
-        let written = self.csv.write_record(fields).map_err(Into::into).and_then(|()| self.csv.flush());
-        self.failure = written.err().map(|cause| failed(&self.path, &cause));
+        self.rows.finish()
     }
 }

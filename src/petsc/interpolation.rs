@@ -1,37 +1,27 @@
 //! Two levels of multigrid: the interpolation from the coarse one.
 
 use super::library::petsc;
-use super::{Int, Ksp, ffi};
+use super::vector::DETERMINE;
+use super::{Int, Ksp, Matrix, ffi};
 use crate::error::{Error, Kind, Result};
 use std::ptr::null_mut;
 
-/// Interpolation from a coarse level: the rows of this process, compressed, one a row of the matrix of the fine level.
-#[derive(Debug, Clone)]
-pub struct Interpolation {
-    /// Row starts.
-    pub row_ptr: Vec<Int>,
-    /// Column of each value, sorted within a row; counted through all processes.
-    pub columns: Vec<Int>,
-    /// The values.
-    pub values: Vec<f64>,
-    /// Number of columns that belong to this process.
-    pub own_columns: usize,
-}
-
 impl Ksp {
-    /// Makes the preconditioner multigrid of two levels (PCMG): this interpolation P, its transpose as restriction, and P'AP as the matrix
-    /// of the coarse level, made anew when the matrix A changes. After [`set_operator`](Ksp::set_operator), before the options.
+    /// Makes the preconditioner multigrid of two levels (PCMG): an interpolation P, its transpose as restriction, and P'AP as the matrix
+    /// of the coarse level, made anew when the `matrix` A of this solver changes. Before the options are read.
+    ///
+    /// P has one row a row of A on this process: row `i` has the columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in increasing order and
+    /// counted through all processes, and the values at the same places; `own` columns belong to this process.
     ///
     /// ```
-    /// use winkler::petsc::{Interpolation, Ksp, Matrix, Session};
+    /// use winkler::petsc::{Ksp, Matrix, Session};
     /// let words = ["-mg_levels_ksp_type", "richardson", "-mg_levels_pc_type", "sor", "-ksp_type", "cg"];
     /// let session = Session::start(&words.map(String::from))?;
     /// // two springs in a row; the coarse level is their mean
     /// let a = Matrix::from_csr(&session, 1, vec![0, 2, 4], vec![0, 1, 0, 1], vec![3.0, -1.0, -1.0, 3.0])?;
     /// let mut ksp = Ksp::new(&session, "")?;
     /// ksp.set_operator(&a)?;
-    /// let (row_ptr, columns, values) = (vec![0, 1, 2], vec![0, 0], vec![1.0, 1.0]);
-    /// ksp.set_interpolation(Interpolation { row_ptr, columns, values, own_columns: 1 })?;
+    /// ksp.set_interpolation(&a, [&[0, 1, 2], &[0, 0]], &[1.0, 1.0], 1)?;
     /// ksp.set_from_options()?;
     /// let mut x = [0.0; 2];
     /// ksp.solve(&[1.0, 1.0], &mut x)?;
@@ -40,20 +30,26 @@ impl Ksp {
     /// ```
     ///
     /// # Errors
-    /// When it has not one row a row of the matrix.
-    pub fn set_interpolation(&mut self, interpolation: Interpolation) -> Result<()> {
-        let Interpolation { row_ptr, columns, values, own_columns } = interpolation;
-        let (rows, block) = (self.rows(), self.block_size() as Int);
-        if row_ptr.len() != rows + 1 || row_ptr.last().is_none_or(|&last| last as usize != columns.len()) {
+    /// When the arrays are not those of such rows.
+    pub fn set_interpolation(
+        &mut self,
+        matrix: &Matrix,
+        [row_ptr, columns]: [&[Int]; 2],
+        values: &[f64],
+        own: usize,
+    ) -> Result<()> {
+        let (rows, block) = (matrix.rows(), matrix.block_size() as Int);
+        let is_whole = row_ptr.len() == rows + 1 && row_ptr[rows] as usize == columns.len();
+        if !is_whole || columns.len() != values.len() {
             let message =
                 format!("an interpolation of {} rows for a matrix of {rows}", row_ptr.len().saturating_sub(1));
             return Err(Error::new(Kind::Solver, message));
         }
         let (i, j, v) = (row_ptr.as_ptr(), columns.as_ptr(), values.as_ptr());
-        let (comm, mut mat, pc) = (self.comm(), null_mut(), self.pc()?);
+        let (comm, mut mat, pc) = (matrix.scope().comm(matrix.session()), null_mut(), self.pc()?);
         petsc!(MatCreate(comm, &mut mat))?;
         let made = (|| {
-            petsc!(MatSetSizes(mat, rows as Int, own_columns as Int, DETERMINE, DETERMINE))?;
+            petsc!(MatSetSizes(mat, rows as Int, own as Int, DETERMINE, DETERMINE))?;
             petsc!(MatSetType(mat, c"aij".as_ptr()))?;
             petsc!(MatSetBlockSizes(mat, block, block))?;
             // each is for one of the two kinds, of one process and of several, and does nothing to the other; both copy
@@ -69,6 +65,3 @@ impl Ksp {
         made
     }
 }
-
-/// PETSC_DETERMINE: the sum over the processes.
-const DETERMINE: Int = -1;

@@ -63,7 +63,6 @@ pub struct Ksp {
     /// Right-hand side and solution, made with the operator.
     vectors: Option<[Vector; 2]>,
     rows: usize,
-    block_size: usize,
     /// Number of updates of the matrix.
     pub(super) updates: Rc<Cell<u64>>,
     /// That number when the preconditioner failed, if it did.
@@ -95,7 +94,6 @@ impl Ksp {
             ksp,
             vectors: None,
             rows: 0,
-            block_size: 1,
             updates: Rc::default(),
             failed_at: Cell::new(None),
             writes_to_b: false,
@@ -122,7 +120,6 @@ impl Ksp {
             let new = || Vector::new(&self.session, self.scope, matrix.rows(), matrix.block_size());
             self.vectors = Some([new()?, new()?]);
             self.rows = matrix.rows();
-            self.block_size = matrix.block_size();
         }
         self.updates = matrix.updates();
         // A failure with another matrix says nothing about this one.
@@ -357,21 +354,6 @@ impl Ksp {
     /// How its options begin, for messages.
     fn own_options(&self) -> String {
         format!("-{}", self.prefix)
-    }
-
-    /// Rows of the matrix on this process.
-    pub(super) fn rows(&self) -> usize {
-        self.rows
-    }
-
-    /// Dofs of a node.
-    pub(super) fn block_size(&self) -> usize {
-        self.block_size
-    }
-
-    /// Its communicator.
-    pub(super) fn comm(&self) -> mpi::ffi::MPI_Comm {
-        self.scope.comm(&self.session)
     }
 
     /// PETSc's preconditioner, which belongs to the solver.

@@ -50,7 +50,6 @@ mod words;
 pub use blas::{cholesky, cholesky_solve};
 pub use ffi::Int;
 pub use heap::{Heap, leave};
-pub use interpolation::Interpolation;
 pub use ksp::{Ksp, Solved};
 pub use matrix::Matrix;
 pub use metis::{nested_dissection, partition};

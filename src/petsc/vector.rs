@@ -6,7 +6,7 @@ use crate::error::Result;
 use std::ptr::{null, null_mut};
 
 /// PETSC_DETERMINE: the sum over the processes.
-const DETERMINE: Int = -1;
+pub(super) const DETERMINE: Int = -1;
 
 /// A PETSc vector: the entries of this process.
 pub(super) struct Vector {

@@ -3,7 +3,7 @@
 use super::body::{Part, bounds};
 use minijinja::{Environment, context};
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
 /// Colours of a picture.
@@ -90,7 +90,7 @@ type Corner = (u32, u32);
 /// are left out, so that a region is as long as its border.
 fn path(triangles: &[[u32; 3]], places: &[[f64; 2]], values: &[f64], level: f64) -> String {
     let is_in = |node: u32| values[node as usize] >= level || level == f64::NEG_INFINITY;
-    let mut edges: HashMap<(Corner, Corner), ()> = HashMap::new();
+    let mut edges: HashSet<(Corner, Corner)> = HashSet::new();
     let mut corners: Vec<Corner> = Vec::with_capacity(4);
     for &[a, b, c] in triangles {
         let [p, q, r] = [a, b, c].map(|node| places[node as usize]);
@@ -109,8 +109,8 @@ fn path(triangles: &[[u32; 3]], places: &[[f64; 2]], values: &[f64], level: f64)
         }
         for k in 0..corners.len() {
             let (from, to) = (corners[k], corners[(k + 1) % corners.len()]);
-            if edges.remove(&(to, from)).is_none() {
-                edges.insert((from, to), ());
+            if !edges.remove(&(to, from)) {
+                edges.insert((from, to));
             }
         }
     }
@@ -120,7 +120,7 @@ fn path(triangles: &[[u32; 3]], places: &[[f64; 2]], values: &[f64], level: f64)
         [0, 1].map(|k| (x[k] + share * (y[k] - x[k])).round() as i64)
     };
     let mut next: HashMap<Corner, Vec<Corner>> = HashMap::new();
-    let mut sorted: Vec<_> = edges.into_keys().collect();
+    let mut sorted: Vec<_> = edges.into_iter().collect();
     sorted.sort_unstable();
     sorted.iter().for_each(|&(from, to)| next.entry(from).or_default().push(to));
     let mut text = String::new();

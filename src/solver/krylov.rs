@@ -6,7 +6,6 @@ use crate::error::Result;
 use crate::fem::Interpolation;
 use crate::linalg::Csr;
 use crate::model::Solved;
-use crate::petsc;
 use crate::petsc::{Ksp, Matrix, Rows, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
@@ -57,19 +56,16 @@ impl Krylov {
         ksp.set_operator(&matrix)?;
         if let Some(interpolation) = interpolation {
             let Interpolation { rows: Csr { ptr, col, values, .. }, own } = interpolation;
-            ksp.set_interpolation(petsc::Interpolation {
-                row_ptr: super::integers(ptr),
-                columns: super::integers(col),
-                values,
-                own_columns: own,
-            })?;
+            ksp.set_interpolation(&matrix, [&super::integers(ptr), &super::integers(col)], &values, own)?;
         }
         chosen.lend(session, || ksp.set_from_options())?;
         if ksp.pc_type() == "gamg" && !near_null_space.is_empty() {
             matrix.set_near_null_space(near_null_space)?;
         }
         let multigrid = matches!(ksp.pc_type().as_str(), "hypre" | "gamg" | "ml" | "mg") && ksp.ksp_type() != "preonly";
-        let keeps = multigrid && chosen.get("ksp_reuse_preconditioner").is_none();
+        // PETSc's own smoothers see every change of G, but bounds of eigenvalues are those of the set-up: only Gauss-Seidel bears that
+        let is_bounded = ksp.pc_type() == "mg" && chosen.get("mg_levels_ksp_type") != Some("richardson");
+        let keeps = multigrid && !is_bounded && chosen.get("ksp_reuse_preconditioner").is_none();
         let free = ksp.ksp_type() != "preonly" && chosen.typed("ksp_rtol").is_none();
         let session = session.clone();
         Ok(Self {

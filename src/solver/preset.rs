@@ -2,7 +2,6 @@
 
 use super::memory;
 use super::options::Chosen;
-use crate::problem::order::Order;
 use crate::problem::solver::Preset;
 
 /// Options of algebraic multigrid by hypre for elasticity with many solves a set-up; docs/solvers.md has the
@@ -25,15 +24,30 @@ const MADE_OFTEN: [(&str, &str); 4] = [
     ("pc_hypre_boomeramg_nodal_coarsen", "6"),
 ];
 
-/// Two levels of multigrid for quadratic elements: Gauss-Seidel there and back for all nodes, algebraic multigrid for the linear elements
-/// with the same vertices. Of the work and memory of algebraic multigrid for all nodes it needs half.
-const QUADRATIC: [(&str, &str); 5] = [
-    ("mg_levels_ksp_type", "richardson"),
-    ("mg_levels_ksp_max_it", "1"),
-    ("mg_levels_pc_type", "sor"),
-    ("mg_coarse_ksp_type", "preonly"),
-    ("mg_coarse_pc_type", "hypre"),
-];
+/// Two levels of multigrid for quadratic elements: a smoother for all nodes, algebraic multigrid for the linear elements with the same
+/// vertices. Of the work and memory of algebraic multigrid for all nodes it needs half.
+const QUADRATIC: [(&str, &str); 2] = [("mg_coarse_ksp_type", "preonly"), ("mg_coarse_pc_type", "hypre")];
+
+/// The smoother of the level of quadratic elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Smoother {
+    /// Gauss-Seidel there and back, which converges for every matrix that is symmetric and positive definite.
+    GaussSeidel,
+    /// For rows of several ranks. Gauss-Seidel within each rank takes steps up to twice too long, or more, at their borders: the
+    /// preconditioner is not positive definite any more (two spheres of 74 799 dofs on three ranks). Steps of Chebyshev's method do not
+    /// depend on the ranks, and take 1.2 to 1.4 times as long on one.
+    Chebyshev,
+}
+
+impl Smoother {
+    fn options(self) -> [(&'static str, &'static str); 3] {
+        let (ksp, steps, pc) = match self {
+            Smoother::GaussSeidel => ("richardson", "1", "sor"),
+            Smoother::Chebyshev => ("chebyshev", "2", "pbjacobi"),
+        };
+        [("mg_levels_ksp_type", ksp), ("mg_levels_ksp_max_it", steps), ("mg_levels_pc_type", pc)]
+    }
+}
 
 /// Relative tolerance of an inner Krylov solve: relative to the outer residual, because corrections are solved.
 const TOLERANCE: &str = "1e-6";
@@ -108,9 +122,9 @@ pub fn in_words(chosen: &Chosen) -> String {
 }
 
 /// Sets the defaults of a solver: after the typed options, and only for the KSP and PC in force. A condensed body has no KSP and no
-/// defaults. With elements of second `order` multigrid has a level for them, unless the user speaks of hypre.
-pub fn apply(chosen: &mut Chosen, preset: Preset, order: Order) {
-    let levels = order == Order::P2 && !chosen.has_typed_of("pc_hypre_");
+/// defaults. With a `smoother` multigrid has a level for quadratic elements, unless the user speaks of hypre.
+pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
+    let levels = smoother.is_some() && !chosen.has_typed_of("pc_hypre_");
     let pc = match preset {
         Preset::Condensed => return,
         Preset::Mumps => "cholesky",
@@ -123,8 +137,9 @@ pub fn apply(chosen: &mut Chosen, preset: Preset, order: Order) {
     let is = |chosen: &Chosen, name: &str, values: &[&str]| values.contains(&chosen.get(name).unwrap_or_default());
     let direct = is(chosen, "pc_type", &["cholesky", "lu"]);
     chosen.set_default("ksp_type", if direct { "preonly" } else { "cg" });
-    if is(chosen, "pc_type", &["mg"]) && order == Order::P2 {
-        QUADRATIC.iter().for_each(|(name, value)| chosen.set_default(name, value));
+    if let Some(smoother) = smoother.filter(|_| is(chosen, "pc_type", &["mg"])) {
+        let options = smoother.options().into_iter().chain(QUADRATIC);
+        options.for_each(|(name, value)| chosen.set_default(name, value));
     }
     chosen.prefer_mumps();
     if !is(chosen, "ksp_type", &["preonly"]) {

@@ -58,9 +58,10 @@ impl<S: InnerSolver> SparseBody<S> {
         body: ElasticBody,
         rows: &Csr,
         free: &[FreeMotion],
-        distribution: Rc<Distribution>,
+        distribution: Distribution,
         words: String,
     ) -> Self {
+        let distribution = Rc::new(distribution);
         let split = Split::new(free, rows).dealt_out(distribution.clone());
         let (rows, robin) = (distribution.of_rows(rows), Lazy::Later { make: None, words });
         Self { body, rows, split, distribution: Some(distribution), robin, sizes: Vec::new() }

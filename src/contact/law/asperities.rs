@@ -15,14 +15,15 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Asperities(Table);
 
-/// Even steps of the curve from first touch to its end. Each is a fiftieth of the standard deviation for heights up to 4 of these; the
-/// law grows in the tail by e in a quarter of it, so that the cubic pieces are right to 1e-6.
+/// Even steps of the curve from first touch to its end. A cubic piece of length h with exact slopes is off by h^4/384 of the fourth derivative.
+/// For heights up to 4 standard deviations h is a fiftieth of one; in the tail the law grows by e in a quarter of it: (4/50)^4/384 = 1e-7.
 const STEPS: f64 = 400.0;
-/// Longest step as a share of the compression: near first touch the law is a power of it, and as right.
+/// Longest step as a share of the compression. Near first touch the law is like c^(5/2), whose fourth derivative is 0.94 of it over c^4:
+/// 0.12^4/384 of that is 5e-7.
 const SHARE: f64 = 0.12;
 /// Standard deviations from the mean beyond which a normal distribution has less than 1e-16.
 const BEYOND: f64 = 8.5;
-/// The first point as a share of an even step.
+/// The first point as a share of an even step: below it, where the law is a straight line, pressures are under (1e-8)^(3/2) of that of a step.
 const LEAST: f64 = 1e-8;
 
 impl Asperities {
