@@ -1,13 +1,14 @@
 //! Frictionless contact of N elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition.
 //!
 //! Data flows one way: scene file -> [`scene::Scene`], made of the types in [`problem`] -> [`mesh::Mesh`] ->
-//! [`fem`] bodies and [`contact`] pairs -> [`model::Model`] -> sweeps -> [`ddm::Outcome`] -> [`report`](commands::report). The
+//! [`fem`] bodies and [`contact`] pairs -> [`model::Model`] -> sweeps -> [`ddm::Outcome`] -> [`run::report`]. The
 //! loops are those of [`ddm`].
 #![deny(unsafe_code)]
 // indices of tensors, rows and nodes read like the formulas
 #![allow(clippy::needless_range_loop)]
 #![warn(missing_docs)]
 
+pub mod api;
 pub mod cli;
 pub mod commands;
 pub mod contact;
@@ -29,5 +30,6 @@ pub mod parallel;
 pub mod petsc;
 pub mod problem;
 pub mod report;
+pub mod run;
 pub mod scene;
 pub mod solver;
