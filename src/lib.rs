@@ -9,7 +9,9 @@
 #![warn(missing_docs)]
 
 pub mod api;
+#[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "cli")]
 pub mod commands;
 pub mod contact;
 pub mod data;
@@ -29,6 +31,7 @@ pub mod parallel;
 #[allow(unsafe_code)]
 pub mod petsc;
 pub mod problem;
+#[cfg(feature = "cli")]
 pub mod report;
 pub mod run;
 pub mod scene;

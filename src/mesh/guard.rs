@@ -2,7 +2,6 @@
 
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::Guard;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
@@ -73,7 +72,7 @@ const MOST_SAID: u64 = 1 << 25;
 pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt, doing: &str) -> io::Result<End> {
     let began = Instant::now();
     let mut child = command.spawn()?;
-    let mut bar: Option<ProgressBar> = None;
+    let mut line = None;
     let end = loop {
         if let Some(status) = child.try_wait()? {
             break End::Itself(status);
@@ -88,26 +87,52 @@ pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt
             break end;
         }
         if elapsed >= QUIET {
-            let bar = bar.get_or_insert_with(line);
-            bar.set_message(format!("{doing}, {} s", elapsed.as_secs()));
-            bar.tick();
+            line.get_or_insert_with(Line::new).show(format!("{doing}, {} s", elapsed.as_secs()));
         }
         // a twentieth of the time so far is lost at most
         std::thread::sleep((elapsed / 20).clamp(Duration::from_millis(1), PAUSE));
     };
-    if let Some(bar) = bar {
-        bar.finish_and_clear();
-    }
     Ok(end)
 }
 
-/// A line on standard error, if that is a terminal.
-fn line() -> ProgressBar {
-    let bar = ProgressBar::new_spinner();
-    if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_msg}") {
-        bar.set_style(style);
+/// A line on standard error, if that is a terminal, till this is dropped.
+#[cfg(feature = "cli")]
+struct Line(indicatif::ProgressBar);
+
+#[cfg(feature = "cli")]
+impl Line {
+    fn new() -> Self {
+        let bar = indicatif::ProgressBar::new_spinner();
+        if let Ok(style) = indicatif::ProgressStyle::with_template("{spinner} {wide_msg}") {
+            bar.set_style(style);
+        }
+        Self(bar)
     }
-    bar
+
+    fn show(&mut self, text: String) {
+        self.0.set_message(text);
+        self.0.tick();
+    }
+}
+
+#[cfg(feature = "cli")]
+impl Drop for Line {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// A library shows nothing.
+#[cfg(not(feature = "cli"))]
+struct Line;
+
+#[cfg(not(feature = "cli"))]
+impl Line {
+    fn new() -> Self {
+        Self
+    }
+
+    fn show(&mut self, _text: String) {}
 }
 
 #[cfg(test)]

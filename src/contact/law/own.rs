@@ -87,13 +87,10 @@ mod tests {
 
     impl LayerLaw for Wrong {
         fn compressed(&self, _point: usize, c: f64) -> Response {
-            let pressure =
-                if self.end > 0.0 && c > self.end { f64::INFINITY } else { c * c * (1.0 - self.pressure * c) };
-            Response {
-                pressure,
-                tangent: 2.0 * c * (1.0 + self.tangent),
-                energy: c * c * c / 3.0 * (1.0 + self.energy),
-            }
+            let Wrong { pressure: cubic, tangent, energy, end } = *self;
+            let pressure = if end > 0.0 && c > end { f64::INFINITY } else { c * c * (1.0 - cubic * c) };
+            let tangent = (2.0 * c - 3.0 * cubic * c * c) * (1.0 + tangent);
+            Response { pressure, tangent, energy: c * c * c * (1.0 / 3.0 - cubic * c / 4.0) * (1.0 + energy) }
         }
     }
 
