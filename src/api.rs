@@ -149,3 +149,7 @@ impl Solution {
         &self.done.built.discrete.bodies[body].points
     }
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../docs/library.md")]
+struct Page;

@@ -45,7 +45,7 @@ fn check(law: &dyn LayerLaw, size: f64) -> Result<(), String> {
         }
         seen.push((c, here));
     }
-    let rounding = ROUNDING * seen[seen.len() - 1].1.energy;
+    let rounding = ROUNDING * seen[seen.len() - 1].1.energy.abs();
     let (mut kinks, mut off) = (0, String::new());
     for two in seen.windows(2) {
         let [(before, last), (c, here)] = [two[0], two[1]];
