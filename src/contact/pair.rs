@@ -5,7 +5,7 @@ use super::cover::{Cover, Left};
 use super::law::LayerLaw;
 use super::pieces::Common;
 use super::side::Side;
-use crate::error::{self, Error};
+use crate::error::{Error, Result};
 use crate::fem::{element, pad};
 use crate::linalg::Csr;
 use std::collections::{BTreeMap, HashMap};
@@ -65,6 +65,9 @@ pub enum Fault {
     Law(Error),
 }
 
+/// From the contact points of a pair to its law.
+pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
+
 /// Makes the arrays of a pair from the common pieces of its surfaces.
 ///
 /// `bodies` are the numbers of the bodies of side a and b, `gap(x)` the scene's own gap, added to the geometric one, `law` the layer at the contact points.
@@ -80,7 +83,7 @@ pub fn assemble<const D: usize>(
     bodies: [usize; 2],
     common: &Common<D>,
     gap: &dyn Fn([f64; 3]) -> f64,
-    law: &dyn Fn(&[[f64; 3]]) -> error::Result<Rc<dyn LayerLaw>>,
+    law: &LawMaker,
 ) -> Result<ContactPair, Fault> {
     let mut points: HashMap<u32, Accumulator> = HashMap::new();
     let mut carriers = vec![None; a.facets.count()];

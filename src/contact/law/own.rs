@@ -40,7 +40,7 @@ fn check(law: &dyn LayerLaw, size: f64) -> Result<(), String> {
     for step in 0..=DECADES * STEPS {
         let c = size * 10f64.powf(f64::from(step) / f64::from(STEPS) - f64::from(DECADES));
         let here = law.compressed(0, c);
-        if step > 0 && !(here.pressure < HUGE) {
+        if step > 0 && (here.pressure.is_nan() || here.pressure >= HUGE) {
             break;
         }
         seen.push((c, here));
@@ -62,7 +62,8 @@ fn check(law: &dyn LayerLaw, size: f64) -> Result<(), String> {
         }
         let [low, high] = [-CLOSE, CLOSE].map(|share| law.pressure(0, c * (1.0 + share)));
         let slope = (high - low) / (2.0 * CLOSE * c);
-        if !((slope - here.tangent).abs() <= OFF * slope.max(here.tangent)) {
+        let fits = (slope - here.tangent).abs() <= OFF * slope.max(here.tangent);
+        if !fits {
             kinks += 1;
             off = format!("p' is {:.3e} at c = {c:.3e}, where differences of p give {slope:.3e}", here.tangent);
         }
