@@ -1,4 +1,4 @@
-//! The library: a scene built in Rust, solved, and read as arrays. The command line goes the same way ([`run`](crate::run)).
+//! The library: a scene built in Rust, solved, and read as arrays. The command line goes the same way ([`run`]).
 //!
 //! Lengths and stresses are in any units that fit each other; forces are in stress times length squared, in the plane for a
 //! thickness of one length. Points and vectors have three components, z = 0 in the plane. docs/library.md has more examples.

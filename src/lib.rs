@@ -1,5 +1,9 @@
 //! Frictionless contact of N elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition.
 //!
+//! Programs use [`api`] (a scene built in Rust, solved, read as arrays) and [`petsc`] (the binding, useful alone). All other modules are
+//! public for the tests and for whoever reads on; they change without notice. The feature `cli`, which is on by default, is the command
+//! line.
+//!
 //! Data flows one way: scene file -> [`scene::Scene`], made of the types in [`problem`] -> [`mesh::Mesh`] ->
 //! [`fem`] bodies and [`contact`] pairs -> [`model::Model`] -> sweeps -> [`ddm::Outcome`] -> [`run::report`]. The
 //! loops are those of [`ddm`].

@@ -1,4 +1,4 @@
-//! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`], [`bench`], [`mesh`]. What those
+//! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`], [`bench`](mod@bench), [`mesh`]. What those
 //! that solve share with the library is in [`run`](crate::run).
 
 pub mod adapt;

@@ -14,7 +14,7 @@ use std::rc::Rc;
 /// A pair of surfaces, discretised: n points with one pressure each.
 ///
 /// Point q stands for a function mu_q of a pressure space on side a, with sum_q mu_q = 1 on the covered surface and
-/// omega_q = int mu_q. With <v>_q = (1/omega_q) int mu_q v over the common pieces, the compression of the layer is
+/// omega_q = int mu_q. With `<v>_q = (1/omega_q) int mu_q v` over the common pieces, the compression of the layer is
 /// `c = B_a u_a + B_b u_b - d`. One set of points serves both sides, so action equals reaction to rounding.
 #[derive(Debug)]
 pub struct ContactPair {

@@ -30,7 +30,7 @@ pub struct Space<const D: usize> {
     measure: OnceCell<f64>,
 }
 
-/// Facets of a body's boundary, oriented so that [`Facets::normal`] points out of the body.
+/// Facets of a body's boundary, oriented so that [`Facets::normals`] points out of the body.
 #[derive(Debug, Clone)]
 pub struct Facets<const D: usize> {
     /// Polynomial order.

@@ -8,7 +8,7 @@ use std::ffi::c_void;
 use std::ptr::null_mut;
 
 /// Rows of a square matrix: all, or those of one of several processes. They live exactly as long as PETSc's matrix, which may outlive
-/// [`Matrix`](super::Matrix) inside a solver: PETSc calls [`free`] at the end.
+/// [`Matrix`](super::Matrix) inside a solver: PETSc calls `free` at the end.
 ///
 /// Values are in this order: all in the columns of the rows' own numbers, row by row, then all others, row by row.
 ///
