@@ -270,7 +270,12 @@ impl fmt::Display for Error {
 
 impl fmt::Debug for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
+        if self.is_silent() {
+            return f.write_str("another rank has the message");
+        }
+        // `main` prints a word of its own before it
+        let text = self.render(false);
+        f.write_str(text.strip_prefix("error: ").unwrap_or(&text))
     }
 }
 

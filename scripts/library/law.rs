@@ -16,12 +16,10 @@ struct Film {
 impl LayerLaw for Film {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         let Film { stiffness: k, thickness: h } = *self;
-        if c >= h {
-            // a rigid stop
-            return Response { pressure: f64::INFINITY, tangent: f64::INFINITY, energy: f64::INFINITY };
-        }
-        let left = 1.0 - c / h;
-        Response { pressure: k * c / left, tangent: k / left.powi(2), energy: -k * h * (h * (-c / h).ln_1p() + c) }
+        // all is infinite from c = h on: a rigid stop
+        let left = (1.0 - c / h).max(0.0);
+        let energy = -k * h * (h * (-c / h).max(-1.0).ln_1p() + c);
+        Response { pressure: k * c / left, tangent: k / left.powi(2), energy }
     }
 }
 
@@ -35,12 +33,8 @@ fn block(mut mesh: MeshArrays, name: &str, y: f64, n: u32) -> MeshArrays {
     let squares = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
     let square = |(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j), at(i + 1, j + 1), at(i, j + 1)];
     let side = |j: u32| (0..n).flat_map(|i| [at(i, j), at(i + 1, j)]).collect::<Vec<u32>>();
-    let (low, high) = (side(0), side(n));
-    mesh.group(name, 2, squares.flat_map(square).collect()).group(&format!("{name}_low"), 1, low).group(
-        &format!("{name}_high"),
-        1,
-        high,
-    )
+    let mesh = mesh.group(name, 2, squares.flat_map(square).collect());
+    mesh.group(&format!("{name}_low"), 1, side(0)).group(&format!("{name}_high"), 1, side(n))
 }
 
 fn main() -> Result<()> {

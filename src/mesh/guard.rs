@@ -56,6 +56,7 @@ pub fn command(program: &Path, bytes: Option<u64>) -> Command {
 }
 
 /// Seconds after which a terminal is told what it waits for.
+#[cfg(feature = "cli")]
 const QUIET: Duration = Duration::from_secs(1);
 
 /// Longest pause between two looks at the program.
@@ -72,7 +73,11 @@ const MOST_SAID: u64 = 1 << 25;
 pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt, doing: &str) -> io::Result<End> {
     let began = Instant::now();
     let mut child = command.spawn()?;
-    let mut line = None;
+    // a library shows nothing
+    #[cfg(not(feature = "cli"))]
+    let _ = doing;
+    #[cfg(feature = "cli")]
+    let mut bar: Option<indicatif::ProgressBar> = None;
     let end = loop {
         if let Some(status) = child.try_wait()? {
             break End::Itself(status);
@@ -86,53 +91,30 @@ pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt
             child.wait()?;
             break end;
         }
+        #[cfg(feature = "cli")]
         if elapsed >= QUIET {
-            line.get_or_insert_with(Line::new).show(format!("{doing}, {} s", elapsed.as_secs()));
+            let bar = bar.get_or_insert_with(line);
+            bar.set_message(format!("{doing}, {} s", elapsed.as_secs()));
+            bar.tick();
         }
         // a twentieth of the time so far is lost at most
         std::thread::sleep((elapsed / 20).clamp(Duration::from_millis(1), PAUSE));
     };
+    #[cfg(feature = "cli")]
+    if let Some(bar) = bar {
+        bar.finish_and_clear();
+    }
     Ok(end)
 }
 
-/// A line on standard error, if that is a terminal, till this is dropped.
+/// A line on standard error, if that is a terminal.
 #[cfg(feature = "cli")]
-struct Line(indicatif::ProgressBar);
-
-#[cfg(feature = "cli")]
-impl Line {
-    fn new() -> Self {
-        let bar = indicatif::ProgressBar::new_spinner();
-        if let Ok(style) = indicatif::ProgressStyle::with_template("{spinner} {wide_msg}") {
-            bar.set_style(style);
-        }
-        Self(bar)
+fn line() -> indicatif::ProgressBar {
+    let bar = indicatif::ProgressBar::new_spinner();
+    if let Ok(style) = indicatif::ProgressStyle::with_template("{spinner} {wide_msg}") {
+        bar.set_style(style);
     }
-
-    fn show(&mut self, text: String) {
-        self.0.set_message(text);
-        self.0.tick();
-    }
-}
-
-#[cfg(feature = "cli")]
-impl Drop for Line {
-    fn drop(&mut self) {
-        self.0.finish_and_clear();
-    }
-}
-
-/// A library shows nothing.
-#[cfg(not(feature = "cli"))]
-struct Line;
-
-#[cfg(not(feature = "cli"))]
-impl Line {
-    fn new() -> Self {
-        Self
-    }
-
-    fn show(&mut self, _text: String) {}
+    bar
 }
 
 #[cfg(test)]
