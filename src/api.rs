@@ -127,6 +127,9 @@ impl Solution {
 
     /// Places, gaps, compressions, pressures and normal displacements at the contact points of a pair below [`Solution::pairs`], on
     /// every rank.
+    ///
+    /// # Panics
+    /// When there is no such pair.
     pub fn contact(&self, pair: usize) -> ContactTable {
         report::contact_table(&self.done, self.estimate.as_ref(), pair)
     }
@@ -135,6 +138,9 @@ impl Solution {
     ///
     /// # Errors
     /// The failure of a solver that should have found the interior of the body.
+    ///
+    /// # Panics
+    /// When there is no such body.
     pub fn body(&self, body: usize) -> Option<Result<&BodyField>> {
         let info = &self.done.built.discrete.bodies[body];
         match self.recovered[body].as_ref()? {
@@ -145,6 +151,9 @@ impl Solution {
 
     /// The number of each node of a body among the points of the mesh: of [`MeshArrays::points`], or of the points in a file that a
     /// group uses.
+    ///
+    /// # Panics
+    /// When there is no such body.
     pub fn points(&self, body: usize) -> &[u32] {
         &self.done.built.discrete.bodies[body].points
     }

@@ -61,6 +61,7 @@ impl BodySpec {
     /// component free.
     #[track_caller]
     pub fn fix<const N: usize>(mut self, on: &str, value: [Option<f64>; N]) -> Self {
+        const { assert!(N <= 3, "displacements have three components at most") };
         let value = std::array::from_fn(|c| value.get(c).copied().flatten().map(Field::Constant));
         self.fix.push(Support { on: Located::here(on), value, normal: None, path: None, factor: 1.0 });
         self
@@ -79,6 +80,14 @@ impl BodySpec {
     pub fn load(mut self, on: &str, kind: LoadKind) -> Self {
         self.load.push(Load { on: Located::here(on), kind, path: None, factor: 1.0 });
         self
+    }
+
+    /// Adds a traction (x, y in the plane, x, y, z in space; stresses), numbers or functions of the place.
+    #[track_caller]
+    pub fn traction<const N: usize>(self, on: &str, traction: [impl Into<Field>; N]) -> Self {
+        const { assert!(N <= 3, "tractions have three components at most") };
+        let mut given = traction.into_iter().map(Into::into);
+        self.load(on, LoadKind::Traction(std::array::from_fn(|_| given.next().unwrap_or(Field::Constant(0.0)))))
     }
 
     /// Adds a pressure against the outer normal (a stress, > 0 pushes), a number or a function of the place.

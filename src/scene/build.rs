@@ -125,17 +125,29 @@ impl Scene {
             let message = format!("`{name}` cannot be the name of a body");
             return Err(Error::scene(&body.name.place, message).label(label).help(help));
         }
+        let is_plane = self.dimension.value == 2;
+        if is_plane && body.force.as_ref().is_some_and(|force| !force[2].is_zero()) {
+            return Err(Error::scene(&body.name.place, "a body force in z in a plane problem"));
+        }
         for support in &body.fix {
             let held = support.value.iter().filter(|value| value.is_some()).count();
             if held + usize::from(support.normal.is_some()) == 0 || (held > 0 && support.normal.is_some()) {
                 let message = "a support holds some components, or the normal alone";
                 return Err(Error::scene(&support.on.place, message));
             }
-            if self.dimension.value == 2 && support.value[2].is_some() {
+            if is_plane && support.value[2].is_some() {
                 return Err(Error::scene(&support.on.place, "a support in z in a plane problem"));
             }
         }
         for load in &body.load {
+            let across = match &load.kind {
+                LoadKind::Pressure(_) => false,
+                LoadKind::Traction(traction) => !traction[2].is_zero(),
+                LoadKind::Force { total, .. } => total[2] != 0.0,
+            };
+            if is_plane && across {
+                return Err(Error::scene(&load.on.place, "a load in z in a plane problem"));
+            }
             let LoadKind::Force { total, .. } = load.kind else { continue };
             if total.iter().any(|force| !force.is_finite()) {
                 return Err(Error::scene(&load.on.place, format!("the force is {total:?}")));
