@@ -21,6 +21,8 @@
 //! # Ok::<(), winkler::error::Error>(())
 //! ```
 
+#![warn(clippy::undocumented_unsafe_blocks)]
+
 mod blas;
 mod error;
 mod failure;
