@@ -14,6 +14,7 @@ const FUNCTIONS: &[&str] = &[
     "KSPCreate",
     "KSPDestroy",
     "KSPGetAndClearConvergenceTest",
+    "KSPGetComputeSingularValues",
     "KSPGetConvergedReason",
     "KSPGetInitialGuessNonzero",
     "KSPGetIterationNumber",

@@ -12,6 +12,10 @@ use std::collections::VecDeque;
 /// grooves, a flange and rollers, 3 and all of it took the fewest iterations among those that needed no more steps than exact ones.
 const DELAY: usize = 3;
 
+/// Error of a step, as a share of it, above which it is not taken: Newton's method converges with any share below one, and the worse the
+/// larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982). Pressures cannot settle where no contact is known yet.
+const MOST: f64 = 0.5;
+
 /// When a linear step ends.
 pub(super) struct Forcing<'a> {
     places: &'a Layer,
@@ -52,6 +56,42 @@ impl<'a> Forcing<'a> {
         let ends = |tolerance: f64| {
             most <= tolerance * peak && trial.error <= 0.5 * tolerance * contact_energy(model, &met).sqrt()
         };
-        moved <= apart || self.tolerance.is_some_and(ends) || trial.is_within(f64::EPSILON.sqrt())
+        (moved < apart && trial.is_within(MOST))
+            || self.tolerance.is_some_and(ends)
+            || trial.is_within(f64::EPSILON.sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::sample::two_pairs;
+
+    /// Steps of two points with p = 4 c and two with p = c^2, of which one opens.
+    #[test]
+    fn a_step_ends_when_pressures_have_settled() {
+        let model = two_pairs();
+        let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
+        let rho = [2.0, 0.5, 0.25, 3.0];
+        let asked = |closings: &[[f64; 4]], tolerance: Option<f64>, error: f64| -> Vec<bool> {
+            let mut forcing = Forcing::new(&places, places.compression.clone(), &rho, tolerance);
+            let trial = |closing| Trial { closing, energy: 1.0, error };
+            closings.iter().map(|closing| forcing.is_enough(&model, &trial(closing))).collect()
+        };
+        // the second pair goes to c = 3, where the line of slope 4 has p = 8 and the law 9: they meet between
+        let far = [0.0, 0.0, 1.0, 0.0];
+        assert_eq!(asked(&[far; 5], None, 0.1), [false, false, false, true, true]);
+        assert_eq!(asked(&[far; 5], None, 0.6), [false; 5], "more than half of the step is missing");
+        // pressures that move by more than they are off
+        let moving = [[0.0, 0.0, 0.2, 0.0], [0.0, 0.0, 0.4, 0.0], [0.0, 0.0, 0.6, 0.0], [0.0, 0.0, 0.8, 0.0]];
+        assert_eq!(asked(&moving, None, 0.1), [false; 4]);
+        // the first pair is linear: nothing is off, and only the tolerance of the run ends the step
+        let linear = [0.1, 0.0, 0.0, 0.0];
+        assert_eq!(asked(&[linear; 5], None, 0.1), [false; 5]);
+        let contact = contact_energy(&model, &Layer::new(&model, vec![0.6, 1.0, 2.0, 1.0])).sqrt();
+        assert_eq!(asked(&[linear; 5], Some(0.01), 0.0049 * contact), [false, false, false, true, true]);
+        assert_eq!(asked(&[linear; 5], Some(0.01), 0.0051 * contact), [false; 5]);
+        // rounding
+        assert_eq!(asked(&[linear; 1], None, 1e-8), [true]);
     }
 }

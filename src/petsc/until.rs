@@ -39,7 +39,8 @@ impl Ksp {
     /// # Errors
     /// PETSc's.
     pub fn estimate_spectrum(&self) -> Result<()> {
-        petsc!(KSPSetComputeSingularValues(self.ksp, ffi::PetscBool_PETSC_TRUE))
+        // SAFETY: a solver of ours and a flag.
+        unsafe { petsc!(KSPSetComputeSingularValues(self.ksp, ffi::PetscBool_PETSC_TRUE)) }
     }
 
     /// Solves `A x = b` from a zero guess until `enough` is true after an iteration, or the tolerances of the solver end it. Collective: the
@@ -68,12 +69,15 @@ impl Ksp {
     /// Those of [`solve`](Self::solve).
     pub fn solve_until(&self, b: &[f64], x: &mut [f64], enough: &mut Enough) -> Result<Solved> {
         let (mut test, mut data, mut destroy) = (None, null_mut(), None);
-        petsc!(KSPGetAndClearConvergenceTest(self.ksp, &mut test, &mut data, &mut destroy))?;
+        // SAFETY: the solver's own test is taken out with its data, and put back below whatever the solve came to.
+        unsafe { petsc!(KSPGetAndClearConvergenceTest(self.ksp, &mut test, &mut data, &mut destroy)) }?;
         let mut until = Until { enough, first: f64::NAN, test, data };
         let context: *mut Until = &mut until;
-        petsc!(KSPSetConvergenceTest(self.ksp, Some(is_enough), context.cast(), None))?;
+        // SAFETY: the test reads this context, which lives until the test is replaced below.
+        unsafe { petsc!(KSPSetConvergenceTest(self.ksp, Some(is_enough), context.cast(), None)) }?;
         let solved = self.solve(b, x);
-        petsc!(KSPSetConvergenceTest(self.ksp, test, data, destroy))?;
+        // SAFETY: what PETSc gave above.
+        unsafe { petsc!(KSPSetConvergenceTest(self.ksp, test, data, destroy)) }?;
         solved
     }
 }
@@ -103,7 +107,8 @@ unsafe extern "C" fn is_enough(
         return 0;
     }
     let (mut vector, mut array, mut rows) = (null_mut(), null(), 0);
-    let read = (|| {
+    // SAFETY: PETSc's solver, which is in a solve and has an iterate; its vector is its own and is only read.
+    let read = (|| unsafe {
         petsc!(KSPBuildSolution(ksp, null_mut(), &mut vector))?;
         petsc!(VecGetLocalSize(vector, &mut rows))?;
         petsc!(VecGetArrayRead(vector, &mut array))
@@ -115,7 +120,8 @@ unsafe extern "C" fn is_enough(
     if (until.enough)(&Iterate { x, residual: norm, first: until.first, least }) {
         *reason = ffi::KSPConvergedReason_KSP_CONVERGED_RTOL;
     }
-    match petsc!(VecRestoreArrayRead(vector, &mut array)) {
+    // SAFETY: gives back what was read above.
+    match unsafe { petsc!(VecRestoreArrayRead(vector, &mut array)) } {
         Ok(()) => 0,
         Err(_) => ERROR,
     }
@@ -123,8 +129,15 @@ unsafe extern "C" fn is_enough(
 
 /// Extreme eigenvalues that conjugate gradients have seen, if they were to look.
 fn extreme(ksp: ffi::KSP) -> Option<[f64; 2]> {
-    let (mut least, mut most) = (0.0, 0.0);
-    petsc!(KSPComputeExtremeSingularValues(ksp, &mut most, &mut least)).ok()?;
+    let (mut least, mut most, mut looks) = (0.0, 0.0, ffi::PetscBool_PETSC_FALSE);
+    // SAFETY: PETSc's solver, which is in a solve, and places for its answers.
+    unsafe {
+        petsc!(KSPGetComputeSingularValues(ksp, &mut looks)).ok()?;
+        if looks == ffi::PetscBool_PETSC_FALSE {
+            return None;
+        }
+        petsc!(KSPComputeExtremeSingularValues(ksp, &mut most, &mut least)).ok()?;
+    }
     Some([least, most])
 }
 
