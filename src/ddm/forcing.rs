@@ -2,6 +2,7 @@
 //! (Ern and Vohralík, Adaptive inexact Newton methods, 2013). Both are known after each iteration of the linear solver.
 
 use super::bound::contact_energy;
+use super::scale::Scale;
 use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::linear::Trial;
@@ -21,8 +22,9 @@ pub(super) struct Forcing<'a> {
     places: &'a Layer,
     /// Slopes on which places are met, n.
     rho: &'a [f64],
-    /// Relative error that ends the run.
+    /// Relative error that ends the run, and what it refers to.
     tolerance: Option<f64>,
+    scale: &'a Scale,
     /// Compressions before the step, n.
     before: Vec<f64>,
     /// Pressures of the last iterations, n each.
@@ -31,8 +33,8 @@ pub(super) struct Forcing<'a> {
 
 impl<'a> Forcing<'a> {
     /// For the step from places and compressions (n).
-    pub fn new(places: &'a Layer, before: Vec<f64>, rho: &'a [f64], tolerance: Option<f64>) -> Self {
-        Self { places, rho, tolerance, pressures: VecDeque::from([places.linear(&before)]), before }
+    pub fn new(places: &'a Layer, before: Vec<f64>, rho: &'a [f64], tolerance: Option<f64>, scale: &'a Scale) -> Self {
+        Self { places, rho, tolerance, scale, pressures: VecDeque::from([places.linear(&before)]), before }
     }
 
     /// Whether a step is solved well enough: the pressures have settled beside their distance from the laws, or beside the error by which
@@ -48,17 +50,19 @@ impl<'a> Forcing<'a> {
             apart += model.weight[q] * (p[q] - met.pressure[q]).abs();
             (most, peak) = (most.max(change), peak.max(met.pressure[q]));
         }
+        // an error that is small beside the energy of the bodies may be large for the pressures of stiff layers
+        let ends = |tolerance: f64| {
+            most <= tolerance * peak
+                && trial.error <= 0.5 * tolerance * contact_energy(model, &met).sqrt()
+                && self.scale.imbalance(model, &model.forces(&p)) <= tolerance
+        };
+        let settled = moved < apart || self.tolerance.is_some_and(ends);
+        let enough = trial.is_within(if settled { MOST } else { f64::EPSILON.sqrt() });
         if self.pressures.len() == DELAY {
             self.pressures.pop_front();
         }
         self.pressures.push_back(p);
-        // an error that is small beside the energy of the bodies may be large for the pressures of stiff layers
-        let ends = |tolerance: f64| {
-            most <= tolerance * peak && trial.error <= 0.5 * tolerance * contact_energy(model, &met).sqrt()
-        };
-        (moved < apart && trial.is_within(MOST))
-            || self.tolerance.is_some_and(ends)
-            || trial.is_within(f64::EPSILON.sqrt())
+        enough
     }
 }
 
@@ -72,9 +76,9 @@ mod tests {
     fn a_step_ends_when_pressures_have_settled() {
         let model = two_pairs();
         let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
-        let rho = [2.0, 0.5, 0.25, 3.0];
+        let (rho, scale) = ([2.0, 0.5, 0.25, 3.0], Scale::default());
         let asked = |closings: &[[f64; 4]], tolerance: Option<f64>, error: f64| -> Vec<bool> {
-            let mut forcing = Forcing::new(&places, places.compression.clone(), &rho, tolerance);
+            let mut forcing = Forcing::new(&places, places.compression.clone(), &rho, tolerance, &scale);
             let trial = |closing| Trial { closing, energy: 1.0, error };
             closings.iter().map(|closing| forcing.is_enough(&model, &trial(closing))).collect()
         };
