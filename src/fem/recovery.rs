@@ -116,7 +116,10 @@ impl<'a, const D: usize> Recovery<'a, D> {
         // the gradient of a parabola is linear, and so are coordinates in linear elements
         let is_linear = self.space.order == Order::P1 && !self.space.axisymmetric;
         let corner = |node: u32| -> [Slope<D>; N] {
-            std::array::from_fn(|k| self.recovered(node, &self.space.nodes[vertices[k] as usize]))
+            std::array::from_fn(|k| {
+                let at = &self.space.nodes[vertices[k] as usize];
+                Slope { h: self.patch(node).slope_of_parabola(&self.monomials, at), hoop: 0.0 }
+            })
         };
         let corners: Vec<[Slope<D>; N]> =
             if is_linear { vertices.iter().map(|&node| corner(node)).collect() } else { Vec::new() };
