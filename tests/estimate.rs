@@ -149,9 +149,9 @@ fn pressure_between_wavy_surfaces() {
             all.extend(["method={}".to_owned(), format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}")]);
             solve_with(case("westergaard"), &all)
         };
-        let better = with(2, 64).contact();
-        for order in [1, 2] {
-            let run = with(order, 16);
+        let better = with(2, 128).contact();
+        for (order, n) in [(1, 32), (2, 16)] {
+            let run = with(order, n);
             let table = run.contact();
             let exact = weighted_error(&table, 0..table.rows(), |q| quadratic(&better, table["x"][q]));
             let reported = run.number("discretization_error/pressure/0");
