@@ -9,8 +9,12 @@ mod requirements;
 
 /// All that the binding calls; a function that is missing here does not exist for the crate.
 const FUNCTIONS: &[&str] = &[
+    "KSPBuildSolution",
+    "KSPComputeExtremeSingularValues",
     "KSPCreate",
     "KSPDestroy",
+    "KSPGetAndClearConvergenceTest",
+    "KSPGetComputeSingularValues",
     "KSPGetConvergedReason",
     "KSPGetInitialGuessNonzero",
     "KSPGetIterationNumber",
@@ -18,6 +22,8 @@ const FUNCTIONS: &[&str] = &[
     "KSPGetResidualNorm",
     "KSPGetTolerances",
     "KSPGetType",
+    "KSPSetComputeSingularValues",
+    "KSPSetConvergenceTest",
     "KSPSetErrorIfNotConverged",
     "KSPSetFromOptions",
     "KSPSetOperators",
@@ -96,9 +102,12 @@ const FUNCTIONS: &[&str] = &[
     "VecCreateSeqWithArray",
     "VecDestroy",
     "VecGetArray",
+    "VecGetArrayRead",
+    "VecGetLocalSize",
     "VecPlaceArray",
     "VecResetArray",
     "VecRestoreArray",
+    "VecRestoreArrayRead",
     "VecSetBlockSize",
 ];
 

@@ -1,6 +1,6 @@
 //! Functions given by files: heights of measured surfaces and profiles, for the expressions of a scene.
 //!
-//! Data flow: a file -> [`read`] numbers in rows -> [`arrange`]d as a [`Grid`], as knots of a profile or as a triangulation -> values
+//! Data flow: a file -> `read` numbers in rows -> arranged as a [`Grid`], as knots of a profile or as a triangulation -> values
 //! and gradients at any place.
 
 mod arrange;

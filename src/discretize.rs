@@ -74,6 +74,8 @@ pub struct BodyInfo {
     pub name: String,
     /// Nodes.
     pub nodes: usize,
+    /// Number of each node among the points of the mesh.
+    pub points: Vec<u32>,
     /// Cells.
     pub cells: usize,
     /// What the check of its mesh counted.
@@ -312,6 +314,7 @@ pub fn discretize<const D: usize>(
         infos.push(BodyInfo {
             name: name.clone(),
             nodes: space.nodes.len(),
+            points: space.points(),
             cells: space.cell_count(),
             facets: FacetCounts::of(&checked[index]),
             dofs: space.dofs(),

@@ -9,10 +9,10 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A text that the user wrote: a scene file, or an option of the command line.
+/// A text that the user wrote: a scene file, an option of the command line, or a line of a Rust program.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Source {
-    /// File name, or the option of the command line (`--set`).
+    /// Name of the file, or the option of the command line (`--set`).
     pub name: String,
     /// The whole text; of an option, the option and its value.
     pub text: String,
@@ -25,6 +25,18 @@ pub struct Place {
     pub source: Arc<Source>,
     /// Byte range in it.
     pub span: Range<usize>,
+}
+
+impl Place {
+    /// The line of the Rust program that calls the function with this attribute (`#[track_caller]`); `word` is what the caret marks.
+    #[track_caller]
+    pub fn here(word: &str) -> Self {
+        let caller = std::panic::Location::caller();
+        // the word stands on the line of the call, so that a refusal shows the number of that line
+        let above = "\n".repeat(caller.line() as usize - 1);
+        let span = above.len()..above.len() + word.len();
+        Self { source: Arc::new(Source { name: caller.file().to_owned(), text: above + word }), span }
+    }
 }
 
 /// A value and the place where the user wrote it.
@@ -40,6 +52,14 @@ impl<T> Located<T> {
     /// Joins a value with its place.
     pub fn new(value: T, place: Place) -> Self {
         Self { value, place }
+    }
+}
+
+impl Located<String> {
+    /// A name and the line of the Rust program where it stands: see [`Place::here`].
+    #[track_caller]
+    pub fn here(name: &str) -> Self {
+        Self::new(name.to_owned(), Place::here(name))
     }
 }
 
@@ -77,11 +97,9 @@ impl Kind {
     }
 }
 
-/// An error that a user can act on.
-#[derive(Debug)]
+/// An error that a user can act on; `{:?}` is the whole message, too, which `main` of a program prints.
 pub struct Error(Box<Inner>);
 
-#[derive(Debug)]
 struct Inner {
     kind: Kind,
     message: String,
@@ -247,6 +265,17 @@ impl Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.render(false))
+    }
+}
+
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_silent() {
+            return f.write_str("another rank has the message");
+        }
+        // `main` prints a word of its own before it
+        let text = self.render(false);
+        f.write_str(text.strip_prefix("error: ").unwrap_or(&text))
     }
 }
 

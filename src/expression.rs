@@ -18,6 +18,7 @@ use crate::error::{Error, Place, Result};
 use program::{Code, MOST_VARIABLES, Number, Program, Values};
 use slip::Slip;
 use std::fmt;
+use std::rc::Rc;
 use std::sync::Arc;
 
 /// An expression such as `5e-4 * max(0, 1 - (x - 4)^2)^1.5`, parsed once and cheap to clone.
@@ -118,13 +119,33 @@ impl fmt::Debug for Expression {
     }
 }
 
-/// A number, or an expression in x, y, z (and for zones the iteration k).
-#[derive(Debug, Clone)]
+/// A number, an expression in x, y, z (and for zones the iteration k), or a function of a Rust program.
+#[derive(Clone)]
 pub enum Field {
     /// The same everywhere; always finite when it comes from a scene.
     Constant(f64),
     /// Depends on the place, or on k.
     Expression(Expression),
+    /// Depends on the place (x, y, z); no scene file has it.
+    Function(Rc<dyn Fn([f64; 3]) -> f64>),
+}
+
+impl From<f64> for Field {
+    fn from(value: f64) -> Self {
+        Field::Constant(value)
+    }
+}
+
+impl<F: Fn([f64; 3]) -> f64 + 'static> From<F> for Field {
+    fn from(function: F) -> Self {
+        Field::Function(Rc::new(function))
+    }
+}
+
+impl fmt::Debug for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Field({})", self.text())
+    }
 }
 
 impl Field {
@@ -158,6 +179,7 @@ impl Field {
         match self {
             Field::Constant(value) => *value,
             Field::Expression(expression) => expression.eval(&[x[0], x[1], x[2], f64::NAN]),
+            Field::Function(function) => function(x),
         }
     }
 
@@ -166,6 +188,7 @@ impl Field {
         match self {
             Field::Constant(value) => *value,
             Field::Expression(expression) => expression.eval(&[x[0], x[1], x[2], k as f64]),
+            Field::Function(function) => function(x),
         }
     }
 
@@ -190,8 +213,8 @@ impl Field {
     /// The data that it asks.
     pub fn data(&self) -> impl Iterator<Item = &Arc<Data>> {
         match self {
-            Field::Constant(_) => None,
             Field::Expression(expression) => Some(expression.data()),
+            _ => None,
         }
         .into_iter()
         .flatten()
@@ -202,25 +225,27 @@ impl Field {
         matches!(self, Field::Constant(0.0))
     }
 
-    /// The number, or the expression as written.
+    /// The number, the expression as written, or the word `function`.
     pub fn text(&self) -> String {
         match self {
             Field::Constant(value) => value.to_string(),
             Field::Expression(expression) => expression.text().to_owned(),
+            Field::Function(_) => "function".to_owned(),
         }
     }
 
-    /// Where the expression stands; constants do not remember it.
+    /// Where the expression stands, if it is one.
     pub fn place(&self) -> Option<&Place> {
         match self {
-            Field::Constant(_) => None,
             Field::Expression(expression) => Some(expression.place()),
+            _ => None,
         }
     }
 
     fn refuse(&self, what: &str, values: &[f64], value: f64) -> Error {
         let Field::Expression(expression) = self else {
-            return Error::new(crate::error::Kind::Scene, format!("{what} is {value}"));
+            let at: Vec<String> = values.iter().map(f64::to_string).collect();
+            return Error::new(crate::error::Kind::Scene, format!("{what} is {value} at ({})", at.join(", ")));
         };
         if let Some(error) = expression.outside(what, values) {
             return error;

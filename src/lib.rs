@@ -1,14 +1,21 @@
 //! Frictionless contact of N elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition.
 //!
+//! Programs use [`api`] (a scene built in Rust, solved, read as arrays) and [`petsc`] (the binding, useful alone). All other modules are
+//! public for the tests and for whoever reads on; they change without notice. The feature `cli`, which is on by default, is the command
+//! line.
+//!
 //! Data flows one way: scene file -> [`scene::Scene`], made of the types in [`problem`] -> [`mesh::Mesh`] ->
-//! [`fem`] bodies and [`contact`] pairs -> [`model::Model`] -> sweeps -> [`ddm::Outcome`] -> [`report`](commands::report). The
+//! [`fem`] bodies and [`contact`] pairs -> [`model::Model`] -> sweeps -> [`ddm::Outcome`] -> [`run::report`]. The
 //! loops are those of [`ddm`].
 #![deny(unsafe_code)]
 // indices of tensors, rows and nodes read like the formulas
 #![allow(clippy::needless_range_loop)]
 #![warn(missing_docs)]
 
+pub mod api;
+#[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "cli")]
 pub mod commands;
 pub mod contact;
 pub mod data;
@@ -28,6 +35,8 @@ pub mod parallel;
 #[allow(unsafe_code)]
 pub mod petsc;
 pub mod problem;
+#[cfg(feature = "cli")]
 pub mod report;
+pub mod run;
 pub mod scene;
 pub mod solver;

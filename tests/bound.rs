@@ -1,15 +1,15 @@
 //! The bound of Newton's error by duality, against the true error: never below it, and hardly above it once it is one.
 
 use std::path::Path;
-use winkler::commands::clock::Clock;
-use winkler::commands::run;
-use winkler::commands::stages::Begin;
 use winkler::ddm::{Outcome, Silent};
 use winkler::error::Result;
 use winkler::interrupt::Interrupt;
 use winkler::model::field::{apply_stiffness, local_dot, residual};
 use winkler::model::{Field, Model};
 use winkler::petsc::Session;
+use winkler::run;
+use winkler::run::clock::Clock;
+use winkler::run::stages::Begin;
 use winkler::scene;
 use winkler::solver::options;
 

@@ -169,6 +169,23 @@ fn multigrid_over_all_bodies() {
     assert_eq!(sweeps.count("body_solves"), 2 * sweeps.count("sweeps"));
 }
 
+/// Linear steps end by what the laws leave: pressures of stiff layers are right as soon as with exact steps, and no step is restarted once
+/// the contact is found.
+#[test]
+fn inexact_steps_are_as_many_as_exact_ones() {
+    for stiffness in ["1e5", "1e9"] {
+        let run = |solver: &str| {
+            let (solver, layer) =
+                (format!("solver={solver}"), format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}"));
+            let sets = ["body.0.order=1", "body.1.order=1", "method={}", &solver, &layer];
+            solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+        };
+        let (inexact, exact) = (run("hypre"), run("condensed"));
+        assert_eq!(inexact.count("iterations"), exact.count("iterations"), "{stiffness}");
+        assert!(distance(&inexact.contact()["pressure"], &exact.contact()["pressure"]) < 2e-8, "{stiffness}");
+    }
+}
+
 /// Rigid bodies foretell a large curved contact, and Newton's steps need not grow it from within.
 #[test]
 fn rigid_bodies_foretell_the_contact() {

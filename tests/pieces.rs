@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 use std::collections::HashMap;
+use winkler::contact::law::{self, OwnLaws};
 use winkler::contact::pieces::{self, Cut, Reach};
 use winkler::contact::side::{length, unit};
 use winkler::contact::{STEADY, Side, assemble};
@@ -270,7 +271,7 @@ fn check<const D: usize>(surfaces: &[Surface; 2], cut: Cut<D>, slack: f64) -> Re
             prop_assert!(p.at_b.iter().all(|l| (-0.1001..1.1001).contains(l)), "{p:?} is off its facet");
         }
         let law = scene::load(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
-        let Ok(pair) = assemble(a, b, [0, 1], &common, &|_| 0.0, &law) else {
+        let Ok(pair) = assemble(a, b, [0, 1], &common, &|_| 0.0, &|at| law::make(&law, &OwnLaws::default(), at)) else {
             prop_assert!(covered < 1e-9, "no pair, but {covered} is covered");
             continue;
         };

@@ -5,6 +5,7 @@ mod common;
 use common::{Scene, case, distance, solve, text_of, winkler};
 use std::collections::HashMap;
 use vtkio::model::{Attribute, DataSet, Piece, Vtk};
+use winkler::contact::law::{self, OwnLaws};
 use winkler::contact::pieces::{self, Cut, Reach};
 use winkler::contact::{Carriers, ContactPair, Side, assemble};
 use winkler::fem::{Frame, Space, assemble as fem};
@@ -104,7 +105,8 @@ fn pair_on<const D: usize>(
     let (a, b) = (side(0), side(1));
     let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0));
     let layer = scene::load(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
-    let pair = assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &layer).expect("a pair");
+    let pair =
+        assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| law::make(&layer, &OwnLaws::default(), at)).expect("a pair");
     (pair, spaces)
 }
 

@@ -1,10 +1,7 @@
 //! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
 
+use super::carry;
 use super::checkpoint::{Checkpoint, Head, settings_digest};
-use super::clock::Clock;
-use super::run;
-use super::stages::{Begin, Built, Done};
-use super::{carry, report};
 use crate::ddm::{Start, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
@@ -16,6 +13,10 @@ use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::problem::mesh::{MeshSource, Sizing};
 use crate::problem::method::{self, MethodName};
+use crate::run;
+use crate::run::clock::Clock;
+use crate::run::report;
+use crate::run::stages::{Begin, Built, Done};
 use crate::scene::{AdaptSpec, Scene};
 use crate::solver::options;
 use std::rc::Rc;

@@ -1,11 +1,6 @@
 //! `winkler check`: builds everything, solves nothing, says what is there.
 
-use super::clock::Clock;
-use super::preflight::Coupling;
-use super::run;
-use super::stages::Built;
-use super::words::in_words;
-use super::{load, preflight, report, surfaces};
+use super::{load, surfaces};
 use crate::contact::{ContactPair, Left};
 use crate::discretize::BodyInfo;
 use crate::error::Result;
@@ -13,6 +8,12 @@ use crate::interrupt::Interrupt;
 use crate::output::report::warning_lines;
 use crate::output::{Folder, LISTED, say, sci};
 use crate::petsc::Session;
+use crate::run;
+use crate::run::clock::Clock;
+use crate::run::preflight::Coupling;
+use crate::run::stages::Built;
+use crate::run::words::in_words;
+use crate::run::{preflight, report};
 use serde_json::json;
 use std::path::PathBuf;
 use std::rc::Rc;

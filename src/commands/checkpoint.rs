@@ -3,12 +3,12 @@
 //! The file `checkpoint` has a line that names its format, a line of JSON, numbers (little-endian f64), and the SHA-256 of all that.
 //! It is replaced as a whole, so that there is always a good one.
 
-use super::stages::{Begin, Done};
 use crate::ddm::{Row, Start, State};
 use crate::discretize::Discrete;
 use crate::error::{Error, Kind, Result};
 use crate::model::{BodySlot, Distribution, Field, Model};
 use crate::output::{RoundReport, StepReport, write_whole};
+use crate::run::stages::{Begin, Done};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

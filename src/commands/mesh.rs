@@ -1,6 +1,5 @@
 //! `winkler mesh`: makes the mesh of a scene, or finds it, and says what is in it.
 
-use super::run::in_parts;
 use crate::error::{Error, Kind, Result};
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
@@ -8,6 +7,7 @@ use crate::mesh::{Loaded, Origin};
 use crate::output::vtu::Encoding;
 use crate::output::{CellKind, Grid, say, write_whole};
 use crate::problem::order::Order;
+use crate::run::in_parts;
 use crate::scene::Scene;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

@@ -1,35 +1,20 @@
-//! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`], [`bench`], [`mesh`]. What those
-//! that solve share is in [`run`], the [`stages`] of a run, and the report of its end.
+//! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`], [`bench`](mod@bench), [`mesh`]. What those
+//! that solve share with the library is in [`run`](crate::run).
 
 pub mod adapt;
-pub mod asking;
-mod balance;
 pub mod bench;
 pub mod carry;
 pub mod check;
 pub mod checkpoint;
-pub mod clock;
-pub mod inner;
-pub mod keep;
-pub mod measure;
+mod curves;
 pub mod mesh;
-pub mod method;
 pub mod new;
-mod plan;
-pub mod preflight;
-pub mod report;
-pub mod results;
 mod reuse;
-pub mod run;
 mod series;
 mod shown;
 pub mod solve;
-pub mod stages;
-pub mod steps;
 pub mod surfaces;
 pub mod sweep;
-pub mod verdict;
-mod words;
 pub mod write;
 
 use crate::error::Result;

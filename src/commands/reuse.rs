@@ -1,13 +1,13 @@
 //! What a run of a sweep takes over from the run before it: K and f of a body do not depend on method, layers and gaps, so a
 //! condensed body is kept as it is, and where only the method changes the whole problem.
 
-use super::clock::Clock;
-use super::run;
-use super::stages::{Built, Done};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::parallel::Ranks;
 use crate::petsc::Session;
+use crate::run;
+use crate::run::clock::Clock;
+use crate::run::stages::{Built, Done};
 use crate::scene::Scene;
 use crate::solver::options;
 use serde_json::Value;

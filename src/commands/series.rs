@@ -1,11 +1,12 @@
 //! Fields of a history: files of each load step, and the collection that gives them their times.
 
-use super::results::{All, Recovered};
-use super::stages::Done;
-use super::{report, shown};
+use super::shown;
 use crate::error::Result;
 use crate::output::collection::{Entry, write_pvd};
 use crate::output::{Folder, safe_name};
+use crate::run::report;
+use crate::run::results::{All, Recovered};
+use crate::run::stages::Done;
 
 /// Folder of the files of steps but the last.
 const FOLDER: &str = "steps";

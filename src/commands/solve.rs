@@ -1,20 +1,21 @@
 //! `winkler solve`: one scene, one run, all its results.
 
 use super::adapt::Plan;
-use super::asking::{Asking, is_snapshot, signal};
 use super::checkpoint::{self, Checkpoint};
-use super::clock::Clock;
-use super::keep::Keep;
-use super::results::All;
-use super::stages::{Built, Done, Ready};
 use super::write::{Writing, to_json};
-use super::{folder_of, load, measure, report, run, series};
+use super::{folder_of, load, series};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::output::{Folder, HistoryWriter, IterationTable, StepTable, Verbosity, say};
 use crate::parallel::{agree, share};
 use crate::petsc::Session;
+use crate::run::asking::{Asking, is_snapshot, signal};
+use crate::run::clock::Clock;
+use crate::run::keep::Keep;
+use crate::run::results::All;
+use crate::run::stages::{Built, Done, Ready};
+use crate::run::{self, measure, report};
 use std::path::{Path, PathBuf};
 
 /// What the user typed.

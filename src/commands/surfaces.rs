@@ -1,7 +1,5 @@
 //! What `check` says of measured surfaces and of the layers made of them.
 
-use super::shown::numbered;
-use super::stages::Built;
 use crate::data::{Data, Roughness};
 use crate::discretize::resolution::{Resolution, resolution};
 use crate::error::Result;
@@ -9,6 +7,8 @@ use crate::output::{Axis, Folder, LISTED, Plot, Series, Style, safe_name, sci};
 use crate::problem::contact::ContactSpec;
 use crate::problem::layer::{AsperitySpec, Depths, LayerSpec};
 use crate::problem::units::label;
+use crate::run::stages::Built;
+use crate::run::words::numbered;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ fn of_contact(built: &Built, spec: &ContactSpec) -> Vec<Arc<Data>> {
         LayerSpec::Asperities(spec) => {
             data.extend(spec.data.iter().filter_map(|name| built.scene.data.get(name).cloned()));
         }
-        LayerSpec::Table(_) => {}
+        LayerSpec::Table(_) | LayerSpec::Own(_) => {}
     }
     data
 }

@@ -1,12 +1,6 @@
 //! `winkler sweep`: a scene over values of its keys, one row a run.
 
-use super::asking::Asking;
-use super::clock::Clock;
-use super::keep::Keep;
-use super::run;
-use super::shown;
-use super::stages::{Begin, Built};
-use super::{folder_of, measure, report, results, reuse};
+use super::{curves, folder_of, reuse};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
@@ -14,6 +8,13 @@ use crate::output::steps::{vector_columns, vector_fields};
 use crate::output::{ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, busiest, say, sci};
 use crate::parallel::agree;
 use crate::petsc::Session;
+use crate::run;
+use crate::run::asking::Asking;
+use crate::run::clock::Clock;
+use crate::run::keep::Keep;
+use crate::run::stages::{Begin, Built};
+use crate::run::words::numbered;
+use crate::run::{measure, report, results};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -88,13 +89,13 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
                 sci(report.residual.unwrap_or(f64::NAN), 2)
             ))?;
         }
-        histories.push(report::convergence(&label, &done.outcome));
+        histories.push(curves::convergence(&label, &done.outcome));
         let pairs = &done.model().pairs;
         let shown = shown.get_or_insert_with(|| busiest(&report.pairs, scenes[0].output.pairs.unwrap_or(LISTED)));
         for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
-            let empty = || report::pressure_plot(&scene.title, scene, &pairs[i], Vec::new());
-            pressures.entry(i).or_insert_with(empty).series.push(report::pressure(&label, &done, i));
-            if let Some(curve) = report::reference(&done.built.discrete, i) {
+            let empty = || curves::pressure_plot(&scene.title, scene, &pairs[i], Vec::new());
+            pressures.entry(i).or_insert_with(empty).series.push(curves::pressure(&label, &done, i));
+            if let Some(curve) = curves::reference(&done.built.discrete, i) {
                 reference.get_or_insert((i, curve));
             }
         }
@@ -251,7 +252,7 @@ fn plots(
 ) -> Result<()> {
     let convergence = Plot::convergence(title, histories);
     folder.write("convergence.svg", |out| convergence.write(out))?;
-    let names = shown::numbered(pressures.iter().map(|_| "pressure".to_owned()));
+    let names = numbered(pressures.iter().map(|_| "pressure".to_owned()));
     for ((pair, of_pair), name) in pressures.into_iter().zip(names) {
         let mut curves = of_pair.series;
         curves.extend(reference.iter().filter(|(index, _)| *index == pair).map(|(_, curve)| curve.clone()));

@@ -1,14 +1,16 @@
 //! All files of a run: what is small comes first, so that a full disk takes fields and not results.
 
-use super::clock::Clock;
-use super::results;
-use super::stages::Done;
-use super::{adapt::Plan, measure, report};
-use super::{series, shown};
+use super::adapt::Plan;
+use super::{curves, series, shown};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::output::{Folder, LISTED, PairRow, Plot, Report, StepReport, busiest, contacts};
 use crate::petsc::Session;
+use crate::run::clock::Clock;
+use crate::run::results;
+use crate::run::stages::Done;
+use crate::run::words::numbered;
+use crate::run::{measure, report};
 use std::path::Path;
 
 /// What is to be written, and where.
@@ -149,7 +151,7 @@ impl Plots {
     fn of(done: &Done, shown: &[usize]) -> Self {
         let has_plot = |i: &usize| done.built.scene.output.plots && done.model().pairs[*i].along_curve;
         let plotted: Vec<usize> = shown.iter().copied().filter(has_plot).collect();
-        let files = shown::numbered(plotted.iter().map(|_| "pressure".to_owned()));
+        let files = numbered(plotted.iter().map(|_| "pressure".to_owned()));
         let plotted = plotted.into_iter().zip(files.into_iter().map(|name| format!("{name}.svg"))).collect();
         Self { shown: shown.to_vec(), plotted }
     }
@@ -159,7 +161,7 @@ impl Plots {
         if !scene.output.plots {
             return Ok(());
         }
-        let convergence = Plot::convergence(&scene.title, &[report::convergence("", &done.outcome)]);
+        let convergence = Plot::convergence(&scene.title, &[curves::convergence("", &done.outcome)]);
         folder.write("convergence.svg", |out| convergence.write(out))?;
         if done.steps.len() > 1 {
             let names = measure::pair_names(&done.built);
@@ -168,14 +170,14 @@ impl Plots {
             folder.write("force-approach.svg", |out| plot.write(out))?;
         }
         for &(i, ref file) in &self.plotted {
-            let mut curves = vec![report::pressure("pressure", done, i)];
-            curves.extend(report::reference(&done.built.discrete, i));
+            let mut curves = vec![curves::pressure("pressure", done, i)];
+            curves.extend(curves::reference(&done.built.discrete, i));
             // with more plots than pairs that a person knows by heart, each says whose it is
             let title = match model.pairs.len() {
                 ..=LISTED => scene.title.clone(),
                 _ => format!("{}: {} - {}", scene.title, model.pairs[i].surfaces[0], model.pairs[i].surfaces[1]),
             };
-            let plot = report::pressure_plot(&title, scene, &model.pairs[i], curves);
+            let plot = curves::pressure_plot(&title, scene, &model.pairs[i], curves);
             folder.write(file, |out| plot.write(out))?;
         }
         Ok(())

@@ -2,20 +2,19 @@
 
 use super::basis::{Carriers, PressureBasis};
 use super::cover::{Cover, Left};
-use super::law::{self, LayerLaw};
+use super::law::LayerLaw;
 use super::pieces::Common;
 use super::side::Side;
-use crate::error::Error;
+use crate::error::{Error, Result};
 use crate::fem::{element, pad};
 use crate::linalg::Csr;
-use crate::problem::layer::LayerSpec;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
 /// A pair of surfaces, discretised: n points with one pressure each.
 ///
 /// Point q stands for a function mu_q of a pressure space on side a, with sum_q mu_q = 1 on the covered surface and
-/// omega_q = int mu_q. With <v>_q = (1/omega_q) int mu_q v over the common pieces, the compression of the layer is
+/// omega_q = int mu_q. With `<v>_q = (1/omega_q) int mu_q v` over the common pieces, the compression of the layer is
 /// `c = B_a u_a + B_b u_b - d`. One set of points serves both sides, so action equals reaction to rounding.
 #[derive(Debug)]
 pub struct ContactPair {
@@ -66,9 +65,12 @@ pub enum Fault {
     Law(Error),
 }
 
+/// From the contact points of a pair to its law.
+pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
+
 /// Makes the arrays of a pair from the common pieces of its surfaces.
 ///
-/// `bodies` are the numbers of the bodies of side a and b, `gap(x)` the scene's own gap, added to the geometric one.
+/// `bodies` are the numbers of the bodies of side a and b, `gap(x)` the scene's own gap, added to the geometric one, `law` the layer at the contact points.
 /// Points: the nodes of side a with the dual basis diag(int phi) M^-1 phi of each facet's covered part, of quadratic triangles
 /// the mid-edges with that of the whole triangle; a facet on which that gives means that are not steady (partly covered) takes
 /// the hats of its vertices.
@@ -81,7 +83,7 @@ pub fn assemble<const D: usize>(
     bodies: [usize; 2],
     common: &Common<D>,
     gap: &dyn Fn([f64; 3]) -> f64,
-    law: &LayerSpec,
+    law: &LawMaker,
 ) -> Result<ContactPair, Fault> {
     let mut points: HashMap<u32, Accumulator> = HashMap::new();
     let mut carriers = vec![None; a.facets.count()];
@@ -119,7 +121,7 @@ pub fn assemble<const D: usize>(
         std::array::from_fn(|c| nodes.iter().map(|&(n, share)| share * a.space.nodes[n as usize][c]).sum())
     };
     let position: Vec<[f64; 3]> = order.iter().map(|node| pad::<D>(mean(&points[node]))).collect();
-    let law = law::make(law, &position).map_err(Fault::Law)?;
+    let law = law(&position).map_err(Fault::Law)?;
     let mut pair = ContactPair {
         surfaces: [a.name.to_owned(), b.name.to_owned()],
         bodies,
@@ -135,7 +137,7 @@ pub fn assemble<const D: usize>(
         moment: [Vec::new(), Vec::new()],
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
-        law: law.into(),
+        law,
         cover: Cover::of(a, common, &carriers),
     };
     for q in 0..pair.nodes.len() {

@@ -9,6 +9,7 @@ use crate::contact::law::LayerLaw;
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::layer::Layer;
+use crate::model::linear::Trial;
 use crate::model::rigid::{Motions, TOLERANCE};
 
 /// Bounds of F1'' in the norm of the Robin form G over a level set: `lower` G <= F1'' <= `upper` G.
@@ -70,8 +71,8 @@ const SETTLED: f64 = 1e-9;
 /// Robin term that the model carries.
 fn spectrum(model: &mut Model, slope: &[f64], load: &[Vec<f64>]) -> Result<Option<(f64, f64)>> {
     let springs = model.forces(slope);
-    let found =
-        gradients(model, &mut Sweeper::default(), &springs, load, (SETTLED, f64::INFINITY, MOST), f64::INFINITY)?;
+    let mut enough = |_: &Model, trial: &Trial| trial.is_within(SETTLED);
+    let found = gradients(model, &mut Sweeper::default(), &springs, load, (&mut enough, MOST), f64::INFINITY)?;
     Ok(found.ok().and_then(|found| found.spectrum))
 }
 

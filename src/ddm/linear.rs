@@ -2,12 +2,12 @@
 
 use super::start::surface_slopes;
 use crate::error::Result;
-use crate::model::linear::{Failure, LinearStep, System};
+use crate::model::linear::{Failure, LinearStep, System, Trial};
 use crate::model::rigid::{Motions, TOLERANCE};
 use crate::model::{Field, Layer, Model};
 
-/// The response w of the bodies and their layers to small loads: (K + B' diag(omega kappa) B) w = r, with its squared energy norm.
-/// `loads` is r, one entry a dof of each body that lives here.
+/// The response w of the bodies and their layers to small loads: (K + B' diag(omega kappa) B) w = r, with its squared energy norm,
+/// whose error may be this `share` of it. `loads` is r, one entry a dof of each body that lives here.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -16,7 +16,7 @@ pub fn respond(
     step: &mut dyn LinearStep,
     places: &Layer,
     loads: &[Vec<f64>],
-    reduction: f64,
+    share: f64,
 ) -> Result<std::result::Result<(Field, f64), Failure>> {
     let mut residual = Vec::new();
     for (slot, load) in model.bodies.iter_mut().zip(loads) {
@@ -26,7 +26,8 @@ pub fn respond(
         });
     }
     let springs = resisting(model, places.springs(model));
-    let system = System { model, places, springs: &springs, residual: &residual, reduction, most: f64::INFINITY };
+    let mut enough = |_: &Model, trial: &Trial| trial.is_within(share);
+    let system = System { model, places, springs: &springs, residual: &residual, enough: &mut enough };
     Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy)))
 }
 

@@ -1,7 +1,6 @@
 //! What a run remembers of its iterates beside the last one: how far and how fast it came. It decides when a run ends and how exact
 //! inner solvers are, not what the solution is, so a run that goes on from a file begins without it.
 
-use super::forcing::Forcing;
 use super::history::Row;
 use super::progress::Progress;
 use super::steady::Steady;
@@ -31,7 +30,6 @@ pub struct Memory {
     pub(super) steady: Steady,
     pub(super) before: Option<Vec<f64>>,
     /// Of Newton's method.
-    pub(super) forcing: Forcing,
     pub(super) progress: Progress,
     /// Places of the next step where a run paused: not on the laws if they have a barrier.
     pub(super) places: Option<Layer>,
@@ -53,7 +51,6 @@ impl Memory {
             floor: Floor::new(patience),
             steady: Steady::default(),
             before: None,
-            forcing: Forcing::default(),
             progress: Progress::default(),
             places: None,
             sweeper: Sweeper { sweeps: earlier, solves_skipped: 0 },

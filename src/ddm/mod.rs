@@ -1,7 +1,7 @@
 //! The method: Robin-Robin domain decomposition for the nonlinear variational equation (26).
 //!
 //! Start with the two loops: [`robin`](self), the paper's, and Newton's, each one screen. They work on point arrays (compression,
-//! pressure, tangent, weight) and on bodies that answer the verbs of [`Body`]; they know no dimension, no element, no mesh and no
+//! pressure, tangent, weight) and on bodies that answer the verbs of [`Body`](crate::model::Body); they know no dimension, no element, no mesh and no
 //! PETSc.
 
 pub mod acceleration;

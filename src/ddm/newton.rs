@@ -10,7 +10,8 @@
 //!
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
-use super::bound::{Gap, Reached, contact_energy};
+use super::bound::{Gap, Reached};
+use super::forcing::Forcing;
 use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
@@ -20,7 +21,7 @@ use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
 use crate::model::layer::{Layer, meeting_slopes};
-use crate::model::linear::{LinearStep, System};
+use crate::model::linear::{LinearStep, System, Trial};
 
 /// Iterates from displacements and places until a rule ends it.
 ///
@@ -28,13 +29,19 @@ use crate::model::linear::{LinearStep, System};
 /// Failures of the solver library. Not converging is a status.
 pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
     let rho = meeting_slopes(run.model);
+    // whether the last step solved its linear system as well as it seemed
+    let mut exact = true;
     loop {
         let springs = resisting(run.model, places.springs(run.model));
         let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
         let (r, _) = residual(run.model, &u, &force);
-        let reduction = run.memory.forcing.reduction();
-        let most = run.memory.forcing.most(contact_energy(run.model, &places));
-        let system = System { model: run.model, places: &places, springs: &springs, residual: &r, reduction, most };
+        let before = run.model.compression(&u.trace);
+        let mut forcing = Forcing::new(&places, before, &rho, run.stop.residual);
+        let mut enough = |model: &Model, trial: &Trial| match exact {
+            true => forcing.is_enough(model, trial),
+            false => trial.is_within(CORRECTED),
+        };
+        let system = System { model: run.model, places: &places, springs: &springs, residual: &r, enough: &mut enough };
         let x = match linear.solve(system)? {
             Ok(solution) => solution,
             Err(failure) => return Ok(run.end(Status::InnerSolver(failure), u, places, linear)),
@@ -50,11 +57,12 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
         let mut measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
         let mut reached = Reached::new(run.model, &run.scale, measured.strain, &gap, &x, &p, &met);
-        let mut exact = true;
+        exact = true;
         if run.is_enough(&reached) {
             // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
-            let (residual, reduction) = (&rest[..], 0.5);
-            let system = System { model: run.model, places: &places, springs: &springs, residual, reduction, most };
+            let mut enough = |_: &Model, trial: &Trial| trial.is_within(0.5);
+            let (residual, enough) = (&rest[..], &mut enough);
+            let system = System { model: run.model, places: &places, springs: &springs, residual, enough };
             let before = linear.counts();
             let more = linear.solve(system)?;
             measured.inner_iterations += linear.counts().inner_iterations - before.inner_iterations;
@@ -67,7 +75,6 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         if let Some(status) = run.end_of_step(&u, &x.field, &measured, &reached, &met, linear)? {
             return Ok(run.end(status, u, met, linear));
         }
-        run.memory.forcing.learn(&gap, &reached, run.stop.residual);
         // a step that knew of no contact runs through the other body
         let blind = places.closed == 0 && met.closed > 0;
         if blind {
@@ -87,6 +94,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         }
     }
 }
+
+/// Error of a step that corrects the linear error of the one before, as a share of it: a digit.
+const CORRECTED: f64 = 0.1;
 
 /// Replaces a step x that led to u by the exact search on F1 along it.
 fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<()> {

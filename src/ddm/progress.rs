@@ -1,6 +1,5 @@
 //! Steps of Newton's method that lead nowhere.
 
-use super::forcing::SHARE;
 use crate::model::Model;
 
 /// Recognises contact sets that follow each other in a circle, or one point at a time: of 4879 random scenes of stiff layers on few
@@ -17,12 +16,15 @@ pub(super) struct Progress {
     rate: f64,
 }
 
+/// What the barrier falls to in a step, as in interior point methods.
+const RATE: f64 = 0.1;
+
 /// Steps in a row without progress before there is a barrier: contact that has just been found may take one.
 const PATIENCE: usize = 2;
 
 impl Default for Progress {
     fn default() -> Self {
-        Self { best: f64::INFINITY, since: 0, barrier: 0.0, first: 0.0, rate: SHARE }
+        Self { best: f64::INFINITY, since: 0, barrier: 0.0, first: 0.0, rate: RATE }
     }
 }
 

@@ -14,7 +14,7 @@
 //! B E a <= 0, and gains, w'a > 0 (Farkas). Elastic bodies then have no equilibrium either.
 //!
 //! What is less than [`PART`] of what it could be counts as zero here: forces out of balance, as the start needs no more digits than the
-//! elastic bodies leave of it; and what a motion closes, by rounding and [`PROXIMAL`] springs. One that is felt at a meshed circle of
+//! elastic bodies leave of it; and what a motion closes, by rounding and proximal springs. One that is felt at a meshed circle of
 //! 1000 edges closes 1e-5 of itself.
 
 use super::line::{self, Unbounded};

@@ -11,7 +11,7 @@ use crate::linalg::Factor;
 use crate::linalg::{axpy, dot, fit};
 use crate::model::Model;
 use crate::model::field::{Field, add_forces, apply_stiffness, local_dot};
-use crate::model::linear::{Failure, LinearStep, Solution, Solved, System};
+use crate::model::linear::{Enough, Failure, LinearStep, Solution, Solved, System, Trial};
 use crate::model::rigid::{Motions, TOLERANCE};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -56,7 +56,7 @@ impl LinearStep for Sweeps {
     }
 
     fn solve(&mut self, system: System) -> Result<Solved> {
-        let System { model, places, springs, residual, reduction, most } = system;
+        let System { model, places, springs, residual, enough } = system;
         model.precision(ROUGH)?;
         if let Some(coefficient) = &mut self.coefficient {
             let weight = coefficient.weight(model, places, self.systems)?;
@@ -64,7 +64,7 @@ impl LinearStep for Sweeps {
         }
         self.systems += 1;
         let before = self.sweeper.sweeps;
-        let found = gradients(model, &mut self.sweeper, springs, residual, (reduction, most, MOST), self.least)?;
+        let found = gradients(model, &mut self.sweeper, springs, residual, (enough, MOST), self.least)?;
         Ok(found.and_then(|found| {
             self.spectrum = found.spectrum.or(self.spectrum);
             self.least = found.spectrum.map_or(self.least, |(low, _)| low.min(self.least));
@@ -96,8 +96,8 @@ pub(super) struct Found {
     pub spectrum: Option<(f64, f64)>,
 }
 
-/// Solves (K + B' diag(springs) B) x = r with the Robin term that the model carries, until the error has fallen to `reduction` in
-/// the energy norm and to `wanted`, or after `most` iterations. `least` is the least eigenvalue that earlier systems showed, infinite
+/// Solves (K + B' diag(springs) B) x = r with the Robin term that the model carries, until that is `enough`, or
+/// after `most` iterations. `least` is the least eigenvalue that earlier systems showed, infinite
 /// if there were none: a young iteration knows of no slow mode.
 ///
 /// # Errors
@@ -107,7 +107,7 @@ pub(super) fn gradients(
     sweeper: &mut Sweeper,
     springs: &[f64],
     residual: &[Vec<f64>],
-    (reduction, wanted, most): (f64, f64, usize),
+    (enough, most): (&mut Enough, usize),
     least: f64,
 ) -> Result<std::result::Result<Found, Failure>> {
     let coarse = Coarse::new(model, springs);
@@ -123,8 +123,8 @@ pub(super) fn gradients(
         }
         let rz: f64 = sweep.decrement.iter().sum();
         let error = lanczos.squared_error(rz);
-        let enough = (reduction * reduction * lanczos.energy).min(wanted * wanted);
-        if error <= enough || lanczos.alphas.len() == most {
+        let trial = Trial { closing: &x.closing(), energy: lanczos.energy, error: error.max(0.0).sqrt() };
+        if error == 0.0 || enough(model, &trial) || lanczos.alphas.len() == most {
             break error;
         }
         let mut p = sweep.correction;

@@ -4,6 +4,7 @@ use super::auto;
 use super::find::{find_group, point};
 use super::part::Part;
 use super::surface::{ContactSurface, Surface};
+use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Reach};
 use crate::contact::{self, ContactPair, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
@@ -56,7 +57,7 @@ pub fn all<const D: usize>(
             .help("contact of a body with itself is out of scope; make two bodies of it"));
         }
         named.insert([a.min(b), a.max(b)]);
-        contacts.push(make_pair(spec.clone(), None, cut, parts, surfaces, fine)?);
+        contacts.push(make_pair(spec.clone(), &scene.laws, None, cut, parts, surfaces, fine)?);
     }
     for (rule, surfaces) in auto::find(&scene.auto, cut, parts, &named)? {
         let rule = &scene.auto[rule];
@@ -64,7 +65,7 @@ pub fn all<const D: usize>(
         for (name, surface) in spec.between.iter_mut().zip(&surfaces) {
             surface.name.clone_into(&mut name.value);
         }
-        contacts.push(make_pair(spec, Some(rule.distance), cut, parts, surfaces, fine)?);
+        contacts.push(make_pair(spec, &scene.laws, Some(rule.distance), cut, parts, surfaces, fine)?);
     }
     Ok(contacts)
 }
@@ -72,6 +73,7 @@ pub fn all<const D: usize>(
 /// The pair of two surfaces; with a `distance` they may be no farther apart.
 fn make_pair<const D: usize>(
     spec: ContactSpec,
+    laws: &OwnLaws,
     distance: Option<f64>,
     cut: Cut<D>,
     parts: &[Part<D>],
@@ -94,8 +96,9 @@ fn make_pair<const D: usize>(
         common.points.iter_mut().for_each(|point| point.gap = 0.0);
     }
     let gap = |x| spec.gap.eval(x);
-    let pair = contact::assemble(&a, &b, [body_a, body_b], &common, &gap, &spec.layer)
-        .map_err(|fault| refuse(&spec, fault))?;
+    let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
+    let pair =
+        contact::assemble(&a, &b, [body_a, body_b], &common, &gap, &law).map_err(|fault| refuse(&spec, fault))?;
     let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
     if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
         let (depth, at) = (-pair.gap[deepest], point(pair.position[deepest]));

@@ -23,7 +23,7 @@ pub struct Verified<'a, const D: usize> {
     pub checked: Rc<[Checked]>,
 }
 
-/// Finds the bodies of a scene and checks its mesh once: see [`roster::bodies`] and [`Mesh::check`].
+/// Finds the bodies of a scene and checks its mesh once: see `roster::bodies` and [`Mesh::check`].
 ///
 /// # Errors
 /// Patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.

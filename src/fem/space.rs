@@ -30,7 +30,7 @@ pub struct Space<const D: usize> {
     measure: OnceCell<f64>,
 }
 
-/// Facets of a body's boundary, oriented so that [`Facets::normal`] points out of the body.
+/// Facets of a body's boundary, oriented so that [`Facets::normals`] points out of the body.
 #[derive(Debug, Clone)]
 pub struct Facets<const D: usize> {
     /// Polynomial order.
@@ -140,6 +140,15 @@ impl<const D: usize> Space<D> {
     /// The points of the mesh that are nodes of the body, in the order of the mesh.
     pub fn mesh_points(&self) -> impl Iterator<Item = u32> {
         self.from_mesh.points()
+    }
+
+    /// The point of the mesh of each node.
+    pub fn points(&self) -> Vec<u32> {
+        let mut points = vec![0; self.nodes.len()];
+        for point in self.mesh_points() {
+            self.from_mesh.get(point).into_iter().for_each(|node| points[node as usize] = point);
+        }
+        points
     }
 
     /// What a cell adds to the measure of the body, by its corners: in a body of revolution the volume of a ring.

@@ -2,7 +2,6 @@
 
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::Guard;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
@@ -57,6 +56,7 @@ pub fn command(program: &Path, bytes: Option<u64>) -> Command {
 }
 
 /// Seconds after which a terminal is told what it waits for.
+#[cfg(feature = "cli")]
 const QUIET: Duration = Duration::from_secs(1);
 
 /// Longest pause between two looks at the program.
@@ -73,7 +73,11 @@ const MOST_SAID: u64 = 1 << 25;
 pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt, doing: &str) -> io::Result<End> {
     let began = Instant::now();
     let mut child = command.spawn()?;
-    let mut bar: Option<ProgressBar> = None;
+    // a library shows nothing
+    #[cfg(not(feature = "cli"))]
+    let _ = doing;
+    #[cfg(feature = "cli")]
+    let mut bar: Option<indicatif::ProgressBar> = None;
     let end = loop {
         if let Some(status) = child.try_wait()? {
             break End::Itself(status);
@@ -87,6 +91,7 @@ pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt
             child.wait()?;
             break end;
         }
+        #[cfg(feature = "cli")]
         if elapsed >= QUIET {
             let bar = bar.get_or_insert_with(line);
             bar.set_message(format!("{doing}, {} s", elapsed.as_secs()));
@@ -95,6 +100,7 @@ pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt
         // a twentieth of the time so far is lost at most
         std::thread::sleep((elapsed / 20).clamp(Duration::from_millis(1), PAUSE));
     };
+    #[cfg(feature = "cli")]
     if let Some(bar) = bar {
         bar.finish_and_clear();
     }
@@ -102,9 +108,10 @@ pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt
 }
 
 /// A line on standard error, if that is a terminal.
-fn line() -> ProgressBar {
-    let bar = ProgressBar::new_spinner();
-    if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_msg}") {
+#[cfg(feature = "cli")]
+fn line() -> indicatif::ProgressBar {
+    let bar = indicatif::ProgressBar::new_spinner();
+    if let Ok(style) = indicatif::ProgressStyle::with_template("{spinner} {wide_msg}") {
         bar.set_style(style);
     }
     bar

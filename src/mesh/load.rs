@@ -18,14 +18,14 @@ pub struct Loaded<const D: usize> {
     pub mesh: Mesh<D>,
     /// Where it came from.
     pub origin: Origin,
-    /// The `.msh` file that was read: the user's own, or the one in the cache.
+    /// The `.msh` file that was read: the user's own, or the one in the cache; empty for arrays.
     pub file: PathBuf,
 }
 
 /// Where a mesh came from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
-    /// The `.msh` file that the scene names.
+    /// The `.msh` file that the scene names, or arrays.
     File,
     /// The cache: Gmsh had meshed the same script with the same numbers before.
     Cache,
@@ -64,6 +64,9 @@ pub fn load_unless<const D: usize>(source: &MeshSource, order: Order, interrupt:
             from_script(file, set, sizes.as_ref(), order, (guard, interrupt), &folders())?
         }
         MeshSource::Msh { file } => from_file(file, order, interrupt)?,
+        MeshSource::Arrays(arrays) => {
+            Loaded { mesh: super::arrays::mesh(arrays, order)?, origin: Origin::File, file: PathBuf::new() }
+        }
     };
     if D == 3 {
         loaded.mesh.sort_cells();

@@ -1,9 +1,11 @@
 //! Simplicial meshes with named groups, from Gmsh.
 //!
 //! [`load`] is the way in: a `.geo` script or a file of another program's geometry is meshed by Gmsh, once, and kept in a cache; so is a
-//! mesh of another format, which Gmsh converts; a `.msh` file (format 4.1, text or binary) is read as it is. Everything downstream sees a [`Mesh`] only.
+//! mesh of another format, which Gmsh converts; a `.msh` file (format 4.1, text or binary) is read as it is; arrays of a Rust program are
+//! checked. Everything downstream sees a [`Mesh`] only.
 
 mod abaqus;
+mod arrays;
 mod cache;
 mod check;
 mod cursor;
@@ -52,7 +54,7 @@ use std::path::PathBuf;
 pub struct Mesh<const D: usize> {
     /// The file that the user named (`.geo` or `.msh`), for messages.
     pub path: PathBuf,
-    /// Coordinates of the points, only those that some group uses, in the order of the file.
+    /// Coordinates of the points in the order of the file, only those that some group uses; all of arrays.
     pub points: Vec<[f64; D]>,
     /// Order of all elements (points have none).
     pub order: Order,

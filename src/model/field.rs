@@ -9,7 +9,7 @@ use crate::linalg::{axpy, dot};
 pub struct Field {
     /// State of each body; empty where the body lives on another rank.
     pub states: Vec<Vec<f64>>,
-    /// B u of all contact rows (see [`super::model`] for the layout).
+    /// B u of all contact rows (see [`model`](crate::model) for the layout).
     pub trace: Vec<f64>,
 }
 

@@ -20,10 +20,29 @@ pub struct System<'a> {
     pub springs: &'a [f64],
     /// r, a state of each body that lives here.
     pub residual: &'a [Vec<f64>],
-    /// How far an iterative solver has to reduce the energy norm of the error.
-    pub reduction: f64,
-    /// Energy norm of the error that is wanted at most, for solvers that know it.
-    pub most: f64,
+    /// When an iterative solver may end.
+    pub enough: &'a mut Enough<'a>,
+}
+
+/// When an iterative solver may end: asked after each iteration, with the same numbers on all ranks.
+pub type Enough<'a> = dyn FnMut(&Model, &Trial) -> bool + 'a;
+
+/// What an iterative solver has so far.
+#[derive(Debug)]
+pub struct Trial<'a> {
+    /// B x, the change of compression at the points, n.
+    pub closing: &'a [f64],
+    /// x'r, the squared energy norm of x.
+    pub energy: f64,
+    /// Estimated energy norm of the error of x.
+    pub error: f64,
+}
+
+impl Trial<'_> {
+    /// Whether the error is this share of x.
+    pub fn is_within(&self, share: f64) -> bool {
+        self.error <= share * self.energy.max(0.0).sqrt()
+    }
 }
 
 /// A solution of a [`System`].

@@ -34,6 +34,7 @@ pub(super) fn field(value: f64) -> String {
 }
 
 /// An integer in superscript digits, for powers of ten.
+#[cfg(feature = "cli")]
 pub(super) fn superscript(value: i32) -> String {
     value
         .to_string()
@@ -74,6 +75,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg(feature = "cli")]
     fn superscripts() {
         assert_eq!(superscript(-1203), "⁻¹²⁰³");
         assert_eq!(superscript(456_789), "⁴⁵⁶⁷⁸⁹");

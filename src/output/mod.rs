@@ -2,6 +2,7 @@
 //!
 //! Nothing here knows the space dimension: points and vectors have three components, z = 0 in the plane.
 
+#[cfg(feature = "cli")]
 mod chart;
 pub mod collection;
 pub mod contact;
@@ -10,10 +11,12 @@ pub mod folder;
 mod format;
 pub mod history;
 mod largest;
+#[cfg(feature = "cli")]
 pub mod plot;
 pub mod report;
 pub mod rows;
 pub mod steps;
+#[cfg(feature = "cli")]
 pub mod table;
 mod tags;
 pub mod vtu;
@@ -42,6 +45,7 @@ pub use contacts::PairRow;
 pub use folder::{Folder, safe_name, write_whole};
 pub use format::{sci, seconds};
 pub use history::HistoryWriter;
+#[cfg(feature = "cli")]
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
@@ -49,5 +53,6 @@ pub use report::{
 };
 pub use rows::RowFile;
 pub use steps::{ReactionReport, StepPairReport, StepReport, StepTable};
+#[cfg(feature = "cli")]
 pub use table::{IterationTable, Verbosity};
 pub use vtu::{BodyField, CellKind, Grid};

@@ -43,12 +43,14 @@ impl Ksp {
     pub(super) fn forget(&self) -> Result<()> {
         let pc = self.pc()?;
         let (mut matrix, mut same) = (null_mut(), null_mut());
-        petsc!(PCGetOperators(pc, &mut matrix, &mut same))?;
-        // The reset lets the matrix go; our reference keeps it till it is set again.
-        petsc!(PetscObjectReference(matrix.cast()))?;
-        let set = petsc!(PCReset(pc)).and_then(|()| petsc!(KSPSetOperators(self.ksp, matrix, matrix)));
-        petsc!(PetscObjectDereference(matrix.cast()))?;
-        set
+        // SAFETY: the reset lets the matrix go; our reference keeps it till it is set again.
+        unsafe {
+            petsc!(PCGetOperators(pc, &mut matrix, &mut same))?;
+            petsc!(PetscObjectReference(matrix.cast()))?;
+            let set = petsc!(PCReset(pc)).and_then(|()| petsc!(KSPSetOperators(self.ksp, matrix, matrix)));
+            petsc!(PetscObjectDereference(matrix.cast()))?;
+            set
+        }
     }
 
     /// Whether MUMPS' factorisation ran out of the space, or of the buffers for messages, that its analysis foresaw: what it takes on
@@ -61,9 +63,12 @@ impl Ksp {
     /// Gives the next factorisation, which is not begun, `percent` more space than MUMPS' analysis foresees.
     pub(super) fn set_room(&self, percent: Int) -> Result<()> {
         let (pc, mut factor) = (self.pc()?, null_mut());
-        petsc!(PCFactorSetUpMatSolverType(pc))?;
-        petsc!(PCFactorGetMatrix(pc, &mut factor))?;
-        petsc!(MatMumpsSetIcntl(factor, 14, percent))
+        // SAFETY: the matrix of the factors belongs to the preconditioner; PETSc refuses one that is not of MUMPS.
+        unsafe {
+            petsc!(PCFactorSetUpMatSolverType(pc))?;
+            petsc!(PCFactorGetMatrix(pc, &mut factor))?;
+            petsc!(MatMumpsSetIcntl(factor, 14, percent))
+        }
     }
 
     /// Remembers with which matrix the preconditioner failed, if it did.
@@ -77,7 +82,8 @@ impl Ksp {
     fn failed_reason(&self) -> Result<ffi::PCFailedReason> {
         let mut reason = ffi::PCFailedReason_PC_NOERROR;
         let pc = self.pc()?;
-        petsc!(PCGetFailedReason(pc, &mut reason))?;
+        // SAFETY: the preconditioner of this solver.
+        unsafe { petsc!(PCGetFailedReason(pc, &mut reason)) }?;
         Ok(reason)
     }
 
@@ -87,10 +93,13 @@ impl Ksp {
             return None;
         }
         let mut factor = null_mut();
-        petsc!(PCFactorGetMatrix(pc, &mut factor)).ok()?;
         let (mut first, mut second) = (0, 0);
-        petsc!(MatMumpsGetInfog(factor, 1, &mut first)).ok()?;
-        petsc!(MatMumpsGetInfog(factor, 2, &mut second)).ok()?;
+        // SAFETY: MUMPS has factored, and the factors belong to the preconditioner.
+        unsafe {
+            petsc!(PCFactorGetMatrix(pc, &mut factor)).ok()?;
+            petsc!(MatMumpsGetInfog(factor, 1, &mut first)).ok()?;
+            petsc!(MatMumpsGetInfog(factor, 2, &mut second)).ok()?;
+        }
         Some((first, second))
     }
 }

@@ -1,9 +1,12 @@
 //! Two levels of multigrid: the interpolation from the coarse one.
 
 use super::library::petsc;
+use super::rows::check;
 use super::vector::DETERMINE;
-use super::{Int, Ksp, Matrix, ffi};
+use super::{Int, Ksp, Matrix, Scope, ffi};
 use crate::error::{Error, Kind, Result};
+use mpi::collective::SystemOperation;
+use mpi::traits::CommunicatorCollectives;
 use std::ptr::null_mut;
 
 impl Ksp {
@@ -39,16 +42,21 @@ impl Ksp {
         own: usize,
     ) -> Result<()> {
         let (rows, block) = (matrix.rows(), matrix.block_size() as Int);
-        let is_whole = row_ptr.len() == rows + 1 && row_ptr[rows] as usize == columns.len();
-        if !is_whole || columns.len() != values.len() {
-            let message =
-                format!("an interpolation of {} rows for a matrix of {rows}", row_ptr.len().saturating_sub(1));
+        let mut width = own;
+        if matrix.scope() == Scope::World {
+            matrix.session().world().all_reduce_into(&own, &mut width, SystemOperation::sum());
+        }
+        check(row_ptr, columns, values, width)?;
+        if row_ptr.len() != rows + 1 {
+            let message = format!("an interpolation of {} rows for a matrix of {rows}", row_ptr.len() - 1);
             return Err(Error::new(Kind::Solver, message));
         }
         let (i, j, v) = (row_ptr.as_ptr(), columns.as_ptr(), values.as_ptr());
         let (comm, mut mat, pc) = (matrix.scope().comm(matrix.session()), null_mut(), self.pc()?);
-        petsc!(MatCreate(comm, &mut mat))?;
-        let made = (|| {
+        // SAFETY: the new matrix.
+        unsafe { petsc!(MatCreate(comm, &mut mat)) }?;
+        // SAFETY: the three arrays are rows of this width, as was checked; PETSc copies them.
+        let made = (|| unsafe {
             petsc!(MatSetSizes(mat, rows as Int, own as Int, DETERMINE, DETERMINE))?;
             petsc!(MatSetType(mat, c"aij".as_ptr()))?;
             petsc!(MatSetBlockSizes(mat, block, block))?;
@@ -60,8 +68,8 @@ impl Ksp {
             petsc!(PCMGSetInterpolation(pc, 1, mat))?;
             petsc!(PCMGSetGalerkin(pc, ffi::PCMGGalerkinType_PC_MG_GALERKIN_BOTH))
         })();
-        // the preconditioner keeps a reference
-        petsc!(MatDestroy(&mut mat))?;
+        // SAFETY: our reference; the preconditioner keeps its own.
+        unsafe { petsc!(MatDestroy(&mut mat)) }?;
         made
     }
 }

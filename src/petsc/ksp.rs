@@ -89,7 +89,8 @@ impl Ksp {
     /// When PETSc does not accept the prefix.
     pub fn of(session: &Session, scope: Scope, prefix: &str) -> Result<Ksp> {
         let (comm, mut ksp) = (scope.comm(session), null_mut());
-        petsc!(KSPCreate(comm, &mut ksp))?;
+        // SAFETY: the processes of the scope all make it.
+        unsafe { petsc!(KSPCreate(comm, &mut ksp)) }?;
         let solver = Ksp {
             ksp,
             vectors: None,
@@ -102,8 +103,11 @@ impl Ksp {
             session: session.clone(),
         };
         let prefix = text(prefix)?;
-        petsc!(KSPSetOptionsPrefix(ksp, prefix.as_ptr()))?;
-        petsc!(KSPSetErrorIfNotConverged(ksp, ffi::PetscBool_PETSC_FALSE))?;
+        // SAFETY: PETSc copies the text.
+        unsafe {
+            petsc!(KSPSetOptionsPrefix(ksp, prefix.as_ptr()))?;
+            petsc!(KSPSetErrorIfNotConverged(ksp, ffi::PetscBool_PETSC_FALSE))?;
+        }
         Ok(solver)
     }
 
@@ -115,7 +119,8 @@ impl Ksp {
         if matrix.scope() != self.scope {
             return Err(Error::new(Kind::Solver, "a matrix and its solver belong to different processes"));
         }
-        petsc!(KSPSetOperators(self.ksp, matrix.raw(), matrix.raw()))?;
+        // SAFETY: the solver takes references to the matrix.
+        unsafe { petsc!(KSPSetOperators(self.ksp, matrix.raw(), matrix.raw())) }?;
         if self.vectors.is_none() || self.rows != matrix.rows() {
             let new = || Vector::new(&self.session, self.scope, matrix.rows(), matrix.block_size());
             self.vectors = Some([new()?, new()?]);
@@ -134,7 +139,8 @@ impl Ksp {
     /// When PETSc refuses an option; for the options that change the matrix itself, `-ksp_diagonal_scale` and
     /// `-pc_factor_in_place`; and for `preonly` over a nested solver that keeps a preconditioner.
     pub fn set_from_options(&mut self) -> Result<()> {
-        petsc!(KSPSetFromOptions(self.ksp)).map_err(|error| {
+        // SAFETY: the solver of this wrapper.
+        unsafe { petsc!(KSPSetFromOptions(self.ksp)) }.map_err(|error| {
             let own = match self.prefix.as_str() {
                 "" => String::new(),
                 prefix => format!("options of this solver begin with `-{prefix}`; "),
@@ -166,7 +172,8 @@ impl Ksp {
             }
         }
         if self.applies_only() {
-            petsc!(KSPSetReusePreconditioner(self.ksp, ffi::PetscBool_PETSC_FALSE))?;
+            // SAFETY: the solver of this wrapper.
+            unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, ffi::PetscBool_PETSC_FALSE)) }?;
         }
         Ok(())
     }
@@ -174,7 +181,9 @@ impl Ksp {
     /// Whether the preconditioner is kept when the matrix changes.
     pub fn reuses_preconditioner(&self) -> bool {
         let mut reuse = ffi::PetscBool_PETSC_FALSE;
-        petsc!(KSPGetReusePreconditioner(self.ksp, &mut reuse)).is_ok() && reuse != ffi::PetscBool_PETSC_FALSE
+        // SAFETY: the solver of this wrapper.
+        let asked = unsafe { petsc!(KSPGetReusePreconditioner(self.ksp, &mut reuse)) };
+        asked.is_ok() && reuse != ffi::PetscBool_PETSC_FALSE
     }
 
     /// Makes the preconditioner or factorisation of the current matrix, if it is not there yet; every solve does it too.
@@ -195,7 +204,8 @@ impl Ksp {
         };
         self.recover()?;
         let pc = self.pc()?;
-        let make = || {
+        // SAFETY: solver and preconditioner of this wrapper; without a matrix PETSc refuses.
+        let make = || unsafe {
             petsc!(KSPSetUp(self.ksp))?;
             // KSPSetUp leaves new values of a matrix it has seen before to the first application
             petsc!(PCSetUp(pc))?;
@@ -228,21 +238,27 @@ impl Ksp {
         let copy = self.writes_to_b.then(|| b.to_vec());
         let b = copy.as_deref().unwrap_or(b);
         let mut guess = ffi::PetscBool_PETSC_FALSE;
-        petsc!(KSPGetInitialGuessNonzero(self.ksp, &mut guess))?;
+        // SAFETY: the solver of this wrapper.
+        unsafe { petsc!(KSPGetInitialGuessNonzero(self.ksp, &mut guess)) }?;
         if guess != ffi::PetscBool_PETSC_FALSE {
             x.fill(0.0);
         }
         self.recover()?;
-        {
+        // SAFETY: both slices are as long as the vectors and outlive the solve, which reads `b` (a copy where it is written to) and writes
+        // to `x`.
+        unsafe {
             let right = right.place(b.as_ptr())?;
             let left = left.place(x.as_mut_ptr())?;
             petsc!(KSPSolve(self.ksp, right.vec(), left.vec()))?;
         }
         self.note_failure()?;
         let (mut iterations, mut reason, mut residual) = (0, 0, 0.0);
-        petsc!(KSPGetIterationNumber(self.ksp, &mut iterations))?;
-        petsc!(KSPGetConvergedReason(self.ksp, &mut reason))?;
-        petsc!(KSPGetResidualNorm(self.ksp, &mut residual))?;
+        // SAFETY: the solver of this wrapper.
+        unsafe {
+            petsc!(KSPGetIterationNumber(self.ksp, &mut iterations))?;
+            petsc!(KSPGetConvergedReason(self.ksp, &mut reason))?;
+            petsc!(KSPGetResidualNorm(self.ksp, &mut residual))?;
+        }
         let reason = ConvergedReason::from_raw(reason, || {
             self.failure().unwrap_or_else(|| "it is infinite or not a number where it was applied".to_owned())
         });
@@ -261,10 +277,13 @@ impl Ksp {
         same("z", z.len(), self.rows)?;
         self.set_up()?;
         let copy = self.writes_to_b.then(|| r.to_vec());
-        let right = right.place(copy.as_deref().unwrap_or(r).as_ptr())?;
-        let left = left.place(z.as_mut_ptr())?;
         let pc = self.pc()?;
-        petsc!(PCApply(pc, right.vec(), left.vec()))
+        // SAFETY: as in `solve`.
+        unsafe {
+            let right = right.place(copy.as_deref().unwrap_or(r).as_ptr())?;
+            let left = left.place(z.as_mut_ptr())?;
+            petsc!(PCApply(pc, right.vec(), left.vec()))
+        }
     }
 
     /// Sets the relative tolerance.
@@ -273,7 +292,8 @@ impl Ksp {
     /// When it is not between 0 and 1.
     pub fn set_tolerance(&self, rtol: f64) -> Result<()> {
         let ([_, atol, dtol], limit) = self.tolerances()?;
-        petsc!(KSPSetTolerances(self.ksp, rtol, atol, dtol, limit))
+        // SAFETY: the solver of this wrapper; PETSc refuses numbers that are none.
+        unsafe { petsc!(KSPSetTolerances(self.ksp, rtol, atol, dtol, limit)) }
     }
 
     /// The relative tolerance in force.
@@ -284,27 +304,25 @@ impl Ksp {
     /// Relative, absolute and divergence tolerance; iteration limit.
     fn tolerances(&self) -> Result<([f64; 3], Int)> {
         let ([mut rtol, mut atol, mut dtol], mut limit) = ([0.0; 3], 0);
-        petsc!(KSPGetTolerances(self.ksp, &mut rtol, &mut atol, &mut dtol, &mut limit))?;
+        // SAFETY: the solver of this wrapper.
+        unsafe { petsc!(KSPGetTolerances(self.ksp, &mut rtol, &mut atol, &mut dtol, &mut limit)) }?;
         Ok(([rtol, atol, dtol], limit))
     }
 
     /// Type of the solver, such as `cg`; empty before it is known (after the options or the set-up).
     pub fn ksp_type(&self) -> String {
         let mut name: *const c_char = null();
-        match petsc!(KSPGetType(self.ksp, &mut name)) {
-            // SAFETY: PETSc's text, copied.
-            Ok(()) => unsafe { string(name) },
-            Err(_) => String::new(),
-        }
+        // SAFETY: null, or PETSc's text, which is copied.
+        unsafe { petsc!(KSPGetType(self.ksp, &mut name)).map_or(String::new(), |()| string(name)) }
     }
 
     /// Type of the preconditioner, such as `gamg`; empty before it is known (after the options or the set-up).
     pub fn pc_type(&self) -> String {
         let mut name: *const c_char = null();
-        match self.pc().and_then(|pc| petsc!(PCGetType(pc, &mut name))) {
-            // SAFETY: PETSc's text, copied.
-            Ok(()) => unsafe { string(name) },
-            Err(_) => String::new(),
+        // SAFETY: null, or PETSc's text, which is copied.
+        unsafe {
+            let asked = self.pc().and_then(|pc| petsc!(PCGetType(pc, &mut name)));
+            asked.map_or(String::new(), |()| string(name))
         }
     }
 
@@ -313,9 +331,11 @@ impl Ksp {
     pub fn factor_package(&self) -> Option<String> {
         let mut name: *const c_char = null();
         let pc = self.pc().ok()?;
-        petsc!(PCFactorGetMatSolverType(pc, &mut name)).ok()?;
-        // SAFETY: PETSc's text, copied.
-        (!name.is_null()).then(|| unsafe { string(name) })
+        // SAFETY: null, or PETSc's text, which is copied.
+        unsafe {
+            petsc!(PCFactorGetMatSolverType(pc, &mut name)).ok()?;
+            (!name.is_null()).then(|| string(name))
+        }
     }
 
     /// Keeps the preconditioner as it is while the matrix changes, or not.
@@ -329,7 +349,8 @@ impl Ksp {
                 .because("it applies it once and would return the solution of the older system")
                 .help(format!("take an iterative method, e.g. `{}ksp_type cg`", self.own_options())));
         }
-        petsc!(KSPSetReusePreconditioner(self.ksp, reuse as ffi::PetscBool))
+        // SAFETY: the solver of this wrapper.
+        unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, reuse as ffi::PetscBool)) }
     }
 
     /// All about the solver and its preconditioner, as `-ksp_view` prints it.
@@ -338,7 +359,8 @@ impl Ksp {
     /// When PETSc cannot show the solver.
     pub fn describe(&self) -> Result<String> {
         let comm = self.scope.comm(&self.session);
-        let (viewed, text) = print::caught(|| {
+        // SAFETY: the viewer of standard output belongs to PETSc.
+        let (viewed, text) = print::caught(|| unsafe {
             let mut viewer = null_mut();
             petsc!(PetscViewerASCIIGetStdout(comm, &mut viewer))?;
             petsc!(KSPView(self.ksp, viewer))
@@ -359,7 +381,8 @@ impl Ksp {
     /// PETSc's preconditioner, which belongs to the solver.
     pub(super) fn pc(&self) -> Result<ffi::PC> {
         let mut pc = null_mut();
-        petsc!(KSPGetPC(self.ksp, &mut pc))?;
+        // SAFETY: the solver of this wrapper, which owns what it gives.
+        unsafe { petsc!(KSPGetPC(self.ksp, &mut pc)) }?;
         Ok(pc)
     }
 }
@@ -369,6 +392,7 @@ const CHANGING: [&str; 3] = ["ksp_diagonal_scale", "ksp_diagonal_scale_fix", "pc
 
 impl Drop for Ksp {
     fn drop(&mut self) {
-        let _ = petsc!(KSPDestroy(&mut self.ksp));
+        // SAFETY: the one reference of this wrapper.
+        let _ = unsafe { petsc!(KSPDestroy(&mut self.ksp)) };
     }
 }

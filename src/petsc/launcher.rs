@@ -65,13 +65,14 @@ pub(super) fn quick<T>(start: impl FnOnce() -> T) -> T {
     if settings.iter().any(|(name, _)| env::var_os(name).is_some()) {
         return start();
     }
-    // SAFETY: Rust's own readers and writers of the environment share a lock. A session is started by the thread that
-    // runs the program, before the libraries below it have threads that might read the environment.
     for (name, value) in settings {
+        // SAFETY: Rust's own readers and writers of the environment share a lock. A session is started by the thread that
+        // runs the program, before the libraries below it have threads that might read the environment.
         unsafe { env::set_var(name, value) };
     }
     let result = start();
     for (name, _) in settings {
+        // SAFETY: as above.
         unsafe { env::remove_var(name) };
     }
     result

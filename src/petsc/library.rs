@@ -66,13 +66,15 @@ pub(super) fn running() -> Result<&'static ffi::Library> {
     open()
 }
 
-/// Calls one PETSc function, of a PETSc that is started if it waits, and checks its return code: `petsc!(MatMult(a, x, y))?`.
+/// Calls one PETSc function, of a PETSc that is started if it waits, and checks its return code:
+/// `unsafe { petsc!(MatMult(a, x, y)) }?`. The call stands in the `unsafe` block of whoever writes it, with the reason.
 ///
-/// It stands for an `unsafe` call: who uses it vouches for the pointers. They are valid because each wrapper owns its
-/// PETSc object and holds a session token.
+/// What holds for every call here, so that reasons need not repeat it: a wrapper has made its PETSc object and destroys it once, in
+/// `Drop`; it holds the session, so that PETSc runs on this thread; the types of arguments are those of PETSc's headers, checked by the
+/// compiler; what PETSc is to write to are variables of that call, of which it keeps no pointer.
 macro_rules! petsc {
     ($function:ident($($argument:expr),* $(,)?)) => {
-        $crate::petsc::library::check(stringify!($function), |petsc| unsafe { petsc.$function($($argument),*) })
+        $crate::petsc::library::check(stringify!($function), |petsc| petsc.$function($($argument),*))
     };
 }
 pub(super) use petsc;
@@ -97,13 +99,15 @@ pub(super) fn start(words: &[String]) -> Result<()> {
     let (count, arguments) = (&raw mut count, &raw mut arguments);
     // Pushed first, so that errors of the start are recorded too and handlers that the user asks for
     // (-on_error_abort, -start_in_debugger) come on top.
-    // SAFETY: the handler has PETSc's own type; the words live till the end of the process.
+    // SAFETY: the handler has PETSc's own type.
     check_in(library, "PetscPushErrorHandler", |petsc| unsafe {
         petsc.PetscPushErrorHandler(Some(record), null_mut())
     })?;
+    // SAFETY: MPI runs; words and count live till the end of the process.
     check_in(library, "PetscInitialize", |petsc| unsafe { petsc.PetscInitialize(count, arguments, null(), null()) })?;
     RUNS.set(true);
     let name = CString::new(NO_SIGNALS).map_err(nul)?;
+    // SAFETY: the name lives till the end of the call.
     check_in(library, "PetscOptionsClearValue", |petsc| unsafe {
         petsc.PetscOptionsClearValue(null_mut(), name.as_ptr())
     })

@@ -81,22 +81,25 @@ impl Matrix {
             (pointers[0], pointers[1], pointers[2], pointers[3], values, values.add(inside))
         };
         let mut mat = null_mut();
-        let made = match scope {
-            Scope::Process => petsc!(MatCreateSeqAIJWithArrays(comm, n, n, i, j, values, &mut mat)),
-            Scope::World => petsc!(MatCreateMPIAIJWithSplitArrays(
-                comm,
-                n,
-                n,
-                total,
-                total,
-                i,
-                j,
-                values,
-                other_i,
-                other_j,
-                other_values,
-                &mut mat
-            )),
+        // SAFETY: `Rows` has checked that the arrays fit each other; they live as long as PETSc's matrix, which frees them at its end.
+        let made = unsafe {
+            match scope {
+                Scope::Process => petsc!(MatCreateSeqAIJWithArrays(comm, n, n, i, j, values, &mut mat)),
+                Scope::World => petsc!(MatCreateMPIAIJWithSplitArrays(
+                    comm,
+                    n,
+                    n,
+                    total,
+                    total,
+                    i,
+                    j,
+                    values,
+                    other_i,
+                    other_j,
+                    other_values,
+                    &mut mat
+                )),
+            }
         };
         if let Err(error) = made {
             // SAFETY: PETSc did not take the arrays.
@@ -105,8 +108,11 @@ impl Matrix {
         }
         let (updates, session) = (Rc::default(), session.clone());
         let matrix = Matrix { mat, scope, rows: own, nonzeros, block_size, values, updates, x, y, session };
-        attach(mat, rows)?;
-        petsc!(MatSetBlockSize(mat, block_size as Int))?;
+        // SAFETY: the matrix was just made over the rows, whose box nobody else has.
+        unsafe {
+            attach(mat, rows)?;
+            petsc!(MatSetBlockSize(mat, block_size as Int))?;
+        }
         Ok(matrix)
     }
 
@@ -153,18 +159,23 @@ impl Matrix {
             Scope::Process => [self.mat, null_mut()],
             Scope::World => {
                 let (mut own, mut others) = (null_mut(), null_mut());
-                petsc!(MatMPIAIJGetSeqAIJ(self.mat, &mut own, &mut others, null_mut()))?;
                 let mut state = 0;
-                petsc!(PetscObjectStateGet(self.mat.cast(), &mut state))?;
-                petsc!(PetscObjectStateSet(self.mat.cast(), state + 1))?;
+                // SAFETY: a matrix of this type was made for this scope; its two parts belong to it.
+                unsafe {
+                    petsc!(MatMPIAIJGetSeqAIJ(self.mat, &mut own, &mut others, null_mut()))?;
+                    petsc!(PetscObjectStateGet(self.mat.cast(), &mut state))?;
+                    petsc!(PetscObjectStateSet(self.mat.cast(), state + 1))?;
+                }
                 [own, others]
             }
         };
         for part in parts.into_iter().filter(|part| !part.is_null()) {
             let mut values = null_mut();
-            petsc!(MatSeqAIJGetArray(part, &mut values))?;
-            // Raises the state of the matrix and forgets its inverted diagonal.
-            petsc!(MatSeqAIJRestoreArray(part, &mut values))?;
+            // SAFETY: nothing is written between the two, which raise the state of the matrix and forget its inverted diagonal.
+            unsafe {
+                petsc!(MatSeqAIJGetArray(part, &mut values))?;
+                petsc!(MatSeqAIJRestoreArray(part, &mut values))?;
+            }
         }
         self.updates.set(self.updates.get() + 1);
         Ok(result)
@@ -181,7 +192,8 @@ impl Matrix {
             ffi::MatOption_MAT_SPD,
             ffi::MatOption_MAT_SPD_ETERNAL,
         ] {
-            petsc!(MatSetOption(self.mat, option, ffi::PetscBool_PETSC_TRUE))?;
+            // SAFETY: the matrix of this wrapper.
+            unsafe { petsc!(MatSetOption(self.mat, option, ffi::PetscBool_PETSC_TRUE)) }?;
         }
         Ok(())
     }
@@ -209,11 +221,13 @@ impl Matrix {
             .collect::<Result<_>>()?;
         let handles: Vec<ffi::Vec> = vectors.iter().map(|vector| vector.vec).collect();
         let (count, mut space) = (handles.len() as Int, null_mut());
-        // The space keeps references to the vectors, the matrix one to the space.
-        petsc!(MatNullSpaceCreate(comm, ffi::PetscBool_PETSC_FALSE, count, handles.as_ptr(), &mut space))?;
-        let set = petsc!(MatSetNearNullSpace(self.mat, space));
-        petsc!(MatNullSpaceDestroy(&mut space))?;
-        set
+        // SAFETY: `count` vectors; the space keeps references to them, the matrix one to the space.
+        unsafe {
+            petsc!(MatNullSpaceCreate(comm, ffi::PetscBool_PETSC_FALSE, count, handles.as_ptr(), &mut space))?;
+            let set = petsc!(MatSetNearNullSpace(self.mat, space));
+            petsc!(MatNullSpaceDestroy(&mut space))?;
+            set
+        }
     }
 
     /// `y = A x`.
@@ -223,9 +237,12 @@ impl Matrix {
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) -> Result<()> {
         same("x", x.len(), self.rows)?;
         same("y", y.len(), self.rows)?;
-        let x = self.x.place(x.as_ptr())?;
-        let y = self.y.place(y.as_mut_ptr())?;
-        petsc!(MatMult(self.mat, x.vec(), y.vec()))
+        // SAFETY: both slices are as long as the vectors and outlive the product, which reads one and writes to the other.
+        unsafe {
+            let x = self.x.place(x.as_ptr())?;
+            let y = self.y.place(y.as_mut_ptr())?;
+            petsc!(MatMult(self.mat, x.vec(), y.vec()))
+        }
     }
 
     /// `y = A x` for the values that `change` makes, which `restore` takes back to the bit: solvers of the matrix do not see it.
@@ -270,7 +287,8 @@ impl Matrix {
 
 impl Drop for Matrix {
     fn drop(&mut self) {
-        let _ = petsc!(MatDestroy(&mut self.mat));
+        // SAFETY: the one reference of this wrapper.
+        let _ = unsafe { petsc!(MatDestroy(&mut self.mat)) };
     }
 }
 

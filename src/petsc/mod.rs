@@ -21,6 +21,8 @@
 //! # Ok::<(), winkler::error::Error>(())
 //! ```
 
+#![warn(clippy::undocumented_unsafe_blocks)]
+
 mod blas;
 mod error;
 mod failure;
@@ -43,6 +45,7 @@ mod scope;
 mod session;
 mod stage;
 mod table;
+mod until;
 mod vector;
 mod waiting;
 mod words;
@@ -60,6 +63,7 @@ pub use rows::Rows;
 pub use scope::Scope;
 pub use session::Session;
 pub use stage::Stage;
+pub use until::{Enough, Iterate};
 pub use waiting::Entry;
 pub use words::{begins_options, is_family, is_global};
 

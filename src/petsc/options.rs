@@ -104,7 +104,8 @@ impl Options {
             waiting::clear(&dashed(name));
             return Ok(());
         }
-        petsc!(PetscOptionsClearValue(null_mut(), known.as_ptr()))
+        // SAFETY: the text lives till the end of the call; null is PETSc's one table.
+        unsafe { petsc!(PetscOptionsClearValue(null_mut(), known.as_ptr())) }
     }
 
     /// All options that are set, by name.
@@ -120,9 +121,9 @@ impl Options {
         }
         let mut entries: BTreeMap<String, Option<String>> = self.left()?.into_iter().collect();
         let mut whole: *mut c_char = null_mut();
-        petsc!(PetscOptionsGetAll(null_mut(), &mut whole))?;
-        // SAFETY: PETSc made the text and ends it with a zero byte; its own function frees it, once.
+        // SAFETY: PETSc makes the text and ends it with a zero byte; its own function frees it, once.
         let words = unsafe {
+            petsc!(PetscOptionsGetAll(null_mut(), &mut whole))?;
             let words = string(whole);
             if let Some(free) = *library::running()?.address::<*const Option<ffi::Free>>("PetscTrFree")? {
                 free(whole.cast(), 0, c"Options::all".as_ptr(), c"options.rs".as_ptr());
@@ -146,8 +147,9 @@ impl Options {
         let mut used = ffi::PetscBool_PETSC_FALSE;
         // This one PETSc function wants the name without its dash.
         let bare = &name.as_c_str().to_bytes_with_nul()[1..];
-        petsc!(PetscOptionsUsed(null_mut(), bare.as_ptr().cast(), &mut used)).is_ok()
-            && used == ffi::PetscBool_PETSC_TRUE
+        // SAFETY: the rest of a text that ends with a zero byte and lives till the end of the call.
+        let asked = unsafe { petsc!(PetscOptionsUsed(null_mut(), bare.as_ptr().cast(), &mut used)) };
+        asked.is_ok() && used == ffi::PetscBool_PETSC_TRUE
     }
 
     /// Marks an option as read, so that PETSc does not warn about it at its end.
@@ -173,16 +175,18 @@ impl Options {
         }
         let mut count = 0;
         let (mut names, mut values) = (null_mut(), null_mut());
-        petsc!(PetscOptionsLeftGet(null_mut(), &mut count, &mut names, &mut values))?;
         // SAFETY: PETSc gives `count` names and as many values; a value is null where there is none. They are copied
         // before PETSc takes its two lists back.
-        let mut entries: Vec<Entry> = (0..count as usize)
-            .map(|i| unsafe {
+        let mut entries: Vec<Entry> = unsafe {
+            petsc!(PetscOptionsLeftGet(null_mut(), &mut count, &mut names, &mut values))?;
+            let entry = |i: usize| {
                 let value = *values.add(i);
                 (format!("-{}", string(*names.add(i))), (!value.is_null()).then(|| string(value)))
-            })
-            .collect();
-        petsc!(PetscOptionsLeftRestore(null_mut(), &mut count, &mut names, &mut values))?;
+            };
+            let entries = (0..count as usize).map(entry).collect();
+            petsc!(PetscOptionsLeftRestore(null_mut(), &mut count, &mut names, &mut values))?;
+            entries
+        };
         entries.sort();
         Ok(entries)
     }

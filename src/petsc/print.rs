@@ -24,7 +24,7 @@ pub(super) fn caught<T>(action: impl FnOnce() -> T) -> (T, String) {
     CAUGHT.take();
     // SAFETY: the variable has this type; PETSc is used by one thread, that of the session, so nobody reads the hook meanwhile.
     let hook = library::running().and_then(|petsc| unsafe { petsc.address::<*mut ffi::Printf>("PetscVFPrintf") });
-    // without PETSc the action itself tells the error
+    // SAFETY: as above; without PETSc the action itself ends with the error
     let restore = hook.ok().map(|hook| unsafe {
         let before = Restore(hook, *hook);
         *hook = append;

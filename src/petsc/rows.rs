@@ -8,7 +8,7 @@ use std::ffi::c_void;
 use std::ptr::null_mut;
 
 /// Rows of a square matrix: all, or those of one of several processes. They live exactly as long as PETSc's matrix, which may outlive
-/// [`Matrix`](super::Matrix) inside a solver: PETSc calls [`free`] at the end.
+/// [`Matrix`](super::Matrix) inside a solver: PETSc calls `free` at the end.
 ///
 /// Values are in this order: all in the columns of the rows' own numbers, row by row, then all others, row by row.
 ///
@@ -118,6 +118,9 @@ impl Rows {
 }
 
 /// Frees the rows of a matrix.
+///
+/// # Safety
+/// The pointer is from a box of [`Rows`] that nobody else frees.
 pub(super) unsafe extern "C" fn free(rows: *mut c_void) -> ffi::PetscErrorCode {
     // SAFETY: the matrix made the pointer from a box and gave it to PETSc's container, which calls this once.
     drop(unsafe { Box::from_raw(rows.cast::<Rows>()) });
@@ -125,19 +128,24 @@ pub(super) unsafe extern "C" fn free(rows: *mut c_void) -> ffi::PetscErrorCode {
 }
 
 /// Gives the rows to the matrix: they are freed when PETSc destroys it.
-pub(super) fn attach(mat: ffi::Mat, rows: *mut Rows) -> Result<()> {
-    // SAFETY: the constant of MPI itself.
-    let comm = unsafe { RSMPI_COMM_SELF };
+///
+/// # Safety
+/// The matrix is one of PETSc's; the rows are from a box that nobody else frees.
+pub(super) unsafe fn attach(mat: ffi::Mat, rows: *mut Rows) -> Result<()> {
     let mut container = null_mut();
-    petsc!(PetscContainerCreate(comm, &mut container))?;
-    petsc!(PetscContainerSetPointer(container, rows.cast()))?;
-    petsc!(PetscContainerSetUserDestroy(container, Some(free)))?;
-    petsc!(PetscObjectCompose(mat.cast(), c"winkler_rows".as_ptr(), container.cast()))?;
-    petsc!(PetscContainerDestroy(&mut container))
+    // SAFETY: the communicator is the constant of MPI itself; the matrix takes a reference to the container, whose destructor fits its
+    // pointer by the caller's promise.
+    unsafe {
+        petsc!(PetscContainerCreate(RSMPI_COMM_SELF, &mut container))?;
+        petsc!(PetscContainerSetPointer(container, rows.cast()))?;
+        petsc!(PetscContainerSetUserDestroy(container, Some(free)))?;
+        petsc!(PetscObjectCompose(mat.cast(), c"winkler_rows".as_ptr(), container.cast()))?;
+        petsc!(PetscContainerDestroy(&mut container))
+    }
 }
 
 /// Checks that arrays are compressed rows with sorted columns, `width` of them.
-fn check(row_ptr: &[Int], columns: &[Int], values: &[f64], width: usize) -> Result<()> {
+pub(super) fn check(row_ptr: &[Int], columns: &[Int], values: &[f64], width: usize) -> Result<()> {
     let wrong = |what: &str| Err(Error::new(Kind::Solver, format!("not a sparse matrix in compressed rows: {what}")));
     let Some(&last) = row_ptr.last() else {
         return wrong("row_ptr is empty");

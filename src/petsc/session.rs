@@ -107,7 +107,8 @@ impl Session {
             return None;
         }
         let (mut major, mut minor, mut patch, mut release) = (0, 0, 0, 0);
-        match petsc!(PetscGetVersionNumber(&mut major, &mut minor, &mut patch, &mut release)) {
+        // SAFETY: four variables to write to.
+        match unsafe { petsc!(PetscGetVersionNumber(&mut major, &mut minor, &mut patch, &mut release)) } {
             Ok(()) => Some(format!("{major}.{minor}.{patch}")),
             Err(_) => None,
         }

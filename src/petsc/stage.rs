@@ -30,17 +30,21 @@ impl Session {
 
 fn begin(name: &str) -> Result<()> {
     let (text, mut stage) = (text(name)?, -1);
-    petsc!(PetscLogStageGetId(text.as_ptr(), &mut stage))?;
-    if stage < 0 {
-        petsc!(PetscLogStageRegister(text.as_ptr(), &mut stage))?;
+    // SAFETY: PETSc copies the text, and the stage is one that it has given.
+    unsafe {
+        petsc!(PetscLogStageGetId(text.as_ptr(), &mut stage))?;
+        if stage < 0 {
+            petsc!(PetscLogStageRegister(text.as_ptr(), &mut stage))?;
+        }
+        petsc!(PetscLogStagePush(stage))
     }
-    petsc!(PetscLogStagePush(stage))
 }
 
 impl Drop for Stage {
     fn drop(&mut self) {
         if self.is_logged && library::runs() {
-            let _ = petsc!(PetscLogStagePop());
+            // SAFETY: this stage was pushed, and those within it are gone: they were dropped before.
+            let _ = unsafe { petsc!(PetscLogStagePop()) };
         }
     }
 }

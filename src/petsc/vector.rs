@@ -19,9 +19,12 @@ impl Vector {
     pub(super) fn new(session: &Session, scope: Scope, rows: usize, block_size: usize) -> Result<Vector> {
         let (comm, mut vec) = (scope.comm(session), null_mut());
         let (block, rows) = (block_size as Int, rows as Int);
-        match scope {
-            Scope::Process => petsc!(VecCreateSeqWithArray(comm, block, rows, null(), &mut vec))?,
-            Scope::World => petsc!(VecCreateMPIWithArray(comm, block, rows, DETERMINE, null(), &mut vec))?,
+        // SAFETY: without an array PETSc touches no entry before one is placed.
+        unsafe {
+            match scope {
+                Scope::Process => petsc!(VecCreateSeqWithArray(comm, block, rows, null(), &mut vec))?,
+                Scope::World => petsc!(VecCreateMPIWithArray(comm, block, rows, DETERMINE, null(), &mut vec))?,
+            }
         }
         Ok(Vector { vec, _session: session.clone() })
     }
@@ -29,31 +32,42 @@ impl Vector {
     /// A vector with memory of its own.
     pub(super) fn owned(session: &Session, scope: Scope, values: &[f64], block_size: usize) -> Result<Vector> {
         let (comm, mut vec) = (scope.comm(session), null_mut());
-        match scope {
-            Scope::Process => petsc!(VecCreateSeq(comm, values.len() as Int, &mut vec))?,
-            Scope::World => petsc!(VecCreateMPI(comm, values.len() as Int, DETERMINE, &mut vec))?,
+        // SAFETY: PETSc makes the memory itself.
+        unsafe {
+            match scope {
+                Scope::Process => petsc!(VecCreateSeq(comm, values.len() as Int, &mut vec))?,
+                Scope::World => petsc!(VecCreateMPI(comm, values.len() as Int, DETERMINE, &mut vec))?,
+            }
         }
         let vector = Vector { vec, _session: session.clone() };
-        petsc!(VecSetBlockSize(vec, block_size as Int))?;
         let mut array = null_mut();
-        petsc!(VecGetArray(vec, &mut array))?;
-        // SAFETY: PETSc's array has as many entries as the vector has here, which was made that long above.
-        unsafe { std::slice::from_raw_parts_mut(array, values.len()) }.copy_from_slice(values);
-        petsc!(VecRestoreArray(vec, &mut array))?;
+        // SAFETY: PETSc's array has as many entries as the vector has here, which was made that long above; nobody else has it
+        // between Get and Restore.
+        unsafe {
+            petsc!(VecSetBlockSize(vec, block_size as Int))?;
+            petsc!(VecGetArray(vec, &mut array))?;
+            std::slice::from_raw_parts_mut(array, values.len()).copy_from_slice(values);
+            petsc!(VecRestoreArray(vec, &mut array))?;
+        }
         Ok(vector)
     }
 
-    /// Lets the vector use memory of the caller until the guard is dropped; it must be as long as the vector, and
-    /// writable if PETSc will write to the vector.
-    pub(super) fn place(&self, values: *const f64) -> Result<Placed<'_>> {
-        petsc!(VecPlaceArray(self.vec, values))?;
+    /// Lets the vector use memory of the caller until the guard is dropped.
+    ///
+    /// # Safety
+    /// The memory is as long as the vector, lives as long as the guard, and is writable and nobody else's if PETSc will write to the
+    /// vector.
+    pub(super) unsafe fn place(&self, values: *const f64) -> Result<Placed<'_>> {
+        // SAFETY: the caller's promise.
+        unsafe { petsc!(VecPlaceArray(self.vec, values)) }?;
         Ok(Placed(self))
     }
 }
 
 impl Drop for Vector {
     fn drop(&mut self) {
-        let _ = petsc!(VecDestroy(&mut self.vec));
+        // SAFETY: the one reference of this wrapper.
+        let _ = unsafe { petsc!(VecDestroy(&mut self.vec)) };
     }
 }
 
@@ -68,6 +82,7 @@ impl Placed<'_> {
 
 impl Drop for Placed<'_> {
     fn drop(&mut self) {
-        let _ = petsc!(VecResetArray(self.0.vec));
+        // SAFETY: an array was placed, or there were no guard.
+        let _ = unsafe { petsc!(VecResetArray(self.0.vec)) };
     }
 }

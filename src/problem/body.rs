@@ -1,8 +1,8 @@
 //! Bodies: their elements, supports, springs and loads.
 
-use super::elasticity::{ElasticitySpec, RegionSpec};
+use super::elasticity::{Constants, ElasticitySpec, RegionSpec};
 use super::order::Order;
-use crate::error::Located;
+use crate::error::{Located, Place};
 use crate::expression::{Differentiable, Field};
 use crate::petsc::{begins_options, is_family};
 
@@ -30,6 +30,71 @@ pub struct BodySpec {
     pub force_factor: f64,
     /// A known displacement to compare with, if any: as many components as the scene has dimensions, of x, y (z).
     pub exact: Option<Vec<Differentiable>>,
+}
+
+impl BodySpec {
+    /// An isotropic body of linear elements on the group of cells of this name: Young's modulus (a stress, > 0) and Poisson's ratio in
+    /// (-1, 0.5), numbers or functions of the place.
+    #[track_caller]
+    pub fn new(name: &str, young: impl Into<Field>, poisson: impl Into<Field>) -> Self {
+        let constants = Constants::Isotropic { young: young.into(), poisson: poisson.into() };
+        Self {
+            name: Located::here(name),
+            elasticity: ElasticitySpec { constants, axes: None, place: Place::here("young, poisson") },
+            regions: Vec::new(),
+            order: Order::P1,
+            fix: Vec::new(),
+            load: Vec::new(),
+            spring: Vec::new(),
+            force: None,
+            force_factor: 1.0,
+            exact: None,
+        }
+    }
+
+    /// With elements of this order, not above that of the mesh.
+    pub fn order(self, order: Order) -> Self {
+        Self { order, ..self }
+    }
+
+    /// Prescribes displacements (x, y in the plane, x, y, z in space; a length each) on a boundary or at points; `None` leaves a
+    /// component free.
+    #[track_caller]
+    pub fn fix<const N: usize>(mut self, on: &str, value: [Option<f64>; N]) -> Self {
+        const { assert!(N <= 3, "displacements have three components at most") };
+        let value = std::array::from_fn(|c| value.get(c).copied().flatten().map(Field::Constant));
+        self.fix.push(Support { on: Located::here(on), value, normal: None, path: None, factor: 1.0 });
+        self
+    }
+
+    /// Lets a plane surface slide in its plane: no displacement along its normal.
+    #[track_caller]
+    pub fn symmetry(mut self, on: &str) -> Self {
+        let (on, value, normal) = (Located::here(on), [const { None }; 3], Some(Field::Constant(0.0)));
+        self.fix.push(Support { on, value, normal, path: None, factor: 1.0 });
+        self
+    }
+
+    /// Adds a load on a boundary: pressure or traction (stresses), or a total force.
+    #[track_caller]
+    pub fn load(mut self, on: &str, kind: LoadKind) -> Self {
+        self.load.push(Load { on: Located::here(on), kind, path: None, factor: 1.0 });
+        self
+    }
+
+    /// Adds a traction (x, y in the plane, x, y, z in space; stresses), numbers or functions of the place.
+    #[track_caller]
+    pub fn traction<const N: usize>(self, on: &str, traction: [impl Into<Field>; N]) -> Self {
+        const { assert!(N <= 3, "tractions have three components at most") };
+        let mut given = traction.into_iter().map(Into::into);
+        self.load(on, LoadKind::Traction(std::array::from_fn(|_| given.next().unwrap_or(Field::Constant(0.0)))))
+    }
+
+    /// Adds a pressure against the outer normal (a stress, > 0 pushes), a number or a function of the place.
+    #[track_caller]
+    pub fn pressure(self, on: &str, pressure: impl Into<Field>) -> Self {
+        self.load(on, LoadKind::Pressure(pressure.into()))
+    }
 }
 
 /// Prescribed displacement components on a named group (a boundary, or points).

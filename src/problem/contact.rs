@@ -31,6 +31,28 @@ pub struct ContactSpec {
     pub table: usize,
 }
 
+impl ContactSpec {
+    /// Two named surfaces of different bodies and the layer between them; the gap is the distance of the meshes.
+    #[track_caller]
+    pub fn new(first: &str, second: &str, layer: LayerSpec) -> Self {
+        Self {
+            between: [Located::here(first), Located::here(second)],
+            gap: Field::Constant(0.0),
+            angle: ANGLE,
+            layer,
+            touching: false,
+            overlap: Overlap::Compress,
+            reference: None,
+            table: 0,
+        }
+    }
+
+    /// With a gap (a length), a number or a function of the place, besides the distance of the meshes.
+    pub fn gap(self, gap: impl Into<Field>) -> Self {
+        Self { gap: gap.into(), ..self }
+    }
+}
+
 /// Contact of all bodies that come near each other, where no [`ContactSpec`] names surfaces of the two and no narrower rule holds.
 #[derive(Debug, Clone)]
 pub struct AutoContact {

@@ -31,6 +31,14 @@ pub struct MethodSpec {
     pub stop: StopRule,
 }
 
+impl MethodSpec {
+    /// The method of this name with its defaults: for [`MethodName::Robin`] those of the paper.
+    pub fn new(name: MethodName) -> Self {
+        let robin = if name == MethodName::Robin { RobinRule::Tangent } else { RobinRule::Auto };
+        Self { name, robin, ..Self::default() }
+    }
+}
+
 impl Default for MethodSpec {
     fn default() -> Self {
         Self {
@@ -120,6 +128,8 @@ pub enum Gamma {
     BarzilaiBorwein,
     /// Best stationary value for the estimated spectrum.
     Spectral,
+    /// The rule of this name that a Rust program gives the scene ([`Scene::rule`](crate::scene::Scene::rule)).
+    Own(String),
 }
 
 impl Gamma {

@@ -11,6 +11,7 @@ pub mod layer;
 pub mod mesh;
 pub mod method;
 pub mod order;
+pub mod own;
 pub mod pattern;
 pub mod robin;
 pub mod solver;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// What can be drawn.
 const WHAT: [&str; 4] = ["stress", "displacement", "pressure", "convergence"];
 
-/// Draws one of [`WHAT`] from a folder of results to `out`, or to a file of its name in the folder; returns the paths. Several pairs
+/// Draws one of `WHAT` from a folder of results to `out`, or to a file of its name in the folder; returns the paths. Several pairs
 /// have a picture each, numbered from the second one on.
 ///
 /// # Errors

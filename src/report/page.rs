@@ -107,7 +107,7 @@ impl Results {
     /// Residual, error and increment of each iteration; none without iterations.
     ///
     /// # Errors
-    /// Those of [`rows`].
+    /// Those of `rows`.
     pub fn convergence(&self) -> Result<Option<Plot>> {
         let rows = rows(&self.folder.join("history.csv"))?;
         // load steps begin to count anew

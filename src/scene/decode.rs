@@ -16,6 +16,7 @@ use crate::mesh::is_shape;
 use crate::output::vtu::Encoding;
 use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
+use crate::problem::own::Own;
 use crate::problem::pattern::Pattern;
 use crate::problem::solver::{Preset, SolverSpec};
 use crate::problem::units::Units;
@@ -71,6 +72,8 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         contacts,
         auto,
         method,
+        laws: Own::default(),
+        rules: Own::default(),
         data: decoder.data,
         solver: solver(keys.get("solver"))?,
         estimate: keys.get("estimate").map_or(Ok(false), Node::boolean)?,

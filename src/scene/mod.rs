@@ -1,5 +1,6 @@
 //! What the user wrote: TOML -> checked [`Scene`]. Every refusal names file, line, and the way out.
 
+mod build;
 mod decode;
 mod overrides;
 mod read;

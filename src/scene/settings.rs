@@ -78,7 +78,7 @@ fn insert(map: &mut Map<String, Value>, key: &str, value: Option<Value>) {
 fn field(field: &Field) -> Value {
     match field {
         Field::Constant(value) => json!(value),
-        Field::Expression(expression) => json!(expression.text()),
+        other => json!(other.text()),
     }
 }
 
@@ -88,6 +88,7 @@ fn vector(components: &[Field; 3], dimension: usize) -> Value {
 
 fn mesh(mesh: &MeshSource) -> Value {
     match mesh {
+        MeshSource::Arrays(arrays) => json!({ "points": arrays.points.len(), "groups": arrays.groups.len() }),
         MeshSource::Msh { file } => json!({ "msh": file.value.display().to_string() }),
         MeshSource::Geo { file, set, guard, .. } => {
             let set: Map<_, _> = set.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
@@ -206,6 +207,7 @@ fn contact(contact: &ContactSpec) -> Value {
             json!({ form.name: values })
         }
         LayerSpec::Table(points) => json!({ "table": points }),
+        LayerSpec::Own(name) => json!({ "own": name }),
         LayerSpec::Asperities(spec) => json!({ "asperities": asperities(spec) }),
         LayerSpec::Pressure { law, up_to } => {
             let mut map = Map::new();
@@ -266,6 +268,7 @@ fn method(method: &MethodSpec) -> Value {
     let gamma = match &method.gamma {
         Gamma::Stationary(gamma) => json!(gamma),
         Gamma::Schedule(list) => json!(list),
+        Gamma::Own(name) => json!({ "own": name }),
         rule => json!(Gamma::NAMED.iter().find(|(_, named)| named == rule).map(|(name, _)| name)),
     };
     let robin = match method.robin {

@@ -1,6 +1,8 @@
 //! What the user asked for, checked: a problem, and what to do with it.
 
+use crate::contact::law::OwnLaws;
 use crate::data::Library;
+use crate::ddm::gamma::OwnRules;
 use crate::error::{Located, Place};
 use crate::output::vtu::Encoding;
 use crate::problem::body::BodySpec;
@@ -27,6 +29,10 @@ pub struct Scene {
     pub units: Option<Units>,
     /// Where the mesh comes from.
     pub mesh: MeshSource,
+    /// Laws of layers that a Rust program brings, by name.
+    pub laws: OwnLaws,
+    /// Rules for gamma that a Rust program brings, by name.
+    pub rules: OwnRules,
     /// Functions from files, by name; those that no expression uses are not read.
     pub data: Library,
     /// The tables of bodies, in the order of the file; the name of one may be a pattern, and so may those of groups.

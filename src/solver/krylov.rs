@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::fem::Interpolation;
 use crate::linalg::Csr;
 use crate::model::Solved;
-use crate::petsc::{Ksp, Matrix, Rows, Session};
+use crate::petsc::{Enough, Ksp, Matrix, Rows, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
 pub struct Krylov {
@@ -27,6 +27,8 @@ pub struct Krylov {
     stale: bool,
     /// Iterations per digit of the first solve with this preconditioner.
     fresh: Option<f64>,
+    /// Share of the residual that the last solve left.
+    reached: f64,
 }
 
 /// Growth of the iterations, over those of a fresh preconditioner, at which a new one is made.
@@ -59,6 +61,10 @@ impl Krylov {
             ksp.set_interpolation(&matrix, [&super::integers(ptr), &super::integers(col)], &values, own)?;
         }
         chosen.lend(session, || ksp.set_from_options())?;
+        // errors in the energy norm follow from it and from residuals in the natural norm
+        if ksp.ksp_type() == "cg" && chosen.get("ksp_norm_type") == Some("natural") {
+            ksp.estimate_spectrum()?;
+        }
         if ksp.pc_type() == "gamg" && !near_null_space.is_empty() {
             matrix.set_near_null_space(near_null_space)?;
         }
@@ -80,12 +86,34 @@ impl Krylov {
             keeps,
             stale: true,
             fresh: None,
+            reached: 1.0,
         })
     }
 
     /// G, for products that leave it as it is.
     pub fn matrix_mut(&mut self) -> &mut Matrix {
         &mut self.matrix
+    }
+
+    /// A solve, timed and counted.
+    fn timed(&mut self, solve: impl FnOnce(&Ksp) -> Result<crate::petsc::Solved>) -> Result<Solved> {
+        self.set_up()?;
+        let stage = self.session.stage("linear solve");
+        let solved = self.with_options(|| solve(&self.ksp))?;
+        drop(stage);
+        let direct = self.ksp.ksp_type() == "preonly";
+        Ok(Solved {
+            iterations: if direct { 0 } else { solved.iterations },
+            failure: (!solved.reason.converged()).then(|| solved.reason.to_string()),
+        })
+    }
+
+    /// Remembers the pace of a solve: the next change of G brings a new preconditioner if this one is worn.
+    fn learn(&mut self, solved: &Solved) {
+        if self.keeps && solved.iterations > FEW {
+            let pace = solved.iterations as f64 / -self.reached.log10();
+            self.stale |= pace > WORN * *self.fresh.get_or_insert(pace);
+        }
     }
 
     /// Some work of the solver that may read options: what the program chose is read by the set-up, but of the options of PETSc some are
@@ -119,20 +147,27 @@ impl InnerSolver for Krylov {
     }
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
-        self.set_up()?;
-        let stage = self.session.stage("linear solve");
-        let solved = self.with_options(|| self.ksp.solve(r, z))?;
-        drop(stage);
-        let direct = self.ksp.ksp_type() == "preonly";
-        if self.keeps && solved.iterations > FEW {
-            // the next change of G brings a new preconditioner if this one is worn
-            let pace = solved.iterations as f64 / -self.ksp.tolerance().log10();
-            self.stale |= pace > WORN * *self.fresh.get_or_insert(pace);
+        self.reached = self.ksp.tolerance();
+        let solved = self.timed(|ksp| ksp.solve(r, z))?;
+        self.learn(&solved);
+        Ok(solved)
+    }
+
+    fn solve_until(&mut self, r: &[f64], z: &mut [f64], enough: &mut Enough) -> Result<Solved> {
+        if !self.free {
+            return self.solve(r, z);
         }
-        Ok(Solved {
-            iterations: if direct { 0 } else { solved.iterations },
-            failure: (!solved.reason.converged()).then(|| solved.reason.to_string()),
-        })
+        self.ksp.set_tolerance(f64::EPSILON)?;
+        let mut reached = 1.0;
+        let solved = self.timed(|ksp| {
+            ksp.solve_until(r, z, &mut |iterate| {
+                reached = iterate.residual / iterate.first;
+                enough(iterate)
+            })
+        })?;
+        self.reached = reached;
+        self.learn(&solved);
+        Ok(solved)
     }
 
     fn precision(&mut self, rtol: f64) -> Result<bool> {
@@ -147,7 +182,7 @@ impl InnerSolver for Krylov {
             ("preonly", "cholesky" | "lu") => 0.0,
             // one application of a preconditioner leaves any share
             ("preonly", _) => 1.0,
-            _ => self.ksp.tolerance(),
+            _ => self.reached,
         }
     }
 

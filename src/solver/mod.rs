@@ -28,7 +28,7 @@ pub use split::Split;
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::Solved;
-use crate::petsc::{Int, Rows};
+use crate::petsc::{Enough, Int, Rows};
 
 /// A whole matrix as PETSc's.
 fn rows(matrix: Csr) -> Result<Rows> {
@@ -64,6 +64,15 @@ pub trait InnerSolver {
     /// Failures of the solver library; not converging is told in [`Solved`].
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
 
+    /// The same, until `enough` is true of z and the share of r that it leaves, for solvers that come nearer step by step. If the user
+    /// set a tolerance, that ends the solve.
+    ///
+    /// # Errors
+    /// Those of [`solve`](Self::solve).
+    fn solve_until(&mut self, r: &[f64], z: &mut [f64], _enough: &mut Enough) -> Result<Solved> {
+        self.solve(r, z)
+    }
+
     /// How far solves have to reduce r, unless the user says; false if solves are what they are.
     ///
     /// # Errors
@@ -72,7 +81,7 @@ pub trait InnerSolver {
         Ok(false)
     }
 
-    /// Share of the energy norm of z that solves may be off: zero for a direct solver.
+    /// Share of the energy norm of z that the last solve may be off: zero for a direct solver.
     fn accuracy(&self) -> f64 {
         0.0
     }

@@ -7,10 +7,10 @@
 use super::{InnerSolver, Krylov, RobinMatrix, integers};
 use crate::error::Result;
 use crate::linalg::{Csr, axpy, countable, dot};
-use crate::model::linear::{Failure, LinearStep, Solution, Solved, System};
+use crate::model::linear::{Failure, LinearStep, Solution, Solved, System, Trial};
 use crate::model::{Body, BodyCounts, BodySlot, Field, Joint, Matrices, Model};
 use crate::parallel::share;
-use crate::petsc::Rows;
+use crate::petsc::{Iterate, Rows};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -181,6 +181,8 @@ struct Joined<S> {
     matrix: RobinMatrix<S>,
     rows: Csr,
     offset: Vec<usize>,
+    /// Number of the first row here.
+    first: usize,
 }
 
 impl<S> Joined<S> {
@@ -231,7 +233,10 @@ impl<S: InnerSolver> Monolithic<S> {
             }
         };
         let matrix = RobinMatrix::new(stiffness, &rows, row_stiffness, make)?;
-        Ok(Self { joined: Rc::new(RefCell::new(Joined { matrix, rows, offset })), is_redundant })
+        Ok(Self {
+            joined: Rc::new(RefCell::new(Joined { matrix, rows, offset, first: start.unwrap_or(0) })),
+            is_redundant,
+        })
     }
 }
 
@@ -254,17 +259,34 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
     }
 
     fn solve(&mut self, system: System) -> Result<Solved> {
-        let System { model, springs, residual, reduction, .. } = system;
+        let System { model, springs, residual, enough, .. } = system;
         let joined = &mut *self.joined.borrow_mut();
         let mut whole = joined.whole(residual);
         if self.is_redundant {
             model.exchange.sum(&mut whole);
         }
         let mut x = vec![0.0; whole.len()];
-        let Joined { matrix, rows, .. } = joined;
-        matrix.solver_mut().precision(reduction)?;
+        let Joined { matrix, rows, first, .. } = joined;
         matrix.update(rows, springs)?;
-        if let Some(reason) = matrix.apply(|solver| solver.solve(&whole, &mut x))?.failure {
+        let points = model.points();
+        let mut left = None;
+        let mut enough = |iterate: &Iterate| {
+            // one message: B x of the rows here, then the energy
+            let here =
+                |q: usize| rows.row(q).filter_map(|(i, b)| Some(b * iterate.x.get(i.checked_sub(*first)?)?)).sum();
+            let mut closing: Vec<f64> = (0..points).map(here).collect();
+            closing.push(dot(iterate.x, &whole));
+            model.exchange.sum(&mut closing);
+            let energy = closing.pop().unwrap_or_default().max(0.0);
+            let error = match iterate.least {
+                // r'A^-1 r is at most r'M^-1 r over the least eigenvalue of M^-1 A
+                Some(least) => iterate.residual / least.sqrt(),
+                None => iterate.residual / iterate.first * energy.sqrt(),
+            };
+            left = Some(error);
+            enough(model, &Trial { closing: &closing, energy, error })
+        };
+        if let Some(reason) = matrix.apply(|solver| solver.solve_until(&whole, &mut x, &mut enough))?.failure {
             return Ok(Err(Failure { body: None, reason }));
         }
         let state = |(slot, part): (&BodySlot, Range<usize>)| {
@@ -283,7 +305,8 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
         model.exchange.sum(&mut field.trace);
         let energy = field.trace.pop().unwrap_or_default();
         let accuracy = joined.matrix.solver().accuracy();
-        Ok(Ok(Solution { field, energy, error: accuracy * energy.max(0.0).sqrt(), is_exact: accuracy == 0.0 }))
+        let error = left.unwrap_or(accuracy * energy.max(0.0).sqrt());
+        Ok(Ok(Solution { field, energy, error, is_exact: accuracy == 0.0 }))
     }
 
     fn counts(&self) -> BodyCounts {

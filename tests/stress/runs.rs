@@ -4,14 +4,14 @@
 
 use crate::scenes::{Case, Expect};
 use std::path::Path;
-use winkler::commands::clock::Clock;
-use winkler::commands::run;
-use winkler::commands::stages::Begin;
-use winkler::commands::{report, results};
 use winkler::ddm::Silent;
 use winkler::error::Result;
 use winkler::interrupt::Interrupt;
 use winkler::petsc::Session;
+use winkler::run;
+use winkler::run::clock::Clock;
+use winkler::run::stages::Begin;
+use winkler::run::{report, results};
 use winkler::scene;
 use winkler::solver::options;
 

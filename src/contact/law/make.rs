@@ -1,17 +1,19 @@
 //! The law that a scene asks for, at the points of a pair.
 
+use super::own::{self, OwnLaws};
 use super::{Asperities, Cubic, Exponential, LayerLaw, Linear, PerPoint, Power, Table, Typed};
 use crate::error::{Error, Kind, Result, shown};
 use crate::expression::Field;
 use crate::problem::layer::{LawForm, LawKind, LayerSpec};
+use std::rc::Rc;
 
-/// Makes the law of a layer; `position` are the contact points.
+/// Makes the law of a layer; `laws` are those of the program by name, `position` the contact points.
 ///
 /// A law whose parameters are numbers is one object for all points.
 ///
 /// # Errors
-/// Parameters out of their range at a point, expressions that are no law of a layer.
-pub fn make(spec: &LayerSpec, position: &[[f64; 3]]) -> Result<Box<dyn LayerLaw>> {
+/// Parameters out of their range at a point, expressions and own laws that are no law of a layer.
+pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
     match spec {
         LayerSpec::Form { form, values } => match form.kind {
             LawKind::Linear => formed(form, values, position, |v| Linear { stiffness: v[0] }),
@@ -19,14 +21,15 @@ pub fn make(spec: &LayerSpec, position: &[[f64; 3]]) -> Result<Box<dyn LayerLaw>
             LawKind::Exponential => formed(form, values, position, |v| Exponential::new(v[0], v[1])),
             LawKind::Cubic => formed(form, values, position, |v| Cubic { k1: v[0], k3: v[1] }),
         },
-        LayerSpec::Asperities(spec) => Ok(Box::new(Asperities::new(spec))),
-        LayerSpec::Table(points) => Ok(Box::new(Table::new(points))),
+        LayerSpec::Asperities(spec) => Ok(Rc::new(Asperities::new(spec))),
+        LayerSpec::Own(name) => own::make(laws, name, position, extent(position)),
+        LayerSpec::Table(points) => Ok(Rc::new(Table::new(points))),
         LayerSpec::Pressure { law, up_to } => {
             let size = extent(position);
             let at = |&x: &[f64; 3]| Typed::new(law, x, *up_to, size);
             match law.plain().uses_only_first() {
-                true => Ok(Box::new(at(&position[0])?)),
-                false => Ok(Box::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
+                true => Ok(Rc::new(at(&position[0])?)),
+                false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
             }
         }
     }
@@ -38,7 +41,7 @@ fn formed<L: LayerLaw + 'static>(
     values: &[Field],
     position: &[[f64; 3]],
     new: fn(&[f64]) -> L,
-) -> Result<Box<dyn LayerLaw>> {
+) -> Result<Rc<dyn LayerLaw>> {
     let at = |&x: &[f64; 3]| -> Result<L> {
         let parameters = form.parameters.iter().zip(values).map(|(known, field)| {
             let value = field.eval_finite(known.what, x)?;
@@ -57,8 +60,8 @@ fn formed<L: LayerLaw + 'static>(
         Ok(new(&parameters.collect::<Result<Vec<f64>>>()?))
     };
     match values.iter().all(Field::is_constant) {
-        true => Ok(Box::new(at(&[0.0; 3])?)),
-        false => Ok(Box::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
+        true => Ok(Rc::new(at(&[0.0; 3])?)),
+        false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
     }
 }
 

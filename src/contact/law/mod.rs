@@ -2,7 +2,7 @@
 //!
 //! The paper writes sigma_n = g(w) with w = -c; here p(c) = -g(-c). A law is monotone with p(0) = 0 and a
 //! bounded tangent on bounded ranges, conditions (6)-(7). A new law is a new file, a form in
-//! [`layer`](crate::problem::layer) and a line in [`make`].
+//! [`layer`](crate::problem::layer) and a line in [`make`]; or in a program over this library the trait alone: [`OwnLaws`].
 //!
 //! With p = 0 for c <= 0 a law is a maximal monotone graph of points (c, p). Its points are found from the compression
 //! ([`LayerLaw::response`]), from the pressure ([`LayerLaw::compression`]) or from a line of slope -rho that meets the
@@ -16,6 +16,7 @@ mod exponential;
 mod gap;
 mod linear;
 mod make;
+mod own;
 mod power;
 mod quadrature;
 mod root;
@@ -30,6 +31,7 @@ pub use cubic::Cubic;
 pub use exponential::Exponential;
 pub use linear::Linear;
 pub use make::make;
+pub use own::OwnLaws;
 pub use power::Power;
 pub use scaled::Scaled;
 pub use table::Table;

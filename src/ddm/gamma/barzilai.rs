@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-14;
 /// gamma^k = s'G s / s'y with s the last step and y the change of the residual: the inverse of a Rayleigh quotient of
 /// G^-1 F1''. The first step is an exact line search.
 ///
-/// The rule is not monotone. F1 may rise, but not above the largest of the last [`WINDOW`] iterates (the nonmonotone line search of
+/// The rule is not monotone. F1 may rise, but not above the largest of the last `WINDOW` iterates (the nonmonotone line search of
 /// Grippo, Lampariello and Lucidi, 1986, as Raydan uses it, 1997): a step that goes further is cut to the exact one.
 #[derive(Debug, Default)]
 pub struct BarzilaiBorwein {

@@ -14,6 +14,7 @@ use super::acceleration::Here;
 use super::forecast::{best_factor, relaxed_factor};
 use super::line::Unbounded;
 use super::ritz::Ritz;
+use crate::problem::own::Own;
 
 /// Chooses gamma^k after the sweep of iteration k.
 pub trait GammaRule {
@@ -38,6 +39,9 @@ pub trait GammaRule {
     /// Forgets what earlier iterations told: the problem changes.
     fn restart(&mut self) {}
 }
+
+/// Rules of a Rust program by name: each makes the rule of a run.
+pub type OwnRules = Own<dyn Fn() -> Box<dyn GammaRule>>;
 
 /// gamma^k = gamma, as in the paper.
 #[derive(Debug, Clone, Copy)]

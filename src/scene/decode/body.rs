@@ -160,8 +160,9 @@ impl Decoder<'_> {
         for (number, field) in numbers.iter_mut().zip(self.vector(node)?) {
             match field {
                 Field::Constant(value) => *number = value,
-                Field::Expression(expression) => {
-                    return Err(Error::scene(expression.place(), "a total force does not depend on the place")
+                field => {
+                    let place = field.place().unwrap_or(&node.place);
+                    return Err(Error::scene(place, "a total force does not depend on the place")
                         .help("give numbers, or a traction with expressions"));
                 }
             }

@@ -26,7 +26,7 @@ impl Decoder<'_> {
                 if says("psi") || says("gamma") || says("robin") || rule { MethodName::Robin } else { default.name }
             }
         };
-        let usual = if name == MethodName::Robin { RobinRule::Tangent } else { default.robin };
+        let default = MethodSpec::new(name);
         let start = keys.get("start").map_or(Ok(default.start), |start| self.start(start))?;
         let steps = keys.get("steps");
         if let (Some(steps), Start::Nested) = (steps, &start) {
@@ -37,7 +37,7 @@ impl Decoder<'_> {
         Ok(MethodSpec {
             name,
             psi: keys.get("psi").map_or(Ok(default.psi), |psi| self.zone(psi))?,
-            robin: keys.get("robin").map_or(Ok(usual), robin)?,
+            robin: keys.get("robin").map_or(Ok(default.robin), robin)?,
             gamma: keys.get("gamma").map_or(Ok(default.gamma), gamma)?,
             interval: self.interval(&keys, name)?,
             depth: keys.get("depth").map_or(Ok(default.depth), depth)?,

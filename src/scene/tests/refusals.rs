@@ -239,7 +239,7 @@ fn only_the_command_line_trusts_a_script() {
     use crate::problem::mesh::MeshSource;
     let trusted = |text: &str, more: &[&str]| match load_text(text, more).expect("a scene").mesh {
         MeshSource::Geo { guard, .. } => guard.trusted,
-        MeshSource::Msh { .. } => false,
+        _ => false,
     };
     assert!(!trusted(GROOVE, &[]) && trusted(GROOVE, &["--trust-geo"]) && trusted(GROOVE, &["trust_geo=true"]));
     let error = load_text(&format!("trust_geo = true\n{GROOVE}"), &[]).expect_err("a scene that trusts itself");

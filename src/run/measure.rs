@@ -2,8 +2,8 @@
 
 use super::balance;
 use super::results::{All, Recovered};
-use super::shown::numbered;
 use super::stages::{Built, Done};
+use super::words::numbered;
 use crate::ddm::Status;
 use crate::model::Model;
 use crate::output::{BalanceReport, BodyReport, ReactionReport, StepPairReport, StepReport};

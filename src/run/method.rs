@@ -33,7 +33,7 @@ pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<M
                 start,
             )?));
         }
-        MethodName::Robin => Box::new(Relaxed::new(rule(&scene.method.gamma))),
+        MethodName::Robin => Box::new(Relaxed::new(rule(scene)?)),
         MethodName::Ncg => Box::new(Conjugate::default()),
         MethodName::Anderson => Box::new(Anderson::new(scene.method.depth)),
     };
@@ -77,13 +77,14 @@ fn linear_step(
     Ok(step)
 }
 
-fn rule(gamma: &Gamma) -> Box<dyn GammaRule> {
-    match gamma {
+fn rule(scene: &Scene) -> Result<Box<dyn GammaRule>> {
+    Ok(match &scene.method.gamma {
         Gamma::Stationary(gamma) => Box::new(Stationary(*gamma)),
         Gamma::Schedule(list) => Box::new(Schedule(list.clone())),
         Gamma::LineSearch => Box::new(LineSearch),
         Gamma::Aitken => Box::new(Aitken::default()),
         Gamma::BarzilaiBorwein => Box::new(BarzilaiBorwein::default()),
         Gamma::Spectral => Box::new(Spectral::default()),
-    }
+        Gamma::Own(name) => scene.rules.get("rule for gamma", name)?(),
+    })
 }

@@ -162,6 +162,7 @@ fn mesh<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt)
     let needs_gmsh = match &scene.mesh {
         MeshSource::Geo { .. } => true,
         MeshSource::Msh { file } => is_other(&file.value),
+        MeshSource::Arrays(_) => false,
     };
     if needs_gmsh {
         agree(session, if session.rank() == 0 { load().map(|_| ()) } else { Ok(()) })?;

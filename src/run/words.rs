@@ -1,6 +1,7 @@
-//! Lists of names in sentences.
+//! Lists of names: in sentences, and each once.
 
 use crate::error::few;
+use std::collections::HashMap;
 
 /// Names of bodies as in a sentence.
 pub fn in_words<'a>(names: impl Iterator<Item = &'a String>) -> String {
@@ -11,9 +12,19 @@ pub fn in_words<'a>(names: impl Iterator<Item = &'a String>) -> String {
     }
 }
 
+/// Each name once: with a number from its second time on.
+pub fn numbered(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    let once = |name: String| match counts.entry(name.clone()).and_modify(|count| *count += 1).or_insert(1) {
+        1 => name,
+        count => format!("{name}-{count}"),
+    };
+    names.map(once).collect()
+}
+
 #[cfg(test)]
 mod tests {
-    use super::in_words;
+    use super::*;
 
     #[test]
     fn long_lists_are_cut() {
@@ -22,5 +33,11 @@ mod tests {
         assert_eq!([said(0), said(1), said(3)], ["", "`b0`", "`b0`, `b1` and `b2`"]);
         assert!(said(13).ends_with("`b11` and `b12`"));
         assert!(said(4096).ends_with("`b11` and 4084 others"));
+    }
+
+    #[test]
+    fn every_name_is_there_once() {
+        let names = ["a-b", "a-c", "a-b", "a-b"].map(str::to_owned);
+        assert_eq!(numbered(names.into_iter()), ["a-b", "a-c", "a-b-2", "a-b-3"]);
     }
 }

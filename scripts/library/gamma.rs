@@ -1,0 +1,40 @@
+//! A rule for gamma of one's own against the built-in ones: Chebyshev's steps, which wear down all modes of a spectrum in turn.
+//!
+//! ```text
+//! cargo run --release --example gamma
+//! ```
+
+use std::f64::consts::PI;
+use std::path::Path;
+use winkler::api::{Gamma, GammaRule, Here, MethodName, MethodSpec, Result, Ritz, Session, Unbounded, solve};
+
+/// Steps after which the rule begins anew.
+const CYCLE: usize = 4;
+
+/// 1/gamma runs through the roots of Chebyshev's polynomial on the estimated bounds of G^-1 F1''.
+struct Chebyshev;
+
+impl GammaRule for Chebyshev {
+    fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded> {
+        let Some((low, high)) = ritz.known() else { return Ok(0.6) };
+        let angle = PI * ((here.k % CYCLE) as f64 + 0.5) / CYCLE as f64;
+        Ok(2.0 / (high + low + (high - low) * angle.cos()))
+    }
+}
+
+fn main() -> Result<()> {
+    let session = Session::start(&[])?;
+    let overrides = ["mesh.set.n=16", "method.stop={residual=1e-9}", "solver=condensed"].map(str::to_owned);
+    for gamma in
+        [Gamma::Stationary(0.6), Gamma::Own("chebyshev".to_owned()), Gamma::Aitken, Gamma::Spectral, Gamma::LineSearch]
+    {
+        let mut scene = winkler::scene::load(Path::new("meshes/groove/scene.toml"), &overrides)?;
+        scene.method = MethodSpec { gamma, stop: scene.method.stop.clone(), ..MethodSpec::new(MethodName::Robin) };
+        let name = format!("{:?}", scene.method.gamma);
+        let solution = solve(&session, scene.rule("chebyshev", || Chebyshev))?;
+        let report = solution.report();
+        let peak = solution.contact(0).pressure.into_iter().fold(0.0, f64::max);
+        println!("{name:20} {} in {:3} sweeps, peak pressure {peak:.6}", report.status, report.sweeps);
+    }
+    Ok(())
+}

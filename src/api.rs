@@ -1,0 +1,164 @@
+//! The library: a scene built in Rust, solved, and read as arrays. The command line goes the same way ([`run`]).
+//!
+//! Lengths and stresses are in any units that fit each other; forces are in stress times length squared, in the plane for a
+//! thickness of one length. Points and vectors have three components, z = 0 in the plane. docs/library.md has more examples.
+//!
+//! Two squares of side 1 with E = 100 and nu = 0, pressed together by p = 1 through a layer p = 50 c: each becomes 1/100 shorter, and
+//! the layer 1/50 thinner.
+//!
+//! ```
+//! use winkler::api::{BodySpec, ContactSpec, LayerSpec, MeshArrays, Scene, Session, solve};
+//!
+//! let square = |y: f64| [[0.0, y, 0.0], [1.0, y, 0.0], [1.0, y + 1.0, 0.0], [0.0, y + 1.0, 0.0]];
+//! let mesh = MeshArrays::new([square(0.0), square(1.0)].concat())
+//!     .group("lower", 2, vec![0, 1, 2, 0, 2, 3])
+//!     .group("upper", 2, vec![4, 5, 6, 4, 6, 7])
+//!     .group("base", 1, vec![0, 1])
+//!     .group("below", 1, vec![3, 2])
+//!     .group("above", 1, vec![4, 5])
+//!     .group("top", 1, vec![6, 7]);
+//! let scene = Scene::new(2, mesh)
+//!     .body(BodySpec::new("lower", 100.0, 0.0).fix("base", [Some(0.0), Some(0.0)]))
+//!     .body(BodySpec::new("upper", 100.0, 0.0).fix("top", [Some(0.0), None]).pressure("top", 1.0))
+//!     .contact(ContactSpec::new("below", "above", LayerSpec::linear(50.0)));
+//!
+//! let session = Session::start(&[])?;
+//! let solution = solve(&session, scene)?;
+//! assert!(solution.is_converged());
+//! assert!(solution.contact(0).pressure.iter().all(|p| (p - 1.0).abs() < 1e-8));
+//! let upper = solution.body(1).expect("one rank has all bodies")?;
+//! let sunk = 0.01 + 0.02 + 0.01;
+//! for (u, x) in upper.displacement.iter().zip(&upper.points) {
+//!     assert!(x[1] < 2.0 || (u[1] + sunk).abs() < 1e-8);
+//! }
+//! # Ok::<(), winkler::api::Error>(())
+//! ```
+
+pub use crate::contact::law::{LayerLaw, PerPoint, Response};
+pub use crate::ddm::acceleration::Here;
+pub use crate::ddm::gamma::GammaRule;
+pub use crate::ddm::line::Unbounded;
+pub use crate::ddm::ritz::Ritz;
+pub use crate::ddm::{Observer, Row, Silent, Status};
+pub use crate::error::{Error, Kind, Result};
+pub use crate::expression::Field;
+pub use crate::output::{BodyField, ContactTable, PairReport, Report};
+pub use crate::petsc::Session;
+pub use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Support};
+pub use crate::problem::contact::{AutoContact, ContactSpec, Overlap};
+pub use crate::problem::elasticity::{Constants, ElasticitySpec, Plane};
+pub use crate::problem::history::History;
+pub use crate::problem::layer::LayerSpec;
+pub use crate::problem::mesh::{GroupArrays, MeshArrays, MeshSource};
+pub use crate::problem::method::{Gamma, Linear, MethodName, MethodSpec, Start};
+pub use crate::problem::order::Order;
+pub use crate::problem::robin::{RobinRule, Zone};
+pub use crate::problem::solver::{Preset, SolverSpec};
+pub use crate::problem::stop::StopRule;
+pub use crate::run::keep::Keep;
+pub use crate::scene::Scene;
+
+use crate::estimate::Estimate;
+use crate::interrupt::Interrupt;
+use crate::run::clock::Clock;
+use crate::run::results::{self, All};
+use crate::run::stages::{Begin, Done};
+use crate::run::{self, report};
+
+/// What a run found.
+pub struct Solution {
+    done: Done,
+    recovered: All,
+    estimate: Option<Estimate>,
+    report: Report,
+}
+
+/// Solves a scene, built here or [loaded](crate::scene::load) from a file. Not converging is no error: see [`Solution::status`]. With
+/// several ranks all of them call it, with the same scene.
+///
+/// # Errors
+/// Refusals of scene, mesh, laws and PETSc options, and failures of PETSc; with several ranks one of them has the words.
+pub fn solve(session: &Session, scene: Scene) -> Result<Solution> {
+    solve_with(session, scene, &mut Silent)
+}
+
+/// [`solve`], with rows of the history shown to an observer while it runs.
+///
+/// # Errors
+/// Those of [`solve`].
+pub fn solve_with(session: &Session, scene: Scene, keep: &mut dyn Keep) -> Result<Solution> {
+    scene.check()?;
+    let (interrupt, mut clock) = (Interrupt::default(), Clock::default());
+    let built = run::build(session, scene, &interrupt, &mut clock)?;
+    let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
+    let mut done = run::iterate(ready, &interrupt, keep, &mut clock)?;
+    let estimate = run::estimate(&mut done, &mut clock)?;
+    let recovered = results::recover(&done);
+    let mut report = report::report(session, &done, &recovered, &clock);
+    report.discretization_error = estimate.as_ref().map(report::discretization_error);
+    Ok(Solution { done, recovered, estimate, report })
+}
+
+impl Solution {
+    /// How the run ended.
+    pub fn status(&self) -> &Status {
+        &self.done.outcome.status
+    }
+
+    /// Whether what was asked for is reached, or all that double numbers allow.
+    pub fn is_converged(&self) -> bool {
+        report::exit_code(&self.done) == 0
+    }
+
+    /// Counters, forces, approaches, largest stresses, times, warnings and settings: what `report.json` has.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// One row an iterate.
+    pub fn history(&self) -> &[Row] {
+        &self.done.outcome.rows
+    }
+
+    /// Number of pairs of contact surfaces: those of the scene in its order, then those that were found.
+    pub fn pairs(&self) -> usize {
+        self.done.model().pairs.len()
+    }
+
+    /// Places, gaps, compressions, pressures and normal displacements at the contact points of a pair below [`Solution::pairs`], on
+    /// every rank.
+    ///
+    /// # Panics
+    /// When there is no such pair.
+    pub fn contact(&self, pair: usize) -> ContactTable {
+        report::contact_table(&self.done, self.estimate.as_ref(), pair)
+    }
+
+    /// Displacements and stresses at the nodes of a body, in the order of the scene; none on ranks that do not speak for it.
+    ///
+    /// # Errors
+    /// The failure of a solver that should have found the interior of the body.
+    ///
+    /// # Panics
+    /// When there is no such body.
+    pub fn body(&self, body: usize) -> Option<Result<&BodyField>> {
+        let info = &self.done.built.discrete.bodies[body];
+        match self.recovered[body].as_ref()? {
+            Ok(recovered) => Some(Ok(recovered.field(info))),
+            Err(error) => Some(Err(Error::new(error.kind(), error.message()))),
+        }
+    }
+
+    /// The number of each node of a body among the points of the mesh: of [`MeshArrays::points`], or of the points in a file that a
+    /// group uses.
+    ///
+    /// # Panics
+    /// When there is no such body.
+    pub fn points(&self, body: usize) -> &[u32] {
+        &self.done.built.discrete.bodies[body].points
+    }
+}
+
+#[cfg(doctest)]
+#[doc = include_str!("../docs/library.md")]
+struct Page;

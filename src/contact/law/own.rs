@@ -1,0 +1,131 @@
+//! Laws that a Rust program brings.
+
+use super::{LayerLaw, Response};
+use crate::error::{Error, Kind, Result, shown};
+use crate::problem::own::Own;
+use std::rc::Rc;
+
+/// Laws of a Rust program by name: each makes the law of a pair from its contact points.
+pub type OwnLaws = Own<dyn Fn(&[[f64; 3]]) -> Box<dyn LayerLaw>>;
+
+/// Compressions to look at in a factor of ten.
+const STEPS: i32 = 8;
+/// How many factors of ten below the extent of the surfaces.
+const DECADES: i32 = 9;
+/// Pressures beyond this only come up in trial states.
+const HUGE: f64 = 1e60;
+/// Share of a compression over which a tangent is compared with a difference. With p ~ c^n the difference is off by n^2/6 of its square,
+/// and by 1e-16 over it of rounding.
+const CLOSE: f64 = 1e-4;
+/// What a tangent may be off: n up to 700, where e^c ends.
+const OFF: f64 = 1e-3;
+/// Rounding of an energy, as a share of the largest: formulas may lose digits where it is small.
+const ROUNDING: f64 = 1e-10;
+
+/// The law of a name at contact points, checked at the first of them for compressions up to `size`, the extent of the surfaces.
+///
+/// # Errors
+/// A name that is not there, and what is no law.
+pub(super) fn make(laws: &OwnLaws, name: &str, position: &[[f64; 3]], size: f64) -> Result<Rc<dyn LayerLaw>> {
+    let law = laws.get("law of a layer", name)?(position);
+    let refuse = |what| Error::new(Kind::Scene, format!("`{name}` is no law of a layer: {what}"));
+    check(&*law, size).map_err(refuse)?;
+    Ok(law.into())
+}
+
+/// Whether p(c) increases from 0, its tangent is its derivative where the law is smooth, and the energy its integral; in words what is
+/// wrong. A law may end, by values that are not finite: there is a rigid stop.
+fn check(law: &dyn LayerLaw, size: f64) -> Result<(), String> {
+    let mut seen: Vec<(f64, Response)> = vec![(0.0, Response::default())];
+    for step in 0..=DECADES * STEPS {
+        let c = size * 10f64.powf(f64::from(step) / f64::from(STEPS) - f64::from(DECADES));
+        let here = law.compressed(0, c);
+        if step > 0 && (here.pressure.is_nan() || here.pressure >= HUGE) {
+            break;
+        }
+        seen.push((c, here));
+    }
+    let rounding = ROUNDING * seen[seen.len() - 1].1.energy.abs();
+    let (mut kinks, mut off) = (0, String::new());
+    for two in seen.windows(2) {
+        let [(before, last), (c, here)] = [two[0], two[1]];
+        if !(here.pressure > last.pressure && here.pressure.is_finite()) {
+            return Err(format!("p is {} at c = {c:.3e} and {} before", shown(here.pressure), shown(last.pressure)));
+        }
+        if !(here.tangent >= 0.0 && here.tangent.is_finite()) {
+            return Err(format!("p' is {} at c = {c:.3e}", shown(here.tangent)));
+        }
+        // p increases, so that its integral lies between two rectangles
+        let (work, width) = (here.energy - last.energy, c - before);
+        if !(work >= width * last.pressure - rounding && work <= width * here.pressure + rounding) {
+            return Err(format!("the energy is not the integral of p at c = {c:.3e}"));
+        }
+        let [low, high] = [-CLOSE, CLOSE].map(|share| law.pressure(0, c * (1.0 + share)));
+        let slope = (high - low) / (2.0 * CLOSE * c);
+        let fits = (slope - here.tangent).abs() <= OFF * slope.max(here.tangent);
+        if !fits {
+            kinks += 1;
+            off = format!("p' is {:.3e} at c = {c:.3e}, where differences of p give {slope:.3e}", here.tangent);
+        }
+    }
+    // a law may have kinks, but not everywhere
+    if 2 * kinks > seen.len() { Err(off) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::law::{Cubic, Exponential, Power, Table};
+
+    /// p = c^2 with mistakes.
+    #[derive(Debug, Default)]
+    struct Wrong {
+        pressure: f64,
+        tangent: f64,
+        energy: f64,
+        end: f64,
+    }
+
+    impl LayerLaw for Wrong {
+        fn compressed(&self, _point: usize, c: f64) -> Response {
+            let Wrong { pressure: cubic, tangent, energy, end } = *self;
+            let pressure = if end > 0.0 && c > end { f64::INFINITY } else { c * c * (1.0 - cubic * c) };
+            let tangent = (2.0 * c - 3.0 * cubic * c * c) * (1.0 + tangent);
+            Response { pressure, tangent, energy: c * c * c * (1.0 / 3.0 - cubic * c / 4.0) * (1.0 + energy) }
+        }
+    }
+
+    #[test]
+    fn laws_pass() {
+        let table = Table::new(&[[0.1, 1.0], [0.2, 1.5], [0.5, 30.0]]);
+        let laws: [Box<dyn LayerLaw>; 6] = [
+            Box::new(Power::new(2.5e-5, 0.2)),
+            Box::new(Exponential::new(1e-3, 2e-3)),
+            Box::new(Cubic { k1: 1.0, k3: 1e9 }),
+            Box::new(table),
+            Box::new(Wrong::default()),
+            Box::new(Wrong { end: 1e-2, ..Wrong::default() }),
+        ];
+        for law in laws {
+            assert_eq!(check(&*law, 1.0), Ok(()), "{law:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_law_is_refused() {
+        for (law, words) in [
+            (Wrong { pressure: 2.0, ..Wrong::default() }, "before"),
+            (Wrong { tangent: 0.01, ..Wrong::default() }, "where differences of p give"),
+            (Wrong { tangent: -2.0, ..Wrong::default() }, "p' is -2e-9"),
+            (Wrong { energy: 0.6, ..Wrong::default() }, "the energy is not the integral"),
+            (Wrong { end: 1e-20, ..Wrong::default() }, "p is inf at c = 1.000e-9"),
+        ] {
+            let said = check(&law, 1.0).expect_err(words);
+            assert!(said.contains(words), "{said}");
+        }
+        let mut laws = OwnLaws::default();
+        laws.insert("film", Rc::new(|_| Box::new(Wrong::default())));
+        let error = make(&laws, "flim", &[[0.0; 3]], 1.0).expect_err("a slip");
+        assert!(error.to_string().contains("did you mean `film`?"), "{error}");
+    }
+}

@@ -1,0 +1,48 @@
+//! What a Rust program adds to a scene by name: laws of layers, rules for gamma.
+
+use crate::error::{Error, Kind, Result, nearest};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::rc::Rc;
+
+/// Things of a Rust program by name.
+pub struct Own<T: ?Sized>(BTreeMap<String, Rc<T>>);
+
+impl<T: ?Sized> Own<T> {
+    /// Adds one, or replaces the one of this name.
+    pub fn insert(&mut self, name: &str, own: Rc<T>) {
+        self.0.insert(name.to_owned(), own);
+    }
+
+    /// The one of a name; `what` says what it is in the message.
+    ///
+    /// # Errors
+    /// A name that is not there.
+    pub fn get(&self, what: &str, name: &str) -> Result<&T> {
+        self.0.get(name).map(|own| &**own).ok_or_else(|| {
+            let error = Error::new(Kind::Scene, format!("no {what} is called `{name}`"));
+            match nearest(name, self.0.keys().map(String::as_str)) {
+                Some(near) => error.help(format!("did you mean `{near}`?")),
+                None => error.help(format!("give the scene a {what} of this name")),
+            }
+        })
+    }
+}
+
+impl<T: ?Sized> Default for Own<T> {
+    fn default() -> Self {
+        Self(BTreeMap::new())
+    }
+}
+
+impl<T: ?Sized> Clone for Own<T> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<T: ?Sized> fmt::Debug for Own<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(self.0.keys()).finish()
+    }
+}

@@ -1,0 +1,21 @@
+//! A run: from a scene to what was found, for the library and for the command line. Its types are the [`stages`], each made from
+//! the one before by [`build`], [`set_up`], [`iterate`] and [`estimate`].
+
+pub mod asking;
+mod balance;
+pub mod clock;
+pub mod inner;
+pub mod keep;
+pub mod measure;
+pub mod method;
+mod phases;
+mod plan;
+pub mod preflight;
+pub mod report;
+pub mod results;
+pub mod stages;
+pub mod steps;
+pub mod verdict;
+pub mod words;
+
+pub use phases::{build, build_with, estimate, in_parts, iterate, set_up, targets};
