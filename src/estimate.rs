@@ -4,14 +4,16 @@
 //! the energy norm, and the part of the displacement that the elements cannot represent. The second one acts like a load
 //! on the discrete problem; its response is what nodal displacements and nodal pressures lack.
 
+mod layer;
 pub mod sizes;
 
 use crate::ddm::{Discretisation, linear};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
-use crate::linalg::Csr;
 use crate::model::field::residual;
+use crate::model::layer::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
+use layer::LayerError;
 use std::rc::Rc;
 
 /// Estimated errors of a discrete solution.
@@ -90,17 +92,9 @@ pub fn estimate(
         }
         model.exchange.sum(&mut compression);
         let range = model.range(index);
-        let between = between(points.interpolation, &layer.compression[range.clone()]);
-        let mut force = vec![0.0; points.weight.len()];
-        for g in 0..force.len() {
-            let at = |c: f64| pair.law.response(points.nearest[g], c).pressure;
-            let off = compression[g] - points.gap[g] - between[g];
-            let rise = at(between[g] + off) - at(between[g]);
-            // within an element the bodies give way to what the layer presses
-            let share = if off == 0.0 { 1.0 } else { 1.0 / (1.0 + points.compliance[g] * rise / off) };
-            layers[index] += points.weight[g] * share * rise * off;
-            force[g] = -points.weight[g] * (at(between[g]) + share * rise);
-        }
+        let of_layer = LayerError::new(pair, &points, layer, range.clone(), &compression);
+        layers[index] = of_layer.energy;
+        let force: Vec<f64> = of_layer.pressure.iter().zip(points.weight).map(|(p, weight)| -weight * p).collect();
         for side in 0..2 {
             let body = pair.bodies[side];
             if let Some(recovered) = &recovered[body] {
@@ -144,32 +138,13 @@ pub fn estimate(
     })
 }
 
-/// Compressions between the contact points, from those at the points. Where some of these are open, a curve through all of them
-/// may rise above all of them, more so the faster the gap grows: no pressure is made of that.
-fn between(interpolation: &Csr, compression: &[f64]) -> Vec<f64> {
-    let mut between = vec![0.0; interpolation.rows()];
-    interpolation.multiply(compression, &mut between);
-    for (g, value) in between.iter_mut().enumerate() {
-        let of_points = || interpolation.row(g).map(|(q, _)| compression[q]);
-        if of_points().any(|c| c < 0.0) {
-            *value = value.min(of_points().fold(f64::NEG_INFINITY, f64::max));
-        }
-    }
-    between
-}
-
-/// What the pressures lack where the compression lacks what the nodal errors close.
+/// What the pressures lack where the compression lacks what the nodal errors close. The response is that of springs at the points that
+/// are closed, so a point that opens or closes takes the place where its law meets the state that the response leaves it, as in a step of
+/// Newton's method: bodies give way to what a point presses, however stiff its layer.
 fn pressure_errors(model: &Model, layer: &Layer, nodal: &Field) -> Vec<f64> {
-    let closing = nodal.closing();
-    let mut errors = Vec::with_capacity(closing.len());
-    for (index, pair) in model.pairs.iter().enumerate() {
-        let range = model.range(index);
-        let of_point = |i: usize| {
-            pair.law.response(i - range.start, layer.compression[i] + closing[i]).pressure - layer.pressure[i]
-        };
-        errors.extend(range.clone().map(of_point));
-    }
-    errors
+    let compression: Vec<f64> = layer.compression.iter().zip(nodal.closing()).map(|(c, more)| c + more).collect();
+    let met = Layer::meet(model, &compression, &layer.linear(&compression), &meeting_slopes(model));
+    met.pressure.iter().zip(&layer.pressure).map(|(exact, found)| exact - found).collect()
 }
 
 /// Relative errors of the pressures of each pair.

@@ -1,6 +1,7 @@
 //! The integration points of a pair one by one, for an estimate of the error: there the compression of the layer and the gap
 //! are those of the points themselves, not means around the nodes.
 
+use super::basis::PressureBasis;
 use super::pair::ContactPair;
 use super::pieces::{Common, Shared};
 use super::side::{Side, length, unit};
@@ -24,6 +25,9 @@ pub struct Fine<const D: usize> {
     pub nearest: Vec<usize>,
     /// Values at the contact points -> values at the integration points, by the shape functions of side a.
     pub interpolation: Csr,
+    /// Values at the contact points -> what the functions of the points make of them at the integration points: the pressure that
+    /// the discrete problem has there.
+    pub pressing: Csr,
     /// Where the points lie on each side.
     pub sides: [FineSide<D>; 2],
 }
@@ -62,27 +66,37 @@ impl<const D: usize> Fine<D> {
             normal: Vec::new(),
             nearest: Vec::new(),
             interpolation: Csr::new(pair.len()),
+            pressing: Csr::new(pair.len()),
             sides: [side(a, |p| p.facet_a, |p| p.at_a), side(b, |p| p.facet_b, |p| p.at_b)],
         };
-        for point in shared {
-            let nodes = a.facets.facet(point.facet_a);
-            let normal = unit(std::array::from_fn(|c| (0..D).map(|k| point.at_a[k] * a.normals[&nodes[k]][c]).sum()));
-            let x = a.facets.coordinates(point.facet_a, a.space);
-            let from = crate::fem::assemble::interpolate(&x, &element::values(a.facets.order, &point.at_a));
-            let rounding = 1e-12 * length(a.area(point.facet_a));
-            let distance = if point.gap.abs() < rounding { 0.0 } else { point.gap };
-            fine.gap.push(distance + gap(super::pad(from)));
-            fine.size.push(length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
-            fine.normal.push(normal);
-            let carriers = pair.cover[point.facet_a].carriers;
-            let shape = carriers.map(|c| c.interpolation(a.facets.order, &point.at_a)).unwrap_or_default();
-            let of_point = |(node, shape): (&u32, f64)| point_of.get(node).map(|&q| (q, shape));
-            let mut row: Vec<(usize, f64)> =
-                nodes.iter().zip(shape).filter(|(_, shape)| *shape != 0.0).filter_map(of_point).collect();
-            row.sort_unstable_by_key(|entry| entry.0);
-            let nearest = row.iter().max_by(|p, q| p.1.total_cmp(&q.1));
-            fine.nearest.push(nearest.map_or(0, |entry| entry.0));
-            fine.interpolation.push_row(row);
+        for chunk in shared.chunk_by(|p, q| p.facet_a == q.facet_a) {
+            let nodes = a.facets.facet(chunk[0].facet_a);
+            let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk);
+            for point in chunk {
+                let normal =
+                    unit(std::array::from_fn(|c| (0..D).map(|k| point.at_a[k] * a.normals[&nodes[k]][c]).sum()));
+                let x = a.facets.coordinates(point.facet_a, a.space);
+                let from = crate::fem::assemble::interpolate(&x, &element::values(a.facets.order, &point.at_a));
+                let rounding = 1e-12 * length(a.area(point.facet_a));
+                let distance = if point.gap.abs() < rounding { 0.0 } else { point.gap };
+                fine.gap.push(distance + gap(super::pad(from)));
+                fine.size.push(length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
+                fine.normal.push(normal);
+                let row = |values: [f64; element::MOST]| {
+                    let of_point = |(node, value): (&u32, f64)| point_of.get(node).map(|&q| (q, value));
+                    let entries = nodes.iter().zip(values).filter(|(_, value)| *value != 0.0).filter_map(of_point);
+                    let mut row: Vec<(usize, f64)> = entries.collect();
+                    row.sort_unstable_by_key(|entry| entry.0);
+                    row
+                };
+                let phi = element::values(a.facets.order, &point.at_a);
+                let mu = |i| if i < nodes.len() { basis.value(i, &phi, &point.at_a) } else { 0.0 };
+                fine.pressing.push_row(row(std::array::from_fn(mu)));
+                let row = row(basis.carriers().interpolation(a.facets.order, &point.at_a));
+                let nearest = row.iter().max_by(|p, q| p.1.total_cmp(&q.1));
+                fine.nearest.push(nearest.map_or(0, |entry| entry.0));
+                fine.interpolation.push_row(row);
+            }
         }
         fine
     }

@@ -56,6 +56,8 @@ pub struct FinePoints<'a> {
     pub nearest: &'a [usize],
     /// Values at the contact points -> values at these.
     pub interpolation: &'a Csr,
+    /// Pressures at the contact points -> those that the discrete problem has at these.
+    pub pressing: &'a Csr,
 }
 
 /// A displacement of a body with what was recovered from it.
@@ -108,10 +110,10 @@ impl<const D: usize> Meshes for Kept<D> {
     }
 
     fn points(&self, pair: usize) -> FinePoints<'_> {
-        let Fine { weight, gap, size, bodies, nearest, interpolation, .. } = &self.fine[pair];
+        let Fine { weight, gap, size, bodies, nearest, interpolation, pressing, .. } = &self.fine[pair];
         let soft: f64 = bodies.iter().map(|&body| 1.0 / self.shapes[body].modulus).sum();
         let compliance = size.iter().map(|size| size * soft / std::f64::consts::PI).collect();
-        FinePoints { weight, gap, compliance, nearest, interpolation }
+        FinePoints { weight, gap, compliance, nearest, interpolation, pressing }
     }
 
     fn cells(&self, body: usize) -> Cells {

@@ -17,8 +17,8 @@ use super::quadrature;
 use super::space::Space;
 use crate::problem::order::Order;
 use bubble::Bubble;
-use patch::Patch;
-use std::collections::{BTreeSet, HashMap};
+use patch::{Monomials, Patch};
+use std::collections::HashMap;
 
 /// Stress (xx yy zz xy yz xz) in a cell at a point of a strain (xx yy zz, and 2 eps of xy yz xz).
 pub type Law<'a, const D: usize> = &'a dyn Fn(usize, [f64; D], &[f64; 6]) -> [f64; 6];
@@ -29,6 +29,8 @@ pub struct Recovery<'a, const D: usize> {
     displacement: &'a [f64],
     /// Polynomial of each vertex; `None` at mid-edge nodes.
     patches: Vec<Option<Patch<D>>>,
+    /// Those of the polynomials.
+    monomials: Monomials,
 }
 
 impl<'a, const D: usize> Recovery<'a, D> {
@@ -45,7 +47,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
     }
 
     fn on<const N: usize>(space: &'a Space<D>, u: &'a [f64]) -> Self {
-        let mut recovery = Self { space, displacement: u, patches: Vec::new() };
+        let degree = if space.order == Order::P1 { 2 } else { 3 };
+        let mut recovery = Self { space, displacement: u, patches: Vec::new(), monomials: Monomials::new(D, degree) };
         let mut around: Vec<Vec<u32>> = vec![Vec::new(); space.nodes.len()];
         let mut facets: HashMap<[u32; D], usize> = HashMap::new();
         for index in 0..space.cell_count() {
@@ -65,29 +68,39 @@ impl<'a, const D: usize> Recovery<'a, D> {
         for (key, _) in facets.into_iter().filter(|(_, cells)| *cells == 1) {
             key.iter().for_each(|&node| outer[node as usize] = true);
         }
-        let degree = if space.order == Order::P1 { 2 } else { 3 };
-        let patch = |node: usize| {
-            let mut cells: BTreeSet<u32> = around[node].iter().copied().collect();
+        let lower: Vec<Monomials> = (0..degree).rev().map(|degree| Monomials::new(D, degree)).collect();
+        let (mut cells, mut nodes) = (Marked::new(space.cell_count()), Marked::new(space.nodes.len()));
+        let mut patch = |node: usize| {
+            cells.clear();
+            around[node].iter().for_each(|&cell| cells.add(cell));
             let mut rings = if outer[node] { 2 } else { 1 };
             loop {
                 while rings > 1 {
-                    let ring: BTreeSet<u32> =
-                        cells.iter().flat_map(|&cell| &recovery.cell(cell as usize)[..N]).copied().collect();
-                    cells.extend(ring.iter().flat_map(|&other| &around[other as usize]));
+                    nodes.clear();
+                    cells
+                        .list
+                        .iter()
+                        .for_each(|&cell| recovery.cell(cell as usize)[..N].iter().for_each(|&n| nodes.add(n)));
+                    nodes
+                        .list
+                        .iter()
+                        .for_each(|&other| around[other as usize].iter().for_each(|&cell| cells.add(cell)));
                     rings -= 1;
                 }
-                let nodes = cells.iter().flat_map(|&cell| recovery.cell(cell as usize)).copied().collect();
-                let fitted = Patch::fit(space, u, space.nodes[node], &nodes, degree);
+                nodes.clear();
+                cells.list.iter().for_each(|&cell| recovery.cell(cell as usize).iter().for_each(|&n| nodes.add(n)));
+                let fit = |monomials| Patch::fit(space, u, space.nodes[node], &nodes.list, monomials);
+                let fitted = fit(&recovery.monomials);
                 // a body of few cells: what its nodes determine
-                if fitted.is_some() || cells.len() == space.cell_count() {
-                    let lower = || (0..degree).rev().find_map(|d| Patch::fit(space, u, space.nodes[node], &nodes, d));
-                    return fitted.or_else(lower);
+                if fitted.is_some() || cells.list.len() == space.cell_count() {
+                    return fitted.or_else(|| lower.iter().find_map(fit));
                 }
                 rings = 2;
             }
         };
         let patches = (0..space.nodes.len()).map(|node| if around[node].is_empty() { None } else { patch(node) });
-        recovery.patches = patches.collect();
+        let patches = patches.collect();
+        recovery.patches = patches;
         recovery
     }
 
@@ -98,11 +111,35 @@ impl<'a, const D: usize> Recovery<'a, D> {
         }
     }
 
+    /// The recovered gradient in a cell with these vertices, at barycentric coordinates and the point there.
+    fn blend<const N: usize>(&self, vertices: &'a [u32]) -> impl Fn(&[f64; N], &[f64; D]) -> Slope<D> + '_ {
+        // the gradient of a parabola is linear, and so are coordinates in linear elements
+        let is_linear = self.space.order == Order::P1 && !self.space.axisymmetric;
+        let corner = |node: u32| -> [Slope<D>; N] {
+            std::array::from_fn(|k| {
+                let at = &self.space.nodes[vertices[k] as usize];
+                Slope { h: self.patch(node).slope_of_parabola(&self.monomials, at), hoop: 0.0 }
+            })
+        };
+        let corners: Vec<[Slope<D>; N]> =
+            if is_linear { vertices.iter().map(|&node| corner(node)).collect() } else { Vec::new() };
+        move |l, at| {
+            let mut sum = Slope::ZERO;
+            for (k, &node) in vertices.iter().enumerate() {
+                if is_linear {
+                    (0..N).for_each(|m| sum.add(l[k] * l[m], &corners[k][m]));
+                } else {
+                    sum.add(l[k], &self.recovered(node, at));
+                }
+            }
+            sum
+        }
+    }
+
     /// Gradient of the polynomial of a vertex.
     fn recovered(&self, node: u32, at: &[f64; D]) -> Slope<D> {
-        let patch = self.patch(node);
-        let hoop = if self.space.axisymmetric { self.space.hoop(at, patch.value(at)[0]) } else { 0.0 };
-        Slope { h: patch.gradient(at), hoop }
+        let (value, h) = self.patch(node).jet(&self.monomials, at);
+        Slope { h, hoop: if self.space.axisymmetric { self.space.hoop(at, value[0]) } else { 0.0 } }
     }
 
     /// Squared energy norm of the difference of recovered and discrete stress on each cell.
@@ -117,16 +154,14 @@ impl<'a, const D: usize> Recovery<'a, D> {
         let rule = quadrature::simplex::<N>(5);
         let of_cell = |index: usize| {
             let (cell, x) = (self.cell(index), self.space.cell_nodes(index));
+            let blend = self.blend::<N>(&cell[..N]);
             let mut sum = 0.0;
             for (l, weight) in rule.points.iter().zip(&rule.weights) {
                 let Some((gradient, measure)) = element::gradients::<D, N>(self.space.order, &x, l) else { continue };
                 let phi = element::values(self.space.order, l);
                 let at = interpolate(&x, &phi);
-                let mut difference = Slope::ZERO;
+                let mut difference = blend(l, &at);
                 difference.add(-1.0, &self.space.slope(cell, &at, &phi, &gradient, self.displacement));
-                for (l, &node) in l.iter().zip(cell) {
-                    difference.add(*l, &self.recovered(node, &at));
-                }
                 let strain = difference.strain();
                 let density: f64 = law(index, at, &strain).iter().zip(strain).map(|(s, e)| s * e).sum();
                 sum += weight * measure * self.space.circle(&at) * density;
@@ -148,7 +183,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
     }
 
     fn interpolation_residual_on<const N: usize>(&self, law: Law<D>) -> Vec<f64> {
-        let rule = quadrature::simplex::<N>(5);
+        // a bubble has one degree more than the elements, and both factors are gradients
+        let rule = quadrature::simplex::<N>(if self.space.order == Order::P1 { 2 } else { 5 });
         let mut residual = vec![0.0; self.space.dofs()];
         let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
         for index in 0..self.space.cell_count() {
@@ -241,5 +277,27 @@ impl<'a, const D: usize> Recovery<'a, D> {
                 (bubble, c)
             })
             .collect()
+    }
+}
+
+/// Numbers without repetition, in the order in which they came.
+struct Marked {
+    list: Vec<u32>,
+    is_in: Vec<bool>,
+}
+
+impl Marked {
+    fn new(count: usize) -> Self {
+        Self { list: Vec::new(), is_in: vec![false; count] }
+    }
+
+    fn add(&mut self, number: u32) {
+        if !std::mem::replace(&mut self.is_in[number as usize], true) {
+            self.list.push(number);
+        }
+    }
+
+    fn clear(&mut self) {
+        self.list.drain(..).for_each(|number| self.is_in[number as usize] = false);
     }
 }

@@ -1,6 +1,8 @@
 //! Runs the program as a user does, in a folder of its own, and reads what it wrote.
 #![allow(dead_code)] // every test program uses its own part of this
 
+pub mod series;
+
 use serde_json::Value;
 use std::fs::{self, File};
 use std::ops::Index;

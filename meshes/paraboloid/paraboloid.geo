@@ -1,0 +1,30 @@
+// Two cubes on each other with nothing shared, tetrahedra graded from two numbers: the radius `a` of the contact around the corner
+// x = y = 0, and the size `h` of elements where it ends. Inside they may be 1.25 h, and they grow with the distance from both.
+SetFactory("OpenCASCADE");
+DefineConstant[ a = {0.2455, Name "a"} ];       // radius of the contact; near it for other layers and loads
+DefineConstant[ h = {0.024, Name "h"} ];        // size of elements where contact ends
+DefineConstant[ L = {0.5, Name "L"} ];          // side of the cubes
+
+inside = 1.25*h; // size on the contact
+growth = 0.35;   // of the size with the distance
+
+Box(1) = {0, 0, -L, L, L, L};
+Box(2) = {0, 0, 0, L, L, L};
+
+Field[1] = MathEval;
+Field[1].F = Sprintf("min(%g, min(%g + %g*sqrt(max(sqrt(x^2 + y^2) - %g, 0)^2 + z^2), %g + %g*sqrt((sqrt(x^2 + y^2) - %g)^2 + z^2)))",
+  L, inside, growth, a, h, growth, a);
+Background Field = 1;
+Mesh.MeshSizeExtendFromBoundary = 0;
+Mesh.MeshSizeFromPoints = 0;
+
+Physical Volume("lower") = {1};
+Physical Surface("lower_x") = {1, 2};
+Physical Surface("lower_y") = {3, 4};
+Physical Surface("lower_bottom") = {5};
+Physical Surface("lower_top") = {6};
+Physical Volume("upper") = {2};
+Physical Surface("upper_x") = {7, 8};
+Physical Surface("upper_y") = {9, 10};
+Physical Surface("upper_bottom") = {11};
+Physical Surface("upper_top") = {12};
