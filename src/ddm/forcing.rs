@@ -13,10 +13,6 @@ use std::collections::VecDeque;
 /// grooves, a flange and rollers, 3 and all of it took the fewest iterations among those that needed no more steps than exact ones.
 const DELAY: usize = 3;
 
-/// Error of a step, as a share of it, above which it is not taken: Newton's method converges with any share below one, and the worse the
-/// larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982). Pressures cannot settle where no contact is known yet.
-const MOST: f64 = 0.5;
-
 /// When a linear step ends.
 pub(super) struct Forcing<'a> {
     places: &'a Layer,
@@ -25,6 +21,8 @@ pub(super) struct Forcing<'a> {
     /// Relative error that ends the run, and what it refers to.
     tolerance: Option<f64>,
     scale: &'a Scale,
+    /// Error of the step, as a share of it, above which it does not end.
+    roughest: f64,
     /// Compressions before the step, n.
     before: Vec<f64>,
     /// Pressures of the last iterations, n each.
@@ -32,9 +30,17 @@ pub(super) struct Forcing<'a> {
 }
 
 impl<'a> Forcing<'a> {
-    /// For the step from places and compressions (n).
-    pub fn new(places: &'a Layer, before: Vec<f64>, rho: &'a [f64], tolerance: Option<f64>, scale: &'a Scale) -> Self {
-        Self { places, rho, tolerance, scale, pressures: VecDeque::from([places.linear(&before)]), before }
+    /// For the step from places and compressions (n) in a run that ends at a tolerance, by a solver with this
+    /// [`roughest`](crate::model::linear::LinearStep::roughest) step.
+    pub fn new(
+        places: &'a Layer,
+        before: Vec<f64>,
+        rho: &'a [f64],
+        stop: (Option<f64>, &'a Scale),
+        roughest: f64,
+    ) -> Self {
+        let (tolerance, scale) = stop;
+        Self { places, rho, tolerance, scale, roughest, pressures: VecDeque::from([places.linear(&before)]), before }
     }
 
     /// Whether a step is solved well enough: the pressures have settled beside their distance from the laws, or beside the error by which
@@ -57,7 +63,7 @@ impl<'a> Forcing<'a> {
                 && self.scale.imbalance(model, &model.forces(&p)) <= tolerance
         };
         let settled = moved < apart || self.tolerance.is_some_and(ends);
-        let enough = trial.is_within(if settled { MOST } else { f64::EPSILON.sqrt() });
+        let enough = trial.is_within(if settled { self.roughest } else { f64::EPSILON.sqrt() });
         if self.pressures.len() == DELAY {
             self.pressures.pop_front();
         }
@@ -78,7 +84,7 @@ mod tests {
         let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
         let (rho, scale) = ([2.0, 0.5, 0.25, 3.0], Scale::default());
         let asked = |closings: &[[f64; 4]], tolerance: Option<f64>, error: f64| -> Vec<bool> {
-            let mut forcing = Forcing::new(&places, places.compression.clone(), &rho, tolerance, &scale);
+            let mut forcing = Forcing::new(&places, places.compression.clone(), &rho, (tolerance, &scale), 0.5);
             let trial = |closing| Trial { closing, energy: 1.0, error };
             closings.iter().map(|closing| forcing.is_enough(&model, &trial(closing))).collect()
         };

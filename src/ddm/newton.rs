@@ -36,7 +36,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
         let (r, _) = residual(run.model, &u, &force);
         let before = run.model.compression(&u.trace);
-        let mut forcing = Forcing::new(&places, before, &rho, run.stop.residual, &run.scale);
+        let mut forcing = Forcing::new(&places, before, &rho, (run.stop.residual, &run.scale), linear.roughest());
         let mut enough = |model: &Model, trial: &Trial| match exact {
             true => forcing.is_enough(model, trial),
             false => trial.is_within(CORRECTED),

@@ -25,7 +25,7 @@ const LEAST: f64 = 0.1;
 /// Iterations over which the gain of energy tells the error before them (Hestenes and Stiefel).
 const DELAY: usize = 4;
 
-/// Precision of iterative solves of bodies as preconditioner.
+/// Precision of iterative solves of bodies as preconditioner, and of a step.
 const ROUGH: f64 = 1e-2;
 
 /// Solves linear steps by sweeps.
@@ -78,6 +78,11 @@ impl LinearStep for Sweeps {
                 false => Ok(found.solution),
             }
         }))
+    }
+
+    /// The error of a young iteration that stands still is larger than it seems.
+    fn roughest(&self) -> f64 {
+        ROUGH
     }
 
     fn sweeps(&self) -> usize {

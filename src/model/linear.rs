@@ -89,6 +89,12 @@ pub trait LinearStep {
     /// Failures of the solver library; a solver that does not reach its tolerance is told in [`Solved`].
     fn solve(&mut self, system: System) -> Result<Solved>;
 
+    /// Error of a step, as a share of it, above which it is not taken. Newton's method converges with any share below one, and the worse the
+    /// larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).
+    fn roughest(&self) -> f64 {
+        0.5
+    }
+
     /// What was done so far with all bodies together, besides what bodies count themselves.
     fn counts(&self) -> BodyCounts {
         BodyCounts::default()
