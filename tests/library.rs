@@ -2,36 +2,11 @@
 
 mod common;
 
-use common::{WINKLER, case, output, root};
-use std::path::Path;
+use common::{case, example, output, root};
 use std::process::Command;
 use std::time::Duration;
 use winkler::api::*;
 use winkler::problem::contact::ANGLE;
-
-/// Builds and runs an example in the folder of the project; gives what it printed.
-fn example(name: &str) -> String {
-    let cargo = |words: &[&str]| {
-        let mut command = Command::new(env!("CARGO"));
-        command.args(words).args(["--locked", "--quiet", "--example", name]).current_dir(root());
-        if !cfg!(debug_assertions) {
-            command.arg("--release");
-        }
-        command
-    };
-    let built = output(cargo(&["build"]), Duration::from_secs(600));
-    assert!(built.0.success(), "{name} is not built\n{}", built.2);
-    let file = Path::new(WINKLER).parent().expect("a folder").join("examples").join(name);
-    let mut command = Command::new(file);
-    command.current_dir(root());
-    // launchers that start at the same moment get into each other's way in a common folder
-    let scratch = tempfile::tempdir().expect("a folder");
-    command.env("OMPI_MCA_orte_tmpdir_base", scratch.path());
-    common::environment(&mut command);
-    let (status, said, complaint) = output(command, Duration::from_secs(60));
-    assert!(status.success(), "{name} ended with {status}\n{said}{complaint}");
-    said
-}
 
 /// The numbers in a line, signs and exponents included.
 fn numbers(line: &str) -> Vec<f64> {
@@ -41,7 +16,7 @@ fn numbers(line: &str) -> Vec<f64> {
 /// The scene in Rust is that of the file, solved to the same digits.
 #[test]
 fn the_groove_built_in_rust_is_that_of_the_file() {
-    let said = example("gmsh");
+    let said = example("gmsh", &[]);
     let run = common::solve(case("groove"), &["--set", "mesh.set.n=16", "--set", "method={}"]).converged();
     let mut lines = said.lines();
     let head = numbers(lines.next().expect("a line"));
@@ -60,7 +35,7 @@ fn the_groove_built_in_rust_is_that_of_the_file() {
 
 #[test]
 fn an_own_law_gives_the_closed_form() {
-    let said = example("law");
+    let said = example("law", &[]);
     let found = said.lines().flat_map(numbers).collect::<Vec<f64>>();
     let [computed, exact, off] = found[..] else { panic!("{said}") };
     assert!(said.starts_with("converged") && (computed - exact).abs() < 1e-9 && off < 1e-9, "{said}");
@@ -70,7 +45,7 @@ fn an_own_law_gives_the_closed_form() {
 /// All rules reach one solution, and Chebyshev's steps in fewer sweeps than the paper's gamma.
 #[test]
 fn an_own_rule_for_gamma_is_one_of_them() {
-    let said = example("gamma");
+    let said = example("gamma", &[]);
     let row = |line: &str| {
         assert!(line.contains(" converged in "), "{said}");
         let [sweeps, peak] = numbers(&line.replace("gamma", ""))[..] else { panic!("{line}") };

@@ -18,8 +18,8 @@ pub(super) struct Forcing<'a> {
     places: &'a Layer,
     /// Slopes on which places are met, n.
     rho: &'a [f64],
-    /// Relative error that ends the run, and what it refers to.
-    tolerance: Option<f64>,
+    /// Relative error that ends the run, or half the digits if none does, and what it refers to.
+    tolerance: f64,
     scale: &'a Scale,
     /// Error of the step, as a share of it, above which it does not end.
     roughest: f64,
@@ -39,7 +39,7 @@ impl<'a> Forcing<'a> {
         stop: (Option<f64>, &'a Scale),
         roughest: f64,
     ) -> Self {
-        let (tolerance, scale) = stop;
+        let (tolerance, scale) = (stop.0.unwrap_or(f64::EPSILON.sqrt()), stop.1);
         Self { places, rho, tolerance, scale, roughest, pressures: VecDeque::from([places.linear(&before)]), before }
     }
 
@@ -62,8 +62,8 @@ impl<'a> Forcing<'a> {
                 && trial.error <= 0.5 * tolerance * contact_energy(model, &met).sqrt()
                 && self.scale.imbalance(model, &model.forces(&p)) <= tolerance
         };
-        let settled = moved < apart || self.tolerance.is_some_and(ends);
-        let enough = trial.is_within(if settled { self.roughest } else { f64::EPSILON.sqrt() });
+        let settled = moved < apart || ends(self.tolerance);
+        let enough = trial.is_within(if settled { self.roughest } else { f64::EPSILON });
         if self.pressures.len() == DELAY {
             self.pressures.pop_front();
         }
@@ -102,6 +102,6 @@ mod tests {
         assert_eq!(asked(&[linear; 5], Some(0.01), 0.0049 * contact), [false, false, false, true, true]);
         assert_eq!(asked(&[linear; 5], Some(0.01), 0.0051 * contact), [false; 5]);
         // rounding
-        assert_eq!(asked(&[linear; 1], None, 1e-8), [true]);
+        assert_eq!(asked(&[linear; 1], None, 1e-16), [true]);
     }
 }

@@ -16,7 +16,8 @@ pub(super) struct Progress {
     rate: f64,
 }
 
-/// What the barrier falls to in a step, as in interior point methods.
+/// What the barrier falls to in a step: the usual 0.1 of barrier methods (Nocedal and Wright, Numerical Optimization, 2006, section 19.3). Where
+/// that is too fast it becomes its root.
 const RATE: f64 = 0.1;
 
 /// Steps in a row without progress before there is a barrier: contact that has just been found may take one.

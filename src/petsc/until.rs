@@ -23,12 +23,16 @@ pub struct Iterate<'a> {
 /// Asked after each iteration: whether that is enough.
 pub type Enough<'a> = dyn FnMut(&Iterate) -> bool + 'a;
 
-/// The test that a solver had, with its data and what destroys that.
+/// A test of PETSc.
 type Test =
     unsafe extern "C" fn(ffi::KSP, super::Int, f64, *mut ffi::KSPConvergedReason, *mut c_void) -> ffi::PetscErrorCode;
+
+/// What [`is_enough`] needs during a solve.
 struct Until<'a, 'b> {
     enough: &'a mut Enough<'b>,
+    /// Norm of the first residual.
     first: f64,
+    /// The test that the solver had, with its data.
     test: Option<Test>,
     data: *mut c_void,
 }
@@ -113,7 +117,7 @@ unsafe extern "C" fn is_enough(
         petsc!(VecGetLocalSize(vector, &mut rows))?;
         petsc!(VecGetArrayRead(vector, &mut array))
     })();
-    let Ok(()) = read else { return ffi::PetscErrorCode::from(ERROR) };
+    let Ok(()) = read else { return ERROR };
     // SAFETY: PETSc's array has that many entries here, and nobody writes to it before it is given back.
     let x = unsafe { std::slice::from_raw_parts(array, rows as usize) };
     let least = extreme(ksp).map(|extreme| extreme[0]).filter(|least| *least > 0.0);

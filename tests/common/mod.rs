@@ -20,6 +20,30 @@ fn patience() -> Duration {
     Duration::from_secs(seconds.unwrap_or(60))
 }
 
+/// Builds and runs an example in the folder of the project; gives what it printed.
+pub fn example(name: &str, args: &[&str]) -> String {
+    let cargo = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO"));
+        command.args(words).args(["--locked", "--quiet", "--example", name]).current_dir(root());
+        if !cfg!(debug_assertions) {
+            command.arg("--release");
+        }
+        command
+    };
+    let built = output(cargo(&["build"]), Duration::from_secs(600));
+    assert!(built.0.success(), "{name} is not built\n{}", built.2);
+    let file = Path::new(WINKLER).parent().expect("a folder").join("examples").join(name);
+    let mut command = Command::new(file);
+    command.args(args).current_dir(root());
+    // launchers that start at the same moment get into each other's way in a common folder
+    let scratch = tempfile::tempdir().expect("a folder");
+    command.env("OMPI_MCA_orte_tmpdir_base", scratch.path());
+    environment(&mut command);
+    let (status, said, complaint) = output(command, Duration::from_secs(60));
+    assert!(status.success(), "{name} ended with {status}\n{said}{complaint}");
+    said
+}
+
 /// What came of one run.
 pub struct Run {
     /// Exit code.

@@ -1,5 +1,6 @@
 //! Laws that a Rust program brings.
 
+use super::typed::HUGE;
 use super::{LayerLaw, Response};
 use crate::error::{Error, Kind, Result, shown};
 use crate::problem::own::Own;
@@ -12,14 +13,12 @@ pub type OwnLaws = Own<dyn Fn(&[[f64; 3]]) -> Box<dyn LayerLaw>>;
 const STEPS: i32 = 8;
 /// How many factors of ten below the extent of the surfaces.
 const DECADES: i32 = 9;
-/// Pressures beyond this only come up in trial states.
-const HUGE: f64 = 1e60;
 /// Share of a compression over which a tangent is compared with a difference. With p ~ c^n the difference is off by n^2/6 of its square,
 /// and by 1e-16 over it of rounding.
 const CLOSE: f64 = 1e-4;
 /// What a tangent may be off: n up to 700, where e^c ends.
 const OFF: f64 = 1e-3;
-/// Rounding of an energy, as a share of the largest: formulas may lose digits where it is small.
+/// Rounding of an energy, as a share of the largest: a formula is a difference of terms, each of which may be 1e6 times the energy.
 const ROUNDING: f64 = 1e-10;
 
 /// The law of a name at contact points, checked at the first of them for compressions up to `size`, the extent of the surfaces.

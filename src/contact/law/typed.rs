@@ -17,8 +17,9 @@ pub struct Typed {
     at_end: Response,
 }
 
-/// Pressures beyond this only come up in trial states; the law is a straight line from there.
-const HUGE: f64 = 1e60;
+/// Pressures beyond this only come up in trial states, and a law is a straight line from there: 1e60 is beyond every unit of stress, and five
+/// of them multiplied are a number.
+pub(super) const HUGE: f64 = 1e60;
 /// Compressions to look at in a factor of ten.
 const STEPS: i32 = 24;
 /// How many factors of ten.

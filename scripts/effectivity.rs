@@ -1,0 +1,105 @@
+//! Estimated over true errors of pressures in space, where contact ends inside a surface, as a Markdown table: that of docs/theory.md, in
+//! some minutes. `cargo run --release --example effectivity -- --quick`: the rows that the tests hold between 0.7 and 2.
+
+#[path = "../tests/common/series.rs"]
+mod series;
+
+use clap::Parser;
+use series::{Boxes, Series};
+use std::path::Path;
+use winkler::api::{ContactTable, Error, Kind, Result, Session, solve};
+use winkler::data::{Data, DataSpec};
+use winkler::scene::load;
+
+/// Estimated over true errors of pressures in space.
+#[derive(Parser)]
+struct Asked {
+    /// A few coarse meshes only
+    #[arg(long)]
+    quick: bool,
+}
+
+/// Pressures at contact points.
+type Exact<'a> = &'a dyn Fn(&ContactTable) -> Vec<f64>;
+
+/// Prints the row of one scene with values to replace.
+fn row(session: &Session, case: &str, order: usize, stiffness: f64, sets: &[String], exact: Exact) -> Result<()> {
+    let mut all: Vec<String> = (0..2).map(|body| format!("body.{body}.order={order}")).collect();
+    all.push(format!("contact.0.layer={{linear={{stiffness={stiffness:e}}}}}"));
+    all.extend_from_slice(sets);
+    let mut scene = load(&Path::new("meshes").join(case).join("scene.toml"), &all)?;
+    scene.estimate = true;
+    let solution = solve(session, scene)?;
+    let table = solution.contact(0);
+    let exact = exact(&table);
+    let sum = |value: &dyn Fn(usize) -> f64| (0..exact.len()).map(|q| table.weight[q] * value(q).powi(2)).sum::<f64>();
+    let error = (sum(&|q| table.pressure[q] - exact[q]) / sum(&|q| table.pressure[q])).sqrt();
+    let Some(estimate) = solution.report().discretization_error.as_ref().filter(|_| solution.is_converged()) else {
+        return Err(Error::new(Kind::Solver, format!("{case} was not solved")));
+    };
+    let (estimated, sets) = (estimate.pressure[0], sets.join(" "));
+    println!("| {case} {sets} | P{order} | {stiffness:e} | {error:.1e} | {estimated:.1e} | {:.2} |", estimated / error);
+    Ok(())
+}
+
+/// Two cubes, one with a paraboloidal face, free graded tetrahedra; `points` of the series along a side.
+fn paraboloids(session: &Session, stiffness: f64, points: usize, meshes: &[(usize, f64)]) -> Result<()> {
+    let gap = |x: f64, y: f64| 4e-3 * (x * x + y * y);
+    let boxes = Boxes { side: 0.5, height: 0.5, young: 2.1e5, poisson: 0.3, stiffness, approach: 3e-4, points };
+    let series = Series::new(boxes, gap);
+    for (order, h) in meshes {
+        let sets = [format!("mesh.set.h={h}")];
+        row(session, "paraboloid", *order, stiffness, &sets, &|table| at(&series, table, &gap))?;
+    }
+    Ok(())
+}
+
+fn at(series: &Series, table: &ContactTable, gap: &dyn Fn(f64, f64) -> f64) -> Vec<f64> {
+    let of = |c: usize| table.points.iter().map(|x| x[c]).collect::<Vec<f64>>();
+    series.at(&of(0), &of(1), gap)
+}
+
+/// Spheres whose surfaces do not match, against Hertz: the layers are so stiff that they change the pressures by less than a tenth of the
+/// errors.
+fn spheres(session: &Session, stiffness: f64, meshes: &[(usize, usize, usize)]) -> Result<()> {
+    let hertz = |x: &[f64; 3]| 279.83 * (1.0 - x[0].powi(2) - x[1].powi(2)).max(0.0).sqrt();
+    for (order, n, edge) in meshes {
+        let sets = [format!("mesh.set.n={n}"), format!("mesh.set.edge={edge}")];
+        row(session, "hertz-sphere", *order, stiffness, &sets, &|table| table.points.iter().map(hertz).collect())?;
+    }
+    Ok(())
+}
+
+/// The rough face.
+fn rough(session: &Session) -> Result<()> {
+    let scene = load(Path::new("meshes/rough/scene.toml"), &[])?;
+    let data = Data::new(DataSpec { file: "meshes/rough/rough.csv".into(), ..scene.data["rough"].spec.clone() });
+    data.load()?;
+    let gap = |x: f64, y: f64| 1e-3 - data.sample(&[x, y]).value;
+    for (stiffness, approach) in [(1e5, 1.5e-3), (5e6, 5e-4), (5e6, 1.5e-3), (1e8, 1.5e-3)] {
+        let boxes = Boxes { side: 1.0, height: 0.5, young: 2.1e5, poisson: 0.3, stiffness, approach, points: 128 };
+        let series = Series::new(boxes, gap);
+        for (order, n) in [(1, 16), (2, 8), (2, 12)] {
+            let sets = [format!("mesh.set.n={n}"), format!("body.upper.fix.2.z=-{approach:e}")];
+            row(session, "rough", order, stiffness, &sets, &|table| at(&series, table, &gap))?;
+        }
+    }
+    Ok(())
+}
+
+fn main() -> Result<()> {
+    let quick = Asked::parse().quick;
+    let session = Session::start(&[])?;
+    println!("| scene | elements | stiffness | error | estimated | ratio |\n| --- | --- | --- | --- | --- | --- |");
+    if quick {
+        // a soft and a medium layer; nearly no layer, where points open and close by the estimate
+        [1e4, 1e6].iter().try_for_each(|k| paraboloids(&session, *k, 64, &[(1, 0.03), (2, 0.05)]))?;
+        spheres(&session, 1e9, &[(1, 6, 1)])?;
+        return spheres(&session, 1e8, &[(2, 3, 1)]);
+    }
+    let meshes = [(1, 0.03), (1, 0.02), (2, 0.05), (2, 0.03), (2, 0.02)];
+    [1e4, 1e5, 1e6, 1e7, 1e8].iter().try_for_each(|k| paraboloids(&session, *k, 192, &meshes))?;
+    let meshes = [(1, 6, 1), (1, 12, 1), (2, 3, 1), (2, 4, 1), (2, 3, 3)];
+    [1e7, 1e9].iter().try_for_each(|k| spheres(&session, *k, &meshes))?;
+    rough(&session)
+}
