@@ -57,12 +57,12 @@ impl<'a> Forcing<'a> {
             (most, peak) = (most.max(change), peak.max(met.pressure[q]));
         }
         // an error that is small beside the energy of the bodies may be large for the pressures of stiff layers
-        let ends = |tolerance: f64| {
-            most <= tolerance * peak
-                && trial.error <= 0.5 * tolerance * contact_energy(model, &met).sqrt()
-                && self.scale.imbalance(model, &model.forces(&p)) <= tolerance
+        let ends = || {
+            most <= self.tolerance * peak
+                && trial.error <= 0.5 * self.tolerance * contact_energy(model, &met).sqrt()
+                && self.scale.imbalance(model, &model.forces(&p)) <= self.tolerance
         };
-        let settled = moved < apart || ends(self.tolerance);
+        let settled = moved < apart || ends();
         let enough = trial.is_within(if settled { self.roughest } else { f64::EPSILON });
         if self.pressures.len() == DELAY {
             self.pressures.pop_front();
