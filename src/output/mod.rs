@@ -13,6 +13,8 @@ pub mod history;
 mod largest;
 #[cfg(feature = "cli")]
 pub mod plot;
+#[cfg(feature = "cli")]
+pub mod progress;
 pub mod report;
 pub mod rows;
 pub mod steps;

@@ -77,11 +77,9 @@ impl Plan {
         if let Some(order) = request.orders.iter().find(|order| !matches!(order, 1 | 2)) {
             return Err(usage(format!("there are no elements of order {order}")).help("--order 1,2"));
         }
-        let scenes = request
-            .scenes
-            .iter()
-            .map(|path| crate::scene::load(path, &request.overrides))
-            .collect::<Result<Vec<_>>>()?;
+        let overrides = request.all_overrides();
+        let scenes =
+            request.scenes.iter().map(|path| crate::scene::load(path, &overrides)).collect::<Result<Vec<_>>>()?;
         let keys = axes.iter().map(|(key, _)| key.clone()).collect();
         let mut plan = Plan { names: names(&scenes), scenes, keys, cases: Vec::new() };
         for index in 0..plan.scenes.len() {
@@ -111,7 +109,7 @@ impl Plan {
         }
         let mut cases = Vec::new();
         for order in orders {
-            let mut mesh = request.overrides.clone();
+            let mut mesh = request.all_overrides();
             mesh.extend(self.keys.iter().zip(values).map(|(key, value)| format!("{key}={value}")));
             if let Some(order) = order {
                 mesh.extend((0..scene.bodies.len()).map(|body| format!("body.{body}.order={order}")));
