@@ -84,7 +84,7 @@ enum Command {
         #[arg(short, value_name = "FILE")]
         output: Option<PathBuf>,
     },
-    /// Draw one picture of a run as SVG
+    /// Draw one picture of a run as SVG or PNG
     Plot {
         /// Folder of results
         #[arg(value_name = "DIR")]
@@ -92,7 +92,7 @@ enum Command {
         /// What to draw: stress, displacement, pressure or convergence
         #[arg(value_name = "WHAT")]
         what: String,
-        /// File to write [default: WHAT.svg in the folder]
+        /// File to write, .svg or .png [default: WHAT.svg in the folder]
         #[arg(short, value_name = "FILE")]
         output: Option<PathBuf>,
     },
@@ -135,6 +135,9 @@ enum Solving {
         /// Write displacements and stresses of the bodies for ParaView (short for --set output.vtu=true)
         #[arg(long)]
         vtu: bool,
+        /// Write displacements, stresses and contact pressures as views for Gmsh (short for --set output.msh=true)
+        #[arg(long)]
+        msh: bool,
         /// Write a page with pictures and tables of the run, report.html (short for --set output.report=true)
         #[arg(long)]
         report: bool,
@@ -365,10 +368,10 @@ fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i3
 
 fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Result<i32> {
     match command {
-        Solving::Solve { scene, output, vtu, report, checkpoint, restart, manner } => {
+        Solving::Solve { scene, output, vtu, msh, report, checkpoint, restart, manner } => {
             let mut overrides = scene.overrides();
-            overrides.extend(vtu.then(|| "--vtu".to_owned()));
-            overrides.extend(report.then(|| "--report".to_owned()));
+            let flags = [(vtu, "--vtu"), (msh, "--msh"), (report, "--report")];
+            overrides.extend(flags.iter().filter(|(given, _)| *given).map(|(_, flag)| (*flag).to_owned()));
             overrides.extend(checkpoint.map(|minutes| format!("--checkpoint {minutes}")));
             let (json, verbosity) = (scene.json, manner.verbosity());
             let request = solve::Request { scene: scene.scene, folder: output, restart, overrides, json, verbosity };

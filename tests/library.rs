@@ -185,7 +185,7 @@ fn scenes_that_contradict_themselves_are_refused() {
     refused(&|s| s.bodies.push(s.bodies[0].clone()), "two bodies are called `lower`");
     refused(&|s| s.bodies.push(BodySpec::new("Ksp!", 1.0, 0.0)), "cannot be the name of a body");
     refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [None; 2]), "holds no component");
-    refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [Some(0.0); 3]), "z in a plane problem");
+    refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [Some(0.0); 3]), "`z` in a plane problem");
     refused(&|s| s.contacts.push(s.contacts[0].clone()), "a second contact of `below` and `above`");
     refused(&|s| s.contacts[0].angle = 2.0 * ANGLE, "the angle is 120");
     refused(

@@ -8,7 +8,6 @@ use crate::petsc::Session;
 use crate::problem::method::MethodName;
 use crate::run;
 use crate::run::clock::Clock;
-use crate::run::inner::WHOLE;
 use crate::run::report::{Shared, solvers_in_words};
 use crate::run::stages::Ready;
 use std::cell::RefCell;
@@ -54,14 +53,14 @@ pub fn decisions(session: &Session, ready: &Ready) -> Result<Vec<String>> {
         lines
             .push(format!("  {carrier} - {other}: {} points on `{carrier}`, whose mesh is finer or alike", pair.len()));
     }
-    let options = session.options().all()?;
-    let text = |(name, value): &(String, Option<String>)| format!("-{name} {}", value.as_deref().unwrap_or_default());
-    for body in discrete.bodies.iter().map(|body| body.name.as_str()).chain([WHOLE]).take(LISTED + 1) {
-        let own = options.iter().filter(|(name, _)| name.strip_prefix(body).is_some_and(|rest| rest.starts_with('_')));
-        let own: Vec<String> = own.map(|option| text(option).trim_end().to_owned()).collect();
-        if !own.is_empty() {
-            lines.push(format!("  PETSc options of {body}: {}", own.join(" ")));
-        }
+    for chosen in built.options.iter().take(LISTED) {
+        // PETSc's table has all of them while they are lent to it
+        let all = chosen.lend(session, || session.options().all())?;
+        let prefix = format!("-{}_", chosen.prefix());
+        let own = all.into_iter().filter(|(name, _)| name.starts_with(&prefix));
+        let own: Vec<String> =
+            own.map(|(name, value)| value.map_or(name.clone(), |value| format!("{name} {value}"))).collect();
+        lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), own.join(" ")));
     }
     Ok(lines)
 }

@@ -9,6 +9,7 @@ pub mod contact;
 pub mod contacts;
 pub mod folder;
 mod format;
+pub mod gmsh;
 pub mod history;
 mod largest;
 #[cfg(feature = "cli")]

@@ -111,6 +111,18 @@ impl<'a> Inner<'a> {
         self.seconds
     }
 
+    /// The options of all solvers of PETSc that a run has: of each body that sweeps solve by one, or of the matrix of all bodies.
+    pub fn into_options(self) -> Vec<Chosen> {
+        match self.linear {
+            Linear::Dense => Vec::new(),
+            Linear::Direct | Linear::Multigrid => vec![self.whole],
+            Linear::Sweeps => {
+                let solved = self.plans.into_iter().filter(|plan| plan.preset != Preset::Condensed);
+                solved.map(|plan| plan.chosen).collect()
+            }
+        }
+    }
+
     /// Options of the matrix of all bodies.
     pub fn whole(&self) -> &Chosen {
         &self.whole

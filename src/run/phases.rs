@@ -134,7 +134,8 @@ impl<const D: usize> Source<D> {
         let (choice, condensed) = (inner.reason(), inner.condensed());
         let interpolation = inner.interpolation();
         let scene = scene.clone();
-        Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, warnings, again: None })
+        let (options, again) = (inner.into_options(), None);
+        Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, options, warnings, again })
     }
 }
 

@@ -3,6 +3,7 @@
 mod body;
 mod contact;
 mod data;
+mod decoder;
 mod elasticity;
 mod history;
 mod layer;
@@ -11,18 +12,17 @@ mod method;
 use super::read::{Keys, Node, Value};
 use super::shape::{Form, Table, word};
 use crate::data::Library;
-use crate::error::{Error, Located, Place, Result, nearest};
-use crate::expression::{Differentiable, Field, Scope};
+use crate::error::{Error, Located, Place, Result};
 use crate::mesh::is_shape;
 use crate::output::vtu::Encoding;
 use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::own::Own;
-use crate::problem::pattern::Pattern;
 use crate::problem::solver::{Preset, SolverSpec};
 use crate::problem::units::Units;
 use crate::scene::{AdaptSpec, OutputSpec, Scene};
-use std::path::{Path, PathBuf};
+use decoder::{Decoder, choose, file, pattern};
+use std::path::Path;
 
 /// The shape of a whole scene.
 pub(super) fn table() -> Table {
@@ -88,15 +88,16 @@ fn adapt_table() -> Table {
 const PRECISIONS: [(&str, bool); 2] = [("double", false), ("single", true)];
 
 fn output_table() -> Table {
-    use Form::{Count, Either, Flag, Number, Text};
+    use Form::{Either, Flag, Number, Text, Whole};
     Table::new("[output]")
         .key("dir", Text, "folder of the results; results/CASE without it")
         .key("vtu", Flag, "whether to write fields for ParaView; false")
+        .key("msh", Flag, "whether to write fields as views for Gmsh; false")
         .key("report", Flag, "whether to write the page report.html; false")
         .key("precision", word(&PRECISIONS), "of the numbers in VTU files; \"double\"")
         .key("compress", Flag, "whether VTU files are compressed; true")
         .key("plots", Flag, "whether to draw the SVG plots; true")
-        .key("pairs", Either(vec![Count, word(&[("all", ())])]), "most pairs with files of their own; 24")
+        .key("pairs", Either(vec![Whole, word(&[("all", ())])]), "most pairs with files of their own; 24")
         .key("checkpoint", Number, "minutes between checkpoints; none without it")
 }
 
@@ -143,59 +144,7 @@ fn units(node: &Node) -> Result<Units> {
     Units::parse(node.string()?).map_err(|(message, advice)| node.refuse(message).help(advice))
 }
 
-/// What the meaning of values depends on.
-struct Decoder<'a> {
-    /// Space dimension: 2 or 3.
-    dimension: usize,
-    /// Folder of the scene file.
-    folder: &'a Path,
-    /// Functions from files.
-    data: Library,
-}
-
 impl Decoder<'_> {
-    /// A number, or an expression in the coordinates.
-    fn field(&self, node: &Node) -> Result<Field> {
-        match &node.value {
-            Value::Integer(_) | Value::Float(_) => Ok(Field::Constant(node.number()?)),
-            Value::String(text) => Field::parse(text, &node.place, self.dimension, false, &self.data),
-            _ => Err(node.expected("a number or an expression", "")),
-        }
-    }
-
-    /// A vector with as many components as space has; the missing third one is zero.
-    fn vector(&self, node: &Node) -> Result<[Field; 3]> {
-        let mut vector = [const { Field::Constant(0.0) }; 3];
-        for (component, item) in vector.iter_mut().zip(self.components(node)?) {
-            *component = self.field(item)?;
-        }
-        Ok(vector)
-    }
-
-    /// A vector that can be differentiated.
-    fn smooth_vector(&self, node: &Node) -> Result<Vec<Differentiable>> {
-        let scope = Scope { variables: &["x", "y", "z"][..self.dimension], data: &self.data };
-        let component = |item: &Node| match &item.value {
-            Value::Integer(_) | Value::Float(_) => {
-                Differentiable::parse(&item.number()?.to_string(), &item.place, scope)
-            }
-            Value::String(text) => Differentiable::parse(text, &item.place, scope),
-            _ => Err(item.expected("a number or an expression", "")),
-        };
-        self.components(node)?.iter().map(component).collect()
-    }
-
-    /// The components of a vector: as many as space has.
-    fn components<'n>(&self, node: &'n Node) -> Result<&'n [Node]> {
-        let items = node.list()?;
-        if items.len() != self.dimension {
-            let place = items.get(self.dimension).map_or(&node.place, |extra| &extra.place);
-            let count = format!("a vector has {} components here, not {}", self.dimension, items.len());
-            return Err(Error::scene(place, count).help(format!("the dimension of the scene is {}", self.dimension)));
-        }
-        Ok(items)
-    }
-
     fn mesh(&self, node: &Node, trusted: bool) -> Result<MeshSource> {
         if let Value::String(name) = &node.value {
             let file = file(self.folder, node)?;
@@ -237,29 +186,6 @@ impl Decoder<'_> {
             trusted,
         };
         Ok(MeshSource::Geo { file, set, places, sizes: None, guard })
-    }
-}
-
-/// The path of a file that must exist, joined with the folder of the scene.
-fn file(folder: &Path, node: &Node) -> Result<Located<PathBuf>> {
-    let name = node.name()?.value;
-    let path = folder.join(&name);
-    match std::fs::metadata(&path) {
-        Ok(found) if found.is_file() => Ok(Located::new(path, node.place.clone())),
-        Ok(_) => Err(node.refuse(format!("{} is not a file", path.display()))),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
-            let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
-            let wanted = path.file_name().unwrap_or_default().to_string_lossy();
-            Err(node.refuse(format!("there is no file {}", path.display())).label("not there").help(
-                match nearest(&wanted, names.iter().map(String::as_str)) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => "paths are relative to the folder of the scene file".to_owned(),
-                },
-            ))
-        }
-        Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
     }
 }
 
@@ -307,30 +233,6 @@ fn numbers(node: &Node) -> Result<Vec<(Place, String, f64)>> {
     Ok(numbers)
 }
 
-/// One of a few words; `what` names the key in the message.
-fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Result<T> {
-    let word = node.string()?;
-    if let Some((_, choice)) = choices.iter().find(|(name, _)| *name == word) {
-        return Ok(choice.clone());
-    }
-    let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
-    Err(node.refuse(format!("unknown {what} `{word}`")).help(match nearest(word, names.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("it is one of {}", names.join(", ")),
-    }))
-}
-
-/// The name of a group, or a pattern of such names.
-fn pattern(node: &Node) -> Result<Located<String>> {
-    let name = node.name()?;
-    match Pattern::new(&name.value) {
-        Ok(_) => Ok(name),
-        Err(flaw) => Err(node
-            .refuse(format!("`{}` is no pattern: {flaw}", name.value))
-            .help("`*` is any text, `?` one character, `[0-9]` one of some")),
-    }
-}
-
 fn preset(node: &Node) -> Result<Preset> {
     choose(node, "solver", &Preset::ALL)
 }
@@ -375,6 +277,7 @@ fn output(node: Option<&Node>) -> Result<OutputSpec> {
         dir: keys.get("dir").map(|dir| dir.name().map(|name| name.value.into())).transpose()?,
         report: keys.flag("report", default.report)?,
         vtu: keys.flag("vtu", default.vtu)?,
+        msh: keys.flag("msh", default.msh)?,
         encoding: Encoding {
             single: keys.get("precision").map_or(Ok(usual.single), |node| choose(node, "precision", &PRECISIONS))?,
             compress: keys.flag("compress", usual.compress)?,

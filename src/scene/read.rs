@@ -1,6 +1,6 @@
 //! TOML as a tree of values that know where they stand, with getters that refuse in words.
 
-use super::shape::Table;
+use super::shape::{Form, Table};
 use crate::error::{Error, Located, Place, Result, Source, nearest, shown};
 use std::ops::Range;
 use std::sync::Arc;
@@ -215,6 +215,38 @@ impl Node {
         match &self.value {
             Value::List(items) => Ok(items),
             _ => Err(self.expected("a list", "")),
+        }
+    }
+}
+
+impl Form {
+    /// Whether a value is of this kind, whatever is in it.
+    fn admits(&self, value: &Value) -> bool {
+        match self {
+            Self::Text | Self::Word(_) => matches!(value, Value::String(_)),
+            Self::Flag => matches!(value, Value::Boolean(_)),
+            Self::Number => matches!(value, Value::Integer(_) | Value::Float(_)),
+            Self::Whole | Self::Count | Self::Among(_) => matches!(value, Value::Integer(_)),
+            Self::Field => matches!(value, Value::Integer(_) | Value::Float(_) | Value::String(_)),
+            Self::List(_) => matches!(value, Value::List(_)),
+            Self::Table(_) | Self::Named(_) => matches!(value, Value::Table(_)),
+            Self::Either(forms) => forms.iter().any(|form| form.admits(value)),
+        }
+    }
+
+    /// Why a whole number is refused; none if it is not.
+    fn breach(&self, value: &Value) -> Option<String> {
+        match (self, value) {
+            (Self::Whole, Value::Integer(..0)) => Some("must be 0 or more".to_owned()),
+            (Self::Count, Value::Integer(..1)) => Some("must be 1 or more".to_owned()),
+            (Self::Among(known), Value::Integer(number)) if !known.contains(number) => {
+                let known: Vec<String> = known.iter().map(i64::to_string).collect();
+                Some(format!("must be {}", known.join(" or ")))
+            }
+            (Self::Either(forms), _) => {
+                forms.iter().filter(|form| form.admits(value)).find_map(|form| form.breach(value))
+            }
+            _ => None,
         }
     }
 }

@@ -36,6 +36,7 @@ fn of(form: &Form) -> Value {
         Form::Text => json!({ "type": "string" }),
         Form::Flag => json!({ "type": "boolean" }),
         Form::Number => json!({ "type": "number" }),
+        Form::Whole => json!({ "type": "integer", "minimum": 0 }),
         Form::Count => json!({ "type": "integer", "minimum": 1 }),
         Form::Among(numbers) => json!({ "enum": numbers }),
         Form::Field => json!({ "type": ["number", "string"] }),

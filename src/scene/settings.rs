@@ -56,6 +56,7 @@ impl Scene {
         let mut output = Map::new();
         insert(&mut output, "dir", self.output.dir.as_ref().map(|dir| json!(dir.display().to_string())));
         output.insert("vtu".into(), json!(self.output.vtu));
+        output.insert("msh".into(), json!(self.output.msh));
         output.insert("report".into(), json!(self.output.report));
         let encoding = self.output.encoding;
         output.insert("precision".into(), json!(if encoding.single { "single" } else { "double" }));

@@ -1,7 +1,6 @@
 //! What a table of a scene may have: its keys, the values that each takes, what they mean. [`Keys::open`](super::read::Keys::open)
 //! refuses what does not fit, and the [JSON schema](super::schema) of scenes is made of the same tables.
 
-use super::read::Value;
 use std::borrow::Cow;
 
 /// A table: its name in messages, its keys, and pairs of keys of which only one can hold.
@@ -34,6 +33,8 @@ pub enum Form {
     Flag,
     /// A number.
     Number,
+    /// A whole number from 0 on.
+    Whole,
     /// A whole number from 1 on.
     Count,
     /// One of some whole numbers.
@@ -95,46 +96,17 @@ impl Form {
         Self::List(Box::new(self))
     }
 
-    /// Whether a value is of this kind, whatever is in it.
-    pub fn admits(&self, value: &Value) -> bool {
-        match self {
-            Self::Text | Self::Word(_) => matches!(value, Value::String(_)),
-            Self::Flag => matches!(value, Value::Boolean(_)),
-            Self::Number => matches!(value, Value::Integer(_) | Value::Float(_)),
-            Self::Count | Self::Among(_) => matches!(value, Value::Integer(_)),
-            Self::Field => matches!(value, Value::Integer(_) | Value::Float(_) | Value::String(_)),
-            Self::List(_) => matches!(value, Value::List(_)),
-            Self::Table(_) | Self::Named(_) => matches!(value, Value::Table(_)),
-            Self::Either(forms) => forms.iter().any(|form| form.admits(value)),
-        }
-    }
-
     /// What it is in words.
     pub fn words(&self) -> String {
         match self {
             Self::Text | Self::Word(_) => "a string".to_owned(),
             Self::Flag => "true or false".to_owned(),
             Self::Number => "a number".to_owned(),
-            Self::Count | Self::Among(_) => "a whole number".to_owned(),
+            Self::Whole | Self::Count | Self::Among(_) => "a whole number".to_owned(),
             Self::Field => "a number or an expression".to_owned(),
             Self::List(_) => "a list".to_owned(),
             Self::Table(_) | Self::Named(_) => "a table".to_owned(),
             Self::Either(forms) => forms.iter().map(Self::words).collect::<Vec<_>>().join(" or "),
-        }
-    }
-
-    /// Why a whole number is refused; none if it is not.
-    pub fn breach(&self, value: &Value) -> Option<String> {
-        match (self, value) {
-            (Self::Count, Value::Integer(..1)) => Some("must be 1 or more".to_owned()),
-            (Self::Among(known), Value::Integer(number)) if !known.contains(number) => {
-                let known: Vec<String> = known.iter().map(i64::to_string).collect();
-                Some(format!("must be {}", known.join(" or ")))
-            }
-            (Self::Either(forms), _) => {
-                forms.iter().filter(|form| form.admits(value)).find_map(|form| form.breach(value))
-            }
-            _ => None,
         }
     }
 }

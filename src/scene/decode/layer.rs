@@ -14,6 +14,7 @@ const POINTS: &str = "write table = [[1e-5, 2], [2e-5, 10]]: compressions and pr
 
 /// The shape of `layer`.
 pub(super) fn table() -> Table {
+    let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure", "asperities"]).collect();
     let forms = FORMS
         .iter()
         .fold(Table::new("the layer"), |table, form| table.key(form.name, self::form(form).form(), "a law"));
@@ -22,7 +23,7 @@ pub(super) fn table() -> Table {
         .key("pressure", Form::Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
         .key("asperities", asperities().form(), "a law of summits: asperities = { modulus = E*, data = \"NAME\" }")
         .key("up_to", Form::Number, "compression beyond which the expression goes on linearly")
-        .apart(&[FORMS[0].name, FORMS[1].name, FORMS[2].name, FORMS[3].name, "table", "pressure", "asperities"])
+        .apart(&laws)
 }
 
 /// The shape of a law with parameters.
