@@ -16,8 +16,11 @@ pub struct Clock {
     /// Seconds of set-up and iteration by the estimate that chose the solvers, where one was made.
     pub estimate: Option<f64>,
     /// Hears which phase has ended, and the estimate.
-    pub watch: Option<Rc<dyn Fn(&str, Option<f64>)>>,
+    pub watch: Option<Rc<Watch>>,
 }
+
+/// What hears the end of a phase: its name, and the estimate.
+pub type Watch = dyn Fn(&str, Option<f64>);
 
 impl Default for Clock {
     fn default() -> Self {

@@ -120,7 +120,8 @@ impl Scene {
             if !pairs.insert([a.min(b), a.max(b)]) {
                 return at.below(0).refuse(format!("a second contact of `{a}` and `{b}`"), "", "remove one of the two");
             }
-            for (side, name) in [a, b].into_iter().enumerate().filter(|(_, name)| name.contains(['*', '?'])) {
+            let is_plural = |name: &String| name.contains(['*', '?']);
+            if let Some((side, name)) = [a, b].into_iter().enumerate().find(|(_, name)| is_plural(name)) {
                 let help = "many pairs are found between bodies: between = \"auto\", of = [\"one_*\", \"other_*\"], distance = D";
                 let message = format!("the pattern `{name}` for one surface");
                 return at.below(side).refuse(message, "one name belongs here", help);

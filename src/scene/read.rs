@@ -287,7 +287,7 @@ impl<'a> Keys<'a> {
                 ));
             };
             if !key.form.admits(&node.value) {
-                return Err(node.expected(&key.form.words(), key.about));
+                return Err(node.expected(&key.form.words(), &key.about));
             }
             if let (Some(breach), Value::Integer(number)) = (key.form.breach(&node.value), &node.value) {
                 return Err(node.refuse(format!("`{name}` is {number}")).label(breach));

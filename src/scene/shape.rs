@@ -20,7 +20,7 @@ pub struct Key {
     /// The values that it takes.
     pub form: Form,
     /// What it is, with its default; the advice where its value is of the wrong kind. Without one the key is no part of a scene file.
-    pub about: &'static str,
+    pub about: Cow<'static, str>,
     /// Whether a table must have it.
     pub must: bool,
 }
@@ -60,14 +60,14 @@ impl Table {
     }
 
     /// With a key that may be left out.
-    pub fn key(mut self, name: &'static str, form: Form, about: &'static str) -> Self {
-        self.keys.push(Key { name, form, about, must: false });
+    pub fn key(mut self, name: &'static str, form: Form, about: impl Into<Cow<'static, str>>) -> Self {
+        self.keys.push(Key { name, form, about: about.into(), must: false });
         self
     }
 
     /// With a key that must be there.
-    pub fn must(mut self, name: &'static str, form: Form, about: &'static str) -> Self {
-        self.keys.push(Key { name, form, about, must: true });
+    pub fn must(mut self, name: &'static str, form: Form, about: impl Into<Cow<'static, str>>) -> Self {
+        self.keys.push(Key { name, form, about: about.into(), must: true });
         self
     }
 

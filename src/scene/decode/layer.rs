@@ -15,9 +15,11 @@ const POINTS: &str = "write table = [[1e-5, 2], [2e-5, 10]]: compressions and pr
 /// The shape of `layer`.
 pub(super) fn table() -> Table {
     let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure", "asperities"]).collect();
-    let forms = FORMS
-        .iter()
-        .fold(Table::new("the layer"), |table, form| table.key(form.name, self::form(form).form(), "a law"));
+    let add = |table: Table, form: &'static LawForm| {
+        let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
+        table.key(form.name, self::form(form).form(), format!("write {} = {{ {} }}", form.name, values.join(", ")))
+    };
+    let forms = FORMS.iter().fold(Table::new("the layer"), add);
     forms
         .key("table", Form::Number.list().list(), POINTS)
         .key("pressure", Form::Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
