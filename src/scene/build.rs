@@ -58,8 +58,8 @@ impl Scene {
         Self { method, ..self }
     }
 
-    /// With a law for [`LayerSpec::Own`](crate::problem::layer::LayerSpec::Own) of this name. `maker` gets the contact points of a pair (x, y, z) and gives the law of all of
-    /// them, which is checked at the first: increasing, with its derivative and its integral.
+    /// With a law for [`LayerSpec::Own`](crate::problem::layer::LayerSpec::Own) of this name. `maker` gets the contact points of a
+    /// pair (x, y, z) and gives the law of all of them, which is checked at the first: increasing, with its derivative and its integral.
     pub fn law<L: LayerLaw + 'static>(mut self, name: &str, maker: impl Fn(&[[f64; 3]]) -> L + 'static) -> Self {
         self.laws.insert(name, Rc::new(move |points: &[[f64; 3]]| Box::new(maker(points)) as _));
         self
