@@ -6,6 +6,7 @@ use crate::output::report::warning_lines;
 use crate::output::{LISTED, Report};
 use crate::petsc::Session;
 use crate::problem::method::MethodName;
+use crate::problem::name_of;
 use crate::run;
 use crate::run::clock::Clock;
 use crate::run::report::{Shared, solvers_in_words};
@@ -39,7 +40,7 @@ pub fn decisions(session: &Session, ready: &Ready) -> Result<Vec<String>> {
     let (scene, discrete) = (&built.scene, &built.discrete);
     let solvers = Shared::gather(discrete).solvers;
     let mut lines = vec![format!("{}: decided", scene.title)];
-    let name = MethodName::ALL.iter().find(|(_, name)| *name == scene.method.name).map_or("", |(name, _)| name);
+    let name = name_of(&MethodName::ALL, &scene.method.name);
     let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
     let linear = if newton { format!("; Newton's linear steps: {}", built.linear.name()) } else { String::new() };
     lines.push(format!("  method: {name}{linear}; until {}", run::targets(scene)));

@@ -5,6 +5,7 @@ use crate::commands::case_of;
 use crate::commands::sweep::{axis, combinations};
 use crate::error::Result;
 use crate::problem::method::MethodName;
+use crate::problem::name_of;
 use crate::problem::order::Order;
 use crate::problem::solver::Preset;
 use crate::scene::Scene;
@@ -125,7 +126,7 @@ impl Plan {
                     key.extend(values.iter().cloned());
                     key.extend([
                         solver.name.clone(),
-                        method.map_or_else(|| name_of(scene.method.name), str::to_owned),
+                        method.map_or_else(|| name_of(&MethodName::ALL, &scene.method.name).to_owned(), str::to_owned),
                         order.map_or_else(|| orders_of(scene), |order| order.to_string()),
                         ranks.to_string(),
                     ]);
@@ -223,11 +224,6 @@ fn names(scenes: &[Scene]) -> Vec<String> {
         _ => scene.path.display().to_string(),
     };
     scenes.iter().map(name).collect()
-}
-
-fn name_of(method: MethodName) -> String {
-    let found = MethodName::ALL.iter().find(|(_, known)| *known == method);
-    found.map_or_else(String::new, |(name, _)| (*name).to_owned())
 }
 
 fn orders_of(scene: &Scene) -> String {
