@@ -47,7 +47,7 @@ fn text(what: &str, elapsed: Duration, estimate: Option<f64>) -> String {
 /// Seconds that are left, in words; nothing where they are not known or were too few.
 pub fn left(seconds: Option<f64>) -> String {
     let known = seconds.and_then(|left| Duration::try_from_secs_f64(left.round()).ok()).filter(|left| !left.is_zero());
-    known.map_or(String::new(), |left| format!(", about {} left", HumanDuration(left)))
+    known.map_or(String::new(), |left| format!(", about {:#} left", HumanDuration(left)))
 }
 
 /// A bar over many runs, with the time that is left; hidden if nothing is to be shown.
@@ -75,7 +75,7 @@ mod tests {
         let at = |seconds: f64, estimate| text("factoring", Duration::from_secs_f64(seconds), estimate);
         assert_eq!(at(0.9, Some(50.0)), "");
         assert_eq!(at(2.3, None), "factoring, 2 s");
-        assert_eq!(at(10.0, Some(50.0)), "factoring, 10 s, about 40 seconds left");
+        assert_eq!(at(10.0, Some(50.0)), "factoring, 10 s, about 40s left");
         // an estimate that was too low is not repeated
         assert_eq!(at(60.0, Some(50.0)), "factoring, 60 s");
         assert_eq!([left(Some(f64::NAN)), left(Some(f64::INFINITY)), left(None)], [""; 3].map(str::to_owned));

@@ -43,7 +43,7 @@ impl IterationTable {
     pub fn new(loud: bool, target: &str, tolerance: Option<f64>) -> Self {
         let bar = if loud && io::stderr().is_terminal() {
             let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-            if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_msg}") {
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}") {
                 bar.set_style(style);
             }
             bar.set_message(format!("before the first sweep, until {target}"));
@@ -96,11 +96,10 @@ impl Observer for IterationTable {
         let (residual, began) = *self.first.get_or_insert((row.residual, row.seconds));
         let to_go = self.tolerance.map(|tolerance| time_left(row, residual, began, tolerance));
         self.bar.set_message(format!(
-            "iteration {}, residual {}, until {}, {} s{}",
+            "iteration {}, residual {}, until {}{}",
             row.iteration,
             sci(row.residual, 2),
             self.target,
-            seconds(row.seconds),
             left(to_go)
         ));
         if shown(row.iteration) {
