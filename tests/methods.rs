@@ -186,6 +186,25 @@ fn inexact_steps_are_as_many_as_exact_ones() {
     }
 }
 
+/// Multigrid sees springs at most as stiff as the elements, and the rest is solved exactly: one set-up serves all steps, and layers that are
+/// all but rigid cost no more iterations than soft ones. Elements of both orders, which have two kinds of multigrid.
+#[test]
+fn rigid_layers_cost_multigrid_no_more_than_soft_ones() {
+    for order in ["1", "2"] {
+        let run = |stiffness: &str| {
+            let layer = format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}");
+            let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
+            let sets = [&orders[0], &orders[1], "method={}", "solver=hypre", &layer];
+            solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+        };
+        let (soft, rigid) = (run("1e4"), run("1e9"));
+        assert_eq!((soft.count("patches"), soft.count("factorizations")), (0, 1));
+        assert_eq!((rigid.count("patches"), rigid.count("factorizations")), (rigid.count("iterations"), 1));
+        let pace = |run: &Run| run.count("inner_iterations") as f64 / run.count("iterations") as f64;
+        assert!(pace(&rigid) < 1.2 * pace(&soft), "order {order}: {} {}", pace(&rigid), pace(&soft));
+    }
+}
+
 /// Rigid bodies foretell a large curved contact, and Newton's steps need not grow it from within.
 #[test]
 fn rigid_bodies_foretell_the_contact() {

@@ -35,6 +35,8 @@ pub struct Report {
     pub factorizations: usize,
     /// Dense factorisations of condensed bodies, all bodies.
     pub dense_factorizations: usize,
+    /// Exact solves near the contact made instead of preconditioner set-ups, all bodies.
+    pub patches: usize,
     /// Symbolic factorisations, all bodies.
     pub symbolic_factorizations: usize,
     /// Stiffness matrices assembled.
