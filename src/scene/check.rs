@@ -306,7 +306,7 @@ fn contact_is_good(at: &At, contact: &ContactSpec) -> Checked {
             if let Depths::Normal { deviation, highest } = spec.depths {
                 numbers.extend([("deviation", deviation), ("highest", highest)]);
             }
-            numbers.into_iter().try_for_each(|(key, value)| at.positive_in(key, &format!("`{key}`"), value))
+            numbers.into_iter().try_for_each(|(key, value)| at.positive_in(key, &format!("the {key}"), value))
         }
         LayerSpec::Pressure { up_to: Some(end), .. } => at.positive_in("up_to", "the end of the law", *end),
         LayerSpec::Pressure { .. } | LayerSpec::Own(_) => Ok(()),
