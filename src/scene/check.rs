@@ -302,11 +302,13 @@ fn contact_is_good(at: &At, contact: &ContactSpec) -> Checked {
         }
         LayerSpec::Asperities(spec) => {
             let at = at.below("asperities");
-            let mut numbers = vec![("density", spec.density), ("radius", spec.radius), ("modulus", spec.modulus)];
+            at.positive_in("modulus", "the modulus", spec.modulus)?;
             if let Depths::Normal { deviation, highest } = spec.depths {
-                numbers.extend([("deviation", deviation), ("highest", highest)]);
+                at.positive_in("deviation", "the deviation", deviation)?;
+                at.positive_in("highest", "the highest summit", highest)?;
             }
-            numbers.into_iter().try_for_each(|(key, value)| at.positive_in(key, &format!("`{key}`"), value))
+            at.positive_in("density", "the density", spec.density)?;
+            at.positive_in("radius", "the radius", spec.radius)
         }
         LayerSpec::Pressure { up_to: Some(end), .. } => at.positive_in("up_to", "the end of the law", *end),
         LayerSpec::Pressure { .. } | LayerSpec::Own(_) => Ok(()),
