@@ -31,7 +31,7 @@ use crate::fem::{
 };
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Checked;
-use crate::model::{BodySlot, Exchange, Mechanism, Model, Segment};
+use crate::model::{BodySlot, Exchange, Loads, Mechanism, Model, Segment};
 use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
 use crate::problem::method::Start;
@@ -274,7 +274,19 @@ pub fn discretize<const D: usize>(
         let stiffness = if held && surface > 0.0 { modulus / depth } else { 0.0 };
         // what only the owner knows, until all ranks share it
         let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
-        if let Some(before) = factory.kept(&name) {
+        let mut kept = factory.kept(&name);
+        let loads = kept.is_some().then(|| Loads {
+            work: rigid::free(&left, &prescribed, &load).iter().map(|motion| motion.work).collect(),
+            force: load.clone(),
+            prescribed: prescribed.clone(),
+            carried: carried.clone(),
+        });
+        let body = kept.as_mut().and_then(|slot| slot.local.as_mut());
+        let serves = match (body, loads) {
+            (Some(body), Some(loads)) => body.reload(&loads)?,
+            _ => false,
+        };
+        if let Some(before) = kept.filter(|_| serves) {
             (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 || dealt.is_some() {

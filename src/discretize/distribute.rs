@@ -2,6 +2,7 @@
 
 use super::draft::Draft;
 use crate::contact::ContactPair;
+use crate::fem::assemble::Couplings;
 use crate::fem::assemble::NodeGraph;
 use crate::fem::{ElasticBody, Interpolation};
 use crate::linalg::Csr;
@@ -203,6 +204,7 @@ impl Dealt {
             stiffness: Csr { columns: self.distribution.total, ptr: starts, col, values },
             load: self.distribution.scatter(&body.load),
             prescribed: body.prescribed.iter().filter_map(place).collect(),
+            held: Couplings::default(),
             lifting: if body.lifting.is_empty() { Vec::new() } else { self.distribution.scatter(&body.lifting) },
             ..body
         }

@@ -10,7 +10,7 @@ use crate::fem::assemble::{self, NodalBlock};
 use crate::fem::interpolation::{Interpolation, coarse_nodes, from_vertices};
 use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
-use crate::linalg::{Csr, countable, dot};
+use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};
 use crate::problem::elasticity::Plane;
@@ -247,10 +247,6 @@ impl<'a, const D: usize> Part<'a, D> {
         self.held.frame.turn_matrix(&mut stiffness);
         // rows that other ranks have
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
-        let work = dot(&load, &carried);
-        let mut body = assemble::support(stiffness, load, prescribed);
-        body.energy_constant -= work;
-        body.carried = carried;
-        Ok(body)
+        Ok(assemble::support(stiffness, load, prescribed, carried))
     }
 }
