@@ -23,7 +23,7 @@ unsafe extern "C" {
 ///
 /// MUMPS is linked and brings them; PETSc, opened later, gets the same ones. The linker leaves MUMPS out of a program that does not
 /// name it.
-fn address(name: &CStr) -> *mut c_void {
+pub(super) fn address(name: &CStr) -> *mut c_void {
     std::hint::black_box(super::ffi::mumps::dmumps_c as *const c_void);
     // SAFETY: a null library means the default search order, and the name ends with a zero byte.
     unsafe { dlsym(std::ptr::null_mut(), name.as_ptr()) }

@@ -29,6 +29,7 @@ mod failure;
 mod ffi;
 mod heap;
 mod interpolation;
+mod kernels;
 mod ksp;
 mod launcher;
 mod library;

@@ -1,7 +1,7 @@
 //! The life of MPI and PETSc in this process.
 
 use super::library::petsc;
-use super::{blas, launcher, library, waiting};
+use super::{blas, kernels, launcher, library, waiting};
 use crate::error::{Error, Kind, Result};
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
@@ -54,6 +54,7 @@ impl Session {
             return Err(Error::new(Kind::Solver, "PETSc was already started in this process")
                 .help("start one session and clone it"));
         }
+        kernels::choose();
         let universe = launcher::quick(mpi::initialize)
             .ok_or_else(|| Error::new(Kind::Solver, "MPI was already started in this process by other code"))?;
         let world = SimpleCommunicator::world();
@@ -114,9 +115,13 @@ impl Session {
         }
     }
 
-    /// Name of the BLAS in use: `OpenBLAS`, `MKL`, `BLIS`, `reference BLAS`, ..., or the file of another one.
+    /// Name of the BLAS in use: `OpenBLAS` with its kernels, as `OpenBLAS (Haswell)`, `MKL`, `BLIS`, `reference BLAS`, ..., or the file of
+    /// another one.
     pub fn blas_name(&self) -> String {
-        blas::name()
+        match (blas::name(), kernels::name()) {
+            (name, Some(kernels)) => format!("{name} ({kernels})"),
+            (name, None) => name,
+        }
     }
 
     /// Ends all ranks at once with an exit code, running no destructor: for a failure that other ranks cannot know of.
