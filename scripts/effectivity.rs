@@ -109,12 +109,13 @@ fn main() -> Result<()> {
         // a soft and a medium layer; nearly no layer, where points open and close by the estimate
         [1e4, 1e6].iter().try_for_each(|k| paraboloids(&session, *k, 64, &[(1, 0.03), (2, 0.05)]))?;
         spheres(&session, 1e9, &[(1, 6, 1)])?;
-        regular(&session, 1e7, &[(1, 16, 12), (2, 8, 6)])?;
+        regular(&session, 1e6, &[(1, 16, 6)])?;
+        regular(&session, 1e7, &[(2, 8, 6)])?;
         return spheres(&session, 1e8, &[(2, 3, 1)]);
     }
     let meshes = [(1, 0.03), (1, 0.02), (2, 0.05), (2, 0.03), (2, 0.02)];
     [1e4, 1e5, 1e6, 1e7, 1e8].iter().try_for_each(|k| paraboloids(&session, *k, 192, &meshes))?;
-    let meshes = [(1, 16, 16), (1, 16, 12), (2, 8, 8), (2, 8, 6), (2, 12, 12), (2, 10, 13)];
+    let meshes = [(1, 16, 16), (1, 16, 12), (1, 16, 6), (2, 8, 8), (2, 8, 6), (2, 12, 12), (2, 10, 13)];
     [1e4, 1e5, 1e6, 1e7, 1e8].iter().try_for_each(|k| regular(&session, *k, &meshes))?;
     let meshes = [(1, 6, 1), (1, 12, 1), (2, 3, 1), (2, 4, 1), (2, 3, 3)];
     [1e7, 1e9].iter().try_for_each(|k| spheres(&session, *k, &meshes))?;

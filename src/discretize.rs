@@ -322,6 +322,7 @@ pub fn discretize<const D: usize>(
             })?);
         }
         let outer = approach::outer_maker(&part, mesh)?;
+        let unloaded = if keep { part.unloaded(mesh, &nodal_load)? } else { Vec::new() };
         let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
         infos.push(BodyInfo {
             name: name.clone(),
@@ -356,7 +357,7 @@ pub fn discretize<const D: usize>(
             outer,
             field: fields::field_maker(name.clone(), space.clone(), elasticity.clone()),
         });
-        shapes.push(Shape { space, elasticity, modulus, held });
+        shapes.push(Shape { space, elasticity, modulus, held, unloaded });
         slots.push(BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness });
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);

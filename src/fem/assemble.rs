@@ -7,7 +7,7 @@ use super::elasticity::{Elasticity, Flaw};
 use super::element;
 use super::frame::Frame;
 use super::pad;
-use super::quadrature;
+use super::quadrature::{self, Parts};
 use super::space::Space;
 use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
@@ -327,20 +327,29 @@ pub fn is_straight<const D: usize>(x: &[[f64; D]], vertices: usize) -> bool {
 }
 
 /// Adds a body force density (per volume) to `load`.
-pub fn body_force<const D: usize>(space: &Space<D>, density: &dyn Fn([f64; D]) -> [f64; D], load: &mut [f64]) {
+pub fn body_force<const D: usize>(
+    space: &Space<D>,
+    parts: Parts,
+    density: &dyn Fn([f64; D]) -> [f64; D],
+    load: &mut [f64],
+) {
     match D {
-        2 => body_force_on::<D, 3>(space, density, load),
-        _ => body_force_on::<D, 4>(space, density, load),
+        2 => body_force_on::<D, 3>(space, parts, density, load),
+        _ => body_force_on::<D, 4>(space, parts, density, load),
     }
 }
 
 fn body_force_on<const D: usize, const N: usize>(
     space: &Space<D>,
+    parts: Parts,
     density: &dyn Fn([f64; D]) -> [f64; D],
     load: &mut [f64],
 ) {
     let low = space.order == Order::P1 && !space.axisymmetric;
-    let rule = quadrature::simplex::<N>(if low { 2 } else { 5 });
+    let mut rule = quadrature::simplex::<N>(if low { 2 } else { 5 });
+    if parts == Parts::Halves {
+        rule = rule.on_parts();
+    }
     for index in 0..space.cell_count() {
         let x = space.cell_nodes(index);
         let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
