@@ -25,10 +25,7 @@ mod verify;
 use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
-use crate::fem::{
-    assemble::NodeGraph,
-    rigid::{self, RigidMotion},
-};
+use crate::fem::{assemble::NodeGraph, rigid};
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Checked;
 use crate::model::{BodySlot, Exchange, Loads, Mechanism, Model, Segment};
@@ -39,6 +36,7 @@ use crate::scene::Scene;
 use approach::OuterMaker;
 use balance::Forces;
 pub use balance::{Balance, Resultant};
+use carried::{Supported, supported};
 pub use distribute::Graph;
 use draft::{Draft, Loose};
 pub use factory::{Assembled, Factory, Outline};
@@ -417,22 +415,6 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
     }
     axpy(-1.0, &discrete.carried, &mut trace);
     Ok(Some(trace))
-}
-
-/// What supports prescribe.
-struct Supported {
-    /// Displacement by which they move the body as one, one entry a dof; empty for none.
-    carried: Vec<f64>,
-    /// (dof, value) besides it, sorted by dof.
-    prescribed: Vec<(usize, f64)>,
-}
-
-/// What the supports of a body prescribe; `free` are the rigid motions of the free body.
-fn supported<const D: usize>(part: &Part<D>, free: &[RigidMotion]) -> Supported {
-    let prescribed = part.prescribed_sorted();
-    let whole = carried::carried(free, &prescribed).filter(|_| part.springs.is_empty());
-    let (carried, prescribed) = whole.unwrap_or((Vec::new(), prescribed));
-    Supported { carried, prescribed }
 }
 
 /// The rows of these segments for displacements of the nodes.

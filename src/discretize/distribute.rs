@@ -2,9 +2,8 @@
 
 use super::draft::Draft;
 use crate::contact::ContactPair;
-use crate::fem::assemble::Couplings;
 use crate::fem::assemble::NodeGraph;
-use crate::fem::{ElasticBody, Interpolation};
+use crate::fem::{Couplings, ElasticBody, Interpolation};
 use crate::linalg::Csr;
 use crate::model::{Distribution, Exchange};
 use std::rc::Rc;

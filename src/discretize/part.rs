@@ -11,7 +11,7 @@ use crate::fem::assemble::{self, NodalBlock};
 use crate::fem::interpolation::{Interpolation, coarse_nodes, from_vertices};
 use crate::fem::quadrature::Parts;
 use crate::fem::rigid::{self, RigidMotion};
-use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
+use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, support, surface};
 use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};
@@ -269,6 +269,6 @@ impl<'a, const D: usize> Part<'a, D> {
         self.held.frame.turn_matrix(&mut stiffness);
         // rows that other ranks have
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
-        Ok(assemble::support(stiffness, load, prescribed, carried))
+        Ok(support(stiffness, load, prescribed, carried))
     }
 }

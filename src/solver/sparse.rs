@@ -2,7 +2,7 @@
 
 use super::{InnerSolver, RobinMatrix, Split};
 use crate::error::{Error, Kind, Result};
-use crate::fem::{ElasticBody, assemble::Couplings, rigid::FreeMotion};
+use crate::fem::{Couplings, ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, dot};
 use crate::model::{Body, BodyCounts, Distribution, Energy, Matrices, Solved};
 use crate::petsc::Rows;
