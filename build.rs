@@ -109,6 +109,29 @@ const FUNCTIONS: &[&str] = &[
     "VecRestoreArray",
     "VecRestoreArrayRead",
     "VecSetBlockSize",
+    "KSPSetPC",
+    "KSPSetType",
+    "PCCreate",
+    "PCDestroy",
+    "PCShellSetApply",
+    "PCShellSetContext",
+    "PCShellGetContext",
+    "PCShellSetName",
+    "PCShellSetView",
+    "PCView",
+    "PCSetOperators",
+    "PCFactorSetMatSolverType",
+    "ISCreateGeneral",
+    "ISDestroy",
+    "ISGetIndices",
+    "ISGetLocalSize",
+    "ISRestoreIndices",
+    "ISSort",
+    "MatIncreaseOverlap",
+    "MatCreateSubMatrices",
+    "MatDestroySubMatrices",
+    "MatMultTranspose",
+    "MatGetOwnershipRange",
 ];
 
 /// Ends the build with a sentence; cargo shows what a failed build script wrote.
@@ -227,7 +250,7 @@ fn declare(petsc: &[PathBuf]) {
         // One type for communicators in the whole crate: that of the `mpi` crate.
         .blocklist_type("(MPI_Comm|ompi_communicator_t)")
         .raw_line("use mpi::ffi::MPI_Comm;")
-        .allowlist_type("(KSPConvergedReason|MatOption|PCFailedReason|PetscErrorType|PetscBool)")
+        .allowlist_type("(KSPConvergedReason|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool)")
         .dynamic_library_name("Library")
         .dynamic_link_require_all(true);
     for function in FUNCTIONS {

@@ -3,7 +3,7 @@
 use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
-use crate::output::say;
+use crate::output::{Verbosity, say};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::report;
@@ -32,12 +32,38 @@ struct Cli {
 const EXIT_CODES: &str = "Exit codes: 0 converged, 1 not converged (results are written), 2 command line, 3 scene, 4 mesh, \
 5 solver or PETSc option, 6 file system, 130, 143 or 129 ended by SIGINT, SIGTERM or SIGHUP (results are written).";
 
+const SOLVE: &str = "PETSc options go behind the scene, with one dash: for all bodies (-ksp_type cg -pc_type hypre), for the body `upper` \
+(-upper_ksp_type cg), or for the matrix of all bodies in Newton's method (-newton_pc_type hypre). -help lists them; with -v the run \
+says which options each body has.
+
+Examples:
+  winkler solve scene.toml -o results/first
+  winkler solve scene.toml --vtu --report --set mesh.set.n=64
+  winkler solve scene.toml --method robin --set method.gamma=line-search -v
+  winkler solve scene.toml -ksp_type cg -pc_type gamg -ksp_converged_reason
+  mpiexec -n 4 winkler solve scene.toml -q";
+
+const CHECK: &str = "Examples:
+  winkler check scene.toml
+  winkler check scene.toml --set mesh.set.n=64 --json
+  winkler check scene.toml -o pictures";
+
+const SWEEP: &str = "Examples:
+  winkler sweep scene.toml --over method.gamma=0.3,0.6,0.9
+  winkler sweep scene.toml --over contact.0.layer.power.a=0.5,1 --over mesh.set.n=16,32 -o results/sweep";
+
+const BENCH: &str = "Examples:
+  winkler bench scene.toml --over mesh.set.n=16,32,64 --solver mumps,hypre --linear
+  winkler bench scene.toml --solver \"-ksp_type cg -pc_type icc\" --order 1,2 --repeat 3
+  winkler bench a.toml b.toml --method newton,robin --ranks 1,2 --budget 600";
+
 #[derive(Subcommand)]
 enum Command {
     #[command(flatten)]
     Solving(Solving),
     /// Compare meshes, orders, inner solvers, methods and ranks: time, memory, counts and errors
-    Bench(BenchArgs),
+    #[command(after_help = BENCH)]
+    Bench(bench::Request),
     /// Make the mesh of a scene, or find it in the cache, and say what is in it
     Mesh {
         #[command(flatten)]
@@ -58,7 +84,7 @@ enum Command {
         #[arg(short, value_name = "FILE")]
         output: Option<PathBuf>,
     },
-    /// Draw one picture of a run as SVG
+    /// Draw one picture of a run as SVG or PNG
     Plot {
         /// Folder of results
         #[arg(value_name = "DIR")]
@@ -66,7 +92,7 @@ enum Command {
         /// What to draw: stress, displacement, pressure or convergence
         #[arg(value_name = "WHAT")]
         what: String,
-        /// File to write [default: WHAT.svg in the folder]
+        /// File to write, .svg or .png [default: WHAT.svg in the folder]
         #[arg(short, value_name = "FILE")]
         output: Option<PathBuf>,
     },
@@ -79,6 +105,8 @@ enum Command {
         #[arg(long)]
         space: bool,
     },
+    /// Print the JSON schema of scene files, by which editors complete and check them
+    Schema,
     /// Print a script that completes commands and options in a shell
     Completions {
         /// bash, zsh, fish, elvish or powershell
@@ -97,6 +125,7 @@ enum Command {
 #[derive(Subcommand)]
 enum Solving {
     /// Solve a scene and write its results
+    #[command(after_help = SOLVE)]
     Solve {
         #[command(flatten)]
         scene: SceneArgs,
@@ -106,6 +135,9 @@ enum Solving {
         /// Write displacements and stresses of the bodies for ParaView (short for --set output.vtu=true)
         #[arg(long)]
         vtu: bool,
+        /// Write displacements, stresses and contact pressures as views for Gmsh (short for --set output.msh=true)
+        #[arg(long)]
+        msh: bool,
         /// Write a page with pictures and tables of the run, report.html (short for --set output.report=true)
         #[arg(long)]
         report: bool,
@@ -115,8 +147,11 @@ enum Solving {
         /// Go on from the checkpoint in a folder of results
         #[arg(long, value_name = "DIR")]
         restart: Option<PathBuf>,
+        #[command(flatten)]
+        manner: Manner,
     },
     /// Build a scene's problem, solve nothing, and say what is there
+    #[command(after_help = CHECK)]
     Check {
         #[command(flatten)]
         scene: SceneArgs,
@@ -125,6 +160,7 @@ enum Solving {
         output: Option<PathBuf>,
     },
     /// Solve a scene for every combination of values of its keys
+    #[command(after_help = SWEEP)]
     Sweep {
         #[command(flatten)]
         scene: SceneArgs,
@@ -134,7 +170,30 @@ enum Solving {
         /// Key and its values, for example method.gamma=0.3,0.6; may be repeated
         #[arg(long, value_name = "KEY=V1,V2,...", required = true)]
         over: Vec<String>,
+        #[command(flatten)]
+        manner: Manner,
     },
+}
+
+/// How much a command says.
+#[derive(Args, Clone, Copy)]
+struct Manner {
+    /// Say errors, warnings and the folder of the results only
+    #[arg(short, long, conflicts_with_all = ["verbose", "json"])]
+    quiet: bool,
+    /// Say what is decided and why, with the PETSc options of each body, on standard error
+    #[arg(short, long)]
+    verbose: bool,
+}
+
+impl Manner {
+    fn verbosity(self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Verbose,
+            _ => Verbosity::Usual,
+        }
+    }
 }
 
 #[derive(Args)]
@@ -154,78 +213,6 @@ impl OverriddenScene {
     /// All overrides.
     fn overrides(self) -> Vec<String> {
         self.overrides.into_iter().chain(self.trust_geo.then(|| "--trust-geo".to_owned())).collect()
-    }
-}
-
-#[derive(Args)]
-struct BenchArgs {
-    /// Scene files (TOML)
-    #[arg(value_name = "SCENE", required = true)]
-    scenes: Vec<PathBuf>,
-    /// Folder for the results [default: bench in that of solve]
-    #[arg(short, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Key and its values, for example mesh.set.n=16,32,64; may be repeated
-    #[arg(long, value_name = "KEY=V1,V2,...")]
-    over: Vec<String>,
-    /// Inner solvers: mumps,hypre,... or one string of PETSc options; may be repeated [default: all presets]
-    #[arg(long = "solver", value_name = "LIST|OPTIONS", allow_hyphen_values = true)]
-    solvers: Vec<String>,
-    /// Methods [default: the scene's]
-    #[arg(long = "method", value_name = "LIST", value_delimiter = ',')]
-    methods: Vec<String>,
-    /// Element orders of all bodies [default: the scene's]
-    #[arg(long = "order", value_name = "LIST", value_delimiter = ',')]
-    orders: Vec<usize>,
-    /// Numbers of MPI ranks
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1")]
-    ranks: Vec<usize>,
-    /// Runs of each combination; times are their medians
-    #[arg(long, value_name = "N", default_value = "1")]
-    repeat: usize,
-    /// Contact table, or folder of results, that errors are measured against
-    #[arg(long, value_name = "PATH")]
-    against: Option<PathBuf>,
-    /// Seconds after which a run is ended
-    #[arg(long, value_name = "S", default_value = "3600", allow_negative_numbers = true)]
-    timeout: f64,
-    /// Seconds after which no further run begins
-    #[arg(long, value_name = "S", default_value = "inf", allow_negative_numbers = true)]
-    budget: f64,
-    /// Also measure one linear factor-and-solve of the same bodies
-    #[arg(long)]
-    linear: bool,
-    /// Keep the rows that the folder has already
-    #[arg(long)]
-    resume: bool,
-    /// Replace a key of the scene in all runs; may be repeated
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    overrides: Vec<String>,
-    /// Run the meshes' .geo scripts even if they can start programs or write files
-    #[arg(long)]
-    trust_geo: bool,
-}
-
-impl BenchArgs {
-    fn request(mut self, petsc: Vec<String>) -> bench::Request {
-        self.overrides.extend(self.trust_geo.then(|| "trust_geo=true".to_owned()));
-        bench::Request {
-            scenes: self.scenes,
-            folder: self.output,
-            overrides: self.overrides,
-            over: self.over,
-            solvers: self.solvers,
-            methods: self.methods,
-            orders: self.orders,
-            ranks: self.ranks,
-            repeat: self.repeat,
-            against: self.against,
-            timeout: self.timeout,
-            budget: self.budget,
-            linear: self.linear,
-            resume: self.resume,
-            petsc,
-        }
     }
 }
 
@@ -265,25 +252,14 @@ impl SceneArgs {
     }
 }
 
-/// Flags of the program that begin with two dashes: with one they look like PETSc's.
-const TWO_DASHES: [&str; 16] = [
-    "-report",
-    "-trust-geo",
-    "-set",
-    "-json",
-    "-method",
-    "-estimate",
-    "-tolerance",
-    "-vtu",
-    "-checkpoint",
-    "-restart",
-    "-over",
-    "-solver",
-    "-order",
-    "-ranks",
-    "-repeat",
-    "-against",
-];
+/// The option of the program, without its dashes, that a word with one dash may mean: it looks like one of PETSc.
+fn two_dashes(petsc: &[String]) -> Option<String> {
+    let command = Cli::command();
+    let known = command.get_subcommands().flat_map(clap::Command::get_arguments).filter_map(clap::Arg::get_long);
+    let known: Vec<&str> = known.filter(|name| name.len() > 1 && *name != "help").collect();
+    let bare = petsc.iter().filter_map(|word| word.strip_prefix('-'));
+    bare.filter(|word| known.contains(word)).map(str::to_owned).next()
+}
 
 /// Runs the program with the words of its command line, the name first; returns the exit code.
 pub fn run(words: Vec<OsString>) -> i32 {
@@ -297,9 +273,9 @@ pub fn run(words: Vec<OsString>) -> i32 {
         }
     };
     let (program, petsc) = options::split(words);
-    if let Some(flag) = TWO_DASHES.iter().find(|flag| petsc.iter().any(|word| word == *flag)) {
-        let error = Error::new(Kind::Usage, format!("PETSc knows no option {flag}"));
-        return complain(&error.help(format!("did you mean -{flag}?")));
+    if let Some(flag) = two_dashes(&petsc) {
+        let error = Error::new(Kind::Usage, format!("PETSc knows no option -{flag}"));
+        return complain(&error.help(format!("did you mean --{flag}?")));
     }
     let bare_help = program.is_empty() && petsc.iter().any(|word| word == "-help");
     let program = if bare_help { vec!["--help".to_owned()] } else { program };
@@ -331,12 +307,16 @@ pub fn run(words: Vec<OsString>) -> i32 {
     cli.color.write_global();
     let alone = match cli.command {
         Command::New { folder, space } => new::new(&folder, space),
+        Command::Schema => say(format_args!("{:#}", crate::scene::schema())).map(|()| 0),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "winkler", &mut std::io::stdout());
             Ok(0)
         }
         Command::Man { folder } => manual(&folder),
-        Command::Bench(arguments) => bench::bench(&interrupt, &arguments.request(petsc)),
+        Command::Bench(mut request) => {
+            request.petsc = petsc;
+            bench::bench(&interrupt, &request)
+        }
         Command::Mesh { scene, output, json } => {
             let (scene, overrides) = (scene.scene.clone(), scene.overrides());
             mesh::mesh(&interrupt, &mesh::Request { scene, overrides, output, json })
@@ -388,25 +368,24 @@ fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i3
 
 fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Result<i32> {
     match command {
-        Solving::Solve { scene, output, vtu, report, checkpoint, restart } => {
+        Solving::Solve { scene, output, vtu, msh, report, checkpoint, restart, manner } => {
             let mut overrides = scene.overrides();
-            overrides.extend(vtu.then(|| "--vtu".to_owned()));
-            overrides.extend(report.then(|| "--report".to_owned()));
+            let flags = [(vtu, "--vtu"), (msh, "--msh"), (report, "--report")];
+            overrides.extend(flags.iter().filter(|(given, _)| *given).map(|(_, flag)| (*flag).to_owned()));
             overrides.extend(checkpoint.map(|minutes| format!("--checkpoint {minutes}")));
-            let request = solve::Request { scene: scene.scene, folder: output, restart, overrides, json: scene.json };
+            let (json, verbosity) = (scene.json, manner.verbosity());
+            let request = solve::Request { scene: scene.scene, folder: output, restart, overrides, json, verbosity };
             solve::solve(session, interrupt, request)
         }
         Solving::Check { scene, output } => {
             let overrides = scene.overrides();
             check::check(session, interrupt, scene.scene, overrides, scene.json, output)
         }
-        Solving::Sweep { scene, output, over } => {
+        Solving::Sweep { scene, output, over, manner } => {
             let overrides = scene.overrides();
-            sweep::sweep(
-                session,
-                interrupt,
-                sweep::Request { scene: scene.scene, folder: output, overrides, over, json: scene.json },
-            )
+            let (json, verbosity) = (scene.json, manner.verbosity());
+            let request = sweep::Request { scene: scene.scene, folder: output, overrides, over, json, verbosity };
+            sweep::sweep(session, interrupt, request)
         }
     }
 }

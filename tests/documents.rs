@@ -137,6 +137,22 @@ fn commands_are_found_in_their_blocks() {
     assert_eq!(found, expected.map(|(line, text)| (line, text.to_owned())));
 }
 
+/// Pieces of sources in the documents: blocks whose first line names their file, and that stand there line for line.
+#[test]
+fn the_pieces_of_sources_in_the_documents_are_those_of_the_sources() {
+    let text = fs::read_to_string(root().join("docs/extending.md")).expect("a document");
+    let blocks = text.split("```rust\n").skip(1).chain(text.split("```toml\n").skip(1));
+    let mut seen = 0;
+    for block in blocks.filter_map(|rest| rest.split("\n```").next()) {
+        let (first, piece) = block.split_once('\n').expect("a file and its lines");
+        let file = first.trim_start_matches(['/', '#', ' ']);
+        let source = fs::read_to_string(root().join(file)).unwrap_or_else(|cause| panic!("{file}: {cause}"));
+        assert!(source.contains(piece), "{file} has no longer\n{piece}");
+        seen += 1;
+    }
+    assert!(seen > 10, "{seen}");
+}
+
 /// A command that fails is told of, with its place.
 #[test]
 fn a_wrong_command_fails() {

@@ -154,7 +154,7 @@ fn scenes_are_solved_or_refused() {
         true,
     );
     refused(&|s| s.bodies[0] = BodySpec::new("lwer", 1.0, 0.3).fix("base", [Some(0.0); 2]), "`lower`?", true);
-    refused(&|s| s.contacts[0].layer = LayerSpec::power(1.0, 2.0), "must not exceed 1", false);
+    refused(&|s| s.contacts[0].layer = LayerSpec::power(1.0, 2.0), "must not exceed 1", true);
     refused(&|s| s.contacts[0].layer = LayerSpec::Own("flim".into()), "no law of a layer is called `flim`", false);
     let own = |s: &mut Scene| {
         *s = s.clone().law("lazy", |_| Lazy);
@@ -184,15 +184,18 @@ fn scenes_that_contradict_themselves_are_refused() {
     refused(&|s| s.bodies.clear(), "no body");
     refused(&|s| s.bodies.push(s.bodies[0].clone()), "two bodies are called `lower`");
     refused(&|s| s.bodies.push(BodySpec::new("Ksp!", 1.0, 0.0)), "cannot be the name of a body");
-    refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [None; 2]), "holds some components");
-    refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [Some(0.0); 3]), "z in a plane problem");
-    refused(&|s| s.contacts.push(s.contacts[0].clone()), "the same pair, twice");
+    refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [None; 2]), "holds no component");
+    refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [Some(0.0); 3]), "`z` in a plane problem");
+    refused(&|s| s.contacts.push(s.contacts[0].clone()), "a second contact of `below` and `above`");
     refused(&|s| s.contacts[0].angle = 2.0 * ANGLE, "the angle is 120");
-    refused(&|s| s.contacts[0].layer = LayerSpec::Table(vec![[1.0, 1.0], [2.0, 1.0]]), "table of the law is 0");
-    refused(&|s| s.contacts[0].layer = LayerSpec::Table(Vec::new()), "points of the law is 0");
+    refused(
+        &|s| s.contacts[0].layer = LayerSpec::Table(vec![[1.0, 1.0], [2.0, 1.0]]),
+        "the pressure 1 of the table does not exceed 1",
+    );
+    refused(&|s| s.contacts[0].layer = LayerSpec::Table(Vec::new()), "the table has no point");
     refused(&|s| s.method.gamma = Gamma::Stationary(-0.5), "gamma is -0.5");
     refused(&|s| s.method.gamma = Gamma::Schedule(Vec::new()), "has no value");
-    refused(&|s| s.method.stop.residual = Some(f64::NAN), "tolerance of `stop` is NaN");
+    refused(&|s| s.method.stop.residual = Some(f64::NAN), "the tolerance is NaN");
     refused(&|s| s.method.stop.residual = None, "has a tolerance");
     refused(&|s| s.method.steps = History::of_shares(vec![0.5, 0.75]), "not the full load");
     refused(&|s| s.method.start = Start::Nested, "only the command line");

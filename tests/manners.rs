@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{environment, output, solve, winkler};
+use common::{case, environment, output, solve, winkler};
 use std::fs;
 use std::process::Command;
 use std::time::Duration;
@@ -58,4 +58,65 @@ fn colours_are_asked_for() {
     assert!(!coloured(&[], None) && coloured(&["--color", "always"], None));
     assert!(coloured(&[], Some(("CLICOLOR_FORCE", "1"))));
     assert!(!coloured(&["--color", "never"], Some(("CLICOLOR_FORCE", "1"))));
+}
+
+/// With `-q` a run that is solved says where its results are; one that is not says so, too. Warnings stay.
+#[test]
+fn quiet_runs_say_what_matters() {
+    let small = ["--set", "mesh.set.n=4"];
+    let run = solve(case("groove"), &[&small[..], &["-q"]].concat()).converged();
+    assert_eq!(run.stdout.trim_start(), format!("results in {}\n", run.folder.display()), "{}", run.said());
+    assert!(run.stderr.is_empty(), "{}", run.stderr);
+    let slow = ["-q", "--method", "robin", "--set", "method.stop={residual=1e-8,iterations=2}"];
+    let run = solve(case("groove"), &[&small[..], &slow].concat());
+    assert_eq!(run.code, 1, "{}", run.said());
+    let lines: Vec<&str> = run.stdout.lines().collect();
+    assert!(lines.len() == 2 && lines[0].contains("not converged") && lines[1].contains("results in"), "{lines:?}");
+    let free = ["-q", "--method", "newton", "--set", "body.upper.fix=[]"];
+    let run = solve(case("groove"), &[&small[..], &free].concat());
+    assert!(run.stdout.contains("warning: "), "{}", run.said());
+    for words in [["-q", "-v"], ["-q", "--json"]] {
+        let run = solve(case("groove"), &words);
+        assert!(run.code == 2 && run.stderr.contains("cannot be used with"), "{}", run.said());
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let (scene, out) = (case("groove").display().to_string(), folder.path().join("runs").display().to_string());
+    let all = winkler(&["sweep", &scene, "-q", "--over", "mesh.set.n=4,8", "--set", "method={}", "-o", &out]);
+    assert_eq!((all.code, all.stdout.trim()), (0, format!("results in {out}").as_str()), "{}", all.said());
+    let all = winkler(&["bench", &scene, "-q", "--solver", "mumps", "--set", "mesh.set.n=4", "-o", &out]);
+    assert_eq!((all.code, all.stdout.trim()), (0, format!("results in {out}").as_str()), "{}", all.said());
+}
+
+/// With `-v` standard error has the decisions and the PETSc options of each body, typed ones and the program's own.
+#[test]
+fn verbose_runs_say_what_was_decided() {
+    let words = ["--set", "mesh.set.n=4", "--method", "robin", "--set", "solver=mumps", "-upper_ksp_type", "cg"];
+    let usual = solve(case("groove"), &words);
+    let run = solve(case("groove"), &[&words[..], &["-v"]].concat());
+    let without = |text: &str| text.lines().filter(|line| !line.contains(" s")).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(without(&run.stdout).len(), without(&usual.stdout).len(), "what comes out is the same");
+    assert!(usual.stderr.is_empty(), "{}", usual.stderr);
+    for part in ["decided", "method: robin", "until increment <=", "inner solver: ", "points on `", "body lower: "] {
+        assert!(run.stderr.contains(part), "no `{part}` in\n{}", run.stderr);
+    }
+    let options = |body: &str| {
+        let begin = format!("  PETSc options of {body}: ");
+        run.stderr.lines().find_map(|line| line.strip_prefix(&begin)).unwrap_or_default().to_owned()
+    };
+    assert!(options("upper").contains("-upper_ksp_type cg"), "{}", run.stderr);
+    assert!(options("lower").contains("-lower_pc_type cholesky"), "{}", run.stderr);
+    assert!(!options("lower").contains("upper"), "{}", run.stderr);
+}
+
+#[test]
+fn help_has_examples_and_petsc_options() {
+    for command in ["solve", "check", "sweep", "bench"] {
+        let help = winkler(&[command, "--help"]);
+        assert!(help.code == 0 && help.stdout.contains("Examples:\n  winkler "), "{}", help.said());
+    }
+    let help = winkler(&["solve", "--help"]).stdout;
+    assert!(help.contains("-upper_ksp_type cg") && help.contains("-newton_pc_type"), "{help}");
+    // options of the program with one dash look like PETSc's
+    let slip = winkler(&["solve", "scene.toml", "-verbose"]);
+    assert!(slip.code == 2 && slip.stderr.contains("did you mean --verbose?"), "{}", slip.said());
 }

@@ -165,6 +165,42 @@ fn refused(run: &Run, code: i32, words: &[&str]) {
     words.iter().for_each(|word| assert!(run.stderr.contains(word), "no `{word}`\n{}", run.said()));
 }
 
+/// Width and height of a PNG, and how many different colours it has.
+fn png(path: &Path) -> ([u32; 2], usize) {
+    let pixels = resvg::tiny_skia::Pixmap::load_png(path).expect("a PNG");
+    let colors: std::collections::BTreeSet<[u8; 4]> =
+        pixels.pixels().iter().map(|p| [p.red(), p.green(), p.blue(), p.alpha()]).collect();
+    ([pixels.width(), pixels.height()], colors.len())
+}
+
+/// The picture of bodies in space has the triangles that face the viewer: of two boxes three faces each.
+#[test]
+fn bodies_in_space_and_contact_surfaces_are_drawn_as_svg_and_png() {
+    let run = solve(case("patch-3d"), &["--vtu"]).converged();
+    let folder = run.folder.to_str().expect("a name");
+    let drawn = winkler(&["plot", folder, "displacement"]);
+    assert_eq!(drawn.code, 0, "{}", drawn.said());
+    let svg = fs::read_to_string(drawn.stdout.trim()).expect("a picture");
+    let shown: usize = svg.matches('M').count();
+    let facets: u64 = (0..2).map(|k| run.report["bodies"][k]["boundary_facets"].as_u64().expect("a number")).sum();
+    assert!(shown as u64 > facets / 3 && (shown as u64) < 2 * facets / 3, "{shown} of {facets}");
+    // text takes pixels of other colours than the bands: both are there, on white
+    let file = run.folder.join("displacement.png");
+    let drawn = winkler(&["plot", folder, "displacement", "-o", file.to_str().expect("a name")]);
+    assert_eq!(drawn.code, 0, "{}", drawn.said());
+    let ([width, height], colors) = png(&file);
+    assert!(width > 1000 && height > 500 && colors > 100, "{width} {height} {colors}");
+    // the pressure on the facets of the joint, the same everywhere: all of it in the last colour
+    let drawn = winkler(&["plot", folder, "pressure"]);
+    let svg = fs::read_to_string(drawn.stdout.trim()).expect("a picture");
+    assert!(svg.contains("fill=\"#fee825\" d=\"M") && !svg.contains("<circle"), "{svg}");
+    let plots = [("convergence", run.folder.join("c.png"))];
+    for (what, file) in plots {
+        assert_eq!(winkler(&["plot", folder, what, "-o", file.to_str().expect("a name")]).code, 0);
+        assert_eq!(png(&file).0, [1800, 1120], "{what}");
+    }
+}
+
 #[test]
 fn what_cannot_be_shown_is_refused() {
     let run = solve(case("patch-3d"), &["--vtu"]).converged();
@@ -173,8 +209,8 @@ fn what_cannot_be_shown_is_refused() {
     refused(&winkler(&["report", "nowhere"]), 6, &["nowhere", "report.json", "winkler solve"]);
     refused(&winkler(&["report", &folder, "-o", "no/page.html"]), 6, &["no/page.html"]);
     refused(&winkler(&["plot", &folder, "stres"]), 2, &["`stres`", "did you mean `stress`?"]);
-    refused(&winkler(&["plot", &folder, "pressure", "-o", "p.png"]), 2, &["p.png", "SVG"]);
-    refused(&winkler(&["plot", &folder, "stress"]), 6, &["space", "winkler report"]);
+    refused(&winkler(&["plot", &folder, "pressure", "-o", "p.pdf"]), 2, &["p.pdf", "SVG or PNG"]);
+    refused(&winkler(&["plot", &folder, "pressure", "-o", "no/p.png"]), 6, &["no/p.png"]);
     refused(&winkler(&["plot", "nowhere", "pressure"]), 6, &["report.json"]);
     let broken = |name: &str, text: &str, words: &[&str]| {
         let path = run.folder.join(name);

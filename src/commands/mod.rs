@@ -10,6 +10,7 @@ mod curves;
 pub mod mesh;
 pub mod new;
 mod reuse;
+mod said;
 mod series;
 mod shown;
 pub mod solve;

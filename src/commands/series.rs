@@ -3,10 +3,12 @@
 use super::shown;
 use crate::error::Result;
 use crate::output::collection::{Entry, write_pvd};
+use crate::output::gmsh::Tags;
 use crate::output::{Folder, safe_name};
 use crate::run::report;
 use crate::run::results::{All, Recovered};
 use crate::run::stages::Done;
+use std::io::Write;
 
 /// Folder of the files of steps but the last.
 const FOLDER: &str = "steps";
@@ -39,8 +41,35 @@ pub fn write(done: &Done, recovered: &All, folder: &Folder, first: bool) -> Resu
 /// # Errors
 /// Those of [`write`].
 pub fn write_last(done: &Done, recovered: &All, folder: &Folder, first: bool) -> Result<()> {
+    if done.built.scene.output.msh {
+        views(done, recovered, folder, first)?;
+    }
+    if !done.built.scene.output.vtu {
+        return Ok(());
+    }
     fields(done, recovered, folder, first, &|name| format!("{}.vtu", safe_name(name)))?;
     if first { collection(done, folder, true) } else { Ok(()) }
+}
+
+/// Writes bodies and contact surfaces for Gmsh, each file with tags of its own.
+fn views(done: &Done, recovered: &All, folder: &Folder, first: bool) -> Result<()> {
+    let discrete = &done.built.discrete;
+    let mut tags = Tags::default();
+    for (info, recovered) in discrete.bodies.iter().zip(recovered) {
+        if let Some(Ok(recovered)) = recovered {
+            let recovered: &Recovered = recovered;
+            let write = |out: &mut dyn Write| recovered.field(info).clone().into_grid()?.write_msh(tags, out);
+            folder.write(&format!("{}.msh", safe_name(&info.name)), write)?;
+        }
+        tags = Tags { entity: tags.entity + 1, points: tags.points + info.nodes, cells: tags.cells + info.cells };
+    }
+    for (i, name) in shown::stems(done).into_iter().enumerate().filter(|_| first) {
+        let grid = report::contact_surface(&name, done, i);
+        folder.write(&format!("{name}.msh"), |out| grid.write_msh(tags, out))?;
+        let (points, cells) = (grid.points.len(), grid.connectivity.len() / grid.cell.stride());
+        tags = Tags { entity: tags.entity + 1, points: tags.points + points, cells: tags.cells + cells };
+    }
+    Ok(())
 }
 
 fn fields(done: &Done, recovered: &All, folder: &Folder, first: bool, file: &dyn Fn(&str) -> String) -> Result<()> {

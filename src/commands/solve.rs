@@ -3,10 +3,11 @@
 use super::adapt::Plan;
 use super::checkpoint::{self, Checkpoint};
 use super::write::{Writing, to_json};
-use super::{folder_of, load, series};
+use super::{folder_of, load, said, series};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
+use crate::output::progress::Line;
 use crate::output::{Folder, HistoryWriter, IterationTable, StepTable, Verbosity, say};
 use crate::parallel::{agree, share};
 use crate::petsc::Session;
@@ -30,6 +31,8 @@ pub struct Request {
     pub overrides: Vec<String>,
     /// Whether to print the report as JSON instead of the table.
     pub json: bool,
+    /// How much to say.
+    pub verbosity: Verbosity,
 }
 
 /// Solves a scene, writes its results and returns the exit code.
@@ -38,13 +41,14 @@ pub struct Request {
 /// Everything that keeps the run from starting, and failures of the file system. Not converging is an exit code, and all
 /// that was computed is written.
 pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Result<i32> {
-    let mut clock = Clock::default();
+    let first = session.rank() == 0;
+    let is_loud = first && !request.json && request.verbosity != Verbosity::Quiet;
+    let mut clock = said::watched(is_loud);
     let scene = load(session, &request.scene, &request.overrides)?;
     let read = |folder: &PathBuf| Checkpoint::read(folder, &scene);
     let kept = agree(session, request.restart.as_ref().map(read).transpose())?;
     let folder = agree(session, Folder::create(folder_of(&scene, request.folder)))?;
     let path = folder.path();
-    let first = session.rank() == 0;
     let mut plan = Plan::new(session, scene, kept, interrupt, &mut clock)?;
     // one rank has the clock
     let asking = Asking::new(interrupt, plan.scene.output.checkpoint.filter(|_| first));
@@ -55,9 +59,13 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         let ready = run::set_up(session, built, begin, &mut clock)?;
         let all = session.options().all()?;
         let monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
-        let verbosity = if request.json || monitored || !first { Verbosity::Quiet } else { Verbosity::Table };
+        if request.verbosity == Verbosity::Verbose {
+            let decided = said::decisions(session, &ready)?;
+            decided.iter().filter(|_| first).for_each(|line| eprintln!("{line}"));
+        }
+        let stop = &plan.scene.method.stop;
         let mut watchers = Watchers {
-            table: IterationTable::new(verbosity, &run::targets(&plan.scene)),
+            table: IterationTable::new(is_loud && !monitored, &run::targets(&plan.scene), stop.residual),
             history: if first { Some(history(&folder, &ready.built)?) } else { None },
             steps: if first { steps(&folder, &ready)? } else { None },
             folder: &folder,
@@ -95,6 +103,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
             agree(session, failed.and(written))?;
         }
     };
+    let line = is_loud.then(|| Line::new("stresses and files", None));
     let writing = Writing { session, path, plan: &plan, done: &done, estimate: estimate.as_ref(), fields: true };
     let (report, written) = writing.all(&mut clock, |report| {
         if let Some(limit) = &plan.limit {
@@ -106,6 +115,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         true => written.and(page(&done, path, first)),
         false => written,
     };
+    drop(line);
     let code = if plan.limit.is_some() { 1 } else { report::exit_code(&done) };
     if first {
         let file = path.join(checkpoint::FILE);
@@ -116,15 +126,16 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         if request.json {
             say(to_json(&report)?.trim_end())?;
         } else {
-            let solvers: Vec<String> = report.bodies.iter().map(|body| body.solver.clone()).collect();
             let again = if saved && code > 1 { "; --restart with this folder goes on" } else { "" };
-            say(format_args!(
-                "{}\n  inner solver: {} ({})\n  results in {}{again}",
-                report.summary(),
-                report::solvers_in_words(&solvers),
-                done.built.choice,
-                path.display()
-            ))?;
+            let results = format!("  results in {}{again}", path.display());
+            say(match request.verbosity {
+                Verbosity::Quiet => said::briefly(&report, code, &results),
+                _ => {
+                    let solvers: Vec<String> = report.bodies.iter().map(|body| body.solver.clone()).collect();
+                    let (solvers, choice) = (report::solvers_in_words(&solvers), &done.built.choice);
+                    format!("{}\n  inner solver: {solvers} ({choice})\n{results}", report.summary())
+                }
+            })?;
         }
     }
     failed.and(written)?;

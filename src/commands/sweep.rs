@@ -1,11 +1,13 @@
 //! `winkler sweep`: a scene over values of its keys, one row a run.
 
-use super::{curves, folder_of, reuse};
+use super::{curves, folder_of, reuse, said};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::steps::{vector_columns, vector_fields};
-use crate::output::{ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, busiest, say, sci};
+use crate::output::{
+    ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, Verbosity, busiest, progress, say, sci,
+};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::run;
@@ -31,6 +33,8 @@ pub struct Request {
     pub over: Vec<String>,
     /// Whether to print the reports as a JSON list.
     pub json: bool,
+    /// How much to say.
+    pub verbosity: Verbosity,
 }
 
 /// Runs a scene for every combination of values and writes `sweep.csv`, `convergence.svg` and `pressure.svg`; returns the
@@ -56,12 +60,19 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     let mut shown = None;
     let mut before = None;
     let mut watched = Watched(Asking::new(interrupt, None));
+    let is_loud = first && !request.json && request.verbosity != Verbosity::Quiet;
+    let bar = progress::runs(runs.len(), is_loud);
     for (scene, values) in scenes.iter().zip(&runs) {
         let mut clock = Clock::default();
+        bar.set_message(label(&axes, values));
         let built = reuse::build(session, scene.clone(), before.take(), interrupt, &mut clock)?;
         let header = header(&axes, &built);
         agree(session, same(columns.get_or_insert_with(|| header.clone()), &header, &label(&axes, values)))?;
         let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
+        if request.verbosity == Verbosity::Verbose {
+            let decided = said::decisions(session, &ready)?;
+            bar.suspend(|| decided.iter().filter(|_| first).for_each(|line| eprintln!("{line}")));
+        }
         let done = run::iterate(ready, interrupt, &mut watched, &mut clock)?;
         clock.total();
         let report = report::report(session, &done, &results::recover(&done), &clock);
@@ -81,13 +92,12 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         };
         table.push(&line(values, &report, scene.dimension.value));
         table.check()?;
-        if !request.json {
-            say(format_args!(
-                "{label}: {}, {} iterations, residual {}",
-                report.status,
-                report.iterations,
-                sci(report.residual.unwrap_or(f64::NAN), 2)
-            ))?;
+        bar.inc(1);
+        // with `-q` runs that are solved say nothing
+        if is_loud || (!request.json && report::exit_code(&done) != 0) {
+            let (status, iterations) = (&report.status, report.iterations);
+            let residual = sci(report.residual.unwrap_or(f64::NAN), 2);
+            bar.suspend(|| say(format_args!("{label}: {status}, {iterations} iterations, residual {residual}")))?;
         }
         histories.push(curves::convergence(&label, &done.outcome));
         let pairs = &done.model().pairs;
@@ -105,6 +115,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         }
         before = Some(done);
     }
+    bar.finish_and_clear();
     if first {
         if scenes[0].output.plots {
             plots(&folder, &scenes[0].title, &histories, pressures, reference)?;

@@ -43,7 +43,7 @@ impl Writing<'_> {
             change(&mut report);
             report
         };
-        let fields = self.fields && done.built.scene.output.vtu;
+        let fields = self.fields && (done.built.scene.output.vtu || done.built.scene.output.msh);
         let first = session.rank() == 0;
         // names of a snapshot are no reason for others
         let folder = match Folder::create(path) {
@@ -109,7 +109,11 @@ impl Writing<'_> {
             names.push(crate::report::FILE.to_owned());
         }
         if fields {
-            names.extend(self.done.built.discrete.bodies.iter().map(|body| format!("{}.vtu", body.name)));
+            let output = &self.done.built.scene.output;
+            for (_, ending) in [(output.vtu, "vtu"), (output.msh, "msh")].iter().filter(|(is_written, _)| *is_written) {
+                let bodies = &self.done.built.discrete.bodies;
+                names.extend(bodies.iter().map(|body| format!("{}.{ending}", body.name)));
+            }
         }
         names.extend(["history.csv", "report.json"].map(str::to_owned));
         names.extend(Some("steps.csv".to_owned()).filter(|_| !self.done.steps.is_empty()));

@@ -30,6 +30,8 @@ pub struct BodyCounts {
     pub factorizations: usize,
     /// Dense factorisations of the Robin matrices of condensed bodies.
     pub dense_factorizations: usize,
+    /// Exact solves near the contact made instead of preconditioner set-ups.
+    pub patches: usize,
     /// Symbolic factorisations (patterns analysed).
     pub symbolic: usize,
     /// Numeric factorisations of K that an earlier run has left.
@@ -54,6 +56,7 @@ impl std::ops::AddAssign for BodyCounts {
     fn add_assign(&mut self, other: Self) {
         self.factorizations += other.factorizations;
         self.dense_factorizations += other.dense_factorizations;
+        self.patches += other.patches;
         self.symbolic += other.symbolic;
         self.factorizations_avoided += other.factorizations_avoided;
         self.solves += other.solves;

@@ -9,10 +9,13 @@ pub mod contact;
 pub mod contacts;
 pub mod folder;
 mod format;
+pub mod gmsh;
 pub mod history;
 mod largest;
 #[cfg(feature = "cli")]
 pub mod plot;
+#[cfg(feature = "cli")]
+pub mod progress;
 pub mod report;
 pub mod rows;
 pub mod steps;

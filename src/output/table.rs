@@ -4,18 +4,21 @@
 //! Piped output stays free of both.
 
 use super::format::{sci, seconds};
+use super::progress::left;
 use crate::ddm::{Observer, Row};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
-/// How much the iteration says while it runs.
+/// How much a command says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verbosity {
-    /// The table and the progress line, each where there is a terminal.
-    Table,
-    /// Notes only.
+    /// Errors, warnings, and where the results are.
     Quiet,
+    /// Tables and progress lines where there is a terminal, and what came out.
+    Usual,
+    /// Besides, what is decided and why.
+    Verbose,
 }
 
 /// Prints one line per iteration: all up to 20, every 10th up to 200, every 100th after that, and always the last.
@@ -26,18 +29,21 @@ pub struct IterationTable {
     notes: Box<dyn Write>,
     bar: ProgressBar,
     target: String,
+    /// Residual that ends the iteration, for the time that is left.
+    tolerance: Option<f64>,
+    first: Option<(f64, f64)>,
     columns: Option<Columns>,
     /// Last row, as long as it is not printed.
     waiting: Option<Row>,
 }
 
 impl IterationTable {
-    /// A table on this process's terminal; `target` says in words when the iteration stops ("residual < 1e-8").
-    pub fn new(verbosity: Verbosity, target: &str) -> Self {
-        let loud = verbosity == Verbosity::Table;
+    /// A table on this process's terminal, if it is `loud`; `target` says in words when the iteration stops ("residual < 1e-8"),
+    /// `tolerance` by which residual.
+    pub fn new(loud: bool, target: &str, tolerance: Option<f64>) -> Self {
         let bar = if loud && io::stderr().is_terminal() {
             let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-            if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_msg}") {
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}") {
                 bar.set_style(style);
             }
             bar.set_message(format!("before the first sweep, until {target}"));
@@ -48,11 +54,13 @@ impl IterationTable {
         };
         let stdout = io::stdout();
         let table = (loud && stdout.is_terminal()).then(|| Box::new(stdout) as Box<dyn Write>);
-        Self::on(table, Box::new(io::stderr()), bar, target)
+        let mut table = Self::on(table, Box::new(io::stderr()), bar, target);
+        table.tolerance = tolerance;
+        table
     }
 
     fn on(table: Option<Box<dyn Write>>, notes: Box<dyn Write>, bar: ProgressBar, target: &str) -> Self {
-        Self { table, notes, bar, target: target.into(), columns: None, waiting: None }
+        Self { table, notes, bar, target: target.into(), tolerance: None, first: None, columns: None, waiting: None }
     }
 
     /// Prints the last row, if it is not there yet, and takes the progress line away. Dropping does the same.
@@ -85,12 +93,14 @@ fn put(bar: &ProgressBar, out: &mut dyn Write, text: &str) {
 
 impl Observer for IterationTable {
     fn row(&mut self, row: &Row) {
+        let (residual, began) = *self.first.get_or_insert((row.residual, row.seconds));
+        let to_go = self.tolerance.map(|tolerance| time_left(row, residual, began, tolerance));
         self.bar.set_message(format!(
-            "iteration {}, residual {}, until {}, {} s",
+            "iteration {}, residual {}, until {}{}",
             row.iteration,
             sci(row.residual, 2),
             self.target,
-            seconds(row.seconds)
+            left(to_go)
         ));
         if shown(row.iteration) {
             self.print(row);
@@ -110,6 +120,12 @@ impl Drop for IterationTable {
     fn drop(&mut self) {
         self.finish();
     }
+}
+
+/// Seconds to a residual if it goes on to fall as it did on average since it was `first` at the time `began`; not finite if it does not
+/// fall.
+fn time_left(row: &Row, first: f64, began: f64, tolerance: f64) -> f64 {
+    (row.residual / tolerance).ln() / (first / row.residual).ln().max(0.0) * (row.seconds - began)
 }
 
 /// Whether iteration `k` has a line of its own in a long run.
@@ -220,6 +236,13 @@ mod tests {
 
     fn iterations(lines: &[String]) -> Vec<usize> {
         lines.iter().skip(1).map(|l| l.split_whitespace().next().unwrap().parse().unwrap()).collect()
+    }
+
+    #[test]
+    fn the_time_left_is_that_of_the_mean_rate() {
+        let at = |residual: f64, seconds: f64| time_left(&Row { residual, seconds, ..Row::default() }, 1.0, 1.0, 1e-8);
+        assert!((at(1e-2, 5.0) - 12.0).abs() < 1e-9, "two digits of eight in four seconds");
+        assert!(!at(1.0, 5.0).is_finite() && !at(2.0, 5.0).is_finite());
     }
 
     #[test]

@@ -106,8 +106,16 @@ impl BodyField {
     /// # Errors
     /// Those of `out`, and `InvalidInput` when the arrays do not fit each other.
     pub fn write(self, encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
+        self.into_grid()?.write(encoding, out)
+    }
+
+    /// The field as a grid with the arrays that [`Self::write`] names.
+    ///
+    /// # Errors
+    /// `InvalidInput` when the arrays do not fit each other.
+    pub fn into_grid(self) -> io::Result<Grid> {
         self.check().map_err(|what| io::Error::new(io::ErrorKind::InvalidInput, what))?;
-        let grid = Grid {
+        Ok(Grid {
             title: self.name,
             points: self.points,
             cell: self.cell,
@@ -119,8 +127,7 @@ impl BodyField {
                 ("principal".to_owned(), 3, self.principal.into_flattened()),
             ],
             at_cells: Vec::new(),
-        };
-        grid.write(encoding, out)
+        })
     }
 
     /// Says what does not fit: ParaView would crash on it, or show another body's values.

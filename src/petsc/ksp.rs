@@ -4,6 +4,7 @@ use super::error::string;
 use super::library::petsc;
 use super::matrix::same;
 use super::mumps::ROOM;
+use super::patch::Patched;
 use super::table::text;
 use super::vector::Vector;
 use super::{ConvergedReason, FAMILIES, Int, Matrix, Scope, Session, ffi, print};
@@ -69,6 +70,8 @@ pub struct Ksp {
     pub(super) failed_at: Cell<Option<u64>>,
     /// Whether a solve writes to its right-hand side.
     writes_to_b: bool,
+    /// What stands around the preconditioner.
+    pub(super) patched: Option<Patched>,
     prefix: String,
     scope: Scope,
     session: Session,
@@ -98,6 +101,7 @@ impl Ksp {
             updates: Rc::default(),
             failed_at: Cell::new(None),
             writes_to_b: false,
+            patched: None,
             prefix: prefix.to_owned(),
             scope,
             session: session.clone(),
@@ -108,6 +112,27 @@ impl Ksp {
             petsc!(KSPSetOptionsPrefix(ksp, prefix.as_ptr()))?;
             petsc!(KSPSetErrorIfNotConverged(ksp, ffi::PetscBool_PETSC_FALSE))?;
         }
+        Ok(solver)
+    }
+
+    /// A factorisation by MUMPS of a symmetric positive definite matrix of this process, whatever options say. What it comes to is told by
+    /// [`failure`](Self::failure).
+    ///
+    /// # Errors
+    /// PETSc's.
+    pub(super) fn factored(session: &Session, matrix: ffi::Mat, rows: usize) -> Result<Ksp> {
+        let mut solver = Self::of(session, Scope::Process, "")?;
+        let new = || Vector::new(session, Scope::Process, rows, 1);
+        (solver.vectors, solver.rows) = (Some([new()?, new()?]), rows);
+        let pc = solver.pc()?;
+        // SAFETY: solver and preconditioner of this wrapper, which take references to the matrix.
+        unsafe {
+            petsc!(KSPSetOperators(solver.ksp, matrix, matrix))?;
+            petsc!(KSPSetType(solver.ksp, c"preonly".as_ptr()))?;
+            petsc!(PCSetType(pc, c"cholesky".as_ptr()))?;
+            petsc!(PCFactorSetMatSolverType(pc, c"mumps".as_ptr()))?;
+        }
+        solver.set_up()?;
         Ok(solver)
     }
 
@@ -249,7 +274,8 @@ impl Ksp {
         unsafe {
             let right = right.place(b.as_ptr())?;
             let left = left.place(x.as_mut_ptr())?;
-            petsc!(KSPSolve(self.ksp, right.vec(), left.vec()))?;
+            petsc!(KSPSolve(self.ksp, right.vec(), left.vec()))
+                .map_err(|error| self.patch_failure().unwrap_or(error))?;
         }
         self.note_failure()?;
         let (mut iterations, mut reason, mut residual) = (0, 0, 0.0);
@@ -277,7 +303,7 @@ impl Ksp {
         same("z", z.len(), self.rows)?;
         self.set_up()?;
         let copy = self.writes_to_b.then(|| r.to_vec());
-        let pc = self.pc()?;
+        let pc = self.whole_pc()?;
         // SAFETY: as in `solve`.
         unsafe {
             let right = right.place(copy.as_deref().unwrap_or(r).as_ptr())?;
@@ -378,8 +404,16 @@ impl Ksp {
         format!("-{}", self.prefix)
     }
 
-    /// PETSc's preconditioner, which belongs to the solver.
+    /// PETSc's preconditioner that options chose, which belongs to the solver.
     pub(super) fn pc(&self) -> Result<ffi::PC> {
+        match &self.patched {
+            Some(patched) => Ok(patched.inner),
+            None => self.whole_pc(),
+        }
+    }
+
+    /// The same with the patch around it.
+    fn whole_pc(&self) -> Result<ffi::PC> {
         let mut pc = null_mut();
         // SAFETY: the solver of this wrapper, which owns what it gives.
         unsafe { petsc!(KSPGetPC(self.ksp, &mut pc)) }?;

@@ -34,6 +34,7 @@ pub struct Matrix {
     mat: ffi::Mat,
     scope: Scope,
     rows: usize,
+    total: usize,
     nonzeros: usize,
     block_size: usize,
     values: *mut f64,
@@ -107,7 +108,8 @@ impl Matrix {
             return Err(error);
         }
         let (updates, session) = (Rc::default(), session.clone());
-        let matrix = Matrix { mat, scope, rows: own, nonzeros, block_size, values, updates, x, y, session };
+        let total = total as usize;
+        let matrix = Matrix { mat, scope, rows: own, total, nonzeros, block_size, values, updates, x, y, session };
         // SAFETY: the matrix was just made over the rows, whose box nobody else has.
         unsafe {
             attach(mat, rows)?;
@@ -124,6 +126,11 @@ impl Matrix {
     /// Number of rows of this process, which is that of its entries in a vector.
     pub fn rows(&self) -> usize {
         self.rows
+    }
+
+    /// Number of rows of all its processes.
+    pub fn total(&self) -> usize {
+        self.total
     }
 
     /// Number of values stored on this process.

@@ -37,6 +37,7 @@ mod matrix;
 mod metis;
 mod mumps;
 mod options;
+mod patch;
 mod print;
 mod reason;
 #[cfg(test)]

@@ -146,4 +146,4 @@ fn extreme(ksp: ffi::KSP) -> Option<[f64; 2]> {
 }
 
 /// PETSC_ERR_LIB: a call inside failed, and its own error is recorded.
-const ERROR: ffi::PetscErrorCode = 76;
+pub(super) const ERROR: ffi::PetscErrorCode = 76;

@@ -11,6 +11,7 @@ pub(super) const DETERMINE: Int = -1;
 /// A PETSc vector: the entries of this process.
 pub(super) struct Vector {
     pub(super) vec: ffi::Vec,
+    len: usize,
     _session: Session,
 }
 
@@ -18,7 +19,7 @@ impl Vector {
     /// A vector without memory of its own, for [`place`](Self::place).
     pub(super) fn new(session: &Session, scope: Scope, rows: usize, block_size: usize) -> Result<Vector> {
         let (comm, mut vec) = (scope.comm(session), null_mut());
-        let (block, rows) = (block_size as Int, rows as Int);
+        let (block, len, rows) = (block_size as Int, rows, rows as Int);
         // SAFETY: without an array PETSc touches no entry before one is placed.
         unsafe {
             match scope {
@@ -26,7 +27,7 @@ impl Vector {
                 Scope::World => petsc!(VecCreateMPIWithArray(comm, block, rows, DETERMINE, null(), &mut vec))?,
             }
         }
-        Ok(Vector { vec, _session: session.clone() })
+        Ok(Vector { vec, len, _session: session.clone() })
     }
 
     /// A vector with memory of its own.
@@ -39,7 +40,7 @@ impl Vector {
                 Scope::World => petsc!(VecCreateMPI(comm, values.len() as Int, DETERMINE, &mut vec))?,
             }
         }
-        let vector = Vector { vec, _session: session.clone() };
+        let vector = Vector { vec, len: values.len(), _session: session.clone() };
         let mut array = null_mut();
         // SAFETY: PETSc's array has as many entries as the vector has here, which was made that long above; nobody else has it
         // between Get and Restore.
@@ -50,6 +51,11 @@ impl Vector {
             petsc!(VecRestoreArray(vec, &mut array))?;
         }
         Ok(vector)
+    }
+
+    /// Number of entries of this process.
+    pub(super) fn len(&self) -> usize {
+        self.len
     }
 
     /// Lets the vector use memory of the caller until the guard is dropped.

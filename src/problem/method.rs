@@ -109,7 +109,7 @@ impl Linear {
 
     /// Its name in the scene.
     pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(_, linear)| *linear == self).map_or("", |(name, _)| name)
+        super::name_of(&Self::ALL, &self)
     }
 }
 

@@ -17,3 +17,8 @@ pub mod robin;
 pub mod solver;
 pub mod stop;
 pub mod units;
+
+/// The name of a choice in a list of all; empty if it has none.
+pub fn name_of<T: PartialEq>(choices: &[(&'static str, T)], choice: &T) -> &'static str {
+    choices.iter().find(|(_, known)| known == choice).map_or("", |(name, _)| name)
+}

@@ -36,6 +36,6 @@ impl Preset {
 
     /// Its name in the scene.
     pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(_, preset)| *preset == self).map_or("", |(name, _)| name)
+        super::name_of(&Self::ALL, &self)
     }
 }

@@ -3,6 +3,7 @@
 use super::body::{Part, bounds};
 use minijinja::{Environment, context};
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
+use serde::Serialize;
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
@@ -34,6 +35,75 @@ pub fn range<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
     }
 }
 
+/// The band of a value in a range; what is no number is in the first.
+pub fn band(value: f64, [least, most]: [f64; 2], squares: bool) -> usize {
+    let share = ((value - least) / (most - least)).max(0.0);
+    ((if squares { share.sqrt() } else { share } * BANDS as f64) as usize).min(BANDS - 1)
+}
+
+/// A part of a picture in one colour.
+#[derive(Serialize)]
+pub struct Piece {
+    /// Its colour.
+    pub fill: String,
+    /// Its outline as SVG has it.
+    pub path: String,
+}
+
+/// What pictures of bodies share: their size, colours and legend.
+pub struct Canvas {
+    low: [f64; 3],
+    high: [f64; 3],
+    pixel: f64,
+    /// Least and largest value.
+    pub range: [f64; 2],
+    squares: bool,
+}
+
+impl Canvas {
+    /// For points within a box, of which two coordinates are seen, and values in a range; see [`svg`].
+    pub fn new([low, high]: [[f64; 3]; 2], range: [f64; 2], squares: bool) -> Self {
+        let pixel = ((high[0] - low[0]) / SIZE[0]).max((high[1] - low[1]) / SIZE[1]);
+        Self { low, high, pixel, range, squares }
+    }
+
+    /// Where a point is seen, in steps of the picture.
+    pub fn place(&self, x: &[f64; 3]) -> [f64; 2] {
+        [(x[0] - self.low[0]) / self.pixel * FINE, (self.high[1] - x[1]) / self.pixel * FINE]
+    }
+
+    /// The value where a band begins.
+    fn level(&self, band: usize) -> f64 {
+        let [least, most] = self.range;
+        let share = band as f64 / BANDS as f64;
+        least + (most - least) * if self.squares { share * share } else { share }
+    }
+
+    /// The picture of bodies: of each its name, its pieces from back to front and its outline.
+    ///
+    /// # Errors
+    /// Those of the template.
+    pub fn draw(
+        &self,
+        bodies: Vec<(String, Vec<Piece>, String)>,
+        title: &str,
+        scale: f64,
+        alone: bool,
+    ) -> Result<String, minijinja::Error> {
+        let [width, height] = [0, 1].map(|k| (self.high[k] - self.low[k]) / self.pixel);
+        let mut environment = Environment::new();
+        environment.add_filter("num", super::words::number_of);
+        environment.render_named_str(
+            "bands.svg.html",
+            include_str!("bands.svg"),
+            context! {
+                bodies, title, alone, scale, width, height, fine => FINE, colors => colors().to_vec(),
+                levels => (0..=BANDS).map(|band| self.level(band)).collect::<Vec<_>>(),
+            },
+        )
+    }
+}
+
 /// The picture of one value, given at the points of all parts; `title` says what it is, with its unit. With `squares` the
 /// levels grow as squares: a stress peaks at contacts, and with equal steps most of a body would have the first colour.
 /// A picture that stands alone has a white ground.
@@ -49,38 +119,39 @@ pub fn svg(
     alone: bool,
 ) -> Result<String, minijinja::Error> {
     let places: Vec<Vec<[f64; 3]>> = parts.iter().map(|part| part.moved(scale)).collect();
-    let [low, high] = bounds(places.iter().flatten());
-    let pixel = ((high[0] - low[0]) / SIZE[0]).max((high[1] - low[1]) / SIZE[1]);
-    let [width, height] = [0, 1].map(|k| (high[k] - low[k]) / pixel);
-    let place = |x: &[f64; 3]| [(x[0] - low[0]) / pixel * FINE, (high[1] - x[1]) / pixel * FINE];
-    let [least, most] = range(values.iter().flatten());
-    let level = |band: usize| {
-        let share = band as f64 / BANDS as f64;
-        least + (most - least) * if squares { share * share } else { share }
+    let canvas = Canvas::new(bounds(places.iter().flatten()), range(values.iter().flatten()), squares);
+    let colors = colors();
+    let body = |((part, places), values): ((&Part, &Vec<[f64; 3]>), &Vec<f64>)| {
+        let places: Vec<[f64; 2]> = places.iter().map(|x| canvas.place(x)).collect();
+        let pieces = (0..BANDS).map(|band| {
+            // all of the body is in the first band, whatever its values are
+            let level = if band == 0 { f64::NEG_INFINITY } else { canvas.level(band) };
+            Piece { fill: colors[band].clone(), path: path(&part.triangles, &places, values, level) }
+        });
+        let pieces: Vec<Piece> = pieces.collect();
+        let outline = pieces[0].path.clone();
+        (part.name.clone(), pieces, outline)
     };
-    let bodies: Vec<_> = parts
-        .iter()
-        .zip(places)
-        .zip(values)
-        .map(|((part, places), values)| {
-            let places: Vec<[f64; 2]> = places.iter().map(place).collect();
-            let paths = (0..BANDS).map(|band| {
-                // all of the body is in the first band, whatever its values are
-                path(&part.triangles, &places, values, if band == 0 { f64::NEG_INFINITY } else { level(band) })
-            });
-            context! { name => part.name, paths => paths.collect::<Vec<_>>() }
-        })
-        .collect();
-    let mut environment = Environment::new();
-    environment.add_filter("num", super::words::number_of);
-    environment.render_named_str(
-        "bands.svg.html",
-        include_str!("bands.svg"),
-        context! {
-            bodies, title, alone, scale, width, height, fine => FINE, colors => colors().to_vec(),
-            levels => (0..=BANDS).map(level).collect::<Vec<_>>(),
-        },
-    )
+    canvas.draw(parts.iter().zip(&places).zip(values).map(body).collect(), title, scale, alone)
+}
+
+/// The picture of the pressure on a contact surface in space, seen along its shortest direction; grey where there is none.
+///
+/// # Errors
+/// Those of the template.
+pub fn pressure(surface: &Part, axes: [usize; 2], title: &str, alone: bool) -> Result<String, minijinja::Error> {
+    let flat: Vec<[f64; 3]> = surface.points.iter().map(|x| [x[axes[0]], x[axes[1]], 0.0]).collect();
+    let pressures: Vec<f64> = surface.value.iter().map(|p| p.max(0.0)).collect();
+    let [_, most] = range(pressures.iter());
+    let canvas = Canvas::new(bounds(flat.iter()), [0.0, most], false);
+    let places: Vec<[f64; 2]> = flat.iter().map(|x| canvas.place(x)).collect();
+    let region = |level: f64| path(&surface.triangles, &places, &pressures, level);
+    let outline = region(f64::NEG_INFINITY);
+    let mut pieces = vec![Piece { fill: "#b8b8b8".to_owned(), path: outline.clone() }];
+    for (band, fill) in colors().into_iter().enumerate() {
+        pieces.push(Piece { fill, path: region(canvas.level(band).max(1e-9 * most)) });
+    }
+    canvas.draw(vec![(surface.name.clone(), pieces, outline)], title, 0.0, alone)
 }
 
 /// A corner of a region: a point of the mesh, twice, or the place between two of them where the level is.

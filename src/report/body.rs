@@ -23,8 +23,8 @@ pub struct Part {
 
 /// Parts of a quadratic triangle (corners, then mid-edges 01 12 02).
 const QUADRATIC: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
-/// Faces of a tetrahedron with the mid-edges that a quadratic one has.
-const FACES: [[usize; 6]; 4] = [[0, 1, 2, 4, 5, 6], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 2, 3, 6, 9, 7]];
+/// Faces of a tetrahedron, seen from outside, with the mid-edges that a quadratic one has.
+const FACES: [[usize; 6]; 4] = [[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]];
 
 impl Part {
     /// Reads a file with the array `value` at its points, as float32 or float64, compressed or not.

@@ -1,7 +1,7 @@
 //! Pressures of pairs of surfaces from their tables: curves in the plane, maps in space.
 
-use super::bands::{BANDS, colors, range};
-use super::body::bounds;
+use super::bands::{self, BANDS, colors, range};
+use super::body::{Part, bounds};
 use crate::error::{Error, Kind, Result};
 use crate::output::{Plot, Series, Style};
 use crate::problem::units::{Units, label};
@@ -71,6 +71,14 @@ pub fn pictures(folder: &Path, is_space: bool, units: Option<&Units>, alone: boo
         // the two longest directions, in the order of their names
         let (across, up) = (axes[0].min(axes[1]), axes[0].max(axes[1]));
         let title = format!("{title}: {pressure}");
+        // the facets, if the run wrote them
+        let file = folder.join(Path::new(table).with_extension("vtu"));
+        if file.is_file() && !table.contains('/') {
+            let surface = Part::read(&file, &title, "pressure")?;
+            let svg = bands::pressure(&surface, [across, up], &title, alone).map_err(failed)?;
+            pictures.push(Picture { kind: "map", svg, note: None });
+            continue;
+        }
         pictures.push(map(&title, &places, &pressures, [across, up], [low, high], alone)?);
     }
     Ok(pictures)

@@ -1,7 +1,8 @@
-//! Single pictures of a run as SVG files.
+//! Single pictures of a run as SVG or PNG files.
 
 use super::contact::failed;
 use super::page::Results;
+use super::raster;
 use crate::error::{Error, Kind, Result, nearest};
 use crate::output::write_whole;
 use std::path::{Path, PathBuf};
@@ -21,9 +22,10 @@ pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf
             .help(near.unwrap_or_else(|| format!("there are {}", WHAT.join(", ")))));
     }
     let path = out.map_or_else(|| folder.join(format!("{what}.svg")), Path::to_owned);
-    if path.extension().is_none_or(|ending| ending != "svg") {
-        return Err(Error::new(Kind::Usage, format!("{} does not end in .svg", path.display()))
-            .help("pictures are SVG; rsvg-convert or Inkscape make PNG or PDF of them"));
+    let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
+    if !matches!(ending.as_str(), "svg" | "png") {
+        return Err(Error::new(Kind::Usage, format!("{} ends neither in .svg nor in .png", path.display()))
+            .help("pictures are SVG or PNG; rsvg-convert or Inkscape make PDF of SVG"));
     }
     let results = Results::read(folder)?;
     let lacks = |lacking: &str, advice: &str| {
@@ -39,9 +41,6 @@ pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf
             if bodies.is_empty() {
                 return Err(lacks("no fields of bodies", "solve the scene again with --vtu"));
             }
-            if bodies.iter().any(|part| part.is_solid) {
-                return Err(lacks("bodies in space", "`winkler report` shows them in a view that turns"));
-            }
             vec![results.bands(&bodies, what == "stress", true)?]
         }
     };
@@ -55,10 +54,12 @@ pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf
         let path = match k {
             0 => path.clone(),
             _ => {
-                path.with_file_name(format!("{}-{}.svg", path.file_stem().unwrap_or_default().to_string_lossy(), k + 1))
+                let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+                path.with_file_name(format!("{stem}-{}.{ending}", k + 1))
             }
         };
-        write_whole(&path, |out| out.write_all(svg.as_bytes()))?;
+        let bytes = if ending == "png" { raster::png(&svg)? } else { svg.into_bytes() };
+        write_whole(&path, |out| out.write_all(&bytes))?;
         Ok(path)
     };
     pictures.into_iter().enumerate().map(file).collect()

@@ -5,6 +5,8 @@ pub mod body;
 mod contact;
 mod figure;
 pub mod page;
+mod raster;
+mod solid;
 mod space;
 mod words;
 

@@ -2,7 +2,7 @@
 
 use super::body::{Part, magnification};
 use super::contact::{Picture, failed, pictures, rows, value};
-use super::{bands, space, words};
+use super::{bands, solid, space, words};
 use crate::error::{Error, Kind, Result};
 use crate::output::{Axis, Plot, Series, Style, safe_name, write_whole};
 use crate::problem::units::{Units, label};
@@ -136,7 +136,7 @@ impl Results {
         pictures(&self.folder, self.is_space(), self.units.as_ref(), alone)
     }
 
-    /// A picture of the stress, or else the displacement, on deformed bodies of the plane.
+    /// A picture of the stress, or else the displacement, on deformed bodies: of those in space their surfaces.
     ///
     /// # Errors
     /// Those of the template.
@@ -147,7 +147,8 @@ impl Results {
             true => self.label("von Mises stress", |units| units.stress),
             false => self.label("displacement", |units| units.length),
         };
-        bands::svg(bodies, &values, stress, &title, magnification(bodies), alone).map_err(failed)
+        let draw = if bodies.iter().any(|part| part.is_solid) { solid::svg } else { bands::svg };
+        draw(bodies, &values, stress, &title, magnification(bodies), alone).map_err(failed)
     }
 
     /// The text of the page.

@@ -1,10 +1,11 @@
 //! Where the time of a run goes.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 use std::time::Instant;
 
 /// Wall seconds of the phases of a run.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Clock {
     began: Instant,
     last: Instant,
@@ -12,12 +13,20 @@ pub struct Clock {
     pub times: BTreeMap<String, f64>,
     /// Largest resident memory of this process so far, 10^6 bytes, at the end of each phase; empty where the system does not say.
     pub memory: BTreeMap<String, f64>,
+    /// Seconds of set-up and iteration by the estimate that chose the solvers, where one was made.
+    pub estimate: Option<f64>,
+    /// Hears which phase has ended, and the estimate.
+    pub watch: Option<Rc<Watch>>,
 }
+
+/// What hears the end of a phase: its name, and the estimate.
+pub type Watch = dyn Fn(&str, Option<f64>);
 
 impl Default for Clock {
     fn default() -> Self {
         let now = Instant::now();
-        Self { began: now, last: now, times: BTreeMap::new(), memory: BTreeMap::new() }
+        let (times, memory) = (BTreeMap::new(), BTreeMap::new());
+        Self { began: now, last: now, times, memory, estimate: None, watch: None }
     }
 }
 
@@ -28,6 +37,7 @@ impl Clock {
         *self.times.entry(name.to_owned()).or_default() += (now - self.last).as_secs_f64();
         self.last = now;
         self.memory.extend(peak_memory().map(|memory| (name.to_owned(), memory)));
+        self.watch.iter().for_each(|watch| watch(name, self.estimate));
     }
 
     /// Seconds since the run began, noted as `total`.

@@ -46,6 +46,8 @@ pub struct Inner<'a> {
     whole: Chosen,
     /// Its interpolation from linear displacements, where bodies have quadratic ones and multigrid.
     interpolation: Option<Interpolation>,
+    /// Seconds of set-up and iteration by the estimates that chose the solvers of bodies in space.
+    seconds: Option<f64>,
     plans: Vec<Plan>,
     /// Place of each body in `plans`.
     places: HashMap<String, usize>,
@@ -76,6 +78,7 @@ impl<'a> Inner<'a> {
             whole: typed.of(WHOLE),
             interpolation: None,
             typed,
+            seconds: None,
             plans: Vec::new(),
             places: HashMap::new(),
             kept: kept.into_iter().map(|slot| (slot.name.clone(), slot)).collect(),
@@ -101,6 +104,23 @@ impl<'a> Inner<'a> {
             })
         };
         kinds.into_iter().filter_map(of_kind).collect::<Vec<_>>().join("; ")
+    }
+
+    /// Seconds of set-up and iteration by the estimates that chose the solvers; none where there was nothing to estimate.
+    pub fn seconds(&self) -> Option<f64> {
+        self.seconds
+    }
+
+    /// The options of all solvers of PETSc that a run has: of each body that sweeps solve by one, or of the matrix of all bodies.
+    pub fn into_options(self) -> Vec<Chosen> {
+        match self.linear {
+            Linear::Dense => Vec::new(),
+            Linear::Direct | Linear::Multigrid => vec![self.whole],
+            Linear::Sweeps => {
+                let solved = self.plans.into_iter().filter(|plan| plan.preset != Preset::Condensed);
+                solved.map(|plan| plan.chosen).collect()
+            }
+        }
     }
 
     /// Options of the matrix of all bodies.
@@ -214,6 +234,7 @@ impl<'a> Inner<'a> {
             let are_kept = plans.iter().all(|plan| self.kept.contains_key(&plan.name));
             let is_direct = comparison.is_direct(if are_kept { usize::MAX } else { self.memory });
             let Comparison { direct, multigrid } = comparison;
+            *self.seconds.get_or_insert(0.0) += if is_direct { direct.seconds } else { multigrid.seconds };
             if is_direct && !are_kept {
                 self.memory = self.memory.saturating_sub(direct.bytes as usize);
             }

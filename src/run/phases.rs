@@ -124,6 +124,7 @@ impl<const D: usize> Source<D> {
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
         let gains = D == 3 && mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
         session.set_blas_threads(if gains { cores / session.size() } else { 1 });
+        clock.estimate = inner.seconds();
         clock.phase("discretize");
         drop(stage);
         let mut warnings = warnings(session, &discrete);
@@ -133,7 +134,8 @@ impl<const D: usize> Source<D> {
         let (choice, condensed) = (inner.reason(), inner.condensed());
         let interpolation = inner.interpolation();
         let scene = scene.clone();
-        Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, warnings, again: None })
+        let (options, again) = (inner.into_options(), None);
+        Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, options, warnings, again })
     }
 }
 

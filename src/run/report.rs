@@ -159,8 +159,8 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
 /// PETSc options as they are typed, from wherever they come; those that PETSc cannot list are no reason to stop.
 fn petsc_options(session: &Session) -> Vec<String> {
     let option = |(name, value): (String, Option<String>)| match value {
-        Some(value) => format!("-{name} {value}"),
-        None => format!("-{name}"),
+        Some(value) => format!("{name} {value}"),
+        None => name,
     };
     session.options().all().unwrap_or_default().into_iter().map(option).collect()
 }

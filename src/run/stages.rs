@@ -29,6 +29,8 @@ pub struct Built {
     pub choice: String,
     /// Names of the condensed bodies, with which another run can go on.
     pub condensed: Vec<String>,
+    /// The options of all its solvers of PETSc.
+    pub options: Vec<Chosen>,
     /// What the user should know of it.
     pub warnings: Vec<String>,
     /// The way to the other legs of a history; none if this problem serves all its steps.

@@ -3,49 +3,111 @@
 mod body;
 mod contact;
 mod data;
+mod decoder;
 mod elasticity;
 mod history;
 mod layer;
 mod method;
 
 use super::read::{Keys, Node, Value};
+use super::shape::{Form, Table, word};
 use crate::data::Library;
-use crate::error::{Error, Located, Place, Result, nearest, shown};
-use crate::expression::{Differentiable, Field, Scope};
+use crate::error::{Error, Located, Place, Result};
 use crate::mesh::is_shape;
 use crate::output::vtu::Encoding;
 use crate::problem::elasticity::Plane;
 use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::own::Own;
-use crate::problem::pattern::Pattern;
 use crate::problem::solver::{Preset, SolverSpec};
 use crate::problem::units::Units;
 use crate::scene::{AdaptSpec, OutputSpec, Scene};
-use std::path::{Path, PathBuf};
+use decoder::{Decoder, choose, file, pattern};
+use std::path::Path;
+
+/// The shape of a whole scene.
+pub(super) fn table() -> Table {
+    use Form::{Among, Either, Flag, Named, Text};
+    Table::new("the scene")
+        .key("title", Text, "title of plots and reports; the name of the file without one")
+        .must("dimension", Among(&[2, 3]), "2 in the plane, 3 in space")
+        .key("plane", word(&Plane::ALL), "what a plane problem stands for; \"strain\" without it")
+        .key("units", Text, "words for labels, such as \"mm, MPa\"; nothing is converted")
+        .must(
+            "mesh",
+            Either(vec![Text, mesh_table().form()]),
+            "a file name, or a table: mesh = { geo = \"a.geo\", set = { n = 32 } }",
+        )
+        .key(
+            "data",
+            Named(Box::new(data::table("data").form())),
+            "functions from files; each begins with a line [data.NAME]",
+        )
+        .must("body", body::table().form().list(), "a body starts with the line [[body]]")
+        .key("contact", contact::table().form().list(), "a contact starts with the line [[contact]]")
+        .key("method", method::table().form(), "the iteration; Newton's method without it")
+        .key(
+            "solver",
+            Either(vec![word(&Preset::ALL), solver_table().form()]),
+            "the inner solver; chosen by the program without it",
+        )
+        .key("estimate", Flag, "whether to estimate the error that the mesh leaves; false")
+        .key("adapt", adapt_table().form(), "adapts the mesh to an error: adapt = { error = 1e-2 }")
+        .key("output", output_table().form(), "what is written, and where")
+        .key("trust_geo", Flag, "")
+}
+
+fn mesh_table() -> Table {
+    use Form::{Count, Named, Number, Text};
+    Table::new("the mesh")
+        .key("geo", Text, "a Gmsh script, or a shape (.step, .iges, .brep, .stl), relative to the scene's folder")
+        .key("msh", Text, "a mesh: Gmsh's .msh, or a format that Gmsh converts")
+        .key("set", Named(Box::new(Number)), "numbers for the script: set = { n = 32 }")
+        .key("size", Number, "largest size of elements in a shape")
+        .key("threads", Count, "threads of Gmsh for free meshes in space")
+        .key("timeout", Number, "seconds after which Gmsh is ended; 1000")
+        .key("memory", Number, "gigabytes that Gmsh may take; what is free when it starts")
+        .apart(&["geo", "msh"])
+}
+
+fn solver_table() -> Table {
+    Table::new("the solver").key("preset", word(&Preset::ALL), "the inner solver of all bodies").key(
+        "options",
+        Form::Text,
+        "PETSc options as on the command line: \"-ksp_rtol 1e-10\"",
+    )
+}
+
+fn adapt_table() -> Table {
+    Table::new("`adapt`")
+        .must("error", Form::Number, "largest relative error of pressures and displacements")
+        .key("cells", Form::Count, "most cells of a mesh; 1000000")
+        .key("rounds", Form::Count, "most meshes; 10")
+}
+
+/// Precisions of VTU files: whether numbers are single.
+const PRECISIONS: [(&str, bool); 2] = [("double", false), ("single", true)];
+
+fn output_table() -> Table {
+    use Form::{Either, Flag, Number, Text, Whole};
+    Table::new("[output]")
+        .key("dir", Text, "folder of the results; results/CASE without it")
+        .key("vtu", Flag, "whether to write fields for ParaView; false")
+        .key("msh", Flag, "whether to write fields as views for Gmsh; false")
+        .key("report", Flag, "whether to write the page report.html; false")
+        .key("precision", word(&PRECISIONS), "of the numbers in VTU files; \"double\"")
+        .key("compress", Flag, "whether VTU files are compressed; true")
+        .key("plots", Flag, "whether to draw the SVG plots; true")
+        .key("pairs", Either(vec![Whole, word(&[("all", ())])]), "most pairs with files of their own; 24")
+        .key("checkpoint", Number, "minutes between checkpoints; none without it")
+}
 
 /// Checks a whole scene, read from `path`. Looks whether the mesh file is there.
 pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
-    const KEYS: &[&str] = &[
-        "title",
-        "dimension",
-        "plane",
-        "units",
-        "mesh",
-        "data",
-        "body",
-        "contact",
-        "method",
-        "solver",
-        "estimate",
-        "adapt",
-        "output",
-        "trust_geo",
-    ];
-    let keys = Keys::open(tree, "the scene", KEYS)?;
+    let keys = Keys::open(tree, &table())?;
     let dimension = dimension(&keys)?;
     let plane = plane(&keys, dimension.value)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut decoder = Decoder { dimension: dimension.value, plane, folder, data: Library::new() };
+    let mut decoder = Decoder { dimension: dimension.value, folder, data: Library::new() };
     decoder.data = decoder.library(keys.get("data"))?;
     let title = match keys.get("title") {
         Some(node) => node.string()?.to_owned(),
@@ -54,11 +116,6 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     let units = keys.get("units").map(units).transpose()?;
     let (contacts, auto) = decoder.contacts(&keys)?;
     let mut method = decoder.method(keys.get("method"))?;
-    if let (Some(adapt), false) = (keys.get("adapt"), method.steps.is_empty()) {
-        return Err(adapt
-            .refuse("an adapted mesh and load steps in one scene")
-            .help("leave `adapt` or `method.steps` away"));
-    }
     let mesh = decoder.mesh(keys.require("mesh")?, trust(tree, &keys)?)?;
     let bodies = decoder.bodies(&keys)?;
     decoder.join(&mut method.steps, &bodies)?;
@@ -76,7 +133,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
         rules: Own::default(),
         data: decoder.data,
         solver: solver(keys.get("solver"))?,
-        estimate: keys.get("estimate").map_or(Ok(false), Node::boolean)?,
+        estimate: keys.flag("estimate", false)?,
         adapt: keys.get("adapt").map(adapt).transpose()?,
         output: output(keys.get("output"))?,
         dimension,
@@ -87,71 +144,7 @@ fn units(node: &Node) -> Result<Units> {
     Units::parse(node.string()?).map_err(|(message, advice)| node.refuse(message).help(advice))
 }
 
-/// What the meaning of values depends on.
-struct Decoder<'a> {
-    /// Space dimension: 2 or 3.
-    dimension: usize,
-    /// What the plane stands for.
-    plane: Plane,
-    /// Folder of the scene file.
-    folder: &'a Path,
-    /// Functions from files.
-    data: Library,
-}
-
 impl Decoder<'_> {
-    /// A number > 0, or an expression.
-    fn positive_field(&self, node: &Node, what: &str) -> Result<Field> {
-        match self.field(node)? {
-            Field::Constant(value) if value <= 0.0 => {
-                Err(node.refuse(format!("{what} is {}", shown(value))).label("must be greater than 0"))
-            }
-            field => Ok(field),
-        }
-    }
-
-    /// A number, or an expression in the coordinates.
-    fn field(&self, node: &Node) -> Result<Field> {
-        match &node.value {
-            Value::Integer(_) | Value::Float(_) => Ok(Field::Constant(node.number()?)),
-            Value::String(text) => Field::parse(text, &node.place, self.dimension, false, &self.data),
-            _ => Err(node.expected("a number or an expression")),
-        }
-    }
-
-    /// A vector with as many components as space has; the missing third one is zero.
-    fn vector(&self, node: &Node) -> Result<[Field; 3]> {
-        let mut vector = [const { Field::Constant(0.0) }; 3];
-        for (component, item) in vector.iter_mut().zip(self.components(node)?) {
-            *component = self.field(item)?;
-        }
-        Ok(vector)
-    }
-
-    /// A vector that can be differentiated.
-    fn smooth_vector(&self, node: &Node) -> Result<Vec<Differentiable>> {
-        let scope = Scope { variables: &["x", "y", "z"][..self.dimension], data: &self.data };
-        let component = |item: &Node| match &item.value {
-            Value::Integer(_) | Value::Float(_) => {
-                Differentiable::parse(&item.number()?.to_string(), &item.place, scope)
-            }
-            Value::String(text) => Differentiable::parse(text, &item.place, scope),
-            _ => Err(item.expected("a number or an expression")),
-        };
-        self.components(node)?.iter().map(component).collect()
-    }
-
-    /// The components of a vector: as many as space has.
-    fn components<'n>(&self, node: &'n Node) -> Result<&'n [Node]> {
-        let items = node.list()?;
-        if items.len() != self.dimension {
-            let place = items.get(self.dimension).map_or(&node.place, |extra| &extra.place);
-            let count = format!("a vector has {} components here, not {}", self.dimension, items.len());
-            return Err(Error::scene(place, count).help(format!("the dimension of the scene is {}", self.dimension)));
-        }
-        Ok(items)
-    }
-
     fn mesh(&self, node: &Node, trusted: bool) -> Result<MeshSource> {
         if let Value::String(name) = &node.value {
             let file = file(self.folder, node)?;
@@ -163,11 +156,7 @@ impl Decoder<'_> {
                 false => MeshSource::Msh { file },
             });
         }
-        if !matches!(node.value, Value::Table(_)) {
-            return Err(node.expected("a file name or a table"));
-        }
-        let keys = Keys::open(node, "the mesh", &["geo", "msh", "set", "size", "threads", "timeout", "memory"])?;
-        keys.exclude("geo", "msh")?;
+        let keys = Keys::open(node, &mesh_table())?;
         if let Some(msh) = keys.get("msh") {
             let path = file(self.folder, msh)?;
             if is_shape(&path.value) {
@@ -190,36 +179,13 @@ impl Decoder<'_> {
         let (places, set) = set.into_iter().map(|(place, name, value)| (place, (name, value))).unzip();
         let usual = Guard::default();
         let guard = Guard {
-            seconds: keys.get("timeout").map_or(Ok(usual.seconds), |node| node.positive("the timeout"))?,
-            gigabytes: keys.get("memory").map(|node| node.positive("the memory")).transpose()?,
-            size: keys.get("size").map(|node| node.positive("the size")).transpose()?,
-            threads: keys.get("threads").map(threads).transpose()?,
+            seconds: keys.get("timeout").map_or(Ok(usual.seconds), Node::number)?,
+            gigabytes: keys.get("memory").map(Node::number).transpose()?,
+            size: keys.get("size").map(Node::number).transpose()?,
+            threads: keys.get("threads").map(Node::count).transpose()?,
             trusted,
         };
         Ok(MeshSource::Geo { file, set, places, sizes: None, guard })
-    }
-}
-
-/// The path of a file that must exist, joined with the folder of the scene.
-fn file(folder: &Path, node: &Node) -> Result<Located<PathBuf>> {
-    let name = node.name()?.value;
-    let path = folder.join(&name);
-    match std::fs::metadata(&path) {
-        Ok(found) if found.is_file() => Ok(Located::new(path, node.place.clone())),
-        Ok(_) => Err(node.refuse(format!("{} is not a file", path.display()))),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
-            let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
-            let wanted = path.file_name().unwrap_or_default().to_string_lossy();
-            Err(node.refuse(format!("there is no file {}", path.display())).label("not there").help(
-                match nearest(&wanted, names.iter().map(String::as_str)) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => "paths are relative to the folder of the scene file".to_owned(),
-                },
-            ))
-        }
-        Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
     }
 }
 
@@ -235,11 +201,7 @@ fn trust(tree: &Node, keys: &Keys) -> Result<bool> {
 
 fn dimension(keys: &Keys) -> Result<Located<usize>> {
     let node = keys.require("dimension")?;
-    match node.whole()? {
-        2 => Ok(Located::new(2, node.place.clone())),
-        3 => Ok(Located::new(3, node.place.clone())),
-        other => Err(node.refuse(format!("the dimension is {other}")).label("must be 2 or 3")),
-    }
+    Ok(Located::new(node.count()?, node.place.clone()))
 }
 
 fn plane(keys: &Keys, dimension: usize) -> Result<Plane> {
@@ -254,17 +216,10 @@ fn plane(keys: &Keys, dimension: usize) -> Result<Plane> {
     choose(&entry.node, "plane", &Plane::ALL)
 }
 
-fn threads(node: &Node) -> Result<usize> {
-    match usize::try_from(node.whole()?) {
-        Ok(count @ 1..) => Ok(count),
-        _ => Err(node.refuse("`threads` must be 1 or more".to_owned())),
-    }
-}
-
 /// Named numbers for Gmsh, sorted by name.
 fn numbers(node: &Node) -> Result<Vec<(Place, String, f64)>> {
     let Value::Table(entries) = &node.value else {
-        return Err(node.expected("a table").help("write set = { n = 32 }"));
+        return Err(node.expected("a table", ""));
     };
     let mut numbers = Vec::new();
     for entry in entries {
@@ -278,30 +233,6 @@ fn numbers(node: &Node) -> Result<Vec<(Place, String, f64)>> {
     Ok(numbers)
 }
 
-/// One of a few words; `what` names the key in the message.
-fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Result<T> {
-    let word = node.string()?;
-    if let Some((_, choice)) = choices.iter().find(|(name, _)| *name == word) {
-        return Ok(choice.clone());
-    }
-    let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
-    Err(node.refuse(format!("unknown {what} `{word}`")).help(match nearest(word, names.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("it is one of {}", names.join(", ")),
-    }))
-}
-
-/// The name of a group, or a pattern of such names.
-fn pattern(node: &Node) -> Result<Located<String>> {
-    let name = node.name()?;
-    match Pattern::new(&name.value) {
-        Ok(_) => Ok(name),
-        Err(flaw) => Err(node
-            .refuse(format!("`{}` is no pattern: {flaw}", name.value))
-            .help("`*` is any text, `?` one character, `[0-9]` one of some")),
-    }
-}
-
 fn preset(node: &Node) -> Result<Preset> {
     choose(node, "solver", &Preset::ALL)
 }
@@ -313,7 +244,7 @@ fn solver(node: Option<&Node>) -> Result<SolverSpec> {
     if let Value::String(_) = node.value {
         return Ok(SolverSpec { preset: Some(preset(node)?), options: Vec::new() });
     }
-    let keys = Keys::open(node, "the solver", &["preset", "options"])?;
+    let keys = Keys::open(node, &solver_table())?;
     let mut options = Vec::new();
     if let Some(node) = keys.get("options") {
         options.extend(node.string()?.split_whitespace().map(str::to_owned));
@@ -327,19 +258,12 @@ fn solver(node: Option<&Node>) -> Result<SolverSpec> {
 }
 
 fn adapt(node: &Node) -> Result<AdaptSpec> {
-    let keys = Keys::open(node, "`adapt`", &["error", "cells", "rounds"])?;
+    let keys = Keys::open(node, &adapt_table())?;
     let error = keys.require("error")?;
-    let count = |key: &str, usual: usize| match keys.get(key) {
-        None => Ok(usual),
-        Some(node) => match usize::try_from(node.whole()?) {
-            Ok(count) if count > 0 => Ok(count),
-            _ => Err(node.refuse(format!("`{key}` must be 1 or more"))),
-        },
-    };
     Ok(AdaptSpec {
-        error: error.positive("the error")?,
-        cells: count("cells", 1_000_000)?,
-        rounds: count("rounds", 10)?,
+        error: error.number()?,
+        cells: keys.get("cells").map_or(Ok(1_000_000), Node::count)?,
+        rounds: keys.get("rounds").map_or(Ok(10), Node::count)?,
         place: error.place.clone(),
     })
 }
@@ -348,32 +272,26 @@ fn output(node: Option<&Node>) -> Result<OutputSpec> {
     let default = OutputSpec::default();
     let Some(node) = node else { return Ok(default) };
     let usual = default.encoding;
-    let keys = Keys::open(
-        node,
-        "[output]",
-        &["dir", "vtu", "report", "precision", "compress", "plots", "pairs", "checkpoint"],
-    )?;
+    let keys = Keys::open(node, &output_table())?;
     Ok(OutputSpec {
         dir: keys.get("dir").map(|dir| dir.name().map(|name| name.value.into())).transpose()?,
-        report: keys.get("report").map_or(Ok(default.report), Node::boolean)?,
-        vtu: keys.get("vtu").map_or(Ok(default.vtu), Node::boolean)?,
+        report: keys.flag("report", default.report)?,
+        vtu: keys.flag("vtu", default.vtu)?,
+        msh: keys.flag("msh", default.msh)?,
         encoding: Encoding {
-            single: keys
-                .get("precision")
-                .map_or(Ok(usual.single), |node| choose(node, "precision", &[("double", false), ("single", true)]))?,
-            compress: keys.get("compress").map_or(Ok(usual.compress), Node::boolean)?,
+            single: keys.get("precision").map_or(Ok(usual.single), |node| choose(node, "precision", &PRECISIONS))?,
+            compress: keys.flag("compress", usual.compress)?,
         },
-        plots: keys.get("plots").map_or(Ok(default.plots), Node::boolean)?,
+        plots: keys.flag("plots", default.plots)?,
         pairs: keys.get("pairs").map(pairs).transpose()?,
-        checkpoint: keys.get("checkpoint").map(|minutes| minutes.positive("the time in minutes")).transpose()?,
+        checkpoint: keys.get("checkpoint").map(Node::number).transpose()?,
     })
 }
 
 /// Most pairs with files of their own: a number, or all.
 fn pairs(node: &Node) -> Result<usize> {
     match node.string() {
-        Ok("all") => Ok(usize::MAX),
-        Ok(_) => Err(node.expected("a whole number or \"all\"")),
-        Err(_) => usize::try_from(node.whole()?).map_err(|_| node.refuse("the number of pairs is below 0")),
+        Ok(_) => choose(node, "number of pairs", &[("all", usize::MAX)]),
+        Err(_) => node.count(),
     }
 }

@@ -1,14 +1,18 @@
 //! What the user wrote: TOML -> checked [`Scene`]. Every refusal names file, line, and the way out.
 
 mod build;
+mod check;
 mod decode;
 mod overrides;
 mod read;
+mod schema;
 mod settings;
+mod shape;
 mod spec;
 #[cfg(test)]
 mod tests;
 
+pub use schema::schema;
 pub use spec::{AdaptSpec, OutputSpec, Scene};
 
 use crate::error::{Error, Kind, Result, Source};
@@ -33,7 +37,9 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     for text in overrides {
         overrides::apply(&mut tree, text)?;
     }
-    decode::scene(&tree, path)
+    let scene = decode::scene(&tree, path)?;
+    scene.verify().map_err(|fault| fault.error.at(tree.place_of(&fault.key)))?;
+    Ok(scene)
 }
 
 fn read_text(path: &Path) -> Result<String> {

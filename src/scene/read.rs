@@ -1,5 +1,6 @@
 //! TOML as a tree of values that know where they stand, with getters that refuse in words.
 
+use super::shape::{Form, Table};
 use crate::error::{Error, Located, Place, Result, Source, nearest, shown};
 use std::ops::Range;
 use std::sync::Arc;
@@ -109,8 +110,8 @@ impl Convert<'_> {
 }
 
 impl Node {
-    /// Refusal of a value of the wrong kind.
-    pub fn expected(&self, what: &str) -> Error {
+    /// Refusal of a value of the wrong kind; `about` says what belongs there.
+    pub fn expected(&self, what: &str, about: &str) -> Error {
         let found = match &self.value {
             Value::String(_) => "a string",
             Value::Integer(_) => "a whole number",
@@ -126,13 +127,29 @@ impl Node {
             Value::Integer(_) | Value::Float(_) | Value::Boolean(_) if what == "a string" => {
                 error.help("write it in quotes")
             }
-            _ => error,
+            _ if about.is_empty() => error,
+            _ => error.help(about),
         }
     }
 
     /// Refusal of a value of the right kind.
     pub fn refuse(&self, message: impl Into<String>) -> Error {
         Error::scene(&self.place, message)
+    }
+
+    /// The place of the value at a dotted path, or of the nearest one around it.
+    pub fn place_of(&self, path: &str) -> &Place {
+        let mut node = self;
+        for key in path.split('.') {
+            let below = match &node.value {
+                Value::Table(entries) => entries.iter().find(|entry| entry.key == key).map(|entry| &entry.node),
+                Value::List(items) => key.parse().ok().and_then(|place: usize| items.get(place)),
+                _ => None,
+            };
+            let Some(below) = below else { break };
+            node = below;
+        }
+        &node.place
     }
 
     /// Whether it is a table with this key.
@@ -149,7 +166,7 @@ impl Node {
     pub fn string(&self) -> Result<&str> {
         match &self.value {
             Value::String(text) => Ok(text),
-            _ => Err(self.expected("a string")),
+            _ => Err(self.expected("a string", "")),
         }
     }
 
@@ -167,7 +184,7 @@ impl Node {
             Value::Integer(value) => Ok(value as f64),
             Value::Float(value) if value.is_finite() => Ok(value),
             Value::Float(_) => Err(self.refuse("the number is not finite")),
-            _ => Err(self.expected("a number")),
+            _ => Err(self.expected("a number", "")),
         }
     }
 
@@ -179,25 +196,57 @@ impl Node {
         }
     }
 
-    /// A whole number; a fraction is refused.
-    pub fn whole(&self) -> Result<i64> {
+    /// A whole number, not negative; a fraction is refused.
+    pub fn count(&self) -> Result<usize> {
         match self.value {
-            Value::Integer(value) => Ok(value),
-            _ => Err(self.expected("a whole number")),
+            Value::Integer(value) => usize::try_from(value).map_err(|_| self.refuse("the number is below 0")),
+            _ => Err(self.expected("a whole number", "")),
         }
     }
 
     pub fn boolean(&self) -> Result<bool> {
         match self.value {
             Value::Boolean(value) => Ok(value),
-            _ => Err(self.expected("true or false")),
+            _ => Err(self.expected("true or false", "")),
         }
     }
 
     pub fn list(&self) -> Result<&[Node]> {
         match &self.value {
             Value::List(items) => Ok(items),
-            _ => Err(self.expected("a list")),
+            _ => Err(self.expected("a list", "")),
+        }
+    }
+}
+
+impl Form {
+    /// Whether a value is of this kind, whatever is in it.
+    fn admits(&self, value: &Value) -> bool {
+        match self {
+            Self::Text | Self::Word(_) => matches!(value, Value::String(_)),
+            Self::Flag => matches!(value, Value::Boolean(_)),
+            Self::Number => matches!(value, Value::Integer(_) | Value::Float(_)),
+            Self::Whole | Self::Count | Self::Among(_) => matches!(value, Value::Integer(_)),
+            Self::Field => matches!(value, Value::Integer(_) | Value::Float(_) | Value::String(_)),
+            Self::List(_) => matches!(value, Value::List(_)),
+            Self::Table(_) | Self::Named(_) => matches!(value, Value::Table(_)),
+            Self::Either(forms) => forms.iter().any(|form| form.admits(value)),
+        }
+    }
+
+    /// Why a whole number is refused; none if it is not.
+    fn breach(&self, value: &Value) -> Option<String> {
+        match (self, value) {
+            (Self::Whole, Value::Integer(..0)) => Some("must be 0 or more".to_owned()),
+            (Self::Count, Value::Integer(..1)) => Some("must be 1 or more".to_owned()),
+            (Self::Among(known), Value::Integer(number)) if !known.contains(number) => {
+                let known: Vec<String> = known.iter().map(i64::to_string).collect();
+                Some(format!("must be {}", known.join(" or ")))
+            }
+            (Self::Either(forms), _) => {
+                forms.iter().filter(|form| form.admits(value)).find_map(|form| form.breach(value))
+            }
+            _ => None,
         }
     }
 }
@@ -209,33 +258,46 @@ const USUAL: [(&str, &str); 6] =
 /// Keys of the whole scene that are values, which TOML gives to the table before them.
 const TOP: [&str; 8] = ["title", "dimension", "plane", "units", "mesh", "solver", "estimate", "adapt"];
 
-/// A table whose keys are all known.
+/// A table whose keys are all known, with values of the right kind.
 pub(super) struct Keys<'a> {
     node: &'a Node,
     entries: &'a [Entry],
-    what: &'a str,
+    what: String,
 }
 
 impl<'a> Keys<'a> {
-    /// Opens a table; `what` names it in messages. The first key outside `known` is refused.
-    pub fn open(node: &'a Node, what: &'a str, known: &[&str]) -> Result<Self> {
-        let Value::Table(entries) = &node.value else {
-            return Err(node.expected("a table").help(format!("its keys are {}", known.join(", "))));
-        };
-        match entries.iter().find(|entry| !known.contains(&entry.key.as_str())) {
-            None => Ok(Self { node, entries, what }),
-            Some(Entry { key, key_place, .. }) => {
-                let error = Error::scene(key_place, format!("unknown key `{key}` in {what}")).label("unknown key");
-                let other = USUAL.iter().find(|(usual, own)| usual == key && known.contains(own)).map(|(_, own)| *own);
-                Err(error.help(match other.or_else(|| nearest(key, known.iter().copied())) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None if TOP.contains(&key.as_str()) => {
-                        format!("`{key}` belongs to the whole scene: write it above the first line in [brackets]")
-                    }
-                    None => format!("its keys are {}", known.join(", ")),
-                }))
+    /// Opens a table; what does not fit its shape is refused.
+    pub fn open(node: &'a Node, shape: &Table) -> Result<Self> {
+        let names = || shape.keys.iter().filter(|key| !key.about.is_empty()).map(|key| key.name);
+        let all = || format!("its keys are {}", names().collect::<Vec<_>>().join(", "));
+        let Value::Table(entries) = &node.value else { return Err(node.expected("a table", &all())) };
+        let keys = Self { node, entries, what: shape.what.to_string() };
+        for Entry { key: name, key_place, node } in entries {
+            let Some(key) = shape.keys.iter().find(|key| key.name == name) else {
+                let error = Error::scene(key_place, format!("unknown key `{name}` in {}", keys.what));
+                let other = USUAL.iter().find(|(usual, own)| usual == name && names().any(|key| key == *own));
+                return Err(error.label("unknown key").help(
+                    match other.map(|(_, own)| *own).or_else(|| nearest(name, names())) {
+                        Some(near) => format!("did you mean `{near}`?"),
+                        None if TOP.contains(&name.as_str()) => {
+                            format!("`{name}` belongs to the whole scene: write it above the first line in [brackets]")
+                        }
+                        None => all(),
+                    },
+                ));
+            };
+            if !key.form.admits(&node.value) {
+                return Err(node.expected(&key.form.words(), &key.about));
+            }
+            if let (Some(breach), Value::Integer(number)) = (key.form.breach(&node.value), &node.value) {
+                return Err(node.refuse(format!("`{name}` is {number}")).label(breach));
             }
         }
+        shape.apart.iter().try_for_each(|[first, second]| keys.exclude(first, second))?;
+        for key in shape.keys.iter().filter(|key| key.must) {
+            keys.require(key.name).map_err(|error| error.help(format!("{}: {}", key.name, key.about)))?;
+        }
+        Ok(keys)
     }
 
     /// The table itself.
@@ -251,6 +313,11 @@ impl<'a> Keys<'a> {
         self.entry(key).map(|entry| &entry.node)
     }
 
+    /// True or false, or what holds without the key.
+    pub fn flag(&self, key: &str, usual: bool) -> Result<bool> {
+        self.get(key).map_or(Ok(usual), Node::boolean)
+    }
+
     /// The value of a key that must be there.
     pub fn require(&self, key: &str) -> Result<&'a Node> {
         self.get(key).ok_or_else(|| {
@@ -259,7 +326,7 @@ impl<'a> Keys<'a> {
     }
 
     /// Refuses a table with two keys of which only one can hold; points at the later one, or the overriding one.
-    pub fn exclude(&self, first: &str, second: &str) -> Result<()> {
+    fn exclude(&self, first: &str, second: &str) -> Result<()> {
         let mut both = self.entries.iter().filter(|entry| entry.key == first || entry.key == second).skip(1);
         match both.next() {
             None => Ok(()),

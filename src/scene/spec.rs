@@ -73,7 +73,9 @@ pub struct OutputSpec {
     pub dir: Option<PathBuf>,
     /// Whether to write `<body>.vtu` and the `.pvd`; default false.
     pub vtu: bool,
-    /// How they are written.
+    /// Whether to write `<body>.msh` with views for Gmsh; default false.
+    pub msh: bool,
+    /// How the `.vtu` are written.
     pub encoding: Encoding,
     /// Whether to write the page of the run, `report.html`; default false.
     pub report: bool,
@@ -90,6 +92,7 @@ impl Default for OutputSpec {
         Self {
             dir: None,
             vtu: false,
+            msh: false,
             encoding: Encoding::default(),
             report: false,
             plots: true,

@@ -1,6 +1,6 @@
 //! Dense Cholesky factorisation by the LAPACK that PETSc runs on: for matrices without zeros.
 
-use super::InnerSolver;
+use super::{Change, InnerSolver, Seen};
 use crate::error::Result;
 use crate::model::Solved;
 use crate::petsc::{Rows, cholesky, cholesky_solve};
@@ -25,10 +25,10 @@ impl Dense {
 }
 
 impl InnerSolver for Dense {
-    fn update(&mut self, write: &mut dyn FnMut(&mut [f64]), _far: bool) -> Result<()> {
-        write(&mut self.values);
+    fn update(&mut self, change: Change) -> Result<Seen> {
+        (change.write)(&mut self.values);
         self.made = None;
-        Ok(())
+        Ok(Seen::Whole)
     }
 
     fn set_up(&mut self) -> Result<()> {

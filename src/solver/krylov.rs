@@ -1,7 +1,7 @@
 //! Any PETSc KSP and PC as inner solver.
 
-use super::InnerSolver;
 use super::options::Chosen;
+use super::{Change, InnerSolver, Seen};
 use crate::error::Result;
 use crate::fem::Interpolation;
 use crate::linalg::Csr;
@@ -29,10 +29,17 @@ pub struct Krylov {
     fresh: Option<f64>,
     /// Share of the residual that the last solve left.
     reached: f64,
+    /// Layers of the graph of G around dofs that are solved exactly.
+    layers: usize,
+    /// Exact solves near the contact that were made.
+    patches: usize,
 }
 
 /// Growth of the iterations, over those of a fresh preconditioner, at which a new one is made.
 const WORN: f64 = 1.5;
+
+/// A patch has at most one in so many dofs.
+const SMALL: usize = 4;
 
 /// Iterations that tell nothing of the pace.
 const FEW: usize = 12;
@@ -74,6 +81,8 @@ impl Krylov {
         let keeps = multigrid && !is_bounded && chosen.get("ksp_reuse_preconditioner").is_none();
         let free = ksp.ksp_type() != "preonly" && chosen.typed("ksp_rtol").is_none();
         let session = session.clone();
+        // hypre smooths with the matrix of the set-up; Gauss-Seidel of two levels with G, which does that work
+        let layers = usize::from(ksp.pc_type() != "mg");
         Ok(Self {
             session,
             chosen,
@@ -87,6 +96,8 @@ impl Krylov {
             stale: true,
             fresh: None,
             reached: 1.0,
+            layers,
+            patches: 0,
         })
     }
 
@@ -108,6 +119,29 @@ impl Krylov {
         })
     }
 
+    /// Whether an exact solve on these dofs, and those around them, costs less than a preconditioner.
+    fn is_few(&self, dofs: &[usize]) -> bool {
+        dofs.len() * (1 + self.layers) * SMALL <= self.matrix.total()
+    }
+
+    /// Changes G but not its preconditioner, and solves exactly on dofs where these are far from each other. False if that does not serve.
+    fn patch(&mut self, change: &Change, dofs: Vec<usize>) -> Result<bool> {
+        if !self.is_few(&dofs) {
+            return Ok(false);
+        }
+        self.matrix.update(change.write)?;
+        self.ksp.set_reuse_preconditioner(true)?;
+        if !dofs.is_empty() {
+            let _stage = self.session.stage("set-up");
+            if !self.ksp.patch(&self.matrix, &dofs, self.layers)? {
+                return Ok(false);
+            }
+            self.patches += 1;
+        }
+        self.changed = false;
+        Ok(true)
+    }
+
     /// Remembers the pace of a solve: the next change of G brings a new preconditioner if this one is worn.
     fn learn(&mut self, solved: &Solved) {
         if self.keeps && solved.iterations > FEW {
@@ -124,10 +158,29 @@ impl Krylov {
 }
 
 impl InnerSolver for Krylov {
-    fn update(&mut self, write: &mut dyn FnMut(&mut [f64]), far: bool) -> Result<()> {
+    fn update(&mut self, change: Change) -> Result<Seen> {
         self.changed = true;
-        self.stale |= far;
-        self.matrix.update(write)
+        if !self.keeps {
+            self.matrix.update(change.write)?;
+            return Ok(Seen::Whole);
+        }
+        self.ksp.unpatch()?;
+        let is_worn = self.set_ups == 0 || self.stale;
+        if !is_worn && self.patch(&change, (change.far)())? {
+            return Ok(Seen::Older);
+        }
+        let stiff = (change.stiff)();
+        if self.is_few(&stiff) {
+            self.matrix.update(change.soften)?;
+            self.stale = true;
+            self.set_up()?;
+            if self.patch(&change, stiff)? {
+                return Ok(Seen::Softened);
+            }
+        }
+        (self.changed, self.stale) = (true, true);
+        self.matrix.update(change.write)?;
+        Ok(Seen::Whole)
     }
 
     fn set_up(&mut self) -> Result<()> {
@@ -197,6 +250,10 @@ impl InnerSolver for Krylov {
 
     fn factorizations(&self) -> (usize, usize) {
         (usize::from(self.set_ups > 0), self.set_ups)
+    }
+
+    fn patches(&self) -> usize {
+        self.patches
     }
 
     fn describe(&self) -> String {

@@ -42,15 +42,36 @@ fn integers(part: Vec<i32>) -> Vec<Int> {
     part.into_iter().map(Int::from).collect()
 }
 
+/// A change of G = K + B' diag(d) B.
+pub struct Change<'a> {
+    /// Writes the values of G in the order of the pattern it was made with.
+    pub write: &'a dyn Fn(&mut [f64]),
+    /// The same with springs at most as stiff as the elements.
+    pub soften: &'a dyn Fn(&mut [f64]),
+    /// Dofs of the contact rows whose springs are far from those that a kept preconditioner has seen, softened ones.
+    pub far: &'a dyn Fn() -> Vec<usize>,
+    /// Those whose springs are far from the softened ones of G itself.
+    pub stiff: &'a dyn Fn() -> Vec<usize>,
+}
+
+/// What a solver works with after a change of G.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seen {
+    /// The preconditioner of an older G.
+    Older,
+    /// One of G with softened springs.
+    Softened,
+    /// G itself.
+    Whole,
+}
+
 /// Owner of the matrix G with a way to solve G z = r.
 pub trait InnerSolver {
-    /// Changes values of G (in the order of the pattern it was made with); the next solve uses the new matrix. `far` tells
-    /// that it is far from the matrix of the last `far` change (at first: from the one it was made with), so that a
-    /// preconditioner of that one would be poor; else an iterative solver may keep it.
+    /// Changes values of G; the next solve uses the new matrix.
     ///
     /// # Errors
     /// Failures of the solver library.
-    fn update(&mut self, write: &mut dyn FnMut(&mut [f64]), far: bool) -> Result<()>;
+    fn update(&mut self, change: Change) -> Result<Seen>;
 
     /// Factors G, or sets its preconditioner up, if it changed since.
     ///
@@ -97,6 +118,11 @@ pub trait InnerSolver {
 
     /// (symbolic, numeric) factorisations or preconditioner set-ups so far.
     fn factorizations(&self) -> (usize, usize);
+
+    /// Exact solves near the contact that were made for kept preconditioners.
+    fn patches(&self) -> usize {
+        0
+    }
 
     /// Whether the factorisations are dense ones, which are counted apart.
     fn is_dense(&self) -> bool {

@@ -1,6 +1,6 @@
 //! The matrix of a linear system with springs at contact points, G = K + B' diag(d) B, and what solves it.
 
-use super::{InnerSolver, Krylov};
+use super::{Change, InnerSolver, Krylov, Seen};
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::{BodyCounts, Solved};
@@ -16,14 +16,16 @@ pub struct RobinMatrix<S> {
     solver: S,
     /// Springs d of G, one a row of B.
     weight: Vec<f64>,
-    /// Those when G was last far from what its preconditioner was made of.
+    /// Those that the preconditioner has seen.
     prepared: Vec<f64>,
-    /// b diag(K) b' of each row.
-    row_stiffness: Vec<f64>,
+    /// The springs that double the stiffness under a row.
+    soft: Vec<f64>,
     coupling: Coupling,
     counts: BodyCounts,
     /// Symbolic and numeric factorisations before the counts began.
     before: (usize, usize),
+    /// Patches before.
+    patches_before: usize,
 }
 
 impl<S: InnerSolver> RobinMatrix<S> {
@@ -39,13 +41,16 @@ impl<S: InnerSolver> RobinMatrix<S> {
         make: impl FnOnce(Rows) -> Result<S>,
     ) -> Result<Self> {
         let weight = vec![0.0; rows.rows()];
+        let square = |q| rows.row(q).map(|(_, b)| b * b).sum::<f64>();
+        let soft = row_stiffness.iter().enumerate().map(|(q, stiffness)| stiffness / square(q).powi(2)).collect();
         Ok(Self {
             prepared: weight.clone(),
             weight,
-            row_stiffness,
+            soft,
             coupling: Coupling::new(&stiffness, rows),
             counts: BodyCounts::default(),
             before: (0, 0),
+            patches_before: 0,
             solver: make(stiffness)?,
         })
     }
@@ -61,12 +66,22 @@ impl<S: InnerSolver> RobinMatrix<S> {
         }
         self.weight.copy_from_slice(weight);
         self.counts.robin_updates += 1;
-        let far = is_far(rows, &self.row_stiffness, &self.prepared, weight);
-        if far {
-            self.prepared.copy_from_slice(weight);
+        let softened: Vec<f64> = weight.iter().zip(&self.soft).map(|(weight, soft)| weight.min(*soft)).collect();
+        let (coupling, soft, prepared) = (&self.coupling, &self.soft, &self.prepared);
+        let change = Change {
+            write: &|g| coupling.write(rows, weight, g),
+            soften: &|g| coupling.write(rows, &softened, g),
+            far: &|| far(rows, soft, prepared, weight),
+            stiff: &|| far(rows, soft, &softened, weight),
+        };
+        let began = Instant::now();
+        match self.solver.update(change)? {
+            Seen::Older => {}
+            Seen::Softened => self.prepared = softened,
+            Seen::Whole => self.prepared.copy_from_slice(weight),
         }
-        let coupling = &self.coupling;
-        self.solver.update(&mut |g| coupling.write(rows, weight, g), far)
+        self.counts.factor_seconds += began.elapsed().as_secs_f64();
+        Ok(())
     }
 
     /// Factors G, or makes its preconditioner, if it changed since.
@@ -105,12 +120,14 @@ impl<S: InnerSolver> RobinMatrix<S> {
         if self.solver.is_dense() {
             return BodyCounts { dense_factorizations: factorizations, ..self.counts };
         }
-        BodyCounts { symbolic, factorizations, ..self.counts }
+        let patches = self.solver.patches() - self.patches_before;
+        BodyCounts { symbolic, factorizations, patches, ..self.counts }
     }
 
     /// Counts from zero.
     pub fn begin_anew(&mut self) {
         self.before = self.solver.factorizations();
+        self.patches_before = self.solver.patches();
         self.counts = BodyCounts::default();
     }
 
@@ -196,21 +213,19 @@ impl Coupling {
     }
 }
 
-/// Growth of the stiffness under a contact point, either way, beyond which a preconditioner is poor.
-const FAR: f64 = 3.0;
+/// Growth of the stiffness under a contact row, either way, beyond which a preconditioner is poor there.
+const FAR: f64 = 1.5;
 
-/// One row in so many may be far: each is an eigenvalue apart from the others, and costs conjugate gradients about one step.
-const FEW: usize = 64;
-
-/// Whether Robin terms `old` and `new` change the stiffness under too many contact rows by more than [`FAR`]. The eigenvalues of
-/// G_old^-1 G_new lie between the least and the largest ratio of the weights; where the body is stiff beside the Robin term
-/// they do not come near that, and only the sum of both counts.
-fn is_far(rows: &Csr, row_stiffness: &[f64], old: &[f64], new: &[f64]) -> bool {
-    let far = |q: &usize| {
-        let square: f64 = rows.row(*q).map(|(_, b)| b * b).sum();
-        let (before, after) =
-            (row_stiffness[*q] + old[*q] * square * square, row_stiffness[*q] + new[*q] * square * square);
+/// Dofs of the contact rows where springs `new` make the stiffness [`FAR`] times that with springs `old`, or a share of it; `soft` are the springs
+/// that double it. The eigenvalues of G_old^-1 G_new lie between the least and the largest ratio of the springs; where the body is stiff
+/// beside them they do not come near that, and only the sum of both counts.
+fn far(rows: &Csr, soft: &[f64], old: &[f64], new: &[f64]) -> Vec<usize> {
+    let is_far = |q: &usize| {
+        let (before, after) = (soft[*q] + old[*q], soft[*q] + new[*q]);
         after > FAR * before || before > FAR * after
     };
-    (0..rows.rows()).filter(far).nth(rows.rows() / FEW).is_some()
+    let mut dofs: Vec<usize> = (0..rows.rows()).filter(is_far).flat_map(|q| rows.row(q).map(|entry| entry.0)).collect();
+    dofs.sort_unstable();
+    dofs.dedup();
+    dofs
 }

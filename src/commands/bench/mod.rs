@@ -15,15 +15,14 @@ pub use request::Request;
 use super::folder_of;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
-use crate::output::{Folder, say};
+use crate::output::{Folder, progress, say};
 use crate::scene::Scene;
-use indicatif::{ProgressBar, ProgressStyle};
 use plan::{Case, Plan};
 use process::Runner;
 use request::usage;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use table::{Row, Table};
 
 /// Runs all combinations, writes `bench.csv` row by row and the plots at the end; returns the exit code: 1 if a run did
@@ -43,7 +42,7 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let reference = compare::References::read(request.against.as_deref(), &plan)?;
     let mut table = Table::open(&folder, &plan, request)?;
     let runner = Runner::new(interrupt, request, folder.path())?;
-    let bar = progress(plan.cases.len());
+    let bar = progress::runs(plan.cases.len(), !request.quiet);
     let mut meshed = BTreeSet::new();
     let began = Instant::now();
     for case in &plan.cases {
@@ -56,7 +55,9 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
             None if began.elapsed().as_secs_f64() >= request.budget => Row::skipped(case, "the budget is spent"),
             None => measure(case, &runner, &reference, &mut meshed)?,
         };
-        bar.suspend(|| say(row.line(&case.label(), is_new)))?;
+        if !(request.quiet && row.is_good()) {
+            bar.suspend(|| say(row.line(&case.label(), is_new)))?;
+        }
         table.add(row)?;
         bar.inc(1);
     }
@@ -67,7 +68,9 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     for (name, plot) in charts::all(&table, &plan) {
         folder.write(&name, |out| plot.write(out))?;
     }
-    say(summary::of(&table, &plan))?;
+    if !request.quiet {
+        say(summary::of(&table, &plan))?;
+    }
     say(format_args!("results in {}", folder.path().display()))?;
     Ok(i32::from(!table.rows.iter().all(Row::is_good)))
 }
@@ -78,21 +81,6 @@ fn folder(request: &Request, plan: &Plan) -> PathBuf {
         (None, [scene]) => folder_of(scene, None).join("bench"),
         (None, _) => PathBuf::from("results/bench"),
     }
-}
-
-/// How often the progress line is drawn.
-const TICK: Duration = Duration::from_millis(200);
-
-fn progress(runs: usize) -> ProgressBar {
-    let bar = ProgressBar::new(runs as u64);
-    if let Ok(style) =
-        ProgressStyle::with_template("{spinner} {bar:30} {pos}/{len}, {elapsed} gone, {eta} left: {wide_msg}")
-    {
-        bar.set_style(style);
-    }
-    // time goes on while a run is on its way
-    bar.enable_steady_tick(TICK);
-    bar
 }
 
 /// One row: as many runs as asked for, and what they say.

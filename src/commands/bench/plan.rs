@@ -5,6 +5,7 @@ use crate::commands::case_of;
 use crate::commands::sweep::{axis, combinations};
 use crate::error::Result;
 use crate::problem::method::MethodName;
+use crate::problem::name_of;
 use crate::problem::order::Order;
 use crate::problem::solver::Preset;
 use crate::scene::Scene;
@@ -77,11 +78,9 @@ impl Plan {
         if let Some(order) = request.orders.iter().find(|order| !matches!(order, 1 | 2)) {
             return Err(usage(format!("there are no elements of order {order}")).help("--order 1,2"));
         }
-        let scenes = request
-            .scenes
-            .iter()
-            .map(|path| crate::scene::load(path, &request.overrides))
-            .collect::<Result<Vec<_>>>()?;
+        let overrides = request.all_overrides();
+        let scenes =
+            request.scenes.iter().map(|path| crate::scene::load(path, &overrides)).collect::<Result<Vec<_>>>()?;
         let keys = axes.iter().map(|(key, _)| key.clone()).collect();
         let mut plan = Plan { names: names(&scenes), scenes, keys, cases: Vec::new() };
         for index in 0..plan.scenes.len() {
@@ -111,7 +110,7 @@ impl Plan {
         }
         let mut cases = Vec::new();
         for order in orders {
-            let mut mesh = request.overrides.clone();
+            let mut mesh = request.all_overrides();
             mesh.extend(self.keys.iter().zip(values).map(|(key, value)| format!("{key}={value}")));
             if let Some(order) = order {
                 mesh.extend((0..scene.bodies.len()).map(|body| format!("body.{body}.order={order}")));
@@ -127,7 +126,7 @@ impl Plan {
                     key.extend(values.iter().cloned());
                     key.extend([
                         solver.name.clone(),
-                        method.map_or_else(|| name_of(scene.method.name), str::to_owned),
+                        method.map_or_else(|| name_of(&MethodName::ALL, &scene.method.name).to_owned(), str::to_owned),
                         order.map_or_else(|| orders_of(scene), |order| order.to_string()),
                         ranks.to_string(),
                     ]);
@@ -225,11 +224,6 @@ fn names(scenes: &[Scene]) -> Vec<String> {
         _ => scene.path.display().to_string(),
     };
     scenes.iter().map(name).collect()
-}
-
-fn name_of(method: MethodName) -> String {
-    let found = MethodName::ALL.iter().find(|(_, known)| *known == method);
-    found.map_or_else(String::new, |(name, _)| (*name).to_owned())
 }
 
 fn orders_of(scene: &Scene) -> String {

@@ -282,7 +282,7 @@ impl<'a> Table<'a> {
         let settings = format!(
             "winkler {}\n--set {:?}\nPETSc {:?}\n--repeat {}\n--timeout {}\n--against {:?}\n",
             env!("CARGO_PKG_VERSION"),
-            request.overrides,
+            request.all_overrides(),
             request.petsc,
             request.repeat,
             request.timeout,

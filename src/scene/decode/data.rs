@@ -5,15 +5,31 @@ use crate::data::{Data, DataSpec, Interpolation, Library, Outside};
 use crate::error::{Error, Result};
 use crate::expression::names;
 use crate::scene::read::{Entry, Keys, Node, Value};
+use crate::scene::shape::{Form, Table, word};
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
+
+/// The shape of `[data.NAME]`.
+pub(super) fn table(what: impl Into<Cow<'static, str>>) -> Table {
+    use Form::{Either, Flag, Number, Text};
+    let pair = || Either(vec![Number, Number.list()]);
+    Table::new(what)
+        .must("file", Text, "a table of numbers, or .npy")
+        .key("points", Flag, "whether each row is a place and its height; false")
+        .key("origin", pair(), "place of the first height; 0")
+        .key("spacing", pair(), "distance of the heights along a row and from row to row")
+        .key("unit", Number, "what a height of 1 in the file is; 1")
+        .key("interpolate", word(&Interpolation::ALL), "what is between the heights; \"linear\"")
+        .key("outside", word(&Outside::ALL), "what is beyond them; \"error\"")
+}
 
 impl Decoder<'_> {
     /// The data of a scene. Files are looked for, not read.
     pub(super) fn library(&self, node: Option<&Node>) -> Result<Library> {
         const EXAMPLE: &str = "write [data.rough] and below it file = \"surface.csv\"";
         let Some(node) = node else { return Ok(Library::new()) };
-        let Value::Table(entries) = &node.value else { return Err(node.expected("a table").help(EXAMPLE)) };
+        let Value::Table(entries) = &node.value else { return Err(node.expected("a table", EXAMPLE)) };
         if let Some(Entry { key, key_place, .. }) =
             entries.iter().find(|entry| !matches!(entry.node.value, Value::Table(_)))
         {
@@ -33,11 +49,9 @@ fn spec(entry: &Entry, folder: &Path) -> Result<DataSpec> {
         return Err(Error::scene(key_place, format!("data cannot be called `{name}`"))
             .label("expressions have this name already"));
     }
-    let what = format!("[data.{name}]");
-    let known = ["file", "points", "origin", "spacing", "unit", "interpolate", "outside"];
-    let keys = Keys::open(node, &what, &known)?;
+    let keys = Keys::open(node, &table(format!("[data.{name}]")))?;
     let path = file(folder, keys.require("file")?)?;
-    let points = keys.get("points").map_or(Ok(false), Node::boolean)?;
+    let points = keys.flag("points", false)?;
     let spacing = match keys.get("spacing") {
         Some(node) => pair(node, |node| node.positive("the spacing"))?,
         None if points => [1.0; 2],

@@ -1,75 +1,80 @@
 //! Elastic constants of bodies and regions.
 
 use super::Decoder;
-use crate::error::{Error, Result, shown};
+use crate::error::Result;
 use crate::expression::Field;
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, RegionSpec};
 use crate::scene::read::{Keys, Node, Value};
+use crate::scene::shape::{Form, Table};
 
-/// Keys that say what a body is made of.
-pub const KEYS: [&str; 5] = ["young", "poisson", "orthotropic", "anisotropic", "axes"];
+/// Adds the keys that say what a body or a region is made of.
+pub(super) fn keys(table: Table) -> Table {
+    table
+        .key("young", Form::Field, "Young's modulus, > 0")
+        .key("poisson", Form::Field, "Poisson's ratio, between -1 and 0.5")
+        .key("orthotropic", orthotropic().form(), "orthotropic = { E1 = ..., E2 = ..., E3 = ..., nu12 = ..., ... }")
+        .key("anisotropic", Form::Field.list(), UPPER)
+        .key("axes", axes().form(), AXES)
+        .apart(&["young", "orthotropic", "anisotropic"])
+        .apart(&["poisson", "orthotropic"])
+        .apart(&["poisson", "anisotropic"])
+}
+
+/// The shape of `[[body.region]]`.
+pub(super) fn region() -> Table {
+    keys(Table::new("[[body.region]]").must("on", Form::Text, "group of its cells"))
+}
+
+const UPPER: &str = "C11, C12, ..., C16, C22, ..., C66: the upper triangle by rows, in the order 11 22 33 23 13 12";
+const AXES: &str = "write first = [1, 1, 0] and second = [-1, 1, 0], or angle = \"pi/6\" and axis = [0, 0, 1]";
+
+fn orthotropic() -> Table {
+    let table = Table::new("the orthotropic material");
+    Constants::ORTHOTROPIC.iter().fold(table, |table, name| table.must(name, Form::Field, "a constant of the material"))
+}
+
+fn axes() -> Table {
+    Table::new("the axes")
+        .key("first", Form::Field.list(), "direction of axis 1")
+        .key("second", Form::Field.list(), "direction on the side of axis 2")
+        .key("angle", Form::Field, "angle (radian) by which x, y, z are turned")
+        .key("axis", Form::Field.list(), "axis of the turn; z in the plane")
+        .apart(&["first", "angle"])
+        .apart(&["second", "angle"])
+        .apart(&["first", "axis"])
+}
 
 impl Decoder<'_> {
     /// The constants among the keys of a body or a region.
     pub(super) fn elasticity(&self, keys: &Keys) -> Result<ElasticitySpec> {
-        for (first, second) in [("young", "orthotropic"), ("young", "anisotropic"), ("orthotropic", "anisotropic")] {
-            keys.exclude(first, second)?;
-        }
         let (constants, place) = if let Some(node) = keys.get("orthotropic") {
-            keys.exclude("poisson", "orthotropic")?;
             (self.orthotropic(node)?, &node.place)
         } else if let Some(node) = keys.get("anisotropic") {
-            keys.exclude("poisson", "anisotropic")?;
             (self.anisotropic(node)?, &node.place)
         } else {
             const OTHERS: &str =
                 "a material is young and poisson, orthotropic = { E1 = ... } or anisotropic = [C11, ...]";
             let young = keys.require("young").map_err(|error| error.help(OTHERS))?;
             let poisson = keys.require("poisson")?;
-            let constants = Constants::Isotropic {
-                young: self.positive_field(young, "Young's modulus")?,
-                poisson: self.poisson(poisson)?,
-            };
+            let constants = Constants::Isotropic { young: self.field(young)?, poisson: self.field(poisson)? };
             (constants, &young.place)
         };
-        let axes = match (keys.entry("axes"), &constants) {
-            (Some(entry), Constants::Isotropic { .. }) => {
-                return Err(Error::scene(&entry.key_place, "axes of an isotropic material")
-                    .label("all directions are alike")
-                    .help("remove them, or give orthotropic or anisotropic constants"));
-            }
-            (entry, _) => entry.map(|entry| self.axes(&entry.node)).transpose()?,
-        };
+        let axes = keys.get("axes").map(|axes| self.axes(axes)).transpose()?;
         Ok(ElasticitySpec { constants, axes, place: place.clone() })
     }
 
     /// Parts of a body with other constants.
     pub(super) fn regions(&self, keys: &Keys) -> Result<Vec<RegionSpec>> {
         let Some(list) = keys.get("region") else { return Ok(Vec::new()) };
-        let items = list.list().map_err(|error| error.help("a region starts with the line [[body.region]]"))?;
         let region = |node: &Node| {
-            let keys = Keys::open(node, "[[body.region]]", &[&["on"], &KEYS[..]].concat())?;
+            let keys = Keys::open(node, &region())?;
             Ok(RegionSpec { on: super::pattern(keys.require("on")?)?, elasticity: self.elasticity(&keys)? })
         };
-        items.iter().map(region).collect()
-    }
-
-    fn poisson(&self, node: &Node) -> Result<Field> {
-        match self.field(node)? {
-            Field::Constant(value) if !(value > -1.0 && value < 0.5) => {
-                let error =
-                    node.refuse(format!("Poisson's ratio is {}", shown(value))).label("must lie between -1 and 0.5");
-                Err(match value == 0.5 {
-                    true => error.help("incompressible bodies are not possible; take 0.4999 and order = 2, say"),
-                    false => error,
-                })
-            }
-            field => Ok(field),
-        }
+        list.list()?.iter().map(region).collect()
     }
 
     fn orthotropic(&self, node: &Node) -> Result<Constants> {
-        let keys = Keys::open(node, "the orthotropic material", &Constants::ORTHOTROPIC)?;
+        let keys = Keys::open(node, &orthotropic())?;
         let mut fields = [const { Field::Constant(0.0) }; 9];
         for (field, name) in fields.iter_mut().zip(Constants::ORTHOTROPIC) {
             *field = self.field(keys.require(name)?)?;
@@ -81,9 +86,9 @@ impl Decoder<'_> {
         let items = node.list()?;
         let mut fields = Box::new([const { Field::Constant(0.0) }; 21]);
         if items.len() != fields.len() {
-            return Err(node.refuse(format!("an anisotropic material has 21 constants, not {}", items.len())).help(
-                "C11, C12, ..., C16, C22, ..., C66: the upper triangle by rows, in the order 11 22 33 23 13 12",
-            ));
+            return Err(node
+                .refuse(format!("an anisotropic material has 21 constants, not {}", items.len()))
+                .help(UPPER));
         }
         for (field, item) in fields.iter_mut().zip(items) {
             *field = self.field(item)?;
@@ -92,10 +97,8 @@ impl Decoder<'_> {
     }
 
     fn axes(&self, node: &Node) -> Result<AxesSpec> {
-        let keys = Keys::open(node, "the axes", &["first", "second", "angle", "axis"])?;
-        keys.exclude("first", "angle")?;
+        let keys = Keys::open(node, &axes())?;
         if let Some(angle) = keys.get("angle") {
-            keys.exclude("angle", "second")?;
             let axis = match (keys.get("axis"), self.dimension) {
                 (None, 2) => [0.0, 0.0, 1.0].map(Field::Constant),
                 (None, _) => self.direction(keys.require("axis")?)?,
@@ -103,13 +106,10 @@ impl Decoder<'_> {
             };
             return Ok(AxesSpec::Angle { angle: self.field(angle)?, axis });
         }
-        keys.exclude("first", "axis")?;
-        const EXAMPLE: &str =
-            "write first = [1, 1, 0] and second = [-1, 1, 0], or angle = \"pi/6\" and axis = [0, 0, 1]";
-        let first = self.direction(keys.require("first").map_err(|error| error.help(EXAMPLE))?)?;
+        let first = self.direction(keys.require("first").map_err(|error| error.help(AXES))?)?;
         let second = match (keys.get("second"), self.dimension) {
             (None, 2) => None,
-            (None, _) => Some(self.direction(keys.require("second").map_err(|error| error.help(EXAMPLE))?)?),
+            (None, _) => Some(self.direction(keys.require("second").map_err(|error| error.help(AXES))?)?),
             (Some(second), _) => Some(self.direction(second)?),
         };
         Ok(AxesSpec::Directions { first, second })

@@ -5,6 +5,7 @@ use crate::error::{Error, Kind, Located, Place, Result, Source, joined, nearest}
 use crate::problem::body::BodySpec;
 use crate::problem::history::{COMMON, History, Step, has_common, paths};
 use crate::scene::read::{Keys, Node, Value};
+use crate::scene::shape::{Form, Table};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -14,25 +15,22 @@ const MOST_STEPS: usize = 1000;
 /// Name of the column of times.
 const TIME: &str = "time";
 
+/// The shape of `steps` from a file.
+pub(super) fn table() -> Table {
+    Table::new("the load steps").must("table", Form::Text, "CSV file with a column of each factor")
+}
+
 impl Decoder<'_> {
     /// Load steps.
     pub(super) fn history(&self, node: &Node) -> Result<History> {
         match &node.value {
-            Value::List(items) => {
-                let shares: Vec<f64> = items.iter().map(|item| item.positive("the factor")).collect::<Result<_>>()?;
-                match shares.last() {
-                    Some(1.0) => Ok(History::of_shares(shares)),
-                    _ => Err(node
-                        .refuse("the last load step is not the full load")
-                        .help("end the list with 1; a table may end anywhere: steps = { table = \"path.csv\" }")),
-                }
-            }
+            Value::List(items) => items.iter().map(Node::number).collect::<Result<_>>().map(History::of_shares),
             Value::Table(_) => {
-                let keys = Keys::open(node, "the load steps", &["table"])?;
+                let keys = Keys::open(node, &table())?;
                 read(file(self.folder, keys.require("table")?)?)
             }
-            _ => match usize::try_from(node.whole()?) {
-                Ok(count) if (1..=MOST_STEPS).contains(&count) => {
+            _ => match node.count()? {
+                count @ 1..=MOST_STEPS => {
                     Ok(History::of_shares((1..=count).map(|step| step as f64 / count as f64).collect()))
                 }
                 _ => Err(node.refuse(format!("the number of load steps must lie between 1 and {MOST_STEPS}"))),

@@ -2,29 +2,62 @@
 
 use super::Decoder;
 use crate::data::{Grid, Summits};
-use crate::error::{Error, Result, nearest, shown};
-use crate::expression::{Differentiable, Field, Scope};
-use crate::problem::layer::{AsperitySpec, Depths, FORMS, LawForm, LayerSpec};
+use crate::error::{Error, Result, nearest};
+use crate::expression::{Differentiable, Scope};
+use crate::problem::layer::{AsperitySpec, Depths, FORMS, LawForm, LayerSpec, Parameter};
 use crate::scene::read::{Keys, Node};
+use crate::scene::shape::{Form, Table};
+
+/// What a layer may be.
+pub(super) const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
+const POINTS: &str = "write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0";
+
+/// The shape of `layer`.
+pub(super) fn table() -> Table {
+    let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure", "asperities"]).collect();
+    let add = |table: Table, form: &'static LawForm| {
+        let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
+        table.key(form.name, self::form(form).form(), format!("write {} = {{ {} }}", form.name, values.join(", ")))
+    };
+    let forms = FORMS.iter().fold(Table::new("the layer"), add);
+    forms
+        .key("table", Form::Number.list().list(), POINTS)
+        .key("pressure", Form::Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
+        .key("asperities", asperities().form(), "a law of summits: asperities = { modulus = E*, data = \"NAME\" }")
+        .key("up_to", Form::Number, "compression beyond which the expression goes on linearly")
+        .apart(&laws)
+}
+
+/// The shape of a law with parameters.
+fn form(form: &'static LawForm) -> Table {
+    let table = Table::new(format!("the {} layer", form.name));
+    form.parameters.iter().fold(table, |table, known| table.must(known.key, Form::Field, known.what))
+}
+
+fn asperities() -> Table {
+    use Form::{Number, Text};
+    Table::new("the layer of asperities")
+        .must("modulus", Number, "E* of both bodies: 1/E* is the sum of (1 - nu^2)/E")
+        .key("data", Text, "data whose summits these are")
+        .key("density", Number, "summits per area")
+        .key("radius", Number, "their radius")
+        .key("deviation", Number, "standard deviation of their heights")
+        .key("highest", Number, "height of the highest above the mean; 4 deviations")
+        .apart(&["data", "density"])
+        .apart(&["data", "radius"])
+        .apart(&["data", "deviation"])
+        .apart(&["data", "highest"])
+}
 
 impl Decoder<'_> {
     pub(super) fn layer(&self, node: &Node) -> Result<LayerSpec> {
-        const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
-        let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure", "asperities"]).collect();
-        let known: Vec<&str> = laws.iter().copied().chain(["up_to"]).collect();
-        let keys = Keys::open(node, "the layer", &known).map_err(|error| match error.advice() {
-            Some(advice) if advice.starts_with("did") => error,
-            _ => error.help(format!("{EXAMPLE}; the laws are {}", laws.join(", "))),
-        })?;
-        for (i, one) in laws.iter().enumerate() {
-            laws[i + 1..].iter().try_for_each(|other| keys.exclude(one, other))?;
-        }
+        let keys = Keys::open(node, &table())?;
         if let (Some(entry), None) = (keys.entry("up_to"), keys.get("pressure")) {
             return Err(Error::scene(&entry.key_place, "`up_to` without an expression")
                 .help("it says how far `pressure = \"...\"` goes; other laws need no end"));
         }
         if let Some(points) = keys.get("table") {
-            return table(points);
+            return points_of(points);
         }
         if let Some(summits) = keys.get("asperities") {
             return self.asperities(summits);
@@ -33,7 +66,7 @@ impl Decoder<'_> {
             let names: &[&'static str] = if self.dimension == 3 { &["c", "x", "y", "z"] } else { &["c", "x", "y"] };
             let scope = Scope { variables: names, data: &self.data };
             let law = Differentiable::parse(law.string()?, &law.place, scope)?;
-            let up_to = keys.get("up_to").map(|end| end.positive("the end of the law")).transpose()?;
+            let up_to = keys.get("up_to").map(Node::number).transpose()?;
             return Ok(LayerSpec::Pressure { law, up_to });
         }
         match FORMS.iter().find_map(|form| Some((form, keys.get(form.name)?))) {
@@ -42,28 +75,11 @@ impl Decoder<'_> {
         }
     }
 
-    /// The parameters of a form; numbers are checked here, expressions at the contact points.
+    /// The parameters of a form.
     fn form(&self, form: &'static LawForm, node: &Node) -> Result<LayerSpec> {
-        let what = format!("the {} layer", form.name);
-        let known: Vec<&str> = form.parameters.iter().map(|parameter| parameter.key).collect();
-        let keys = Keys::open(node, &what, &known)?;
-        let mut values = Vec::new();
-        for parameter in form.parameters {
-            let node = keys.require(parameter.key)?;
-            let field = self.field(node)?;
-            if let Field::Constant(value) = field
-                && let Some(breach) = parameter.bounds.breach(value)
-            {
-                let error = node.refuse(format!("{} is {}", parameter.what, shown(value))).label(breach);
-                return Err(match breach {
-                    "must not exceed 1" => {
-                        error.help("p(c) = (c/B)^(1/a) with a > 1 is infinitely stiff at first touch, p'(0) = infinity")
-                    }
-                    _ => error,
-                });
-            }
-            values.push(field);
-        }
+        let keys = Keys::open(node, &self::form(form))?;
+        let value = |parameter: &Parameter| self.field(keys.require(parameter.key)?);
+        let values = form.parameters.iter().map(value).collect::<Result<_>>()?;
         Ok(LayerSpec::Form { form, values })
     }
 }
@@ -74,31 +90,17 @@ const HIGHEST: f64 = 4.0;
 impl Decoder<'_> {
     /// Summits, by numbers or of data.
     fn asperities(&self, node: &Node) -> Result<LayerSpec> {
-        let keys = Keys::open(
-            node,
-            "the layer of asperities",
-            &["modulus", "data", "density", "radius", "deviation", "highest"],
-        )?;
-        let positive = |key: &str| {
-            let missing = |error: Error| {
-                error.help(
-                    "give modulus = E* and data = \"NAME\", or modulus, density, radius and deviation of the summits",
-                )
-            };
-            keys.require(key).map_err(missing)?.positive(&format!("the {key}"))
-        };
-        let modulus = positive("modulus")?;
+        let keys = Keys::open(node, &asperities())?;
+        let missing = "give modulus = E* and data = \"NAME\", or modulus, density, radius and deviation of the summits";
+        let number = |key: &str| keys.require(key).map_err(|error| error.help(missing))?.number();
+        let modulus = number("modulus")?;
         let Some(named) = keys.get("data") else {
-            let deviation = positive("deviation")?;
-            let highest =
-                keys.get("highest").map_or(Ok(HIGHEST * deviation), |node| node.positive("the highest summit"))?;
+            let deviation = number("deviation")?;
+            let highest = keys.get("highest").map_or(Ok(HIGHEST * deviation), Node::number)?;
             let depths = Depths::Normal { deviation, highest };
-            let (density, radius) = (positive("density")?, positive("radius")?);
+            let (density, radius) = (number("density")?, number("radius")?);
             return Ok(LayerSpec::Asperities(AsperitySpec { density, radius, modulus, depths, data: None }));
         };
-        for own in ["density", "radius", "deviation", "highest"] {
-            keys.exclude("data", own)?;
-        }
         let name = named.string()?;
         let Some(data) = self.data.get(name) else {
             let error = named.refuse(format!("there are no data `{name}`"));
@@ -119,31 +121,17 @@ impl Decoder<'_> {
     }
 }
 
-/// Points (c, p), both increasing from zero.
-fn table(node: &Node) -> Result<LayerSpec> {
-    const EXAMPLE: &str = "write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0";
+/// Points (c, p) of a law.
+fn points_of(node: &Node) -> Result<LayerSpec> {
     let mut points: Vec<[f64; 2]> = Vec::new();
-    for item in node.list().map_err(|error| error.help(EXAMPLE))? {
-        let [c, p] = item.list().map_err(|error| error.help(EXAMPLE))? else {
-            return Err(item.refuse("a point of the table is a compression and a pressure").help(EXAMPLE));
+    for item in node.list()? {
+        let [c, p] = item.list().map_err(|error| error.help(POINTS))? else {
+            return Err(item.refuse("a point of the table is a compression and a pressure").help(POINTS));
         };
-        let point = [c.number()?, p.number()?];
-        if points.is_empty() && point == [0.0, 0.0] {
-            continue; // every law begins there
-        }
-        let last = points.last().copied().unwrap_or([0.0, 0.0]);
-        for (i, (what, node)) in [("compression", c), ("pressure", p)].into_iter().enumerate() {
-            if point[i] <= last[i] {
-                return Err(node
-                    .refuse(format!("the {what} {} of the table does not exceed {}", shown(point[i]), shown(last[i])))
-                    .label("must be greater than the one before it")
-                    .help("a layer's law increases from p(0) = 0"));
-            }
-        }
-        points.push(point);
+        points.push([c.number()?, p.number()?]);
     }
-    if points.is_empty() {
-        return Err(node.refuse("the table has no point").help(EXAMPLE));
+    if points.first() == Some(&[0.0, 0.0]) {
+        points.remove(0); // every law begins there
     }
     Ok(LayerSpec::Table(points))
 }

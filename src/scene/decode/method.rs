@@ -1,23 +1,71 @@
 //! `[method]`: the outer iteration.
 
-use super::{Decoder, choose};
+use super::{Decoder, choose, history};
 use crate::error::{Result, nearest};
 use crate::expression::Field;
 use crate::problem::method::{Gamma, Linear, MethodName, MethodSpec, Start};
 use crate::problem::robin::{RobinRule, Zone};
 use crate::problem::stop::StopRule;
 use crate::scene::read::{Keys, Node, Value};
+use crate::scene::shape::{Form, Table, word};
+
+/// The shape of `[method]`.
+pub(super) fn table() -> Table {
+    use Form::{Count, Either, Flag, Number, Text};
+    Table::new("[method]")
+        .key("name", word(&MethodName::ALL), "the method; \"auto\"")
+        .key("psi", Text, "Robin zone: \"none\", \"full\", \"active\" (which it is without this key) or a condition")
+        .key(
+            "gamma",
+            Either(vec![Number, Number.list(), word(&Gamma::NAMED)]),
+            "relaxation of `robin`: a number, a list, a rule; 0.6",
+        )
+        .key("robin", Either(vec![word(&COEFFICIENTS), floor_table().form()]), "Robin coefficient on the zone")
+        .key("interval", Flag, "whether `robin` finds the interval of gamma at the end; false")
+        .key("depth", Count, "earlier steps that `anderson` mixes; 5")
+        .key("linear", word(&Linear::ALL), "how linear steps are solved; chosen by the program without it")
+        .key(
+            "start",
+            Either(vec![word(&STARTS), start_table().form()]),
+            "it is \"auto\", \"zero\", \"nested\" or { normal = 1e-4 }",
+        )
+        .key(
+            "steps",
+            Either(vec![Count, Number.list(), history::table().form()]),
+            "load steps: a number, shares that end with 1, or a table",
+        )
+        .key("stop", stop_table().form(), "when to stop: stop = { residual = 1e-8 }")
+}
+
+fn start_table() -> Table {
+    Table::new("the start").must("normal", Form::Field, "outer normal displacement on every contact surface")
+}
+
+fn floor_table() -> Table {
+    Table::new("the Robin coefficient").must("floor", Form::Number, "least coefficient everywhere on the contact")
+}
+
+fn stop_table() -> Table {
+    Table::new("the stop rule")
+        .key("residual", Form::Number, "relative residual, or error of Newton's method; 1e-8")
+        .key("increment", Form::Number, "the paper's rule on the increment")
+        .key("balanced", Form::Flag, "whether a tenth of the mesh's error is enough; false")
+        .key("iterations", Form::Count, "most iterations; 2000")
+}
+
+/// Robin coefficients by name.
+const COEFFICIENTS: [(&str, RobinRule); 3] =
+    [("tangent", RobinRule::Tangent), ("frozen", RobinRule::Frozen), ("auto", RobinRule::Auto)];
+
+/// Starts by name.
+const STARTS: [(&str, Start); 3] = [("auto", Start::Auto), ("zero", Start::Zero), ("nested", Start::Nested)];
 
 impl Decoder<'_> {
     /// The method, defaults where nothing is said.
     pub(super) fn method(&self, node: Option<&Node>) -> Result<MethodSpec> {
         let default = MethodSpec::default();
         let Some(node) = node else { return Ok(default) };
-        let keys = Keys::open(
-            node,
-            "[method]",
-            &["name", "psi", "gamma", "robin", "interval", "depth", "linear", "start", "steps", "stop"],
-        )?;
+        let keys = Keys::open(node, &table())?;
         let name = match keys.get("name") {
             Some(name) => choose(name, "method", &MethodName::ALL)?,
             None => {
@@ -27,44 +75,18 @@ impl Decoder<'_> {
             }
         };
         let default = MethodSpec::new(name);
-        let start = keys.get("start").map_or(Ok(default.start), |start| self.start(start))?;
-        let steps = keys.get("steps");
-        if let (Some(steps), Start::Nested) = (steps, &start) {
-            return Err(steps
-                .refuse("load steps after a start from a coarser mesh")
-                .help("each step starts from the one before: leave `start = \"nested\"` away"));
-        }
         Ok(MethodSpec {
             name,
             psi: keys.get("psi").map_or(Ok(default.psi), |psi| self.zone(psi))?,
             robin: keys.get("robin").map_or(Ok(default.robin), robin)?,
             gamma: keys.get("gamma").map_or(Ok(default.gamma), gamma)?,
-            interval: self.interval(&keys, name)?,
-            depth: keys.get("depth").map_or(Ok(default.depth), depth)?,
-            linear: keys.get("linear").map(|linear| self.linear(linear, name)).transpose()?,
-            start,
-            steps: steps.map_or(Ok(default.steps), |steps| self.history(steps))?,
+            interval: keys.flag("interval", false)?,
+            depth: keys.get("depth").map_or(Ok(default.depth), Node::count)?,
+            linear: keys.get("linear").map(|way| choose(way, "way to solve linear steps", &Linear::ALL)).transpose()?,
+            start: keys.get("start").map_or(Ok(default.start), |start| self.start(start))?,
+            steps: keys.get("steps").map_or(Ok(default.steps), |steps| self.history(steps))?,
             stop: keys.get("stop").map_or(Ok(default.stop), stop)?,
         })
-    }
-
-    fn linear(&self, node: &Node, name: MethodName) -> Result<Linear> {
-        if !matches!(name, MethodName::Auto | MethodName::Newton) {
-            return Err(node
-                .refuse("only Newton's method has linear steps of all bodies")
-                .help("name = \"newton\", or leave `linear` away"));
-        }
-        choose(node, "way to solve linear steps", &Linear::ALL)
-    }
-
-    fn interval(&self, keys: &Keys, name: MethodName) -> Result<bool> {
-        let Some(node) = keys.get("interval") else { return Ok(false) };
-        if node.boolean()? && name != MethodName::Robin {
-            return Err(node
-                .refuse("only the method `robin` has an interval of gamma")
-                .help("name = \"robin\", or leave `interval` away"));
-        }
-        node.boolean()
     }
 
     fn zone(&self, node: &Node) -> Result<Zone> {
@@ -89,11 +111,10 @@ impl Decoder<'_> {
 
     fn start(&self, node: &Node) -> Result<Start> {
         if let Value::String(_) = node.value {
-            let words = [("auto", Start::Auto), ("zero", Start::Zero), ("nested", Start::Nested)];
             let all = "it is \"auto\", \"zero\", \"nested\" or { normal = 1e-4 }";
-            return choose(node, "start", &words).map_err(|error| error.help(all));
+            return choose(node, "start", &STARTS).map_err(|error| error.help(all));
         }
-        let keys = Keys::open(node, "the start", &["normal"])?;
+        let keys = Keys::open(node, &start_table())?;
         Ok(Start::Normal(self.field(keys.require("normal")?)?))
     }
 }
@@ -101,50 +122,28 @@ impl Decoder<'_> {
 fn gamma(node: &Node) -> Result<Gamma> {
     match &node.value {
         Value::String(_) => choose(node, "rule for gamma", &Gamma::NAMED),
-        Value::List(items) if items.is_empty() => {
-            Err(node.refuse("gamma has no value").help("write a number, a list of numbers, or the name of a rule"))
-        }
-        Value::List(items) => {
-            items.iter().map(|item| item.positive("gamma")).collect::<Result<_>>().map(Gamma::Schedule)
-        }
-        _ => node.positive("gamma").map(Gamma::Stationary),
+        Value::List(items) => items.iter().map(Node::number).collect::<Result<_>>().map(Gamma::Schedule),
+        _ => node.number().map(Gamma::Stationary),
     }
 }
 
 fn robin(node: &Node) -> Result<RobinRule> {
     if let Value::String(_) = node.value {
-        let words = [("tangent", RobinRule::Tangent), ("frozen", RobinRule::Frozen), ("auto", RobinRule::Auto)];
-        return choose(node, "Robin coefficient", &words);
+        return choose(node, "Robin coefficient", &COEFFICIENTS);
     }
-    let keys = Keys::open(node, "the Robin coefficient", &["floor"])?;
-    keys.require("floor")?.positive("the floor").map(RobinRule::Floor)
-}
-
-fn depth(node: &Node) -> Result<usize> {
-    match usize::try_from(node.whole()?) {
-        Ok(depth) if (1..=50).contains(&depth) => Ok(depth),
-        _ => Err(node.refuse("the depth must lie between 1 and 50")),
-    }
+    let keys = Keys::open(node, &floor_table())?;
+    keys.require("floor")?.number().map(RobinRule::Floor)
 }
 
 fn stop(node: &Node) -> Result<StopRule> {
     let default = StopRule::default();
-    let keys = Keys::open(node, "the stop rule", &["residual", "increment", "balanced", "iterations"])?;
-    let tolerance = |key: &str| keys.get(key).map(|node| node.positive("the tolerance")).transpose();
+    let keys = Keys::open(node, &stop_table())?;
+    let tolerance = |key: &str| keys.get(key).map(Node::number).transpose();
     let increment = tolerance("increment")?;
-    let iterations = match keys.get("iterations") {
-        None => default.iterations,
-        Some(node) => match usize::try_from(node.whole()?) {
-            Ok(count) if count > 0 => count,
-            _ => {
-                return Err(node.refuse("no iteration is allowed").label("must be 1 or more"));
-            }
-        },
-    };
-    let residual = match (tolerance("residual")?, increment) {
-        (None, None) => default.residual,
-        (given, _) => given,
-    };
-    let balanced = keys.get("balanced").map_or(Ok(false), Node::boolean)?;
-    Ok(StopRule { residual, increment, balanced, iterations })
+    Ok(StopRule {
+        residual: tolerance("residual")?.or(default.residual.filter(|_| increment.is_none())),
+        increment,
+        balanced: keys.flag("balanced", false)?,
+        iterations: keys.get("iterations").map_or(Ok(default.iterations), Node::count)?,
+    })
 }

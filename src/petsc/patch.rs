@@ -1,0 +1,341 @@
+//! An exact solve on a few dofs around the preconditioner of a solver.
+//!
+//! A preconditioner M of a matrix that was near A everywhere but on some dofs P becomes one of A by a multiplicative Schwarz step, made
+//! symmetric:
+//!
+//! ```text
+//! y = S r_P,   z = P y + M (r - A P y),   z += P S (r - A z)_P       S = (P'AP)^-1
+//! ```
+//!
+//! Both products are with columns P alone. Of several processes each has its rows of them, and all have S.
+
+use super::library::petsc;
+use super::vector::Vector;
+use super::{Int, Ksp, Matrix, Scope, Session, ffi};
+use crate::error::{Error, Result};
+use mpi::collective::SystemOperation;
+use mpi::traits::CommunicatorCollectives;
+use std::cell::RefCell;
+use std::ffi::c_void;
+use std::ops::Range;
+use std::ptr::{null, null_mut};
+
+/// The solver's own preconditioner and the one around it.
+pub(super) struct Patched {
+    pub(super) inner: ffi::PC,
+    outer: ffi::PC,
+    /// What [`apply`] works with; `outer` has a pointer to it.
+    patch: *mut Patch,
+}
+
+/// What the preconditioner around another needs.
+struct Patch {
+    inner: ffi::PC,
+    /// Residual and result of the inner preconditioner, as long as the matrix here.
+    whole: [Vector; 2],
+    /// The dofs P of this process: (entry of a vector here, place in P).
+    own: Vec<(usize, usize)>,
+    /// The rows here that have entries in columns P.
+    rows: Vec<usize>,
+    /// A in these rows and the columns P.
+    columns: ffi::Mat,
+    /// Vectors over the rows, and over P.
+    parts: [Vector; 2],
+    solver: Ksp,
+    scope: Scope,
+    session: Session,
+    /// The first failure within a solve.
+    failure: RefCell<Option<Error>>,
+}
+
+impl Ksp {
+    /// Solves exactly on some `dofs` of the `matrix` of this solver, and on those within `layers` of its graph around them, before and after
+    /// the preconditioner, which stays that of an older matrix. Collective, with the same dofs, counted through all processes, on each. New
+    /// values of the matrix need a new patch.
+    ///
+    /// ```
+    /// use winkler::petsc::{Ksp, Matrix, Session};
+    /// let session = Session::start(&["-ksp_type", "cg", "-pc_type", "jacobi"].map(String::from))?;
+    /// // a spring in a chain of ten becomes a million times as stiff
+    /// let (mut ptr, mut columns, mut values) = (vec![0], vec![], vec![]);
+    /// for i in 0..10 {
+    ///     for j in [i - 1, i, i + 1].into_iter().filter(|j| (0..10).contains(j)) {
+    ///         columns.push(j);
+    ///         values.push(if i == j { 2.0 } else { -1.0 });
+    ///     }
+    ///     ptr.push(columns.len() as i32);
+    /// }
+    /// let mut matrix = Matrix::from_csr(&session, 1, ptr, columns, values)?;
+    /// matrix.set_spd()?;
+    /// let mut ksp = Ksp::new(&session, "")?;
+    /// ksp.set_operator(&matrix)?;
+    /// ksp.set_from_options()?;
+    /// ksp.set_up()?;
+    /// ksp.set_reuse_preconditioner(true)?;
+    /// matrix.update(|values| [12, 16].map(|at| values[at] += 1e6))?;
+    /// matrix.update(|values| [13, 15].map(|at| values[at] -= 1e6))?;
+    /// let mut x = [0.0; 10];
+    /// let worn = ksp.solve(&[1.0; 10], &mut x)?.iterations;
+    /// ksp.patch(&matrix, &[4, 5], 0)?;
+    /// let patched = ksp.solve(&[1.0; 10], &mut x)?.iterations;
+    /// assert!(patched <= 6 && worn > patched && (x[4] - x[5]).abs() < 1e-5 && x[4] > 12.0, "{worn} {patched} {x:?}");
+    /// ksp.unpatch()?;
+    /// assert_eq!(ksp.pc_type(), "jacobi");
+    /// # Ok::<(), winkler::error::Error>(())
+    /// ```
+    ///
+    /// False, without a patch, if P'AP is not positive definite to rounding.
+    ///
+    /// # Errors
+    /// PETSc's.
+    pub fn patch(&mut self, matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<bool> {
+        self.unpatch()?;
+        self.recover()?;
+        let inner = self.pc()?;
+        let Some(patch) = Patch::new(matrix, inner, dofs, layers)? else { return Ok(false) };
+        let patch = Box::into_raw(Box::new(patch));
+        // SAFETY: the preconditioner belongs to this solver; a reference of our own keeps it when another takes its place.
+        unsafe { petsc!(PetscObjectReference(inner.cast())) }?;
+        let mut patched = Patched { inner, outer: null_mut(), patch };
+        // SAFETY: a new preconditioner, whose pointer to the patch lives as long as it, in `patched`.
+        unsafe {
+            petsc!(PCCreate(matrix.scope().comm(matrix.session()), &mut patched.outer))?;
+            petsc!(PCSetType(patched.outer, c"shell".as_ptr()))?;
+            petsc!(PCShellSetContext(patched.outer, patch.cast()))?;
+            petsc!(PCShellSetApply(patched.outer, Some(apply)))?;
+            petsc!(PCShellSetName(patched.outer, c"exact solve near the contact around the preconditioner".as_ptr()))?;
+            petsc!(PCShellSetView(patched.outer, Some(view)))?;
+            petsc!(PCSetOperators(patched.outer, matrix.raw(), matrix.raw()))?;
+            petsc!(KSPSetPC(self.ksp, patched.outer))?;
+        }
+        self.patched = Some(patched);
+        Ok(true)
+    }
+
+    /// Goes back to the preconditioner alone.
+    ///
+    /// # Errors
+    /// PETSc's.
+    pub fn unpatch(&mut self) -> Result<()> {
+        match self.patched.take() {
+            // SAFETY: the preconditioner that this solver had.
+            Some(patched) => unsafe { petsc!(KSPSetPC(self.ksp, patched.inner)) },
+            None => Ok(()),
+        }
+    }
+
+    /// A failure of the patch in the last solve, which PETSc knows by its number alone.
+    pub(super) fn patch_failure(&self) -> Option<Error> {
+        // SAFETY: the patch lives as long as `patched`, and no solve runs.
+        self.patched.as_ref().and_then(|patched| unsafe { &*patched.patch }.failure.take())
+    }
+}
+
+impl Drop for Patched {
+    fn drop(&mut self) {
+        // SAFETY: the references of this type; PETSc calls `apply` no more, since the solver has another preconditioner or is gone.
+        unsafe {
+            let _ = petsc!(PCDestroy(&mut self.outer));
+            let _ = petsc!(PCDestroy(&mut self.inner));
+            drop(Box::from_raw(self.patch));
+        }
+    }
+}
+
+impl Patch {
+    fn new(matrix: &Matrix, inner: ffi::PC, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
+        let (session, scope, own) = (matrix.session().clone(), matrix.scope(), matrix.own()?);
+        let new = |rows| Vector::new(&session, Scope::Process, rows, 1);
+        let whole = || Vector::new(&session, scope, matrix.rows(), matrix.block_size());
+        let patch = Indices::new(dofs)?;
+        patch.grow(matrix, layers)?;
+        let inside = patch.get()?;
+        let touched = Indices::new(&inside)?;
+        touched.grow(matrix, 1)?;
+        let rows: Vec<usize> = touched.get()?.into_iter().filter(|i| own.contains(i)).collect();
+        let mut block = patch.submatrix(matrix, &patch)?;
+        // SAFETY: a matrix of this process, of rows and columns of one that is positive definite.
+        unsafe {
+            petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, ffi::PetscBool_PETSC_TRUE))?;
+            petsc!(MatSetOption(block, ffi::MatOption_MAT_SPD, ffi::PetscBool_PETSC_TRUE))?;
+        }
+        let solver = Ksp::factored(&session, block, inside.len());
+        // SAFETY: our reference; the solver has its own.
+        unsafe { petsc!(MatDestroy(&mut block)) }?;
+        let solver = solver?;
+        if solver.failure().is_some() {
+            return Ok(None);
+        }
+        let here = |(place, dof): (usize, &usize)| own.contains(dof).then(|| (dof - own.start, place));
+        Ok(Some(Self {
+            inner,
+            whole: [whole()?, whole()?],
+            own: inside.iter().enumerate().filter_map(here).collect(),
+            columns: Indices::new(&rows)?.submatrix(matrix, &patch)?,
+            parts: [new(rows.len())?, new(inside.len())?],
+            rows: rows.into_iter().map(|i| i - own.start).collect(),
+            solver,
+            scope,
+            session,
+            failure: RefCell::default(),
+        }))
+    }
+
+    /// Adds up what the processes have.
+    fn sum(&self, values: &mut [f64]) {
+        if self.scope == Scope::World {
+            let mine = values.to_vec();
+            self.session.world().all_reduce_into(&mine[..], values, SystemOperation::sum());
+        }
+    }
+
+    /// z = M^-1 r, one entry a row here each.
+    fn apply(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
+        let n = self.parts[1].len();
+        let (mut residual, mut y) = (vec![0.0; n], vec![0.0; n]);
+        self.own.iter().for_each(|&(i, k)| residual[k] = r[i]);
+        self.sum(&mut residual);
+        self.solver.solve(&residual, &mut y)?;
+        let mut part = vec![0.0; self.rows.len()];
+        let mut rest = r.to_vec();
+        // SAFETY: the slices are as long as the vectors they are placed in and outlive the calls, which read one and write to the other.
+        unsafe {
+            let (y, part) = (self.parts[1].place(y.as_ptr())?, self.parts[0].place(part.as_mut_ptr())?);
+            petsc!(MatMult(self.columns, y.vec(), part.vec()))?;
+        }
+        self.rows.iter().zip(&part).for_each(|(&i, ay)| rest[i] -= ay);
+        // SAFETY: as above.
+        unsafe {
+            let (rest, z) = (self.whole[0].place(rest.as_ptr())?, self.whole[1].place(z.as_mut_ptr())?);
+            petsc!(PCApply(self.inner, rest.vec(), z.vec()))?;
+        }
+        self.own.iter().for_each(|&(i, k)| z[i] += y[k]);
+        part.iter_mut().zip(&self.rows).for_each(|(part, &i)| *part = z[i]);
+        let mut az = vec![0.0; n];
+        // SAFETY: as above.
+        unsafe {
+            let (part, az) = (self.parts[0].place(part.as_ptr())?, self.parts[1].place(az.as_mut_ptr())?);
+            petsc!(MatMultTranspose(self.columns, part.vec(), az.vec()))?;
+        }
+        self.sum(&mut az);
+        residual.iter_mut().zip(&az).for_each(|(r, az)| *r -= az);
+        self.solver.solve(&residual, &mut y)?;
+        self.own.iter().for_each(|&(i, k)| z[i] += y[k]);
+        Ok(())
+    }
+}
+
+impl Drop for Patch {
+    fn drop(&mut self) {
+        // SAFETY: the one reference of this type.
+        let _ = unsafe { petsc!(MatDestroy(&mut self.columns)) };
+    }
+}
+
+/// PCApply of the preconditioner around another.
+unsafe extern "C" fn apply(pc: ffi::PC, r: ffi::Vec, z: ffi::Vec) -> ffi::PetscErrorCode {
+    let (mut patch, mut rows, mut from, mut to) = (null_mut::<c_void>(), 0, null(), null_mut());
+    // SAFETY: PETSc passes its own preconditioner, whose context is the patch, and two vectors, whose arrays have that many entries here
+    // and belong to nobody else until they are given back.
+    let done: Result<_> = (|| unsafe {
+        petsc!(PCShellGetContext(pc, (&raw mut patch).cast()))?;
+        let patch = &*patch.cast::<Patch>();
+        petsc!(VecGetLocalSize(r, &mut rows))?;
+        petsc!(VecGetArrayRead(r, &mut from))?;
+        petsc!(VecGetArray(z, &mut to))?;
+        let slices =
+            (std::slice::from_raw_parts(from, rows as usize), std::slice::from_raw_parts_mut(to, rows as usize));
+        let applied = patch.apply(slices.0, slices.1);
+        petsc!(VecRestoreArrayRead(r, &mut from))?;
+        petsc!(VecRestoreArray(z, &mut to))?;
+        Ok(match applied {
+            Ok(()) => 0,
+            Err(error) => {
+                patch.failure.replace(Some(error));
+                super::until::ERROR
+            }
+        })
+    })();
+    done.unwrap_or(super::until::ERROR)
+}
+
+/// PCView of it: the inner one.
+unsafe extern "C" fn view(pc: ffi::PC, viewer: ffi::PetscViewer) -> ffi::PetscErrorCode {
+    let mut patch = null_mut::<c_void>();
+    // SAFETY: as in `apply`.
+    let done = (|| unsafe {
+        petsc!(PCShellGetContext(pc, (&raw mut patch).cast()))?;
+        petsc!(PCView((*patch.cast::<Patch>()).inner, viewer))
+    })();
+    done.map_or(super::until::ERROR, |()| 0)
+}
+
+/// Numbers of rows, in increasing order.
+struct Indices(ffi::IS);
+
+impl Indices {
+    fn new(numbers: &[usize]) -> Result<Self> {
+        let mut numbers: Vec<Int> = numbers.iter().map(|&i| i as Int).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let (count, copy, mut is) = (numbers.len() as Int, ffi::PetscCopyMode_PETSC_COPY_VALUES, null_mut());
+        // SAFETY: PETSc copies the numbers.
+        unsafe { petsc!(ISCreateGeneral(mpi::ffi::RSMPI_COMM_SELF, count, numbers.as_ptr(), copy, &mut is)) }?;
+        Ok(Self(is))
+    }
+
+    /// Adds the columns of these rows, so many times.
+    fn grow(&self, matrix: &Matrix, layers: usize) -> Result<()> {
+        if layers == 0 {
+            return Ok(());
+        }
+        let mut is = self.0;
+        // SAFETY: one set, whose contents PETSc replaces.
+        unsafe {
+            petsc!(MatIncreaseOverlap(matrix.raw(), 1, &mut is, layers as Int))?;
+            petsc!(ISSort(is))
+        }
+    }
+
+    fn get(&self) -> Result<Vec<usize>> {
+        let (mut count, mut numbers) = (0, null());
+        // SAFETY: PETSc's array, read before it is given back.
+        unsafe {
+            petsc!(ISGetLocalSize(self.0, &mut count))?;
+            petsc!(ISGetIndices(self.0, &mut numbers))?;
+            let copy = (0..count as usize).map(|k| *numbers.add(k) as usize).collect();
+            petsc!(ISRestoreIndices(self.0, &mut numbers))?;
+            Ok(copy)
+        }
+    }
+
+    /// These rows and those columns of a matrix, on this process.
+    fn submatrix(&self, matrix: &Matrix, columns: &Indices) -> Result<ffi::Mat> {
+        let (scall, mut list) = (ffi::MatReuse_MAT_INITIAL_MATRIX, null_mut());
+        // SAFETY: PETSc makes a list of one matrix; our reference keeps the matrix when the list goes.
+        unsafe {
+            petsc!(MatCreateSubMatrices(matrix.raw(), 1, &self.0, &columns.0, scall, &mut list))?;
+            let part = *list;
+            petsc!(PetscObjectReference(part.cast()))?;
+            petsc!(MatDestroySubMatrices(1, &mut list))?;
+            Ok(part)
+        }
+    }
+}
+
+impl Drop for Indices {
+    fn drop(&mut self) {
+        // SAFETY: the one reference of this type.
+        let _ = unsafe { petsc!(ISDestroy(&mut self.0)) };
+    }
+}
+
+impl Matrix {
+    /// Numbers of the rows of this process.
+    fn own(&self) -> Result<Range<usize>> {
+        let (mut first, mut end) = (0, 0);
+        // SAFETY: the matrix of this wrapper.
+        unsafe { petsc!(MatGetOwnershipRange(self.raw(), &mut first, &mut end)) }?;
+        Ok(first as usize..end as usize)
+    }
+}

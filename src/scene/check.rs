@@ -1,0 +1,365 @@
+//! What every scene must satisfy, read from a file or built in Rust: each check once. A refusal names the key that it is about, as
+//! `--set` has it, so that who has read a file can point at it; a Rust program gets the line where the body or the surface was named.
+
+use super::Scene;
+use crate::error::{Error, Place, Result, shown};
+use crate::expression::Field;
+use crate::problem::body::{BodySpec, LoadKind, SPELLING, SpringKind, Support, fault, is_in_name};
+use crate::problem::contact::{AutoContact, ContactSpec};
+use crate::problem::elasticity::{Constants, ElasticitySpec, Plane};
+use crate::problem::layer::{Depths, LayerSpec};
+use crate::problem::mesh::MeshSource;
+use crate::problem::method::{Gamma, MethodName, MethodSpec, Start};
+use crate::problem::pattern::is_pattern;
+use crate::problem::robin::RobinRule;
+use std::collections::HashSet;
+
+/// A refusal and the key that it is about.
+pub(super) struct Fault {
+    /// Dotted path of the key.
+    pub key: String,
+    /// The refusal, which points at what a program has near it.
+    pub error: Error,
+}
+
+type Checked = Result<(), Fault>;
+
+/// A key of the scene, and what a Rust program has near it.
+struct At<'a> {
+    key: String,
+    near: &'a Place,
+}
+
+impl<'a> At<'a> {
+    fn new(key: impl Into<String>, near: &'a Place) -> Self {
+        Self { key: key.into(), near }
+    }
+
+    fn below(&self, key: impl std::fmt::Display) -> Self {
+        Self { key: format!("{}.{key}", self.key), near: self.near }
+    }
+
+    /// A refusal; texts may be empty.
+    fn refuse(&self, message: impl Into<String>, label: &str, help: &str) -> Checked {
+        let error = Error::scene(self.near, message).label(label);
+        Err(Fault { key: self.key.clone(), error: if help.is_empty() { error } else { error.help(help) } })
+    }
+
+    /// Refuses a number that is not finite and > 0.
+    fn positive(&self, what: &str, value: f64) -> Checked {
+        match value > 0.0 && value.is_finite() {
+            true => Ok(()),
+            false => self.refuse(format!("{what} is {}", shown(value)), "must be greater than 0", ""),
+        }
+    }
+
+    /// The same for the number below a key.
+    fn positive_in(&self, key: &str, what: &str, value: f64) -> Checked {
+        self.below(key).positive(what, value)
+    }
+
+    /// Refuses what cannot be the name of a body, or a pattern of such.
+    fn name(&self, name: &str) -> Checked {
+        let fault = match is_pattern(name) {
+            true => name.chars().any(|c| !is_in_name(c) && !"*?[]!-".contains(c)).then_some(SPELLING),
+            false => fault(name),
+        };
+        fault.map_or(Ok(()), |[label, help]| self.refuse(format!("`{name}` cannot be the name of a body"), label, help))
+    }
+}
+
+impl Scene {
+    /// Checks what no later stage checks: numbers that are not fields, names, and what contradicts itself.
+    ///
+    /// # Errors
+    /// The first refusal, with the line of the program where the body, surface or group was named.
+    pub fn check(&self) -> Result<()> {
+        if self.adapt.is_some() || matches!(self.method.start, Start::Nested) {
+            let message = "several meshes for one scene: only the command line makes them";
+            return Err(Error::scene(&self.dimension.place, message));
+        }
+        self.verify().map_err(|fault| fault.error)
+    }
+
+    pub(super) fn verify(&self) -> Checked {
+        let at = |key: &str| At::new(key, &self.dimension.place);
+        let dimension = self.dimension.value;
+        if !matches!(dimension, 2 | 3) || (dimension == 3 && self.plane != Plane::Strain) {
+            let message = "the dimension is 2 or 3, and only plane problems have a `plane`";
+            return at("dimension").refuse(message, "", "");
+        }
+        if let MeshSource::Geo { guard, .. } = &self.mesh {
+            at("mesh.timeout").positive("the timeout", guard.seconds)?;
+            guard.gigabytes.map_or(Ok(()), |memory| at("mesh.memory").positive("the memory", memory))?;
+            guard.size.map_or(Ok(()), |size| at("mesh.size").positive("the size", size))?;
+        }
+        if self.bodies.is_empty() {
+            return at("body").refuse("the scene has no body", "", "a body starts with the line [[body]]");
+        }
+        let mut names = HashSet::new();
+        for (number, body) in self.bodies.iter().enumerate() {
+            let at = At::new(format!("body.{number}"), &body.name.place);
+            let name = &body.name.value;
+            if !names.insert(name) {
+                let help = "names of bodies are those of physical groups of cells, one for each";
+                let message = format!("two bodies are called `{name}`");
+                return at.below("name").refuse(message, "taken by an earlier body", help);
+            }
+            at.below("name").name(name)?;
+            self.body_is_good(&at, body)?;
+        }
+        let mut pairs = HashSet::new();
+        for contact in &self.contacts {
+            let at = At::new(format!("contact.{}.between", contact.table), &contact.between[0].place);
+            let [a, b] = contact.between.each_ref().map(|name| &name.value);
+            let second = At { near: &contact.between[1].place, ..at.below(1) };
+            if a == b {
+                let help = "name one surface of each of two bodies";
+                return second.refuse(format!("a contact between `{b}` and itself"), "", help);
+            }
+            if !pairs.insert([a.min(b), a.max(b)]) {
+                return at.below(0).refuse(format!("a second contact of `{a}` and `{b}`"), "", "remove one of the two");
+            }
+            let is_plural = |name: &String| name.contains(['*', '?']);
+            if let Some((side, name)) = [a, b].into_iter().enumerate().find(|(_, name)| is_plural(name)) {
+                let help = "many pairs are found between bodies: between = \"auto\", of = [\"one_*\", \"other_*\"], distance = D";
+                let message = format!("the pattern `{name}` for one surface");
+                return at.below(side).refuse(message, "one name belongs here", help);
+            }
+        }
+        rules(&self.auto)?;
+        for contact in self.contacts.iter().chain(self.auto.iter().map(|auto| &auto.contact)) {
+            contact_is_good(&At::new(format!("contact.{}", contact.table), &contact.between[0].place), contact)?;
+        }
+        method_is_good(&at("method"), &self.method)?;
+        if let Some(adapt) = &self.adapt {
+            at("adapt.error").positive("the error", adapt.error)?;
+            if !self.method.steps.is_empty() {
+                let help = "leave `adapt` or `method.steps` away";
+                return at("adapt").refuse("an adapted mesh and load steps in one scene", "", help);
+            }
+        }
+        self.output.checkpoint.map_or(Ok(()), |time| at("output.checkpoint").positive("the time in minutes", time))
+    }
+
+    fn body_is_good(&self, at: &At, body: &BodySpec) -> Checked {
+        let is_plane = self.dimension.value == 2;
+        elasticity_is_good(at, &body.elasticity)?;
+        for (number, region) in body.regions.iter().enumerate() {
+            let near = &region.on.place;
+            elasticity_is_good(&At { near, ..at.below(format_args!("region.{number}")) }, &region.elasticity)?;
+        }
+        if is_plane && body.force.as_ref().is_some_and(|force| !force[2].is_zero()) {
+            return at.below("force").refuse("a body force in z in a plane problem", "", "");
+        }
+        for (number, support) in body.fix.iter().enumerate() {
+            let at = At { near: &support.on.place, ..at.below(format_args!("fix.{number}")) };
+            self.support_is_good(&at, support)?;
+        }
+        for (number, spring) in body.spring.iter().enumerate() {
+            let at = At { near: &spring.on.place, ..at.below(format_args!("spring.{number}")) };
+            let constant = |field: &Field| if let Field::Constant(value) = field { *value } else { f64::MIN_POSITIVE };
+            match &spring.kind {
+                SpringKind::Normal(k) => at.positive_in("normal", "the stiffness", constant(k))?,
+                SpringKind::Vector(all) if all.iter().all(Field::is_zero) => {
+                    let label = "some component must be greater than 0";
+                    return at.below("stiffness").refuse("the spring has no stiffness", label, "");
+                }
+                SpringKind::Vector(all) => {
+                    let mut negative = all.iter().map(constant).filter(|value| *value < 0.0 || value.is_nan());
+                    negative.try_for_each(|value| at.positive_in("stiffness", "the stiffness", value))?;
+                }
+            }
+        }
+        for (number, load) in body.load.iter().enumerate() {
+            let at = At { near: &load.on.place, ..at.below(format_args!("load.{number}")) };
+            let across = match &load.kind {
+                LoadKind::Pressure(_) => false,
+                LoadKind::Traction(traction) => !traction[2].is_zero(),
+                LoadKind::Force { total, .. } => total[2] != 0.0,
+            };
+            if is_plane && across {
+                return at.refuse("a load in z in a plane problem", "", "");
+            }
+            let LoadKind::Force { total, .. } = load.kind else { continue };
+            if total.iter().any(|force| !force.is_finite()) {
+                return at.below("force").refuse(format!("the force is {total:?}"), "", "");
+            }
+            if self.plane == Plane::Axisymmetric && total[0] != 0.0 {
+                return at.below("force").refuse(
+                    "a total force across the axis in an axisymmetric scene",
+                    "radial forces cancel all around: the first component must be 0",
+                    "for a radial load give pressure = p or traction = [tr, ta]",
+                );
+            }
+        }
+        Ok(())
+    }
+
+    fn support_is_good(&self, at: &At, support: &Support) -> Checked {
+        let is_plane = self.dimension.value == 2;
+        let held = support.value.iter().flatten().count();
+        if held > 0 && support.normal.is_some() {
+            return at.refuse("a support holds some components, or the normal alone", "", "");
+        }
+        if is_plane && support.value[2].is_some() {
+            let help = "remove it, or set dimension = 3";
+            return at.below("z").refuse("a support in `z` in a plane problem", "there is no z", help);
+        }
+        if held == 0 && support.normal.is_none() {
+            let axes = if is_plane { "x, y" } else { "x, y, z" };
+            let help = format!("give the displacement in some of {axes}: x = 0; or symmetry = true");
+            return at.refuse(format!("the support on `{}` holds no component", support.on.value), "", &help);
+        }
+        Ok(())
+    }
+}
+
+fn elasticity_is_good(at: &At, elasticity: &ElasticitySpec) -> Checked {
+    let Constants::Isotropic { young, poisson } = &elasticity.constants else { return Ok(()) };
+    if let Field::Constant(young) = young {
+        at.positive_in("young", "Young's modulus", *young)?;
+    }
+    if let Field::Constant(value) = *poisson
+        && !(value > -1.0 && value < 0.5)
+    {
+        let label = "must lie between -1 and 0.5";
+        let help = "incompressible bodies are not possible; take 0.4999 and order = 2, say";
+        let help = if value == 0.5 { help } else { "" };
+        return at.below("poisson").refuse(format!("Poisson's ratio is {}", shown(value)), label, help);
+    }
+    match elasticity.axes {
+        None => Ok(()),
+        Some(_) => at.below("axes").refuse(
+            "axes of an isotropic material",
+            "all directions are alike",
+            "remove them, or give orthotropic or anisotropic constants",
+        ),
+    }
+}
+
+/// Rules that find pairs: each of other bodies.
+fn rules(all: &[AutoContact]) -> Checked {
+    let mut known = HashSet::new();
+    for AutoContact { distance, of, contact } in all {
+        let at = At::new(format!("contact.{}", contact.table), &contact.between[0].place);
+        at.positive_in("distance", "the distance", *distance)?;
+        let names = of.as_ref().map(|of| of.each_ref().map(|name| &name.value));
+        for (side, name) in names.iter().flatten().enumerate() {
+            at.below(format_args!("of.{side}")).name(name)?;
+        }
+        if !known.insert(names.map(|[a, b]| [a.min(b), a.max(b)])) {
+            return match names {
+                None => at.refuse(
+                    "a second contact between \"auto\" of all bodies",
+                    "",
+                    "name the bodies of each: of = [\"one_*\", \"other_*\"]",
+                ),
+                Some([a, b]) => {
+                    let message = format!("a second contact between \"auto\" of `{a}` and `{b}`");
+                    at.below("of.0").refuse(message, "", "remove one of the two")
+                }
+            };
+        }
+    }
+    Ok(())
+}
+
+fn contact_is_good(at: &At, contact: &ContactSpec) -> Checked {
+    at.positive_in("angle", "the angle", contact.angle)?;
+    if contact.angle > 90.0 {
+        let message = format!("the angle is {} degrees", shown(contact.angle));
+        return at.below("angle").refuse(message, "must be at most 90", "");
+    }
+    let at = at.below("layer");
+    match &contact.layer {
+        LayerSpec::Form { form, values } => {
+            for (parameter, value) in form.parameters.iter().zip(values) {
+                let Field::Constant(value) = *value else { continue };
+                let Some(breach) = parameter.bounds.breach(value) else { continue };
+                let steep = "p(c) = (c/B)^(1/a) with a > 1 is infinitely stiff at first touch, p'(0) = infinity";
+                let help = if breach == "must not exceed 1" { steep } else { "" };
+                let at = at.below(format_args!("{}.{}", form.name, parameter.key));
+                return at.refuse(format!("{} is {}", parameter.what, shown(value)), breach, help);
+            }
+            Ok(())
+        }
+        LayerSpec::Table(points) => {
+            let at = at.below("table");
+            if points.is_empty() {
+                return at.refuse("the table has no point", "", "write table = [[1e-5, 2], [2e-5, 10]]");
+            }
+            for (before, point) in std::iter::once(&[0.0; 2]).chain(points).zip(points) {
+                for (k, what) in ["compression", "pressure"].into_iter().enumerate() {
+                    if point[k] <= before[k] || !point[k].is_finite() {
+                        let values = [point[k], before[k]].map(shown).join(" of the table does not exceed ");
+                        let help = "a layer's law increases from p(0) = 0";
+                        return at.refuse(format!("the {what} {values}"), "", help);
+                    }
+                }
+            }
+            Ok(())
+        }
+        LayerSpec::Asperities(spec) => {
+            let at = at.below("asperities");
+            let mut numbers = vec![("density", spec.density), ("radius", spec.radius), ("modulus", spec.modulus)];
+            if let Depths::Normal { deviation, highest } = spec.depths {
+                numbers.extend([("deviation", deviation), ("highest", highest)]);
+            }
+            numbers.into_iter().try_for_each(|(key, value)| at.positive_in(key, &format!("`{key}`"), value))
+        }
+        LayerSpec::Pressure { up_to: Some(end), .. } => at.positive_in("up_to", "the end of the law", *end),
+        LayerSpec::Pressure { .. } | LayerSpec::Own(_) => Ok(()),
+    }
+}
+
+fn method_is_good(at: &At, method: &MethodSpec) -> Checked {
+    match &method.gamma {
+        Gamma::Stationary(gamma) => at.positive_in("gamma", "gamma", *gamma)?,
+        Gamma::Schedule(list) if list.is_empty() => {
+            let help = "write a number, a list of numbers, or the name of a rule";
+            return at.below("gamma").refuse("gamma has no value", "", help);
+        }
+        Gamma::Schedule(list) => {
+            let one = |(k, gamma): (usize, &f64)| at.below(format_args!("gamma.{k}")).positive("gamma", *gamma);
+            list.iter().enumerate().try_for_each(one)?;
+        }
+        _ => {}
+    }
+    if let RobinRule::Floor(floor) = method.robin {
+        at.positive_in("robin.floor", "the floor", floor)?;
+    }
+    if !(1..=50).contains(&method.depth) {
+        return at.below("depth").refuse("the depth must lie between 1 and 50", "", "");
+    }
+    if method.linear.is_some() && !matches!(method.name, MethodName::Auto | MethodName::Newton) {
+        let help = "name = \"newton\", or leave `linear` away";
+        return at.below("linear").refuse("only Newton's method has linear steps of all bodies", "", help);
+    }
+    if method.interval && method.name != MethodName::Robin {
+        let help = "name = \"robin\", or leave `interval` away";
+        return at.below("interval").refuse("only the method `robin` has an interval of gamma", "", help);
+    }
+    if !method.steps.is_empty() && matches!(method.start, Start::Nested) {
+        let help = "each step starts from the one before: leave `start = \"nested\"` away";
+        return at.below("steps").refuse("load steps after a start from a coarser mesh", "", help);
+    }
+    // tables come from files, which were checked
+    let steps = if method.steps.is_table() { &[] } else { &method.steps.steps[..] };
+    for (k, step) in steps.iter().enumerate() {
+        let at = at.below(format_args!("steps.{k}"));
+        step.factors.iter().try_for_each(|share| at.positive("the factor", *share))?;
+    }
+    if steps.last().is_some_and(|last| last.factors != [1.0]) {
+        let help = "end the list with 1; a table may end anywhere: steps = { table = \"path.csv\" }";
+        return at.below("steps").refuse("the last load step is not the full load", "", help);
+    }
+    let (at, stop) = (at.below("stop"), &method.stop);
+    if stop.iterations == 0 || stop.residual.or(stop.increment).is_none() {
+        return at.refuse("a stop rule has a tolerance, and at least one iteration", "", "");
+    }
+    for (key, tolerance) in [("residual", stop.residual), ("increment", stop.increment)] {
+        tolerance.map_or(Ok(()), |tolerance| at.positive_in(key, "the tolerance", tolerance))?;
+    }
+    Ok(())
+}

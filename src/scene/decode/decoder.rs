@@ -1,0 +1,109 @@
+//! What all tables need: numbers, expressions, vectors, words, files.
+
+use crate::data::Library;
+use crate::error::{Error, Located, Result, nearest};
+use crate::expression::{Differentiable, Field, Scope};
+use crate::problem::pattern::Pattern;
+use crate::scene::read::{Node, Value};
+use std::path::{Path, PathBuf};
+
+/// What the meaning of values depends on.
+pub struct Decoder<'a> {
+    /// Space dimension: 2 or 3.
+    pub dimension: usize,
+    /// Folder of the scene file.
+    pub folder: &'a Path,
+    /// Functions from files.
+    pub data: Library,
+}
+
+impl Decoder<'_> {
+    /// A number, or an expression in the coordinates.
+    pub fn field(&self, node: &Node) -> Result<Field> {
+        match &node.value {
+            Value::Integer(_) | Value::Float(_) => Ok(Field::Constant(node.number()?)),
+            Value::String(text) => Field::parse(text, &node.place, self.dimension, false, &self.data),
+            _ => Err(node.expected("a number or an expression", "")),
+        }
+    }
+
+    /// A vector with as many components as space has; the missing third one is zero.
+    pub fn vector(&self, node: &Node) -> Result<[Field; 3]> {
+        let mut vector = [const { Field::Constant(0.0) }; 3];
+        for (component, item) in vector.iter_mut().zip(self.components(node)?) {
+            *component = self.field(item)?;
+        }
+        Ok(vector)
+    }
+
+    /// A vector that can be differentiated.
+    pub fn smooth_vector(&self, node: &Node) -> Result<Vec<Differentiable>> {
+        let scope = Scope { variables: &["x", "y", "z"][..self.dimension], data: &self.data };
+        let component = |item: &Node| match &item.value {
+            Value::Integer(_) | Value::Float(_) => {
+                Differentiable::parse(&item.number()?.to_string(), &item.place, scope)
+            }
+            Value::String(text) => Differentiable::parse(text, &item.place, scope),
+            _ => Err(item.expected("a number or an expression", "")),
+        };
+        self.components(node)?.iter().map(component).collect()
+    }
+
+    /// The components of a vector: as many as space has.
+    pub fn components<'n>(&self, node: &'n Node) -> Result<&'n [Node]> {
+        let items = node.list()?;
+        if items.len() != self.dimension {
+            let place = items.get(self.dimension).map_or(&node.place, |extra| &extra.place);
+            let count = format!("a vector has {} components here, not {}", self.dimension, items.len());
+            return Err(Error::scene(place, count).help(format!("the dimension of the scene is {}", self.dimension)));
+        }
+        Ok(items)
+    }
+}
+
+/// The path of a file that must exist, joined with the folder of the scene.
+pub fn file(folder: &Path, node: &Node) -> Result<Located<PathBuf>> {
+    let name = node.name()?.value;
+    let path = folder.join(&name);
+    match std::fs::metadata(&path) {
+        Ok(found) if found.is_file() => Ok(Located::new(path, node.place.clone())),
+        Ok(_) => Err(node.refuse(format!("{} is not a file", path.display()))),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+            let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
+            let wanted = path.file_name().unwrap_or_default().to_string_lossy();
+            Err(node.refuse(format!("there is no file {}", path.display())).label("not there").help(
+                match nearest(&wanted, names.iter().map(String::as_str)) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => "paths are relative to the folder of the scene file".to_owned(),
+                },
+            ))
+        }
+        Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
+    }
+}
+
+/// One of a few words; `what` names the key in the message.
+pub fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Result<T> {
+    let word = node.string()?;
+    if let Some((_, choice)) = choices.iter().find(|(name, _)| *name == word) {
+        return Ok(choice.clone());
+    }
+    let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
+    Err(node.refuse(format!("unknown {what} `{word}`")).help(match nearest(word, names.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("it is one of {}", names.join(", ")),
+    }))
+}
+
+/// The name of a group, or a pattern of such names.
+pub fn pattern(node: &Node) -> Result<Located<String>> {
+    let name = node.name()?;
+    match Pattern::new(&name.value) {
+        Ok(_) => Ok(name),
+        Err(flaw) => Err(node
+            .refuse(format!("`{}` is no pattern: {flaw}", name.value))
+            .help("`*` is any text, `?` one character, `[0-9]` one of some")),
+    }
+}
