@@ -70,6 +70,20 @@ fn spheres(session: &Session, stiffness: f64, meshes: &[(usize, usize, usize)]) 
     Ok(())
 }
 
+/// Two boxes with a paraboloidal gap, regular tetrahedra; the elements of the upper face are `m` along a side.
+fn regular(session: &Session, stiffness: f64, meshes: &[(usize, usize, usize)]) -> Result<()> {
+    let gap = |x: f64, y: f64| 1e-3 * (x * x + y * y);
+    let boxes = Boxes { side: 1.0, height: 0.5, young: 2.1e5, poisson: 0.3, stiffness, approach: 3e-4, points: 128 };
+    let series = Series::new(boxes, gap);
+    for (order, n, m) in meshes {
+        let sets = [format!("mesh.set.n={n}"), format!("mesh.set.m={m}")];
+        let case =
+            [&sets[..], &["body.upper.fix.2.z=-3e-4".into(), "contact.0.gap=\"1e-3*(x^2 + y^2)\"".into()]].concat();
+        row(session, "rough", *order, stiffness, &case, &|table| at(&series, table, &gap))?;
+    }
+    Ok(())
+}
+
 /// The rough face.
 fn rough(session: &Session) -> Result<()> {
     let scene = load(Path::new("meshes/rough/scene.toml"), &[])?;
@@ -95,10 +109,14 @@ fn main() -> Result<()> {
         // a soft and a medium layer; nearly no layer, where points open and close by the estimate
         [1e4, 1e6].iter().try_for_each(|k| paraboloids(&session, *k, 64, &[(1, 0.03), (2, 0.05)]))?;
         spheres(&session, 1e9, &[(1, 6, 1)])?;
+        regular(&session, 1e6, &[(1, 16, 6)])?;
+        regular(&session, 1e7, &[(2, 8, 6)])?;
         return spheres(&session, 1e8, &[(2, 3, 1)]);
     }
     let meshes = [(1, 0.03), (1, 0.02), (2, 0.05), (2, 0.03), (2, 0.02)];
     [1e4, 1e5, 1e6, 1e7, 1e8].iter().try_for_each(|k| paraboloids(&session, *k, 192, &meshes))?;
+    let meshes = [(1, 16, 16), (1, 16, 12), (1, 16, 6), (2, 8, 8), (2, 8, 6), (2, 12, 12), (2, 10, 13)];
+    [1e4, 1e5, 1e6, 1e7, 1e8].iter().try_for_each(|k| regular(&session, *k, &meshes))?;
     let meshes = [(1, 6, 1), (1, 12, 1), (2, 3, 1), (2, 4, 1), (2, 3, 3)];
     [1e7, 1e9].iter().try_for_each(|k| spheres(&session, *k, &meshes))?;
     rough(&session)

@@ -25,13 +25,10 @@ mod verify;
 use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
-use crate::fem::{
-    assemble::NodeGraph,
-    rigid::{self, RigidMotion},
-};
+use crate::fem::{assemble::NodeGraph, rigid};
 use crate::linalg::{Csr, axpy};
 use crate::mesh::Checked;
-use crate::model::{BodySlot, Exchange, Mechanism, Model, Segment};
+use crate::model::{BodySlot, Exchange, Loads, Mechanism, Model, Segment};
 use crate::output::vtu::BodyField;
 use crate::problem::contact::ContactSpec;
 use crate::problem::method::Start;
@@ -39,6 +36,7 @@ use crate::scene::Scene;
 use approach::OuterMaker;
 use balance::Forces;
 pub use balance::{Balance, Resultant};
+use carried::{Supported, supported};
 pub use distribute::Graph;
 use draft::{Draft, Loose};
 pub use factory::{Assembled, Factory, Outline};
@@ -274,7 +272,19 @@ pub fn discretize<const D: usize>(
         let stiffness = if held && surface > 0.0 { modulus / depth } else { 0.0 };
         // what only the owner knows, until all ranks share it
         let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
-        if let Some(before) = factory.kept(&name) {
+        let mut kept = factory.kept(&name);
+        let loads = kept.is_some().then(|| Loads {
+            work: rigid::free(&left, &prescribed, &load).iter().map(|motion| motion.work).collect(),
+            force: load.clone(),
+            prescribed: prescribed.clone(),
+            carried: carried.clone(),
+        });
+        let body = kept.as_mut().and_then(|slot| slot.local.as_mut());
+        let serves = match (body, loads) {
+            (Some(body), Some(loads)) => body.reload(&loads)?,
+            _ => false,
+        };
+        if let Some(before) = kept.filter(|_| serves) {
             (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             assemblies_avoided += 1;
         } else if owner[index] == ranks.0 || dealt.is_some() {
@@ -310,6 +320,7 @@ pub fn discretize<const D: usize>(
             })?);
         }
         let outer = approach::outer_maker(&part, mesh)?;
+        let unloaded = if keep { part.unloaded(mesh, &nodal_load)? } else { Vec::new() };
         let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
         infos.push(BodyInfo {
             name: name.clone(),
@@ -344,7 +355,7 @@ pub fn discretize<const D: usize>(
             outer,
             field: fields::field_maker(name.clone(), space.clone(), elasticity.clone()),
         });
-        shapes.push(Shape { space, elasticity, modulus, held });
+        shapes.push(Shape { space, elasticity, modulus, held, unloaded });
         slots.push(BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness });
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
@@ -404,22 +415,6 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
     }
     axpy(-1.0, &discrete.carried, &mut trace);
     Ok(Some(trace))
-}
-
-/// What supports prescribe.
-struct Supported {
-    /// Displacement by which they move the body as one, one entry a dof; empty for none.
-    carried: Vec<f64>,
-    /// (dof, value) besides it, sorted by dof.
-    prescribed: Vec<(usize, f64)>,
-}
-
-/// What the supports of a body prescribe; `free` are the rigid motions of the free body.
-fn supported<const D: usize>(part: &Part<D>, free: &[RigidMotion]) -> Supported {
-    let prescribed = part.prescribed_sorted();
-    let whole = carried::carried(free, &prescribed).filter(|_| part.springs.is_empty());
-    let (carried, prescribed) = whole.unwrap_or((Vec::new(), prescribed));
-    Supported { carried, prescribed }
 }
 
 /// The rows of these segments for displacements of the nodes.

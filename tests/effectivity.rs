@@ -7,7 +7,7 @@ mod common;
 fn estimates_are_of_the_size_of_errors() {
     let said = common::example("effectivity", &["--quick"]);
     let rows: Vec<&str> = said.lines().skip(2).collect();
-    assert_eq!(rows.len(), 6, "{said}");
+    assert_eq!(rows.len(), 8, "{said}");
     for row in rows {
         let ratio = row.split('|').nth(6).and_then(|ratio| ratio.trim().parse::<f64>().ok());
         assert!(ratio.is_some_and(|ratio| (0.7..2.0).contains(&ratio)), "{row}");

@@ -134,6 +134,43 @@ fn pressure_of_a_wave_on_free_meshes() {
     }
 }
 
+/// Rings whose facets do not face each other: chords and parabolas that miss the circle make most of the error.
+#[test]
+fn curved_surfaces_are_seen() {
+    for (order, n) in [(1, 6), (1, 12), (2, 6), (2, 12)] {
+        let mut all = sets(order, n);
+        all[0] = format!("mesh.set.ni={n}");
+        all.extend([format!("mesh.set.no={}", 4 * n / 3), "contact.0.touching=false".to_owned()]);
+        let run = solve_with(case("rings"), &all);
+        let table = run.contact();
+        let exact = weighted_error(&table, 0..table.rows(), |_| 8.985_959);
+        is_effective(run.number("discretization_error/pressure/0"), exact, &format!("P{order}, n = {n}"));
+    }
+}
+
+/// A load that bends within an element: what its quadrature misses presses or lacks.
+#[test]
+fn quadrature_of_loads_is_seen() {
+    let solved = |order: usize, n: usize| {
+        let mut all = sets(order, n);
+        all.push("contact.0.gap=0".to_owned());
+        all.push("body.upper.load.0.pressure=\"20 + 80*exp(-((x - 0.56)/0.04)^2)\"".to_owned());
+        solve_with(case("wavy"), &all)
+    };
+    let fine = solved(2, 64).contact();
+    for order in [1, 2] {
+        let run = solved(order, 8);
+        let table = run.contact();
+        let at = |q: usize| {
+            let place = (0..fine.rows()).find(|&k| (fine["x"][k] - table["x"][q]).abs() < 1e-9);
+            fine["pressure"][place.expect("nodes of a mesh are nodes of a finer one")]
+        };
+        let exact = pressure_error(&table, order, at);
+        assert!(order == 2 || exact > 0.02, "{exact}");
+        is_effective(run.number("discretization_error/pressure/0"), exact, &format!("P{order}"));
+    }
+}
+
 /// Relative root of mean squares of differences of the pressures from `exact` at some points, by their weights.
 fn weighted_error(table: &Table, points: impl Iterator<Item = usize> + Clone, exact: impl Fn(usize) -> f64) -> f64 {
     let sum = |value: &dyn Fn(usize) -> f64| points.clone().map(|q| table["weight"][q] * value(q).powi(2)).sum::<f64>();

@@ -89,12 +89,19 @@ fn a_step_of_a_path_is_a_run_with_its_loads() {
     }
 }
 
-/// Steps with loads in proportion are one problem, and others are as many as there are directions.
+/// Steps with loads in proportion are one problem, and others are as many as there are directions; condensed bodies serve all of them.
 #[test]
-fn only_another_direction_assembles_anew() {
-    let counts = |table: &str| solve(with_table(table), &[]).converged().count("assemblies");
-    assert_eq!(counts("press,lift\n0.1,0.2\n0.4,0.8\n0.2,0.4\n"), 2);
-    assert_eq!(counts("press,lift\n0.1,0.2\n0.4,0.8\n0.2,0.5\n0.1,0.25\n"), 4);
+fn only_another_direction_makes_another_problem() {
+    let counts = |table: &str, solver: &str| {
+        let run = solve(with_table(table), &["--set", &format!("solver={solver}")]).converged();
+        ["assemblies", "assemblies_avoided", "factorizations_avoided"].map(|name| run.count(name))
+    };
+    let (straight, bent) =
+        ("press,lift\n0.1,0.2\n0.4,0.8\n0.2,0.4\n", "press,lift\n0.1,0.2\n0.4,0.8\n0.2,0.5\n0.1,0.25\n");
+    assert_eq!(counts(straight, "mumps"), [2, 0, 0]);
+    assert_eq!(counts(bent, "mumps"), [4, 0, 0]);
+    assert_eq!(counts(straight, "condensed"), [2, 0, 0]);
+    assert_eq!(counts(bent, "condensed"), [2, 2, 2]);
     // one column of all loads: no line names it
     let scene = case("groove-held");
     let folder = tempfile::tempdir().expect("a folder");

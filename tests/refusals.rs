@@ -253,6 +253,11 @@ fn a_script_that_gmsh_refuses() {
     let script = std::fs::read_to_string(root().join("meshes/patch/patch.geo")).expect("a script");
     let wrong = script.replace("Line(3) = {3, 4};", "Line(3) = {3, 4;");
     assert_ne!(script, wrong);
+    // numbers that would keep Gmsh busy for hours, or are none of a mesh
+    for (h, words) in [("1e-9", "take h = 0.00012 or more"), ("0", "numbers above 0"), ("-1", "numbers above 0")] {
+        let run = solve(case("paraboloid"), &["--set", &format!("mesh.set.h={h}")]);
+        refused(&run, MESH, &["paraboloid.geo", words]);
+    }
     let file = folder.path().join("wrong.geo");
     std::fs::write(&file, &wrong).expect("a script");
     let line = 1 + wrong.lines().position(|line| line.contains("{3, 4;")).expect("the line");

@@ -8,6 +8,7 @@ use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 use winkler::contact::law::{self, OwnLaws};
 use winkler::contact::pieces::{self, Cut, Reach};
 use winkler::contact::{Carriers, ContactPair, Side, assemble};
+use winkler::fem::quadrature::Parts;
 use winkler::fem::{Frame, Space, assemble as fem};
 use winkler::mesh::{Mesh, load};
 use winkler::problem::order::Order;
@@ -251,9 +252,9 @@ fn volume_and_area_of_a_ball() {
             let space = Space::new(&mesh, mesh.group("ball").expect("a body"), degree);
             let total = |load: &[f64]| load.iter().step_by(3).sum::<f64>();
             let (mut volume, mut area) = (vec![0.0; space.dofs()], vec![0.0; space.dofs()]);
-            fem::body_force(&space, &|_| [1.0, 0.0, 0.0], &mut volume);
+            fem::body_force(&space, Parts::Whole, &|_| [1.0, 0.0, 0.0], &mut volume);
             let facets = space.facets(mesh.group("skin").expect("a surface"));
-            winkler::fem::surface::surface_load(&space, &facets, &|_, _| [1.0, 0.0, 0.0], &mut area);
+            winkler::fem::surface::surface_load(&space, &facets, Parts::Whole, &|_, _| [1.0, 0.0, 0.0], &mut area);
             // the boundary found from the cells is the group, facet by facet
             let sorted = |facets: &winkler::fem::Facets<3>| {
                 let mut all: Vec<Vec<u32>> = (0..facets.count()).map(|i| facets.facet(i).to_vec()).collect();

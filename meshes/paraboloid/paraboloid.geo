@@ -8,6 +8,18 @@ DefineConstant[ L = {0.5, Name "L"} ];          // side of the cubes
 inside = 1.25*h; // size on the contact
 growth = 0.35;   // of the size with the distance
 
+If (h <= 0 || a <= 0 || L <= 0)
+  Error("h = %g, a = %g and L = %g are lengths: take numbers above 0", h, a, L);
+  Abort;
+EndIf
+// Corners of tetrahedra of size s: sqrt(2)/s^3 in a unit of volume, integrated over the sizes below. Gmsh makes 1e7 of them in a
+// quarter of an hour, in 20 GB.
+corners = Sqrt(2)*(Pi*a^2/4/(growth*inside^2) + Pi^2*a/(2*growth^2*h));
+If (corners > 1e7)
+  Error("h = %g makes some %.1e nodes around a contact of radius a = %g: take h = %.2g or more", h, corners, a, a/2000);
+  Abort;
+EndIf
+
 Box(1) = {0, 0, -L, L, L, L};
 Box(2) = {0, 0, 0, L, L, L};
 

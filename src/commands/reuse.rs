@@ -1,5 +1,5 @@
-//! What a run of a sweep takes over from the run before it: K and f of a body do not depend on method, layers and gaps, so a
-//! condensed body is kept as it is, and where only the method changes the whole problem.
+//! What a run of a sweep takes over from the run before it: K of a body does not depend on method, layers, gaps and the values of loads
+//! and supports, so a condensed body is kept, and where only the method changes the whole problem.
 
 use crate::error::Result;
 use crate::interrupt::Interrupt;
@@ -10,7 +10,7 @@ use crate::run::clock::Clock;
 use crate::run::stages::{Built, Done};
 use crate::scene::Scene;
 use crate::solver::options;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::rc::Rc;
 
 /// Builds `scene` after another scene of the sweep was solved, with what that one has left.
@@ -27,11 +27,11 @@ pub fn build(
     let Some(Done { built: mut last, .. }) = before else { return run::build(session, scene, interrupt, clock) };
     // tables of factors change the loads of bodies
     let is_full = !last.scene.method.steps.is_table() && !scene.method.steps.is_table();
-    let same = |without: &[&str]| is_full && settings(&last.scene, without) == settings(&scene, without);
+    let same = |makes: fn(&mut Value)| settings(&last.scene, makes) == settings(&scene, makes);
     let condensed = last.condensed.len() == last.discrete.bodies.len();
     // an estimate of the error needs the meshes, which are kept only for it
     let meshes = |scene: &Scene| scene.estimate || scene.method.stop.balanced;
-    if condensed && meshes(&last.scene) == meshes(&scene) && same(&[]) {
+    if condensed && meshes(&last.scene) == meshes(&scene) && is_full && same(|_| ()) {
         let discrete = &mut last.discrete;
         discrete.model.exchange = Rc::new(Ranks::new(session));
         let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
@@ -39,20 +39,51 @@ pub fn build(
         discrete.assemblies = 0;
         return Ok(Built { scene, ..last });
     }
-    let kept = if same(&["gap", "layer", "reference"]) { last.into_condensed() } else { Vec::new() };
+    let kept = if same(without_values) { last.into_condensed() } else { Vec::new() };
     options::withdraw(session)?;
     run::build_with(session, scene, kept, interrupt, clock)
 }
 
-/// A scene without what no body depends on, and without some keys of its contacts.
-fn settings(scene: &Scene, without: &[&str]) -> Value {
+/// A scene without what no body depends on, and what `makes` leaves of it.
+fn settings(scene: &Scene, makes: fn(&mut Value)) -> Value {
     let mut settings = scene.settings();
     if let Value::Object(map) = &mut settings {
         ["title", "units", "method", "output"].iter().for_each(|key| drop(map.remove(*key)));
     }
-    let contacts = settings.get_mut("contact").and_then(Value::as_array_mut).into_iter().flatten();
-    for contact in contacts.filter_map(Value::as_object_mut) {
-        without.iter().for_each(|key| drop(contact.remove(*key)));
-    }
+    makes(&mut settings);
     settings
+}
+
+/// Leaves what stiffness matrices, contact rows and the choice of prescribed dofs come from.
+fn without_values(settings: &mut Value) {
+    each(settings, "contact", |contact| without(contact, &["gap", "layer", "reference"]));
+    each(settings, "body", |body| {
+        without(body, &["force", "path"]);
+        if let Some(Value::Array(loads)) = body.get_mut("load") {
+            // rigid surfaces join dofs
+            loads.retain(|load| load["rigid"] == true);
+        }
+        for key in ["load", "fix"] {
+            each_of(body.get_mut(key), |item| {
+                without(item, &["path"]);
+                for key in ["force", "x", "y", "z", "normal"] {
+                    item.get_mut(key).into_iter().for_each(|value| *value = Value::Bool(true));
+                }
+            });
+        }
+    });
+}
+
+fn without(table: &mut Map<String, Value>, keys: &[&str]) {
+    keys.iter().for_each(|key| drop(table.remove(*key)));
+}
+
+/// Edits each table of a list of a scene.
+fn each(settings: &mut Value, list: &str, edit: impl FnMut(&mut Map<String, Value>)) {
+    each_of(settings.get_mut(list), edit);
+}
+
+fn each_of(list: Option<&mut Value>, edit: impl FnMut(&mut Map<String, Value>)) {
+    let tables = list.and_then(Value::as_array_mut).into_iter().flatten();
+    tables.filter_map(Value::as_object_mut).for_each(edit);
 }

@@ -2,6 +2,7 @@
 //! are those of the points themselves, not means around the nodes.
 
 use super::basis::PressureBasis;
+use super::near::Near;
 use super::pair::ContactPair;
 use super::pieces::{Common, Shared};
 use super::side::{Side, length, unit};
@@ -30,6 +31,8 @@ pub struct Fine<const D: usize> {
     pub pressing: Csr,
     /// Where the points lie on each side.
     pub sides: [FineSide<D>; 2],
+    /// Where the contact points lie on side b.
+    pub near: Near<D>,
 }
 
 /// Where the points lie on a surface.
@@ -43,13 +46,15 @@ pub struct FineSide<const D: usize> {
 }
 
 impl<const D: usize> Fine<D> {
-    /// The points of `pair`, made of these sides and common pieces; `gap(x)` is the scene's own gap.
+    /// The points of `pair`, made of these sides and common pieces; `gap(x)` is the scene's own gap. The distance of the meshes does not
+    /// count where they are `touching`.
     pub fn new(
         a: &Side<D>,
         b: &Side<D>,
         common: &Common<D>,
         pair: &ContactPair,
         gap: &dyn Fn([f64; 3]) -> f64,
+        touching: bool,
     ) -> Self {
         let shared = &common.points;
         let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
@@ -67,6 +72,7 @@ impl<const D: usize> Fine<D> {
             nearest: Vec::new(),
             interpolation: Csr::new(pair.len()),
             pressing: Csr::new(pair.len()),
+            near: Near::new(a, b, common, pair, (!touching).then_some(gap)),
             sides: [side(a, |p| p.facet_a, |p| p.at_a), side(b, |p| p.facet_b, |p| p.at_b)],
         };
         for chunk in shared.chunk_by(|p, q| p.facet_a == q.facet_a) {

@@ -7,6 +7,7 @@ mod basis;
 mod cover;
 pub mod fine;
 pub mod law;
+mod near;
 pub mod order;
 mod pair;
 pub mod pieces;

@@ -4,6 +4,7 @@ use super::find::find_group;
 use super::part::Part;
 use crate::contact::{add, pad};
 use crate::error::Result;
+use crate::fem::quadrature::Parts;
 use crate::fem::{Facets, Space, assemble, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
@@ -102,14 +103,20 @@ fn mean<const D: usize>(u: &[f64], weights: impl Iterator<Item = (u32, f64)>) ->
 /// Integrals of the shape functions over a surface.
 fn areas<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> Vec<(u32, f64)> {
     let mut all = vec![0.0; space.dofs()];
-    surface::surface_load(space, facets, &|_, _| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }), &mut all);
+    surface::surface_load(
+        space,
+        facets,
+        Parts::Whole,
+        &|_, _| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }),
+        &mut all,
+    );
     first_components::<D>(&all)
 }
 
 /// Integrals of the shape functions over the body.
 fn volumes<const D: usize>(space: &Space<D>) -> Vec<(u32, f64)> {
     let mut all = vec![0.0; space.dofs()];
-    assemble::body_force(space, &|_| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }), &mut all);
+    assemble::body_force(space, Parts::Whole, &|_| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }), &mut all);
     first_components::<D>(&all)
 }
 

@@ -1,8 +1,25 @@
 //! Supports that move a body as one: that motion is taken out before anything is rounded.
 
+use super::part::Part;
 use crate::fem::rigid::RigidMotion;
 use crate::linalg::axpy;
 use nalgebra::{DMatrix, DVector};
+
+/// What supports prescribe.
+pub struct Supported {
+    /// Displacement by which they move the body as one, one entry a dof; empty for none.
+    pub carried: Vec<f64>,
+    /// (dof, value) besides it, sorted by dof.
+    pub prescribed: Vec<(usize, f64)>,
+}
+
+/// What the supports of a body prescribe; `free` are the rigid motions of the free body.
+pub fn supported<const D: usize>(part: &Part<D>, free: &[RigidMotion]) -> Supported {
+    let prescribed = part.prescribed_sorted();
+    let whole = self::carried(free, &prescribed).filter(|_| part.springs.is_empty());
+    let (carried, prescribed) = whole.unwrap_or((Vec::new(), prescribed));
+    Supported { carried, prescribed }
+}
 
 /// Supports agree with a rigid motion to this share of the largest prescribed displacement.
 const AGREES: f64 = 1e-9;
@@ -12,7 +29,7 @@ type Prescribed = Vec<(usize, f64)>;
 
 /// The rigid motion that the prescribed (dof, value) give the body, one entry a dof, and what they prescribe besides it; `None`
 /// if they prescribe zero or deform the body.
-pub fn carried(motions: &[RigidMotion], prescribed: &[(usize, f64)]) -> Option<(Vec<f64>, Prescribed)> {
+fn carried(motions: &[RigidMotion], prescribed: &[(usize, f64)]) -> Option<(Vec<f64>, Prescribed)> {
     let largest = prescribed.iter().fold(0.0f64, |max, (_, u)| max.max(u.abs()));
     if largest == 0.0 {
         return None;

@@ -3,7 +3,7 @@
 use super::draft::Draft;
 use crate::contact::ContactPair;
 use crate::fem::assemble::NodeGraph;
-use crate::fem::{ElasticBody, Interpolation};
+use crate::fem::{Couplings, ElasticBody, Interpolation};
 use crate::linalg::Csr;
 use crate::model::{Distribution, Exchange};
 use std::rc::Rc;
@@ -203,6 +203,7 @@ impl Dealt {
             stiffness: Csr { columns: self.distribution.total, ptr: starts, col, values },
             load: self.distribution.scatter(&body.load),
             prescribed: body.prescribed.iter().filter_map(place).collect(),
+            held: Couplings::default(),
             lifting: if body.lifting.is_empty() { Vec::new() } else { self.distribution.scatter(&body.lifting) },
             ..body
         }

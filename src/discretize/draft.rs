@@ -3,6 +3,7 @@
 use super::part::Part;
 use crate::contact::ContactPair;
 use crate::error::Result;
+use crate::fem::quadrature::Parts;
 use crate::fem::rigid::{self, RigidMotion};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use crate::mesh::Mesh;
@@ -60,7 +61,7 @@ impl Draft {
             (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].rows[side].row(q)));
         }
         let free = part.in_dofs(rigid::of(&part.space));
-        let nodal_load = part.load(mesh)?;
+        let nodal_load = part.load(mesh, Parts::Whole)?;
         let load = part.load_on_dofs(nodal_load.clone());
         Ok(Self { segments, rows, free, nodal_load, load })
     }

@@ -51,7 +51,7 @@ pub trait Factory {
     /// PETSc's refusal of a matrix or an option value.
     fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>>;
 
-    /// A body of this name with the same K, f and contact rows, left by an earlier scene on the rank that owns it.
+    /// A body of this name with the same K and contact rows, left by an earlier scene or leg on the rank that owns it.
     fn kept(&mut self, name: &str) -> Option<BodySlot>;
 }
 

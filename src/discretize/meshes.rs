@@ -21,6 +21,9 @@ pub trait Meshes {
     /// Recovers from displacements of all nodes of a body.
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn Recovered + 'a>;
 
+    /// Forces at the nodes of a body that the quadrature of its loads misses; empty for none.
+    fn unloaded(&self, body: usize) -> &[f64];
+
     /// The integration points of a pair.
     fn points(&self, pair: usize) -> FinePoints<'_>;
 
@@ -71,6 +74,10 @@ pub trait Recovered {
     /// Outer normal displacement at the integration points of a side of a pair, the interpolation error added.
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
 
+    /// At the contact points of a pair, of whose side b this is, with rows B_b of its nodal displacements: what the compression lacks where
+    /// the mean around a point is taken for the value at the point itself.
+    fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64>;
+
     /// Adds `sum force_g n.v` over the integration points of a side of a pair to `r`, for every shape function v.
     fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]);
 }
@@ -85,6 +92,8 @@ pub struct Shape<const D: usize> {
     pub modulus: f64,
     /// Its supports, which choose the dofs.
     pub held: Rc<Held<D>>,
+    /// See [`Meshes::unloaded`].
+    pub unloaded: Vec<f64>,
 }
 
 /// [`Meshes`] in `D` dimensions.
@@ -107,6 +116,10 @@ impl<const D: usize> Meshes for Kept<D> {
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn Recovered + 'a> {
         let shape = &self.shapes[body];
         Box::new(OnBody { kept: self, shape, u, recovery: Recovery::new(&shape.space, u) })
+    }
+
+    fn unloaded(&self, body: usize) -> &[f64] {
+        &self.shapes[body].unloaded
     }
 
     fn points(&self, pair: usize) -> FinePoints<'_> {
@@ -180,6 +193,15 @@ impl<const D: usize> OnBody<'_, D> {
 const SIGN: [f64; 2] = [1.0, -1.0];
 
 impl<const D: usize> OnBody<'_, D> {
+    /// Displacement at barycentric coordinates of a facet, the interpolation error added.
+    fn displacement(&self, nodes: &[u32], l: &[f64; D]) -> [f64; D] {
+        let mut u = self.recovery.bubble(&nodes[..D], l);
+        for (&node, phi) in nodes.iter().zip(element::values(self.shape.space.order, l)) {
+            (0..D).for_each(|c| u[c] += phi * self.u[D * node as usize + c]);
+        }
+        u
+    }
+
     /// Visits the integration points of a side: number, normal, nodes and barycentric coordinates of each.
     fn visit(&self, pair: usize, side: usize, mut visitor: impl FnMut(usize, [f64; D], &[u32], &[f64; D])) {
         let fine = &self.kept.fine[pair];
@@ -202,13 +224,23 @@ impl<const D: usize> Recovered for OnBody<'_, D> {
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
         let mut values = vec![0.0; self.kept.fine[pair].weight.len()];
         self.visit(pair, side, |g, normal, nodes, l| {
-            let mut u = self.recovery.bubble(&nodes[..D], l);
-            for (&node, phi) in nodes.iter().zip(element::values(self.shape.space.order, l)) {
-                (0..D).for_each(|c| u[c] += phi * self.u[D * node as usize + c]);
-            }
+            let u = self.displacement(nodes, l);
             values[g] = (0..D).map(|c| normal[c] * u[c]).sum();
         });
         values
+    }
+
+    fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64> {
+        let Fine { near, sides, .. } = &self.kept.fine[pair];
+        let mut mean = vec![0.0; near.at.len()];
+        rows.multiply(self.u, &mut mean);
+        let lacks = |(q, mean): (usize, f64)| {
+            let (nodes, l) = (sides[1].facets.facet(near.facet[q]), &near.at[q]);
+            let u = self.displacement(nodes, l);
+            let here: f64 = (0..D).map(|c| -near.normal[q][c] * u[c]).sum();
+            here - mean + near.distance[q]
+        };
+        mean.into_iter().enumerate().map(lacks).collect()
     }
 
     fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]) {

@@ -111,7 +111,7 @@ fn make_pair<const D: usize>(
         pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(&spec)))?;
     }
     let surface = ContactSurface::new(&a, &pair);
-    let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap));
+    let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching));
     Ok(Contact { spec, pair, fine, swapped, surface })
 }
 

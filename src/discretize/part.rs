@@ -6,11 +6,13 @@ use super::springs;
 use super::supports::Held;
 use crate::contact;
 use crate::error::{Error, Result};
+use crate::expression::Field;
 use crate::fem::assemble::{self, NodalBlock};
 use crate::fem::interpolation::{Interpolation, coarse_nodes, from_vertices};
+use crate::fem::quadrature::Parts;
 use crate::fem::rigid::{self, RigidMotion};
-use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, surface};
-use crate::linalg::{Csr, countable, dot};
+use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, support, surface};
+use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};
 use crate::problem::elasticity::Plane;
@@ -108,16 +110,16 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 
     /// Nodal forces of the loads, but for those on rigid surfaces. Supports are not regarded.
-    pub fn load(&self, mesh: &Mesh<D>) -> Result<Vec<f64>> {
+    pub fn load(&self, mesh: &Mesh<D>, parts: Parts) -> Result<Vec<f64>> {
         let name = &self.spec.name;
         let mut load = vec![0.0; self.space.dofs()];
         for spec in &self.spec.load {
-            self.add_load(spec, spec.factor, mesh, &mut load)?;
+            self.add_load(spec, spec.factor, mesh, parts, &mut load)?;
         }
         if let Some(fields) = &self.spec.force {
             let values = Values::of("this body force", &name.value);
             let density = |x: [f64; D]| std::array::from_fn(|c| self.spec.force_factor * values.at(&fields[c], x));
-            assemble::body_force(&self.space, &density, &mut load);
+            assemble::body_force(&self.space, parts, &density, &mut load);
             values.refused()?;
             if load.iter().any(|f| !f.is_finite()) {
                 return Err(Error::scene(&name.place, format!("body `{}`: the body force is too large", name.value))
@@ -127,8 +129,27 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(load)
     }
 
+    /// What the quadrature of the nodal forces `load` misses; empty where all loads are constant.
+    ///
+    /// # Errors
+    /// Those of [`Part::load`].
+    pub fn unloaded(&self, mesh: &Mesh<D>, load: &[f64]) -> Result<Vec<f64>> {
+        let is_constant = |load: &Load| match &load.kind {
+            LoadKind::Pressure(pressure) => pressure.is_constant(),
+            LoadKind::Traction(traction) => traction.iter().all(Field::is_constant),
+            LoadKind::Force { .. } => true,
+        };
+        let force = self.spec.force.iter().flatten();
+        if self.spec.load.iter().all(is_constant) && force.into_iter().all(Field::is_constant) {
+            return Ok(Vec::new());
+        }
+        let mut missed = self.load(mesh, Parts::Halves)?;
+        missed.iter_mut().zip(load).for_each(|(missed, load)| *missed -= load);
+        Ok(missed)
+    }
+
     /// Adds `factor` times a load of the scene to nodal forces, unless its surface is rigid.
-    fn add_load(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, load: &mut [f64]) -> Result<()> {
+    fn add_load(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, parts: Parts, load: &mut [f64]) -> Result<()> {
         let name = &self.spec.name;
         let group = find_group(mesh, &spec.on, &[D - 1], "load")?;
         let facets = self.space.facets(group);
@@ -143,6 +164,7 @@ impl<'a, const D: usize> Part<'a, D> {
         surface::surface_load(
             &self.space,
             &facets,
+            parts,
             &|x, n| match &spec.kind {
                 LoadKind::Pressure(field) => {
                     let pressure = factor * values.at(field, x);
@@ -168,7 +190,7 @@ impl<'a, const D: usize> Part<'a, D> {
     /// Those of [`Part::load`].
     pub fn resultant(&self, spec: &Load, mesh: &Mesh<D>) -> Result<[f64; 3]> {
         let mut load = vec![0.0; self.space.dofs()];
-        self.add_load(spec, 1.0, mesh, &mut load)?;
+        self.add_load(spec, 1.0, mesh, Parts::Whole, &mut load)?;
         let mut sum = [0.0; 3];
         let forces = load.chunks_exact(D).map(|f| self.space.net_force(std::array::from_fn(|c| f[c])));
         forces.for_each(|force| contact::add(&mut sum, force));
@@ -247,10 +269,6 @@ impl<'a, const D: usize> Part<'a, D> {
         self.held.frame.turn_matrix(&mut stiffness);
         // rows that other ranks have
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
-        let work = dot(&load, &carried);
-        let mut body = assemble::support(stiffness, load, prescribed);
-        body.energy_constant -= work;
-        body.carried = carried;
-        Ok(body)
+        Ok(support(stiffness, load, prescribed, carried))
     }
 }

@@ -15,12 +15,19 @@ pub(super) struct LayerError {
 
 impl LayerError {
     /// That of a pair with contact points `range`; `giving` is what the recovered displacements of both bodies close at each
-    /// integration point.
+    /// integration point, `beyond` what the compression of each contact point lacks as a mean.
     ///
     /// With s the compliance of the bodies to a pressure that changes within a facet, the state c + s p is interpolated, and the law meets
     /// it at the place (c_h, p_h). Under a soft layer the state is the compression; under a stiff one it is the pressure inside the
     /// contact and the gap outside, and contact ends where it vanishes.
-    pub fn new(pair: &ContactPair, points: &FinePoints, layer: &Layer, range: Range<usize>, giving: &[f64]) -> Self {
+    pub fn new(
+        pair: &ContactPair,
+        points: &FinePoints,
+        layer: &Layer,
+        range: Range<usize>,
+        giving: &[f64],
+        beyond: &[f64],
+    ) -> Self {
         let (compression, pressure) = (&layer.compression[range.clone()], &layer.pressure[range.clone()]);
         let tangent = &layer.tangent[range];
         let mut error = Self { energy: 0.0, pressure: Vec::with_capacity(giving.len()) };
@@ -39,7 +46,7 @@ impl LayerError {
             let state = between(&|q| compression[q] + compliance * pressure[q]);
             let c_h = pair.law.meet(nearest, state, 1.0 / compliance);
             let p_h = at(c_h);
-            let off = giving - points.gap[g] - between(&|q| compression[q]);
+            let off = giving - points.gap[g] - between(&|q| compression[q] + beyond[q]);
             let rise = at(c_h + off) - p_h;
             let slope = if off == 0.0 { 0.0 } else { rise / off };
             let of_layer = weight_of_layer(slope * compliance);

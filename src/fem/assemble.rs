@@ -7,7 +7,7 @@ use super::elasticity::{Elasticity, Flaw};
 use super::element;
 use super::frame::Frame;
 use super::pad;
-use super::quadrature;
+use super::quadrature::{self, Parts};
 use super::space::Space;
 use crate::linalg::Csr;
 use crate::problem::order::Order;
@@ -151,29 +151,6 @@ pub fn add_blocks<const D: usize>(graph: &NodeGraph, blocks: &[NodalBlock<D>], m
     }
 }
 
-/// One elastic body, discretised: stiffness K, load f, and what the supports took out.
-///
-/// Supported dofs stay as rows of K with one entry, `K[c][c]` = a typical diagonal, and `f[c] = K[c][c] u_c`, so that
-/// their residual vanishes at the prescribed value; their columns went to the right-hand side.
-#[derive(Debug, Clone)]
-pub struct ElasticBody {
-    /// Stiffness matrix K, symmetric positive semidefinite.
-    pub stiffness: Csr,
-    /// Load vector f, one entry a dof.
-    pub load: Vec<f64>,
-    /// Prescribed (dof, value), sorted by dof.
-    pub prescribed: Vec<(usize, f64)>,
-    /// K_fc u_c on the free dofs if some prescribed value is not zero, else empty. Strain energy needs it.
-    pub lifting: Vec<f64>,
-    /// What must be added to u'Ku/2 - f'u to give the potential energy of the body.
-    pub energy_constant: f64,
-    /// u_c'K_cc u_c minus the u_c'K_cc u_c that the scaled diagonal gives: correction of u'Ku.
-    pub strain_constant: f64,
-    /// Rigid displacement of all dofs that supports give the body, to be added to u; empty if there is none. All else here
-    /// is relative to it.
-    pub carried: Vec<f64>,
-}
-
 /// Why a body could not be assembled.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Defect {
@@ -282,20 +259,29 @@ pub fn is_straight<const D: usize>(x: &[[f64; D]], vertices: usize) -> bool {
 }
 
 /// Adds a body force density (per volume) to `load`.
-pub fn body_force<const D: usize>(space: &Space<D>, density: &dyn Fn([f64; D]) -> [f64; D], load: &mut [f64]) {
+pub fn body_force<const D: usize>(
+    space: &Space<D>,
+    parts: Parts,
+    density: &dyn Fn([f64; D]) -> [f64; D],
+    load: &mut [f64],
+) {
     match D {
-        2 => body_force_on::<D, 3>(space, density, load),
-        _ => body_force_on::<D, 4>(space, density, load),
+        2 => body_force_on::<D, 3>(space, parts, density, load),
+        _ => body_force_on::<D, 4>(space, parts, density, load),
     }
 }
 
 fn body_force_on<const D: usize, const N: usize>(
     space: &Space<D>,
+    parts: Parts,
     density: &dyn Fn([f64; D]) -> [f64; D],
     load: &mut [f64],
 ) {
     let low = space.order == Order::P1 && !space.axisymmetric;
-    let rule = quadrature::simplex::<N>(if low { 2 } else { 5 });
+    let mut rule = quadrature::simplex::<N>(if low { 2 } else { 5 });
+    if parts == Parts::Halves {
+        rule = rule.on_parts();
+    }
     for index in 0..space.cell_count() {
         let x = space.cell_nodes(index);
         let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
@@ -319,87 +305,9 @@ pub fn interpolate<const D: usize>(x: &[[f64; D]], phi: &[f64]) -> [f64; D] {
     std::array::from_fn(|i| x.iter().zip(phi).map(|(x, phi)| phi * x[i]).sum())
 }
 
-/// Takes prescribed dofs out of K and f, symmetrically, and keeps what energies need.
-///
-/// `prescribed` holds (dof, value), sorted, without repetition. Rows of K that are empty live elsewhere, with their energies.
-pub fn support(mut stiffness: Csr, mut load: Vec<f64>, mut prescribed: Vec<(usize, f64)>) -> ElasticBody {
-    let n = load.len();
-    let mut value = vec![None; n];
-    for &(dof, u) in &prescribed {
-        value[dof] = Some(u);
-    }
-    let free: Vec<f64> = (0..n)
-        .filter(|&i| value[i].is_none())
-        .filter_map(|i| stiffness.position(i, i).map(|k| stiffness.values[k]))
-        .collect();
-    let scale = if free.is_empty() { 1.0 } else { free.iter().sum::<f64>() / free.len() as f64 };
-    let moved = prescribed.iter().any(|&(_, u)| u != 0.0);
-    let mut lifting = if moved { vec![0.0; n] } else { Vec::new() };
-    let (mut energy_constant, mut strain_constant) = (0.0, 0.0);
-    for i in 0..n {
-        if stiffness.range(i).is_empty() {
-            continue;
-        }
-        for k in stiffness.range(i) {
-            let j = stiffness.col[k] as usize;
-            match (value[i], value[j]) {
-                (None, None) => {}
-                (None, Some(u)) => {
-                    if moved {
-                        lifting[i] += stiffness.values[k] * u;
-                    }
-                    stiffness.values[k] = 0.0;
-                }
-                (Some(_), None) => stiffness.values[k] = 0.0,
-                (Some(u), Some(v)) => {
-                    strain_constant += u * stiffness.values[k] * v;
-                    stiffness.values[k] = if i == j { scale } else { 0.0 };
-                }
-            }
-        }
-        if let Some(u) = value[i] {
-            energy_constant += 0.5 * scale * u * u - load[i] * u;
-            load[i] = scale * u;
-        } else if moved {
-            load[i] -= lifting[i];
-        }
-    }
-    prescribed.retain(|entry| !stiffness.range(entry.0).is_empty());
-    energy_constant += 0.5 * strain_constant;
-    strain_constant -= prescribed.iter().map(|(_, u)| scale * u * u).sum::<f64>();
-    let carried = Vec::new();
-    ElasticBody { stiffness, load, prescribed, lifting, energy_constant, strain_constant, carried }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::dot;
-
-    /// Two dofs joined by springs to each other and to ground: K = [[3, -1], [-1, 2]].
-    fn springs() -> Csr {
-        let mut k = Csr::new(2);
-        k.push_row([(0, 3.0), (1, -1.0)]);
-        k.push_row([(0, -1.0), (1, 2.0)]);
-        k
-    }
-
-    #[test]
-    fn a_prescribed_value_keeps_energies_and_equilibrium() {
-        let body = support(springs(), vec![5.0, 0.7], vec![(1, 0.4)]);
-        let u = [(5.0 + 0.4) / 3.0, 0.4];
-        let mut ku = [0.0; 2];
-        body.stiffness.multiply(&u, &mut ku);
-        let residual: f64 = (0..2).map(|i| (body.load[i] - ku[i]).abs()).sum();
-        assert!(residual < 1e-15, "{residual}");
-        let mut full = [0.0; 2];
-        springs().multiply(&u, &mut full);
-        let strain = dot(&u, &ku) + 2.0 * dot(&body.lifting, &u) + body.strain_constant;
-        assert!((strain - dot(&u, &full)).abs() < 1e-14);
-        let energy = 0.5 * dot(&u, &ku) - dot(&body.load, &u) + body.energy_constant;
-        let exact = 0.5 * dot(&u, &full) - 5.0 * u[0] - 0.7 * u[1];
-        assert!((energy - exact).abs() < 1e-14, "{energy} {exact}");
-    }
 
     #[test]
     fn a_cell_is_straight_if_each_edge_is() {

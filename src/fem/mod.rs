@@ -20,15 +20,17 @@ mod sample;
 pub mod slope;
 pub mod space;
 pub mod stress;
+mod support;
 pub mod surface;
 
-pub use assemble::{ElasticBody, NodeGraph};
+pub use assemble::NodeGraph;
 pub use elasticity::Elasticity;
 pub use frame::Frame;
 pub use interpolation::Interpolation;
 pub use material::Material;
 pub use slope::Slope;
 pub use space::{Facets, Space};
+pub use support::{Couplings, ElasticBody, support};
 
 /// A vector of 2 or 3 components as 3.
 pub fn pad<const D: usize>(v: [f64; D]) -> [f64; 3] {

@@ -1,18 +1,20 @@
 //! Integrals over surfaces: loads, foundations, areas.
 
 use super::assemble::{NodalBlock, interpolate};
+use super::element;
+use super::quadrature::{self, Parts};
 use super::space::{Facets, Space, area_vector};
-use super::{element, quadrature};
 use crate::problem::order::Order;
 
 /// Adds a surface load to `load`; `traction(x, n)` is force per area at a point with outer unit normal n.
 pub fn surface_load<const D: usize>(
     space: &Space<D>,
     facets: &Facets<D>,
+    parts: Parts,
     traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
     load: &mut [f64],
 ) {
-    on_facets(space, facets, &mut |nodes, phi, weight, x, normal| {
+    on_facets(space, facets, parts, &mut |nodes, phi, weight, x, normal| {
         let force = traction(x, normal);
         for (a, &node) in nodes.iter().enumerate() {
             for c in 0..D {
@@ -27,8 +29,11 @@ pub fn surface_load<const D: usize>(
 type Visit<'a, const D: usize> = dyn FnMut(&[u32], &[f64], f64, [f64; D], [f64; D]) + 'a;
 
 /// Visits the integration points of a surface.
-fn on_facets<const D: usize>(space: &Space<D>, facets: &Facets<D>, visit: &mut Visit<D>) {
-    let rule = quadrature::simplex::<D>(if space.order == Order::P1 { 3 } else { 5 });
+fn on_facets<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts, visit: &mut Visit<D>) {
+    let mut rule = quadrature::simplex::<D>(if space.order == Order::P1 { 3 } else { 5 });
+    if parts == Parts::Halves {
+        rule = rule.on_parts();
+    }
     for index in 0..facets.count() {
         let x = facets.coordinates(index, space);
         for (l, weight) in rule.points.iter().zip(&rule.weights) {
@@ -50,7 +55,7 @@ pub fn foundation<const D: usize>(
     stiffness: &dyn Fn([f64; D], [f64; D]) -> [[f64; D]; D],
 ) -> Vec<NodalBlock<D>> {
     let mut blocks = Vec::new();
-    on_facets(space, facets, &mut |nodes, phi, weight, x, normal| {
+    on_facets(space, facets, Parts::Whole, &mut |nodes, phi, weight, x, normal| {
         let density = stiffness(x, normal);
         for (a, &first) in nodes.iter().enumerate() {
             for (b, &second) in nodes.iter().enumerate() {
@@ -65,6 +70,6 @@ pub fn foundation<const D: usize>(
 /// Length (area) of a surface, in bodies of revolution the area that the curve sweeps over.
 pub fn measure<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
     let mut sum = 0.0;
-    on_facets(space, facets, &mut |_, _, weight, _, _| sum += weight);
+    on_facets(space, facets, Parts::Whole, &mut |_, _, weight, _, _| sum += weight);
     sum
 }

@@ -94,6 +94,19 @@ impl Matrices<'_> {
     }
 }
 
+/// Loads of a body whose K stays.
+#[derive(Debug)]
+pub struct Loads {
+    /// f, one entry a dof.
+    pub force: Vec<f64>,
+    /// Prescribed (dof, value), sorted by dof.
+    pub prescribed: Vec<(usize, f64)>,
+    /// See [`Body::carried`].
+    pub carried: Vec<f64>,
+    /// Work of f on each rigid motion that supports leave.
+    pub work: Vec<f64>,
+}
+
 /// An elastic body with stiffness K, load f and contact rows B (one row a contact point of each of its surfaces).
 ///
 /// A state is a vector of `len()` numbers whose meaning is the body's own: all dofs, or those that were retained.
@@ -192,6 +205,15 @@ pub trait Body {
 
     /// Starts the counts anew for another run with the same K and f; what need not be done again counts as avoided.
     fn begin_anew(&mut self);
+
+    /// Takes other loads and keeps what was made of K. False, and nothing has changed, where other dofs are prescribed or K is needed
+    /// anew.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn reload(&mut self, _loads: &Loads) -> Result<bool> {
+        Ok(false)
+    }
 
     /// Its matrices, if they are in this process's memory: for methods that join the bodies.
     fn matrices(&self) -> Option<Matrices<'_>> {

@@ -13,7 +13,7 @@ pub mod linear;
 pub mod origin;
 pub mod rigid;
 
-pub use body::{Body, BodyCounts, Energy, Matrices, Solved};
+pub use body::{Body, BodyCounts, Energy, Loads, Matrices, Solved};
 pub use distribution::Distribution;
 pub use exchange::{Exchange, Serial};
 pub use field::Field;

@@ -83,9 +83,9 @@ fn build_in<const D: usize>(
     let begun = history.begun;
     let mut built = source.build(begun, kept, clock)?;
     if begun < history.steps.len() && history.leg(begun) != (0..history.steps.len()) {
-        built.again = Some(Rc::new(move |step, begin, clock| {
+        built.again = Some(Rc::new(move |step, begin, kept, clock| {
             options::withdraw(&source.session)?;
-            set_up(&source.session, source.build(step, Vec::new(), clock)?, begin, clock)
+            set_up(&source.session, source.build(step, kept, clock)?, begin, clock)
         }));
     }
     Ok(built)

@@ -37,8 +37,9 @@ pub struct Built {
     pub again: Option<Again>,
 }
 
-/// Makes a problem with the loads of another leg of a history: first step of the leg, where it begins. Collective.
-pub type Again = Rc<dyn Fn(usize, Begin, &mut Clock) -> Result<Ready>>;
+/// Makes a problem with the loads of another leg of a history: first step of the leg, where it begins, the condensed bodies of the leg
+/// before. Collective.
+pub type Again = Rc<dyn Fn(usize, Begin, Vec<BodySlot>, &mut Clock) -> Result<Ready>>;
 
 /// What another mesh or another process gives a run.
 #[derive(Default)]
@@ -97,7 +98,7 @@ impl Built {
         self.linear == Linear::Dense || self.condensed.len() == self.discrete.bodies.len()
     }
 
-    /// The condensed bodies, their counts begun anew, for another scene with the same bodies.
+    /// The condensed bodies, their counts begun anew, for other loads, layers or gaps.
     pub fn into_condensed(self) -> Vec<BodySlot> {
         let mut slots = self.discrete.model.bodies;
         slots.retain(|slot| self.condensed.contains(&slot.name));

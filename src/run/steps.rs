@@ -2,7 +2,7 @@
 //!
 //! At a share s of all loads and prescribed displacements, u/s solves the problem of these loads with the gap d/s and the layer
 //! p(s c)/s. So on a leg of a history, where all loads are in proportion, a step changes gaps and laws alone: no body is
-//! assembled, reduced or factored anew. Another leg is another problem on the same mesh.
+//! assembled, reduced or factored anew. Another leg is another problem on the same mesh, to which condensed bodies are kept.
 
 use super::clock::Clock;
 use super::keep::{self, Keep};
@@ -13,7 +13,7 @@ use super::stages::{Begin, Done, Ready};
 use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
 use crate::ddm::{Method, Observer, Row, Start, Status};
-use crate::discretize;
+use crate::discretize::{self, Discrete};
 use crate::error::Result;
 use crate::model::{BodyCounts, Field, Layer, Model};
 use crate::problem::history::History;
@@ -76,7 +76,7 @@ fn load(model: &mut Model, laws: &[Rc<dyn LayerLaw>], factor: f64) {
 fn start(
     start: Start,
     method: &mut Method,
-    discrete: &discretize::Discrete,
+    discrete: &Discrete,
     scene: &Scene,
     [before, share]: [f64; 2],
 ) -> Result<Start> {
@@ -174,16 +174,18 @@ impl<'a> Steps<'a> {
         self.end_step(&mut done, of_step);
         self.counts += Shared::gather(&done.built.discrete).counts;
         self.counts += of_step.joint;
-        let assemblies = done.built.discrete.assemblies;
+        let Discrete { assemblies, assemblies_avoided, .. } = done.built.discrete;
         let Done { built, method, outcome, steps, earlier, mut warnings, .. } = done;
         // without loads any pressure is infinitely far
         let start = (usable && !self.history.is_at_rest(self.step)).then_some(Start::Pressure(outcome.layer.pressure));
         let (again, mut known) = (built.again.clone(), built.warnings.clone());
-        drop((built, method));
+        drop(method);
+        let kept = built.into_condensed();
         let Some(again) = again else { unreachable!("a history of several legs comes with the way to them") };
-        let mut ready = again(self.step, Begin { start, steps, earlier }, clock)?;
+        let mut ready = again(self.step, Begin { start, steps, earlier }, kept, clock)?;
         ready.built.again = Some(again);
         ready.built.discrete.assemblies += assemblies;
+        ready.built.discrete.assemblies_avoided += assemblies_avoided;
         self.laws = laws(&ready.built.discrete.model);
         for (all, new) in [(&mut known, &mut ready.built.warnings), (&mut warnings, &mut ready.warnings)] {
             new.retain(|warning| !all.contains(warning));

@@ -6,11 +6,12 @@
 //! energies and all that is printed are the same numbers.
 
 use super::options::Chosen;
+use super::sparse::Loaded;
 use super::{Dense, Retained, SparseBody, memory};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, dot};
-use crate::model::{Body, BodyCounts, Energy, Matrices, Solved};
+use crate::model::{Body, BodyCounts, Energy, Loads, Matrices, Solved};
 use crate::petsc::{Rows, Schur, Session};
 use std::cell::RefCell;
 use std::time::Instant;
@@ -21,7 +22,7 @@ pub struct CondensedBody {
     chosen: Chosen,
     retained: Retained,
     dimension: usize,
-    /// K, f and B of all dofs till they are condensed; f stays.
+    /// K and f of all dofs; K till it is condensed.
     whole: ElasticBody,
     load: Vec<f64>,
     /// Rigid motions that supports leave, on the retained dofs.
@@ -49,11 +50,7 @@ impl CondensedBody {
         free: Vec<FreeMotion>,
         retained: Retained,
     ) -> Self {
-        let on_retained = |motion: FreeMotion| {
-            let turned = retained.turn(&motion.displacement);
-            FreeMotion { displacement: retained.dofs.iter().map(|&dof| turned[dof]).collect(), work: motion.work }
-        };
-        let free = free.into_iter().map(on_retained).collect();
+        let free = free.into_iter().map(|motion| on_retained(&retained, motion)).collect();
         let load = retained.turn(&whole.load);
         Self { session: session.clone(), chosen, retained, dimension, whole, load, free, condensed: None }
     }
@@ -70,6 +67,25 @@ impl CondensedBody {
         }
     }
 
+    /// The loads on the retained dofs.
+    fn loaded(&self, schur: &mut Schur) -> Result<Loaded> {
+        let (mut whole_lifting, mut lifting) = (Vec::new(), Vec::new());
+        if !self.whole.lifting.is_empty() {
+            whole_lifting = self.retained.turn(&self.whole.lifting);
+            lifting = schur.condense(&whole_lifting)?;
+        }
+        let load = schur.condense(&self.load)?;
+        // the interior under the loads alone, with the retained dofs at rest
+        let rest = schur.expand_condensed(&self.load, &vec![0.0; self.retained.dofs.len()])?;
+        let work = dot(&self.load, &rest);
+        Ok(Loaded {
+            load,
+            lifting,
+            energy_constant: self.whole.energy_constant - 0.5 * work,
+            strain_constant: self.whole.strain_constant + work + 2.0 * dot(&whole_lifting, &rest),
+        })
+    }
+
     fn eliminate(&self) -> Result<Condensed> {
         let began = Instant::now();
         let (dofs, retained) = (&self.retained.dofs, self.retained.dofs.len());
@@ -84,28 +100,20 @@ impl CondensedBody {
             return Err(Error::new(Kind::Solver, message).help("take multigrid: --set solver=hypre"));
         }
         schur.factor()?;
-        let (mut whole_lifting, mut lifting) = (Vec::new(), Vec::new());
-        if !self.whole.lifting.is_empty() {
-            whole_lifting = self.retained.turn(&self.whole.lifting);
-            lifting = schur.condense(&whole_lifting)?;
-        }
-        let load = schur.condense(&self.load)?;
-        // the interior under the loads alone, with the retained dofs at rest
-        let rest = schur.expand_condensed(&self.load, &vec![0.0; retained])?;
-        let work = dot(&self.load, &rest);
-        let body = ElasticBody {
-            stiffness: Csr::full(retained, schur.take_complement()),
-            load,
-            prescribed: Vec::new(),
-            energy_constant: self.whole.energy_constant - 0.5 * work,
-            strain_constant: self.whole.strain_constant + work + 2.0 * dot(&whole_lifting, &rest),
-            lifting,
-            carried: Vec::new(),
-        };
+        let loaded = self.loaded(&mut schur)?;
+        let stiffness = Csr::full(retained, schur.take_complement());
+        let body = ElasticBody { stiffness, ..ElasticBody::default() };
         let dense = |stiffness: Rows| Ok(Dense::new(stiffness));
-        let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, dense, String::new());
+        let mut body = SparseBody::new(body, self.retained.rows.clone(), &[], dense, String::new());
+        body.reload(loaded, &self.free);
         Ok(Condensed { kept: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
     }
+}
+
+/// Turns the dofs of motions and leaves the retained ones.
+fn on_retained(retained: &Retained, motion: FreeMotion) -> FreeMotion {
+    let turned = retained.turn(&motion.displacement);
+    FreeMotion { displacement: retained.dofs.iter().map(|&dof| turned[dof]).collect(), work: motion.work }
 }
 
 impl Body for CondensedBody {
@@ -199,6 +207,21 @@ impl Body for CondensedBody {
             condensed.kept = true;
             condensed.body.begin_anew();
         }
+    }
+
+    fn reload(&mut self, loads: &Loads) -> Result<bool> {
+        let Some(mut condensed) = self.condensed.take() else { return Ok(false) };
+        let dofs = |prescribed: &[(usize, f64)]| prescribed.iter().map(|entry| entry.0).collect::<Vec<_>>();
+        let fits = dofs(&self.whole.prescribed) == dofs(&loads.prescribed) && self.free.len() == loads.work.len();
+        if fits {
+            self.whole.reload(loads.force.clone(), loads.prescribed.clone(), loads.carried.clone());
+            self.load = self.retained.turn(&self.whole.load);
+            self.free.iter_mut().zip(&loads.work).for_each(|(motion, work)| motion.work = *work);
+            let loaded = self.loaded(condensed.schur.get_mut())?;
+            condensed.body.reload(loaded, &self.free);
+        }
+        self.condensed = Some(condensed);
+        Ok(fits)
     }
 
     fn matrices(&self) -> Option<Matrices<'_>> {

@@ -2,7 +2,7 @@
 
 use super::{InnerSolver, RobinMatrix, Split};
 use crate::error::{Error, Kind, Result};
-use crate::fem::{ElasticBody, rigid::FreeMotion};
+use crate::fem::{Couplings, ElasticBody, rigid::FreeMotion};
 use crate::linalg::{Csr, dot};
 use crate::model::{Body, BodyCounts, Distribution, Energy, Matrices, Solved};
 use crate::petsc::Rows;
@@ -23,6 +23,18 @@ pub struct SparseBody<S> {
     sizes: Vec<[f64; 2]>,
 }
 
+/// What loads make of a body without prescribed dofs: see [`ElasticBody`].
+pub struct Loaded {
+    /// f.
+    pub load: Vec<f64>,
+    /// Forces of prescribed values on the dofs.
+    pub lifting: Vec<f64>,
+    /// What energies lack.
+    pub energy_constant: f64,
+    /// What u'Ku lacks.
+    pub strain_constant: f64,
+}
+
 /// G, made when something is first to be solved: a body that is only measured, or joined with others, needs none.
 enum Lazy<S> {
     Later {
@@ -41,7 +53,7 @@ impl<S: InnerSolver> SparseBody<S> {
     /// Joins a body, its contact rows (columns: its dofs, none of them prescribed) and a solver that `make` makes of K, on a
     /// pattern that holds B'B, when something is first to be solved. `free` are the rigid motions that its supports leave.
     pub fn new(
-        body: ElasticBody,
+        mut body: ElasticBody,
         rows: Csr,
         free: &[FreeMotion],
         make: impl FnOnce(Rows) -> Result<S> + 'static,
@@ -49,6 +61,7 @@ impl<S: InnerSolver> SparseBody<S> {
     ) -> Self {
         let robin = Lazy::Later { make: Some(Box::new(make)), words };
         let split = Split::new(free, &rows);
+        body.held = Couplings::default();
         Self { body, rows, split, distribution: None, robin, sizes: Vec::new() }
     }
 
@@ -65,6 +78,20 @@ impl<S: InnerSolver> SparseBody<S> {
         let split = Split::new(free, rows).dealt_out(distribution.clone());
         let (rows, robin) = (distribution.of_rows(rows), Lazy::Later { make: None, words });
         Self { body, rows, split, distribution: Some(distribution), robin, sizes: Vec::new() }
+    }
+
+    /// Takes other loads on the same K; their work on the motions that its supports leave is in `free`.
+    pub fn reload(&mut self, loaded: Loaded, free: &[FreeMotion]) {
+        let Loaded { load, lifting, energy_constant, strain_constant } = loaded;
+        self.body = ElasticBody {
+            load,
+            lifting,
+            energy_constant,
+            strain_constant,
+            stiffness: std::mem::take(&mut self.body.stiffness),
+            ..ElasticBody::default()
+        };
+        self.split = Split::new(free, &self.rows);
     }
 
     /// Displacements of all dofs for a state.
