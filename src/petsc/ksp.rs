@@ -1,10 +1,10 @@
 //! Linear solvers.
 
+use super::around::Around;
 use super::error::string;
 use super::library::petsc;
 use super::matrix::same;
 use super::mumps::ROOM;
-use super::patch::Patched;
 use super::table::text;
 use super::vector::Vector;
 use super::{ConvergedReason, FAMILIES, Int, Matrix, Scope, Session, ffi, print};
@@ -71,7 +71,7 @@ pub struct Ksp {
     /// Whether a solve writes to its right-hand side.
     writes_to_b: bool,
     /// What stands around the preconditioner.
-    pub(super) patched: Option<Patched>,
+    pub(super) around: Option<Around>,
     prefix: String,
     scope: Scope,
     session: Session,
@@ -101,7 +101,7 @@ impl Ksp {
             updates: Rc::default(),
             failed_at: Cell::new(None),
             writes_to_b: false,
-            patched: None,
+            around: None,
             prefix: prefix.to_owned(),
             scope,
             session: session.clone(),
@@ -275,7 +275,7 @@ impl Ksp {
             let right = right.place(b.as_ptr())?;
             let left = left.place(x.as_mut_ptr())?;
             petsc!(KSPSolve(self.ksp, right.vec(), left.vec()))
-                .map_err(|error| self.patch_failure().unwrap_or(error))?;
+                .map_err(|error| self.around.as_ref().and_then(Around::failure).unwrap_or(error))?;
         }
         self.note_failure()?;
         let (mut iterations, mut reason, mut residual) = (0, 0, 0.0);
@@ -406,13 +406,13 @@ impl Ksp {
 
     /// PETSc's preconditioner that options chose, which belongs to the solver.
     pub(super) fn pc(&self) -> Result<ffi::PC> {
-        match &self.patched {
-            Some(patched) => Ok(patched.inner),
+        match &self.around {
+            Some(around) => Ok(around.inner),
             None => self.whole_pc(),
         }
     }
 
-    /// The same with the patch around it.
+    /// The same with what stands around it.
     fn whole_pc(&self) -> Result<ffi::PC> {
         let mut pc = null_mut();
         // SAFETY: the solver of this wrapper, which owns what it gives.

@@ -23,6 +23,7 @@
 
 #![warn(clippy::undocumented_unsafe_blocks)]
 
+mod around;
 mod blas;
 mod error;
 mod failure;

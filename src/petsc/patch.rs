@@ -9,28 +9,18 @@
 //!
 //! Both products are with columns P alone. Of several processes each has its rows of them, and all have S.
 
+use super::around::Around;
 use super::library::petsc;
 use super::vector::Vector;
 use super::{Int, Ksp, Matrix, Scope, Session, ffi};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
-use std::cell::RefCell;
-use std::ffi::c_void;
 use std::ops::Range;
 use std::ptr::{null, null_mut};
 
-/// The solver's own preconditioner and the one around it.
-pub(super) struct Patched {
-    pub(super) inner: ffi::PC,
-    outer: ffi::PC,
-    /// What [`apply`] works with; `outer` has a pointer to it.
-    patch: *mut Patch,
-}
-
 /// What the preconditioner around another needs.
 struct Patch {
-    inner: ffi::PC,
     /// Residual and result of the inner preconditioner, as long as the matrix here.
     whole: [Vector; 2],
     /// The dofs P of this process: (entry of a vector here, place in P).
@@ -44,8 +34,6 @@ struct Patch {
     solver: Ksp,
     scope: Scope,
     session: Session,
-    /// The first failure within a solve.
-    failure: RefCell<Option<Error>>,
 }
 
 impl Ksp {
@@ -92,23 +80,12 @@ impl Ksp {
         self.unpatch()?;
         self.recover()?;
         let inner = self.pc()?;
-        let Some(patch) = Patch::new(matrix, inner, dofs, layers)? else { return Ok(false) };
-        let patch = Box::into_raw(Box::new(patch));
-        // SAFETY: the preconditioner belongs to this solver; a reference of our own keeps it when another takes its place.
-        unsafe { petsc!(PetscObjectReference(inner.cast())) }?;
-        let mut patched = Patched { inner, outer: null_mut(), patch };
-        // SAFETY: a new preconditioner, whose pointer to the patch lives as long as it, in `patched`.
-        unsafe {
-            petsc!(PCCreate(matrix.scope().comm(matrix.session()), &mut patched.outer))?;
-            petsc!(PCSetType(patched.outer, c"shell".as_ptr()))?;
-            petsc!(PCShellSetContext(patched.outer, patch.cast()))?;
-            petsc!(PCShellSetApply(patched.outer, Some(apply)))?;
-            petsc!(PCShellSetName(patched.outer, c"exact solve near the contact around the preconditioner".as_ptr()))?;
-            petsc!(PCShellSetView(patched.outer, Some(view)))?;
-            petsc!(PCSetOperators(patched.outer, matrix.raw(), matrix.raw()))?;
-            petsc!(KSPSetPC(self.ksp, patched.outer))?;
-        }
-        self.patched = Some(patched);
+        let Some(patch) = Patch::new(matrix, dofs, layers)? else { return Ok(false) };
+        let name = c"exact solve on some dofs around the preconditioner";
+        let around = Around::new(matrix, inner, name, Box::new(move |inner, r, z| patch.apply(inner, r, z)))?;
+        // SAFETY: a preconditioner of the same matrix.
+        unsafe { petsc!(KSPSetPC(self.ksp, around.outer)) }?;
+        self.around = Some(around);
         Ok(true)
     }
 
@@ -117,40 +94,23 @@ impl Ksp {
     /// # Errors
     /// PETSc's.
     pub fn unpatch(&mut self) -> Result<()> {
-        match self.patched.take() {
+        match self.around.take() {
             // SAFETY: the preconditioner that this solver had.
-            Some(patched) => unsafe { petsc!(KSPSetPC(self.ksp, patched.inner)) },
+            Some(around) => unsafe { petsc!(KSPSetPC(self.ksp, around.inner)) },
             None => Ok(()),
-        }
-    }
-
-    /// A failure of the patch in the last solve, which PETSc knows by its number alone.
-    pub(super) fn patch_failure(&self) -> Option<Error> {
-        // SAFETY: the patch lives as long as `patched`, and no solve runs.
-        self.patched.as_ref().and_then(|patched| unsafe { &*patched.patch }.failure.take())
-    }
-}
-
-impl Drop for Patched {
-    fn drop(&mut self) {
-        // SAFETY: the references of this type; PETSc calls `apply` no more, since the solver has another preconditioner or is gone.
-        unsafe {
-            let _ = petsc!(PCDestroy(&mut self.outer));
-            let _ = petsc!(PCDestroy(&mut self.inner));
-            drop(Box::from_raw(self.patch));
         }
     }
 }
 
 impl Patch {
-    fn new(matrix: &Matrix, inner: ffi::PC, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
+    fn new(matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
         let (session, scope, own) = (matrix.session().clone(), matrix.scope(), matrix.own()?);
         let new = |rows| Vector::new(&session, Scope::Process, rows, 1);
         let whole = || Vector::new(&session, scope, matrix.rows(), matrix.block_size());
-        let patch = Indices::new(dofs)?;
+        let mut patch = Indices::new(dofs)?;
         patch.grow(matrix, layers)?;
         let inside = patch.get()?;
-        let touched = Indices::new(&inside)?;
+        let mut touched = Indices::new(&inside)?;
         touched.grow(matrix, 1)?;
         let rows: Vec<usize> = touched.get()?.into_iter().filter(|i| own.contains(i)).collect();
         let mut block = patch.submatrix(matrix, &patch)?;
@@ -168,7 +128,6 @@ impl Patch {
         }
         let here = |(place, dof): (usize, &usize)| own.contains(dof).then(|| (dof - own.start, place));
         Ok(Some(Self {
-            inner,
             whole: [whole()?, whole()?],
             own: inside.iter().enumerate().filter_map(here).collect(),
             columns: Indices::new(&rows)?.submatrix(matrix, &patch)?,
@@ -177,7 +136,6 @@ impl Patch {
             solver,
             scope,
             session,
-            failure: RefCell::default(),
         }))
     }
 
@@ -189,8 +147,8 @@ impl Patch {
         }
     }
 
-    /// z = M^-1 r, one entry a row here each.
-    fn apply(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
+    /// z = M^-1 r with the preconditioner `inner` of the older matrix, one entry a row here each.
+    fn apply(&self, inner: ffi::PC, r: &[f64], z: &mut [f64]) -> Result<()> {
         let n = self.parts[1].len();
         let (mut residual, mut y) = (vec![0.0; n], vec![0.0; n]);
         self.own.iter().for_each(|&(i, k)| residual[k] = r[i]);
@@ -207,7 +165,7 @@ impl Patch {
         // SAFETY: as above.
         unsafe {
             let (rest, z) = (self.whole[0].place(rest.as_ptr())?, self.whole[1].place(z.as_mut_ptr())?);
-            petsc!(PCApply(self.inner, rest.vec(), z.vec()))?;
+            petsc!(PCApply(inner, rest.vec(), z.vec()))?;
         }
         self.own.iter().for_each(|&(i, k)| z[i] += y[k]);
         part.iter_mut().zip(&self.rows).for_each(|(part, &i)| *part = z[i]);
@@ -232,44 +190,6 @@ impl Drop for Patch {
     }
 }
 
-/// PCApply of the preconditioner around another.
-unsafe extern "C" fn apply(pc: ffi::PC, r: ffi::Vec, z: ffi::Vec) -> ffi::PetscErrorCode {
-    let (mut patch, mut rows, mut from, mut to) = (null_mut::<c_void>(), 0, null(), null_mut());
-    // SAFETY: PETSc passes its own preconditioner, whose context is the patch, and two vectors, whose arrays have that many entries here
-    // and belong to nobody else until they are given back.
-    let done: Result<_> = (|| unsafe {
-        petsc!(PCShellGetContext(pc, (&raw mut patch).cast()))?;
-        let patch = &*patch.cast::<Patch>();
-        petsc!(VecGetLocalSize(r, &mut rows))?;
-        petsc!(VecGetArrayRead(r, &mut from))?;
-        petsc!(VecGetArray(z, &mut to))?;
-        let slices =
-            (std::slice::from_raw_parts(from, rows as usize), std::slice::from_raw_parts_mut(to, rows as usize));
-        let applied = patch.apply(slices.0, slices.1);
-        petsc!(VecRestoreArrayRead(r, &mut from))?;
-        petsc!(VecRestoreArray(z, &mut to))?;
-        Ok(match applied {
-            Ok(()) => 0,
-            Err(error) => {
-                patch.failure.replace(Some(error));
-                super::until::ERROR
-            }
-        })
-    })();
-    done.unwrap_or(super::until::ERROR)
-}
-
-/// PCView of it: the inner one.
-unsafe extern "C" fn view(pc: ffi::PC, viewer: ffi::PetscViewer) -> ffi::PetscErrorCode {
-    let mut patch = null_mut::<c_void>();
-    // SAFETY: as in `apply`.
-    let done = (|| unsafe {
-        petsc!(PCShellGetContext(pc, (&raw mut patch).cast()))?;
-        petsc!(PCView((*patch.cast::<Patch>()).inner, viewer))
-    })();
-    done.map_or(super::until::ERROR, |()| 0)
-}
-
 /// Numbers of rows, in increasing order.
 struct Indices(ffi::IS);
 
@@ -285,15 +205,14 @@ impl Indices {
     }
 
     /// Adds the columns of these rows, so many times.
-    fn grow(&self, matrix: &Matrix, layers: usize) -> Result<()> {
+    fn grow(&mut self, matrix: &Matrix, layers: usize) -> Result<()> {
         if layers == 0 {
             return Ok(());
         }
-        let mut is = self.0;
-        // SAFETY: one set, whose contents PETSc replaces.
+        // SAFETY: one set, which PETSc puts a new one in the place of.
         unsafe {
-            petsc!(MatIncreaseOverlap(matrix.raw(), 1, &mut is, layers as Int))?;
-            petsc!(ISSort(is))
+            petsc!(MatIncreaseOverlap(matrix.raw(), 1, &mut self.0, layers as Int))?;
+            petsc!(ISSort(self.0))
         }
     }
 

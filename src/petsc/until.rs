@@ -1,5 +1,6 @@
 //! A linear solve that ends when the caller says so.
 
+use super::around::ERROR;
 use super::ksp::Solved;
 use super::library::petsc;
 use super::{Ksp, ffi};
@@ -144,6 +145,3 @@ fn extreme(ksp: ffi::KSP) -> Option<[f64; 2]> {
     }
     Some([least, most])
 }
-
-/// PETSC_ERR_LIB: a call inside failed, and its own error is recorded.
-pub(super) const ERROR: ffi::PetscErrorCode = 76;
