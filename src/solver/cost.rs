@@ -10,9 +10,9 @@ use crate::linalg::factorisation;
 use crate::petsc::nested_dissection;
 use crate::problem::order::Order;
 
-/// Operations in a second of one core: the twelve factored runs of docs/solvers.md ("The choice") that take half a second or more
-/// took -25 % to +60 % beside what it says.
-const RATE: f64 = 1.1e10;
+/// Operations in a second of one core with AVX-512: the six factored runs of docs/solvers.md ("The choice") that take more than a second
+/// and a half took -15 % to +48 % beside what it says.
+const RATE: f64 = 2.8e10;
 
 /// Seconds of multigrid for an entry of K, from its set-up to the last of Newton's steps: the median of the fourteen scenes there, P1
 /// and P2, 5000 to 216 000 dofs, which took -30 % to +80 % beside what it says.

@@ -213,7 +213,8 @@ impl Coupling {
     }
 }
 
-/// Growth of the stiffness under a contact row, either way, beyond which a preconditioner is poor there.
+/// Growth of the stiffness under a contact row, either way, beyond which a preconditioner is poor there: below 2, so that springs which were
+/// softened from more than FAR are seen. With 3 `groove3d` under a layer of 1e7 takes 76 iterations for 48.
 const FAR: f64 = 1.5;
 
 /// Dofs of the contact rows where springs `new` make the stiffness [`FAR`] times that with springs `old`, or a share of it; `soft` are the springs
