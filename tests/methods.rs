@@ -186,11 +186,10 @@ fn inexact_steps_are_as_many_as_exact_ones() {
     }
 }
 
-/// Multigrid sees springs at most as stiff as the elements, and the rest is solved exactly: one set-up serves all steps, and layers that are
-/// all but rigid cost half as many iterations more than soft ones at most (ten times as many where multigrid sees them all and nothing is solved
-/// exactly). Elements of both orders, which have two kinds of multigrid.
+/// Stiff and changed rows are solved exactly: one set-up serves all steps, and layers that are all but rigid cost hardly more iterations than
+/// soft ones (ten times as many if nothing is solved exactly). Elements of both orders, which have two kinds of multigrid.
 #[test]
-fn rigid_layers_cost_multigrid_little() {
+fn rigid_layers_cost_multigrid_no_more_than_soft_ones() {
     for order in ["1", "2"] {
         let run = |stiffness: &str| {
             let layer = format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}");
@@ -202,7 +201,7 @@ fn rigid_layers_cost_multigrid_little() {
         assert_eq!((soft.count("patches"), soft.count("factorizations")), (0, 1));
         assert_eq!((rigid.count("patches"), rigid.count("factorizations")), (rigid.count("iterations"), 1));
         let pace = |run: &Run| run.count("inner_iterations") as f64 / run.count("iterations") as f64;
-        assert!(pace(&rigid) < 1.5 * pace(&soft), "order {order}: {} {}", pace(&rigid), pace(&soft));
+        assert!(pace(&rigid) < 1.1 * pace(&soft), "order {order}: {} {}", pace(&rigid), pace(&soft));
     }
 }
 

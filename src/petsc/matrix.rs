@@ -8,6 +8,7 @@ use crate::error::{Error, Kind, Result};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
 use std::cell::Cell;
+use std::ops::Range;
 use std::ptr::null_mut;
 use std::rc::Rc;
 
@@ -33,7 +34,8 @@ use std::rc::Rc;
 pub struct Matrix {
     mat: ffi::Mat,
     scope: Scope,
-    rows: usize,
+    /// Numbers of the rows here among all.
+    own: Range<usize>,
     total: usize,
     nonzeros: usize,
     block_size: usize,
@@ -65,7 +67,8 @@ impl Matrix {
     /// # Errors
     /// When the block size does not divide the number of rows.
     pub fn new(session: &Session, block_size: usize, rows: Rows) -> Result<Matrix> {
-        let (scope, own, nonzeros) = (rows.scope, rows.own().len(), rows.values.len());
+        let (scope, all, nonzeros) = (rows.scope, rows.own(), rows.values.len());
+        let own = all.len();
         if block_size == 0 || own % block_size != 0 {
             return Err(Error::new(Kind::Solver, format!("blocks of {block_size} do not divide {own} rows")));
         }
@@ -109,7 +112,7 @@ impl Matrix {
         }
         let (updates, session) = (Rc::default(), session.clone());
         let total = total as usize;
-        let matrix = Matrix { mat, scope, rows: own, total, nonzeros, block_size, values, updates, x, y, session };
+        let matrix = Matrix { mat, scope, own: all, total, nonzeros, block_size, values, updates, x, y, session };
         // SAFETY: the matrix was just made over the rows, whose box nobody else has.
         unsafe {
             attach(mat, rows)?;
@@ -125,7 +128,12 @@ impl Matrix {
 
     /// Number of rows of this process, which is that of its entries in a vector.
     pub fn rows(&self) -> usize {
-        self.rows
+        self.own.len()
+    }
+
+    /// Their numbers among those of all its processes.
+    pub fn own(&self) -> Range<usize> {
+        self.own.clone()
     }
 
     /// Number of rows of all its processes.
@@ -212,7 +220,7 @@ impl Matrix {
     /// When a mode has not one entry a row.
     pub fn set_near_null_space(&mut self, modes: &[Vec<f64>]) -> Result<()> {
         for mode in modes {
-            same("a near-null mode", mode.len(), self.rows)?;
+            same("a near-null mode", mode.len(), self.rows())?;
         }
         let (scope, session) = (self.scope, &self.session);
         let comm = scope.comm(session);
@@ -242,8 +250,8 @@ impl Matrix {
     /// # Errors
     /// When `x` or `y` has not one entry a row.
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) -> Result<()> {
-        same("x", x.len(), self.rows)?;
-        same("y", y.len(), self.rows)?;
+        same("x", x.len(), self.rows())?;
+        same("y", y.len(), self.rows())?;
         // SAFETY: both slices are as long as the vectors and outlive the product, which reads one and writes to the other.
         unsafe {
             let x = self.x.place(x.as_ptr())?;

@@ -16,7 +16,6 @@ use super::{Int, Ksp, Matrix, Scope, Session, ffi};
 use crate::error::Result;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
-use std::ops::Range;
 use std::ptr::{null, null_mut};
 
 /// What the preconditioner around another needs.
@@ -104,7 +103,7 @@ impl Ksp {
 
 impl Patch {
     fn new(matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
-        let (session, scope, own) = (matrix.session().clone(), matrix.scope(), matrix.own()?);
+        let (session, scope, own) = (matrix.session().clone(), matrix.scope(), matrix.own());
         let new = |rows| Vector::new(&session, Scope::Process, rows, 1);
         let whole = || Vector::new(&session, scope, matrix.rows(), matrix.block_size());
         let mut patch = Indices::new(dofs)?;
@@ -246,15 +245,5 @@ impl Drop for Indices {
     fn drop(&mut self) {
         // SAFETY: the one reference of this type.
         let _ = unsafe { petsc!(ISDestroy(&mut self.0)) };
-    }
-}
-
-impl Matrix {
-    /// Numbers of the rows of this process.
-    fn own(&self) -> Result<Range<usize>> {
-        let (mut first, mut end) = (0, 0);
-        // SAFETY: the matrix of this wrapper.
-        unsafe { petsc!(MatGetOwnershipRange(self.raw(), &mut first, &mut end)) }?;
-        Ok(first as usize..end as usize)
     }
 }

@@ -8,10 +8,11 @@ use std::fmt::Write;
 /// Towards the viewer: from above, with x to the right and y away from him.
 const TOWARDS: [f64; 3] = [0.52, -0.74, 0.43];
 
-/// Brightnesses by which a surface looks bent; more make a larger file of the same look.
+/// Brightnesses by which a surface looks bent. Of 3, 6 and 12 in the picture of `flange` (406, 414 and 421 kB), 3 show a pipe as strips.
 const SHADES: usize = 6;
 
-/// Share of its brightness that a surface keeps at the rim, where it turns away.
+/// Share of its brightness that a surface keeps at the rim, where it turns away. Of 0.3, 0.6 and 0.9 on `flange`, at 0.3 the levels are no
+/// longer the colours of the legend, and at 0.9 edges are not seen.
 const RIM: f64 = 0.6;
 
 /// The picture of one value, given at the points of all parts: see [`super::bands::svg`].

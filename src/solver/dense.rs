@@ -52,8 +52,8 @@ impl InnerSolver for Dense {
         Ok(Solved::default())
     }
 
-    fn factorizations(&self) -> (usize, usize) {
-        (usize::from(self.factorizations > 0), self.factorizations)
+    fn factorizations(&self) -> [usize; 3] {
+        [usize::from(self.factorizations > 0), self.factorizations, 0]
     }
 
     fn is_dense(&self) -> bool {

@@ -46,11 +46,9 @@ fn integers(part: Vec<i32>) -> Vec<Int> {
 pub struct Change<'a> {
     /// Writes the values of G in the order of the pattern it was made with.
     pub write: &'a dyn Fn(&mut [f64]),
-    /// The same with springs at most as stiff as the elements.
-    pub soften: &'a dyn Fn(&mut [f64]),
-    /// Dofs of the contact rows whose springs are far from those that a kept preconditioner has seen, softened ones.
+    /// Dofs of the contact rows that a kept preconditioner is poor at.
     pub far: &'a dyn Fn() -> Vec<usize>,
-    /// Those whose springs are far from the softened ones of G itself.
+    /// Those that a new one is poor at: stiff ones.
     pub stiff: &'a dyn Fn() -> Vec<usize>,
 }
 
@@ -59,8 +57,8 @@ pub struct Change<'a> {
 pub enum Seen {
     /// The preconditioner of an older G.
     Older,
-    /// One of G with softened springs.
-    Softened,
+    /// One of G, around which stiff rows are solved exactly.
+    Patched,
     /// G itself.
     Whole,
 }
@@ -116,13 +114,8 @@ pub trait InnerSolver {
         self.solve(r, z)
     }
 
-    /// (symbolic, numeric) factorisations or preconditioner set-ups so far.
-    fn factorizations(&self) -> (usize, usize);
-
-    /// Exact solves near the contact that were made for kept preconditioners.
-    fn patches(&self) -> usize {
-        0
-    }
+    /// Symbolic and numeric factorisations or preconditioner set-ups so far, and exact solves made around a preconditioner.
+    fn factorizations(&self) -> [usize; 3];
 
     /// Whether the factorisations are dense ones, which are counted apart.
     fn is_dense(&self) -> bool {
