@@ -56,15 +56,15 @@ fn settings(scene: &Scene, makes: fn(&mut Value)) -> Value {
 
 /// Leaves what stiffness matrices, contact rows and the choice of prescribed dofs come from.
 fn without_values(settings: &mut Value) {
-    each(settings, "contact", |contact| without(contact, &["gap", "layer", "reference"]));
-    each(settings, "body", |body| {
+    each(settings.get_mut("contact"), |contact| without(contact, &["gap", "layer", "reference"]));
+    each(settings.get_mut("body"), |body| {
         without(body, &["force", "path"]);
         if let Some(Value::Array(loads)) = body.get_mut("load") {
             // rigid surfaces join dofs
             loads.retain(|load| load["rigid"] == true);
         }
         for key in ["load", "fix"] {
-            each_of(body.get_mut(key), |item| {
+            each(body.get_mut(key), |item| {
                 without(item, &["path"]);
                 for key in ["force", "x", "y", "z", "normal"] {
                     item.get_mut(key).into_iter().for_each(|value| *value = Value::Bool(true));
@@ -79,11 +79,7 @@ fn without(table: &mut Map<String, Value>, keys: &[&str]) {
 }
 
 /// Edits each table of a list of a scene.
-fn each(settings: &mut Value, list: &str, edit: impl FnMut(&mut Map<String, Value>)) {
-    each_of(settings.get_mut(list), edit);
-}
-
-fn each_of(list: Option<&mut Value>, edit: impl FnMut(&mut Map<String, Value>)) {
+fn each(list: Option<&mut Value>, edit: impl FnMut(&mut Map<String, Value>)) {
     let tables = list.and_then(Value::as_array_mut).into_iter().flatten();
     tables.filter_map(Value::as_object_mut).for_each(edit);
 }
