@@ -205,6 +205,21 @@ fn rigid_layers_cost_multigrid_no_more_than_soft_ones() {
     }
 }
 
+/// Rigid motions of all bodies around multigrid: iterations do not grow with the number of bodies (56, 150 and 223 without). Two bodies of
+/// which one is held have no use for them.
+#[test]
+fn many_bodies_cost_multigrid_no_more_iterations() {
+    for k in [2, 4, 6] {
+        let set = format!("mesh.set.k={k}");
+        let run = solve(case("blocks"), &["--set", &set, "--set", "solver=hypre", "--set", "output.plots=false"]);
+        let run = run.converged();
+        assert!(run.count("inner_iterations") <= 40, "{} bodies: {}", k * k * k, run.said());
+        assert_eq!(run.text("linear_step"), "cg + hypre with rigid motions of all bodies");
+    }
+    let alone = solve(case("groove3d"), &["--set", "mesh.set.n=4", "--set", "method={}", "--set", "solver=hypre"]);
+    assert_eq!(alone.converged().text("linear_step"), "cg + hypre");
+}
+
 /// Rigid bodies foretell a large curved contact, and Newton's steps need not grow it from within.
 #[test]
 fn rigid_bodies_foretell_the_contact() {

@@ -7,7 +7,7 @@ use std::fs;
 
 /// Small meshes of scenes of every kind: held and floating bodies, in the plane, of revolution and in space, P1 and P2, on springs, with
 /// rigid surfaces and turned axes, many bodies.
-const SCENES: [(&str, &[&str]); 9] = [
+const SCENES: [(&str, &[&str]); 10] = [
     ("groove", &["mesh.set.n=4"]),
     ("groove3d", &["mesh.set.n=4"]),
     ("stack", &["mesh.set.n=4"]),
@@ -17,6 +17,7 @@ const SCENES: [(&str, &[&str]); 9] = [
     ("sphere-layer", &[]),
     ("wall", &["mesh.set.columns=3", "mesh.set.rows=4", "output.pairs=100"]),
     ("coating", &["mesh.set.n=4"]),
+    ("blocks", &["mesh.set.k=2", "output.pairs=100"]),
 ];
 
 /// Far below what is compared.

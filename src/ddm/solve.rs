@@ -129,6 +129,8 @@ pub struct Outcome {
     pub method: &'static str,
     /// What was done with all bodies together, besides what bodies count themselves.
     pub joint: BodyCounts,
+    /// What solved it for all bodies together; empty if each had its own solver.
+    pub linear_step: String,
     /// Estimated bounds of the spectrum of G^-1 F1'', if the method saw enough.
     pub spectrum: Option<(f64, f64)>,
     /// What rounding of gaps and displacements can make of a pressure, as a share of the largest.
@@ -300,6 +302,7 @@ impl Outcome {
             memory: None,
             method: method.name(),
             joint: BodyCounts::default(),
+            linear_step: String::new(),
             spectrum: None,
             rounding: 0.0,
             forecast: None,
@@ -341,6 +344,7 @@ impl Run<'_> {
             memory: Some(memory),
             method: method.name(),
             joint: method.linear().counts(),
+            linear_step: method.linear().describe(),
             spectrum,
             interval: found,
         })

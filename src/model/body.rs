@@ -4,6 +4,7 @@ use super::distribution::Distribution;
 use crate::error::Result;
 use crate::linalg::Csr;
 use serde::{Deserialize, Serialize};
+use std::rc::Rc;
 
 /// Quadratic terms of F1 (25) of one body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -77,7 +78,7 @@ pub struct Matrices<'a> {
     /// B, of the dofs v.
     pub rows: &'a Csr,
     /// R: one vector over the dofs v for each number in a.
-    pub motions: &'a [Vec<f64>],
+    pub motions: &'a [Rc<[f64]>],
     /// B R: one vector over the contact rows each.
     pub traces: &'a [Vec<f64>],
 }

@@ -27,6 +27,8 @@ pub struct Report {
     pub message: String,
     /// Method that made the last step: `robin`, `ncg`, `anderson`, `newton-robin`, `newton`.
     pub method: String,
+    /// What solved the linear steps of all bodies together, such as `cg + hypre`; empty if each body had its own solver.
+    pub linear_step: String,
     /// Updates of the iterate.
     pub iterations: usize,
     /// Times that every body was solved.

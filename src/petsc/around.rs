@@ -1,40 +1,158 @@
 //! A preconditioner in Rust around one of PETSc (PCSHELL).
 
 use super::library::petsc;
-use super::{Matrix, ffi};
+use super::matrix::same;
+use super::vector::Vector;
+use super::{Ksp, Matrix, ffi};
 use crate::error::{Error, Result};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
 
-/// Applies z = M^-1 r with the help of another preconditioner, one entry a row of this process each.
-pub(super) type Apply = dyn Fn(ffi::PC, &[f64], &mut [f64]) -> Result<()>;
+/// A space of vectors P y on which a matrix A is solved exactly, Q = P (P'AP)^-1 P'. Around a preconditioner M, both symmetric, it makes
+///
+/// ```text
+/// z = Q r + (I - Q A) M (I - A Q) r
+/// ```
+///
+/// a multiplicative Schwarz step before and after M. Slices have one entry a row of this process each; calls are collective.
+pub trait Subspace {
+    /// x += Q r, r -= A Q r.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()>;
 
-/// A solver's own preconditioner and the one around it.
+    /// z -= Q A z.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    fn project(&self, z: &mut [f64]) -> Result<()>;
+}
+
+/// The preconditioner inside another.
+struct Inner {
+    pc: ffi::PC,
+    /// Headers of its argument and its result.
+    vectors: [Vector; 2],
+}
+
+impl Inner {
+    /// z = M r.
+    fn apply(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
+        same("r", r.len(), self.vectors[0].len())?;
+        same("z", z.len(), self.vectors[1].len())?;
+        // SAFETY: the slices are as long as the vectors and outlive the call, which reads one and writes to the other.
+        unsafe {
+            let (r, z) = (self.vectors[0].place(r.as_ptr())?, self.vectors[1].place(z.as_mut_ptr())?);
+            petsc!(PCApply(self.pc, r.vec(), z.vec()))
+        }
+    }
+}
+
+/// A preconditioner of a solver and the one around it.
 pub(super) struct Around {
-    /// The own one.
-    pub inner: ffi::PC,
     /// The one around it.
-    pub outer: ffi::PC,
+    outer: ffi::PC,
     /// `outer` has this pointer.
     context: *mut Context,
 }
 
 /// What the callbacks work with.
 struct Context {
-    inner: ffi::PC,
-    apply: Box<Apply>,
+    inner: Inner,
+    subspace: Box<dyn Subspace>,
+    /// Whether it is applied to residuals with Q r = 0 alone.
+    is_started: Cell<bool>,
     /// The first failure, which PETSc knows by its number alone.
     failure: RefCell<Option<Error>>,
 }
 
+impl Context {
+    fn apply(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
+        if self.is_started.get() {
+            self.inner.apply(r, z)?;
+            return self.subspace.project(z);
+        }
+        let (mut rest, mut x) = (r.to_vec(), vec![0.0; r.len()]);
+        self.subspace.start(&mut rest, &mut x)?;
+        self.inner.apply(&rest, z)?;
+        self.subspace.project(z)?;
+        z.iter_mut().zip(&x).for_each(|(z, x)| *z += x);
+        Ok(())
+    }
+}
+
+impl Ksp {
+    /// Puts a space in which the `matrix` of this solver is solved exactly around its preconditioner, with what is around that already; `name`
+    /// is what `-ksp_view` shows. Collective. New values of the matrix need a new space.
+    ///
+    /// # Errors
+    /// PETSc's.
+    pub fn wrap(&mut self, matrix: &Matrix, name: &'static std::ffi::CStr, subspace: Box<dyn Subspace>) -> Result<()> {
+        let around = Around::new(matrix, self.whole_pc()?, name, subspace)?;
+        // SAFETY: a preconditioner of the same matrix.
+        unsafe { petsc!(KSPSetPC(self.ksp, around.outer)) }?;
+        self.around.push(around);
+        Ok(())
+    }
+
+    /// Goes back to the solver's own preconditioner.
+    ///
+    /// # Errors
+    /// PETSc's.
+    pub fn unwrap(&mut self) -> Result<()> {
+        if let Some(around) = self.around.first() {
+            // SAFETY: the preconditioner that this solver had.
+            unsafe { petsc!(KSPSetPC(self.ksp, around.inner())) }?;
+        }
+        // those outside first
+        while self.around.pop().is_some() {}
+        Ok(())
+    }
+
+    /// Solves exactly in the outermost space beforehand: x = Q b, and `rest` = b - A x. Conjugate gradients from there have residuals with Q r = 0,
+    /// for which z = (I - Q A) M r: half of the work in the space is saved (Tang, Nabben, Vuik, Erlangga, J. Sci. Comput. 39, 2009, "A-DEF2").
+    /// What is returned ends that when it is dropped; none without a space or with another method.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub(super) fn start(&self, rest: &mut [f64], x: &mut [f64]) -> Result<Option<Started<'_>>> {
+        let Some(around) = self.around.last().filter(|_| self.ksp_type() == "cg") else { return Ok(None) };
+        let context = around.context();
+        context.subspace.start(rest, x)?;
+        context.is_started.set(true);
+        Ok(Some(Started(&context.is_started)))
+    }
+}
+
+/// While it lives, residuals are those of a solve that was started in the space.
+pub(super) struct Started<'a>(&'a Cell<bool>);
+
+impl Drop for Started<'_> {
+    fn drop(&mut self) {
+        self.0.set(false);
+    }
+}
+
 impl Around {
-    /// Around a preconditioner of this matrix; `name` is what `-ksp_view` shows.
-    pub fn new(matrix: &Matrix, inner: ffi::PC, name: &'static std::ffi::CStr, apply: Box<Apply>) -> Result<Self> {
+    fn new(
+        matrix: &Matrix,
+        inner: ffi::PC,
+        name: &'static std::ffi::CStr,
+        subspace: Box<dyn Subspace>,
+    ) -> Result<Self> {
         // SAFETY: a reference of our own keeps the inner one when its solver takes another.
         unsafe { petsc!(PetscObjectReference(inner.cast())) }?;
-        let context = Box::into_raw(Box::new(Context { inner, apply, failure: RefCell::default() }));
-        let mut around = Self { inner, outer: null_mut(), context };
+        let whole = || Vector::new(matrix.session(), matrix.scope(), matrix.rows(), matrix.block_size());
+        let inner = Inner { pc: inner, vectors: [whole()?, whole()?] };
+        let context = Box::into_raw(Box::new(Context {
+            inner,
+            subspace,
+            is_started: Cell::new(false),
+            failure: RefCell::default(),
+        }));
+        let mut around = Self { outer: null_mut(), context };
         // SAFETY: a new preconditioner, whose context lives as long as our reference to it.
         unsafe {
             petsc!(PCCreate(matrix.scope().comm(matrix.session()), &mut around.outer))?;
@@ -48,10 +166,19 @@ impl Around {
         Ok(around)
     }
 
+    fn context(&self) -> &Context {
+        // SAFETY: the context lives as long as `self`, and is shared only.
+        unsafe { &*self.context }
+    }
+
+    /// The preconditioner inside.
+    pub fn inner(&self) -> ffi::PC {
+        self.context().inner.pc
+    }
+
     /// What it failed with, once.
     pub fn failure(&self) -> Option<Error> {
-        // SAFETY: the context lives as long as `self`, and is shared only.
-        unsafe { &*self.context }.failure.take()
+        self.context().failure.take()
     }
 }
 
@@ -60,8 +187,8 @@ impl Drop for Around {
         // SAFETY: the references of this type; the solver has another preconditioner by now, or is gone, so that PETSc calls back no more.
         unsafe {
             let _ = petsc!(PCDestroy(&mut self.outer));
-            let _ = petsc!(PCDestroy(&mut self.inner));
-            drop(Box::from_raw(self.context));
+            let mut context = Box::from_raw(self.context);
+            let _ = petsc!(PCDestroy(&mut context.inner.pc));
         }
     }
 }
@@ -79,7 +206,7 @@ unsafe extern "C" fn applied(pc: ffi::PC, r: ffi::Vec, z: ffi::Vec) -> ffi::Pets
         petsc!(VecGetArray(z, &mut to))?;
         let (r_here, z_here) =
             (std::slice::from_raw_parts(from, rows as usize), std::slice::from_raw_parts_mut(to, rows as usize));
-        let applied = (context.apply)(context.inner, r_here, z_here);
+        let applied = context.apply(r_here, z_here);
         petsc!(VecRestoreArrayRead(r, &mut from))?;
         petsc!(VecRestoreArray(z, &mut to))?;
         Ok(match applied {
@@ -99,7 +226,7 @@ unsafe extern "C" fn viewed(pc: ffi::PC, viewer: ffi::PetscViewer) -> ffi::Petsc
     // SAFETY: as in `applied`.
     let done: Result<_> = (|| unsafe {
         petsc!(PCShellGetContext(pc, (&raw mut context).cast()))?;
-        petsc!(PCView((*context.cast::<Context>()).inner, viewer))
+        petsc!(PCView((*context.cast::<Context>()).inner.pc, viewer))
     })();
     done.map_or(ERROR, |()| 0)
 }

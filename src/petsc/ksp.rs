@@ -70,8 +70,8 @@ pub struct Ksp {
     pub(super) failed_at: Cell<Option<u64>>,
     /// Whether a solve writes to its right-hand side.
     writes_to_b: bool,
-    /// What stands around the preconditioner.
-    pub(super) around: Option<Around>,
+    /// What stands around the preconditioner, the innermost first.
+    pub(super) around: Vec<Around>,
     prefix: String,
     scope: Scope,
     session: Session,
@@ -101,7 +101,7 @@ impl Ksp {
             updates: Rc::default(),
             failed_at: Cell::new(None),
             writes_to_b: false,
-            around: None,
+            around: Vec::new(),
             prefix: prefix.to_owned(),
             scope,
             session: session.clone(),
@@ -275,7 +275,7 @@ impl Ksp {
             let right = right.place(b.as_ptr())?;
             let left = left.place(x.as_mut_ptr())?;
             petsc!(KSPSolve(self.ksp, right.vec(), left.vec()))
-                .map_err(|error| self.around.as_ref().and_then(Around::failure).unwrap_or(error))?;
+                .map_err(|error| self.around.iter().find_map(Around::failure).unwrap_or(error))?;
         }
         self.note_failure()?;
         let (mut iterations, mut reason, mut residual) = (0, 0, 0.0);
@@ -406,14 +406,14 @@ impl Ksp {
 
     /// PETSc's preconditioner that options chose, which belongs to the solver.
     pub(super) fn pc(&self) -> Result<ffi::PC> {
-        match &self.around {
-            Some(around) => Ok(around.inner),
+        match self.around.first() {
+            Some(around) => Ok(around.inner()),
             None => self.whole_pc(),
         }
     }
 
     /// The same with what stands around it.
-    fn whole_pc(&self) -> Result<ffi::PC> {
+    pub(super) fn whole_pc(&self) -> Result<ffi::PC> {
         let mut pc = null_mut();
         // SAFETY: the solver of this wrapper, which owns what it gives.
         unsafe { petsc!(KSPGetPC(self.ksp, &mut pc)) }?;

@@ -53,6 +53,7 @@ mod vector;
 mod waiting;
 mod words;
 
+pub use around::Subspace;
 pub use blas::{cholesky, cholesky_solve};
 pub use ffi::Int;
 pub use heap::{Heap, leave};

@@ -9,7 +9,7 @@
 //!
 //! Both products are with columns P alone. Of several processes each has its rows of them, and all have S.
 
-use super::around::Around;
+use super::around::Subspace;
 use super::library::petsc;
 use super::vector::Vector;
 use super::{Int, Ksp, Matrix, Scope, Session, ffi};
@@ -20,8 +20,6 @@ use std::ptr::{null, null_mut};
 
 /// What the preconditioner around another needs.
 struct Patch {
-    /// Residual and result of the inner preconditioner, as long as the matrix here.
-    whole: [Vector; 2],
     /// The dofs P of this process: (entry of a vector here, place in P).
     own: Vec<(usize, usize)>,
     /// The rows here that have entries in columns P.
@@ -66,7 +64,7 @@ impl Ksp {
     /// ksp.patch(&matrix, &[3, 4], 0)?;
     /// let patched = ksp.solve(&[1.0; 10], &mut x)?.iterations;
     /// assert!(patched < worn && (x[3] - x[4]).abs() < 1e-4 && x[3] > 12.0, "{worn} {patched} {x:?}");
-    /// ksp.unpatch()?;
+    /// ksp.unwrap()?;
     /// assert_eq!(ksp.pc_type(), "jacobi");
     /// # Ok::<(), winkler::error::Error>(())
     /// ```
@@ -76,28 +74,11 @@ impl Ksp {
     /// # Errors
     /// PETSc's.
     pub fn patch(&mut self, matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<bool> {
-        self.unpatch()?;
         self.recover()?;
-        let inner = self.pc()?;
         let Some(patch) = Patch::new(matrix, dofs, layers)? else { return Ok(false) };
         let name = c"exact solve on some dofs around the preconditioner";
-        let around = Around::new(matrix, inner, name, Box::new(move |inner, r, z| patch.apply(inner, r, z)))?;
-        // SAFETY: a preconditioner of the same matrix.
-        unsafe { petsc!(KSPSetPC(self.ksp, around.outer)) }?;
-        self.around = Some(around);
+        self.wrap(matrix, name, Box::new(patch))?;
         Ok(true)
-    }
-
-    /// Goes back to the preconditioner alone.
-    ///
-    /// # Errors
-    /// PETSc's.
-    pub fn unpatch(&mut self) -> Result<()> {
-        match self.around.take() {
-            // SAFETY: the preconditioner that this solver had.
-            Some(around) => unsafe { petsc!(KSPSetPC(self.ksp, around.inner)) },
-            None => Ok(()),
-        }
     }
 }
 
@@ -105,7 +86,6 @@ impl Patch {
     fn new(matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
         let (session, scope, own) = (matrix.session().clone(), matrix.scope(), matrix.own());
         let new = |rows| Vector::new(&session, Scope::Process, rows, 1);
-        let whole = || Vector::new(&session, scope, matrix.rows(), matrix.block_size());
         let mut patch = Indices::new(dofs)?;
         patch.grow(matrix, layers)?;
         let inside = patch.get()?;
@@ -127,7 +107,6 @@ impl Patch {
         }
         let here = |(place, dof): (usize, &usize)| own.contains(dof).then(|| (dof - own.start, place));
         Ok(Some(Self {
-            whole: [whole()?, whole()?],
             own: inside.iter().enumerate().filter_map(here).collect(),
             columns: Indices::new(&rows)?.submatrix(matrix, &patch)?,
             parts: [new(rows.len())?, new(inside.len())?],
@@ -146,38 +125,41 @@ impl Patch {
         }
     }
 
-    /// z = M^-1 r with the preconditioner `inner` of the older matrix, one entry a row here each.
-    fn apply(&self, inner: ffi::PC, r: &[f64], z: &mut [f64]) -> Result<()> {
-        let n = self.parts[1].len();
-        let (mut residual, mut y) = (vec![0.0; n], vec![0.0; n]);
+    /// (P'AP)^-1 of what the processes have of a vector over P, altogether.
+    fn solve(&self, mut part: Vec<f64>) -> Result<Vec<f64>> {
+        self.sum(&mut part);
+        let mut y = vec![0.0; part.len()];
+        self.solver.solve(&part, &mut y)?;
+        Ok(y)
+    }
+}
+
+impl Subspace for Patch {
+    fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
+        let mut residual = vec![0.0; self.parts[1].len()];
         self.own.iter().for_each(|&(i, k)| residual[k] = r[i]);
-        self.sum(&mut residual);
-        self.solver.solve(&residual, &mut y)?;
+        let y = self.solve(residual)?;
         let mut part = vec![0.0; self.rows.len()];
-        let mut rest = r.to_vec();
-        // SAFETY: the slices are as long as the vectors they are placed in and outlive the calls, which read one and write to the other.
+        // SAFETY: the slices are as long as the vectors they are placed in and outlive the call, which reads one and writes to the other.
         unsafe {
             let (y, part) = (self.parts[1].place(y.as_ptr())?, self.parts[0].place(part.as_mut_ptr())?);
             petsc!(MatMult(self.columns, y.vec(), part.vec()))?;
         }
-        self.rows.iter().zip(&part).for_each(|(&i, ay)| rest[i] -= ay);
-        // SAFETY: as above.
-        unsafe {
-            let (rest, z) = (self.whole[0].place(rest.as_ptr())?, self.whole[1].place(z.as_mut_ptr())?);
-            petsc!(PCApply(inner, rest.vec(), z.vec()))?;
-        }
-        self.own.iter().for_each(|&(i, k)| z[i] += y[k]);
-        part.iter_mut().zip(&self.rows).for_each(|(part, &i)| *part = z[i]);
-        let mut az = vec![0.0; n];
+        self.rows.iter().zip(&part).for_each(|(&i, ay)| r[i] -= ay);
+        self.own.iter().for_each(|&(i, k)| x[i] += y[k]);
+        Ok(())
+    }
+
+    fn project(&self, z: &mut [f64]) -> Result<()> {
+        let part: Vec<f64> = self.rows.iter().map(|&i| z[i]).collect();
+        let mut az = vec![0.0; self.parts[1].len()];
         // SAFETY: as above.
         unsafe {
             let (part, az) = (self.parts[0].place(part.as_ptr())?, self.parts[1].place(az.as_mut_ptr())?);
             petsc!(MatMultTranspose(self.columns, part.vec(), az.vec()))?;
         }
-        self.sum(&mut az);
-        residual.iter_mut().zip(&az).for_each(|(r, az)| *r -= az);
-        self.solver.solve(&residual, &mut y)?;
-        self.own.iter().for_each(|&(i, k)| z[i] += y[k]);
+        let y = self.solve(az)?;
+        self.own.iter().for_each(|&(i, k)| z[i] -= y[k]);
         Ok(())
     }
 }

@@ -15,7 +15,7 @@ pub struct Iterate<'a> {
     pub x: &'a [f64],
     /// Norm of its residual, as the solver measures it (its `-ksp_norm_type`).
     pub residual: f64,
-    /// The same of the zero guess.
+    /// The same of the first guess: zero, or what a [`Subspace`](super::Subspace) has solved exactly.
     pub first: f64,
     /// Least eigenvalue of the preconditioned matrix that conjugate gradients have seen.
     pub least: Option<f64>,
@@ -73,6 +73,14 @@ impl Ksp {
     /// # Errors
     /// Those of [`solve`](Self::solve).
     pub fn solve_until(&self, b: &[f64], x: &mut [f64], enough: &mut Enough) -> Result<Solved> {
+        let (mut rest, mut start) = (b.to_vec(), vec![0.0; b.len()]);
+        let started = self.start(&mut rest, &mut start)?;
+        let mut whole = vec![0.0; b.len()];
+        let mut of_whole = |iterate: &Iterate| {
+            whole.iter_mut().zip(&start).zip(iterate.x).for_each(|((whole, start), x)| *whole = start + x);
+            enough(&Iterate { x: &whole, ..*iterate })
+        };
+        let enough: &mut Enough = if started.is_some() { &mut of_whole } else { enough };
         let (mut test, mut data, mut destroy) = (None, null_mut(), None);
         // SAFETY: the solver's own test is taken out with its data, and put back below whatever the solve came to.
         unsafe { petsc!(KSPGetAndClearConvergenceTest(self.ksp, &mut test, &mut data, &mut destroy)) }?;
@@ -80,9 +88,10 @@ impl Ksp {
         let context: *mut Until = &mut until;
         // SAFETY: the test reads this context, which lives until the test is replaced below.
         unsafe { petsc!(KSPSetConvergenceTest(self.ksp, Some(is_enough), context.cast(), None)) }?;
-        let solved = self.solve(b, x);
+        let solved = self.solve(&rest, x);
         // SAFETY: what PETSc gave above.
         unsafe { petsc!(KSPSetConvergenceTest(self.ksp, test, data, destroy)) }?;
+        x.iter_mut().zip(&start).for_each(|(x, start)| *x += start);
         solved
     }
 }

@@ -63,6 +63,7 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
             first: counts.first_seconds + joint.first_seconds,
             solve: counts.solve_seconds + joint.solve_seconds,
         },
+        linear_step: outcome.linear_step.clone(),
         patches: counts.patches + joint.patches,
         symbolic_factorizations: counts.symbolic + joint.symbolic,
         body_solves: counts.solves,

@@ -31,6 +31,8 @@ pub struct Krylov {
     reached: f64,
     /// Exact solves near the contact that were made.
     patches: usize,
+    /// Whether rigid motions of bodies are around the preconditioner.
+    is_framed: bool,
 }
 
 /// Growth of the iterations, over those of a fresh preconditioner, at which a new one is made.
@@ -94,6 +96,7 @@ impl Krylov {
             fresh: None,
             reached: 1.0,
             patches: 0,
+            is_framed: false,
         })
     }
 
@@ -140,6 +143,20 @@ impl Krylov {
         Ok(true)
     }
 
+    /// Keeps the preconditioner or makes a new one, after a change of G.
+    fn renew(&mut self, change: &Change) -> Result<Seen> {
+        if !self.keeps {
+            return Ok(Seen::Whole);
+        }
+        self.stale |= self.set_ups == 0;
+        if !self.stale && self.patch(&(change.far)())? {
+            return Ok(Seen::Older);
+        }
+        self.stale = true;
+        self.set_up()?;
+        Ok(if self.patch(&(change.stiff)())? { Seen::Patched } else { Seen::Whole })
+    }
+
     /// Remembers the pace of a solve: the next change of G brings a new preconditioner if this one is worn.
     fn learn(&mut self, solved: &Solved) {
         if self.keeps && solved.iterations > FEW {
@@ -157,19 +174,19 @@ impl Krylov {
 
 impl InnerSolver for Krylov {
     fn update(&mut self, change: Change) -> Result<Seen> {
-        self.ksp.unpatch()?;
+        self.ksp.unwrap()?;
         self.matrix.update(change.write)?;
         self.changed = true;
-        if !self.keeps {
-            return Ok(Seen::Whole);
+        let seen = self.renew(&change)?;
+        // of other preconditioners the user sees what he chose
+        if self.multigrid
+            && let Some(coarse) = (change.coarse)()
+        {
+            self.set_up()?;
+            self.is_framed = true;
+            self.ksp.wrap(&self.matrix, c"rigid motions of bodies around the preconditioner", coarse)?;
         }
-        self.stale |= self.set_ups == 0;
-        if !self.stale && self.patch(&(change.far)())? {
-            return Ok(Seen::Older);
-        }
-        self.stale = true;
-        self.set_up()?;
-        Ok(if self.patch(&(change.stiff)())? { Seen::Patched } else { Seen::Whole })
+        Ok(seen)
     }
 
     fn set_up(&mut self) -> Result<()> {
@@ -244,6 +261,7 @@ impl InnerSolver for Krylov {
     fn describe(&self) -> String {
         let coarse = || self.chosen.get("mg_coarse_pc_type").map(str::to_owned);
         let inside = self.ksp.factor_package().or_else(coarse).map_or(String::new(), |name| format!(" by {name}"));
-        format!("{} + {}{inside}", self.ksp.ksp_type(), self.ksp.pc_type())
+        let around = if self.is_framed { " with rigid motions of all bodies" } else { "" };
+        format!("{} + {}{inside}{around}", self.ksp.ksp_type(), self.ksp.pc_type())
     }
 }

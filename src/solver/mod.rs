@@ -3,6 +3,7 @@
 //! [`SparseBody`] owns K, f and B and answers the verbs of [`Body`](crate::model::Body); a [`RobinMatrix`] is G, by an
 //! [`InnerSolver`]. A new way to solve is a new file with that trait. [`CondensedBody`] is such a body whose dofs are those of its contact.
 
+mod coarse;
 mod condensed;
 pub mod cost;
 pub mod dense;
@@ -16,6 +17,7 @@ mod robin;
 mod sparse;
 mod split;
 
+pub use coarse::Coarse;
 pub use condensed::CondensedBody;
 pub use dense::Dense;
 pub use krylov::Krylov;
@@ -28,7 +30,7 @@ pub use split::Split;
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::Solved;
-use crate::petsc::{Enough, Int, Rows};
+use crate::petsc::{Enough, Int, Rows, Subspace};
 
 /// A whole matrix as PETSc's.
 fn rows(matrix: Csr) -> Result<Rows> {
@@ -50,6 +52,8 @@ pub struct Change<'a> {
     pub far: &'a dyn Fn() -> Vec<usize>,
     /// Those that a new one is poor at: stiff ones.
     pub stiff: &'a dyn Fn() -> Vec<usize>,
+    /// What rigid motions of bodies put around a preconditioner, if there are any.
+    pub coarse: &'a dyn Fn() -> Option<Box<dyn Subspace>>,
 }
 
 /// What a solver works with after a change of G.

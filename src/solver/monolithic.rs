@@ -4,7 +4,7 @@
 //! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Of bodies that are dealt out over ranks each
 //! rank has its rows; of bodies that live whole on several ranks, condensed ones, every rank has the matrix and solves for itself.
 
-use super::{InnerSolver, Krylov, RobinMatrix, integers};
+use super::{Coarse, InnerSolver, Krylov, RobinMatrix, integers};
 use crate::error::Result;
 use crate::linalg::{Csr, axpy, countable, dot};
 use crate::model::linear::{Failure, LinearStep, Solution, Solved, System, Trial};
@@ -26,13 +26,15 @@ pub struct Union {
     /// Stiffness matrix of all bodies with these springs, with the pattern of B'B: the rows of this rank.
     pub stiffness: Csr,
     /// One row a contact point, [B_a B_a R_a B_b B_b R_b]: all of them.
-    pub rows: Csr,
+    pub rows: Rc<Csr>,
     /// First entry here of each body's state, and the number of all.
     pub offset: Vec<usize>,
     /// Number of the first row here, if other ranks have the others; columns are counted through all.
     start: Option<usize>,
     /// b diag(K) b' of each row b.
     row_stiffness: Vec<f64>,
+    /// Rigid motions, if the rows of nodes leave them in v.
+    coarse: Option<Coarse>,
     /// Whether every rank has the whole matrix and some of the bodies.
     is_redundant: bool,
 }
@@ -66,7 +68,10 @@ impl Union {
             Some(Matrices { stiffness, rows, motions: &[], traces: &[] })
         });
         let parts = parts.collect::<Option<Vec<_>>>();
-        parts.map(|parts| Self::new(model, &parts)).transpose()
+        let Some(parts) = parts else { return Ok(None) };
+        let union = Self::new(model, &parts)?;
+        let coarse = Coarse::of(model, &union.offset, &union.rows, union.start.unwrap_or(0));
+        Ok(Some(Self { coarse, ..union }))
     }
 
     fn new(model: &Model, parts: &[Matrices]) -> Result<Self> {
@@ -154,7 +159,7 @@ impl Union {
         stiffness.values.shrink_to_fit();
         let (sides, points) = (model.row_stiffness(), model.points());
         let row_stiffness = (0..points).map(|q| sides[q] + sides[points + q]).collect();
-        Ok(Self { stiffness, rows, offset, start, row_stiffness, is_redundant: false })
+        Ok(Self { stiffness, rows: Rc::new(rows), offset, start, row_stiffness, coarse: None, is_redundant: false })
     }
 
     /// The same with all entries of K stored, row by row.
@@ -179,7 +184,7 @@ pub struct Monolithic<S> {
 /// The matrix of all bodies.
 struct Joined<S> {
     matrix: RobinMatrix<S>,
-    rows: Csr,
+    rows: Rc<Csr>,
     offset: Vec<usize>,
     /// Number of the first row here.
     first: usize,
@@ -224,7 +229,7 @@ impl<S: InnerSolver> Monolithic<S> {
     /// # Errors
     /// Those of `make`.
     pub fn new(union: Union, make: impl FnOnce(Rows) -> Result<S>) -> Result<Self> {
-        let Union { stiffness, rows, offset, start, row_stiffness, is_redundant } = union;
+        let Union { stiffness, rows, offset, start, row_stiffness, coarse, is_redundant } = union;
         let stiffness = match start {
             None => super::rows(stiffness)?,
             Some(start) => {
@@ -232,7 +237,7 @@ impl<S: InnerSolver> Monolithic<S> {
                 Rows::of_process(start, total, integers(ptr), integers(col), values)?
             }
         };
-        let matrix = RobinMatrix::new(stiffness, &rows, row_stiffness, make)?;
+        let matrix = RobinMatrix::new(stiffness, &rows, row_stiffness, make)?.with_coarse(coarse);
         Ok(Self {
             joined: Rc::new(RefCell::new(Joined { matrix, rows, offset, first: start.unwrap_or(0) })),
             is_redundant,
@@ -323,7 +328,7 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
 struct Gathered {
     stiffness: Csr,
     rows: Csr,
-    motions: Vec<Vec<f64>>,
+    motions: Vec<Rc<[f64]>>,
     traces: Vec<Vec<f64>>,
 }
 
@@ -369,8 +374,8 @@ fn gather(model: &Model) -> Option<Vec<Gathered>> {
 }
 
 /// As many dofs as there are motions such that no combination of these leaves them all at rest: the pivots of an elimination.
-fn pins(motions: &[Vec<f64>]) -> Vec<usize> {
-    let mut left = motions.to_vec();
+fn pins(motions: &[Rc<[f64]>]) -> Vec<usize> {
+    let mut left: Vec<Vec<f64>> = motions.iter().map(|motion| motion.to_vec()).collect();
     let mut pins = Vec::new();
     while let Some(mut motion) = left.pop() {
         let largest =

@@ -1,11 +1,12 @@
 //! The matrix of a linear system with springs at contact points, G = K + B' diag(d) B, and what solves it.
 
-use super::{Change, InnerSolver, Krylov, Seen};
+use super::{Change, Coarse, InnerSolver, Krylov, Seen};
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::{BodyCounts, Solved};
 use crate::petsc::Rows;
 use std::ops::Range;
+use std::rc::Rc;
 use std::time::Instant;
 
 /// G of one body, or of all bodies together.
@@ -21,6 +22,8 @@ pub struct RobinMatrix<S> {
     /// The springs that double the stiffness under a row.
     soft: Vec<f64>,
     coupling: Coupling,
+    /// Rigid motions around the preconditioner, if G is of several bodies.
+    coarse: Option<Rc<Coarse>>,
     counts: BodyCounts,
     /// The factorisations of the solver before the counts began.
     before: [usize; 3],
@@ -46,10 +49,16 @@ impl<S: InnerSolver> RobinMatrix<S> {
             weight,
             soft,
             coupling: Coupling::new(&stiffness, rows),
+            coarse: None,
             counts: BodyCounts::default(),
             before: [0; 3],
             solver: make(stiffness)?,
         })
+    }
+
+    /// With rigid motions around the preconditioner.
+    pub fn with_coarse(self, coarse: Option<Coarse>) -> Self {
+        Self { coarse: coarse.map(Rc::new), ..self }
     }
 
     /// Sets the springs d.
@@ -69,6 +78,7 @@ impl<S: InnerSolver> RobinMatrix<S> {
             write: &|g| coupling.write(rows, weight, g),
             far: &|| far(rows, soft, prepared, weight),
             stiff: &|| far(rows, soft, &softened, weight),
+            coarse: &|| self.coarse.as_ref().map(|coarse| coarse.with(weight)),
         };
         let began = Instant::now();
         match self.solver.update(change)? {

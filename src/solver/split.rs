@@ -15,7 +15,7 @@ use std::rc::Rc;
 pub struct Split {
     /// R, one vector over the dofs each. Their lengths lie between 1 and 2: they are scaled by powers of two, which leaves a
     /// translation of a flat surface the same digits at all points, and few of them.
-    motions: Vec<Vec<f64>>,
+    motions: Vec<Rc<[f64]>>,
     /// R'R, of which nothing but the diagonal is left.
     squares: Vec<f64>,
     /// B R.
@@ -47,14 +47,14 @@ impl Split {
             rows.multiply(&motion, &mut trace);
             split.traces.push(trace);
             split.work.push(work / scale);
-            split.motions.push(motion);
+            split.motions.push(motion.into());
         }
         split
     }
 
     /// The part of the rank that has these dofs. Forces on rigid motions belong to the rank that speaks for the body.
     pub fn dealt_out(mut self, distribution: Rc<Distribution>) -> Self {
-        self.motions.iter_mut().for_each(|motion| *motion = distribution.scatter(motion));
+        self.motions.iter_mut().for_each(|motion| *motion = distribution.scatter(motion).into());
         if !distribution.leads {
             self.work.fill(0.0);
         }
@@ -82,7 +82,7 @@ impl Split {
     }
 
     /// R, one vector over the dofs each.
-    pub fn motions(&self) -> &[Vec<f64>] {
+    pub fn motions(&self) -> &[Rc<[f64]>] {
         &self.motions
     }
 
