@@ -109,7 +109,7 @@ impl Factor {
             let (k, l) = (step[i], step[j]);
             entries[k.min(l)].push((k.max(l), if k <= l { block.transpose() } else { block.clone() }));
         }
-        let mut work = Work { x: vec![0.0; factor.count], row: vec![0; factor.columns.len()], sum: Vec::new() };
+        let mut work = Work { x: vec![0.0; factor.count], row: vec![0; factor.columns.len()], runs: Vec::new() };
         for (k, entries) in entries.iter().enumerate() {
             factor.assemble(k, entries, &mut work);
             for &(j, position) in &earlier[k] {
@@ -148,28 +148,36 @@ impl Factor {
         let touched = &source.below[position..];
         let count: usize = touched.iter().map(|(_, range)| range.len()).sum();
         let top = source.height - count;
-        for p in 0..target.own.len() {
-            work.sum.clear();
-            work.sum.resize(count, 0.0);
-            let amount = |q: usize| source.pivot[q] * source.column(q)[top + p];
-            let of = |q: usize| &source.column(q)[top..];
-            // three unknowns at once: bodies have three or six, and a sum is then read and written less often
-            for three in source.order.chunks(3) {
-                match *three {
-                    [a, b, c] => {
-                        let (x, y, z) = (amount(a), amount(b), amount(c));
-                        let all = of(a).iter().zip(of(b)).zip(of(c));
-                        work.sum.iter_mut().zip(all).for_each(|(sum, ((a, b), c))| *sum += x * a + y * b + z * c);
-                    }
-                    _ => three.iter().for_each(|&q| super::axpy(amount(q), of(q), &mut work.sum)),
+        // rows that follow each other in both columns, as most do in the last ones, which are full
+        work.runs.clear();
+        let mut from = top;
+        for (column, range) in touched {
+            let to = work.row[*column];
+            match work.runs.last_mut() {
+                Some((start, first, length)) if *start + *length == from && *first + *length == to => {
+                    *length += range.len()
                 }
+                _ => work.runs.push((from, to, range.len())),
             }
-            let start = p * target.height;
-            let mut from = 0;
-            for (column, range) in touched {
-                let to = start + work.row[*column];
-                super::axpy(-1.0, &work.sum[from..from + range.len()], &mut target.panel[to..to + range.len()]);
-                from += range.len();
+            from += range.len();
+        }
+        for p in 0..target.own.len() {
+            let amount = |q: usize| source.pivot[q] * source.column(q)[top + p];
+            let panel = &mut target.panel[p * target.height..(p + 1) * target.height];
+            // three unknowns at once: bodies have three or six, and a row is then read and written less often
+            for some in source.order.chunks(3) {
+                for &(from, to, length) in &work.runs {
+                    let rows = &mut panel[to..to + length];
+                    let of = |q: usize| &source.column(q)[from..from + length];
+                    match *some {
+                        [a, b, c] => {
+                            let (x, y, z) = (amount(a), amount(b), amount(c));
+                            let all = of(a).iter().zip(of(b)).zip(of(c));
+                            rows.iter_mut().zip(all).for_each(|(row, ((a, b), c))| *row -= x * a + y * b + z * c);
+                        }
+                        _ => some.iter().for_each(|&q| super::axpy(-amount(q), of(q), rows)),
+                    }
+                }
             }
         }
     }
@@ -320,7 +328,8 @@ struct Work {
     x: Vec<f64>,
     /// First row of each column's unknowns in the panel at hand.
     row: Vec<usize>,
-    sum: Vec<f64>,
+    /// Rows of one panel that are rows of another: first row there, first row here, and how many.
+    runs: Vec<(usize, usize, usize)>,
 }
 
 /// 1/root of each diagonal entry, zero where it is rounding.

@@ -3,7 +3,7 @@
 use super::library::petsc;
 use super::matrix::same;
 use super::vector::Vector;
-use super::{Ksp, Matrix, ffi};
+use super::{Matrix, ffi};
 use crate::error::{Error, Result};
 use std::cell::{Cell, RefCell};
 use std::ffi::c_void;
@@ -53,7 +53,7 @@ impl Inner {
 /// A preconditioner of a solver and the one around it.
 pub(super) struct Around {
     /// The one around it.
-    outer: ffi::PC,
+    pub outer: ffi::PC,
     /// `outer` has this pointer.
     context: *mut Context,
 }
@@ -83,60 +83,8 @@ impl Context {
     }
 }
 
-impl Ksp {
-    /// Puts a space in which the `matrix` of this solver is solved exactly around its preconditioner, with what is around that already; `name`
-    /// is what `-ksp_view` shows. Collective. New values of the matrix need a new space.
-    ///
-    /// # Errors
-    /// PETSc's.
-    pub fn wrap(&mut self, matrix: &Matrix, name: &'static std::ffi::CStr, subspace: Box<dyn Subspace>) -> Result<()> {
-        let around = Around::new(matrix, self.whole_pc()?, name, subspace)?;
-        // SAFETY: a preconditioner of the same matrix.
-        unsafe { petsc!(KSPSetPC(self.ksp, around.outer)) }?;
-        self.around.push(around);
-        Ok(())
-    }
-
-    /// Goes back to the solver's own preconditioner.
-    ///
-    /// # Errors
-    /// PETSc's.
-    pub fn unwrap(&mut self) -> Result<()> {
-        if let Some(around) = self.around.first() {
-            // SAFETY: the preconditioner that this solver had.
-            unsafe { petsc!(KSPSetPC(self.ksp, around.inner())) }?;
-        }
-        // those outside first
-        while self.around.pop().is_some() {}
-        Ok(())
-    }
-
-    /// Solves exactly in the outermost space beforehand: x = Q b, and `rest` = b - A x. Conjugate gradients from there have residuals with Q r = 0,
-    /// for which z = (I - Q A) M r: half of the work in the space is saved (Tang, Nabben, Vuik, Erlangga, J. Sci. Comput. 39, 2009, "A-DEF2").
-    /// What is returned ends that when it is dropped; none without a space or with another method.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    pub(super) fn start(&self, rest: &mut [f64], x: &mut [f64]) -> Result<Option<Started<'_>>> {
-        let Some(around) = self.around.last().filter(|_| self.ksp_type() == "cg") else { return Ok(None) };
-        let context = around.context();
-        context.subspace.start(rest, x)?;
-        context.is_started.set(true);
-        Ok(Some(Started(&context.is_started)))
-    }
-}
-
-/// While it lives, residuals are those of a solve that was started in the space.
-pub(super) struct Started<'a>(&'a Cell<bool>);
-
-impl Drop for Started<'_> {
-    fn drop(&mut self) {
-        self.0.set(false);
-    }
-}
-
 impl Around {
-    fn new(
+    pub fn new(
         matrix: &Matrix,
         inner: ffi::PC,
         name: &'static std::ffi::CStr,
@@ -176,6 +124,17 @@ impl Around {
         self.context().inner.pc
     }
 
+    /// x += Q r and r -= A Q r. From then on, until what is returned is dropped, it takes residuals to have Q r = 0.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<Started<'_>> {
+        let context = self.context();
+        context.subspace.start(r, x)?;
+        context.is_started.set(true);
+        Ok(Started(&context.is_started))
+    }
+
     /// What it failed with, once.
     pub fn failure(&self) -> Option<Error> {
         self.context().failure.take()
@@ -190,6 +149,15 @@ impl Drop for Around {
             let mut context = Box::from_raw(self.context);
             let _ = petsc!(PCDestroy(&mut context.inner.pc));
         }
+    }
+}
+
+/// While it lives, residuals are those of a solve that was started in the space.
+pub(super) struct Started<'a>(&'a Cell<bool>);
+
+impl Drop for Started<'_> {
+    fn drop(&mut self) {
+        self.0.set(false);
     }
 }
 
