@@ -100,11 +100,6 @@ impl Krylov {
         })
     }
 
-    /// G, for products that leave it as it is.
-    pub fn matrix_mut(&mut self) -> &mut Matrix {
-        &mut self.matrix
-    }
-
     /// A solve, timed and counted.
     fn timed(&mut self, solve: impl FnOnce(&Ksp) -> Result<crate::petsc::Solved>) -> Result<Solved> {
         self.set_up()?;
@@ -171,6 +166,12 @@ impl Krylov {
         if self.chosen.has_typed() { self.chosen.lend(&self.session, work) } else { work() }
     }
 }
+    const HAS_ROWS: bool = true;
+
+    fn matrix_mut(&mut self) -> Option<&mut Matrix> {
+        Some(&mut self.matrix)
+    }
+
 
 impl InnerSolver for Krylov {
     fn update(&mut self, change: Change) -> Result<Seen> {
