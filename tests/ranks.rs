@@ -263,3 +263,20 @@ fn solves_that_are_known_are_skipped_on_all_ranks() {
     assert!(counts[0].0 > 10, "{counts:?}");
     assert!((serial.number("F1") / parallel.number("F1") - 1.0).abs() < 1e-9);
 }
+
+/// Quadratic elements have another smoother on several ranks, and keep their preconditioner for the whole run as on one: with about as many
+/// iterations.
+#[test]
+fn quadratic_elements_keep_their_preconditioner() {
+    let args = ["--method", "newton", "--set", "solver=hypre", "--set", "mesh.set.n=2", "--set", "output.plots=false"];
+    let serial = solve(case("hertz-sphere"), &args).converged();
+    let most = 1.3 * serial.number("inner_iterations");
+    for ranks in [2, 3] {
+        let parallel = solve_on(ranks, case("hertz-sphere"), &args).converged();
+        for key in ["factorizations", "patches", "iterations"] {
+            assert_eq!(parallel.count(key), serial.count(key), "{key} on {ranks}");
+        }
+        assert!(parallel.count("factorizations") == 1 && parallel.count("patches") > 1);
+        assert!(parallel.number("inner_iterations") <= most, "{}", parallel.said());
+    }
+}
