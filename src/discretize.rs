@@ -250,7 +250,7 @@ pub fn discretize<const D: usize>(
     for (index, ((part, (((draft, supported), graph), dealt)), (gauged, loose))) in
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
-        let Draft { segments, rows, free, nodal_load, load } = draft;
+        let Draft { segments, rows, free, mut nodal_load, load } = draft;
         let Supported { carried, prescribed } = supported;
         let mut offset = vec![0.0; rows.rows()];
         if !carried.is_empty() {
@@ -319,19 +319,26 @@ pub fn discretize<const D: usize>(
         }
         let outer = approach::outer_maker(&part, mesh)?;
         let unloaded = if keep { part.unloaded(mesh, &nodal_load)? } else { Vec::new() };
-        let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
+        let warning = elastic::warning(part.spec, &part.space, scene.plane);
+        let (nodes, points, cells) = (part.space.nodes.len(), part.space.points(), part.space.cell_count());
+        let mut space = part.space;
+        if owner[index] != ranks.0 && !keep {
+            // only the rank that speaks for the body recovers fields
+            (space, nodal_load) = (space.without_cells(), Vec::new());
+        }
+        let (space, held, elasticity) = (Rc::new(space), Rc::new(part.held), Rc::new(elasticity));
         infos.push(BodyInfo {
             name: name.clone(),
-            nodes: space.nodes.len(),
-            points: space.points(),
-            cells: space.cell_count(),
+            nodes,
+            points,
+            cells,
             facets: FacetCounts::of(&checked[index]),
-            dofs: space.dofs(),
+            dofs: D * nodes,
             supported: held.supported(),
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: unfelt.into_iter().map(|(name, _)| name).collect(),
             gauged,
-            warning: elastic::warning(part.spec, &space, scene.plane),
+            warning,
             stiffness,
             load: resultant,
             rank: owner[index],
@@ -343,7 +350,7 @@ pub fn discretize<const D: usize>(
                 Box::new(move |v| held.frame.displacements(v))
             },
             balance: {
-                let rows = nodal_rows(&segments, &pairs, space.dofs());
+                let rows = nodal_rows(&segments, &pairs, D * nodes);
                 let (springs, supports) = (part.springs, part.spec.fix.len());
                 let (space, held, elasticity) = (space.clone(), held.clone(), elasticity.clone());
                 let forces = Forces { space, elasticity, held, springs, supports, load: nodal_load, rows };

@@ -11,6 +11,51 @@ unsafe extern "C" {
     fn PMPI_Abort(comm: MPI_Comm, code: c_int) -> c_int;
 }
 
+/// What the C library is told of its heap.
+#[cfg(target_env = "gnu")]
+mod libc {
+    use std::ffi::c_int;
+
+    unsafe extern "C" {
+        fn mallopt(option: c_int, value: c_int) -> c_int;
+        fn malloc_trim(pad: usize) -> c_int;
+    }
+
+    /// Arrays of so many bytes come from the system, which has them back when they are freed; the heap has others, and gives its end back
+    /// when that is twice as long.
+    pub fn set_apart(bytes: c_int) {
+        // SAFETY: M_MMAP_THRESHOLD and M_TRIM_THRESHOLD, and numbers that they take.
+        unsafe {
+            mallopt(-3, bytes);
+            mallopt(-1, 2 * bytes);
+        }
+    }
+
+    /// Gives back what is free.
+    pub fn trim() {
+        // SAFETY: the C library walks its own lists.
+        unsafe { malloc_trim(0) };
+    }
+}
+
+/// Has the system take back each large array of a mesh as soon as it is freed, where the C library can: by itself that makes them part of its
+/// heap, in which holes stay. With [`give_back`] a rank of four takes 332 MB instead of 390 (two cubes of 48^3).
+pub fn keep_apart() {
+    #[cfg(target_env = "gnu")]
+    libc::set_apart(1 << 20);
+}
+
+/// Gives memory that is free back to the system before solvers are set up, whose arrays come and go, and stay part of the heap: apart they would
+/// take 4 % more time.
+pub fn give_back() {
+    #[cfg(target_env = "gnu")]
+    {
+        libc::trim();
+        // what the C library comes to by itself
+        libc::set_apart(32 << 20);
+    }
+}
+
 /// The code with which hypre ends all ranks where it gets no memory.
 const HYPRE: c_int = -1;
 
