@@ -79,6 +79,7 @@ const FUNCTIONS: &[&str] = &[
     "PCGetFailedReason",
     "PCGetOperators",
     "PCGetType",
+    "PCMGGetSmoother",
     "PCMGSetGalerkin",
     "PCMGSetInterpolation",
     "PCMGSetLevels",

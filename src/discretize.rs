@@ -37,7 +37,7 @@ use approach::OuterMaker;
 use balance::Forces;
 pub use balance::{Balance, Resultant};
 use carried::{Supported, supported};
-pub use distribute::Graph;
+pub use distribute::{Deal, Graph};
 use draft::{Draft, Loose};
 pub use factory::{Assembled, Factory, Outline};
 use fields::{ErrorMaker, FieldMaker};
@@ -205,8 +205,6 @@ pub fn discretize<const D: usize>(
         fine.extend(points);
         contacts.push(ContactInfo { spec, swapped, surface });
     }
-    let loads: Vec<usize> = parts.iter().map(|part| part.space.dofs()).collect();
-    let mut owner = crate::parallel::owners(&loads, ranks.1);
     let (mut slots, mut infos, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
     let (mut assemblies, mut assemblies_avoided) = (0, 0);
     let drafts = parts.iter().zip(draft::segments(parts.len(), &pairs));
@@ -230,29 +228,30 @@ pub fn discretize<const D: usize>(
         graph,
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
-    let all_graphs = || lazy.iter().map(|graph| graph()).collect::<Vec<&NodeGraph>>();
-    let dealt = factory.deal_out(&|| distribute::graph::<D>(&all_graphs(), &drafts, &pairs))?;
-    let mut coarse = Vec::new();
-    if let Some(owner) = &dealt
-        && parts.iter().any(|part| factory.wants_interpolation(&part.spec.name.value))
-    {
-        let sizes: Vec<usize> = parts.iter().map(|part| part.space.nodes.len()).collect();
-        coarse = distribute::distribute_coarse(parts.iter().map(Part::coarse_nodes).collect(), &sizes, owner, ranks);
-    }
-    let mut coarse = coarse.into_iter();
-    let dealt = dealt.map(|dealt| distribute::distribute::<D>(&drafts, &dealt, ranks, &exchange));
-    if let Some(dealt) = &dealt {
-        owner = dealt.iter().map(|dealt| dealt.leader).collect();
-    }
-    let mut dealt = dealt.into_iter().flatten();
-    let drafts = drafts.into_iter().zip(supported).zip(graphs);
+    let graph = |bodies: &[usize]| {
+        let bodies: Vec<_> = bodies.iter().map(|&body| (lazy[body](), &drafts[body])).collect();
+        distribute::graph::<D>(&bodies, &pairs)
+    };
+    let deals = factory.deal_out(&graph)?;
+    let coarse = |body: usize| match factory.wants_interpolation(&parts[body].spec.name.value) {
+        true => parts[body].coarse_nodes(),
+        false => Vec::new(),
+    };
+    let dealt = distribute::distribute::<D>(&drafts, &coarse, &deals, ranks, &exchange);
+    drop(deals);
+    let loads = parts.iter().zip(&dealt).map(|(part, dealt)| if dealt.is_some() { 0 } else { part.space.dofs() });
+    let mut owner = crate::parallel::owners(&loads.collect::<Vec<_>>(), ranks.1);
+    dealt
+        .iter()
+        .zip(&mut owner)
+        .for_each(|(dealt, owner)| *owner = dealt.as_ref().map_or(*owner, |dealt| dealt.leader));
+    let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt);
     let known = gauged.into_iter().zip(loose);
-    for (index, ((part, ((draft, supported), graph)), (gauged, loose))) in
+    for (index, ((part, (((draft, supported), graph), dealt)), (gauged, loose))) in
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
-        let Draft { segments, rows, free, nodal_load, load } = draft;
+        let Draft { segments, rows, free, mut nodal_load, load } = draft;
         let Supported { carried, prescribed } = supported;
-        let (dealt, coarse) = (dealt.next(), coarse.next());
         let mut offset = vec![0.0; rows.rows()];
         if !carried.is_empty() {
             rows.multiply(&carried, &mut offset);
@@ -272,7 +271,7 @@ pub fn discretize<const D: usize>(
         let stiffness = if held && surface > 0.0 { modulus / depth } else { 0.0 };
         // what only the owner knows, until all ranks share it
         let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
-        let mut kept = factory.kept(&name);
+        let mut kept = factory.kept(&name).filter(|_| owner[index] == ranks.0);
         let loads = kept.is_some().then(|| Loads {
             work: rigid::free(&left, &prescribed, &load).iter().map(|motion| motion.work).collect(),
             force: load.clone(),
@@ -303,16 +302,15 @@ pub fn discretize<const D: usize>(
             if let Some(dealt) = &dealt {
                 body = dealt.own::<D>(body);
             }
-            let distribution = dealt.map(|dealt| dealt.distribution);
-            let interpolation = factory.wants_interpolation(&name).then(|| match (coarse, &distribution) {
-                (Some(coarse), Some(dealt)) => coarse.own::<D>(&part.interpolation(&coarse.nodes), &dealt.own),
-                _ => part.interpolation(&part.coarse_nodes()),
+            let interpolation = factory.wants_interpolation(&name).then(|| match &dealt {
+                Some(dealt) => dealt.interpolation::<D>(|coarse| part.interpolation(coarse)),
+                None => part.interpolation(&part.coarse_nodes()),
             });
             local = Some(factory.make(Assembled {
                 name: name.clone(),
                 dimension: D,
                 body,
-                distribution,
+                distribution: dealt.map(|dealt| dealt.distribution),
                 rows,
                 motions: part.smooth(free),
                 left,
@@ -321,19 +319,26 @@ pub fn discretize<const D: usize>(
         }
         let outer = approach::outer_maker(&part, mesh)?;
         let unloaded = if keep { part.unloaded(mesh, &nodal_load)? } else { Vec::new() };
-        let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
+        let warning = elastic::warning(part.spec, &part.space, scene.plane);
+        let (nodes, points, cells) = (part.space.nodes.len(), part.space.points(), part.space.cell_count());
+        let mut space = part.space;
+        if owner[index] != ranks.0 && !keep {
+            // only the rank that speaks for the body recovers fields
+            (space, nodal_load) = (space.without_cells(), Vec::new());
+        }
+        let (space, held, elasticity) = (Rc::new(space), Rc::new(part.held), Rc::new(elasticity));
         infos.push(BodyInfo {
             name: name.clone(),
-            nodes: space.nodes.len(),
-            points: space.points(),
-            cells: space.cell_count(),
+            nodes,
+            points,
+            cells,
             facets: FacetCounts::of(&checked[index]),
-            dofs: space.dofs(),
+            dofs: D * nodes,
             supported: held.supported(),
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: unfelt.into_iter().map(|(name, _)| name).collect(),
             gauged,
-            warning: elastic::warning(part.spec, &space, scene.plane),
+            warning,
             stiffness,
             load: resultant,
             rank: owner[index],
@@ -345,7 +350,7 @@ pub fn discretize<const D: usize>(
                 Box::new(move |v| held.frame.displacements(v))
             },
             balance: {
-                let rows = nodal_rows(&segments, &pairs, space.dofs());
+                let rows = nodal_rows(&segments, &pairs, D * nodes);
                 let (springs, supports) = (part.springs, part.spec.fix.len());
                 let (space, held, elasticity) = (space.clone(), held.clone(), elasticity.clone());
                 let forces = Forces { space, elasticity, held, springs, supports, load: nodal_load, rows };

@@ -165,3 +165,118 @@ fn states_go_from_some_ranks_to_others() {
         assert!(apart.fold(0.0, f64::max) <= 1e-8 * whole.number("pairs/0/peak_pressure"), "{ranks}");
     }
 }
+
+/// Two cubes with a bowed gap, the lower one eight times the other, which contact alone holds.
+const CUBES: [&str; 4] = ["--set", "mesh.set={nl=12,nu=6}", "--set", "contact.0.gap=\"2e-5*((x-0.5)^2+(y-0.5)^2)\""];
+
+/// Runs a scene by sweeps on some ranks, to a residual of 1e-9 unless the words say more.
+fn swept(ranks: usize, scene: &str, words: &[&str]) -> Run {
+    let stop = ["--set", "method.stop={residual=1e-9}", "--set", "output.plots=false"];
+    let args = [&stop, words].concat();
+    match ranks {
+        1 => solve(case(scene), &args),
+        _ => solve_on(ranks, case(scene), &args),
+    }
+    .converged()
+}
+
+/// The pressures of sweeps on one rank on several, to `to` of the peak.
+fn same_sweeps(ranks: &[usize], scene: &str, words: &[&str], to: f64) {
+    let serial = swept(1, scene, words);
+    for &ranks in ranks {
+        let parallel = swept(ranks, scene, words);
+        let apart = pressures(&parallel).into_iter().zip(pressures(&serial)).map(|(a, b)| (a - b).abs());
+        let (apart, peak) = (apart.fold(0.0, f64::max), pressures(&serial).into_iter().fold(0.0, f64::max));
+        assert!(peak > 0.0 && apart <= to * peak, "{scene} {words:?} on {ranks}: {:e} apart", apart / peak);
+        assert_eq!(parallel.solvers(), serial.solvers(), "{scene} {words:?} on {ranks}");
+        assert_eq!(parallel.count("assemblies"), serial.count("assemblies"));
+        assert_eq!(parallel.warnings(), serial.warnings());
+    }
+}
+
+/// One large body beside a small one, more ranks than bodies, one body too many, free bodies and quadratic elements, by each method: sweeps deal
+/// bodies out, and find what one rank finds.
+#[test]
+fn bodies_of_sweeps_are_dealt_out() {
+    let cubes = |words: &[&'static str]| [&CUBES, words].concat();
+    let newton = ["--method", "newton-robin", "--set", "solver=hypre"];
+    same_sweeps(&[2, 5, 8], "patch-3d", &cubes(&newton), 1e-8);
+    same_sweeps(&[2], "patch-3d", &cubes(&["--method", "robin", "--set", "solver=hypre"]), 1e-7);
+    same_sweeps(&[3], "patch-3d", &cubes(&["--method", "ncg", "--set", "solver=mumps"]), 1e-7);
+    same_sweeps(
+        &[3],
+        "patch-3d",
+        &cubes(&["--method", "anderson", "-lower_pc_type", "gamg", "-lower_ksp_type", "cg"]),
+        1e-7,
+    );
+    same_sweeps(
+        &[3],
+        "hertz-sphere",
+        &[&newton[..], &["--set", "mesh.set.n=3", "--set", "body.1.order=1"]].concat(),
+        1e-7,
+    );
+}
+
+/// The matrix of a large body has its rows on all ranks; the small one stays whole, and so does a large one whose solver is one of a rank.
+#[test]
+fn large_bodies_are_dealt_out_and_small_ones_are_whole() {
+    let args = ["--method", "ncg", "--set", "solver=hypre", "-ksp_view"];
+    let run = swept(2, "patch-3d", &[&CUBES[..], &args].concat());
+    let view = ["KSP Object: (lower_) 2 MPI processes", "type: mpiaij", "rows=6591, cols=6591"];
+    assert!(view.iter().all(|text| run.stdout.contains(text)), "{}", run.stdout);
+    assert!(!run.stdout.contains("KSP Object: (upper_) 2"), "{}", run.stdout);
+    let args = ["--method", "newton-robin", "-lower_ksp_type", "cg", "-lower_pc_type", "icc", "-lower_ksp_view"];
+    let run = swept(2, "patch-3d", &[&CUBES[..], &args].concat());
+    let view = ["KSP Object: (lower_) 1 MPI process", "type: seqaij", "rows=6591, cols=6591"];
+    assert!(view.iter().all(|text| run.stdout.contains(text)), "{}", run.stdout);
+    assert_eq!([run.count("bodies/0/rank"), run.count("bodies/1/rank")], [0, 1]);
+}
+
+/// A sweep has one message. A body that is dealt out adds two if contact alone holds it, for the balance of its residual and of its correction
+/// on rigid motions, and none if supports do.
+#[test]
+fn messages_of_dealt_out_bodies() {
+    let upper = ["--set", "mesh.set={nl=6,nu=12}", CUBES[2], CUBES[3]];
+    for (ranks, sets, each) in [(2, &CUBES, 1), (8, &CUBES, 1), (2, &upper, 3)] {
+        let of = |limit: usize| {
+            let stop = format!("method.stop={{residual=1e-14,iterations={limit}}}");
+            let args = ["--method", "robin", "--set", "solver=hypre", "--set", &stop];
+            let run = solve_on(ranks, case("patch-3d"), &[&sets[..], &args].concat());
+            assert_eq!(run.count("iterations"), limit, "{}", run.said());
+            run.count("messages")
+        };
+        assert_eq!(of(5) - of(2), 3 * each, "{sets:?} on {ranks}");
+    }
+}
+
+/// Bodies that never touch need one solve each, dealt out or not, which ranks agree on by a message.
+#[test]
+fn solves_that_are_known_are_skipped_on_all_ranks() {
+    let args = ["--set", "mesh.set.n=40", "--set", "solver=mumps", "--set", "contact.0.gap=1"];
+    let [serial, parallel] = [1, 3].map(|ranks| {
+        let args = [&args[..], &["--set", "method.stop={residual=1e-5}", "-ksp_view"]].concat();
+        swept(ranks, "groove", &args)
+    });
+    assert!(parallel.stdout.contains("KSP Object: (lower_) 3 MPI processes"), "{}", parallel.stdout);
+    let counts = [&serial, &parallel].map(|run| (run.count("body_solves_skipped"), run.count("sweeps")));
+    assert_eq!(counts[0], counts[1]);
+    assert!(counts[0].0 > 10, "{counts:?}");
+    assert!((serial.number("F1") / parallel.number("F1") - 1.0).abs() < 1e-9);
+}
+
+/// Quadratic elements have another smoother on several ranks, and keep their preconditioner for the whole run as on one: with about as many
+/// iterations.
+#[test]
+fn quadratic_elements_keep_their_preconditioner() {
+    let args = ["--method", "newton", "--set", "solver=hypre", "--set", "mesh.set.n=2", "--set", "output.plots=false"];
+    let serial = solve(case("hertz-sphere"), &args).converged();
+    let most = 1.3 * serial.number("inner_iterations");
+    for ranks in [2, 3] {
+        let parallel = solve_on(ranks, case("hertz-sphere"), &args).converged();
+        for key in ["factorizations", "patches", "iterations"] {
+            assert_eq!(parallel.count(key), serial.count(key), "{key} on {ranks}");
+        }
+        assert!(parallel.count("factorizations") == 1 && parallel.count("patches") > 1);
+        assert!(parallel.number("inner_iterations") <= most, "{}", parallel.said());
+    }
+}

@@ -60,6 +60,9 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
         let mut first = None;
         for step in 0..STEPS {
             body.trace(&u, &mut rows);
+            if body.distribution().is_some() {
+                model.exchange.sum(&mut rows);
+            }
             let mut violation = 0.0f64;
             for q in 0..rows.len() {
                 let apart = if springs[q] > 0.0 { rows[q] - target[q] } else { 0.0 };

@@ -72,7 +72,7 @@ impl Run<'_> {
         let mut sums = [0.0; SUMS + ASKS];
         (sums[0], sums[1]) = (energy.strain, energy.potential);
         sums[SUMS..].copy_from_slice(&numbers(self.observer.asked()));
-        for body in self.model.bodies.iter().filter_map(|slot| slot.local.as_ref()) {
+        for body in self.model.bodies.iter().filter_map(|slot| slot.local.as_ref()).filter(|body| body.leads()) {
             let counts = body.counts();
             sums[2] += counts.factorizations as f64;
             sums[3] += counts.inner_iterations as f64;

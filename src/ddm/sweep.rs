@@ -37,10 +37,10 @@ pub struct Sweep {
     open: Vec<bool>,
 }
 
-/// Whether r = s r0 to rounding of r0.
-fn is_multiple(r: &[f64], s: f64, r0: &[f64]) -> bool {
-    let difference: f64 = r.iter().zip(r0).map(|(r, r0)| (r - s * r0).powi(2)).sum();
-    difference <= 1e-12 * dot(r, r)
+/// |r - s r0| and |r|, squared, of the numbers here.
+fn apart(r: &[f64], s: f64, r0: &[f64]) -> [f64; 2] {
+    let difference = r.iter().zip(r0).map(|(r, r0)| (r - s * r0).powi(2)).sum();
+    [difference, dot(r, r)]
 }
 
 /// Does sweeps and remembers what need not be done again.
@@ -78,11 +78,15 @@ impl Sweeper {
         let open: Vec<bool> = (0..model.bodies.len()).map(is_open).collect();
         let (residual, energies) = residuals(model, iterate, &layer.force);
         let known = |index: usize| {
-            let (last, gamma) = last?;
-            let same =
-                open[index] && last.open[index] && is_multiple(&residual[index], 1.0 - gamma, &last.residual[index]);
-            same.then(|| {
-                let mut z = vec![0.0; iterate.states[index].len()];
+            let (last, gamma) = last.filter(|(last, _)| open[index] && last.open[index])?;
+            let body = model.bodies[index].local.as_ref()?;
+            let mut sums = apart(&residual[index], 1.0 - gamma, &last.residual[index]);
+            if body.distribution().is_some() {
+                model.exchange.sum(&mut sums);
+            }
+            // r = (1 - gamma) r_last to rounding
+            (sums[0] <= 1e-12 * sums[1]).then(|| {
+                let mut z = vec![0.0; body.len()];
                 axpy(1.0 - gamma, &last.correction.states[index], &mut z);
                 z
             })
@@ -125,11 +129,9 @@ impl Sweeper {
             };
             let r = &residual[index];
             let scalars = &mut buffer[rows + SCALARS * index..rows + SCALARS * (index + 1)];
+            let skipped = known[index].is_some();
             let z = match known[index].take() {
-                Some(z) => {
-                    scalars[4] = 1.0;
-                    z
-                }
+                Some(z) => z,
                 None => {
                     let mut z = vec![0.0; r.len()];
                     let Solved { failure, .. } = match other {
@@ -146,9 +148,12 @@ impl Sweeper {
             scalars[0] = dot(r, &z);
             scalars[1] = energies[index].strain;
             scalars[2] = energies[index].potential;
-            let counts = body.counts();
-            scalars[5] = counts.factorizations as f64;
-            scalars[6] = counts.inner_iterations as f64;
+            if body.leads() {
+                let counts = body.counts();
+                scalars[4] = f64::from(skipped);
+                scalars[5] = counts.factorizations as f64;
+                scalars[6] = counts.inner_iterations as f64;
+            }
             scalars[7] = other.map_or(0.0, |other| dot(&other[index], &z));
             let mut trace = vec![0.0; model.bodies[index].row_stiffness.len()];
             if let Some(body) = &model.bodies[index].local {

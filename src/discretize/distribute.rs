@@ -18,10 +18,18 @@ pub struct Graph {
     pub weight: Vec<i32>,
 }
 
-/// The nodes of all bodies, body by body, joined where K couples them, and at contact points.
-pub fn graph<const D: usize>(graphs: &[&NodeGraph], drafts: &[Draft], pairs: &[ContactPair]) -> Graph {
+/// Bodies whose rows of K are in one matrix of all ranks.
+pub struct Deal {
+    /// Their numbers in the scene, in increasing order.
+    pub bodies: Vec<usize>,
+    /// The rank of each of their nodes, body by body.
+    pub owner: Vec<u32>,
+}
+
+/// The nodes of bodies, body by body, joined where K couples them, and at contact points.
+pub fn graph<const D: usize>(bodies: &[(&NodeGraph, &Draft)], pairs: &[ContactPair]) -> Graph {
     let mut first = vec![0];
-    graphs.iter().for_each(|graph| first.push(first[first.len() - 1] + graph.ptr.len() - 1));
+    bodies.iter().for_each(|(graph, _)| first.push(first[first.len() - 1] + graph.ptr.len() - 1));
     // a contact point joins the first node on its one side with the first on the other
     let mut ends: Vec<[Option<i32>; 2]> = Vec::new();
     let mut begin = vec![0];
@@ -29,7 +37,7 @@ pub fn graph<const D: usize>(graphs: &[&NodeGraph], drafts: &[Draft], pairs: &[C
         ends.resize(ends.len() + pair.len(), [None; 2]);
         begin.push(ends.len());
     }
-    for (body, draft) in drafts.iter().enumerate() {
+    for (body, (_, draft)) in bodies.iter().enumerate() {
         let mut row = 0;
         for segment in &draft.segments {
             for at in begin[segment.pair]..begin[segment.pair + 1] {
@@ -45,7 +53,7 @@ pub fn graph<const D: usize>(graphs: &[&NodeGraph], drafts: &[Draft], pairs: &[C
     joined.dedup();
     let mut joined = joined.into_iter().peekable();
     let mut all = Graph { ptr: vec![0], col: Vec::new(), weight: Vec::new() };
-    for (graph, &first) in graphs.iter().zip(&first) {
+    for ((graph, _), &first) in bodies.iter().zip(&first) {
         for node in 0..graph.ptr.len() - 1 {
             let neighbours = &graph.col[graph.ptr[node] as usize..graph.ptr[node + 1] as usize];
             all.weight.push(neighbours.len() as i32);
@@ -69,13 +77,36 @@ pub struct Dealt {
     pub distribution: Distribution,
     /// The rank that speaks for the body.
     pub leader: usize,
-    /// Number of each node in the matrix of all bodies.
+    /// Number of each node in the matrix that has its rows.
     number: Vec<u32>,
+    /// Its coarse nodes; none where no interpolation is wanted.
+    coarse: Coarse,
 }
 
-/// What rank `rank` knows of each body when `owner` has the rank of every node, body by body.
+/// What rank `rank` knows of each body; none for those that are not dealt out. `coarse` tells the coarse nodes of a body.
 pub fn distribute<const D: usize>(
     drafts: &[Draft],
+    coarse: &dyn Fn(usize) -> Vec<u32>,
+    deals: &[Deal],
+    ranks: (usize, usize),
+    exchange: &Rc<dyn Exchange>,
+) -> Vec<Option<Dealt>> {
+    let mut all: Vec<Option<Dealt>> = drafts.iter().map(|_| None).collect();
+    for Deal { bodies, owner } in deals {
+        let sizes = bodies.iter().map(|&body| drafts[body].rows.columns / D);
+        let coarse = distribute_coarse(bodies.iter().map(|&body| coarse(body)).collect(), sizes, owner, ranks);
+        let drafts = bodies.iter().map(|&body| &drafts[body]).zip(coarse);
+        bodies
+            .iter()
+            .zip(of_deal::<D>(drafts, owner, ranks, exchange))
+            .for_each(|(&body, dealt)| all[body] = Some(dealt));
+    }
+    all
+}
+
+/// The same of the bodies of one matrix, with the rank of every node, body by body.
+fn of_deal<'a, const D: usize>(
+    drafts: impl Iterator<Item = (&'a Draft, Coarse)>,
     owner: &[u32],
     (rank, ranks): (usize, usize),
     exchange: &Rc<dyn Exchange>,
@@ -83,7 +114,7 @@ pub fn distribute<const D: usize>(
     let (number, starts) = numbered(owner, ranks);
     let (start, total) = (D * starts[rank] as usize, D * owner.len());
     let (mut owner, mut number) = (owner, &number[..]);
-    let of_body = |draft: &Draft| {
+    let of_body = |(draft, coarse): (&Draft, Coarse)| {
         let nodes = draft.rows.columns / D;
         let (of_node, numbers);
         (of_node, owner) = owner.split_at(nodes);
@@ -108,9 +139,9 @@ pub fn distribute<const D: usize>(
             leads: leader == rank,
             exchange: exchange.clone(),
         };
-        Dealt { distribution, leader, number }
+        Dealt { distribution, leader, number, coarse }
     };
-    drafts.iter().map(of_body).collect()
+    drafts.map(of_body).collect()
 }
 
 /// Numbers of things that `owner` deals out: rank by rank, there in their order; and the first number of each rank.
@@ -127,24 +158,24 @@ fn numbered(owner: &[u32], ranks: usize) -> (Vec<u32>, Vec<u32>) {
 }
 
 /// The coarse nodes of a body that is dealt out.
-pub struct DealtCoarse {
+struct Coarse {
     /// Which nodes these are.
-    pub nodes: Vec<u32>,
-    /// Their numbers among the coarse nodes of all bodies.
+    nodes: Vec<u32>,
+    /// Their numbers among the coarse nodes of the bodies in one matrix.
     number: Vec<u32>,
-    /// How many all bodies have, and this one on this rank.
+    /// How many all of these have, and this one on this rank.
     counts: [usize; 2],
 }
 
 /// The coarse `nodes` of each body when `owner` has the rank of every node, body by body; bodies have so many nodes.
-pub fn distribute_coarse(
+fn distribute_coarse(
     nodes: Vec<Vec<u32>>,
-    sizes: &[usize],
+    sizes: impl Iterator<Item = usize>,
     owner: &[u32],
     (rank, ranks): (usize, usize),
-) -> Vec<DealtCoarse> {
+) -> Vec<Coarse> {
     let mut first = 0;
-    let of_body = |(nodes, size): (&Vec<u32>, &usize)| {
+    let of_body = |(nodes, size): (&Vec<u32>, usize)| {
         let owner = &owner[first..first + size];
         first += size;
         nodes.iter().map(|&node| owner[node as usize]).collect()
@@ -156,32 +187,31 @@ pub fn distribute_coarse(
         let own = owners.iter().filter(|&&owner| owner as usize == rank).count();
         let (here, others) = rest.split_at(nodes.len());
         rest = others;
-        DealtCoarse { nodes, number: here.to_vec(), counts: [number.len(), own] }
+        Coarse { nodes, number: here.to_vec(), counts: [number.len(), own] }
     };
     nodes.into_iter().zip(owners).map(of_body).collect()
 }
 
-impl DealtCoarse {
-    /// The rows of these dofs of an interpolation; columns are counted through all bodies.
-    pub fn own<const D: usize>(&self, whole: &Interpolation, dofs: &[u32]) -> Interpolation {
-        let [all, own] = self.counts;
+impl Dealt {
+    /// The rows of own dofs of the interpolation that `whole` makes from coarse nodes; columns are counted through the bodies in one matrix.
+    pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Interpolation) -> Interpolation {
+        let Coarse { nodes, number, counts: [all, own] } = &self.coarse;
+        let whole = whole(nodes);
         let mut rows = Csr::new(D * all);
-        for &dof in dofs {
-            let number = |j: usize| D * self.number[j / D] as usize + j % D;
+        for &dof in &self.distribution.own {
+            let number = |j: usize| D * number[j / D] as usize + j % D;
             rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
         }
         Interpolation { rows, own: D * own }
     }
-}
 
-impl Dealt {
     /// Whether a node is an own one.
     pub fn is_own<const D: usize>(&self, node: usize) -> bool {
         let Distribution { first, own, .. } = &self.distribution;
         (*first..first + own.len()).contains(&(D * self.number[node] as usize))
     }
 
-    /// A body that was assembled for own nodes alone, in its own dofs; columns of K are those of the matrix of all bodies.
+    /// A body that was assembled for own nodes alone, in its own dofs; columns of K are those of the matrix that has its rows.
     pub fn own<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
         let own = &self.distribution.own;
         let Csr { ptr, mut col, mut values, .. } = body.stiffness;

@@ -1,6 +1,6 @@
 //! What bodies need to become solvers, and who makes them.
 
-use super::distribute::Graph;
+use super::distribute::{Deal, Graph};
 use crate::error::Result;
 use crate::fem::assemble::NodeGraph;
 use crate::fem::rigid::{FreeMotion, RigidMotion};
@@ -35,12 +35,12 @@ pub trait Factory {
     /// Failures of PETSc's options.
     fn plan(&mut self, outlines: &[Outline]) -> Result<()>;
 
-    /// Deals the nodes of all bodies out to the ranks if their solvers want that, after the plan: the rank of each node of `graph`, body
-    /// by body; none where bodies stay whole. Collective; the graph is made on one rank.
+    /// Deals the nodes of those bodies out to the ranks whose solvers want that, after the plan: bodies that share a matrix together; none for
+    /// bodies that stay whole. Collective; the `graph` of the bodies with these numbers is made on one rank.
     ///
     /// # Errors
     /// When the partitioner fails.
-    fn deal_out(&mut self, graph: &dyn Fn() -> Graph) -> Result<Option<Vec<u32>>>;
+    fn deal_out(&mut self, graph: &dyn Fn(&[usize]) -> Graph) -> Result<Vec<Deal>>;
 
     /// Whether the interpolation of a body from linear displacements is wanted, after the plan.
     fn wants_interpolation(&self, name: &str) -> bool;

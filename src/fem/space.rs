@@ -83,6 +83,12 @@ impl<const D: usize> Space<D> {
         )
     }
 
+    /// The space of a body whose nodes and cells nobody here asks for.
+    pub fn without_cells(self) -> Self {
+        let (nodes, cells, from_mesh) = Default::default();
+        Self { nodes, cells, from_mesh, measure: OnceCell::new(), ..self }
+    }
+
     /// The meridian of a body of revolution. Nodes whose radius is rounding of the largest one get the radius zero.
     pub fn revolved(mut self) -> Self {
         let largest = self.nodes.iter().fold(0.0, |max: f64, x| max.max(x[0].abs()));

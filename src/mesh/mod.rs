@@ -75,6 +75,11 @@ impl<const D: usize> Mesh<D> {
         self.groups.iter().filter(move |group| group.dimension == dimension).map(|group| group.name.as_str())
     }
 
+    /// Forgets the numbers of elements in the file, which messages of [`check`](Self::check) name.
+    pub fn forget_tags(&mut self) {
+        self.groups.iter_mut().for_each(|group| group.tags = Vec::new());
+    }
+
     /// The mesh of the same simplices without mid-edge points; a copy if there are none.
     pub fn lower_order(&self) -> Mesh<D> {
         let mut groups = self.groups.clone();

@@ -7,13 +7,14 @@ use super::exchange::Exchange;
 use crate::linalg::Csr;
 use std::rc::Rc;
 
-/// The dofs of a body that one rank owns, and where they are in the matrix of all bodies, which has their rows of K.
+/// The dofs of a body that one rank owns, and where they are in the matrix of all ranks that has their rows of K: that of all bodies, or
+/// one of the body's own.
 pub struct Distribution {
     /// Number of dofs of the body.
     pub dofs: usize,
     /// Those of this rank, sorted.
     pub own: Vec<u32>,
-    /// Number of the first of them in the matrix of all bodies; the others follow.
+    /// Number of the first of them in that matrix; the others follow.
     pub first: usize,
     /// First row of that matrix on this rank.
     pub start: usize,

@@ -72,4 +72,45 @@ impl Ksp {
         unsafe { petsc!(MatDestroy(&mut mat)) }?;
         made
     }
+
+    /// Has the smoother of these two levels see the values that the `matrix` of this solver has now, where the preconditioner is kept:
+    /// Chebyshev's method estimates its bounds anew. The coarse level stays as it is.
+    ///
+    /// ```
+    /// use winkler::petsc::{Ksp, Matrix, Session};
+    /// let words = "-ksp_type cg -ksp_rtol 1e-10 -mg_levels_ksp_type chebyshev -mg_levels_pc_type jacobi -mg_coarse_pc_type cholesky";
+    /// let session = Session::start(&words.split(' ').map(String::from).collect::<Vec<_>>())?;
+    /// // sixty springs to the ground; then a stiff one that all of the last thirty share
+    /// let (n, row) = (60, |spring: f64, i: usize| {
+    ///     (0..60).map(move |j| f64::from(u8::from(i == j)) + if i.min(j) < 30 { 0.0 } else { spring })
+    /// });
+    /// let columns = (0..n).flat_map(|_| 0..n as i32).collect();
+    /// let values = (0..n).flat_map(|i| row(0.0, i)).collect();
+    /// let mut a = Matrix::from_csr(&session, 1, (0..=n as i32).map(|i| i * n as i32).collect(), columns, values)?;
+    /// a.set_spd()?;
+    /// let mut ksp = Ksp::new(&session, "")?;
+    /// ksp.set_operator(&a)?;
+    /// ksp.set_interpolation(&a, [&(0..=60).collect::<Vec<_>>(), &(0..60).map(|i| i / 2).collect::<Vec<_>>()], &[1.0; 60], 30)?;
+    /// ksp.set_from_options()?;
+    /// ksp.set_up()?;
+    /// ksp.set_reuse_preconditioner(true)?;
+    /// a.update(|values| (0..n).for_each(|i| (0..n).zip(row(1.0, i)).for_each(|(j, value)| values[n * i + j] = value)))?;
+    /// let (b, mut x) = ((0..n).map(|i| (i % 7) as f64).collect::<Vec<_>>(), vec![0.0; n]);
+    /// assert!(!ksp.solve(&b, &mut x)?.reason.converged());
+    /// ksp.renew_smoother(&a)?;
+    /// assert!(ksp.solve(&b, &mut x)?.reason.converged());
+    /// # Ok::<(), winkler::error::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// PETSc's; when there are no two levels.
+    pub fn renew_smoother(&self, matrix: &Matrix) -> Result<()> {
+        let (pc, mut smoother) = (self.pc()?, null_mut());
+        // SAFETY: the smoother belongs to the preconditioner, and takes references to the matrix it has already.
+        unsafe {
+            petsc!(PCMGGetSmoother(pc, 1, &mut smoother))?;
+            petsc!(KSPSetOperators(smoother, matrix.raw(), matrix.raw()))?;
+            petsc!(KSPSetUp(smoother))
+        }
+    }
 }

@@ -64,7 +64,7 @@ pub fn partition(ptr: &mut [i32], col: &mut [i32], weight: &mut [i32], parts: us
     let function = function(c"METIS_PartGraphKway").map_err(|error| {
         error
             .because("it deals the bodies out to several ranks")
-            .help("`apt-get install libmetis5`, or solve body by body: --method newton-robin")
+            .help("`apt-get install libmetis5`, or run on one rank")
     })?;
     let (mut count, mut constraints, mut wanted, mut cut) = (nodes as i32, 1, parts as i32, 0);
     let mut part = vec![-1; nodes];
@@ -93,7 +93,7 @@ pub fn partition(ptr: &mut [i32], col: &mut [i32], weight: &mut [i32], parts: us
     if code != 1 || part.iter().any(|&part| part as usize >= parts) {
         return Err(Error::new(Kind::Solver, "METIS returned no partition")
             .because(format!("METIS_PartGraphKway returned {code}"))
-            .help("solve body by body: --method newton-robin"));
+            .help("run on one rank"));
     }
     Ok(part)
 }

@@ -3,9 +3,10 @@
 //! Newton's method joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
 //! bodies then need no solver of their own. Else every body has one, and sweeps solve the linear steps.
 
+use super::deal::dealt_out;
 use super::plan::{DENSE, Plan, agree};
 use super::words::in_words;
-use crate::discretize::{Assembled, Factory, Graph, Outline};
+use crate::discretize::{Assembled, Deal, Factory, Graph, Outline};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Interpolation;
 use crate::fem::assemble::NodeGraph;
@@ -49,6 +50,8 @@ pub struct Inner<'a> {
     /// Seconds of set-up and iteration by the estimates that chose the solvers of bodies in space.
     seconds: Option<f64>,
     plans: Vec<Plan>,
+    /// Whether each body is dealt out over the ranks, where sweeps solve linear steps.
+    dealt: Vec<bool>,
     /// Place of each body in `plans`.
     places: HashMap<String, usize>,
     /// Condensed bodies that an earlier scene has left; `local` is there on the rank that owns it.
@@ -80,6 +83,7 @@ impl<'a> Inner<'a> {
             typed,
             seconds: None,
             plans: Vec::new(),
+            dealt: Vec::new(),
             places: HashMap::new(),
             kept: kept.into_iter().map(|slot| (slot.name.clone(), slot)).collect(),
         })
@@ -336,34 +340,40 @@ impl Factory for Inner<'_> {
                 preset::apply(&mut self.whole, Preset::Hypre, Some(smoother).filter(|_| is_quadratic));
             }
             Linear::Sweeps => {
-                for plan in &mut self.plans {
-                    let smoother = Some(Smoother::GaussSeidel).filter(|_| plan.order == Order::P2);
-                    preset::apply(&mut plan.chosen, plan.preset, smoother);
+                self.dealt = dealt_out(&self.plans, self.session.size());
+                for (plan, dealt) in self.plans.iter_mut().zip(&self.dealt) {
+                    let smoother = if *dealt { Smoother::Chebyshev } else { Smoother::GaussSeidel };
+                    preset::apply(&mut plan.chosen, plan.preset, Some(smoother).filter(|_| plan.order == Order::P2));
                 }
             }
         }
         Ok(())
     }
 
-    fn deal_out(&mut self, graph: &dyn Fn() -> Graph) -> Result<Option<Vec<u32>>> {
-        let ranks = self.session.size();
+    fn deal_out(&mut self, graph: &dyn Fn(&[usize]) -> Graph) -> Result<Vec<Deal>> {
+        let bodies = 0..self.plans.len();
         // a condensed body lives on one rank, and all of them can have what is left of it
         let is_whole = self.plans.iter().any(|plan| plan.preset == Preset::Condensed);
-        if ranks == 1 || is_whole || !matches!(self.linear, Linear::Direct | Linear::Multigrid) {
-            return Ok(None);
-        }
-        let mut owner = Ok(Vec::new());
-        if self.session.rank() == 0 {
-            let Graph { mut ptr, mut col, mut weight } = graph();
-            owner = partition(&mut ptr, &mut col, &mut weight, ranks);
-        }
-        let mut owner = agreed(self.session, owner)?;
-        let world = self.session.world();
-        let mut nodes = owner.len();
-        world.process_at_rank(0).broadcast_into(&mut nodes);
-        owner.resize(nodes, 0);
-        world.process_at_rank(0).broadcast_into(&mut owner[..]);
-        Ok(Some(owner))
+        let together: Vec<Vec<usize>> = match self.linear {
+            Linear::Sweeps => bodies.filter(|&body| self.dealt[body]).map(|body| vec![body]).collect(),
+            Linear::Direct | Linear::Multigrid if self.session.size() > 1 && !is_whole => vec![bodies.collect()],
+            _ => Vec::new(),
+        };
+        let deal = |bodies: Vec<usize>| {
+            let mut owner = Ok(Vec::new());
+            if self.session.rank() == 0 {
+                let Graph { mut ptr, mut col, mut weight } = graph(&bodies);
+                owner = partition(&mut ptr, &mut col, &mut weight, self.session.size());
+            }
+            let mut owner = agreed(self.session, owner)?;
+            let world = self.session.world();
+            let mut nodes = owner.len();
+            world.process_at_rank(0).broadcast_into(&mut nodes);
+            owner.resize(nodes, 0);
+            world.process_at_rank(0).broadcast_into(&mut owner[..]);
+            Ok(Deal { bodies, owner })
+        };
+        together.into_iter().map(deal).collect()
     }
 
     fn wants_interpolation(&self, name: &str) -> bool {
@@ -401,15 +411,19 @@ impl Factory for Inner<'_> {
             let first = if distribution.is_some() { 0 } else { whole.rows.columns };
             whole.append(&next, first);
         }
-        let modes: Vec<Vec<f64>> = match self.linear {
+        let mut modes: Vec<Vec<f64>> = match self.linear {
             Linear::Sweeps => motions.into_iter().map(|motion| motion.displacement).collect(),
             _ => Vec::new(),
         };
-        if let Some(distribution) = distribution {
-            return Ok(Box::new(SparseBody::<Krylov>::dealt_out(body, &rows, &left, distribution, words)));
+        if let Some(distribution) = &distribution {
+            modes.iter_mut().for_each(|mode| *mode = distribution.scatter(mode));
         }
         let make = move |stiffness: Rows| Krylov::new(&session, chosen, dimension, stiffness, &modes, levels);
-        Ok(Box::new(SparseBody::new(body, rows, &left, make, words)))
+        let body = SparseBody::new(body, rows, &left, make, words);
+        Ok(Box::new(match distribution {
+            Some(distribution) => body.dealt_out(distribution),
+            None => body,
+        }))
     }
 
     fn kept(&mut self, name: &str) -> Option<BodySlot> {

@@ -4,6 +4,7 @@
 pub mod asking;
 mod balance;
 pub mod clock;
+mod deal;
 pub mod inner;
 pub mod keep;
 pub mod measure;

@@ -17,7 +17,7 @@ use crate::interrupt::Interrupt;
 use crate::mesh::{Checked, Mesh, is_other};
 use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
-use crate::petsc::Session;
+use crate::petsc::{Session, give_back};
 use crate::problem::body::BodySpec;
 use crate::problem::mesh::MeshSource;
 use crate::problem::method::Linear;
@@ -56,10 +56,13 @@ pub fn build_with(
     clock: &mut Clock,
 ) -> Result<Built> {
     agree(session, options::refuse_log(session))?;
-    match scene.dimension.value {
+    let built = match scene.dimension.value {
         2 => build_in::<2>(session, scene, pieces::plane, kept, interrupt, clock),
         _ => build_in::<3>(session, scene, pieces::space, kept, interrupt, clock),
-    }
+    };
+    // solvers find the memory of the mesh free
+    give_back();
+    built
 }
 
 /// What [`build`] does where the dimension matters.
@@ -73,11 +76,12 @@ fn build_in<const D: usize>(
 ) -> Result<Built> {
     interrupt.hold();
     let stage = session.stage("mesh");
-    let mesh = mesh::<D>(session, &scene, interrupt)?;
+    let mut mesh = mesh::<D>(session, &scene, interrupt)?;
     let verified = agree(session, interrupt.release().and_then(|()| discretize::verify(&scene, &mesh)))?;
     clock.phase("mesh");
     drop(stage);
     let Verified { bodies, checked, .. } = verified;
+    mesh.forget_tags();
     let source = Source { session: session.clone(), scene, mesh, bodies, checked, cut };
     let history = &source.scene.method.steps;
     let begun = history.begun;

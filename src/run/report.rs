@@ -201,7 +201,7 @@ impl Shared {
         for slot in &discrete.model.bodies {
             let leader = slot.local.as_ref().filter(|body| body.leads());
             mine.solvers.push(leader.map_or(String::new(), |body| body.describe()));
-            mine.counts += slot.local.as_ref().map_or(BodyCounts::default(), |body| body.counts());
+            mine.counts += leader.map_or(BodyCounts::default(), |body| body.counts());
         }
         share(&*discrete.model.exchange, &mine).into_iter().reduce(Self::with).unwrap_or_default()
     }

@@ -77,9 +77,7 @@ impl Krylov {
             matrix.set_near_null_space(near_null_space)?;
         }
         let multigrid = matches!(ksp.pc_type().as_str(), "hypre" | "gamg" | "ml" | "mg") && ksp.ksp_type() != "preonly";
-        // PETSc's own smoothers see every change of G, but bounds of eigenvalues are those of the set-up: only Gauss-Seidel bears that
-        let is_bounded = ksp.pc_type() == "mg" && chosen.get("mg_levels_ksp_type") != Some("richardson");
-        let keeps = multigrid && !is_bounded && chosen.get("ksp_reuse_preconditioner").is_none();
+        let keeps = multigrid && chosen.get("ksp_reuse_preconditioner").is_none();
         let free = ksp.ksp_type() != "preonly" && chosen.typed("ksp_rtol").is_none();
         let session = session.clone();
         Ok(Self {
@@ -100,11 +98,6 @@ impl Krylov {
         })
     }
 
-    /// G, for products that leave it as it is.
-    pub fn matrix_mut(&mut self) -> &mut Matrix {
-        &mut self.matrix
-    }
-
     /// A solve, timed and counted.
     fn timed(&mut self, solve: impl FnOnce(&Ksp) -> Result<crate::petsc::Solved>) -> Result<Solved> {
         self.set_up()?;
@@ -119,7 +112,7 @@ impl Krylov {
     }
 
     /// Layers of the graph of G around dofs that are solved exactly: hypre smooths with the matrix of the set-up, and one layer does what it
-    /// cannot; Gauss-Seidel of two levels has G itself.
+    /// cannot; smoothers of two levels have G itself.
     fn layers(&self) -> usize {
         usize::from(self.ksp.pc_type() != "mg")
     }
@@ -150,6 +143,10 @@ impl Krylov {
         }
         self.stale |= self.set_ups == 0;
         if !self.stale && self.patch(&(change.far)())? {
+            if self.ksp.pc_type() == "mg" {
+                // smoothers of PETSc see every change of G, but bounds of eigenvalues are those of their set-up
+                self.chosen.lend(&self.session, || self.ksp.renew_smoother(&self.matrix))?;
+            }
             return Ok(Seen::Older);
         }
         self.stale = true;
@@ -173,6 +170,12 @@ impl Krylov {
 }
 
 impl InnerSolver for Krylov {
+    const HAS_ROWS: bool = true;
+
+    fn matrix_mut(&mut self) -> Option<&mut Matrix> {
+        Some(&mut self.matrix)
+    }
+
     fn update(&mut self, change: Change) -> Result<Seen> {
         self.ksp.unwrap()?;
         self.matrix.update(change.write)?;

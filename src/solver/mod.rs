@@ -30,12 +30,15 @@ pub use split::Split;
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::Solved;
-use crate::petsc::{Enough, Int, Rows, Subspace};
+use crate::petsc::{Enough, Int, Matrix, Rows, Subspace};
 
-/// A whole matrix as PETSc's.
-fn rows(matrix: Csr) -> Result<Rows> {
-    let Csr { ptr, col, values, .. } = matrix;
-    Rows::all(integers(ptr), integers(col), values)
+/// A whole matrix as PETSc's, or the rows of this rank from number `start` on.
+fn rows(matrix: Csr, start: Option<usize>) -> Result<Rows> {
+    let Csr { columns, ptr, col, values } = matrix;
+    match start {
+        None => Rows::all(integers(ptr), integers(col), values),
+        Some(start) => Rows::of_process(start, columns, integers(ptr), integers(col), values),
+    }
 }
 
 /// A pattern in PETSc's integers; where these have 32 bits, the array itself.
@@ -69,6 +72,14 @@ pub enum Seen {
 
 /// Owner of the matrix G with a way to solve G z = r.
 pub trait InnerSolver {
+    /// Whether it has G in rows, with which K can be applied: nobody else needs K then.
+    const HAS_ROWS: bool = false;
+
+    /// G, for products that leave it as it is, of a solver that has it in rows.
+    fn matrix_mut(&mut self) -> Option<&mut Matrix> {
+        None
+    }
+
     /// Changes values of G; the next solve uses the new matrix.
     ///
     /// # Errors

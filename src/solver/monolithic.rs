@@ -4,7 +4,7 @@
 //! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Of bodies that are dealt out over ranks each
 //! rank has its rows; of bodies that live whole on several ranks, condensed ones, every rank has the matrix and solves for itself.
 
-use super::{Coarse, InnerSolver, Krylov, RobinMatrix, integers};
+use super::{Coarse, InnerSolver, Krylov, RobinMatrix};
 use crate::error::Result;
 use crate::linalg::{Csr, axpy, countable, dot};
 use crate::model::linear::{Failure, LinearStep, Solution, Solved, System, Trial};
@@ -210,10 +210,7 @@ impl Joint for Joined<Krylov> {
     fn multiply(&mut self, states: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let x = self.whole(states);
         let mut y = vec![0.0; x.len()];
-        if self.matrix.multiply_stiffness(&self.rows, &x, &mut y).is_err() {
-            // the run ends with the first number that is none
-            y.fill(f64::NAN);
-        }
+        self.matrix.multiply_stiffness(&self.rows, &x, &mut y);
         let of_body = |(part, state): (Range<usize>, &Vec<f64>)| {
             let mut product = y[part].to_vec();
             product.resize(state.len(), 0.0);
@@ -230,14 +227,7 @@ impl<S: InnerSolver> Monolithic<S> {
     /// Those of `make`.
     pub fn new(union: Union, make: impl FnOnce(Rows) -> Result<S>) -> Result<Self> {
         let Union { stiffness, rows, offset, start, row_stiffness, coarse, is_redundant } = union;
-        let stiffness = match start {
-            None => super::rows(stiffness)?,
-            Some(start) => {
-                let Csr { columns: total, ptr, col, values } = stiffness;
-                Rows::of_process(start, total, integers(ptr), integers(col), values)?
-            }
-        };
-        let matrix = RobinMatrix::new(stiffness, &rows, row_stiffness, make)?.with_coarse(coarse);
+        let matrix = RobinMatrix::new(super::rows(stiffness, start)?, &rows, row_stiffness, make)?.with_coarse(coarse);
         Ok(Self {
             joined: Rc::new(RefCell::new(Joined { matrix, rows, offset, first: start.unwrap_or(0) })),
             is_redundant,

@@ -1,6 +1,6 @@
 //! The matrix of a linear system with springs at contact points, G = K + B' diag(d) B, and what solves it.
 
-use super::{Change, Coarse, InnerSolver, Krylov, Seen};
+use super::{Change, Coarse, InnerSolver, Seen};
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::{BodyCounts, Solved};
@@ -119,6 +119,19 @@ impl<S: InnerSolver> RobinMatrix<S> {
         Ok(solved)
     }
 
+    /// y = K x, by G with the springs taken out meanwhile; numbers that are none if PETSc fails, with which the run ends. The solver has G in
+    /// rows.
+    pub fn multiply_stiffness(&mut self, rows: &Csr, x: &[f64], y: &mut [f64]) {
+        let (coupling, weight) = (&self.coupling, &self.weight);
+        let product = self
+            .solver
+            .matrix_mut()
+            .map(|matrix| matrix.multiply_changed(|g| coupling.reset(g), |g| coupling.write(rows, weight, g), x, y));
+        if !matches!(product, Some(Ok(()))) {
+            y.fill(f64::NAN);
+        }
+    }
+
     /// What was done so far.
     pub fn counts(&self) -> BodyCounts {
         let made = self.solver.factorizations();
@@ -143,18 +156,6 @@ impl<S: InnerSolver> RobinMatrix<S> {
     /// The solver, for what does not change G.
     pub fn solver_mut(&mut self) -> &mut S {
         &mut self.solver
-    }
-}
-
-impl RobinMatrix<Krylov> {
-    /// y = K x, by G with the springs taken out meanwhile.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    pub fn multiply_stiffness(&mut self, rows: &Csr, x: &[f64], y: &mut [f64]) -> Result<()> {
-        let (coupling, weight) = (&self.coupling, &self.weight);
-        let matrix = self.solver.matrix_mut();
-        matrix.multiply_changed(|g| coupling.reset(g), |g| coupling.write(rows, weight, g), x, y)
     }
 }
 

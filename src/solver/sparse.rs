@@ -15,11 +15,11 @@ pub struct SparseBody<S> {
     body: ElasticBody,
     rows: Csr,
     split: Split,
-    /// Where its dofs are dealt out over the ranks: how. K and B have the dofs of this rank then, K with the columns of the matrix of all
-    /// bodies.
+    /// Where its dofs are dealt out over the ranks: how. K and B have the dofs of this rank then, K with the columns of the matrix that its
+    /// rows are in.
     distribution: Option<Rc<Distribution>>,
     robin: Lazy<S>,
-    /// Diagonal and sum of magnitudes of each row of K, if it was given away.
+    /// Diagonal and sum of magnitudes of each row of K, if the solver has it or it was given away.
     sizes: Vec<[f64; 2]>,
 }
 
@@ -65,19 +65,12 @@ impl<S: InnerSolver> SparseBody<S> {
         Self { body, rows, split, distribution: None, robin, sizes: Vec::new() }
     }
 
-    /// The part of this rank of a body that has no solver of its own; `body` has the dofs of this rank ([`Distribution`]), `rows` and
-    /// `free` those of all.
-    pub fn dealt_out(
-        body: ElasticBody,
-        rows: &Csr,
-        free: &[FreeMotion],
-        distribution: Distribution,
-        words: String,
-    ) -> Self {
+    /// The part of this rank, of a body made of its own dofs and of contact rows and motions of all dofs. Its matrix, if it gets one of its
+    /// own, is one of all ranks.
+    pub fn dealt_out(self, distribution: Distribution) -> Self {
         let distribution = Rc::new(distribution);
-        let split = Split::new(free, rows).dealt_out(distribution.clone());
-        let (rows, robin) = (distribution.of_rows(rows), Lazy::Later { make: None, words });
-        Self { body, rows, split, distribution: Some(distribution), robin, sizes: Vec::new() }
+        let split = self.split.dealt_out(distribution.clone());
+        Self { rows: distribution.of_rows(&self.rows), split, distribution: Some(distribution), ..self }
     }
 
     /// Takes other loads on the same K; their work on the motions that its supports leave is in `free`.
@@ -108,15 +101,32 @@ impl<S: InnerSolver> SparseBody<S> {
         if let Lazy::Later { make, .. } = &mut self.robin
             && let Some(make) = make.take()
         {
-            let stiffness = &self.body.stiffness;
-            let row_stiffness = self.rows.quadratic_diagonal(stiffness);
-            let matrix = RobinMatrix::new(super::rows(stiffness.clone())?, &self.rows, row_stiffness, make)?;
+            let stiffness = if S::HAS_ROWS { self.take_stiffness() } else { self.body.stiffness.clone() };
+            let diagonal = |i: usize| self.sizes.get(i).map_or_else(|| stiffness.diagonal(i), |sizes| sizes[0]);
+            let square = |q: usize| self.rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum();
+            let mut row_stiffness: Vec<f64> = (0..self.rows.rows()).map(square).collect();
+            let (mut start, mut rows) = (None, &self.rows);
+            if let Some(distribution) = &self.distribution {
+                distribution.exchange.sum(&mut row_stiffness);
+                (start, rows) = (Some(distribution.start), &distribution.rows);
+            }
+            let matrix = RobinMatrix::new(super::rows(stiffness, start)?, rows, row_stiffness, make)?;
             self.robin = Lazy::Now(Box::new(matrix));
         }
         match &mut self.robin {
             Lazy::Now(robin) => Ok(robin),
             Lazy::Later { .. } => Err(Error::new(Kind::Solver, "an inner solver could not be made")),
         }
+    }
+
+    /// K, of which diagonal and sizes stay.
+    fn take_stiffness(&mut self) -> Csr {
+        let k = std::mem::replace(&mut self.body.stiffness, Csr::new(0));
+        let first = self.distribution.as_ref().map_or(0, |distribution| distribution.first);
+        let diagonal = |i: usize| k.position(i, first + i).map_or(0.0, |at| k.values[at]);
+        let sizes = |i: usize| [diagonal(i), k.row(i).map(|(_, a)| a.abs()).sum()];
+        self.sizes = (0..k.rows()).map(sizes).collect();
+        k
     }
 
     /// G, if it was made.
@@ -182,7 +192,11 @@ impl<S: InnerSolver> Body for SparseBody<S> {
 
     fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
         let n = self.dofs();
-        self.body.stiffness.multiply(&u[..n], &mut y[..n]);
+        let rows = self.distribution.as_ref().map_or(&self.rows, |distribution| &distribution.rows);
+        match &mut self.robin {
+            Lazy::Now(robin) if S::HAS_ROWS => robin.multiply_stiffness(rows, &u[..n], &mut y[..n]),
+            _ => self.body.stiffness.multiply(&u[..n], &mut y[..n]),
+        }
         y[n..].fill(0.0);
     }
 
@@ -190,18 +204,14 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         if self.made().is_some() {
             return None;
         }
-        let k = std::mem::replace(&mut self.body.stiffness, Csr::new(0));
-        let first = self.distribution.as_ref().map_or(0, |distribution| distribution.first);
-        let diagonal = |i: usize| k.position(i, first + i).map_or(0.0, |at| k.values[at]);
-        let sizes = |i: usize| [diagonal(i), k.row(i).map(|(_, a)| a.abs()).sum()];
-        self.sizes = (0..k.rows()).map(sizes).collect();
-        Some(k)
+        Some(self.take_stiffness())
     }
 
     fn robin(&mut self, weight: &[f64]) -> Result<()> {
         self.robin_matrix()?;
+        let rows = self.distribution.as_ref().map_or(&self.rows, |distribution| &distribution.rows);
         match &mut self.robin {
-            Lazy::Now(robin) => robin.update(&self.rows, weight),
+            Lazy::Now(robin) => robin.update(rows, weight),
             Lazy::Later { .. } => Ok(()),
         }
     }

@@ -4,12 +4,12 @@ use super::cells::{Cells, NONE};
 use super::faces::Faces;
 use crate::error::Result;
 
-/// The part of each cell, numbered 0, 1, ... in the order of their first cells.
+/// What hangs together, numbered 0, 1, ... in the order of their first cells.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Parts {
     /// Number of parts.
     pub count: usize,
-    /// Part of each cell.
+    /// Part of each cell; none where all are one.
     pub of_cell: Vec<u32>,
 }
 
@@ -21,8 +21,11 @@ pub fn parts<const D: usize>(cells: &Cells<D>, faces: &Faces<D>) -> Result<Parts
     let mut joined = Joined::new(cells.count());
     faces.inner().for_each(|[a, b]| joined.join(a.cell, b.cell));
     let parts = joined.classes();
+    if parts.count == 1 {
+        return Ok(Parts { of_cell: Vec::new(), ..parts });
+    }
     let mut first = vec![NONE; cells.points.len()];
-    for cell in 0..if parts.count > 1 { cells.count() } else { 0 } {
+    for cell in 0..cells.count() {
         for &node in cells.cell(cell) {
             let first = &mut first[node as usize];
             if *first == NONE {

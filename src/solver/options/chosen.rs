@@ -131,6 +131,14 @@ impl Chosen {
         self.choices.iter().any(|(name, choice)| choice.origin != Origin::Default && name.starts_with(family))
     }
 
+    /// Options that the user wrote whose names end so, with their values.
+    pub fn typed_that_end<'a>(&'a self, end: &'a str) -> impl Iterator<Item = (&'a str, &'a str)> {
+        let typed = self.choices.iter().filter(|(_, choice)| choice.origin != Origin::Default);
+        typed
+            .filter(move |(name, _)| name.ends_with(end))
+            .map(|(name, choice)| (&name[..], choice.value.as_deref().unwrap_or_default()))
+    }
+
     /// Whether the user wrote an option that this solver has.
     pub fn has_typed(&self) -> bool {
         self.choices.values().any(|choice| choice.origin != Origin::Default)
