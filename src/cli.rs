@@ -89,7 +89,7 @@ enum Command {
         /// Folder of results
         #[arg(value_name = "DIR")]
         folder: PathBuf,
-        /// What to draw: stress, displacement, pressure or convergence
+        /// What to draw: stress, displacement, pressure, convergence, or area (in contact, over the force at load steps)
         #[arg(value_name = "WHAT")]
         what: String,
         /// File to write, .svg or .png [default: WHAT.svg in the folder]

@@ -218,7 +218,7 @@ fn discs() {
                 assert!(error < 1e-11, "{what}: {norm} {error} of body {body}");
             }
         }
-        close("area", run.number("pairs/0/contact_length"), PI, 1e-12);
+        close("area", run.number("pairs/0/contact_area"), PI, 1e-12);
         let forces = run.forces(0);
         close("force", forces[1][1], 10.0 * PI, 1e-11);
         assert!((forces[0][1] + forces[1][1]).abs() < 1e-12 && forces[0][0] == 0.0, "{what}: {forces:?}");
@@ -328,7 +328,7 @@ fn tubes_in_contact() {
     for p in &run.contact()["pressure"] {
         close("pressure", *p, 8.985_959_438, 1e-4);
     }
-    close("area", run.number("pairs/0/contact_length"), 2.0 * PI, 1e-12);
+    close("area", run.number("pairs/0/contact_area"), 2.0 * PI, 1e-12);
     assert_eq!(run.forces(0), [[0.0; 3]; 2]);
     // what is said before the first sweep knows of the load all the same
     let check = winkler(&["check", &scene.path.display().to_string()]);
@@ -344,7 +344,7 @@ fn tubes_in_contact() {
 fn hertz() {
     let run = solved(case("hertz-sphere"), &[]);
     close("peak", run.number("pairs/0/peak_pressure"), 279.83, 0.01);
-    close("radius", (run.number("pairs/0/contact_length") / PI).sqrt(), 1.0, 0.02);
+    close("radius", (run.number("pairs/0/contact_area") / PI).sqrt(), 1.0, 0.02);
     // where c = 0 between two points, without the decision to which of them the edge belongs
     close("edge", run.number("pairs/0/contact_ends/0/0"), 1.0, 0.005);
     close("force", run.forces(0)[1][1], 586.081, 1e-8);

@@ -148,6 +148,34 @@ fn curved_surfaces_are_seen() {
     }
 }
 
+/// A quarter of a ring pressed down, or a dome of revolution under pressure, on a column: quadratic elements with straight edges miss the curved boundaries, all of which are away
+/// from the contact. The reference has curved ones, and twice as many.
+#[test]
+fn straight_edges_away_from_the_contact_are_seen() {
+    let pressed = "fix = [{ on = \"arch_top\", x = 0, y = -1e-3 }]";
+    let loaded = "load = [{ on = \"arch_outside\", pressure = 10 }]";
+    for (plane, pushed) in [("strain", pressed), ("axisymmetric", loaded)] {
+        let scene = Scene::new(format!(
+            "dimension = 2\nplane = \"{plane}\"\nestimate = true\nmesh = {{ geo = \"{}\" }}\n\
+             [[body]]\nname = \"arch\"\nyoung = 2e5\npoisson = 0.3\norder = 2\n{pushed}\n\
+             [[body]]\nname = \"column\"\nyoung = 2e5\npoisson = 0.3\norder = 2\n\
+             fix = [{{ on = \"column_bottom\", x = 0, y = 0 }}]\n\
+             [[contact]]\nbetween = [\"arch_foot\", \"column_top\"]\nlayer = {{ linear = {{ stiffness = 1e6 }} }}\n\
+             [output]\nvtu = false\nplots = false\n",
+            root().join("tests/curved/arch.geo").display()
+        ));
+        let run = |n: usize, straight: usize| {
+            solve_with(&scene, &[format!("mesh.set.n={n}"), format!("mesh.set.straight={straight}")])
+        };
+        let better = run(12, 0);
+        for n in [3, 4, 6] {
+            let run = run(n, 1);
+            let exact = distance_from(&run.contact(), &better.contact());
+            is_effective(run.number("discretization_error/pressure/0"), exact, &format!("{plane}, n = {n}"));
+        }
+    }
+}
+
 /// A load that bends within an element: what its quadrature misses presses or lacks.
 #[test]
 fn quadrature_of_loads_is_seen() {

@@ -164,7 +164,7 @@ fn shapes_are_meshed() {
         let fine = solved(&name, &text, &format!("{{ geo = \"{name}\", size = 0.2 }}"), &NUMBERED).converged();
         assert!(fine.count("dofs") > 3 * coarse.count("dofs"), "{format}");
         assert!((fine.number("pairs/0/force/0/2") + 10.0).abs() < 1e-9, "{format}");
-        assert!((fine.number("pairs/0/contact_length") - 1.0).abs() < 1e-9, "{format}");
+        assert!((fine.number("pairs/0/contact_area") - 1.0).abs() < 1e-9, "{format}");
     }
     // the surface of a cube, twelve triangles: its volume is 1
     let corners = |n: usize| [n & 1, n >> 1 & 1, n >> 2 & 1].map(|c| c.to_string()).join(" ");

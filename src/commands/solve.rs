@@ -160,7 +160,8 @@ fn steps(folder: &Folder, ready: &Ready) -> Result<Option<StepTable>> {
         return Ok(None);
     }
     let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
-    let mut table = StepTable::create(folder, &history.names, &pairs, &reactions, built.scene.dimension.value)?;
+    let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
+    let mut table = StepTable::create(folder, &history.names, &pairs, &reactions, dimension, measure)?;
     ready.steps.iter().for_each(|step| table.row(&history.names, step));
     Ok(Some(table))
 }

@@ -4,7 +4,7 @@ use super::{curves, folder_of, reuse, said};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
-use crate::output::steps::{vector_columns, vector_fields};
+use crate::output::steps::{contact_column, vector_columns, vector_fields};
 use crate::output::{
     ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, Verbosity, busiest, progress, say, sci,
 };
@@ -196,7 +196,7 @@ fn label(axes: &[(String, Vec<String>)], values: &[String]) -> String {
 
 fn header(axes: &[(String, Vec<String>)], built: &Built) -> Vec<String> {
     let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
-    let dimension = built.scene.dimension.value;
+    let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
     let mut header: Vec<String> = axes.iter().map(|(key, _)| key.clone()).collect();
     let columns = [
         "status",
@@ -213,7 +213,7 @@ fn header(axes: &[(String, Vec<String>)], built: &Built) -> Vec<String> {
     ];
     header.extend(columns.map(str::to_owned));
     for pair in &pairs {
-        header.extend(["peak_pressure", "contact_length", "layer_energy"].map(|what| format!("{what} {pair}")));
+        header.extend(["peak_pressure", &contact_column(measure), "layer_energy"].map(|what| format!("{what} {pair}")));
         header.extend(vector_columns("force", pair, dimension));
         header.push(format!("approach {pair}"));
     }
@@ -232,7 +232,7 @@ fn line(values: &[String], report: &Report, dimension: usize) -> Vec<String> {
     line.push(report.dofs.to_string());
     line.push(number(report.times.get("total").copied()));
     for pair in &report.pairs {
-        line.extend([pair.peak_pressure, pair.contact_length, pair.layer_energy].map(|value| format!("{value:?}")));
+        line.extend([pair.peak_pressure, pair.extent.contact(), pair.layer_energy].map(|value| format!("{value:?}")));
         line.extend(vector_fields(&pair.force[0], dimension));
         line.push(number(pair.approach));
     }

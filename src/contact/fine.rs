@@ -18,7 +18,7 @@ pub struct Fine<const D: usize> {
     pub weight: Vec<f64>,
     /// Gap of each point: distance of the meshes along the normal, and the scene's own gap.
     pub gap: Vec<f64>,
-    /// Size of the facet of side a under each point: its length, or the root of its area.
+    /// Size of the facet of side a under each point: its length, or the side of the square that two such triangles make.
     pub size: Vec<f64>,
     /// Unit normal from side a to side b at each point.
     pub normal: Vec<[f64; D]>,
@@ -86,7 +86,8 @@ impl<const D: usize> Fine<D> {
                 let rounding = 1e-12 * length(a.area(point.facet_a));
                 let distance = if point.gap.abs() < rounding { 0.0 } else { point.gap };
                 fine.gap.push(distance + gap(super::pad(from)));
-                fine.size.push(length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
+                let sides = (D - 1) as f64;
+                fine.size.push((sides * length(a.area(point.facet_a))).powf(1.0 / sides));
                 fine.normal.push(normal);
                 let row = |values: [f64; element::MOST]| {
                     let of_point = |(node, value): (&u32, f64)| point_of.get(node).map(|&q| (q, value));

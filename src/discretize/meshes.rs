@@ -68,7 +68,8 @@ pub trait Recovered {
     /// Squared energy norm of recovered minus discrete stress, for each cell.
     fn energy_errors(&self) -> Vec<f64>;
 
-    /// Residual of the interpolation error at all nodes, see [`Recovery::interpolation_residual`].
+    /// Residual at all nodes of the interpolation error, see [`Recovery::interpolation_residual`], and of what straight facets miss of a
+    /// curved boundary, see [`Recovery::add_strip`].
     fn interpolation_residual(&self) -> Vec<f64>;
 
     /// Outer normal displacement at the integration points of a side of a pair, the interpolation error added.
@@ -218,7 +219,10 @@ impl<const D: usize> Recovered for OnBody<'_, D> {
     }
 
     fn interpolation_residual(&self) -> Vec<f64> {
-        self.recovery.interpolation_residual(&|cell, x, strain| self.stress(cell, x, strain))
+        let law = |cell, x, strain: &[f64; 6]| self.stress(cell, x, strain);
+        let mut residual = self.recovery.interpolation_residual(&law);
+        self.recovery.add_strip(&law, &mut residual);
+        residual
     }
 
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {

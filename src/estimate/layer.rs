@@ -17,9 +17,8 @@ impl LayerError {
     /// That of a pair with contact points `range`; `giving` is what the recovered displacements of both bodies close at each
     /// integration point, `beyond` what the compression of each contact point lacks as a mean.
     ///
-    /// With s the compliance of the bodies to a pressure that changes within a facet, the state c + s p is interpolated, and the law meets
-    /// it at the place (c_h, p_h). Under a soft layer the state is the compression; under a stiff one it is the pressure inside the
-    /// contact and the gap outside, and contact ends where it vanishes.
+    /// The recovered displacements belong to the pressures of the contact points, interpolated. With s the compliance of the bodies to a
+    /// pressure that changes within a facet, a pressure p there leaves the compression c* - s (p - p_i), and the law meets this line.
     pub fn new(
         pair: &ContactPair,
         points: &FinePoints,
@@ -42,32 +41,26 @@ impl LayerError {
                 let largest = || carriers().map(|(q, _)| value(q)).fold(f64::NEG_INFINITY, f64::max);
                 if is_whole { curve } else { curve.min(largest()) }
             };
-            let at = |c: f64| pair.law.response(nearest, c).pressure;
-            let state = between(&|q| compression[q] + compliance * pressure[q]);
-            let c_h = pair.law.meet(nearest, state, 1.0 / compliance);
-            let p_h = at(c_h);
-            let off = giving - points.gap[g] - between(&|q| compression[q] + beyond[q]);
-            let rise = at(c_h + off) - p_h;
-            let slope = if off == 0.0 { 0.0 } else { rise / off };
-            let of_layer = weight_of_layer(slope * compliance);
-            error.energy += points.weight[g] * of_layer * rise * off;
-            // between closed points p_h is made of nodal pressures alone, with their noise
-            let of_state = if is_whole {
-                of_layer
-            } else {
-                let along = carriers().map(|(q, _)| tangent[q]).fold(0.0, f64::max) * compliance;
-                weight_of_layer(along / (1.0 + along))
+            let met = |state: f64| {
+                let c = pair.law.meet(nearest, state, 1.0 / compliance);
+                (c, pair.law.response(nearest, c).pressure)
             };
+            let (c_h, p_h) = met(between(&|q| compression[q] + compliance * pressure[q]));
+            let lacking: f64 = carriers().map(|(q, share)| share * beyond[q]).sum();
+            let here = giving - points.gap[g] - lacking;
+            let (c, p) = met(here + compliance * between(&|q| pressure[q]).max(0.0));
+            error.energy += points.weight[g] * (p - p_h) * (c - c_h);
             let discrete: f64 = points.pressing.row(g).map(|(q, mu)| mu * pressure[q]).sum();
-            error.pressure.push(discrete + of_state * (p_h - discrete) + of_layer * rise);
+            let stiffness = carriers().map(|(q, _)| tangent[q]).fold(0.0, f64::max) * compliance;
+            error.pressure.push(if is_whole { discrete + weight_of_law(stiffness) * (p - discrete) } else { p });
         }
         error
     }
 }
 
-/// Weight of a pressure that follows from a compression or a state, beside the one of the discrete problem: where displacements miss
-/// e, the first misses `slope` e and the second e over the compliance of the bodies. The mean of the two with the least variance has
-/// weights as one over their squares. `stiffness` is the slope times the compliance.
-fn weight_of_layer(stiffness: f64) -> f64 {
+/// Weight of the law's pressure beside that of the discrete problem, in a facet whose points are all closed: where displacements miss e, the law
+/// misses kappa e, as c* and p_i do together, and equilibrium e/s. The mean of the two with the least variance has weights as one over
+/// their squares. `stiffness` is s kappa.
+fn weight_of_law(stiffness: f64) -> f64 {
     1.0 / (1.0 + stiffness * stiffness)
 }

@@ -7,6 +7,7 @@
 
 mod bubble;
 mod patch;
+mod strip;
 #[cfg(test)]
 mod tests;
 
@@ -111,29 +112,29 @@ impl<'a, const D: usize> Recovery<'a, D> {
         }
     }
 
-    /// The recovered gradient in a cell with these vertices, at barycentric coordinates and the point there.
-    fn blend<const N: usize>(&self, vertices: &'a [u32]) -> impl Fn(&[f64; N], &[f64; D]) -> Slope<D> + '_ {
-        // the gradient of a parabola is linear, and so are coordinates in linear elements
-        let is_linear = self.space.order == Order::P1 && !self.space.axisymmetric;
-        let corner = |node: u32| -> [Slope<D>; N] {
-            std::array::from_fn(|k| {
-                let at = &self.space.nodes[vertices[k] as usize];
-                Slope { h: self.patch(node).slope_of_parabola(&self.monomials, at), hoop: 0.0 }
-            })
-        };
-        let corners: Vec<[Slope<D>; N]> =
-            if is_linear { vertices.iter().map(|&node| corner(node)).collect() } else { Vec::new() };
-        move |l, at| {
-            let mut sum = Slope::ZERO;
-            for (k, &node) in vertices.iter().enumerate() {
-                if is_linear {
-                    (0..N).for_each(|m| sum.add(l[k] * l[m], &corners[k][m]));
-                } else {
-                    sum.add(l[k], &self.recovered(node, at));
+    /// Strain of the recovered displacement less the discrete one in a cell, as products l_k l_m have it, k <= m: the gradient of a parabola is linear,
+    /// coordinates are so in linear elements, and all products sum to one.
+    fn strain_errors<const N: usize>(&self, cell: &[u32], gradient: &[[f64; D]]) -> Vec<[f64; 6]> {
+        let discrete = self.space.slope(cell, &[0.0; D], &[], gradient, self.displacement);
+        let corners: [[f64; D]; N] = std::array::from_fn(|k| self.space.nodes[cell[k] as usize]);
+        let slopes = cell.iter().map(|&node| {
+            let patch = self.patch(node);
+            corners.map(|at| patch.slope_of_parabola(&self.monomials, &at))
+        });
+        let slopes: Vec<[[[f64; D]; D]; N]> = slopes.collect();
+        let mut errors = Vec::with_capacity(N * (N + 1) / 2);
+        for k in 0..N {
+            for m in k..N {
+                let mut slope = Slope { h: slopes[k][m], hoop: 0.0 };
+                slope.add(-1.0, &discrete);
+                if m > k {
+                    slope.add(1.0, &Slope { h: slopes[m][k], hoop: 0.0 });
+                    slope.add(-1.0, &discrete);
                 }
+                errors.push(slope.strain());
             }
-            sum
         }
+        errors
     }
 
     /// Gradient of the polynomial of a vertex.
@@ -152,19 +153,36 @@ impl<'a, const D: usize> Recovery<'a, D> {
 
     fn energy_errors_on<const N: usize>(&self, law: Law<D>) -> Vec<f64> {
         let rule = quadrature::simplex::<N>(5);
+        let is_linear = self.space.order == Order::P1 && !self.space.axisymmetric;
+        let density = |index: usize, at: [f64; D], strain: &[f64; 6]| -> f64 {
+            law(index, at, strain).iter().zip(strain).map(|(s, e)| s * e).sum()
+        };
         let of_cell = |index: usize| {
             let (cell, x) = (self.cell(index), self.space.cell_nodes(index));
-            let blend = self.blend::<N>(&cell[..N]);
             let mut sum = 0.0;
+            if is_linear {
+                let Some((gradient, measure)) = element::gradients::<D, N>(Order::P1, &x, &rule.points[0]) else {
+                    return 0.0;
+                };
+                let errors = self.strain_errors::<N>(cell, &gradient[..N]);
+                for (l, weight) in rule.points.iter().zip(&rule.weights) {
+                    let products = (0..N).flat_map(|k| (k..N).map(move |m| l[k] * l[m]));
+                    let mut strain = [0.0; 6];
+                    for (product, error) in products.zip(&errors) {
+                        (0..6).for_each(|i| strain[i] += product * error[i]);
+                    }
+                    sum += weight * measure * density(index, interpolate(&x, l), &strain);
+                }
+                return sum;
+            }
             for (l, weight) in rule.points.iter().zip(&rule.weights) {
                 let Some((gradient, measure)) = element::gradients::<D, N>(self.space.order, &x, l) else { continue };
                 let phi = element::values(self.space.order, l);
                 let at = interpolate(&x, &phi);
-                let mut difference = blend(l, &at);
+                let mut difference = Slope::ZERO;
+                l.iter().zip(cell).for_each(|(l, &node)| difference.add(*l, &self.recovered(node, &at)));
                 difference.add(-1.0, &self.space.slope(cell, &at, &phi, &gradient, self.displacement));
-                let strain = difference.strain();
-                let density: f64 = law(index, at, &strain).iter().zip(strain).map(|(s, e)| s * e).sum();
-                sum += weight * measure * self.space.circle(&at) * density;
+                sum += weight * measure * self.space.circle(&at) * density(index, at, &difference.strain());
             }
             sum
         };

@@ -83,7 +83,7 @@ fn write(out: &mut dyn Write, pairs: &[PairReport], rows: &[PairRow]) -> io::Res
         let counts = [pair.points, row.closed].map(|count| count.to_string());
         let [force, _] = pair.force;
         let numbers = force.into_iter().chain([pair.peak_pressure]).chain(pair.peak_at);
-        let numbers = numbers.chain([pair.contact_length, pair.open_length]).chain(row.gap).chain(row.opening);
+        let numbers = numbers.chain([pair.extent.contact(), pair.extent.open()]).chain(row.gap).chain(row.opening);
         let numbers = numbers.chain([pair.layer_energy]).map(field);
         csv.write_record(names.chain(counts).chain(numbers).chain([row.table.clone(), row.plot.clone()]))?;
     }
@@ -93,6 +93,7 @@ fn write(out: &mut dyn Write, pairs: &[PairReport], rows: &[PairRow]) -> io::Res
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::Extent;
 
     #[test]
     fn a_row_has_means_by_weight_and_stands_under_its_columns() {
@@ -105,8 +106,7 @@ mod tests {
             force: [[1.0, 2.0, 3.0], [-1.0, -2.0, -3.0]],
             peak_pressure: 4.0,
             peak_at: [5.0, 6.0, 7.0],
-            contact_length: 8.0,
-            open_length: 9.0,
+            extent: Extent::Area { contact_area: 8.0, open_area: 9.0 },
             layer_energy: 10.0,
             ..PairReport::default()
         };

@@ -55,7 +55,7 @@ pub use report::{
     PairReport, Report, RoundReport, busiest,
 };
 pub use rows::RowFile;
-pub use steps::{ReactionReport, StepPairReport, StepReport, StepTable};
+pub use steps::{Extent, ReactionReport, StepPairReport, StepReport, StepTable};
 #[cfg(feature = "cli")]
 pub use table::{IterationTable, Verbosity};
 pub use vtu::{BodyField, CellKind, Grid};

@@ -2,7 +2,7 @@
 
 use super::format::{sci, seconds};
 use super::largest::largest;
-use super::steps::StepReport;
+use super::steps::{Extent, StepReport};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -283,10 +283,9 @@ pub struct PairReport {
     pub peak_pressure: f64,
     /// Where it is (x, y, z).
     pub peak_at: [f64; 3],
-    /// Length (area) with c > 0.
-    pub contact_length: f64,
-    /// Length (area) that is covered by both surfaces and has c < 0.
-    pub open_length: f64,
+    /// How much is in contact, and how much is covered by both surfaces and open.
+    #[serde(flatten)]
+    pub extent: Extent,
     /// Plane problems: where contact begins or ends, c = 0 between two points, interpolated linearly.
     pub contact_ends: Vec<[f64; 3]>,
 }
@@ -364,8 +363,8 @@ impl Report {
                     "{names}: force {}, peak pressure {} at ({x}, {y}, {z}), contact {}, open {}",
                     vector(pair.force[0]),
                     readable(pair.peak_pressure, 6),
-                    readable(pair.contact_length, 6),
-                    readable(pair.open_length, 6)
+                    readable(pair.extent.contact(), 6),
+                    readable(pair.extent.open(), 6)
                 )
             } else {
                 format!("{names}: no contact")

@@ -36,12 +36,60 @@ pub struct StepPairReport {
     pub force: [f64; 3],
     /// How far the bodies come nearer to each other; none where normals cancel.
     pub approach: Option<f64>,
-    /// Length (area) with c > 0.
-    pub contact_length: f64,
+    /// How much of it is in contact.
+    #[serde(flatten)]
+    pub extent: Extent,
     /// Largest pressure.
     pub peak_pressure: f64,
     /// Points with c > 0.
     pub closed: usize,
+}
+
+/// How much of what two surfaces cover is in contact, c > 0, and how much is open, c < 0: lengths in the plane; areas in space, and of bodies
+/// of revolution, all around.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+#[allow(missing_docs)] // the names are those of the report
+pub enum Extent {
+    Length { contact_length: f64, open_length: f64 },
+    Area { contact_area: f64, open_area: f64 },
+}
+
+impl Default for Extent {
+    fn default() -> Self {
+        Self::Length { contact_length: 0.0, open_length: 0.0 }
+    }
+}
+
+impl Extent {
+    /// Of a pair whose points have these weights, a [`measure`](crate::contact::ContactPair::measure) of them, and compressions.
+    pub fn new(measure: &str, weight: &[f64], compression: &[f64]) -> Self {
+        let sum = |is: fn(f64) -> bool| {
+            weight.iter().zip(compression).filter(|(_, c)| is(**c)).fold(0.0, |sum, (weight, _)| sum + weight)
+        };
+        let (contact, open) = (sum(|c| c > 0.0), sum(|c| c < 0.0));
+        match measure {
+            "length" => Self::Length { contact_length: contact, open_length: open },
+            _ => Self::Area { contact_area: contact, open_area: open },
+        }
+    }
+
+    /// What is in contact.
+    pub fn contact(&self) -> f64 {
+        let (Self::Length { contact_length: contact, .. } | Self::Area { contact_area: contact, .. }) = self;
+        *contact
+    }
+
+    /// What is open.
+    pub fn open(&self) -> f64 {
+        let (Self::Length { open_length: open, .. } | Self::Area { open_area: open, .. }) = self;
+        *open
+    }
+}
+
+/// Name of the column of what is in contact, by the measure of the pairs.
+pub fn contact_column(measure: &str) -> String {
+    format!("contact_{measure}")
 }
 
 /// The force of a support, a spring or a rigid surface on its body.
@@ -73,7 +121,8 @@ pub struct StepTable {
 }
 
 impl StepTable {
-    /// Opens `steps.csv` and writes its header: names of `factors`, of `pairs`, and of `reactions`, each once.
+    /// Opens `steps.csv` and writes its header: names of `factors`, of `pairs`, whose contact has this `measure`, and of `reactions`, each
+    /// once.
     ///
     /// # Errors
     /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
@@ -83,13 +132,14 @@ impl StepTable {
         pairs: &[String],
         reactions: &[String],
         dimension: usize,
+        measure: &str,
     ) -> Result<Self> {
         let mut header = vec!["step".to_owned(), "time".to_owned()];
         header.extend_from_slice(factors);
         header.extend(["status", "iterations", "residual"].map(str::to_owned));
         for pair in pairs {
             header.extend(vector_columns("force", pair, dimension));
-            let numbers = ["approach", "contact_length", "peak_pressure", "closed"];
+            let numbers = ["approach", &contact_column(measure), "peak_pressure", "closed"];
             header.extend(numbers.map(|what| format!("{what} {pair}")));
         }
         header.extend(reactions.iter().flat_map(|name| vector_columns("reaction", name, dimension)));
@@ -105,7 +155,7 @@ impl StepTable {
         line.extend([step.status.clone(), step.iterations.to_string(), number(step.residual)]);
         for pair in &step.pairs {
             line.extend(vector_fields(&pair.force, self.dimension));
-            line.extend([number(pair.approach), field(pair.contact_length), field(pair.peak_pressure)]);
+            line.extend([number(pair.approach), field(pair.extent.contact()), field(pair.peak_pressure)]);
             line.push(pair.closed.to_string());
         }
         line.extend(step.reactions.iter().flat_map(|reaction| vector_fields(&reaction.force, self.dimension)));

@@ -8,7 +8,7 @@ use crate::output::write_whole;
 use std::path::{Path, PathBuf};
 
 /// What can be drawn.
-const WHAT: [&str; 4] = ["stress", "displacement", "pressure", "convergence"];
+const WHAT: [&str; 5] = ["stress", "displacement", "pressure", "convergence", "area"];
 
 /// Draws one of `WHAT` from a folder of results to `out`, or to a file of its name in the folder; returns the paths. Several pairs
 /// have a picture each, numbered from the second one on.
@@ -35,6 +35,12 @@ pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf
         "pressure" => results.pressures(true)?.into_iter().map(|picture| picture.svg).collect(),
         "convergence" => {
             results.convergence()?.map(|plot| plot.svg().map_err(failed)).transpose()?.into_iter().collect()
+        }
+        "area" => {
+            let Some(plot) = results.area() else {
+                return Err(lacks("no load steps", "give the scene `method.steps`, or a history of its loads"));
+            };
+            vec![plot.svg().map_err(failed)?]
         }
         _ => {
             let bodies = results.bodies()?;

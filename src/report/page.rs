@@ -128,6 +128,30 @@ impl Results {
         Ok((!series.is_empty()).then(|| Plot { title, x: axis("iteration", false), y: axis("relative", true), series }))
     }
 
+    /// What is in contact over the contact force, a curve of the load steps for each pair; none without steps.
+    pub fn area(&self) -> Option<Plot> {
+        let steps = self.report["steps"].as_array().filter(|steps| !steps.is_empty())?;
+        let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
+        let point = |pair: &Value| {
+            let force = pair["force"].as_array().into_iter().flatten().map(|f| number(f).powi(2)).sum::<f64>().sqrt();
+            (force, number(pair.get("contact_area").unwrap_or(&pair["contact_length"])))
+        };
+        let curve = |(i, pair): (usize, &Value)| {
+            let names: Vec<&str> = pair["bodies"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+            let points = steps.iter().map(|step| point(&step["pairs"][i])).collect();
+            Series::new(&names.join(" - "), points, Style::LineMarkers)
+        };
+        let series: Vec<Series> = self.report["pairs"].as_array()?.iter().enumerate().map(curve).collect();
+        let is_area = steps[0]["pairs"][0].get("contact_area").is_some();
+        let size = match self.units.as_ref().map(|units| units.length) {
+            Some(length) if is_area => label("area in contact", Some(&format!("{length}^2"))),
+            length => label(if is_area { "area in contact" } else { "length in contact" }, length),
+        };
+        let axis = |label: String| Axis { label, log: false };
+        let title = String::new();
+        Some(Plot { title, x: axis(self.label("contact force", |units| &units.force)), y: axis(size), series })
+    }
+
     /// A picture of the pressure of each pair that touches and has a table.
     ///
     /// # Errors

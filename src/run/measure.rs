@@ -6,7 +6,7 @@ use super::stages::{Built, Done};
 use super::words::numbered;
 use crate::ddm::Status;
 use crate::model::Model;
-use crate::output::{BalanceReport, BodyReport, ReactionReport, StepPairReport, StepReport};
+use crate::output::{BalanceReport, BodyReport, Extent, ReactionReport, StepPairReport, StepReport};
 use crate::problem::history::History;
 
 /// Sum of the normals of a pair over that of its weights below which it has no mean normal. Around a closed surface the sum is zero but for
@@ -21,6 +21,11 @@ pub fn pair_names(built: &Built) -> Vec<String> {
         format!("{a}-{b}")
     });
     numbered(names)
+}
+
+/// What the points of all pairs have: `"length"`, or `"area"` in space and on bodies of revolution.
+pub fn of_points(built: &Built) -> &'static str {
+    built.discrete.model.pairs.first().map_or("length", |pair| pair.measure)
 }
 
 /// Names of what holds the bodies, each once: supports, springs, rigid surfaces, body by body.
@@ -87,7 +92,7 @@ pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
     StepPairReport {
         force: resultant(force, &pair.resultant[discrete.sides(i)[0]]),
         approach,
-        contact_length: closed().fold(0.0, |sum, q| sum + pair.weight[q]),
+        extent: Extent::new(pair.measure, &pair.weight, c),
         peak_pressure: layer.pressure[range].iter().copied().fold(0.0, f64::max),
         closed: closed().count(),
     }

@@ -17,7 +17,7 @@ use crate::model::BodyCounts;
 use crate::output::sci;
 use crate::output::vtu::Grid;
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, InnerTimes, IntervalReport, LISTED, PairReport, PairRow, Report,
+    BodyReport, ContactTable, EstimateReport, Extent, InnerTimes, IntervalReport, LISTED, PairReport, PairRow, Report,
 };
 use crate::parallel::share;
 use crate::petsc::Session;
@@ -233,7 +233,6 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
-    let length = |is: fn(f64) -> bool| (0..pair.len()).filter(|&q| is(c[q])).fold(0.0, |sum, q| sum + pair.weight[q]);
     let sides = discrete.sides(i);
     let coupling = preflight::coupling(&done.built, i);
     let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
@@ -254,8 +253,7 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         approach,
         peak_pressure: p[peak],
         peak_at: pair.position[peak],
-        contact_length: length(|c| c > 0.0),
-        open_length: length(|c| c < 0.0),
+        extent: Extent::new(pair.measure, &pair.weight, c),
         contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
     }
 }

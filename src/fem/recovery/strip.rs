@@ -1,0 +1,319 @@
+//! The strip of a body between straight facets and the smooth boundary through their vertices.
+//!
+//! Over a straight facet the boundary rises by delta = sum r_ij l_i l_j, one r an edge: the surface of second degree through the vertices of
+//! the facet that is nearest to those of the facets around it. Facets that meet at a corner do not know each other.
+
+use super::{Law, Recovery};
+use crate::fem::element::{self, EDGES};
+use crate::fem::space::{Space, area_vector};
+use crate::fem::{Facets, assemble, quadrature};
+use crate::problem::order::Order;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::HashMap;
+
+/// Cosine of the angle at which facets meet in a corner: 40 degrees, as where Gmsh makes surfaces of triangles (its tutorial t13). A
+/// circle of nine edges is one.
+const CORNER: f64 = 0.766;
+
+/// Least share of the squared heights of the vertices around a facet that a surface of second degree explains. It explains all where the
+/// boundary is smooth, and half where one side of the facet goes on straight and the other turns.
+const EXPLAINED: f64 = 0.75;
+
+/// Straight facets with what the boundary rises over their edges, in the order of [`EDGES`]: positive outwards.
+struct Strip<const D: usize> {
+    facets: Facets<D>,
+    rise: Vec<Vector3<f64>>,
+}
+
+impl<const D: usize> Strip<D> {
+    fn of(space: &Space<D>) -> Self {
+        let all = space.boundary();
+        let straight = |i: &usize| assemble::is_straight(&all.coordinates(*i, space), D);
+        // quadratic facets have the boundary of the mesh: where one is curved, the straight ones are so
+        let is_known = space.order == Order::P2 && !(0..all.count()).all(|i| straight(&i));
+        let inside = |i: usize| all.facet(i)[..D].iter().all(|&node| space.on_axis(node));
+        let around = Around::new(space, &all);
+        let rises: Vec<_> =
+            (0..all.count()).map(|i| if is_known || inside(i) { None } else { around.rise(i) }).collect();
+        let keep: Vec<bool> = rises.iter().map(Option::is_some).collect();
+        Self { facets: all.only(&keep), rise: rises.into_iter().flatten().collect() }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.rise.is_empty()
+    }
+}
+
+/// Facets beside each other.
+struct Around<'a, const D: usize> {
+    space: &'a Space<D>,
+    facets: &'a Facets<D>,
+    normal: Vec<[f64; D]>,
+    /// Facets that go on smoothly beyond the edge (in the plane: node) opposite to each vertex.
+    beside: Vec<[Option<usize>; D]>,
+}
+
+impl<'a, const D: usize> Around<'a, D> {
+    fn new(space: &'a Space<D>, facets: &'a Facets<D>) -> Self {
+        let normal: Vec<[f64; D]> = facets.normals(space).into_iter().step_by(D).collect();
+        let mut first: HashMap<[u32; D], (usize, usize)> = HashMap::new();
+        let mut beside = vec![[None; D]; facets.count()];
+        for i in 0..facets.count() {
+            let nodes = &facets.facet(i)[..D];
+            for opposite in 0..D {
+                let mut key: [u32; D] = std::array::from_fn(|k| if k == opposite { u32::MAX } else { nodes[k] });
+                key.sort_unstable();
+                let Some((other, at)) = first.insert(key, (i, opposite)) else { continue };
+                if dot(&normal[i], &normal[other]) >= CORNER {
+                    (beside[i][opposite], beside[other][at]) = (Some(other), Some(i));
+                }
+            }
+        }
+        Self { space, facets, normal, beside }
+    }
+
+    fn vertices(&self, i: usize) -> &[u32] {
+        &self.facets.facet(i)[..D]
+    }
+
+    /// Vertices of the facets that touch facet `i` and go on smoothly.
+    fn ring(&self, i: usize) -> Vec<[f64; D]> {
+        let own = self.vertices(i);
+        let (mut found, mut nodes, mut next) = (vec![i], Vec::<u32>::new(), 0);
+        while next < found.len() {
+            for other in self.beside[found[next]].into_iter().flatten() {
+                if !found.contains(&other) && self.vertices(other).iter().any(|node| own.contains(node)) {
+                    found.push(other);
+                    nodes.extend(self.vertices(other).iter().filter(|node| !own.contains(node)));
+                }
+            }
+            next += 1;
+        }
+        nodes.sort_unstable();
+        nodes.dedup();
+        let mut ring: Vec<[f64; D]> = nodes.into_iter().map(|node| self.space.nodes[node as usize]).collect();
+        // beyond the axis a body of revolution goes on as its mirror image
+        let mirrored = |n: &[f64; D]| n[1] * n[1] - n[0] * n[0] >= CORNER;
+        if own.iter().any(|&node| self.space.on_axis(node)) && mirrored(&self.normal[i]) {
+            let others = own.iter().filter(|node| !self.space.on_axis(**node));
+            ring.extend(others.map(|&node| {
+                let mut x = self.space.nodes[node as usize];
+                x[0] = -x[0];
+                x
+            }));
+        }
+        ring
+    }
+
+    /// Rises over the edges of facet `i`; `None` where it is a part of a plane, or of no smooth surface.
+    ///
+    /// A height at the distance d misses the next term of Taylor's series, d^3: squares have the weight d^-6.
+    fn rise(&self, i: usize) -> Option<Vector3<f64>> {
+        let x = self.facets.coordinates(i, self.space);
+        let (normal, dual) = (&self.normal[i], dual(&x));
+        let centre: [f64; D] = std::array::from_fn(|c| x[..D].iter().map(|x| x[c]).sum::<f64>() / D as f64);
+        let size = (0..D).map(|k| distance(&x[k], &centre)).fold(0.0, f64::max);
+        let (mut gram, mut right, mut squares, mut highest) = (Matrix3::zeros(), Vector3::zeros(), 0.0, 0.0f64);
+        for at in self.ring(i) {
+            let from: [f64; D] = std::array::from_fn(|c| at[c] - x[0][c]);
+            let height = dot(normal, &from) / size;
+            let mut l = [0.0; D];
+            (1..D).for_each(|k| l[k] = dot(&dual[k], &from));
+            l[0] = 1.0 - l[1..].iter().sum::<f64>();
+            let row = products(&l);
+            let weight = (size / distance(&at, &centre)).powi(6);
+            gram += weight * row * row.transpose();
+            right += weight * height * row;
+            squares += weight * height * height;
+            highest = highest.max(height.abs());
+        }
+        // planes have no more than rounding, as edges that are straight
+        if highest <= 1e-9 {
+            return None;
+        }
+        let of = gram.symmetric_eigen();
+        let least = 1e-6 * of.eigenvalues.max();
+        let inverse = of.eigenvalues.map(|value| if value > least { 1.0 / value } else { 0.0 });
+        let rise = of.eigenvectors * inverse.component_mul(&(of.eigenvectors.transpose() * right));
+        (rise.dot(&right) >= EXPLAINED * squares).then_some(size * rise)
+    }
+}
+
+impl<const D: usize> Recovery<'_, D> {
+    /// Adds the residual of the strip between straight facets and the curved boundary to `residual`, one entry a dof:
+    /// `-int delta (sigma - sigma_nn) : grad v` along the facets for every shape function v, with the recovered stress sigma.
+    ///
+    /// The strip is a part of the body that cells do not have; it carries sigma. The pressure -sigma_nn on the boundary works on the curve and not on
+    /// the facet: the difference is that of div v in the strip. Other loads on it, and those of bodies, change less.
+    pub fn add_strip(&self, law: Law<D>, residual: &mut [f64]) {
+        let strip = Strip::of(self.space);
+        if strip.is_empty() {
+            return;
+        }
+        let cells = self.cells_behind(&strip.facets);
+        let (rule, order) = (quadrature::simplex::<D>(5), self.space.order);
+        let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
+        for (i, rise) in strip.rise.iter().enumerate() {
+            let (nodes, x) = (strip.facets.facet(i), strip.facets.coordinates(i, self.space));
+            let area = area_vector(Order::P1, &x[..D], &[1.0 / D as f64; D]);
+            let size = dot(&area, &area).sqrt();
+            let (normal, dual) = (area.map(|a| a / size), dual(&x));
+            for (l, weight) in rule.points.iter().zip(&rule.weights) {
+                let (phi, slopes) = (element::values(order, l), element::derivatives(order, l));
+                let at = assemble::interpolate(&x, &phi);
+                let mut slope = super::Slope::ZERO;
+                l.iter().zip(nodes).for_each(|(l, &node)| slope.add(*l, &self.recovered(node, &at)));
+                let stress = law(cells[i], at, &slope.strain());
+                let of = |c: usize, j: usize| stress[place[c][j]];
+                let pressing: f64 = (0..D).map(|c| (0..D).map(|j| normal[c] * of(c, j) * normal[j]).sum::<f64>()).sum();
+                let weight = weight * size * self.space.circle(&at) * rise.dot(&products(l));
+                for (a, &node) in nodes.iter().enumerate() {
+                    let along = |j: usize| (1..D).map(|k| (slopes[a][k] - slopes[a][0]) * dual[k][j]).sum::<f64>();
+                    for c in 0..D {
+                        let work: f64 =
+                            (0..D).map(|j| (of(c, j) - if c == j { pressing } else { 0.0 }) * along(j)).sum();
+                        residual[D * node as usize + c] -= weight * work;
+                    }
+                    residual[D * node as usize] -= weight * (stress[2] - pressing) * self.space.hoop(&at, phi[a]);
+                }
+            }
+        }
+    }
+
+    /// The cell that each facet bounds.
+    fn cells_behind(&self, facets: &Facets<D>) -> Vec<usize> {
+        let mut outer = vec![false; self.space.nodes.len()];
+        let key = |nodes: &[u32]| {
+            let mut key: [u32; D] = std::array::from_fn(|k| nodes[k]);
+            key.sort_unstable();
+            key
+        };
+        let wanted: HashMap<[u32; D], usize> = (0..facets.count()).map(|i| (key(facets.facet(i)), i)).collect();
+        facets.nodes.iter().for_each(|&node| outer[node as usize] = true);
+        let mut behind = vec![0; facets.count()];
+        for index in 0..self.space.cell_count() {
+            let corners = &self.cell(index)[..=D];
+            if corners.iter().filter(|&&node| outer[node as usize]).count() < D {
+                continue;
+            }
+            for opposite in 0..=D {
+                let face: [u32; D] = std::array::from_fn(|k| corners[if k < opposite { k } else { k + 1 }]);
+                wanted.get(&key(&face)).into_iter().for_each(|&i| behind[i] = index);
+            }
+        }
+        behind
+    }
+}
+
+/// l_i l_j of the edges of a facet.
+fn products<const D: usize>(l: &[f64; D]) -> Vector3<f64> {
+    let edges = D * (D - 1) / 2;
+    Vector3::from_fn(|k, _| if k < edges { l[EDGES[k].0] * l[EDGES[k].1] } else { 0.0 })
+}
+
+/// Gradients of the barycentric coordinates in the plane of a facet with these corners; that of the first is not made.
+fn dual<const D: usize>(x: &[[f64; D]]) -> [[f64; D]; D] {
+    let arm = |k: usize| -> [f64; D] { std::array::from_fn(|c| x[k][c] - x[0][c]) };
+    let mut dual = [[0.0; D]; D];
+    let a = arm(1);
+    if D == 2 {
+        let square = dot(&a, &a);
+        dual[1] = a.map(|a| a / square);
+        return dual;
+    }
+    let b = arm(2);
+    let (aa, ab, bb) = (dot(&a, &a), dot(&a, &b), dot(&b, &b));
+    let determinant = aa * bb - ab * ab;
+    dual[1] = std::array::from_fn(|c| (bb * a[c] - ab * b[c]) / determinant);
+    dual[2] = std::array::from_fn(|c| (aa * b[c] - ab * a[c]) / determinant);
+    dual
+}
+
+fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|c| a[c] * b[c]).sum()
+}
+
+fn distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::sample::block;
+
+    /// The cube of `sample::block` in coordinates without its skew.
+    fn straight<const D: usize>(x: &[f64; D]) -> [f64; D] {
+        let mut a = *x;
+        (0..D - 1).rev().for_each(|c| a[c] -= 0.2 * a[c + 1]);
+        a
+    }
+
+    fn bent<const D: usize>(mut x: [f64; D]) -> [f64; D] {
+        x[D - 1] += 0.2 * x[0] * x[0] + if D == 3 { 0.1 * x[1] * x[1] - 0.1 * x[0] * x[1] } else { 0.0 };
+        x
+    }
+
+    fn flat<const D: usize>(mut x: [f64; D]) -> [f64; D] {
+        let mut at = x;
+        at[D - 1] = 0.0;
+        x[D - 1] -= bent(at)[D - 1];
+        x
+    }
+
+    /// A block bent into paraboloids, which chords miss at one side and exceed at the other.
+    fn curves_are_seen<const D: usize>(order: Order) {
+        let mut space = block::<D>(6, order);
+        space.nodes.iter_mut().for_each(|x| *x = bent(*x));
+        if order == Order::P2 {
+            // with straight edges, as of a mesh of first order
+            for cell in space.cells.chunks_exact(space.stride) {
+                for (k, &(i, j)) in EDGES[..D * (D + 1) / 2].iter().enumerate() {
+                    let ends = [cell[i], cell[j]].map(|node| space.nodes[node as usize]);
+                    space.nodes[cell[D + 1 + k] as usize] = std::array::from_fn(|c| 0.5 * (ends[0][c] + ends[1][c]));
+                }
+            }
+        }
+        let strip = Strip::of(&space);
+        let (mut most, mut least) = (0.0f64, 0.0f64);
+        for (i, rise) in strip.rise.iter().enumerate() {
+            let x = strip.facets.coordinates(i, &space);
+            let l = [1.0 / D as f64; D];
+            let mean = |x: &[[f64; D]]| -> [f64; D] { assemble::interpolate(x, &element::values(Order::P1, &l)) };
+            let (chord, curve) = (mean(&x[..D]), bent(mean(&x[..D].iter().map(|x| flat(*x)).collect::<Vec<_>>())));
+            let area = area_vector(Order::P1, &x[..D], &l);
+            let height: f64 = (0..D).map(|c| area[c] * (curve[c] - chord[c])).sum::<f64>() / dot(&area, &area).sqrt();
+            let found = rise.dot(&products(&l));
+            assert!((found - height).abs() < 0.1 * height.abs() + 1e-5, "{D} {order:?} {i}: {found} {height}");
+            (most, least) = (most.max(found), least.min(found));
+        }
+        assert!(most > 4e-4 && least < -4e-4, "{most} {least}");
+    }
+
+    #[test]
+    fn straight_facets_know_the_curve_through_their_vertices() {
+        curves_are_seen::<2>(Order::P1);
+        curves_are_seen::<2>(Order::P2);
+        curves_are_seen::<3>(Order::P1);
+        curves_are_seen::<3>(Order::P2);
+    }
+
+    /// Planes, a roof of planes, and quadratic facets that are curved as the boundary is.
+    fn nothing_is_missed<const D: usize>() {
+        let mut roof = block::<D>(4, Order::P1);
+        assert!(Strip::of(&roof).is_empty());
+        // the planes meet at 33 degrees, less than a corner
+        roof.nodes.iter_mut().for_each(|x| x[D - 1] += 0.3 * (straight(x)[0] - 0.5).abs());
+        let strip = Strip::of(&roof);
+        assert!(strip.is_empty(), "{D}: {} of {} facets", strip.rise.len(), roof.boundary().count());
+        let mut curved = block::<D>(4, Order::P2);
+        curved.nodes.iter_mut().for_each(|x| *x = bent(*x));
+        assert!(Strip::of(&curved).is_empty());
+    }
+
+    #[test]
+    fn planes_and_corners_have_no_strip() {
+        nothing_is_missed::<2>();
+        nothing_is_missed::<3>();
+    }
+}

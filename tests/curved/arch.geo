@@ -1,0 +1,36 @@
+// A quarter of a ring on a column as wide as it: contact is plane, and the curved boundaries are away from it.
+DefineConstant[ n = {4, Name "n"} ];                // elements along the ring
+DefineConstant[ m = {4, Name "m"} ];                // across it
+DefineConstant[ straight = {1, Name "straight"} ];  // whether quadratic elements have straight edges
+Mesh.SecondOrderLinear = straight;
+Point(1) = {0, 0, 0};
+Point(2) = {0.6, 0, 0};
+Point(3) = {1, 0, 0};
+Point(4) = {0, 1, 0};
+Point(5) = {0, 0.6, 0};
+Line(1) = {2, 3};
+Circle(2) = {3, 1, 4};
+Line(3) = {4, 5};
+Circle(4) = {5, 1, 2};
+Curve Loop(1) = {1:4};
+Plane Surface(1) = {1};
+Point(12) = {0.6, -0.4, 0};
+Point(13) = {1, -0.4, 0};
+Point(14) = {1, 0, 0};
+Point(15) = {0.6, 0, 0};
+Line(11) = {12, 13};
+Line(12) = {13, 14};
+Line(13) = {14, 15};
+Line(14) = {15, 12};
+Curve Loop(2) = {11:14};
+Plane Surface(2) = {2};
+Transfinite Curve {1, 3, 11:14} = m + 1;
+Transfinite Curve {2, 4} = n + 1;
+Transfinite Surface {1, 2};
+Physical Surface("arch") = {1};
+Physical Surface("column") = {2};
+Physical Curve("arch_foot") = {1};
+Physical Curve("arch_outside") = {2};
+Physical Curve("arch_top") = {3};
+Physical Curve("column_top") = {13};
+Physical Curve("column_bottom") = {11};
