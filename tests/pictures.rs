@@ -201,6 +201,29 @@ fn bodies_in_space_and_contact_surfaces_are_drawn_as_svg_and_png() {
     }
 }
 
+/// The curve of contact over force has a mark for each load step, and an area in space is called one, in tables too.
+#[test]
+fn contact_over_force() {
+    let sets = ["--set", "mesh.set.n=4", "--set", "method.steps=3", "--set", "output.vtu=false"];
+    for (name, column) in [("groove-held", "contact_length"), ("rough", "contact_area")] {
+        let run = solve(case(name), &sets).converged();
+        let header = fs::read_to_string(run.folder.join("steps.csv")).expect("steps.csv");
+        assert!(
+            header.lines().next().is_some_and(|header| header.contains(&format!(",{column} lower-upper,"))),
+            "{header}"
+        );
+        let steps = run.report["steps"].as_array().expect("steps");
+        assert_eq!(steps[2]["pairs"][0][column], run.report["pairs"][0][column]);
+        let folder = run.folder.to_str().expect("a name");
+        assert_eq!(winkler(&["plot", folder, "area"]).code, 0);
+        let drawn = fs::read_to_string(run.folder.join("area.svg")).expect("a picture");
+        assert_eq!(drawn.matches("<circle").count(), 3, "{name}");
+        assert!(drawn.contains("contact force") && drawn.contains(&column.replace("contact_", "")), "{name}");
+    }
+    let run = solve(case("groove-held"), &["--set", "mesh.set.n=4"]).converged();
+    refused(&winkler(&["plot", run.folder.to_str().expect("a name"), "area"]), 6, &["no load steps", "method.steps"]);
+}
+
 #[test]
 fn what_cannot_be_shown_is_refused() {
     let run = solve(case("patch-3d"), &["--vtu"]).converged();

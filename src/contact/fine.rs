@@ -1,7 +1,7 @@
 //! The integration points of a pair one by one, for an estimate of the error: there the compression of the layer and the gap
 //! are those of the points themselves, not means around the nodes.
 
-use super::basis::PressureBasis;
+use super::basis::{Carriers, PressureBasis};
 use super::near::Near;
 use super::pair::ContactPair;
 use super::pieces::{Common, Shared};
@@ -24,6 +24,8 @@ pub struct Fine<const D: usize> {
     pub normal: Vec<[f64; D]>,
     /// The contact point nearest to each: for laws that differ from point to point.
     pub nearest: Vec<usize>,
+    /// Whether the contact points of its facet are at mid-edges.
+    pub at_edges: Vec<bool>,
     /// Values at the contact points -> values at the integration points, by the shape functions of side a.
     pub interpolation: Csr,
     /// Values at the contact points -> what the functions of the points make of them at the integration points: the pressure that
@@ -70,6 +72,7 @@ impl<const D: usize> Fine<D> {
             size: Vec::new(),
             normal: Vec::new(),
             nearest: Vec::new(),
+            at_edges: Vec::new(),
             interpolation: Csr::new(pair.len()),
             pressing: Csr::new(pair.len()),
             near: Near::new(a, b, common, pair, (!touching).then_some(gap)),
@@ -99,6 +102,7 @@ impl<const D: usize> Fine<D> {
                 let phi = element::values(a.facets.order, &point.at_a);
                 let mu = |i| if i < nodes.len() { basis.value(i, &phi, &point.at_a) } else { 0.0 };
                 fine.pressing.push_row(row(std::array::from_fn(mu)));
+                fine.at_edges.push(basis.carriers() == Carriers::MidEdges);
                 let row = row(basis.carriers().interpolation(a.facets.order, &point.at_a));
                 let nearest = row.iter().max_by(|p, q| p.1.total_cmp(&q.1));
                 fine.nearest.push(nearest.map_or(0, |entry| entry.0));

@@ -57,6 +57,8 @@ pub struct FinePoints<'a> {
     pub compliance: Vec<f64>,
     /// Contact point nearest to each.
     pub nearest: &'a [usize],
+    /// Whether the contact points around each are at mid-edges.
+    pub at_edges: &'a [bool],
     /// Values at the contact points -> values at these.
     pub interpolation: &'a Csr,
     /// Pressures at the contact points -> those that the discrete problem has at these.
@@ -124,10 +126,10 @@ impl<const D: usize> Meshes for Kept<D> {
     }
 
     fn points(&self, pair: usize) -> FinePoints<'_> {
-        let Fine { weight, gap, size, bodies, nearest, interpolation, pressing, .. } = &self.fine[pair];
+        let Fine { weight, gap, size, bodies, nearest, at_edges, interpolation, pressing, .. } = &self.fine[pair];
         let soft: f64 = bodies.iter().map(|&body| 1.0 / self.shapes[body].modulus).sum();
         let compliance = size.iter().map(|size| size * soft / std::f64::consts::PI).collect();
-        FinePoints { weight, gap, compliance, nearest, interpolation, pressing }
+        FinePoints { weight, gap, compliance, nearest, at_edges, interpolation, pressing }
     }
 
     fn cells(&self, body: usize) -> Cells {

@@ -50,17 +50,29 @@ impl LayerError {
             let here = giving - points.gap[g] - lacking;
             let (c, p) = met(here + compliance * between(&|q| pressure[q]).max(0.0));
             error.energy += points.weight[g] * (p - p_h) * (c - c_h);
-            let discrete: f64 = points.pressing.row(g).map(|(q, mu)| mu * pressure[q]).sum();
+            let (mut discrete, mut amplified) = (0.0, 0.0);
+            for (q, mu) in points.pressing.row(g) {
+                discrete += mu * pressure[q];
+                amplified += mu * mu;
+            }
             let stiffness = carriers().map(|(q, _)| tangent[q]).fold(0.0, f64::max) * compliance;
-            error.pressure.push(if is_whole { discrete + weight_of_law(stiffness) * (p - discrete) } else { p });
+            let of_law = match () {
+                () if is_whole => weight_of_law(stiffness, 1.0),
+                // with the weight below quadratic facets in space had 0.57 of the error under a layer of 1e8
+                () if points.at_edges[g] => 1.0,
+                () => weight_of_law(stiffness / (1.0 + stiffness), amplified),
+            };
+            error.pressure.push(discrete + of_law * (p - discrete));
         }
         error
     }
 }
 
-/// Weight of the law's pressure beside that of the discrete problem, in a facet whose points are all closed: where displacements miss e, the law
-/// misses kappa e, as c* and p_i do together, and equilibrium e/s. The mean of the two with the least variance has weights as one over
-/// their squares. `stiffness` is s kappa.
-fn weight_of_law(stiffness: f64) -> f64 {
-    1.0 / (1.0 + stiffness * stiffness)
+/// Weight of the law's pressure beside that of the discrete problem: where displacements miss e, the law misses a share of e/s, `stiffness`, and
+/// the discrete pressure, made of such that miss e/s each, the root of `amplified` times e/s. The mean of the two with the least variance has weights
+/// as one over their squares.
+///
+/// In a facet whose points are all closed the law misses kappa e, as c* and p_i do together; else e/(s + 1/kappa).
+fn weight_of_law(stiffness: f64, amplified: f64) -> f64 {
+    amplified / (amplified + stiffness * stiffness)
 }
