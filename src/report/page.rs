@@ -139,7 +139,7 @@ impl Results {
         let curve = |(i, pair): (usize, &Value)| {
             let names: Vec<&str> = pair["bodies"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
             let points = steps.iter().map(|step| point(&step["pairs"][i])).collect();
-            Series::new(&names.join(" - "), points, Style::LineMarkers)
+            Series::new(names.join(" - "), points, Style::LineMarkers)
         };
         let series: Vec<Series> = self.report["pairs"].as_array()?.iter().enumerate().map(curve).collect();
         let is_area = steps[0]["pairs"][0].get("contact_area").is_some();

@@ -8,20 +8,29 @@
 use crate::error::Result;
 use crate::linalg::{Csr, Factor, axpy, dot};
 use crate::model::rigid::{Motions, TOLERANCE};
-use crate::model::{Exchange, Model, Motion, Segment};
+use crate::model::{BodySlot, Exchange, Model, Motion, Segment};
 use crate::petsc::Subspace;
 use nalgebra::DVector;
 use std::ops::Range;
 use std::rc::Rc;
 
+/// A body as the coarse space sees it.
+struct Moving {
+    /// Its contact rows.
+    segments: Vec<Segment>,
+    /// Its free rigid motions, as the contact rows feel them.
+    motions: Vec<Motion>,
+    /// The same over its rows of A here: columns of Z.
+    columns: Vec<Rc<[f64]>>,
+    /// Where these rows are in a vector here.
+    range: Range<usize>,
+}
+
 /// The coarse space, of the rows of this rank.
 pub struct Coarse {
-    /// Of each body: its contact rows, and what its motions do there.
-    bodies: Vec<(Vec<Segment>, Vec<Motion>)>,
+    bodies: Vec<Moving>,
     /// Contact points of each pair.
     points: Vec<usize>,
-    /// Of each body: where its rows are in a vector here, and its columns of Z there.
-    columns: Vec<(Range<usize>, Vec<Rc<[f64]>>)>,
     /// B; columns: all rows of A.
     rows: Rc<Csr>,
     /// First row of A here.
@@ -33,35 +42,29 @@ impl Coarse {
     /// Of the bodies of a model, whose rows begin at `offset` in a vector here; `rows` are B of all bodies together and `first` is the number
     /// of the first row here. `None` if no two bodies in contact move freely: what moves alone is no frame.
     pub fn of(model: &Model, offset: &[usize], rows: &Rc<Csr>, first: usize) -> Option<Self> {
-        let mut coarse = Self {
-            bodies: Vec::new(),
-            points: (0..model.pairs.len()).map(|pair| model.range(pair).len()).collect(),
-            columns: Vec::new(),
-            rows: rows.clone(),
-            first,
-            exchange: model.exchange.clone(),
-        };
-        for (slot, ends) in model.bodies.iter().zip(offset.windows(2)) {
+        let moving = |(slot, ends): (&BodySlot, &[usize])| {
             // springs to the ground are in K
             let free = slot.local.as_ref().filter(|_| slot.sprung.is_none()).and_then(|body| body.matrices());
-            let (mut motions, mut columns) = (Vec::new(), Vec::new());
-            if let Some(free) = free {
-                let motion = |trace: &Vec<f64>| Motion { name: String::new(), trace: trace.clone(), work: 0.0 };
-                motions = free.traces.iter().map(motion).collect();
-                columns = free.motions.to_vec();
+            let (traces, columns) = free.map_or((&[][..], &[][..]), |free| (free.traces, free.motions));
+            let motion = |trace: &Vec<f64>| Motion { name: String::new(), trace: trace.clone(), work: 0.0 };
+            Moving {
+                segments: slot.segments.clone(),
+                motions: traces.iter().map(motion).collect(),
+                columns: columns.to_vec(),
+                range: ends[0]..ends[1],
             }
-            coarse.bodies.push((slot.segments.clone(), motions));
-            coarse.columns.push((ends[0]..ends[1], columns));
-        }
+        };
+        let bodies: Vec<Moving> = model.bodies.iter().zip(offset.windows(2)).map(moving).collect();
         let mut sides = vec![0; model.pairs.len()];
-        for (segments, _) in coarse.bodies.iter().filter(|(_, motions)| !motions.is_empty()) {
-            segments.iter().for_each(|segment| sides[segment.pair] += 1);
+        for body in bodies.iter().filter(|body| !body.motions.is_empty()) {
+            body.segments.iter().for_each(|segment| sides[segment.pair] += 1);
         }
-        sides.contains(&2).then_some(coarse)
+        let points = (0..model.pairs.len()).map(|pair| model.range(pair).len()).collect();
+        sides.contains(&2).then(|| Self { bodies, points, rows: rows.clone(), first, exchange: model.exchange.clone() })
     }
 
     fn motions(&self) -> Motions<'_> {
-        Motions::new(self.bodies.iter().map(|(segments, motions)| (&segments[..], &motions[..])), &self.points)
+        Motions::new(self.bodies.iter().map(|body| (&body.segments[..], &body.motions[..])), &self.points)
     }
 
     /// The space for these springs D, one entry a contact point.
@@ -88,7 +91,7 @@ impl Sprung {
     /// x += s Z y.
     fn add(&self, s: f64, y: &DVector<f64>, x: &mut [f64]) {
         let mut amounts = y.iter();
-        for (range, columns) in &self.coarse.columns {
+        for Moving { columns, range, .. } in &self.coarse.bodies {
             columns.iter().zip(&mut amounts).for_each(|(column, y)| axpy(s * y, column, &mut x[range.clone()]));
         }
     }
@@ -96,9 +99,9 @@ impl Sprung {
 
 impl Subspace for Sprung {
     fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
-        let Coarse { columns, rows, first, .. } = &*self.coarse;
+        let Coarse { bodies, rows, first, .. } = &*self.coarse;
         let products =
-            columns.iter().flat_map(|(range, columns)| columns.iter().map(|column| dot(column, &r[range.clone()])));
+            bodies.iter().flat_map(|body| body.columns.iter().map(|column| dot(column, &r[body.range.clone()])));
         let y = self.solve(DVector::from_vec(products.collect()));
         self.add(1.0, &y, x);
         let closing = self.coarse.motions().closing(&y);
