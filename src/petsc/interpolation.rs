@@ -80,9 +80,10 @@ impl Ksp {
     /// use winkler::petsc::{Ksp, Matrix, Session};
     /// let words = "-ksp_type cg -ksp_rtol 1e-10 -mg_levels_ksp_type chebyshev -mg_levels_pc_type jacobi -mg_coarse_pc_type cholesky";
     /// let session = Session::start(&words.split(' ').map(String::from).collect::<Vec<_>>())?;
-    /// // sixty springs to the ground; then a stiff one that all of the last thirty share
+    /// // sixty springs to the ground; then one against the last thirty moving up and down in turn, which the coarse level cannot
     /// let (n, row) = (60, |spring: f64, i: usize| {
-    ///     (0..60).map(move |j| f64::from(u8::from(i == j)) + if i.min(j) < 30 { 0.0 } else { spring })
+    ///     let spring = move |j: usize| if i.min(j) < 30 { 0.0 } else { spring * [1.0, -1.0][(i + j) % 2] };
+    ///     (0..60).map(move |j| f64::from(u8::from(i == j)) + spring(j))
     /// });
     /// let columns = (0..n).flat_map(|_| 0..n as i32).collect();
     /// let values = (0..n).flat_map(|i| row(0.0, i)).collect();
