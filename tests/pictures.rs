@@ -217,7 +217,7 @@ fn contact_over_force() {
         let folder = run.folder.to_str().expect("a name");
         assert_eq!(winkler(&["plot", folder, "area"]).code, 0);
         let drawn = fs::read_to_string(run.folder.join("area.svg")).expect("a picture");
-        assert_eq!(drawn.matches("<circle").count(), 3, "{name}");
+        assert_eq!(drawn.matches("<polygon").count(), 3, "{name}");
         assert!(drawn.contains("contact force") && drawn.contains(&column.replace("contact_", "")), "{name}");
     }
     let run = solve(case("groove-held"), &["--set", "mesh.set.n=4"]).converged();
