@@ -61,13 +61,15 @@ fn is_for_several(plan: &Plan) -> bool {
 mod tests {
     use super::*;
 
-    /// One body is dealt out, of unequal ones the large one, of as many equal ones as ranks none; of one too many, one.
+    /// One body is dealt out, of unequal ones the large one and, if that gains more than its messages take, the other; of as many equal ones as
+    /// ranks none; of one too many, one.
     #[test]
     fn large_bodies_are_dealt_out() {
         let dealt = |loads: &[usize], ranks| largest(loads, &vec![true; loads.len()], ranks);
         assert_eq!(dealt(&[100_000], 2), [true]);
         assert_eq!(dealt(&[100_000], 1), [false]);
-        assert_eq!(dealt(&[10_000, 80_000], 2), [false, true]);
+        assert_eq!(dealt(&[1_500, 80_000], 2), [false, true]);
+        assert_eq!(dealt(&[10_000, 80_000], 2), [true, true]);
         assert_eq!(dealt(&[50_000, 50_000], 2), [false, false]);
         assert_eq!(dealt(&[50_000, 50_000], 3), [true, true]);
         assert_eq!(dealt(&[50_000; 3], 2), [true, false, false]);
