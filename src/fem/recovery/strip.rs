@@ -15,9 +15,9 @@ use std::collections::HashMap;
 /// circle of nine edges is one.
 const CORNER: f64 = 0.766;
 
-/// Least share of the squared heights of the vertices around a facet that a surface of second degree explains. It explains all where the
-/// boundary is smooth, and half where one side of the facet goes on straight and the other turns.
-const EXPLAINED: f64 = 0.75;
+/// Least share of the squared heights over squared distances of the vertices around a facet that a surface of second degree explains. On cylinders
+/// and spheres it leaves at most 0.02, with 38 degrees a facet; beside the edge of a roof at least 0.23 in space and half in the plane.
+const EXPLAINED: f64 = 0.9;
 
 /// Straight facets with what the boundary rises over their edges, in the order of [`EDGES`]: positive outwards.
 struct Strip<const D: usize> {
@@ -113,7 +113,7 @@ impl<'a, const D: usize> Around<'a, D> {
         let (normal, dual) = (&self.normal[i], dual(&x));
         let centre: [f64; D] = std::array::from_fn(|c| x[..D].iter().map(|x| x[c]).sum::<f64>() / D as f64);
         let size = (0..D).map(|k| distance(&x[k], &centre)).fold(0.0, f64::max);
-        let (mut gram, mut right, mut squares, mut highest) = (Matrix3::zeros(), Vector3::zeros(), 0.0, 0.0f64);
+        let (mut gram, mut right, mut heights) = (Matrix3::zeros(), Vector3::zeros(), Vec::new());
         for at in self.ring(i) {
             let from: [f64; D] = std::array::from_fn(|c| at[c] - x[0][c]);
             let height = dot(normal, &from) / size;
@@ -121,21 +121,25 @@ impl<'a, const D: usize> Around<'a, D> {
             (1..D).for_each(|k| l[k] = dot(&dual[k], &from));
             l[0] = 1.0 - l[1..].iter().sum::<f64>();
             let row = products(&l);
-            let weight = (size / distance(&at, &centre)).powi(6);
-            gram += weight * row * row.transpose();
-            right += weight * height * row;
-            squares += weight * height * height;
-            highest = highest.max(height.abs());
+            let near = (size / distance(&at, &centre)).powi(2);
+            gram += near.powi(3) * row * row.transpose();
+            right += near.powi(3) * height * row;
+            heights.push((near, row, height));
         }
         // planes have no more than rounding, as edges that are straight
-        if highest <= 1e-9 {
+        if heights.iter().all(|(_, _, height)| height.abs() <= 1e-9) {
             return None;
         }
         let of = gram.symmetric_eigen();
         let least = 1e-6 * of.eigenvalues.max();
         let inverse = of.eigenvalues.map(|value| if value > least { 1.0 / value } else { 0.0 });
         let rise = of.eigenvectors * inverse.component_mul(&(of.eigenvectors.transpose() * right));
-        (rise.dot(&right) >= EXPLAINED * squares).then_some(size * rise)
+        // as curvatures, so that the far side of the facet counts: the vertices beside it alone do not know a roof from a cylinder
+        let sum = |of: &dyn Fn(&Vector3<f64>, f64) -> f64| -> f64 {
+            heights.iter().map(|(near, row, height)| (near * of(row, *height)).powi(2)).sum()
+        };
+        let missed = sum(&|row, height| height - rise.dot(row));
+        (missed <= (1.0 - EXPLAINED) * sum(&|_, height| height)).then_some(size * rise)
     }
 }
 
