@@ -278,3 +278,12 @@ fn petsc_is_loaded_only_by_runs_that_make_its_objects() {
         assert!(coarse("groove", &words).text("petsc").starts_with("3."), "{words:?}");
     }
 }
+
+/// The first set-up of a body's multigrid is one of those that take the time of all: benchmarks count in it.
+#[test]
+fn the_first_set_up_is_timed() {
+    let run =
+        solve(case("groove"), &["--method", "robin", "--set", "mesh.set.n=8", "--set", "solver=hypre"]).converged();
+    let (first, all) = (run.number("inner_times/first"), run.number("inner_times/factor"));
+    assert!(first <= all && first > all / (4.0 * run.count("factorizations") as f64), "{first} of {all}");
+}

@@ -86,8 +86,16 @@ impl<S: InnerSolver> RobinMatrix<S> {
             Seen::Patched => self.prepared = softened,
             Seen::Whole => self.prepared.copy_from_slice(weight),
         }
-        self.counts.factor_seconds += began.elapsed().as_secs_f64();
+        self.note(began.elapsed().as_secs_f64());
         Ok(())
+    }
+
+    /// Adds the seconds of a factorisation or set-up.
+    fn note(&mut self, seconds: f64) {
+        self.counts.factor_seconds += seconds;
+        if self.counts.first_seconds == 0.0 && self.solver.factorizations()[1] > self.before[1] {
+            self.counts.first_seconds = seconds;
+        }
     }
 
     /// Factors G, or makes its preconditioner, if it changed since.
@@ -97,11 +105,7 @@ impl<S: InnerSolver> RobinMatrix<S> {
     pub fn set_up(&mut self) -> Result<()> {
         let began = Instant::now();
         let done = self.solver.set_up();
-        let seconds = began.elapsed().as_secs_f64();
-        self.counts.factor_seconds += seconds;
-        if self.counts.first_seconds == 0.0 {
-            self.counts.first_seconds = seconds;
-        }
+        self.note(began.elapsed().as_secs_f64());
         done
     }
 
