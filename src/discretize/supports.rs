@@ -4,6 +4,7 @@ use super::find::{earlier, find_group, not_on_body, of_body, point};
 use crate::contact::pad;
 use crate::error::{Error, Place, Result};
 use crate::fem::{Facets, Frame, Space};
+use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, LoadKind};
 use nalgebra::{DMatrix, DVector};
@@ -218,10 +219,6 @@ impl<const D: usize> Held<D> {
 
 fn unit<const D: usize>(component: usize) -> [f64; D] {
     std::array::from_fn(|c| if c == component { 1.0 } else { 0.0 })
-}
-
-fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).map(|c| a[c] * b[c]).sum()
 }
 
 /// The outer unit normal of a plane surface.

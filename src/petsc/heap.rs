@@ -7,34 +7,17 @@ use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 unsafe extern "C" {
-    fn _exit(code: i32) -> !;
     fn PMPI_Abort(comm: MPI_Comm, code: c_int) -> c_int;
 }
 
-/// What the C library is told of its heap.
+/// Arrays of so many bytes come from the system, which has them back when they are freed; the heap has others, and gives its end back when that is
+/// twice as long.
 #[cfg(target_env = "gnu")]
-mod libc {
-    use std::ffi::c_int;
-
-    unsafe extern "C" {
-        fn mallopt(option: c_int, value: c_int) -> c_int;
-        fn malloc_trim(pad: usize) -> c_int;
-    }
-
-    /// Arrays of so many bytes come from the system, which has them back when they are freed; the heap has others, and gives its end back
-    /// when that is twice as long.
-    pub fn set_apart(bytes: c_int) {
-        // SAFETY: M_MMAP_THRESHOLD and M_TRIM_THRESHOLD, and numbers that they take.
-        unsafe {
-            mallopt(-3, bytes);
-            mallopt(-1, 2 * bytes);
-        }
-    }
-
-    /// Gives back what is free.
-    pub fn trim() {
-        // SAFETY: the C library walks its own lists.
-        unsafe { malloc_trim(0) };
+fn set_apart(bytes: c_int) {
+    // SAFETY: parameters of the C library, and numbers that they take.
+    unsafe {
+        libc::mallopt(libc::M_MMAP_THRESHOLD, bytes);
+        libc::mallopt(libc::M_TRIM_THRESHOLD, 2 * bytes);
     }
 }
 
@@ -42,7 +25,7 @@ mod libc {
 /// heap, in which holes stay. With [`give_back`] a rank of four takes 332 MB instead of 390 (two cubes of 48^3).
 pub fn keep_apart() {
     #[cfg(target_env = "gnu")]
-    libc::set_apart(1 << 20);
+    set_apart(1 << 20);
 }
 
 /// Gives memory that is free back to the system before solvers are set up, whose arrays come and go, and stay part of the heap: apart they would
@@ -50,9 +33,10 @@ pub fn keep_apart() {
 pub fn give_back() {
     #[cfg(target_env = "gnu")]
     {
-        libc::trim();
+        // SAFETY: the C library walks its own lists.
+        unsafe { libc::malloc_trim(0) };
         // what the C library comes to by itself
-        libc::set_apart(32 << 20);
+        set_apart(32 << 20);
     }
 }
 
@@ -70,7 +54,7 @@ pub unsafe extern "C" fn MPI_Abort(comm: MPI_Comm, code: c_int) -> c_int {
     if code == HYPRE {
         out_of_memory("hypre got none");
         // SAFETY: as in [`Heap::given`].
-        unsafe { _exit(crate::error::Kind::Solver.exit_code()) }
+        unsafe { libc::_exit(crate::error::Kind::Solver.exit_code()) }
     }
     // SAFETY: the caller's promise.
     unsafe { PMPI_Abort(comm, code) }
@@ -95,7 +79,7 @@ pub fn leave(code: i32) -> ! {
     // SAFETY: a null file means all files of the C library; nothing of this program comes after that.
     unsafe {
         super::ffi::fflush(std::ptr::null_mut());
-        _exit(code)
+        libc::_exit(code)
     }
 }
 
@@ -107,7 +91,7 @@ impl Heap {
     fn given(memory: *mut u8, bytes: usize) -> *mut u8 {
         if memory.is_null() && out_of_memory(format_args!("{} MB more were wanted", bytes.div_ceil(1_000_000))) {
             // SAFETY: it returns to nobody, and runs nothing that might want memory.
-            unsafe { _exit(crate::error::Kind::Solver.exit_code()) }
+            unsafe { libc::_exit(crate::error::Kind::Solver.exit_code()) }
         }
         memory
     }

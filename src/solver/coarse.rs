@@ -31,17 +31,17 @@ pub struct Coarse {
     bodies: Vec<Moving>,
     /// Contact points of each pair.
     points: Vec<usize>,
-    /// B; columns: all rows of A.
-    rows: Rc<Csr>,
-    /// First row of A here.
-    first: usize,
+    /// B Z: a row a contact point, a column a motion.
+    closing: Csr,
+    /// B of the rows of A here: a row a contact point.
+    rows: Csr,
     exchange: Rc<dyn Exchange>,
 }
 
 impl Coarse {
     /// Of the bodies of a model, whose rows begin at `offset` in a vector here; `rows` are B of all bodies together and `first` is the number
     /// of the first row here. `None` if no two bodies in contact move freely: what moves alone is no frame.
-    pub fn of(model: &Model, offset: &[usize], rows: &Rc<Csr>, first: usize) -> Option<Self> {
+    pub fn of(model: &Model, offset: &[usize], rows: &Csr, first: usize) -> Option<Self> {
         let moving = |(slot, ends): (&BodySlot, &[usize])| {
             // springs to the ground are in K
             let free = slot.local.as_ref().filter(|_| slot.sprung.is_none()).and_then(|body| body.matrices());
@@ -59,17 +59,31 @@ impl Coarse {
         for body in bodies.iter().filter(|body| !body.motions.is_empty()) {
             body.segments.iter().for_each(|segment| sides[segment.pair] += 1);
         }
+        if !sides.contains(&2) {
+            return None;
+        }
+        let (mut entries, mut count) = (vec![Vec::new(); model.points()], 0);
+        for (body, Moving { motions, .. }) in bodies.iter().enumerate() {
+            for (row, place) in model.trace_ranges(body).flatten().enumerate() {
+                let of_row = motions.iter().zip(count..).map(|(motion, column)| (column, motion.trace[row]));
+                entries[place % model.points()].extend(of_row);
+            }
+            count += motions.len();
+        }
+        let mut closing = Csr::new(count);
+        entries.into_iter().for_each(|row| closing.push_row(row));
+        let mut here = Csr::new(offset[offset.len() - 1]);
+        let own = |(i, b): (usize, f64)| Some((i.checked_sub(first)?, b)).filter(|(i, _)| *i < here.columns);
+        let own: Vec<Vec<(usize, f64)>> = (0..rows.rows()).map(|q| rows.row(q).filter_map(own).collect()).collect();
+        own.into_iter().for_each(|row| here.push_row(row));
         let points = (0..model.pairs.len()).map(|pair| model.range(pair).len()).collect();
-        sides.contains(&2).then(|| Self { bodies, points, rows: rows.clone(), first, exchange: model.exchange.clone() })
-    }
-
-    fn motions(&self) -> Motions<'_> {
-        Motions::new(self.bodies.iter().map(|body| (&body.segments[..], &body.motions[..])), &self.points)
+        Some(Self { bodies, points, closing, rows: here, exchange: model.exchange.clone() })
     }
 
     /// The space for these springs D, one entry a contact point.
     pub fn with(self: &Rc<Self>, springs: &[f64]) -> Box<dyn Subspace> {
-        let factor = self.motions().springs(springs).factor(TOLERANCE);
+        let bodies = self.bodies.iter().map(|body| (&body.segments[..], &body.motions[..]));
+        let factor = Motions::new(bodies, &self.points).springs(springs).factor(TOLERANCE);
         Box::new(Sprung { coarse: self.clone(), springs: springs.to_vec(), factor })
     }
 }
@@ -83,9 +97,17 @@ struct Sprung {
 
 impl Sprung {
     /// S of what the ranks have, altogether.
-    fn solve(&self, mut work: DVector<f64>) -> DVector<f64> {
-        self.coarse.exchange.sum(work.as_mut_slice());
-        self.factor.solve(&work)
+    fn solve(&self, mut work: Vec<f64>) -> DVector<f64> {
+        self.coarse.exchange.sum(&mut work);
+        self.factor.solve(&DVector::from_vec(work))
+    }
+
+    /// D times what `closing` makes of z: springs as the points close.
+    fn forces(&self, closing: &Csr, z: &[f64]) -> Vec<f64> {
+        let mut forces = vec![0.0; self.springs.len()];
+        closing.multiply(z, &mut forces);
+        forces.iter_mut().zip(&self.springs).for_each(|(force, spring)| *force *= spring);
+        forces
     }
 
     /// x += s Z y.
@@ -99,29 +121,20 @@ impl Sprung {
 
 impl Subspace for Sprung {
     fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
-        let Coarse { bodies, rows, first, .. } = &*self.coarse;
+        let Coarse { bodies, closing, rows, .. } = &*self.coarse;
         let products =
             bodies.iter().flat_map(|body| body.columns.iter().map(|column| dot(column, &r[body.range.clone()])));
-        let y = self.solve(DVector::from_vec(products.collect()));
+        let y = self.solve(products.collect());
         self.add(1.0, &y, x);
-        let closing = self.coarse.motions().closing(&y);
-        for (q, force) in closing.iter().zip(&self.springs).map(|(c, d)| c * d).enumerate().filter(|(_, f)| *f != 0.0) {
-            for (i, b) in rows.row(q) {
-                if let Some(r) = i.checked_sub(*first).and_then(|i| r.get_mut(i)) {
-                    *r -= b * force;
-                }
-            }
-        }
+        rows.add_transpose(-1.0, &self.forces(closing, y.as_slice()), r);
         Ok(())
     }
 
     fn project(&self, z: &mut [f64]) -> Result<()> {
-        let Coarse { rows, first, .. } = &*self.coarse;
-        let closing = |q| -> f64 { rows.row(q).filter_map(|(i, b)| Some(b * z.get(i.checked_sub(*first)?)?)).sum() };
-        let force = |(q, d): (usize, &f64)| if *d == 0.0 { 0.0 } else { d * closing(q) };
-        let forces: Vec<f64> = self.springs.iter().enumerate().map(force).collect();
-        let y = self.solve(self.coarse.motions().work(&forces));
-        self.add(-1.0, &y, z);
+        let Coarse { closing, rows, .. } = &*self.coarse;
+        let mut work = vec![0.0; closing.columns];
+        closing.add_transpose(1.0, &self.forces(rows, z), &mut work);
+        self.add(-1.0, &self.solve(work), z);
         Ok(())
     }
 }

@@ -26,7 +26,7 @@ pub struct Union {
     /// Stiffness matrix of all bodies with these springs, with the pattern of B'B: the rows of this rank.
     pub stiffness: Csr,
     /// One row a contact point, [B_a B_a R_a B_b B_b R_b]: all of them.
-    pub rows: Rc<Csr>,
+    pub rows: Csr,
     /// First entry here of each body's state, and the number of all.
     pub offset: Vec<usize>,
     /// Number of the first row here, if other ranks have the others; columns are counted through all.
@@ -159,7 +159,7 @@ impl Union {
         stiffness.values.shrink_to_fit();
         let (sides, points) = (model.row_stiffness(), model.points());
         let row_stiffness = (0..points).map(|q| sides[q] + sides[points + q]).collect();
-        Ok(Self { stiffness, rows: Rc::new(rows), offset, start, row_stiffness, coarse: None, is_redundant: false })
+        Ok(Self { stiffness, rows, offset, start, row_stiffness, coarse: None, is_redundant: false })
     }
 
     /// The same with all entries of K stored, row by row.
@@ -184,7 +184,7 @@ pub struct Monolithic<S> {
 /// The matrix of all bodies.
 struct Joined<S> {
     matrix: RobinMatrix<S>,
-    rows: Rc<Csr>,
+    rows: Csr,
     offset: Vec<usize>,
     /// Number of the first row here.
     first: usize,

@@ -7,6 +7,7 @@ use super::{Law, Recovery};
 use crate::fem::element::{self, EDGES};
 use crate::fem::space::{Space, area_vector};
 use crate::fem::{Facets, assemble, quadrature};
+use crate::linalg::dot;
 use crate::problem::order::Order;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
@@ -231,10 +232,6 @@ fn dual<const D: usize>(x: &[[f64; D]]) -> [[f64; D]; D] {
     dual[1] = std::array::from_fn(|c| (bb * a[c] - ab * b[c]) / determinant);
     dual[2] = std::array::from_fn(|c| (aa * b[c] - ab * a[c]) / determinant);
     dual
-}
-
-fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).map(|c| a[c] * b[c]).sum()
 }
 
 fn distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
