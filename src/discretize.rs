@@ -4,6 +4,7 @@ mod approach;
 mod auto;
 mod balance;
 mod carried;
+mod cells;
 mod distribute;
 mod draft;
 mod elastic;
@@ -11,10 +12,12 @@ mod factory;
 mod fields;
 mod find;
 mod gauge;
+mod known;
 mod mechanism;
 pub mod meshes;
 mod pairs;
 mod part;
+mod post;
 pub mod resolution;
 mod roster;
 mod springs;
@@ -26,28 +29,28 @@ use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
 use crate::fem::{assemble::NodeGraph, rigid};
-use crate::linalg::{Csr, axpy};
+use crate::linalg::{Csr, axpy, dot};
 use crate::mesh::Checked;
 use crate::model::{BodySlot, Exchange, Loads, Mechanism, Model, Segment};
-use crate::output::vtu::BodyField;
+use crate::problem::body::BodySpec;
 use crate::problem::contact::ContactSpec;
 use crate::problem::method::Start;
 use crate::scene::Scene;
-use approach::OuterMaker;
 use balance::Forces;
 pub use balance::{Balance, Resultant};
 use carried::{Supported, supported};
+use cells::Needs;
 pub use distribute::{Deal, Graph};
 use draft::{Draft, Loose};
 pub use factory::{Assembled, Factory, Outline};
-use fields::{ErrorMaker, FieldMaker};
+use known::parts;
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
-use part::Part;
+pub use post::Post;
 use std::cell::OnceCell;
 use std::rc::Rc;
 pub use surface::ContactSurface;
-pub use verify::{Verified, verify};
+pub use verify::{Findings, Verified, verify};
 
 /// What the check of the mesh of a body counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -103,47 +106,16 @@ pub struct BodyInfo {
     pub springs: Vec<String>,
     /// Names of its rigid surfaces.
     pub rigid: Vec<String>,
-    field: FieldMaker,
-    nodal: NodalMaker,
-    balance: BalanceMaker,
-    errors: Option<ErrorMaker>,
-    outer: OuterMaker,
+    post: Option<Post>,
 }
 
-/// State of all dofs -> displacements of all nodes.
-type NodalMaker = Box<dyn Fn(&[f64]) -> Vec<f64>>;
-
-/// Displacements of all nodes, forces omega p at the contact rows -> forces on the body.
-type BalanceMaker = Box<dyn Fn(&[f64], &[f64]) -> Balance>;
-
 impl BodyInfo {
-    /// Displacements and recovered stresses for output, from a state of all dofs. `bent` is the same without the rigid motion that
-    /// supports leave: beside a large one the digits of the deformation are few.
-    pub fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
-        let mut field = (self.field)(&(self.nodal)(bent));
-        let u = (self.nodal)(v);
-        let dimension = u.len() / field.points.len().max(1);
-        for (to, u) in field.displacement.iter_mut().zip(u.chunks_exact(dimension.max(1))) {
-            to[..u.len()].copy_from_slice(u);
-        }
-        field
-    }
-
-    /// Forces on the body in a state of all dofs, under the forces omega p of its contact rows.
-    pub fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
-        (self.balance)(&(self.nodal)(v), force)
-    }
-
-    /// Mean displacement of where the body is loaded along a direction, else of where it is held along it, else of all of it; from a
-    /// state of all dofs.
-    pub fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3] {
-        (self.outer)(&(self.nodal)(v), direction)
-    }
-
-    /// Errors against the scene's known displacements over the norms of these, if the scene has them: L2 norm, H1 seminorm,
-    /// energy norm ([`norms::error`](crate::fem::norms::error)); from a state of all dofs.
-    pub fn errors(&self, v: &[f64]) -> Option<[f64; 3]> {
-        self.errors.as_ref().map(|errors| errors(&(self.nodal)(v)))
+    /// What the body says of its displacements.
+    ///
+    /// # Panics
+    /// On ranks that do not speak for the body.
+    pub fn post(&self) -> &Post {
+        self.post.as_ref().unwrap_or_else(|| unreachable!("only the rank that speaks for a body recovers it"))
     }
 }
 
@@ -179,8 +151,8 @@ pub struct Discrete {
 
 /// Turns a scene and its mesh into a model.
 ///
-/// `ranks` is (this rank, number of ranks); `cut` finds the common pieces of surfaces in this dimension. `factory` turns each
-/// body of this rank into one that solves. `keep` tells to keep the meshes, for an estimate of the error.
+/// `bodies` are those of `verified` under the loads of a step; `cut` finds the common pieces of surfaces in this dimension. `factory` turns
+/// each body of this rank into one that solves. `keep` tells to keep the meshes, for an estimate of the error. Collective.
 ///
 /// # Errors
 /// Refusals of the scene against its mesh: missing groups, surfaces of the wrong body, supports that contradict each
@@ -188,15 +160,15 @@ pub struct Discrete {
 pub fn discretize<const D: usize>(
     scene: &Scene,
     verified: &Verified<D>,
+    bodies: &[BodySpec],
     cut: contact::pieces::Cut<D>,
-    ranks: (usize, usize),
     keep: bool,
     exchange: Rc<dyn Exchange>,
     factory: &mut dyn Factory,
 ) -> Result<Discrete> {
-    let Verified { mesh, bodies, checked } = verified;
-    let mut parts = bodies.iter().map(|spec| Part::new(spec, mesh, scene.plane)).collect::<Result<Vec<_>>>()?;
-    parts.iter().zip(&**checked).try_for_each(|(part, checked)| verify::held(part, &checked.parts, mesh))?;
+    let Verified { mesh, checked, .. } = verified;
+    let rank = exchange.rank();
+    let (mut parts, whole) = parts(scene, verified, bodies, &*exchange)?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
     for found in pairs::all(scene, mesh, cut, &parts, keep)? {
@@ -237,20 +209,24 @@ pub fn discretize<const D: usize>(
         true => parts[body].coarse_nodes(),
         false => Vec::new(),
     };
-    let dealt = distribute::distribute::<D>(&drafts, &coarse, &deals, ranks, &exchange);
-    drop(deals);
+    let dealt = distribute::distribute::<D>(&drafts, &coarse, &deals, &exchange);
     let loads = parts.iter().zip(&dealt).map(|(part, dealt)| if dealt.is_some() { 0 } else { part.space.dofs() });
-    let mut owner = crate::parallel::owners(&loads.collect::<Vec<_>>(), ranks.1);
+    let mut owner = crate::parallel::owners(&loads.collect::<Vec<_>>(), exchange.ranks());
     dealt
         .iter()
         .zip(&mut owner)
         .for_each(|(dealt, owner)| *owner = dealt.as_ref().map_or(*owner, |dealt| dealt.leader));
+    let needs = if keep { Needs::everywhere(parts.len()) } else { Needs::of(&owner, &drafts, &deals, D) };
+    let elasticities = cells::deal(&mut parts, whole, &needs, scene.plane, &*exchange)?;
+    drop(needs);
+    drop(deals);
     let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt);
-    let known = gauged.into_iter().zip(loose);
-    for (index, ((part, (((draft, supported), graph), dealt)), (gauged, loose))) in
+    let known = gauged.into_iter().zip(loose).zip(elasticities);
+    for (index, ((part, (((draft, supported), graph), dealt)), ((gauged, loose), elasticity))) in
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
-        let Draft { segments, rows, free, mut nodal_load, load } = draft;
+        let is_owner = owner[index] == rank;
+        let Draft { segments, rows, free, nodal_load, load } = draft;
         let Supported { carried, prescribed } = supported;
         let mut offset = vec![0.0; rows.rows()];
         if !carried.is_empty() {
@@ -263,15 +239,13 @@ pub fn discretize<const D: usize>(
             contact::pad(std::array::from_fn::<f64, D, _>(|c| nodal_load.iter().skip(c).step_by(D).sum()));
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
         let surface: f64 = segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
-        let elasticity = elastic::of(part.spec, &part.space, mesh, scene.plane)?;
-        let modulus = elastic::modulus(&part.space, &elasticity, share(&segments, &pairs));
+        let modulus = dot(&part.known.moduli, &share(&segments, &pairs));
         let held = motions.len() == unfelt.len();
-        let volume: f64 = (0..part.space.cell_count()).map(|cell| part.space.share(cell)).sum();
-        let depth = volume / surface;
+        let depth = part.known.volume / surface;
         let stiffness = if held && surface > 0.0 { modulus / depth } else { 0.0 };
         // what only the owner knows, until all ranks share it
         let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
-        let mut kept = factory.kept(&name).filter(|_| owner[index] == ranks.0);
+        let mut kept = factory.kept(&name).filter(|_| is_owner);
         let loads = kept.is_some().then(|| Loads {
             work: rigid::free(&left, &prescribed, &load).iter().map(|motion| motion.work).collect(),
             force: load.clone(),
@@ -286,7 +260,7 @@ pub fn discretize<const D: usize>(
         if let Some(before) = kept.filter(|_| serves) {
             (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             assemblies_avoided += 1;
-        } else if owner[index] == ranks.0 || dealt.is_some() {
+        } else if is_owner || dealt.is_some() {
             let left = rigid::free(&left, &prescribed, &load);
             let mut graph = graph.into_inner().unwrap_or_else(|| part.graph(&rows));
             if let Some(dealt) = &dealt {
@@ -294,7 +268,7 @@ pub fn discretize<const D: usize>(
             }
             let mut body = part.assemble(mesh, &graph, &elasticity, load, prescribed, carried)?;
             drop(graph);
-            if owner[index] == ranks.0 {
+            if is_owner {
                 assemblies += 1;
                 scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
             }
@@ -317,20 +291,22 @@ pub fn discretize<const D: usize>(
                 interpolation,
             })?);
         }
-        let outer = approach::outer_maker(&part, mesh)?;
         let unloaded = if keep { part.unloaded(mesh, &nodal_load)? } else { Vec::new() };
         let warning = elastic::warning(part.spec, &part.space, scene.plane);
-        let (nodes, points, cells) = (part.space.nodes.len(), part.space.points(), part.space.cell_count());
-        let mut space = part.space;
-        if owner[index] != ranks.0 && !keep {
-            // only the rank that speaks for the body recovers fields
-            (space, nodal_load) = (space.without_cells(), Vec::new());
-        }
-        let (space, held, elasticity) = (Rc::new(space), Rc::new(part.held), Rc::new(elasticity));
+        let outer = if is_owner { Some(approach::outer_maker(&part, mesh)?) } else { None };
+        let (nodes, cells) = (part.space.nodes.len(), part.known.cells);
+        let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
+        let post = |outer| {
+            let rows = nodal_rows(&segments, &pairs, D * nodes);
+            let (space, held, elasticity) = (space.clone(), held.clone(), elasticity.clone());
+            let (springs, supports) = (part.springs, part.spec.fix.len());
+            let forces = Forces { space, elasticity, held, springs, supports, load: nodal_load, rows };
+            Post::new(part.spec, outer, forces)
+        };
         infos.push(BodyInfo {
             name: name.clone(),
             nodes,
-            points,
+            points: part.known.points,
             cells,
             facets: FacetCounts::of(&checked[index]),
             dofs: D * nodes,
@@ -345,22 +321,11 @@ pub fn discretize<const D: usize>(
             supports: part.spec.fix.iter().map(|support| support.on.value.clone()).collect(),
             springs: part.spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
             rigid: held.rigid.iter().map(|(load, _)| part.spec.load[*load].on.value.clone()).collect(),
-            nodal: {
-                let held = held.clone();
-                Box::new(move |v| held.frame.displacements(v))
-            },
-            balance: {
-                let rows = nodal_rows(&segments, &pairs, D * nodes);
-                let (springs, supports) = (part.springs, part.spec.fix.len());
-                let (space, held, elasticity) = (space.clone(), held.clone(), elasticity.clone());
-                let forces = Forces { space, elasticity, held, springs, supports, load: nodal_load, rows };
-                Box::new(move |u, force| forces.balance(u, force))
-            },
-            errors: fields::error_maker(part.spec, &space, &elasticity)?,
-            outer,
-            field: fields::field_maker(name.clone(), space.clone(), elasticity.clone()),
+            post: outer.map(post).transpose()?,
         });
-        shapes.push(Shape { space, elasticity, modulus, held, unloaded });
+        if keep {
+            shapes.push(Shape { space, elasticity, modulus, held, unloaded });
+        }
         slots.push(BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness });
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);

@@ -1,11 +1,11 @@
 //! Which rank owns which body, and what ranks tell each other, over the `mpi` crate.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 use crate::model::Exchange;
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
 use mpi::datatype::PartitionMut;
-use mpi::traits::CommunicatorCollectives;
+use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::cell::Cell;
@@ -36,6 +36,10 @@ impl Exchange for Ranks {
         self.session.size()
     }
 
+    fn rank(&self) -> usize {
+        self.session.rank()
+    }
+
     fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
         if self.session.size() == 1 {
             return vec![mine];
@@ -55,16 +59,76 @@ impl Exchange for Ranks {
         starts.iter().zip(ends).map(|(&start, end)| all[start as usize..end as usize].to_vec()).collect()
     }
 
+    fn tell(&self, mut mine: Vec<u8>) -> Vec<u8> {
+        let root = self.session.world();
+        let root = root.process_at_rank(0);
+        let mut length = mine.len() as u64;
+        root.broadcast_into(&mut length);
+        mine.resize(length as usize, 0);
+        mine.chunks_mut(CHUNK).for_each(|chunk| root.broadcast_into(chunk));
+        mine
+    }
+
+    fn deal(&self, of_rank: &mut dyn FnMut(usize) -> Vec<u8>) -> Vec<u8> {
+        let world = self.session.world();
+        if self.session.rank() == 0 {
+            for rank in 1..self.session.size() {
+                let (bytes, other) = (of_rank(rank), world.process_at_rank(rank as i32));
+                other.send(&(bytes.len() as u64));
+                bytes.chunks(CHUNK).for_each(|chunk| other.send(chunk));
+            }
+            return of_rank(0);
+        }
+        let root = world.process_at_rank(0);
+        let (length, _) = root.receive::<u64>();
+        let mut bytes = vec![0; length as usize];
+        for chunk in bytes.chunks_mut(CHUNK) {
+            root.receive_into(chunk);
+        }
+        bytes
+    }
+
     fn messages(&self) -> usize {
         self.messages.get()
     }
 }
 
-/// What each rank knows, in their order; collective. Numbers go as text: those that must keep their last digit go by
-/// [`Exchange::sum`].
+/// Bytes of one message: MPI counts them by 31 bits.
+const CHUNK: usize = 1 << 30;
+
+/// What each rank knows, in their order; collective.
 pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: &T) -> Vec<T> {
-    let bytes = serde_json::to_vec(mine).unwrap_or_default();
-    exchange.share(bytes).iter().filter_map(|bytes| serde_json::from_slice(bytes).ok()).collect()
+    exchange.share(pack(mine)).iter().filter_map(|bytes| unpack(bytes)).collect()
+}
+
+/// What the first rank has found; `mine` is there alone, and is asked for nowhere else. Collective.
+///
+/// # Errors
+/// That of the first rank, there; elsewhere one of the same kind without words.
+pub fn tell<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: impl FnOnce() -> Result<T>) -> Result<T> {
+    if exchange.rank() == 0 {
+        let found = mine();
+        if exchange.ranks() > 1 {
+            exchange.tell(pack(&found.as_ref().map_err(|error| error.kind().exit_code())));
+        }
+        return found;
+    }
+    let told: Option<Result<T, i32>> = unpack(&exchange.tell(Vec::new()));
+    told.unwrap_or(Err(Kind::Solver.exit_code())).map_err(Error::silent)
+}
+
+/// What the first rank makes for each rank; `of_rank` is called there alone. Collective.
+pub fn deal<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, of_rank: impl Fn(usize) -> T) -> Option<T> {
+    unpack(&exchange.deal(&mut |rank| pack(&of_rank(rank))))
+}
+
+/// Plain data as bytes, numbers with all their digits.
+fn pack<T: Serialize>(value: &T) -> Vec<u8> {
+    postcard::to_allocvec(value).unwrap_or_default()
+}
+
+fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
+    postcard::from_bytes(bytes).ok()
 }
 
 /// Owner of each body: whole bodies, largest first, each to the rank with the least load so far.

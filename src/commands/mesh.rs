@@ -47,7 +47,7 @@ fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request)
     if let Some(path) = &request.output {
         write(path, &loaded)?;
     }
-    let facts = facts(scene, &loaded, seconds)?;
+    let facts = facts(scene, loaded, seconds)?;
     if request.json {
         say(format_args!("{facts:#}"))?;
     } else {
@@ -57,9 +57,10 @@ fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request)
 }
 
 /// All that is said about a mesh.
-fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Result<Value> {
-    let mesh = &loaded.mesh;
+fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Result<Value> {
+    let Loaded { mesh, origin, file } = loaded;
     let verified = crate::discretize::verify(scene, mesh)?;
+    let mesh = &verified.mesh;
     let mut checked = verified.checked.iter();
     let mut bodies = Vec::new();
     for body in &verified.bodies {
@@ -85,8 +86,8 @@ fn facts<const D: usize>(scene: &Scene, loaded: &Loaded<D>, seconds: f64) -> Res
         .collect();
     Ok(json!({
         "title": scene.title,
-        "file": loaded.file,
-        "origin": match loaded.origin {
+        "file": file,
+        "origin": match origin {
             Origin::File => "the scene's own file",
             Origin::Cache => "from the cache",
             Origin::Gmsh => "made by Gmsh",

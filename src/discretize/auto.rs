@@ -40,7 +40,7 @@ pub fn find<'a, const D: usize>(
             Side::new(
                 &part.spec.name.value,
                 &part.space,
-                part.space.boundary(),
+                part.known.boundary(&part.space),
                 &part.held.prescribed,
                 &part.held.frame,
             )

@@ -83,14 +83,14 @@ pub struct Dealt {
     coarse: Coarse,
 }
 
-/// What rank `rank` knows of each body; none for those that are not dealt out. `coarse` tells the coarse nodes of a body.
+/// What this rank knows of each body; none for those that are not dealt out. `coarse` tells the coarse nodes of a body.
 pub fn distribute<const D: usize>(
     drafts: &[Draft],
     coarse: &dyn Fn(usize) -> Vec<u32>,
     deals: &[Deal],
-    ranks: (usize, usize),
     exchange: &Rc<dyn Exchange>,
 ) -> Vec<Option<Dealt>> {
+    let ranks = (exchange.rank(), exchange.ranks());
     let mut all: Vec<Option<Dealt>> = drafts.iter().map(|_| None).collect();
     for Deal { bodies, owner } in deals {
         let sizes = bodies.iter().map(|&body| drafts[body].rows.columns / D);

@@ -31,8 +31,20 @@ pub fn of<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, pla
             of_cell[cell] = number + 1;
         }
     }
+    made(spec, of_cell, D, plane)
+}
+
+/// The elasticity of some cells of a body by the numbers of their constants; empty if the body has no regions.
+///
+/// # Errors
+/// Constants that make no material.
+pub fn of_regions(spec: &BodySpec, of_cell: Vec<u32>, dimension: usize, plane: Plane) -> Result<Elasticity> {
+    made(spec, of_cell.into_iter().map(|number| number as usize).collect(), dimension, plane)
+}
+
+fn made(spec: &BodySpec, of_cell: Vec<usize>, dimension: usize, plane: Plane) -> Result<Elasticity> {
     let specs: Vec<&ElasticitySpec> = specs(spec).collect();
-    Elasticity::new(&specs, of_cell, D, plane).map_err(|(number, flaw)| refusal(spec, number, None, &flaw))
+    Elasticity::new(&specs, of_cell, dimension, plane).map_err(|(number, flaw)| refusal(spec, number, None, &flaw))
 }
 
 fn specs(spec: &BodySpec) -> impl Iterator<Item = &ElasticitySpec> {
@@ -73,18 +85,20 @@ pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw)
     }
 }
 
-/// Mean modulus of a body against pressure on surfaces with the mean squared normal components `share` (which sum to one).
-/// Cells whose constants make no material at their middle count as nothing: assembly refuses them.
-pub fn modulus<const D: usize>(space: &Space<D>, elasticity: &Elasticity, share: [f64; 3]) -> f64 {
-    let in_cell = |cell: usize| {
-        let moduli = elasticity.moduli(cell, pad(space.centroid(cell))).unwrap_or_default();
-        (0..3).map(|c| share[c] * moduli[c]).sum::<f64>()
-    };
+/// Mean moduli of a body against pressure along x, y, z. Cells whose constants make no material at their middle count as nothing: assembly
+/// refuses them.
+pub fn moduli<const D: usize>(space: &Space<D>, elasticity: &Elasticity) -> [f64; 3] {
+    let in_cell = |cell: usize| elasticity.moduli(cell, pad(space.centroid(cell))).unwrap_or_default();
     if elasticity.is_constant() {
         return in_cell(0);
     }
-    let sum: f64 = (0..space.cell_count()).map(|cell| space.share(cell) * in_cell(cell)).sum();
-    sum / (0..space.cell_count()).map(|cell| space.share(cell)).sum::<f64>()
+    let (mut sum, mut volume) = ([0.0; 3], 0.0);
+    for cell in 0..space.cell_count() {
+        let share = space.share(cell);
+        crate::contact::add(&mut sum, in_cell(cell).map(|modulus| share * modulus));
+        volume += share;
+    }
+    sum.map(|sum| sum / volume)
 }
 
 /// What the user should know: linear elements are too stiff where the volume can hardly change.

@@ -29,7 +29,8 @@ pub struct Outline<'a> {
 
 /// Gives bodies their inner solvers.
 pub trait Factory {
-    /// Decides on the solvers of all bodies, in the order of the scene: called once, on every rank.
+    /// Decides on the solvers of all bodies, in the order of the scene. Collective, once; graphs are made on the first rank alone, which has all
+    /// cells.
     ///
     /// # Errors
     /// Failures of PETSc's options.

@@ -2,6 +2,7 @@
 
 use super::elastic;
 use super::find::{Values, find_group, not_on_body, point, without_area};
+use super::known::Known;
 use super::springs;
 use super::supports::Held;
 use crate::contact;
@@ -15,7 +16,6 @@ use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, support, surface};
 use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};
-use crate::problem::elasticity::Plane;
 use nalgebra::DMatrix;
 
 /// A body of the scene with its space, supports and springs.
@@ -28,30 +28,20 @@ pub struct Part<'a, const D: usize> {
     pub held: Held<D>,
     /// Springs to the ground: for each of the scene, its stiffnesses between nodes.
     pub springs: Vec<Vec<NodalBlock<D>>>,
+    /// What of its cells is known on all ranks.
+    pub known: Known,
 }
 
 impl<'a, const D: usize> Part<'a, D> {
-    /// Finds the body's cells in the mesh and applies its supports.
+    /// Applies the supports and springs of a body.
     ///
     /// # Errors
-    /// Refusals of the scene against its mesh, and bodies of revolution with points of negative radius.
-    pub fn new(spec: &'a BodySpec, mesh: &Mesh<D>, plane: Plane) -> Result<Self> {
-        let group = find_group(mesh, &spec.name, &[D], "body")?;
-        let mut space = Space::new(mesh, group, spec.order);
-        if plane == Plane::Axisymmetric {
-            space = space.revolved();
-            if let Some(x) = space.nodes.iter().find(|x| x[0] < 0.0) {
-                let message =
-                    format!("body `{}` has a negative radius at {}", spec.name.value, point(contact::pad(*x)));
-                return Err(Error::mesh(&mesh.path, None, message).help(
-                    "axisymmetric bodies are drawn as meridians, x >= 0 with the axis at x = 0: leave one half away",
-                ));
-            }
-        }
+    /// Refusals of the scene against its mesh.
+    pub fn new(spec: &'a BodySpec, mesh: &Mesh<D>, space: Space<D>, known: Known) -> Result<Self> {
         let held = Held::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| springs::blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
-        Ok(Self { spec, space, held, springs })
+        Ok(Self { spec, space, held, springs, known })
     }
 
     /// Rigid motions of the nodes as motions of the dofs.
@@ -111,20 +101,11 @@ impl<'a, const D: usize> Part<'a, D> {
 
     /// Nodal forces of the loads, but for those on rigid surfaces. Supports are not regarded.
     pub fn load(&self, mesh: &Mesh<D>, parts: Parts) -> Result<Vec<f64>> {
-        let name = &self.spec.name;
-        let mut load = vec![0.0; self.space.dofs()];
+        let whole = parts == Parts::Whole;
+        let force = if whole { self.known.force.clone() } else { body_force(self.spec, &self.space, parts)? };
+        let mut load = if force.is_empty() { vec![0.0; self.space.dofs()] } else { force };
         for spec in &self.spec.load {
             self.add_load(spec, spec.factor, mesh, parts, &mut load)?;
-        }
-        if let Some(fields) = &self.spec.force {
-            let values = Values::of("this body force", &name.value);
-            let density = |x: [f64; D]| std::array::from_fn(|c| self.spec.force_factor * values.at(&fields[c], x));
-            assemble::body_force(&self.space, parts, &density, &mut load);
-            values.refused()?;
-            if load.iter().any(|f| !f.is_finite()) {
-                return Err(Error::scene(&name.place, format!("body `{}`: the body force is too large", name.value))
-                    .label("its forces are beyond the range of numbers"));
-            }
         }
         Ok(load)
     }
@@ -232,7 +213,7 @@ impl<'a, const D: usize> Part<'a, D> {
 
     /// The nodes that linear displacements have, sorted.
     pub fn coarse_nodes(&self) -> Vec<u32> {
-        coarse_nodes(&self.space, &self.held.frame)
+        coarse_nodes(&self.space, &self.known.corners, &self.held.frame)
     }
 
     /// Interpolation of the dofs from those at these nodes.
@@ -271,4 +252,22 @@ impl<'a, const D: usize> Part<'a, D> {
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
         Ok(support(stiffness, load, prescribed, carried))
     }
+}
+
+/// Nodal forces of the body force of a body of which all cells are here; empty without one.
+///
+/// # Errors
+/// A force that is not finite somewhere, or beyond the range of numbers.
+pub fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Parts) -> Result<Vec<f64>> {
+    let (name, Some(fields)) = (&spec.name, &spec.force) else { return Ok(Vec::new()) };
+    let mut load = vec![0.0; space.dofs()];
+    let values = Values::of("this body force", &name.value);
+    let density = |x: [f64; D]| std::array::from_fn(|c| spec.force_factor * values.at(&fields[c], x));
+    assemble::body_force(space, parts, &density, &mut load);
+    values.refused()?;
+    if load.iter().any(|f| !f.is_finite()) {
+        return Err(Error::scene(&name.place, format!("body `{}`: the body force is too large", name.value))
+            .label("its forces are beyond the range of numbers"));
+    }
+    Ok(load)
 }

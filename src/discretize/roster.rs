@@ -16,13 +16,12 @@ use std::collections::{BTreeSet, HashMap};
 /// # Errors
 /// Patterns that match nothing, two tables equally near to a body, groups that cannot name bodies, a total force on several
 /// surfaces.
-pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Vec<BodySpec>> {
+pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> Result<Vec<BodySpec>> {
     if !scene.bodies.iter().any(is_plural) {
         return Ok(scene.bodies.clone());
     }
     let members = members(scene, mesh)?;
-    let names: Vec<&str> = members.iter().flatten().copied().collect();
-    let mut lying = lying(&names, mesh).into_iter();
+    let mut lying = lying.iter().map(|groups| groups.iter().map(|&group| &mesh.groups[group as usize]).collect());
     let mut bodies = Vec::new();
     for (table, names) in scene.bodies.iter().zip(&members) {
         let lines = Lines { table, mesh, names, lying: lying.by_ref().take(names.len()).collect() };
@@ -122,8 +121,18 @@ pub fn tie(what: &str, [first, second]: [&str; 2], place: &Place) -> Error {
         .help("the name itself wins, then the pattern with more characters of its own: give one of them more")
 }
 
+/// Numbers of the groups that lie on each body, body by body of each table; none where no table or line stands for many.
+pub type Lying = Vec<Vec<u32>>;
+
 /// The groups that lie on each body: its own cells, and those of which it has all corners of an element.
-fn lying<'m, const D: usize>(names: &[&str], mesh: &'m Mesh<D>) -> Vec<Vec<&'m Group>> {
+///
+/// # Errors
+/// Patterns of bodies that match nothing or too much.
+pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Lying> {
+    if !scene.bodies.iter().any(is_plural) {
+        return Ok(Vec::new());
+    }
+    let names = members(scene, mesh)?.concat();
     let number: HashMap<&str, usize> = names.iter().copied().zip(0..).collect();
     let mut last = vec![usize::MAX; mesh.points.len()];
     let mut owners: Vec<(u32, usize)> = Vec::new();
@@ -140,9 +149,9 @@ fn lying<'m, const D: usize>(names: &[&str], mesh: &'m Mesh<D>) -> Vec<Vec<&'m G
         owners[first..].iter().take_while(move |entry| entry.0 == point).map(|entry| entry.1)
     };
     let mut lying = vec![Vec::new(); names.len()];
-    for group in mesh.groups.iter() {
+    for (place, group) in (0..).zip(mesh.groups.iter()) {
         if let Some(&body) = number.get(group.name.as_str()).filter(|_| group.dimension == D) {
-            lying[body].push(group);
+            lying[body].push(place);
             continue;
         }
         let on_all = |corners: &[u32], body: usize| corners.iter().all(|&point| of(point).any(|other| other == body));
@@ -151,9 +160,9 @@ fn lying<'m, const D: usize>(names: &[&str], mesh: &'m Mesh<D>) -> Vec<Vec<&'m G
             of(simplex[0]).filter(move |&body| on_all(&corners, body)).collect::<Vec<_>>()
         };
         let bodies: BTreeSet<usize> = group.simplices().flat_map(on).collect();
-        bodies.into_iter().for_each(|body| lying[body].push(group));
+        bodies.into_iter().for_each(|body| lying[body].push(place));
     }
-    lying
+    Ok(lying)
 }
 
 /// What a table says of groups, and the groups on each of its bodies.

@@ -2,37 +2,75 @@
 
 use super::find::point;
 use super::part::Part;
-use super::roster;
+use super::roster::{self, Lying};
 use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::fem::Space;
 use crate::fem::rigid::{self, RigidMotion};
-use crate::mesh::{Asked, Checked, Duty, Mesh, Parts};
+use crate::mesh::{Asked, Checked, Duty, Mesh, Parts, Told};
 use crate::problem::body::BodySpec;
 use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 use std::rc::Rc;
 
 /// A mesh that holds what bodies must be.
 #[derive(Debug)]
-pub struct Verified<'a, const D: usize> {
-    /// The mesh.
-    pub mesh: &'a Mesh<D>,
+pub struct Verified<const D: usize> {
+    /// The mesh; on all ranks but the first without the cells of bodies.
+    pub mesh: Mesh<D>,
     /// The bodies of the scene, each with a name of its own.
     pub bodies: Vec<BodySpec>,
     /// What was found of each body, in the same order; bodies that the mesh does not have are missing.
     pub checked: Rc<[Checked]>,
+    lying: Lying,
+}
+
+/// What the first rank has found of a mesh, for the others.
+#[derive(Serialize, Deserialize)]
+pub struct Findings {
+    mesh: Told,
+    checked: Vec<Checked>,
+    lying: Lying,
 }
 
 /// Finds the bodies of a scene and checks its mesh once: see `roster::bodies` and [`Mesh::check`].
 ///
 /// # Errors
 /// Patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.
-pub fn verify<'a, const D: usize>(scene: &Scene, mesh: &'a Mesh<D>) -> Result<Verified<'a, D>> {
-    let bodies = roster::bodies(scene, mesh)?;
+pub fn verify<const D: usize>(scene: &Scene, mesh: Mesh<D>) -> Result<Verified<D>> {
+    let lying = roster::lying(scene, &mesh)?;
+    let bodies = roster::bodies(scene, &mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
     let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty())?;
-    Ok(Verified { mesh, bodies, checked: checked.into() })
+    Ok(Verified { mesh, bodies, checked: checked.into(), lying })
+}
+
+impl<const D: usize> Verified<D> {
+    /// What other ranks have to know.
+    pub fn findings(&self) -> Findings {
+        // supports may hold all nodes of a group of cells
+        let held = self.bodies.iter().flat_map(|body| &body.fix).map(|fix| fix.on.value.as_str());
+        let held: HashSet<&str> = held.collect();
+        let mesh = self.mesh.told(|name| held.contains(name));
+        let counted = |checked: &Checked| Checked {
+            parts: Parts { count: checked.parts.count, of_cell: Vec::new() },
+            ..*checked
+        };
+        Findings { mesh, checked: self.checked.iter().map(counted).collect(), lying: self.lying.clone() }
+    }
+
+    /// What the first rank has found, on another one.
+    ///
+    /// # Errors
+    /// None that [`verify`] has not found before.
+    pub fn told(scene: &Scene, findings: Findings) -> Result<Self> {
+        let Findings { mesh, checked, lying } = findings;
+        let mesh = Mesh::of(mesh);
+        let bodies = roster::bodies(scene, &mesh, &lying)?;
+        Ok(Self { mesh, bodies, checked: checked.into(), lying })
+    }
 }
 
 /// A body with the groups that serve it.

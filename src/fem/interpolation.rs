@@ -26,16 +26,28 @@ impl Interpolation {
     }
 }
 
-/// The nodes of linear displacements, sorted: the vertices, and those that stand for others.
-pub fn coarse_nodes<const D: usize>(space: &Space<D>, frame: &Frame<D>) -> Vec<u32> {
-    let mut is_coarse = vec![space.order == Order::P1; space.nodes.len()];
-    let vertices = space.cells.chunks_exact(space.stride).flat_map(|cell| &cell[..=D]);
-    vertices.chain(frame.master.values()).for_each(|&node| is_coarse[node as usize] = true);
-    (0..space.nodes.len() as u32).filter(|&node| is_coarse[node as usize]).collect()
+/// The corners of cells, sorted, of a space with nodes between them; empty where all nodes are corners.
+pub fn corners<const D: usize>(space: &Space<D>) -> Vec<u32> {
+    let mut is_corner = vec![false; if space.order == Order::P1 { 0 } else { space.nodes.len() }];
+    let cells = space.cells.chunks_exact(space.stride).filter(|_| space.order == Order::P2);
+    cells.flat_map(|cell| &cell[..=D]).for_each(|&node| is_corner[node as usize] = true);
+    (0..is_corner.len() as u32).filter(|&node| is_corner[node as usize]).collect()
+}
+
+/// The nodes of linear displacements, sorted: the corners, and nodes that stand for others.
+pub fn coarse_nodes<const D: usize>(space: &Space<D>, corners: &[u32], frame: &Frame<D>) -> Vec<u32> {
+    if space.order == Order::P1 {
+        return (0..space.nodes.len() as u32).collect();
+    }
+    let mut coarse: Vec<u32> = corners.iter().chain(frame.master.values()).copied().collect();
+    coarse.sort_unstable();
+    coarse.dedup();
+    coarse
 }
 
 /// Interpolation from the dofs at the nodes `coarse` ([`coarse_nodes`]) to all dofs of a body: a node in the middle of an edge moves as the
-/// mean of the ends. Prescribed dofs have no part in it, but for a one where they are in both spaces, so that P'KP has their diagonal.
+/// mean of the ends. Prescribed dofs have no part in it, but for a one where they are in both spaces, so that P'KP has their diagonal. Nodes
+/// whose cells are not here have empty rows.
 pub fn from_vertices<const D: usize>(
     space: &Space<D>,
     frame: &Frame<D>,
@@ -64,7 +76,8 @@ pub fn from_vertices<const D: usize>(
             let mut row: Vec<(usize, f64)> = Vec::new();
             // v_c = axis_c . (u_a + u_b)/2, and u = sum_k axis_k v_k at the ends
             let axis = frame.axes.get(&(node as u32)).map_or(unit(c), |axes| axes[c]);
-            for end in ends.iter().filter(|_| !is_prescribed(D * node + c)) {
+            let is_here = ends[0] as usize != node;
+            for end in ends.iter().filter(|_| is_here && !is_prescribed(D * node + c)) {
                 let (end, shares) = frame.force(*end, axis);
                 let Ok(place) = coarse.binary_search(&end) else {
                     unreachable!("a vertex is coarse, and so is its master")
@@ -94,7 +107,7 @@ mod tests {
     /// Values at all dofs, and those of them at coarse nodes.
     fn both(space: &Space<3>, frame: &Frame<3>, u: impl Fn(&[f64; 3]) -> [f64; 3]) -> (Vec<f64>, Vec<f64>) {
         let all = frame.dofs(&space.nodes.iter().flat_map(u).collect::<Vec<_>>());
-        let coarse = coarse_nodes(space, frame);
+        let coarse = coarse_nodes(space, &corners(space), frame);
         let few = coarse.iter().flat_map(|&node| all[3 * node as usize..3 * node as usize + 3].to_vec()).collect();
         (all, few)
     }
@@ -107,7 +120,7 @@ mod tests {
     #[test]
     fn linear_displacements_are_interpolated_exactly() {
         let space = block::<3>(2, Order::P2);
-        let coarse = coarse_nodes(&space, &Frame::default());
+        let coarse = coarse_nodes(&space, &corners(&space), &Frame::default());
         assert_eq!((space.nodes.len(), coarse.len()), (125, 27));
         let turned = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
         let middle =
@@ -125,7 +138,7 @@ mod tests {
     #[test]
     fn supports_have_no_part() {
         let space = block::<3>(1, Order::P2);
-        let vertices = coarse_nodes(&space, &Frame::default());
+        let vertices = coarse_nodes(&space, &corners(&space), &Frame::default());
         let master =
             (0..27).find(|node| vertices.binary_search(node).is_err()).expect("a node in the middle of an edge");
         let tied = [vertices[0], vertices[1]];

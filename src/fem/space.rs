@@ -65,6 +65,24 @@ impl<const D: usize> Space<D> {
         space
     }
 
+    /// The space on the points of a mesh, node by node, of a body of which only some `cells` (body node numbers) are here; `measure` is that of
+    /// all of them.
+    pub fn of_points(mesh: &Mesh<D>, points: &[u32], order: Order, cells: Vec<u32>, measure: f64) -> Self {
+        let mut from_mesh = Numbering::new(points.iter().copied());
+        for (node, &point) in (0..).zip(points) {
+            from_mesh.number(point, node);
+        }
+        Space {
+            order,
+            nodes: points.iter().map(|&point| mesh.points[point as usize]).collect(),
+            stride: element::node_count(D + 1, order),
+            cells,
+            axisymmetric: false,
+            from_mesh,
+            measure: OnceCell::from(measure),
+        }
+    }
+
     /// The same nodes with the cells alone that touch one of those `marked`, and the numbers that these cells have here.
     pub fn around(&self, marked: &[bool]) -> (Self, Vec<usize>) {
         let cell = |index: usize| &self.cells[index * self.stride..(index + 1) * self.stride];
@@ -81,12 +99,6 @@ impl<const D: usize> Space<D> {
             },
             kept,
         )
-    }
-
-    /// The space of a body whose nodes and cells nobody here asks for.
-    pub fn without_cells(self) -> Self {
-        let (nodes, cells, from_mesh) = Default::default();
-        Self { nodes, cells, from_mesh, measure: OnceCell::new(), ..self }
     }
 
     /// The meridian of a body of revolution. Nodes whose radius is rounding of the largest one get the radius zero.
@@ -310,7 +322,7 @@ impl<const D: usize> Space<D> {
             }
             nodes.extend(facet);
         }
-        Facets { order: self.order, stride: element::node_count(D, self.order), nodes }
+        Facets::new(self.order, nodes)
     }
 
     fn points_inwards(&self, facet: &[u32], opposite: u32) -> bool {
@@ -334,6 +346,11 @@ fn key<const D: usize>(nodes: &[u32]) -> [u32; D] {
 }
 
 impl<const D: usize> Facets<D> {
+    /// Facets by their nodes.
+    pub fn new(order: Order, nodes: Vec<u32>) -> Self {
+        Self { order, stride: element::node_count(D, order), nodes }
+    }
+
     /// Number of facets.
     pub fn count(&self) -> usize {
         self.nodes.len() / self.stride

@@ -1,10 +1,11 @@
 //! The groups of a mesh by name; and compact numbering: points that no group uses go.
 
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::ops::{Deref, DerefMut};
 
 /// A named group of simplices of one dimension.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Group {
     /// Name of the physical group.
     pub name: String,

@@ -27,6 +27,7 @@ mod split;
 #[cfg(test)]
 mod tests;
 mod tokens;
+mod told;
 mod trust;
 mod unv;
 
@@ -37,6 +38,7 @@ pub use load::{Loaded, Origin, keep_final, load, load_unless, recall_final};
 pub use msh::{Maker, parse, read};
 pub use quality::Quality;
 pub use sizes::{follows, unstructured, view};
+pub use told::Told;
 pub use trust::{Breach, breach};
 
 use crate::problem::order::Order;

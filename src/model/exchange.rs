@@ -7,8 +7,14 @@ pub trait Exchange {
     fn sum(&self, values: &mut [f64]);
     /// Number of ranks.
     fn ranks(&self) -> usize;
+    /// Number of this one.
+    fn rank(&self) -> usize;
     /// The bytes of each rank, in their order.
     fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>>;
+    /// The bytes of the first rank.
+    fn tell(&self, mine: Vec<u8>) -> Vec<u8>;
+    /// The bytes that the first rank makes for this one; `of_rank` is called there alone, rank by rank.
+    fn deal(&self, of_rank: &mut dyn FnMut(usize) -> Vec<u8>) -> Vec<u8>;
     /// Sums and shares so far between several ranks.
     fn messages(&self) -> usize;
 }
@@ -22,8 +28,17 @@ impl Exchange for Serial {
     fn ranks(&self) -> usize {
         1
     }
+    fn rank(&self) -> usize {
+        0
+    }
     fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
         vec![mine]
+    }
+    fn tell(&self, mine: Vec<u8>) -> Vec<u8> {
+        mine
+    }
+    fn deal(&self, of_rank: &mut dyn FnMut(usize) -> Vec<u8>) -> Vec<u8> {
+        of_rank(0)
     }
     fn messages(&self) -> usize {
         0

@@ -1,7 +1,9 @@
 //! Order of finite elements.
 
+use serde::{Deserialize, Serialize};
+
 /// Polynomial order of the displacements.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Order {
     /// Linear simplices.
     P1,

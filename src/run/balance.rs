@@ -25,7 +25,7 @@ pub fn gather(done: &Done, recovered: &All) -> Vec<BalanceReport> {
                 // bodies know of full loads alone
                 let full = |v: &[f64]| v.iter().map(|v| v / done.share).collect::<Vec<_>>();
                 let force = model.at_rows(index, &done.outcome.layer.force);
-                let Balance { parts, size } = info.balance(&full(bent), &full(&force));
+                let Balance { parts, size } = info.post().balance(&full(bent), &full(&force));
                 let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
                 message.iter_mut().zip(numbers).for_each(|(place, number)| *place = done.share * number);
             }

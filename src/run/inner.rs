@@ -12,7 +12,7 @@ use crate::fem::Interpolation;
 use crate::fem::assemble::NodeGraph;
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot};
-use crate::parallel::agree as agreed;
+use crate::parallel::{Ranks, agree as agreed, tell};
 use crate::petsc::{Rows, Session, partition};
 use crate::problem::method::{Linear, MethodName};
 use crate::problem::order::Order;
@@ -218,22 +218,25 @@ impl<'a> Inner<'a> {
         }
     }
 
-    /// Chooses for bodies in space: for all together where Newton's method may join them.
-    fn choose_in_space(&mut self, plans: &mut [&mut Plan], outlines: &[&Outline]) {
+    /// Chooses for bodies in space: for all together where Newton's method may join them. The first rank knows their graphs. Collective.
+    fn choose_in_space(&mut self, plans: &mut [&mut Plan], outlines: &[&Outline]) -> Result<()> {
         let joined = self.may_join();
         let size = if joined { plans.len().max(1) } else { 1 };
         for (plans, outlines) in plans.chunks_mut(size).zip(outlines.chunks(size)) {
-            let candidates = plans.iter().zip(outlines).map(|(plan, outline)| {
-                let NodeGraph { ptr, col, .. } = (outline.graph)();
-                let retained = plan.retained.as_ref().filter(|_| plan.condensable);
-                Candidate { dofs: plan.dofs, order: plan.order, retained, ptr, col }
-            });
             let step = match self.method {
                 _ if joined => Step::Joined,
                 MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => Step::Swept,
                 MethodName::Robin | MethodName::Ncg | MethodName::Anderson => Step::Sweeps,
             };
-            let comparison = cost::compare(&candidates.collect::<Vec<_>>(), step);
+            let compare = || {
+                let candidates = plans.iter().zip(outlines).map(|(plan, outline)| {
+                    let NodeGraph { ptr, col, .. } = (outline.graph)();
+                    let retained = plan.retained.as_ref().filter(|_| plan.condensable);
+                    Candidate { dofs: plan.dofs, order: plan.order, retained, ptr, col }
+                });
+                Ok(cost::compare(&candidates.collect::<Vec<_>>(), step))
+            };
+            let comparison = tell(&Ranks::new(self.session), compare)?;
             // bodies that are kept have their memory already
             let are_kept = plans.iter().all(|plan| self.kept.contains_key(&plan.name));
             let is_direct = comparison.is_direct(if are_kept { usize::MAX } else { self.memory });
@@ -257,6 +260,7 @@ impl<'a> Inner<'a> {
                 plan.reason.clone_from(&reason);
             }
         }
+        Ok(())
     }
 
     /// How linear steps are solved, once bodies have their presets.
@@ -323,7 +327,7 @@ impl Factory for Inner<'_> {
             plans.iter_mut().zip(outlines).zip(open).filter_map(|(both, open)| open.then_some(both)).unzip();
         match outlines.first().map(|outline| outline.dimension) {
             Some(2) => plans_open.into_iter().for_each(|plan| self.choose_in_plane(plan)),
-            _ => self.choose_in_space(&mut plans_open, &outlines_open),
+            _ => self.choose_in_space(&mut plans_open, &outlines_open)?,
         }
         self.plans = plans;
         self.linear = self.join()?;

@@ -111,7 +111,7 @@ pub fn approaches(done: &Done, recovered: &All) -> Vec<Option<f64>> {
                 None => 0.0,
                 Some(Err(_)) => f64::NAN,
                 Some(Ok(Recovered { state, .. })) => {
-                    let u = discrete.bodies[body].outer(state, n);
+                    let u = discrete.bodies[body].post().outer(state, n);
                     sign * (0..3).map(|k| u[k] * n[k]).sum::<f64>()
                 }
             };

@@ -14,12 +14,9 @@ use crate::discretize::{self, ContactInfo, Discrete, Verified};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
-use crate::mesh::{Checked, Mesh, is_other};
 use crate::model::{BodySlot, Mechanism};
-use crate::parallel::{Ranks, agree};
+use crate::parallel::{self, Ranks, agree};
 use crate::petsc::{Session, give_back};
-use crate::problem::body::BodySpec;
-use crate::problem::mesh::MeshSource;
 use crate::problem::method::Linear;
 use crate::problem::order::Order;
 use crate::scene::Scene;
@@ -74,15 +71,12 @@ fn build_in<const D: usize>(
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
-    interrupt.hold();
     let stage = session.stage("mesh");
-    let mut mesh = mesh::<D>(session, &scene, interrupt)?;
-    let verified = agree(session, interrupt.release().and_then(|()| discretize::verify(&scene, &mesh)))?;
+    let mut verified = verified::<D>(session, &scene, interrupt)?;
     clock.phase("mesh");
     drop(stage);
-    let Verified { bodies, checked, .. } = verified;
-    mesh.forget_tags();
-    let source = Source { session: session.clone(), scene, mesh, bodies, checked, cut };
+    verified.mesh.forget_tags();
+    let source = Source { session: session.clone(), scene, verified, cut };
     let history = &source.scene.method.steps;
     let begun = history.begun;
     let mut built = source.build(begun, kept, clock)?;
@@ -99,40 +93,35 @@ fn build_in<const D: usize>(
 struct Source<const D: usize> {
     session: Session,
     scene: Rc<Scene>,
-    mesh: Mesh<D>,
-    /// Bodies under their full loads.
-    bodies: Vec<BodySpec>,
-    checked: Rc<[Checked]>,
+    verified: Verified<D>,
     cut: Cut<D>,
 }
 
 impl<const D: usize> Source<D> {
     /// The problem under the loads of a step of the scene's history, or the full ones. Collective.
     fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
-        let Self { session, scene, mesh, checked, cut, .. } = self;
+        let Self { session, scene, verified, cut } = self;
         let stage = session.stage("discretize");
-        let mut bodies = self.bodies.clone();
+        let mut bodies = verified.bodies.clone();
         scene.method.steps.apply(step, &mut bodies);
         let names: Vec<String> = bodies.iter().map(|body| body.name.value.clone()).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        let verified = Verified { mesh, bodies, checked: checked.clone() };
         agree(session, scene_options(session, scene, &names))?;
         let mut inner = Inner::new(session, scene, &names, kept)?;
-        let ranks = (session.rank(), session.size());
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
-        let discrete = discretize::discretize(scene, &verified, *cut, ranks, keep, exchange, &mut inner);
+        let discrete = discretize::discretize(scene, verified, &bodies, *cut, keep, exchange, &mut inner);
         let mut discrete = agree(session, discrete)?;
         discrete.share();
         // small fronts and several ranks lose by BLAS threads, and the short vectors of a Krylov method do; large factorisations gain
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-        let gains = D == 3 && mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
+        let gains = D == 3 && verified.mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
         session.set_blas_threads(if gains { cores / session.size() } else { 1 });
         clock.estimate = inner.seconds();
         clock.phase("discretize");
         drop(stage);
         let mut warnings = warnings(session, &discrete);
-        warnings.extend(in_parts(mesh.split));
+        warnings.extend(in_parts(verified.mesh.split));
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear(), inner.whole().clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());
@@ -158,22 +147,23 @@ fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()
     Ok(())
 }
 
-/// The mesh: one rank lets Gmsh work, then every rank reads.
-fn mesh<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<Mesh<D>> {
+/// The mesh, checked: one rank lets Gmsh work, reads and looks, and tells the others. Collective.
+fn verified<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<Verified<D>> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let load = || crate::mesh::load_unless::<D>(&scene.mesh, order, interrupt).map(|loaded| loaded.mesh);
-    if session.size() == 1 {
-        return load();
-    }
-    let needs_gmsh = match &scene.mesh {
-        MeshSource::Geo { .. } => true,
-        MeshSource::Msh { file } => is_other(&file.value),
-        MeshSource::Arrays(_) => false,
+    interrupt.hold();
+    let mut first = None;
+    let read = || {
+        let loaded = crate::mesh::load_unless::<D>(&scene.mesh, order, interrupt)?;
+        interrupt.release()?;
+        let verified = first.insert(discretize::verify(scene, loaded.mesh)?);
+        Ok((session.size() > 1).then(|| verified.findings()))
     };
-    if needs_gmsh {
-        agree(session, if session.rank() == 0 { load().map(|_| ()) } else { Ok(()) })?;
+    let findings = parallel::tell(&Ranks::new(session), read).and_then(|found| interrupt.release().map(|()| found));
+    match (first, agree(session, findings)?) {
+        (None, Some(findings)) => agree(session, Verified::told(scene, findings)),
+        (Some(verified), _) => agree(session, Ok(verified)),
+        (None, None) => unreachable!("the first rank has read the mesh, and tells others"),
     }
-    agree(session, load())
 }
 
 fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {

@@ -19,7 +19,7 @@ pub struct Recovered {
 impl Recovered {
     /// Displacements and stresses at the nodes, made when they are first asked for.
     pub fn field(&self, info: &BodyInfo) -> &BodyField {
-        self.field.get_or_init(|| info.field(&self.state, &self.bent))
+        self.field.get_or_init(|| info.post().field(&self.state, &self.bent))
     }
 }
 
@@ -75,7 +75,7 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) {
                 mine[1..4].copy_from_slice(&field.points[largest]);
                 mine[4] = field.principal.iter().map(|s| s[0]).fold(f64::NEG_INFINITY, f64::max);
                 mine[5] = field.principal.iter().map(|s| s[2]).fold(f64::INFINITY, f64::min);
-                mine[6..].copy_from_slice(&info.errors(&recovered.state).unwrap_or([f64::NAN; 3]));
+                mine[6..].copy_from_slice(&info.post().errors(&recovered.state).unwrap_or([f64::NAN; 3]));
             }
         }
     }

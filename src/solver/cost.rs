@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::linalg::factorisation;
 use crate::petsc::nested_dissection;
 use crate::problem::order::Order;
+use serde::{Deserialize, Serialize};
 
 /// Operations in a second of one core with AVX-512: the six factored runs of docs/solvers.md ("The choice") that take more than a second
 /// and a half took -15 % to +48 % beside what it says.
@@ -74,7 +75,7 @@ pub struct Candidate<'a> {
 }
 
 /// Seconds of one core and bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Cost {
     /// Seconds; rather a measure than a forecast, since machines differ.
     pub seconds: f64,
@@ -92,6 +93,7 @@ impl Cost {
 }
 
 /// A choice for some bodies in space.
+#[derive(Serialize, Deserialize)]
 pub struct Comparison {
     /// Condensed, or factored where nothing can be condensed.
     pub direct: Cost,

@@ -334,33 +334,16 @@ fn matrices(model: &Model) -> impl Iterator<Item = Option<Matrices<'_>>> {
     model.bodies.iter().map(|slot| slot.local.as_ref().and_then(|body| body.matrices()))
 }
 
-/// Gives every rank the matrices of all bodies, each of which lives on one; two messages. `None` if a body has none.
+/// Gives every rank the matrices of all bodies, each of which lives on one; one message. `None` if a body has none.
 fn gather(model: &Model) -> Option<Vec<Gathered>> {
-    let here: Vec<Option<Matrices>> = matrices(model).collect();
-    let mine = here.iter().map(|matrices| {
-        let Matrices { stiffness, rows, motions, traces } = (*matrices)?;
-        let stiffness = Csr { values: Vec::new(), ..stiffness.clone() };
-        Some(Gathered { stiffness, rows: rows.clone(), motions: motions.to_vec(), traces: traces.to_vec() })
+    let here = matrices(model).map(|matrices| {
+        let Matrices { stiffness, rows, motions, traces } = matrices?;
+        let (motions, traces) = (motions.to_vec(), traces.to_vec());
+        Some(Gathered { stiffness: stiffness.clone(), rows: rows.clone(), motions, traces })
     });
-    let mine: Vec<Option<Gathered>> = mine.collect();
-    let mut all = share(&*model.exchange, &mine);
+    let mut all = share(&*model.exchange, &here.collect::<Vec<_>>());
     let of = |body: usize| all.iter_mut().find_map(|of_rank| of_rank.get_mut(body)?.take());
-    let mut copies: Vec<Gathered> = (0..here.len()).map(of).collect::<Option<_>>()?;
-    let mut values = Vec::new();
-    for (copy, matrices) in copies.iter().zip(&here) {
-        match matrices {
-            Some(matrices) => values.extend_from_slice(&matrices.stiffness.values),
-            None => values.resize(values.len() + copy.stiffness.col.len(), 0.0),
-        }
-    }
-    model.exchange.sum(&mut values);
-    let mut rest = &values[..];
-    for copy in &mut copies {
-        let (own, others) = rest.split_at(copy.stiffness.col.len());
-        copy.stiffness.values = own.to_vec();
-        rest = others;
-    }
-    Some(copies)
+    (0..model.bodies.len()).map(of).collect()
 }
 
 /// As many dofs as there are motions such that no combination of these leaves them all at rest: the pivots of an elimination.

@@ -42,6 +42,7 @@ use crate::problem::order::Order;
 use cells::{Cells, NONE};
 use faces::Faces;
 use groups::InUse;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use surface::Surface;
 
@@ -57,7 +58,7 @@ pub struct Asked<'a> {
 }
 
 /// What was found of a body.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Checked {
     /// Facets between two cells.
     pub inner: usize,

@@ -3,9 +3,10 @@
 use super::cells::{Cells, NONE};
 use super::faces::Faces;
 use crate::error::Result;
+use serde::{Deserialize, Serialize};
 
 /// What hangs together, numbered 0, 1, ... in the order of their first cells.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Parts {
     /// Number of parts.
     pub count: usize,
