@@ -17,6 +17,7 @@ mod mechanism;
 pub mod meshes;
 mod pairs;
 mod part;
+mod parts;
 mod post;
 pub mod resolution;
 mod roster;
@@ -28,7 +29,8 @@ mod verify;
 use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
-use crate::fem::{assemble::NodeGraph, rigid};
+use crate::fem::assemble::NodeGraph;
+use crate::fem::rigid::{FreeMotion, RigidMotion};
 use crate::linalg::{Csr, axpy, dot};
 use crate::mesh::Checked;
 use crate::model::{BodySlot, Exchange, Loads, Mechanism, Model, Segment};
@@ -43,9 +45,10 @@ use cells::Needs;
 pub use distribute::{Deal, Graph};
 use draft::{Draft, Loose};
 pub use factory::{Assembled, Factory, Outline};
-use known::parts;
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
+use part::Part;
+use parts::parts;
 pub use post::Post;
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -189,14 +192,18 @@ pub fn discretize<const D: usize>(
     let lazy = parts.iter().zip(&drafts).zip(&graphs);
     let lazy: Vec<_> =
         lazy.map(|((part, draft), graph)| move || graph.get_or_init(|| part.graph(&draft.rows))).collect();
-    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(&lazy);
-    let outlines = outlines.map(|(((part, draft), supported), graph)| Outline {
+    let motions = parts.iter().zip(&drafts);
+    let motions: Vec<_> =
+        motions.map(|(part, draft)| move |k: usize, dof: usize| part.dof_of(&draft.free[k], dof)).collect();
+    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(lazy.iter().zip(&motions));
+    let outlines = outlines.map(|(((part, draft), supported), (graph, motion))| Outline {
         name: &part.spec.name.value,
         dimension: D,
         order: part.space.order,
         rows: &draft.rows,
         prescribed: &supported.prescribed,
-        motions: &draft.free,
+        motions: draft.free.len(),
+        motion,
         graph,
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
@@ -216,7 +223,7 @@ pub fn discretize<const D: usize>(
         .iter()
         .zip(&mut owner)
         .for_each(|(dealt, owner)| *owner = dealt.as_ref().map_or(*owner, |dealt| dealt.leader));
-    let needs = if keep { Needs::everywhere(parts.len()) } else { Needs::of(&owner, &drafts, &deals, D) };
+    let needs = if keep { Needs::everywhere(parts.len()) } else { Needs::of(&owner, &drafts, &deals) };
     let elasticities = cells::deal(&mut parts, whole, &needs, scene.plane, &*exchange)?;
     drop(needs);
     drop(deals);
@@ -226,7 +233,7 @@ pub fn discretize<const D: usize>(
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
         let is_owner = owner[index] == rank;
-        let Draft { segments, rows, free, nodal_load, load } = draft;
+        let Draft { segments, rows, nodal_load, load, .. } = draft;
         let Supported { carried, prescribed } = supported;
         let mut offset = vec![0.0; rows.rows()];
         if !carried.is_empty() {
@@ -247,7 +254,7 @@ pub fn discretize<const D: usize>(
         let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
         let mut kept = factory.kept(&name).filter(|_| is_owner);
         let loads = kept.is_some().then(|| Loads {
-            work: rigid::free(&left, &prescribed, &load).iter().map(|motion| motion.work).collect(),
+            work: free(&part, &left, &prescribed, &load).iter().map(|motion| motion.work).collect(),
             force: load.clone(),
             prescribed: prescribed.clone(),
             carried: carried.clone(),
@@ -261,7 +268,7 @@ pub fn discretize<const D: usize>(
             (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             assemblies_avoided += 1;
         } else if is_owner || dealt.is_some() {
-            let left = rigid::free(&left, &prescribed, &load);
+            let left = free(&part, &left, &prescribed, &load);
             let mut graph = graph.into_inner().unwrap_or_else(|| part.graph(&rows));
             if let Some(dealt) = &dealt {
                 graph = graph.of(|node| dealt.is_own::<D>(node));
@@ -286,7 +293,7 @@ pub fn discretize<const D: usize>(
                 body,
                 distribution: dealt.map(|dealt| dealt.distribution),
                 rows,
-                motions: part.smooth(free),
+                motions: &|| part.smooth(),
                 left,
                 interpolation,
             })?);
@@ -385,6 +392,16 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
     }
     axpy(-1.0, &discrete.carried, &mut trace);
     Ok(Some(trace))
+}
+
+/// The motions that supports and springs leave to a body, with the work that `load` does on them.
+fn free<const D: usize>(
+    part: &Part<D>,
+    left: &[RigidMotion<D>],
+    prescribed: &[(usize, f64)],
+    load: &[f64],
+) -> Vec<FreeMotion> {
+    left.iter().map(|motion| FreeMotion::new(part.dofs_of(motion), prescribed, load)).collect()
 }
 
 /// The rows of these segments for displacements of the nodes.

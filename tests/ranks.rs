@@ -2,8 +2,9 @@
 
 mod common;
 
-use common::{Run, case, solve, solve_on};
+use common::{Run, case, solve, solve_on, text_of};
 use std::fs;
+use tempfile::TempDir;
 
 /// Small meshes of scenes of every kind: held and floating bodies, in the plane, of revolution and in space, P1 and P2, on springs, with
 /// rigid surfaces and turned axes, many bodies.
@@ -19,6 +20,28 @@ const SCENES: [(&str, &[&str]); 10] = [
     ("coating", &["mesh.set.n=4"]),
     ("blocks", &["mesh.set.k=2", "output.pairs=100"]),
 ];
+
+/// Ranks other than the first have no use for the mesh: here one has the scene in a folder without it. A support that holds all cells of a body is
+/// known there, too.
+#[test]
+fn one_rank_reads_the_mesh() {
+    let words = ["--method", "newton", "--set", "mesh.set.n=4", "--set", "solver=hypre", "--set", STOP];
+    let rigid = ["--set", "body.0.fix=[{on=\"lower\",x=0,y=0,z=0}]", "--set", "body.0.load=[]"];
+    let elsewhere = TempDir::new().expect("a temporary folder");
+    let scene = elsewhere.path().join("scene.toml");
+    fs::write(&scene, text_of("groove3d")).expect("written");
+    let [scene, folder] = [scene, elsewhere.path().join("results")].map(|path| path.display().to_string());
+    for more in [&rigid[..], &[]] {
+        let words = [&words[..], more].concat();
+        let serial = solve(case("groove3d"), &words).converged();
+        let other = [":", "-n", "1", env!("CARGO_BIN_EXE_winkler"), "solve", &scene, "-o", &folder];
+        let parallel = solve_on(2, case("groove3d"), &[&words, &other[..], &words].concat()).converged();
+        assert_eq!(parallel.count("ranks"), 3);
+        assert_eq!(parallel.report["bodies"][0]["dofs"], serial.report["bodies"][0]["dofs"]);
+        let apart = pressures(&serial).into_iter().zip(pressures(&parallel)).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f64::max) <= 1e-8 * serial.number("pairs/0/peak_pressure"));
+    }
+}
 
 /// Far below what is compared.
 const STOP: &str = "method.stop={residual=1e-11}";

@@ -31,13 +31,13 @@ impl<'a> Needs<'a> {
     }
 
     /// Of bodies with these `leaders`, some of which are dealt out.
-    pub fn of(leaders: &[usize], drafts: &[Draft], deals: &'a [Deal], dimension: usize) -> Vec<Self> {
+    pub fn of<const D: usize>(leaders: &[usize], drafts: &[Draft<D>], deals: &'a [Deal]) -> Vec<Self> {
         let mut needs: Vec<Self> = leaders.iter().map(|&leader| Needs::Owners { leader, of_node: None }).collect();
         for Deal { bodies, owner } in deals {
             let mut rest = &owner[..];
             for &body in bodies {
                 let own;
-                (own, rest) = rest.split_at(drafts[body].rows.columns / dimension);
+                (own, rest) = rest.split_at(drafts[body].rows.columns / D);
                 needs[body] = Needs::Owners { leader: leaders[body], of_node: Some(own) };
             }
         }

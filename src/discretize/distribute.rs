@@ -27,7 +27,7 @@ pub struct Deal {
 }
 
 /// The nodes of bodies, body by body, joined where K couples them, and at contact points.
-pub fn graph<const D: usize>(bodies: &[(&NodeGraph, &Draft)], pairs: &[ContactPair]) -> Graph {
+pub fn graph<const D: usize>(bodies: &[(&NodeGraph, &Draft<D>)], pairs: &[ContactPair]) -> Graph {
     let mut first = vec![0];
     bodies.iter().for_each(|(graph, _)| first.push(first[first.len() - 1] + graph.ptr.len() - 1));
     // a contact point joins the first node on its one side with the first on the other
@@ -85,7 +85,7 @@ pub struct Dealt {
 
 /// What this rank knows of each body; none for those that are not dealt out. `coarse` tells the coarse nodes of a body.
 pub fn distribute<const D: usize>(
-    drafts: &[Draft],
+    drafts: &[Draft<D>],
     coarse: &dyn Fn(usize) -> Vec<u32>,
     deals: &[Deal],
     exchange: &Rc<dyn Exchange>,
@@ -106,7 +106,7 @@ pub fn distribute<const D: usize>(
 
 /// The same of the bodies of one matrix, with the rank of every node, body by body.
 fn of_deal<'a, const D: usize>(
-    drafts: impl Iterator<Item = (&'a Draft, Coarse)>,
+    drafts: impl Iterator<Item = (&'a Draft<D>, Coarse)>,
     owner: &[u32],
     (rank, ranks): (usize, usize),
     exchange: &Rc<dyn Exchange>,
@@ -114,7 +114,7 @@ fn of_deal<'a, const D: usize>(
     let (number, starts) = numbered(owner, ranks);
     let (start, total) = (D * starts[rank] as usize, D * owner.len());
     let (mut owner, mut number) = (owner, &number[..]);
-    let of_body = |(draft, coarse): (&Draft, Coarse)| {
+    let of_body = |(draft, coarse): (&Draft<D>, Coarse)| {
         let nodes = draft.rows.columns / D;
         let (of_node, numbers);
         (of_node, owner) = owner.split_at(nodes);

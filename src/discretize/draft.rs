@@ -14,13 +14,13 @@ use nalgebra::{DMatrix, DVector};
 pub const NO_WORK: f64 = 1e-9;
 
 /// A body before it is assembled.
-pub struct Draft {
+pub struct Draft<const D: usize> {
     /// Its contact rows, pair by pair.
     pub segments: Vec<Segment>,
     /// These rows; columns: its dofs.
     pub rows: Csr,
-    /// Rigid motions of the free body, in its dofs.
-    pub free: Vec<RigidMotion>,
+    /// Rigid motions of the free body.
+    pub free: Vec<RigidMotion<D>>,
     /// Loads on its nodes.
     pub nodal_load: Vec<f64>,
     /// Loads on its dofs.
@@ -28,9 +28,9 @@ pub struct Draft {
 }
 
 /// The rigid motions that supports and springs leave to a body.
-pub struct Loose {
-    /// In the dofs of the body.
-    pub left: Vec<RigidMotion>,
+pub struct Loose<const D: usize> {
+    /// As they are.
+    pub left: Vec<RigidMotion<D>>,
     /// As contact and loads see them.
     pub motions: Vec<Motion>,
     /// Those that supports alone leave, if springs resist some of them.
@@ -48,46 +48,42 @@ pub fn segments(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<Segment>> {
     segments
 }
 
-impl Draft {
+impl<const D: usize> Draft<D> {
     /// A body with its contact rows and loads.
-    pub fn new<const D: usize>(
-        part: &Part<D>,
-        segments: Vec<Segment>,
-        pairs: &[ContactPair],
-        mesh: &Mesh<D>,
-    ) -> Result<Self> {
+    pub fn new(part: &Part<D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
         let mut rows = Csr::new(part.space.dofs());
         for &Segment { pair, side } in &segments {
             (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].rows[side].row(q)));
         }
-        let free = part.in_dofs(rigid::of(&part.space));
         let nodal_load = part.load(mesh, Parts::Whole)?;
         let load = part.load_on_dofs(nodal_load.clone());
-        Ok(Self { segments, rows, free, nodal_load, load })
+        Ok(Self { segments, rows, free: rigid::of(&part.space), nodal_load, load })
     }
 
     /// Motions as contact and loads see them.
-    pub fn motions<const D: usize>(&self, all: &[RigidMotion]) -> Vec<Motion> {
-        let of = |motion: &RigidMotion| {
-            let mut trace = vec![0.0; self.rows.rows()];
-            self.rows.multiply(&motion.displacement, &mut trace);
-            Motion { name: motion.name.clone(), trace, work: work::<D>(&motion.displacement, &self.load) }
+    pub fn motions(&self, part: &Part<D>, all: &[RigidMotion<D>]) -> Vec<Motion> {
+        let of = |motion: &RigidMotion<D>| {
+            let (displacement, mut trace) = (part.dofs_of(motion), vec![0.0; self.rows.rows()]);
+            self.rows.multiply(&displacement, &mut trace);
+            Motion { name: motion.name.clone(), trace, work: work::<D>(&displacement, &self.load) }
         };
         all.iter().map(of).collect()
     }
 
     /// What supports and springs leave to the body now.
-    pub fn loose<const D: usize>(&self, part: &Part<D>) -> Loose {
-        let left = part.left(&self.free);
-        let motions = self.motions::<D>(&left);
+    pub fn loose(&self, part: &Part<D>) -> Loose<D> {
+        let at = |k: usize, node: u32| self.free[k].at(&part.space.nodes[node as usize]);
+        let left = part.left(self.free.len(), &at);
+        let left: Vec<_> = left.iter().map(|weights| rigid::combine(&self.free, weights)).collect();
+        let motions = self.motions(part, &left);
         let unfelt = felt_by_none(&motions);
         let sprung = part.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
-        let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions::<D>(&all), stiffness });
+        let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions(part, &all), stiffness });
         Loose { left, motions, sprung, unfelt }
     }
 
     /// The dof outside the contact rows, so that these stay as they are, that a motion moves most, unless that is little.
-    pub fn candidate<const D: usize>(&self, part: &Part<D>, displacement: &[f64]) -> Option<usize> {
+    pub fn candidate(&self, part: &Part<D>, displacement: &[f64]) -> Option<usize> {
         let mut in_rows = vec![false; displacement.len()];
         self.rows.col.iter().for_each(|&dof| in_rows[dof as usize] = true);
         let candidates = (0..in_rows.len()).filter(|dof| !in_rows[*dof] && !part.held.prescribed.contains_key(dof));

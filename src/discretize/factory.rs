@@ -3,7 +3,7 @@
 use super::distribute::{Deal, Graph};
 use crate::error::Result;
 use crate::fem::assemble::NodeGraph;
-use crate::fem::rigid::{FreeMotion, RigidMotion};
+use crate::fem::rigid::FreeMotion;
 use crate::fem::{ElasticBody, Interpolation};
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot, Distribution};
@@ -21,8 +21,10 @@ pub struct Outline<'a> {
     pub rows: &'a Csr,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: &'a [(usize, f64)],
-    /// Rigid motions of the free body.
-    pub motions: &'a [RigidMotion],
+    /// Number of rigid motions of the free body.
+    pub motions: usize,
+    /// What one of them does at a dof.
+    pub motion: &'a dyn Fn(usize, usize) -> f64,
     /// Which of its nodes K couples, made when it is first asked for.
     pub graph: &'a dyn Fn() -> &'a NodeGraph,
 }
@@ -57,7 +59,7 @@ pub trait Factory {
 }
 
 /// A body ready for its inner solver.
-pub struct Assembled {
+pub struct Assembled<'a> {
     /// Name in the scene.
     pub name: String,
     /// Space dimension: block size of the matrix.
@@ -69,8 +71,8 @@ pub struct Assembled {
     /// All contact rows of the body, pair by pair.
     pub rows: Csr,
     /// Motions with hardly any strain in a few cells, for multigrid's near-null space: the rigid ones of the free body, in one of
-    /// revolution those of its meridian.
-    pub motions: Vec<RigidMotion>,
+    /// revolution those of its meridian. One vector of all dofs each.
+    pub motions: &'a dyn Fn() -> Vec<Vec<f64>>,
     /// Those that its supports leave.
     pub left: Vec<FreeMotion>,
     /// Interpolation of its displacements from linear ones, if it was wanted. Rows: the dofs of `body`; columns: of this body alone, or of

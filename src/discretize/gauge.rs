@@ -8,15 +8,16 @@ use super::part::Part;
 use crate::fem::rigid;
 
 /// Fixes the motions of a body that nothing feels and no load works on, and names them; `loose` becomes what is left.
-pub fn fix<const D: usize>(part: &mut Part<D>, draft: &Draft, loose: &mut Loose) -> Vec<String> {
+pub fn fix<const D: usize>(part: &mut Part<D>, draft: &Draft<D>, loose: &mut Loose<D>) -> Vec<String> {
     let mut fixed = Vec::new();
     loop {
         let idle = loose.unfelt.iter().find_map(|(_, weights)| {
             let motion = rigid::combine(&loose.left, weights);
-            (work::<D>(&motion.displacement, &draft.load) == 0.0).then_some(motion)
+            let displacement = part.dofs_of(&motion);
+            (work::<D>(&displacement, &draft.load) == 0.0).then_some((motion, displacement))
         });
-        let Some(motion) = idle else { return fixed };
-        let Some(dof) = draft.candidate(part, &motion.displacement) else { return fixed };
+        let Some((motion, displacement)) = idle else { return fixed };
+        let Some(dof) = draft.candidate(part, &displacement) else { return fixed };
         part.held.prescribed.insert(dof, 0.0);
         *loose = draft.loose(part);
         fixed.push(motion.name);

@@ -3,20 +3,10 @@
 //! Nodes, surfaces, supports and loads are known everywhere, so that every rank finds the same contact points, rigid motions and
 //! numbers; cells go, once dofs are dealt out, to the ranks that assemble their nodes ([`cells`](super::cells)).
 
-use super::elastic;
-use super::find::{find_group, point};
-use super::part::{self, Part};
-use super::verify::{self, Verified};
-use crate::contact::pad;
-use crate::error::{Error, Result};
-use crate::fem::quadrature::Parts;
-use crate::fem::{Elasticity, Facets, Space, interpolation};
+use crate::fem::{Facets, Space};
 use crate::mesh::Mesh;
-use crate::model::Exchange;
-use crate::parallel;
 use crate::problem::body::BodySpec;
 use crate::problem::elasticity::Plane;
-use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 
 /// What all ranks know of a body.
@@ -28,7 +18,7 @@ pub struct Known {
     pub cells: usize,
     /// Area (volume) of the body; of one of revolution that of the rings.
     pub volume: f64,
-    /// Means of the moduli along x, y, z over it ([`elastic::moduli`]).
+    /// Means of the moduli along x, y, z over it ([`moduli`](super::elastic::moduli)).
     pub moduli: [f64; 3],
     /// Nodal forces of the body force; empty without one.
     pub force: Vec<f64>,
@@ -37,64 +27,14 @@ pub struct Known {
     /// Nodes of all facets of the boundary, oriented outwards, where contacts are to be found.
     pub boundary: Vec<u32>,
     /// Nodes of the cells behind surfaces, which say which side of a facet is out; none where one rank has all cells.
-    behind: Vec<u32>,
+    pub behind: Vec<u32>,
     /// Area (volume) of the cells by their corners.
-    measure: f64,
-}
-
-/// What a scene asks of all bodies.
-#[derive(Clone, Copy)]
-struct Wanted<'a> {
-    /// Kind of a plane problem.
-    plane: Plane,
-    /// Whether contacts are to be found on whole boundaries.
-    boundaries: bool,
-    /// Whether each point of the mesh is on a surface; empty where one rank has all cells.
-    on_surface: &'a [bool],
+    pub measure: f64,
 }
 
 impl Known {
-    /// The space and the elasticity of a body of which this rank has all cells, and what others are told of it.
-    ///
-    /// # Errors
-    /// Refusals of the scene against its mesh, and bodies of revolution with points of negative radius.
-    fn of<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, wanted: Wanted) -> Result<(Space<D>, Elasticity, Self)> {
-        let group = find_group(mesh, &spec.name, &[D], "body")?;
-        let mut space = Space::new(mesh, group, spec.order);
-        if wanted.plane == Plane::Axisymmetric {
-            space = space.revolved();
-            if let Some(x) = space.nodes.iter().find(|x| x[0] < 0.0) {
-                let message = format!("body `{}` has a negative radius at {}", spec.name.value, point(pad(*x)));
-                return Err(Error::mesh(&mesh.path, None, message).help(
-                    "axisymmetric bodies are drawn as meridians, x >= 0 with the axis at x = 0: leave one half away",
-                ));
-            }
-        }
-        let elasticity = elastic::of(spec, &space, mesh, wanted.plane)?;
-        let points = space.points();
-        let on_surface = |node: &&u32| wanted.on_surface[points[**node as usize] as usize];
-        let is_behind = |cell: &&[u32]| cell[..=D].iter().filter(on_surface).count() >= D;
-        let cells = space.cells.chunks_exact(space.stride);
-        let known = Self {
-            cells: space.cell_count(),
-            volume: (0..space.cell_count()).map(|cell| space.share(cell)).sum(),
-            moduli: elastic::moduli(&space, &elasticity),
-            force: part::body_force(spec, &space, Parts::Whole)?,
-            corners: interpolation::corners(&space),
-            boundary: if wanted.boundaries { space.boundary().nodes } else { Vec::new() },
-            behind: if wanted.on_surface.is_empty() {
-                Vec::new()
-            } else {
-                cells.filter(is_behind).flatten().copied().collect()
-            },
-            measure: space.measure(),
-            points,
-        };
-        Ok((space, elasticity, known))
-    }
-
     /// The space of a body on a rank that has not read its cells: with those behind surfaces.
-    fn space<const D: usize>(&self, spec: &BodySpec, mesh: &Mesh<D>, plane: Plane) -> Space<D> {
+    pub fn space<const D: usize>(&self, spec: &BodySpec, mesh: &Mesh<D>, plane: Plane) -> Space<D> {
         let space = Space::of_points(mesh, &self.points, spec.order, self.behind.clone(), self.measure);
         if plane == Plane::Axisymmetric { space.revolved() } else { space }
     }
@@ -103,48 +43,4 @@ impl Known {
     pub fn boundary<const D: usize>(&self, space: &Space<D>) -> Facets<D> {
         Facets::new(space.order, self.boundary.clone())
     }
-}
-
-/// The bodies with their spaces, supports and springs, as the first rank has read them, with the elasticity of their cells there. Collective.
-///
-/// # Errors
-/// Refusals of the scene against its mesh.
-pub fn parts<'a, const D: usize>(
-    scene: &Scene,
-    verified: &Verified<D>,
-    bodies: &'a [BodySpec],
-    exchange: &dyn Exchange,
-) -> Result<(Vec<Part<'a, D>>, Option<Vec<Elasticity>>)> {
-    let Verified { mesh, checked, .. } = verified;
-    let mut first = None;
-    let read = || {
-        let on_surface = if exchange.ranks() > 1 { on_surfaces(mesh) } else { Vec::new() };
-        let wanted = Wanted { plane: scene.plane, boundaries: !scene.auto.is_empty(), on_surface: &on_surface };
-        let (mut parts, mut elasticities) = (Vec::new(), Vec::new());
-        for (index, spec) in bodies.iter().enumerate() {
-            let (space, elasticity, known) = Known::of(spec, mesh, wanted)?;
-            let part = Part::new(spec, mesh, space, known)?;
-            verify::held(&part, &checked[index].parts, mesh)?;
-            parts.push(part);
-            elasticities.push(elasticity);
-        }
-        let known = parts.iter().map(|part| part.known.clone()).collect();
-        first = Some((parts, elasticities));
-        Ok(known)
-    };
-    let known: Vec<Known> = parallel::tell(exchange, read)?;
-    if let Some((parts, elasticities)) = first {
-        return Ok((parts, Some(elasticities)));
-    }
-    let of_body =
-        |(spec, known): (&'a BodySpec, Known)| Part::new(spec, mesh, known.space(spec, mesh, scene.plane), known);
-    Ok((bodies.iter().zip(known).map(of_body).collect::<Result<_>>()?, None))
-}
-
-/// Whether each point of a mesh is on a surface.
-fn on_surfaces<const D: usize>(mesh: &Mesh<D>) -> Vec<bool> {
-    let mut on_surface = vec![false; mesh.points.len()];
-    let surfaces = mesh.groups.iter().filter(|group| group.dimension == D - 1);
-    surfaces.flat_map(|group| &group.connectivity).for_each(|&point| on_surface[point as usize] = true);
-    on_surface
 }

@@ -21,17 +21,17 @@ use std::collections::HashMap;
 const FLAWED: f64 = 0.03;
 
 /// What was fixed, and what cannot be.
-pub struct Fixed {
+pub struct Fixed<const D: usize> {
     /// Names of the motions of each body alone that are fixed.
     pub gauged: Vec<Vec<String>>,
     /// Motions of several bodies.
     pub mechanisms: Vec<Mechanism>,
     /// The motions left to each body.
-    pub loose: Vec<Loose>,
+    pub loose: Vec<Loose<D>>,
 }
 
 /// Fixes the motions that nothing feels and no load works on: of whole groups of bodies, of each body alone, then what is left.
-pub fn fix<const D: usize>(parts: &mut [Part<D>], drafts: &[Draft], pairs: &[ContactPair]) -> Fixed {
+pub fn fix<const D: usize>(parts: &mut [Part<D>], drafts: &[Draft<D>], pairs: &[ContactPair]) -> Fixed<D> {
     let loose = parts.iter().zip(drafts).map(|(part, draft)| draft.loose(part)).collect();
     let mut search = Search { parts, drafts, pairs, loose, found: Vec::new() };
     for group in groups(drafts.len(), pairs) {
@@ -91,7 +91,7 @@ struct Rows {
 
 impl Rows {
     /// Of bodies in the order of `drafts`.
-    fn new<'d>(drafts: impl Iterator<Item = &'d Draft>, pairs: &[ContactPair]) -> Self {
+    fn new<'d, const D: usize>(drafts: impl Iterator<Item = &'d Draft<D>>, pairs: &[ContactPair]) -> Self {
         let mut rows = Self { segments: Vec::new(), points: Vec::new(), weight: Vec::new() };
         let mut number = HashMap::new();
         for draft in drafts {
@@ -118,10 +118,10 @@ impl Rows {
 
 struct Search<'p, 's, const D: usize> {
     parts: &'p mut [Part<'s, D>],
-    drafts: &'p [Draft],
+    drafts: &'p [Draft<D>],
     pairs: &'p [ContactPair],
     /// The motions that supports and springs leave to each body now.
-    loose: Vec<Loose>,
+    loose: Vec<Loose<D>>,
     found: Vec<Mechanism>,
 }
 
@@ -131,48 +131,37 @@ impl<const D: usize> Search<'_, '_, D> {
         Rows::new(bodies.iter().map(|&body| &self.drafts[body]), self.pairs)
     }
 
-    /// The rigid motions of some bodies as one: for each body those of its nodes.
-    fn as_one(&self, bodies: &[usize]) -> Vec<Vec<RigidMotion>> {
-        let spaces: Vec<&Space<D>> = bodies.iter().map(|&body| &self.parts[body].space).collect();
-        let mut first = 0;
-        let whole = rigid::of_all(&spaces);
-        let of = |space: &&Space<D>| {
-            let range = first..first + space.dofs();
-            first = range.end;
-            let part = |motion: &RigidMotion| RigidMotion {
-                name: motion.name.clone(),
-                displacement: motion.displacement[range.clone()].to_vec(),
-            };
-            whole.iter().map(part).collect()
-        };
-        spaces.iter().map(of).collect()
+    /// The rigid motions of some bodies as one.
+    fn as_one(&self, bodies: &[usize]) -> Vec<RigidMotion<D>> {
+        rigid::of_all(&bodies.iter().map(|&body| &self.parts[body].space).collect::<Vec<_>>())
     }
 
     /// The rigid motions of a group as one body that supports do not feel. Contact does not either, but for the error of meshed
     /// surfaces that are curved and apart.
     fn of_group(&self, group: &[usize]) -> Vec<Moving> {
-        let all: Vec<Vec<RigidMotion>> =
-            self.as_one(group).into_iter().zip(group).map(|(nodal, &body)| self.parts[body].in_dofs(nodal)).collect();
-        let count = all[0].len();
+        let all = self.as_one(group);
+        let count = all.len();
         let mut held = DMatrix::zeros(count, count);
-        for (own, &body) in all.iter().zip(group) {
-            let left: Vec<&[f64]> = self.loose[body].left.iter().map(|motion| &motion.displacement[..]).collect();
-            let off: Vec<Vec<f64>> = own.iter().map(|motion| rest(&motion.displacement, &left)).collect();
+        let dofs = |motions: &[RigidMotion<D>], body: usize| {
+            motions.iter().map(|motion| self.parts[body].dofs_of(motion)).collect::<Vec<_>>()
+        };
+        for &body in group {
+            let left = dofs(&self.loose[body].left, body);
+            let off: Vec<Vec<f64>> = dofs(&all, body).iter().map(|motion| rest(motion, &left)).collect();
             held += DMatrix::from_fn(count, count, |i, j| dot(&off[i], &off[j]) / off[i].len() as f64);
         }
         let motions: Vec<Vec<Motion>> =
-            all.iter().zip(group).map(|(own, &body)| self.drafts[body].motions::<D>(own)).collect();
+            group.iter().map(|&body| self.drafts[body].motions(&self.parts[body], &all)).collect();
         let rows = self.rows(group);
         let felt = rows.feel(motions.iter().map(Vec::as_slice));
         let moving = |weights: DVector<f64>| {
             // all bodies move by the same motion
             let amounts = DVector::from_fn(felt.count(), |i, _| weights[i % count]);
             let square: f64 = felt.closing(&amounts).iter().zip(&rows.weight).map(|(c, weight)| weight * c * c).sum();
-            let parts = all.iter().map(|own| rigid::combine(own, &weights));
-            let (mut names, displacement): (Vec<_>, Vec<_>) =
-                parts.map(|motion| (motion.name, motion.displacement)).unzip();
+            let motion = rigid::combine(&all, &weights);
+            let displacement = group.iter().map(|&body| self.parts[body].dofs_of(&motion)).collect();
             let error = square.sqrt() / weights.amax();
-            Moving { bodies: group.to_vec(), displacement, name: names.swap_remove(0), error }
+            Moving { bodies: group.to_vec(), displacement, name: motion.name, error }
         };
         let mut free = Blocks::free(&held, 1.0, TOLERANCE);
         // translations come first
@@ -202,7 +191,7 @@ impl<const D: usize> Search<'_, '_, D> {
                 for &(motion, amount) in own {
                     let motion = motion - felt.of_body(at).start;
                     weights[motion] = amount;
-                    axpy(amount, &left[motion].displacement, &mut displacement);
+                    axpy(amount, &self.parts[body].dofs_of(&left[motion]), &mut displacement);
                 }
                 moving.bodies.push(body);
                 moving.displacement.push(displacement);
@@ -218,12 +207,14 @@ impl<const D: usize> Search<'_, '_, D> {
     fn name_as_one(&self, moving: &Moving) -> Option<String> {
         let nodal = moving.bodies.iter().zip(&moving.displacement);
         let nodal: Vec<f64> = nodal.flat_map(|(&body, v)| self.parts[body].held.frame.displacements(v)).collect();
-        let spaces: Vec<&Space<D>> = moving.bodies.iter().map(|&body| &self.parts[body].space).collect();
-        let whole = rigid::of_all(&spaces);
-        let vectors: Vec<&[f64]> = whole.iter().map(|motion| &motion.displacement[..]).collect();
+        let whole = self.as_one(&moving.bodies);
+        let of_bodies = |motion: &RigidMotion<D>| -> Vec<f64> {
+            moving.bodies.iter().flat_map(|&body| motion.nodal(&self.parts[body].space.nodes)).collect()
+        };
+        let vectors: Vec<Vec<f64>> = whole.iter().map(of_bodies).collect();
         let off = rest(&nodal, &vectors);
         let is_one = dot(&off, &off) <= PART * PART * dot(&nodal, &nodal);
-        is_one.then(|| rigid::combine(&whole, &DVector::from_vec(fit(&vectors, &nodal))).name)
+        is_one.then(|| rigid::combine(&whole, &DVector::from_vec(fit(&slices(&vectors), &nodal))).name)
     }
 
     /// Fixes what motions of some bodies are left, until there are none, loads work on one, or one cannot be fixed.
@@ -319,10 +310,15 @@ impl<const D: usize> Search<'_, '_, D> {
 const NEAR: f64 = 1e-2;
 
 /// What a displacement is besides some motions.
-fn rest(displacement: &[f64], motions: &[&[f64]]) -> Vec<f64> {
+fn rest(displacement: &[f64], motions: &[Vec<f64>]) -> Vec<f64> {
     let mut rest = displacement.to_vec();
-    fit(motions, displacement).iter().zip(motions).for_each(|(&a, motion)| axpy(-a, motion, &mut rest));
+    let amounts = fit(&slices(motions), displacement);
+    amounts.iter().zip(motions).for_each(|(&a, motion)| axpy(-a, motion, &mut rest));
     rest
+}
+
+fn slices(vectors: &[Vec<f64>]) -> Vec<&[f64]> {
+    vectors.iter().map(Vec::as_slice).collect()
 }
 
 /// Largest dimension of a body along an axis.

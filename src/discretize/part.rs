@@ -16,7 +16,7 @@ use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, support, surface};
 use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// A body of the scene with its space, supports and springs.
 pub struct Part<'a, const D: usize> {
@@ -44,17 +44,20 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(Self { spec, space, held, springs, known })
     }
 
-    /// Rigid motions of the nodes as motions of the dofs.
-    pub fn in_dofs(&self, motions: Vec<RigidMotion>) -> Vec<RigidMotion> {
-        let turned =
-            |motion: RigidMotion| RigidMotion { displacement: self.held.frame.dofs(&motion.displacement), ..motion };
-        motions.into_iter().map(turned).collect()
+    /// Displacements of all dofs in a rigid motion.
+    pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
+        self.held.frame.dofs(&motion.nodal(&self.space.nodes))
     }
 
-    /// The motions that multigrid must know of a body with these rigid ones. Far from the axis a ring is nearly as soft
-    /// against radial displacements and turns of its section as a plane body.
-    pub fn smooth(&self, rigid: Vec<RigidMotion>) -> Vec<RigidMotion> {
-        if self.space.axisymmetric { self.in_dofs(rigid::modes(&self.space.nodes)) } else { rigid }
+    /// What a rigid motion does at a dof.
+    pub fn dof_of(&self, motion: &RigidMotion<D>, dof: usize) -> f64 {
+        self.held.frame.dof(dof, |node| motion.at(&self.space.nodes[node as usize]))
+    }
+
+    /// Displacements of all dofs in motions with hardly any strain, which multigrid must know: the rigid ones of the body. Far from the axis a
+    /// ring is nearly as soft against radial displacements and turns of its section as a plane body.
+    pub fn smooth(&self) -> Vec<Vec<f64>> {
+        rigid::modes(|| self.space.nodes.iter()).iter().map(|motion| self.dofs_of(motion)).collect()
     }
 
     /// Prescribed (dof, value), sorted by dof.
@@ -64,38 +67,28 @@ impl<'a, const D: usize> Part<'a, D> {
         all
     }
 
-    /// The rigid motions, given and returned in the body's dofs, that neither supports nor springs hold.
-    pub fn left(&self, free: &[RigidMotion]) -> Vec<RigidMotion> {
-        let left = rigid::left_by_supports(free, &self.prescribed_sorted());
-        let turned = |motion: &RigidMotion| RigidMotion {
-            name: motion.name.clone(),
-            displacement: self.held.frame.displacements(&motion.displacement),
-        };
+    /// Weights of those of `count` motions that neither supports nor springs hold; `u` is what a motion does at a node.
+    pub fn left(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
+        let left = self.left_by_supports(count, u);
         let springs = self.springs.concat();
-        if springs.is_empty() {
-            return left;
-        }
-        let (nodal, all) = (left.iter().map(turned).collect(), free.iter().map(turned).collect::<Vec<_>>());
-        let left = rigid::left_by_springs(nodal, &all, &springs);
-        self.in_dofs(left)
+        if springs.is_empty() { left } else { rigid::left_by_springs(left, &rigid::of_springs(count, u, &springs)) }
     }
 
-    /// The rigid motions that supports leave, in the body's dofs, with the stiffness of the springs in terms of them; none without
-    /// springs.
-    pub fn sprung(&self, free: &[RigidMotion]) -> Option<(Vec<RigidMotion>, DMatrix<f64>)> {
+    fn left_by_supports(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
+        let value = |k: usize, dof: usize| self.held.frame.dof(dof, |node| u(k, node));
+        rigid::left_by_supports(count, value, &self.prescribed_sorted())
+    }
+
+    /// The rigid motions that supports leave, with the stiffness of the springs in terms of them; none without springs.
+    pub fn sprung(&self, free: &[RigidMotion<D>]) -> Option<(Vec<RigidMotion<D>>, DMatrix<f64>)> {
         let springs = self.springs.concat();
         if springs.is_empty() {
             return None;
         }
-        let left = rigid::left_by_supports(free, &self.prescribed_sorted());
-        let nodal: Vec<RigidMotion> = left
-            .iter()
-            .map(|motion| RigidMotion {
-                name: motion.name.clone(),
-                displacement: self.held.frame.displacements(&motion.displacement),
-            })
-            .collect();
-        let stiffness = rigid::of_springs(&nodal, &springs);
+        let left = self.left_by_supports(free.len(), &|k, node| free[k].at(&self.space.nodes[node as usize]));
+        let left: Vec<_> = left.iter().map(|weights| rigid::combine(free, weights)).collect();
+        let at = |k: usize, node: u32| left[k].at(&self.space.nodes[node as usize]);
+        let stiffness = rigid::of_springs(left.len(), at, &springs);
         Some((left, stiffness))
     }
 

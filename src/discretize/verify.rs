@@ -99,14 +99,27 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Re
         nodes.sort_unstable();
         nodes.dedup();
     });
-    let motions: Vec<Vec<RigidMotion>> = nodes.iter().map(|nodes| of_nodes(space, nodes)).collect();
-    let whole = part.left(&part.in_dofs(rigid::of(space))).len();
-    if part.left(&part.in_dofs(motions.concat())).len() <= whole {
+    let motions: Vec<Vec<RigidMotion<D>>> = nodes.iter().map(|nodes| of_nodes(space, nodes)).collect();
+    // a part moves, the others stay at rest
+    let mut part_of = vec![0; space.nodes.len()];
+    nodes.iter().zip(0..).for_each(|(nodes, number)| nodes.iter().for_each(|&node| part_of[node as usize] = number));
+    let each: Vec<(usize, &RigidMotion<D>)> =
+        motions.iter().enumerate().flat_map(|(number, own)| own.iter().map(move |motion| (number, motion))).collect();
+    let left = |moving: &[(usize, &RigidMotion<D>)]| {
+        let at = |k: usize, node: u32| match moving[k].0 == part_of[node as usize] {
+            true => moving[k].1.at(&space.nodes[node as usize]),
+            false => [0.0; D],
+        };
+        part.left(moving.len(), &at).len()
+    };
+    let free = rigid::of(space);
+    let whole = part.left(free.len(), &|k, node| free[k].at(&space.nodes[node as usize])).len();
+    if left(&each) <= whole {
         return Ok(());
     }
     // contact may hold a part that supports leave free in part: the one most free is the one that is meant
-    let free = |part_of: usize| part.left(&part.in_dofs(motions[part_of].clone())).len();
-    let most = (0..parts.count).min_by_key(|&part_of| std::cmp::Reverse(free(part_of))).unwrap_or(0);
+    let alone = |number: usize| left(&each.iter().filter(|moving| moving.0 == number).copied().collect::<Vec<_>>());
+    let most = (0..parts.count).min_by_key(|&number| std::cmp::Reverse(alone(number))).unwrap_or(0);
     let at = pad(space.nodes[nodes[most][0] as usize]);
     let (name, count) = (&part.spec.name.value, parts.count);
     let message =
@@ -115,19 +128,11 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Re
         .help("make a body of each part, support each of them, or let them share facets (in the script: `Coherence;`)"))
 }
 
-/// The rigid motions of some nodes of a body; the others stay at rest.
-fn of_nodes<const D: usize>(space: &Space<D>, nodes: &[u32]) -> Vec<RigidMotion> {
-    let places: Vec<[f64; D]> = nodes.iter().map(|&node| space.nodes[node as usize]).collect();
-    let mut motions = rigid::modes(&places);
+/// The rigid motions of some nodes of a body.
+fn of_nodes<const D: usize>(space: &Space<D>, nodes: &[u32]) -> Vec<RigidMotion<D>> {
+    let mut motions = rigid::modes(|| nodes.iter().map(|&node| &space.nodes[node as usize]));
     if space.axisymmetric {
         motions = vec![motions.swap_remove(1)];
-    }
-    for motion in &mut motions {
-        let mut all = vec![0.0; space.dofs()];
-        for (k, &node) in nodes.iter().enumerate() {
-            (0..D).for_each(|c| all[D * node as usize + c] = motion.displacement[D * k + c]);
-        }
-        motion.displacement = all;
     }
     motions
 }

@@ -59,6 +59,17 @@ impl<const D: usize> Frame<D> {
         v
     }
 
+    /// What a displacement field is at a dof.
+    pub fn dof(&self, dof: usize, u: impl Fn(u32) -> [f64; D]) -> f64 {
+        let node = (dof / D) as u32;
+        let mut own = u(node);
+        if let Some(&master) = self.master.get(&node) {
+            let of_master = u(master);
+            own = std::array::from_fn(|c| own[c] - of_master[c]);
+        }
+        self.turned(node, own)[dof % D]
+    }
+
     /// Nodal displacements of dofs, u = T v.
     pub fn displacements(&self, v: &[f64]) -> Vec<f64> {
         let mut u = v.to_vec();

@@ -143,7 +143,7 @@ mod tests {
             (0..27).find(|node| vertices.binary_search(node).is_err()).expect("a node in the middle of an edge");
         let tied = [vertices[0], vertices[1]];
         let frame = Frame { master: tied.map(|node| (node, master)).into(), ..Frame::default() };
-        let coarse = coarse_nodes(&space, &frame);
+        let coarse = coarse_nodes(&space, &corners(&space), &frame);
         assert_eq!(coarse.len(), 9);
         let is_tied = |dof: usize| tied.contains(&(dof as u32 / 3));
         let (all, few) = both(&space, &frame, |_| [1.0, -2.0, 3.0]);

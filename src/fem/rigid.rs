@@ -2,16 +2,40 @@
 
 use super::assemble::NodalBlock;
 use super::space::Space;
-use crate::linalg::{Blocks, PART, TOLERANCE};
+use crate::linalg::{Blocks, PART, TOLERANCE, dot};
 use nalgebra::{DMatrix, DVector};
 
-/// A rigid motion: displacement of every node and a name for messages.
+/// A rigid motion, as a sum of translations and rotations about a centre: a few numbers, however many nodes the body has.
 #[derive(Debug, Clone)]
-pub struct RigidMotion {
+pub struct RigidMotion<const D: usize> {
     /// "translation along y", "rotation", or a mixture of them.
     pub name: String,
-    /// Displacement, one entry a dof (`D * node + component`), largest entry about one.
-    pub displacement: Vec<f64>,
+    centre: [f64; D],
+    /// The largest distance along an axis from the centre, by which rotations are divided.
+    size: f64,
+    /// Shares of the translations along the axes, then of the rotations in [`PLANES`].
+    weights: [f64; 6],
+}
+
+/// The plane that each rotation turns, from the first axis to the second, and its name in space.
+const PLANES: [(usize, usize, &str); 3] =
+    [(1, 2, "rotation about x"), (2, 0, "rotation about y"), (0, 1, "rotation about z")];
+
+impl<const D: usize> RigidMotion<D> {
+    /// Displacement at a point.
+    pub fn at(&self, x: &[f64; D]) -> [f64; D] {
+        let mut u = std::array::from_fn(|c| self.weights[c]);
+        for ((i, j, _), weight) in PLANES.into_iter().zip(&self.weights[3..]).filter(|(_, weight)| **weight != 0.0) {
+            u[i] -= weight * (x[j] - self.centre[j]) / self.size;
+            u[j] += weight * (x[i] - self.centre[i]) / self.size;
+        }
+        u
+    }
+
+    /// Displacements of nodes.
+    pub fn nodal(&self, nodes: &[[f64; D]]) -> Vec<f64> {
+        nodes.iter().flat_map(|x| self.at(x)).collect()
+    }
 }
 
 /// A rigid motion that supports leave free.
@@ -23,27 +47,22 @@ pub struct FreeMotion {
     pub work: f64,
 }
 
-/// The motions of [`left_by_supports`] with the work that `load` does on them.
-pub fn free(left: &[RigidMotion], prescribed: &[(usize, f64)], load: &[f64]) -> Vec<FreeMotion> {
-    let of = |motion: &RigidMotion| {
-        let mut displacement = motion.displacement.clone();
+impl FreeMotion {
+    /// The motion with these displacements of dofs, of which supports hold some, and the work that `load` does on it.
+    pub fn new(mut displacement: Vec<f64>, prescribed: &[(usize, f64)], load: &[f64]) -> Self {
         prescribed.iter().for_each(|entry| displacement[entry.0] = 0.0);
-        FreeMotion { work: crate::linalg::dot(&displacement, load), displacement }
-    };
-    left.iter().map(of).collect()
+        Self { work: dot(&displacement, load), displacement }
+    }
 }
 
 /// The rigid motions of a body; of one of revolution the translation along its axis alone.
-pub fn of<const D: usize>(space: &Space<D>) -> Vec<RigidMotion> {
+pub fn of<const D: usize>(space: &Space<D>) -> Vec<RigidMotion<D>> {
     of_all(&[space])
 }
 
-/// The rigid motions of several bodies as one, node by node and body by body.
-pub fn of_all<const D: usize>(spaces: &[&Space<D>]) -> Vec<RigidMotion> {
-    let mut all = match spaces {
-        [space] => modes(&space.nodes),
-        _ => modes(&spaces.iter().flat_map(|space| space.nodes.iter().copied()).collect::<Vec<_>>()),
-    };
+/// The rigid motions of several bodies as one.
+pub fn of_all<const D: usize>(spaces: &[&Space<D>]) -> Vec<RigidMotion<D>> {
+    let mut all = modes(|| spaces.iter().flat_map(|space| &space.nodes));
     if spaces.iter().any(|space| space.axisymmetric) {
         all = vec![all.swap_remove(1)];
     }
@@ -52,82 +71,71 @@ pub fn of_all<const D: usize>(spaces: &[&Space<D>]) -> Vec<RigidMotion> {
 
 /// The 3 (2D) or 6 (3D) rigid motions about the centre of `nodes`: translations, then rotations, scaled to
 /// displacements of about one. Gmsh and PETSc call them rigid body modes.
-pub fn modes<const D: usize>(nodes: &[[f64; D]]) -> Vec<RigidMotion> {
-    let n = nodes.len().max(1) as f64;
-    let centre: [f64; D] = std::array::from_fn(|i| nodes.iter().map(|x| x[i]).sum::<f64>() / n);
-    let size =
-        nodes.iter().flat_map(|x| (0..D).map(move |i| (x[i] - centre[i]).abs())).fold(f64::MIN_POSITIVE, f64::max);
-    let mut all = Vec::new();
-    for c in 0..D {
-        let mut displacement = vec![0.0; D * nodes.len()];
-        displacement.iter_mut().skip(c).step_by(D).for_each(|u| *u = 1.0);
-        all.push(RigidMotion { name: format!("translation along {}", ["x", "y", "z"][c]), displacement });
-    }
-    let planes: &[(usize, usize, &str)] = if D == 2 {
-        &[(0, 1, "rotation")]
-    } else {
-        &[(1, 2, "rotation about x"), (2, 0, "rotation about y"), (0, 1, "rotation about z")]
-    };
-    for &(i, j, name) in planes {
-        let mut displacement = vec![0.0; D * nodes.len()];
-        for (node, x) in nodes.iter().enumerate() {
-            displacement[D * node + i] = -(x[j] - centre[j]) / size;
-            displacement[D * node + j] = (x[i] - centre[i]) / size;
-        }
-        all.push(RigidMotion { name: name.to_owned(), displacement });
-    }
-    all
+pub fn modes<'x, const D: usize, I: Iterator<Item = &'x [f64; D]>>(nodes: impl Fn() -> I) -> Vec<RigidMotion<D>> {
+    let n = nodes().count().max(1) as f64;
+    let centre: [f64; D] = std::array::from_fn(|i| nodes().map(|x| x[i]).sum::<f64>() / n);
+    let size = nodes().flat_map(|x| (0..D).map(move |i| (x[i] - centre[i]).abs())).fold(f64::MIN_POSITIVE, f64::max);
+    let translations = (0..D).map(|c| (c, format!("translation along {}", ["x", "y", "z"][c])));
+    let rotations = (0..3).filter(|&k| D == 3 || k == 2);
+    let rotations = rotations.map(|k| (3 + k, if D == 2 { "rotation" } else { PLANES[k].2 }.to_owned()));
+    let unit = |place: usize| std::array::from_fn(|k| if k == place { 1.0 } else { 0.0 });
+    let motion = |(place, name)| RigidMotion { name, centre, size, weights: unit(place) };
+    translations.chain(rotations).map(motion).collect()
 }
 
-/// The rigid motions that vanish on the prescribed dofs: a basis of what the supports leave free.
-pub fn left_by_supports(motions: &[RigidMotion], prescribed: &[(usize, f64)]) -> Vec<RigidMotion> {
-    let rows = DMatrix::from_fn(prescribed.len(), motions.len(), |i, j| motions[j].displacement[prescribed[i].0]);
-    Blocks::free(&(rows.transpose() * &rows), prescribed.len().max(1) as f64, TOLERANCE)
-        .into_iter()
-        .map(|weights| combine(motions, &weights))
-        .collect()
+/// Weights of `count` motions that prescribed dofs leave free: a basis; `value` is what a motion does at a dof.
+pub fn left_by_supports(
+    count: usize,
+    value: impl Fn(usize, usize) -> f64,
+    prescribed: &[(usize, f64)],
+) -> Vec<DVector<f64>> {
+    let rows = DMatrix::from_fn(prescribed.len(), count, |i, j| value(j, prescribed[i].0));
+    let free = Blocks::free(&(rows.transpose() * &rows), prescribed.len().max(1) as f64, TOLERANCE);
+    free.into_iter().map(scaled).collect()
 }
 
-/// Stiffness of springs in terms of motions of the nodes.
-pub fn of_springs<const D: usize>(motions: &[RigidMotion], springs: &[NodalBlock<D>]) -> DMatrix<f64> {
-    let energy = |a: &RigidMotion, b: &RigidMotion| -> f64 {
-        let at = |motion: &RigidMotion, node: u32, c: usize| motion.displacement[D * node as usize + c];
-        let of = |spring: &NodalBlock<D>| -> f64 {
-            let [i, j] = spring.nodes;
-            let terms = (0..D).flat_map(|c| (0..D).map(move |d| (c, d)));
-            terms.map(|(c, d)| at(a, i, c) * spring.block[c][d] * at(b, j, d)).sum()
-        };
-        springs.iter().map(of).sum()
-    };
-    DMatrix::from_fn(motions.len(), motions.len(), |i, j| energy(&motions[i], &motions[j]))
-}
-
-/// Of the motions in `left`, those that springs do not feel; `all` are the motions of the free body, which set the scale.
-pub fn left_by_springs<const D: usize>(
-    left: Vec<RigidMotion>,
-    all: &[RigidMotion],
+/// Stiffness of springs in terms of `count` motions; `at` is the displacement of a node.
+pub fn of_springs<const D: usize>(
+    count: usize,
+    at: impl Fn(usize, u32) -> [f64; D],
     springs: &[NodalBlock<D>],
-) -> Vec<RigidMotion> {
-    let scale = of_springs(all, springs).diagonal().max();
-    if scale == 0.0 {
+) -> DMatrix<f64> {
+    let mut stiffness = DMatrix::zeros(count, count);
+    for NodalBlock { nodes, block } in springs {
+        let [of_a, of_b] = nodes.map(|node| (0..count).map(|k| at(k, node)).collect::<Vec<_>>());
+        for (i, a) in of_a.iter().enumerate() {
+            let pull: [f64; D] = std::array::from_fn(|d| (0..D).map(|c| a[c] * block[c][d]).sum());
+            of_b.iter().enumerate().for_each(|(j, b)| stiffness[(i, j)] += dot(&pull, b));
+        }
+    }
+    stiffness
+}
+
+/// Of the motions with weights `left`, those that springs do not feel; their stiffness in terms of the motions of the free body sets the scale.
+pub fn left_by_springs(left: Vec<DVector<f64>>, stiffness: &DMatrix<f64>) -> Vec<DVector<f64>> {
+    let scale = stiffness.diagonal().max();
+    if scale == 0.0 || left.is_empty() {
         return left;
     }
-    let gram = of_springs(&left, springs);
-    Blocks::free(&gram, scale, TOLERANCE).into_iter().map(|weights| combine(&left, &weights)).collect()
+    let left = DMatrix::from_columns(&left);
+    let free = Blocks::free(&(left.transpose() * stiffness * &left), scale, TOLERANCE);
+    free.into_iter().map(|weights| scaled(&left * weights)).collect()
 }
 
-/// Combination of motions, named after the parts that matter.
-pub fn combine(motions: &[RigidMotion], weights: &DVector<f64>) -> RigidMotion {
+fn scaled(weights: DVector<f64>) -> DVector<f64> {
     let largest = weights.amax();
-    let mut name = Vec::new();
-    let mut displacement = vec![0.0; motions.first().map_or(0, |m| m.displacement.len())];
-    for (motion, &weight) in motions.iter().zip(weights.iter()) {
-        if weight.abs() > PART * largest {
-            name.push(motion.name.as_str());
-        }
-        crate::linalg::axpy(weight / largest, &motion.displacement, &mut displacement);
-    }
-    RigidMotion { name: crate::error::joined(name), displacement }
+    weights / largest
+}
+
+/// Combination of motions about the same centre, its largest weight one; named after the parts that matter.
+pub fn combine<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64>) -> RigidMotion<D> {
+    let largest = weights.amax();
+    let matters = |(_, weight): &(&RigidMotion<D>, &f64)| weight.abs() > PART * largest;
+    let name = motions.iter().zip(weights).filter(matters).map(|(motion, _)| motion.name.as_str());
+    let name = crate::error::joined(name);
+    let sum = |k: usize| motions.iter().zip(weights).map(|(motion, weight)| weight / largest * motion.weights[k]).sum();
+    let (centre, size) = motions.first().map_or(([0.0; D], 1.0), |motion| (motion.centre, motion.size));
+    RigidMotion { name, centre, size, weights: std::array::from_fn(sum) }
 }
 
 #[cfg(test)]
@@ -137,19 +145,34 @@ mod tests {
     #[test]
     fn supports_leave_what_they_do_not_hold() {
         let nodes = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
-        let all = modes(&nodes);
+        let all = modes(|| nodes.iter());
+        let value = |k: usize, dof: usize| all[k].at(&nodes[dof / 2])[dof % 2];
         let left = |dofs: &[usize]| {
             let prescribed: Vec<_> = dofs.iter().map(|&dof| (dof, 0.0)).collect();
-            left_by_supports(&all, &prescribed).into_iter().map(|m| m.name).collect::<Vec<_>>()
+            let left = left_by_supports(3, value, &prescribed);
+            left.iter().map(|weights| combine(&all, weights)).collect::<Vec<_>>()
         };
-        assert_eq!(left(&[]).len(), 3);
+        let names = |dofs: &[usize]| left(dofs).into_iter().map(|motion| motion.name).collect::<Vec<_>>();
+        assert_eq!(names(&[]).len(), 3);
         // x held on the edge x = 2: translation along y is left, and nothing else
-        assert_eq!(left(&[2, 4]), ["translation along y"]);
-        assert_eq!(left(&[0, 1, 3]), Vec::<String>::new());
+        assert_eq!(names(&[2, 4]), ["translation along y"]);
+        assert_eq!(names(&[0, 1, 3]), Vec::<String>::new());
         // one pinned node: a rotation about it
-        let pinned = left_by_supports(&all, &[(0, 0.0), (1, 0.0)]);
+        let pinned = left(&[0, 1]);
         assert_eq!(pinned.len(), 1);
-        assert!(pinned[0].displacement[0].abs() < 1e-14 && pinned[0].displacement[1].abs() < 1e-14);
-        assert!(pinned[0].displacement[5].abs() > 0.4);
+        let u = pinned[0].nodal(&nodes);
+        assert!(u[0].abs() < 1e-14 && u[1].abs() < 1e-14 && u[5].abs() > 0.4);
+    }
+
+    /// In space a rotation about z is that of the plane, and about x it turns y to z.
+    #[test]
+    fn rotations_turn_their_planes() {
+        let nodes = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0]];
+        let all = modes(|| nodes.iter());
+        let at = |name: &str| all.iter().find(|motion| motion.name == name).map(|motion| motion.at(&nodes[1]));
+        assert_eq!(at("rotation about z"), Some([-1.0, 1.0, 0.0]));
+        assert_eq!(at("rotation about x"), Some([0.0, -1.0, 1.0]));
+        assert_eq!(at("rotation about y"), Some([1.0, 0.0, -1.0]));
+        assert_eq!(at("translation along y"), Some([0.0, 1.0, 0.0]));
     }
 }

@@ -98,6 +98,8 @@ pub struct Report {
     pub times: BTreeMap<String, f64>,
     /// Largest resident memory of the first rank at the end of each phase, 10^6 bytes.
     pub memory: BTreeMap<String, f64>,
+    /// The same of every rank, but for the phase `output`.
+    pub memory_of_ranks: Vec<BTreeMap<String, f64>>,
     /// Wall seconds of the inner solvers, summed over the bodies; they lie within the phases `set-up` and `iterate`.
     pub inner_times: InnerTimes,
     /// What a user should know.

@@ -309,8 +309,10 @@ impl Factory for Inner<'_> {
         let mut plans = Vec::new();
         // bodies for which the program is to choose
         let mut open = Vec::new();
-        for (index, &Outline { name, dimension, order, rows, prescribed, motions, .. }) in outlines.iter().enumerate() {
-            let (dofs, retained) = (rows.columns, Retained::new(dimension, rows, prescribed, motions));
+        for (index, &Outline { name, dimension, order, rows, prescribed, motions, motion, .. }) in
+            outlines.iter().enumerate()
+        {
+            let (dofs, retained) = (rows.columns, Retained::new(dimension, rows, prescribed, motions, motion));
             let chosen = self.typed.of(name);
             // a KSP of all bodies together wants them whole
             let typed = chosen.asks_for_ksp() || (self.may_join() && self.whole.asks_for_ksp());
@@ -416,7 +418,7 @@ impl Factory for Inner<'_> {
             whole.append(&next, first);
         }
         let mut modes: Vec<Vec<f64>> = match self.linear {
-            Linear::Sweeps => motions.into_iter().map(|motion| motion.displacement).collect(),
+            Linear::Sweeps => motions(),
             _ => Vec::new(),
         };
         if let Some(distribution) = &distribution {

@@ -75,6 +75,7 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
         assemblies_avoided: shared.assemblies_avoided,
         factorizations_avoided: counts.factorizations_avoided,
         body_solves_skipped: outcome.solves_skipped,
+        memory_of_ranks: share(&*model.exchange, &clock.memory),
         messages: model.exchange.messages(),
         steps: done.steps.clone(),
         residual: finite(last.map(|row| row.residual)),

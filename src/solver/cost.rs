@@ -193,7 +193,7 @@ mod tests {
                 rows.push_row([(3 * (i + x * (j + y * k)) + 2, 1.0)]);
             }
         }
-        (ptr, col, Retained::new(3, &rows, &[], &[]))
+        (ptr, col, Retained::new(3, &rows, &[], 0, &|_, _| 0.0))
     }
 
     fn of(sizes: &[[usize; 3]], step: Step) -> Comparison {

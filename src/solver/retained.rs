@@ -4,9 +4,8 @@
 //! that touch a node, the node is turned to axes (n, t, ...), and of its dofs one is left. Dofs of a few more nodes are
 //! retained where supports and contact do not hold the interior safely.
 
-use crate::fem::rigid::{self, RigidMotion};
 use crate::linalg::{Blocks, Csr, dot};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
 /// Rows of a node count as parallel below this sine of their angle.
@@ -31,8 +30,14 @@ pub struct Retained {
 
 impl Retained {
     /// Chooses the dofs for contact `rows` (columns: all dofs, `dimension` of them a node), `prescribed` (dof, value) and the
-    /// rigid motions of the free body.
-    pub fn new(dimension: usize, rows: &Csr, prescribed: &[(usize, f64)], motions: &[RigidMotion]) -> Self {
+    /// `motions` of the free body, which are rigid: `motion` is what one of them does at a dof.
+    pub fn new(
+        dimension: usize,
+        rows: &Csr,
+        prescribed: &[(usize, f64)],
+        motions: usize,
+        motion: &dyn Fn(usize, usize) -> f64,
+    ) -> Self {
         let mut is_prescribed = vec![false; rows.columns];
         prescribed.iter().for_each(|entry| is_prescribed[entry.0] = true);
         let mut vectors: BTreeMap<usize, Vec<Vec<f64>>> = BTreeMap::new();
@@ -53,7 +58,7 @@ impl Retained {
         let turned = retained.turn_rows(rows);
         let mut kept = vec![false; rows.columns];
         turned.col.iter().for_each(|&dof| kept[dof as usize] = true);
-        retained.hold(&mut kept, &is_prescribed, motions);
+        retained.hold(&mut kept, &is_prescribed, motions, motion);
         retained.dofs = (0..kept.len()).filter(|&dof| kept[dof]).collect();
         let mut place = vec![0; kept.len()];
         retained.dofs.iter().enumerate().for_each(|(i, &dof)| place[dof] = i);
@@ -65,22 +70,35 @@ impl Retained {
     }
 
     /// Adds dofs until supports and retained dofs together hold every rigid motion.
-    fn hold(&self, kept: &mut [bool], is_prescribed: &[bool], motions: &[RigidMotion]) {
-        let turned: Vec<Vec<f64>> = motions.iter().map(|motion| self.turn(&motion.displacement)).collect();
+    fn hold(&self, kept: &mut [bool], is_prescribed: &[bool], motions: usize, motion: &dyn Fn(usize, usize) -> f64) {
         loop {
-            let held: Vec<usize> = (0..kept.len()).filter(|&dof| kept[dof] || is_prescribed[dof]).collect();
-            let gram = DMatrix::from_fn(turned.len(), turned.len(), |i, j| {
-                held.iter().map(|&dof| turned[i][dof] * turned[j][dof]).sum()
-            });
-            let free = Blocks::free(&gram, held.len().max(1) as f64, SAFE);
+            let (mut gram, mut count) = (DMatrix::zeros(motions, motions), 0);
+            for dof in (0..kept.len()).filter(|&dof| kept[dof] || is_prescribed[dof]) {
+                let at = DVector::from_fn(motions, |k, _| self.turned(dof, |dof| motion(k, dof)));
+                gram.syger(1.0, &at, &at, 1.0);
+                count += 1;
+            }
+            gram.fill_upper_triangle_with_lower_triangle();
+            let free = Blocks::free(&gram, count.max(1) as f64, SAFE);
             let Some(weights) = free.first() else { return };
-            let motion = rigid::combine(motions, weights);
-            let motion = self.turn(&motion.displacement);
+            let size = |dof: usize| {
+                let sum = |dof: usize| (0..motions).map(|k| weights[k] * motion(k, dof)).sum();
+                self.turned(dof, sum).abs() / weights.amax()
+            };
             let candidates = (0..kept.len()).filter(|&dof| !kept[dof] && !is_prescribed[dof]);
-            match candidates.max_by(|&i, &j| motion[i].abs().total_cmp(&motion[j].abs())) {
-                Some(dof) if motion[dof].abs() > 1e-3 => kept[dof] = true,
+            match candidates.map(|dof| (dof, size(dof))).max_by(|a, b| a.1.total_cmp(&b.1)) {
+                Some((dof, size)) if size > 1e-3 => kept[dof] = true,
                 _ => return,
             }
+        }
+    }
+
+    /// Entry of a vector in the turned axes.
+    fn turned(&self, dof: usize, u: impl Fn(usize) -> f64) -> f64 {
+        let (node, c) = (dof / self.dimension, dof % self.dimension);
+        match self.axes.get(&node) {
+            None => u(dof),
+            Some(axes) => axes[c].iter().enumerate().map(|(k, axis)| axis * u(node * self.dimension + k)).sum(),
         }
     }
 
@@ -213,9 +231,15 @@ fn frame(normal: Vec<f64>) -> Vec<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fem::rigid;
 
     /// Nodes of a square with side 2; the dofs of node i are 2 i and 2 i + 1.
     const NODES: [[f64; 2]; 4] = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
+
+    fn of(rows: &Csr, prescribed: &[(usize, f64)]) -> Retained {
+        let motions = rigid::modes(|| NODES.iter());
+        Retained::new(2, rows, prescribed, 3, &|k, dof| motions[k].at(&NODES[dof / 2])[dof % 2])
+    }
 
     fn rows(list: &[&[(usize, f64)]]) -> Csr {
         let mut rows = Csr::new(8);
@@ -228,7 +252,7 @@ mod tests {
         let supported = [(0, 0.0), (1, 0.0), (2, 0.0), (3, 0.0)];
         let s = 0.5f64.sqrt();
         let plane = rows(&[&[(4, s), (5, s), (6, 0.5 * s), (7, 0.5 * s)], &[(6, s), (7, s)]]);
-        let retained = Retained::new(2, &plane, &supported, &rigid::modes(&NODES));
+        let retained = of(&plane, &supported);
         assert_eq!(retained.dofs, [4, 6]);
         assert!((retained.rows.values[0] - 1.0).abs() < 1e-15 && (retained.rows.values[1] - 0.5).abs() < 1e-15);
         let u = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
@@ -236,7 +260,7 @@ mod tests {
         assert!((turned[4] - 1.1 * s).abs() < 1e-15);
         assert!(retained.turn_back(&turned).iter().zip(u).all(|(a, b)| (a - b).abs() < 1e-15));
         let corner = rows(&[&[(4, s), (5, s)], &[(4, 1.0), (6, 1.0)]]);
-        let retained = Retained::new(2, &corner, &supported, &rigid::modes(&NODES));
+        let retained = of(&corner, &supported);
         assert_eq!(retained.dofs, [4, 5, 6]);
     }
 
@@ -244,18 +268,18 @@ mod tests {
     #[test]
     fn what_contact_does_not_hold_gets_a_dof() {
         let flat = rows(&[&[(5, 1.0)], &[(7, 1.0)]]);
-        let retained = Retained::new(2, &flat, &[], &rigid::modes(&NODES));
+        let retained = of(&flat, &[]);
         assert_eq!(retained.dofs.len(), 3);
         assert!(retained.dofs.iter().any(|dof| dof % 2 == 0), "{:?}", retained.dofs);
-        assert_eq!(Retained::new(2, &flat, &[(0, 0.0)], &rigid::modes(&NODES)).dofs, [5, 7]);
-        assert_eq!(Retained::new(2, &rows(&[]), &[], &rigid::modes(&NODES)).dofs.len(), 3);
+        assert_eq!(of(&flat, &[(0, 0.0)]).dofs, [5, 7]);
+        assert_eq!(of(&rows(&[]), &[]).dofs.len(), 3);
     }
 
     #[test]
     fn a_turned_matrix_is_the_same_form() {
         let s = [0.6, 0.8];
         let flat = rows(&[&[(4, s[0]), (5, s[1])]]);
-        let retained = Retained::new(2, &flat, &[(0, 0.0), (1, 0.0), (3, 0.0)], &rigid::modes(&NODES));
+        let retained = of(&flat, &[(0, 0.0), (1, 0.0), (3, 0.0)]);
         assert_eq!(retained.dofs, [4]);
         let mut matrix = Csr::new(8);
         for i in 0..8usize {
