@@ -26,6 +26,8 @@ pub struct Gap {
     pub mismatch: f64,
     /// [`change`] to the new places.
     pub change: f64,
+    /// The largest of it at a point, per area.
+    pub largest: f64,
     /// sum omega |p - p_q| over sum omega p_q.
     pub share: f64,
 }
@@ -41,6 +43,7 @@ impl Gap {
                 let (c, p) = (compression[q], pressure[q]);
                 let moved = p - places.pressure[q];
                 apart += weight * moved.abs();
+                gap.largest = gap.largest.max(moved * moved / rho[q]);
                 gap.mismatch = gap.mismatch.max((p - pair.law.pressure(point, c)).abs());
                 if p < 0.0 {
                     gap.is_bound = false;
