@@ -47,8 +47,6 @@ pub trait Observer {
     fn asked(&self) -> u8 {
         0
     }
-    /// Something worth a line of its own (a warning, a change of method).
-    fn note(&mut self, _text: &str) {}
 }
 
 /// Nobody watches.

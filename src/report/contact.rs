@@ -99,7 +99,7 @@ fn map(
     let [_, most] = range(pressures.iter());
     let every = places.len().div_ceil(POINTS).max(1);
     let point = |(x, &p): (&[f64; 3], &f64)| {
-        let band = if p > 0.0 { ((p / most * BANDS as f64) as i64).min(BANDS as i64 - 1) } else { -1 };
+        let band = if p > 0.0 { bands::band(p, [0.0, most], false) as i64 } else { -1 };
         ((x[axes[0]] - low[axes[0]]) / pixel, (high[axes[1]] - x[axes[1]]) / pixel, band)
     };
     let points: Vec<_> = places.iter().zip(pressures).step_by(every).map(point).collect();
