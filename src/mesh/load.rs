@@ -1,11 +1,12 @@
 //! From what the scene names to a mesh: Gmsh, or the cache, or a file.
 
-use super::cache::{Key, Workshop, folders};
+use super::cache::{Workshop, file_name, folders};
 use super::gmsh::{Gmsh, Task};
 use super::msh::Maker;
 use super::script::Script;
 use super::{Mesh, foreign, msh};
 use crate::error::{Error, Located, Place, Result};
+use crate::file::digest_of_bytes;
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::order::Order;
@@ -65,7 +66,7 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     let path = &file.value;
     let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
     let mut loaded = match foreign::is_mesh(path, &bytes) {
-        true => converted(file, &bytes, interrupt, &folders())?,
+        true => converted(file, &bytes, interrupt)?,
         false => Loaded { mesh: msh::parse(path, &bytes, Maker::User)?, origin: Origin::File, file: path.clone() },
     };
     loaded.mesh = match (loaded.mesh.order, order) {
@@ -83,20 +84,12 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     Ok(loaded)
 }
 
-/// A mesh of another program, or of another version of Gmsh's format, as Gmsh writes it; with the cache in one of `folders`.
-fn converted<const D: usize>(
-    file: &Located<PathBuf>,
-    bytes: &[u8],
-    interrupt: &Interrupt,
-    folders: &[PathBuf],
-) -> Result<Loaded<D>> {
+/// A mesh of another program, or of another version of Gmsh's format, as Gmsh writes it.
+fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &Interrupt) -> Result<Loaded<D>> {
     let path = &file.value;
     let gmsh = Gmsh::find()?;
-    let mut key = Key::new();
-    [&b"converted"[..], gmsh.identity().as_bytes(), path.extension().unwrap_or_default().as_encoded_bytes(), bytes]
-        .iter()
-        .for_each(|piece| key.add(piece));
-    let name = key.file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    let name = file_name(("converted", gmsh.identity(), ending, digest_of_bytes(bytes)), path);
     let parse = |bytes: &[u8]| {
         msh::parse(path, bytes, Maker::Other).map_err(|error| match error.advice() {
             // what helps a script helps nobody here
@@ -111,7 +104,7 @@ fn converted<const D: usize>(
             Task { script, shown: path, set: &[], is_mesh: true, dimension: D, order: Order::P1, guard, interrupt };
         gmsh.run(&task, made, work)
     };
-    kept(&name, folders, parse, make).map_err(|error| error.at(&file.place))
+    kept(&name, &folders(), parse, make).map_err(|error| error.at(&file.place))
 }
 
 /// The mesh of this name in the cache, which is in one of `folders`; or what `make` makes of it in a folder to work in, and in a file there.
@@ -158,7 +151,10 @@ pub(super) fn from_script<const D: usize>(
         script.judge(file)?;
     }
     let gmsh = Gmsh::find()?;
-    let name = file_name::<D>(path, &script, set, sizes, order, guard, &gmsh);
+    // one thread or many: the same algorithm
+    let asked = (D, order.degree(), guard.threads.is_some(), guard.size, set, sizes);
+    let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
+    let name = file_name((gmsh.identity(), asked, files, script.is_ended()), path);
     let make = |work: &Path, made: &Path| {
         let own = match is_shape {
             true => foreign::script(path, &script.files[0], D, guard.size, work)?,
@@ -206,39 +202,7 @@ pub fn recall_final(purpose: &str) -> Option<String> {
 }
 
 fn final_name(purpose: &str) -> String {
-    let mut key = Key::new();
-    key.add(purpose.as_bytes());
-    key.file_name("sizes") + ".pos"
-}
-
-/// Name of the mesh in the cache: it changes with everything that changes the mesh.
-fn file_name<const D: usize>(
-    path: &Path,
-    script: &Script,
-    set: &[(String, f64)],
-    sizes: Option<&str>,
-    order: Order,
-    guard: &Guard,
-    gmsh: &Gmsh,
-) -> String {
-    let mut key = Key::new();
-    key.add(gmsh.identity().as_bytes());
-    key.add(&[D as u8, order as u8]);
-    // one thread or many: the same algorithm
-    key.add(&[u8::from(guard.threads.is_some())]);
-    guard.size.iter().for_each(|size| key.add(&size.to_le_bytes()));
-    for (name, value) in set {
-        key.add(name.as_bytes());
-        key.add(&value.to_le_bytes());
-    }
-    for text in &script.files {
-        key.add(text);
-    }
-    if !script.is_ended() {
-        key.add(b"ended");
-    }
-    sizes.iter().for_each(|view| key.add(view.as_bytes()));
-    key.file_name(&path.file_stem().unwrap_or_default().to_string_lossy())
+    file_name(purpose, Path::new("sizes")) + ".pos"
 }
 
 /// The mesh in bytes that Gmsh made from a script, of the order asked for.
