@@ -3,14 +3,14 @@
 use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
-use crate::output::{Verbosity, say};
+use crate::output::say;
 use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::report;
 use crate::solver::options;
 use anstream::{AutoStream, ColorChoice};
 use clap::error::ContextKind;
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use std::ffi::OsString;
 use std::io::ErrorKind;
@@ -65,16 +65,7 @@ enum Command {
     #[command(after_help = BENCH)]
     Bench(bench::Request),
     /// Make the mesh of a scene, or find it in the cache, and say what is in it
-    Mesh {
-        #[command(flatten)]
-        scene: OverriddenScene,
-        /// File to write: .msh or .vtu
-        #[arg(short, value_name = "FILE")]
-        output: Option<PathBuf>,
-        /// Print it as JSON
-        #[arg(long)]
-        json: bool,
-    },
+    Mesh(mesh::Request),
     /// Write a page with pictures and tables of a run, from its files alone: one HTML file
     Report {
         /// Folder of results
@@ -126,130 +117,13 @@ enum Command {
 enum Solving {
     /// Solve a scene and write its results
     #[command(after_help = SOLVE)]
-    Solve {
-        #[command(flatten)]
-        scene: SceneArgs,
-        /// Folder for the results [default: output.dir of the scene, else results/CASE]
-        #[arg(short, value_name = "DIR")]
-        output: Option<PathBuf>,
-        /// Write displacements and stresses of the bodies for ParaView (short for --set output.vtu=true)
-        #[arg(long)]
-        vtu: bool,
-        /// Write displacements, stresses and contact pressures as views for Gmsh (short for --set output.msh=true)
-        #[arg(long)]
-        msh: bool,
-        /// Write a page with pictures and tables of the run, report.html (short for --set output.report=true)
-        #[arg(long)]
-        report: bool,
-        /// Minutes between checkpoints (short for --set output.checkpoint=T)
-        #[arg(long, value_name = "T", allow_hyphen_values = true)]
-        checkpoint: Option<String>,
-        /// Go on from the checkpoint in a folder of results
-        #[arg(long, value_name = "DIR")]
-        restart: Option<PathBuf>,
-        #[command(flatten)]
-        manner: Manner,
-    },
+    Solve(solve::Request),
     /// Build a scene's problem, solve nothing, and say what is there
     #[command(after_help = CHECK)]
-    Check {
-        #[command(flatten)]
-        scene: SceneArgs,
-        /// Folder for pictures of measured surfaces and layers of asperities [default: none are drawn]
-        #[arg(short, value_name = "DIR")]
-        output: Option<PathBuf>,
-    },
+    Check(check::Request),
     /// Solve a scene for every combination of values of its keys
     #[command(after_help = SWEEP)]
-    Sweep {
-        #[command(flatten)]
-        scene: SceneArgs,
-        /// Folder for the results [default: output.dir of the scene, else results/CASE]
-        #[arg(short, value_name = "DIR")]
-        output: Option<PathBuf>,
-        /// Key and its values, for example method.gamma=0.3,0.6; may be repeated
-        #[arg(long, value_name = "KEY=V1,V2,...", required = true)]
-        over: Vec<String>,
-        #[command(flatten)]
-        manner: Manner,
-    },
-}
-
-/// How much a command says.
-#[derive(Args, Clone, Copy)]
-struct Manner {
-    /// Say errors, warnings and the folder of the results only
-    #[arg(short, long, conflicts_with_all = ["verbose", "json"])]
-    quiet: bool,
-    /// Say what is decided and why, with the PETSc options of each body, on standard error
-    #[arg(short, long)]
-    verbose: bool,
-}
-
-impl Manner {
-    fn verbosity(self) -> Verbosity {
-        match (self.quiet, self.verbose) {
-            (true, _) => Verbosity::Quiet,
-            (_, true) => Verbosity::Verbose,
-            _ => Verbosity::Usual,
-        }
-    }
-}
-
-#[derive(Args)]
-struct OverriddenScene {
-    /// Scene file (TOML)
-    #[arg(value_name = "SCENE")]
-    scene: PathBuf,
-    /// Replace a key of the scene, for example mesh.set.n=64; may be repeated
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    overrides: Vec<String>,
-    /// Run the mesh's .geo script even if it can start programs or write files
-    #[arg(long)]
-    trust_geo: bool,
-}
-
-impl OverriddenScene {
-    /// All overrides.
-    fn overrides(self) -> Vec<String> {
-        self.overrides.into_iter().chain(self.trust_geo.then(|| "--trust-geo".to_owned())).collect()
-    }
-}
-
-#[derive(Args)]
-struct SceneArgs {
-    /// Scene file (TOML)
-    #[arg(value_name = "SCENE")]
-    scene: PathBuf,
-    /// Replace a key of the scene, for example method.gamma=0.3 or contact.0.layer.power.a=0.3; may be repeated
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    overrides: Vec<String>,
-    /// Method: auto, robin, ncg, anderson, newton-robin or newton (short for --set method.name=NAME)
-    #[arg(long, value_name = "NAME")]
-    method: Option<String>,
-    /// Estimate the error of the discretisation (short for --set estimate=true)
-    #[arg(long)]
-    estimate: bool,
-    /// Adapt the mesh until the estimated error of pressures and displacements is at most this (short for --set adapt.error=E)
-    #[arg(long, value_name = "E", allow_hyphen_values = true)]
-    tolerance: Option<String>,
-    /// Run the mesh's .geo script even if it can start programs or write files
-    #[arg(long)]
-    trust_geo: bool,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
-}
-
-impl SceneArgs {
-    /// All overrides, those with names of their own last.
-    fn overrides(&self) -> Vec<String> {
-        let method = self.method.iter().map(|name| format!("--method {name}"));
-        let tolerance = self.tolerance.iter().map(|error| format!("--tolerance {error}"));
-        let flags = [(self.estimate, "--estimate"), (self.trust_geo, "--trust-geo")];
-        let flags = flags.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.to_owned());
-        self.overrides.iter().cloned().chain(method).chain(tolerance).chain(flags).collect()
-    }
+    Sweep(sweep::Request),
 }
 
 /// The option of the program, without its dashes, that a word with one dash may mean: it looks like one of PETSc.
@@ -317,10 +191,7 @@ pub fn run(words: Vec<OsString>) -> i32 {
             request.petsc = petsc;
             bench::bench(&interrupt, &request)
         }
-        Command::Mesh { scene, output, json } => {
-            let (scene, overrides) = (scene.scene.clone(), scene.overrides());
-            mesh::mesh(&interrupt, &mesh::Request { scene, overrides, output, json })
-        }
+        Command::Mesh(request) => mesh::mesh(&interrupt, &request),
         Command::Report { folder, output } => report::save(&folder, output.as_deref()).and_then(|path| {
             say(path.display())?;
             Ok(0)
@@ -368,25 +239,9 @@ fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i3
 
 fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Result<i32> {
     match command {
-        Solving::Solve { scene, output, vtu, msh, report, checkpoint, restart, manner } => {
-            let mut overrides = scene.overrides();
-            let flags = [(vtu, "--vtu"), (msh, "--msh"), (report, "--report")];
-            overrides.extend(flags.iter().filter(|(given, _)| *given).map(|(_, flag)| (*flag).to_owned()));
-            overrides.extend(checkpoint.map(|minutes| format!("--checkpoint {minutes}")));
-            let (json, verbosity) = (scene.json, manner.verbosity());
-            let request = solve::Request { scene: scene.scene, folder: output, restart, overrides, json, verbosity };
-            solve::solve(session, interrupt, request)
-        }
-        Solving::Check { scene, output } => {
-            let overrides = scene.overrides();
-            check::check(session, interrupt, scene.scene, overrides, scene.json, output)
-        }
-        Solving::Sweep { scene, output, over, manner } => {
-            let overrides = scene.overrides();
-            let (json, verbosity) = (scene.json, manner.verbosity());
-            let request = sweep::Request { scene: scene.scene, folder: output, overrides, over, json, verbosity };
-            sweep::sweep(session, interrupt, request)
-        }
+        Solving::Solve(request) => solve::solve(session, interrupt, &request),
+        Solving::Check(request) => check::check(session, interrupt, &request),
+        Solving::Sweep(request) => sweep::sweep(session, interrupt, &request),
     }
 }
 

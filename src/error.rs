@@ -205,6 +205,16 @@ impl Error {
         self
     }
 
+    /// Advises the known name that `name` may be a slip of, or else what `otherwise` says.
+    pub fn suggest<'a>(
+        self,
+        name: &str,
+        known: impl IntoIterator<Item = &'a str>,
+        otherwise: impl FnOnce() -> String,
+    ) -> Self {
+        self.help(suggestion(name, known).unwrap_or_else(otherwise))
+    }
+
     /// Adds a cause, printed on a line of its own.
     pub fn because(mut self, cause: impl Into<String>) -> Self {
         self.0.causes.push(cause.into());
@@ -330,6 +340,11 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .filter(|(distance, _)| *distance <= 1 + name.len() / 4)
         .min_by_key(|(distance, candidate)| (*distance, candidate.to_string()))
         .map(|(_, candidate)| candidate)
+}
+
+/// The same as advice.
+pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    nearest(name, known).map(|near| format!("did you mean `{near}`?"))
 }
 
 /// The text that the caret of a rendered error marks.

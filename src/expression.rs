@@ -5,21 +5,21 @@ mod grammar;
 mod operators;
 mod program;
 mod scope;
-mod slip;
 #[cfg(test)]
 mod tests;
+mod text;
 mod token;
 
-pub use dual::Differentiable;
 pub use scope::Scope;
 
 use crate::data::{Data, Library};
 use crate::error::{Error, Place, Result};
-use program::{Code, MOST_VARIABLES, Number, Program, Values};
-use slip::Slip;
+use dual::Dual;
+use program::{MOST_VARIABLES, Program, Step, Values};
 use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
+use text::Text;
 
 /// An expression such as `5e-4 * max(0, 1 - (x - 4)^2)^1.5`, parsed once and cheap to clone.
 ///
@@ -27,9 +27,7 @@ use std::sync::Arc;
 /// a^b^c is a^(b^c). Comparisons give 1 or 0. A value outside the domain of a function is NaN and stays one.
 #[derive(Clone)]
 pub struct Expression {
-    program: Arc<Program<f64>>,
-    /// Which entries of the values it uses.
-    uses: Arc<[usize]>,
+    program: Arc<Program>,
     variables: Arc<[&'static str]>,
     text: Arc<str>,
     place: Place,
@@ -45,34 +43,20 @@ impl Expression {
     /// # Errors
     /// Texts that are no expression, and data that cannot be read.
     pub fn parse(text: &str, place: &Place, scope: Scope) -> Result<Self> {
-        Self::made(text, place, scope, |slot| slot).map(|(expression, _)| expression)
+        Self::made(text, place, scope, |slot| slot)
     }
 
-    /// The same with another program for a second kind of number.
-    fn with<T: Number>(text: &str, place: &Place, scope: Scope) -> Result<(Self, Program<T>)> {
-        let (expression, code) = Self::made(text, place, scope, |slot| slot)?;
-        Ok((expression, linked(&code, text, place)?))
-    }
-
-    /// An expression with its code; `slot` says which value each variable of the scope takes.
-    fn made(text: &str, place: &Place, scope: Scope, slot: impl Fn(usize) -> usize) -> Result<(Self, Vec<Code>)> {
+    /// The same; `slot` says which value each variable of the scope takes.
+    fn made(text: &str, place: &Place, scope: Scope, slot: impl Fn(usize) -> usize) -> Result<Self> {
         debug_assert!(scope.variables.len() <= MOST_VARIABLES);
-        let mut code = grammar::parse(text, scope).map_err(|slip| slip.into_error(text, place))?;
-        let mut uses = Vec::new();
+        let mut code = grammar::parse(Text { text, place }, scope)?;
         for step in &mut code {
-            if let Code::Variable(variable) = step {
+            if let Step::Variable(variable) = step {
                 *variable = slot(*variable);
-                uses.push(*variable);
             }
         }
-        let expression = Self {
-            program: Arc::new(linked(&code, text, place)?),
-            uses: uses.into(),
-            variables: scope.variables.into(),
-            text: text.into(),
-            place: place.clone(),
-        };
-        Ok((expression, code))
+        let program = Arc::new(Program::new(code));
+        Ok(Self { program, variables: scope.variables.into(), text: text.into(), place: place.clone() })
     }
 
     /// Value for the values of the variables, in the order given to [`Expression::parse`]; NaN where it is not
@@ -81,14 +65,22 @@ impl Expression {
         self.program.eval(&full(values))
     }
 
+    /// The same with the derivative by the variable of this number.
+    pub fn eval_by(&self, variable: usize, values: &[f64]) -> (f64, f64) {
+        let values = full(values);
+        let dual = |slot| Dual { value: values[slot], slope: if slot == variable { 1.0 } else { 0.0 } };
+        let Dual { value, slope } = self.program.eval(&std::array::from_fn(dual));
+        (value, slope)
+    }
+
     /// Whether the expression uses no variable.
     pub fn is_constant(&self) -> bool {
-        self.uses.is_empty()
+        self.program.variables().next().is_none()
     }
 
     /// Whether it depends on no variable but the first.
     pub fn uses_only_first(&self) -> bool {
-        self.uses.iter().all(|&slot| slot == 0)
+        self.program.variables().all(|slot| slot == 0)
     }
 
     /// The data that it asks.
@@ -161,7 +153,7 @@ impl Field {
             })
             .collect();
         let slot = |variable: usize| coordinate(names[variable]).unwrap_or(variable);
-        let (expression, _) = Expression::made(text, place, Scope { variables: &names, data }, slot)?;
+        let expression = Expression::made(text, place, Scope { variables: &names, data }, slot)?;
         if !expression.is_constant() {
             return Ok(Field::Expression(expression));
         }
@@ -264,12 +256,6 @@ fn coordinate(name: &str) -> Option<usize> {
 
 fn full(values: &[f64]) -> Values<f64> {
     std::array::from_fn(|slot| values.get(slot).copied().unwrap_or(f64::NAN))
-}
-
-fn linked<T: Number>(code: &[Code], text: &str, place: &Place) -> Result<Program<T>> {
-    // the grammar makes no code that cannot be linked
-    let refuse = || Slip::new(0..text.len(), "this is no expression").into_error(text, place);
-    Program::link(code).ok_or_else(refuse)
 }
 
 /// Names that have a meaning in every expression.

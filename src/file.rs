@@ -1,6 +1,8 @@
-//! Reading of files that users name.
+//! Reading of files that users name, and digests of data.
 
 use crate::error::{Error, Kind, Result};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
@@ -22,9 +24,28 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
         .help("name a regular file; what a pipe gives can be saved as one"))
 }
 
+/// SHA-256 of numbers, texts, lists and tuples of such, in hexadecimal digits. Lengths are part of it, so that pieces do not run together.
+pub fn digest(data: &impl Serialize) -> String {
+    // nothing of these kinds fails
+    digest_of_bytes(&postcard::to_allocvec(data).unwrap_or_default())
+}
+
+/// The same of the contents of a file.
+pub fn digest_of_bytes(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pieces_of_a_digest_do_not_run_together() {
+        assert_eq!(digest(&("ab", "c")), digest(&("ab".to_owned(), "c")));
+        assert_ne!(digest(&("ab", "c")), digest(&("a", "bc")));
+        assert_ne!(digest(&[2.0, 1.0]), digest(&[2.0, 1.0 + f64::EPSILON]));
+        assert!(digest(&()).starts_with("e3b0c442"), "that of no byte");
+    }
 
     #[test]
     fn only_regular_files_are_read() {

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use winkler::contact::Side;
 use winkler::fem::{Elasticity, Frame, Space, stress};
+use winkler::interrupt::Interrupt;
 use winkler::mesh::load;
 use winkler::problem::order::Order;
 use winkler::scene;
@@ -386,7 +387,7 @@ fn soft_layer() {
 fn normals_on_the_axis() {
     let scene = scene::load(&case("shells"), &[]).expect("a scene");
     for degree in [Order::P1, Order::P2] {
-        let mesh = load::<2>(&scene.mesh, degree).expect("a mesh").mesh;
+        let mesh = load::<2>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
         let space = Space::new(&mesh, mesh.group("inner").expect("a body"), degree).revolved();
         let facets = space.facets(mesh.group("inner_contact").expect("a surface"));
         let (free, frame) = (HashMap::new(), Frame::default());
@@ -408,7 +409,7 @@ fn stress_along_the_circles() {
     let elasticity =
         Elasticity::new(&[&scene.bodies[0].elasticity], Vec::new(), 2, scene.plane).expect("an isotropic material");
     for degree in [Order::P1, Order::P2] {
-        let mesh = load::<2>(&scene.mesh, degree).expect("a mesh").mesh;
+        let mesh = load::<2>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
         let space = Space::new(&mesh, mesh.group("inner").expect("a body"), degree).revolved();
         assert!(space.nodes.iter().any(|x| x[0] == 0.0), "the shell meets the axis");
         let u: Vec<f64> = space.nodes.iter().flat_map(|x| [a * x[0], b * x[1]]).collect();

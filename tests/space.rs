@@ -10,6 +10,7 @@ use winkler::contact::pieces::{self, Cut, Reach};
 use winkler::contact::{Carriers, ContactPair, Side, assemble};
 use winkler::fem::quadrature::Parts;
 use winkler::fem::{Frame, Space, assemble as fem};
+use winkler::interrupt::Interrupt;
 use winkler::mesh::{Mesh, load};
 use winkler::problem::order::Order;
 use winkler::scene;
@@ -23,7 +24,7 @@ fn run(name: &str, set: &[&str]) -> common::Run {
 /// The mesh of a case, with overrides.
 fn mesh<const D: usize>(name: &str, set: &str, order: Order) -> Mesh<D> {
     let scene = scene::load(&case(name), &[format!("mesh.set={set}")]).expect("a scene");
-    load::<D>(&scene.mesh, order).expect("a mesh").mesh
+    load::<D>(&scene.mesh, order, &Interrupt::default()).expect("a mesh").mesh
 }
 
 /// Observed order from errors on meshes, each twice as fine as the one before.
@@ -204,7 +205,9 @@ fn points_of_quadratic_triangles() {
     let text = "dimension = 3\nmesh = { geo = \"blocks.geo\", set = { h = 0.3 } }\n[[body]]\nname = \"large\"\nyoung = 1\npoisson = 0.3\n";
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).expect("a scene");
-    let mesh = load::<3>(&scene::load(&path, &[]).expect("a scene").mesh, Order::P2).expect("a mesh").mesh;
+    let mesh = load::<3>(&scene::load(&path, &[]).expect("a scene").mesh, Order::P2, &Interrupt::default())
+        .expect("a mesh")
+        .mesh;
     for (bodies, kinds) in [
         (["small", "large"], vec![Some(Carriers::MidEdges)]),
         (["large", "small"], vec![None, Some(Carriers::Vertices), Some(Carriers::MidEdges)]),
@@ -248,7 +251,7 @@ fn volume_and_area_of_a_ball() {
     for (degree, expected) in [(Order::P1, 1.7), (Order::P2, 3.5)] {
         let errors = [0.4, 0.2].map(|h| {
             let scene = scene::load(&path, &[format!("mesh.set.h={h}")]).expect("a scene");
-            let mesh = load::<3>(&scene.mesh, degree).expect("a mesh").mesh;
+            let mesh = load::<3>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
             let space = Space::new(&mesh, mesh.group("ball").expect("a body"), degree);
             let total = |load: &[f64]| load.iter().step_by(3).sum::<f64>();
             let (mut volume, mut area) = (vec![0.0; space.dofs()], vec![0.0; space.dofs()]);

@@ -3,6 +3,7 @@
 use super::carry;
 use super::checkpoint::{Checkpoint, Head, settings_digest};
 use crate::ddm::{Start, Status};
+use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Sizes};
@@ -11,7 +12,7 @@ use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::agree;
 use crate::petsc::Session;
-use crate::problem::mesh::{MeshSource, Sizing};
+use crate::problem::mesh::MeshSource;
 use crate::problem::method::{self, MethodName};
 use crate::run;
 use crate::run::clock::Clock;
@@ -94,25 +95,24 @@ impl Plan {
             follow(Rc::make_mut(&mut plan.scene), checkpoint.head.sizes.clone());
             return Ok(plan);
         }
+        let mut sized = |scene: &Scene, sizes: fn(&dyn Meshes, usize) -> Sizes| {
+            let built = run::build(session, scene.clone(), interrupt, clock)?;
+            let bodies = built.discrete.bodies.len();
+            let sizes = built.discrete.meshes.as_ref().map(|meshes| view(sizes(&**meshes, bodies)));
+            options::withdraw(session).map(|()| sizes)
+        };
         if plan.goal.is_none() {
             let mut coarse = Scene::clone(&plan.scene);
             coarse.estimate = true;
-            let built = run::build(session, coarse.clone(), interrupt, clock)?;
-            let (meshes, bodies) = (&built.discrete.meshes, built.discrete.bodies.len());
-            let sizes = meshes.as_ref().map(|meshes| sizes::scaled(&**meshes, bodies, 2.0));
-            options::withdraw(session)?;
+            let sizes = sized(&coarse, |meshes, bodies| sizes::scaled(meshes, bodies, 2.0))?;
             coarse.method.stop.balanced = true;
-            follow(&mut coarse, sizes.map(view));
+            follow(&mut coarse, sizes);
             plan.finer = Some(std::mem::replace(&mut plan.scene, Rc::new(coarse)));
             return Ok(plan);
         }
         let mut view_of_first = mesh::recall_final(&plan.purpose);
         if view_of_first.is_none() {
-            let built = run::build(session, plan.scene.clone(), interrupt, clock)?;
-            let (meshes, bodies) = (&built.discrete.meshes, built.discrete.bodies.len());
-            let sizes = meshes.as_ref().map(|meshes| sizes::uniform(&**meshes, bodies, FIRST * bodies));
-            options::withdraw(session)?;
-            view_of_first = sizes.map(view);
+            view_of_first = sized(&plan.scene, |meshes, bodies| sizes::uniform(meshes, bodies, FIRST * bodies))?;
         }
         follow(Rc::make_mut(&mut plan.scene), view_of_first);
         Ok(plan)
@@ -145,7 +145,7 @@ impl Plan {
     /// What a checkpoint of this round says of it; none of a coarse mesh that only gives the start.
     pub fn head(&self) -> Option<Head> {
         let sizes = match &self.scene.mesh {
-            MeshSource::Geo { sizes: Some(Sizing::View(view)), .. } => Some(view.to_string()),
+            MeshSource::Geo { sizes: Some(view), .. } => Some(view.to_string()),
             _ => None,
         };
         let rounds = self.rounds.clone();
@@ -206,7 +206,7 @@ impl Plan {
             return Ok(false);
         }
         if error <= goal.error {
-            if let MeshSource::Geo { sizes: Some(Sizing::View(view)), .. } = &self.scene.mesh {
+            if let MeshSource::Geo { sizes: Some(view), .. } = &self.scene.mesh {
                 let kept = if session.rank() == 0 { mesh::keep_final(&self.purpose, view) } else { Ok(()) };
                 agree(session, kept)?;
             }
@@ -238,6 +238,6 @@ fn view(sizes: Sizes) -> String {
 /// Lets the mesh of a scene follow sizes.
 fn follow(scene: &mut Scene, view: Option<String>) {
     if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
-        *sizes = view.map(|view| Sizing::View(view.into()));
+        *sizes = view.map(Into::into);
     }
 }

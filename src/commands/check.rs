@@ -1,5 +1,6 @@
 //! `winkler check`: builds everything, solves nothing, says what is there.
 
+use super::typed::SceneArgs;
 use super::{load, surfaces};
 use crate::contact::{ContactPair, Left};
 use crate::discretize::BodyInfo;
@@ -18,21 +19,24 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::rc::Rc;
 
+/// What the user typed.
+#[derive(clap::Args)]
+pub struct Request {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Folder for pictures of measured surfaces and layers of asperities [default: none are drawn]
+    #[arg(short, value_name = "DIR")]
+    output: Option<PathBuf>,
+}
+
 /// Builds a scene's problem and prints bodies, dofs, surfaces, gaps and the rigid motions left to each body; returns the
 /// exit code. With a folder it draws the measured surfaces and the layers of asperities in it.
 ///
 /// # Errors
 /// Refusals of scene and mesh; pictures that cannot be written.
-pub fn check(
-    session: &Session,
-    interrupt: &Interrupt,
-    path: PathBuf,
-    overrides: Vec<String>,
-    as_json: bool,
-    folder: Option<PathBuf>,
-) -> Result<i32> {
+pub fn check(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let mut clock = Clock::default();
-    let mut scene = load(session, &path, &overrides)?;
+    let mut scene = load(session, &request.scene.scene, &request.scene.overrides())?;
     let settings = scene.settings();
     if scene.method.steps.is_table() {
         Rc::make_mut(&mut scene).method.steps = scene.method.steps.heaviest();
@@ -43,10 +47,10 @@ pub fn check(
     if session.rank() != 0 {
         return Ok(0);
     }
-    if let Some(folder) = folder {
+    if let Some(folder) = &request.output {
         surfaces::draw(&built, &Folder::create(folder)?)?;
     }
-    if as_json {
+    if request.scene.json {
         let mut value = json!(report::headline(session, &built, &shared.solvers, &clock));
         value["settings"] = settings;
         value["status"] = json!("checked");

@@ -1,13 +1,15 @@
 //! The state of a run in a file: what another process, on any number of ranks, needs to go on.
 //!
-//! The file `checkpoint` has a line that names its format, a line of JSON, numbers (little-endian f64), and the SHA-256 of all that.
+//! The file `checkpoint` has a line that names its format, a line of JSON, numbers as `postcard` writes them, and the SHA-256 of all that.
 //! It is replaced as a whole, so that there is always a good one.
 
 use crate::ddm::{Row, Start, State};
 use crate::discretize::Discrete;
 use crate::error::{Error, Kind, Result};
+use crate::file::digest;
 use crate::model::{BodySlot, Distribution, Field, Model};
 use crate::output::{RoundReport, StepReport, write_whole};
+use crate::parallel::share;
 use crate::run::stages::{Begin, Done};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -18,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file in the folder of results.
 pub const FILE: &str = "checkpoint";
 
-const FORMAT: &str = "winkler checkpoint 2";
+const FORMAT: &str = "winkler checkpoint 3";
 
 /// Bytes of the digest at the end.
 const DIGEST: usize = 32;
@@ -36,12 +38,6 @@ pub struct Head {
     pub sizes: Option<String>,
     /// Load steps before this one.
     pub steps: Vec<StepReport>,
-    /// Rows of these steps, and of this one.
-    pub rows: [usize; 2],
-    /// Contact points.
-    pub points: usize,
-    /// Length of the state of each body.
-    pub states: Vec<usize>,
 }
 
 /// A state that was read.
@@ -61,23 +57,18 @@ impl Checkpoint {
     /// The file cannot be written, on the rank that writes it.
     pub fn write(folder: &Path, head: Head, done: &Done, writes: bool) -> Result<()> {
         let (model, Done { built, outcome, steps, earlier, .. }) = (done.model(), done);
-        let (states, all) = gather(model, &outcome.iterate);
+        let states = gather(model, &outcome.iterate);
         if !writes {
             return Ok(());
         }
-        let rows = [earlier.len(), outcome.rows.len()];
-        let (mesh, steps) = (mesh_digest(&built.discrete), steps.clone());
-        let head = Head { mesh, steps, rows, points: model.points(), states, ..head };
-        let json = serde_json::to_string(&head).map_err(|cause| {
-            Error::new(Kind::File, "the checkpoint cannot be written as JSON").because(cause.to_string())
-        })?;
-        let mut bytes = format!("{FORMAT}\n{json}\n").into_bytes();
-        let numbers = earlier.iter().chain(&outcome.rows).flat_map(to_numbers);
-        let numbers =
-            numbers.chain(outcome.layer.compression.iter().chain(&outcome.iterate.trace).chain(&all).copied());
-        numbers.for_each(|number| bytes.extend(number.to_le_bytes()));
-        let digest = Sha256::digest(&bytes);
-        bytes.extend(&digest[..]);
+        let head = Head { mesh: mesh_digest(&built.discrete), steps: steps.clone(), ..head };
+        let failed = |cause: String| Error::new(Kind::File, "the checkpoint cannot be written").because(cause);
+        let json = serde_json::to_string(&head).map_err(|cause| failed(cause.to_string()))?;
+        let numbers = (earlier, &outcome.rows, &outcome.layer.compression, &outcome.iterate.trace, states);
+        let mut bytes = postcard::to_extend(&numbers, format!("{FORMAT}\n{json}\n").into_bytes())
+            .map_err(|cause| failed(cause.to_string()))?;
+        let sum = Sha256::digest(&bytes);
+        bytes.extend(&sum[..]);
         write_whole(&folder.join(FILE), |out| out.write_all(&bytes))
     }
 
@@ -132,8 +123,8 @@ impl Checkpoint {
     }
 }
 
-/// States of all bodies one after another, and their lengths; two messages, and one for each body that is dealt out.
-fn gather(model: &Model, field: &Field) -> (Vec<usize>, Vec<f64>) {
+/// States of all bodies; one message, and one for each body that is dealt out.
+fn gather(model: &Model, field: &Field) -> Vec<Vec<f64>> {
     let whole = |(slot, state): (&BodySlot, &Vec<f64>)| {
         let Some((body, distribution)) = slot.local.as_ref().and_then(|body| Some((body, body.distribution()?))) else {
             return state.clone();
@@ -143,18 +134,12 @@ fn gather(model: &Model, field: &Field) -> (Vec<usize>, Vec<f64>) {
         if body.leads() { all } else { Vec::new() }
     };
     let states: Vec<Vec<f64>> = model.bodies.iter().zip(&field.states).map(whole).collect();
-    let mut lengths: Vec<f64> = states.iter().map(|state| state.len() as f64).collect();
-    model.exchange.sum(&mut lengths);
-    let mut all = vec![0.0; lengths.iter().sum::<f64>() as usize];
-    let mut rest = &mut all[..];
-    for (state, length) in states.iter().zip(&lengths) {
-        let (own, others) = rest.split_at_mut(*length as usize);
-        // empty where the body lives elsewhere
-        own.iter_mut().zip(state).for_each(|(place, number)| *place = *number);
-        rest = others;
-    }
-    model.exchange.sum(&mut all);
-    (lengths.into_iter().map(|length| length as usize).collect(), all)
+    // empty where the body lives elsewhere
+    let fill = |mut all: Vec<Vec<f64>>, other: Vec<Vec<f64>>| {
+        all.iter_mut().zip(other).filter(|(own, _)| own.is_empty()).for_each(|(own, other)| *own = other);
+        all
+    };
+    share(&*model.exchange, &states).into_iter().reduce(fill).unwrap_or_default()
 }
 
 fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
@@ -162,55 +147,9 @@ fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
     let mut lines = text.splitn(3, |&byte| byte == b'\n');
     let is_ours = lines.next()? == FORMAT.as_bytes() && Sha256::digest(text)[..] == *digest;
     let head: Head = serde_json::from_slice(lines.next()?).ok().filter(|_| is_ours)?;
-    let bodies = head.states.len();
-    let (numbers, odd) = lines.next()?.as_chunks::<8>();
-    let mut numbers = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes));
-    let mut take = |count: usize| numbers.by_ref().take(count).collect::<Vec<f64>>();
-    let mut rows = |count: usize| (0..count).map(|_| from_numbers(&take(ROW + bodies))).collect::<Option<Vec<Row>>>();
-    let (earlier, rows) = (rows(head.rows[0])?, rows(head.rows[1])?);
-    let (compression, trace) = (take(head.points), take(2 * head.points));
-    let states = head.states.iter().map(|&length| take(length)).collect();
-    let is_whole = odd.is_empty() && numbers.next().is_none();
+    let (earlier, rows, compression, trace, states) = postcard::from_bytes(lines.next()?).ok()?;
     let state = State { field: Field { states, trace }, compression, rows, memory: None };
-    is_whole.then(|| Checkpoint { path: path.to_owned(), head, earlier, state })
-}
-
-/// Numbers of a row before those of its bodies.
-const ROW: usize = 14;
-
-fn to_numbers(row: &Row) -> Vec<f64> {
-    let counts =
-        [row.step, row.iteration, row.closed, row.points, row.sweeps, row.factorizations, row.inner_iterations];
-    let mut numbers: Vec<f64> = counts.iter().map(|&count| count as f64).collect();
-    numbers.push(f64::from(row.is_bound));
-    numbers.extend([row.residual, row.increment, row.error, row.gamma, row.energy, row.seconds]);
-    numbers.extend(&row.increments);
-    numbers
-}
-
-fn from_numbers(numbers: &[f64]) -> Option<Row> {
-    let (counts, rest) = numbers.split_first_chunk::<8>()?;
-    let [step, iteration, closed, points, sweeps, factorizations, inner_iterations, bound] =
-        counts.map(|count| count as usize);
-    let (&[residual, increment, error, gamma, energy, seconds], increments) = rest.split_first_chunk::<6>()?;
-    let (is_bound, increments) = (bound == 1, increments.to_vec());
-    Some(Row {
-        step,
-        iteration,
-        residual,
-        increment,
-        error,
-        is_bound,
-        increments,
-        gamma,
-        energy,
-        closed,
-        points,
-        sweeps,
-        factorizations,
-        inner_iterations,
-        seconds,
-    })
+    Some(Checkpoint { path: path.to_owned(), head, earlier, state })
 }
 
 /// Digest of what a scene asks for, without what changes neither problem nor method: where its files are, what Gmsh may take, what is written,
@@ -229,25 +168,12 @@ pub fn settings_digest(scene: &Scene) -> String {
     for (_, data) in settings["data"].as_object_mut().into_iter().flatten() {
         data["file"] = Value::Null;
     }
-    let mut digest = Sha256::new().chain_update(settings.to_string());
-    scene.data.values().flat_map(|data| data.numbers()).for_each(|number| digest.update(number.to_le_bytes()));
-    hex(digest)
+    digest(&(settings.to_string(), scene.data.values().flat_map(|data| data.numbers()).collect::<Vec<f64>>()))
 }
 
 /// Digest of the bodies' sizes and of all contact points.
 fn mesh_digest(discrete: &Discrete) -> String {
-    let mut digest = Sha256::new();
-    for body in &discrete.bodies {
-        digest.update(&body.name);
-        [body.nodes, body.cells, body.dofs].iter().for_each(|count| digest.update(count.to_le_bytes()));
-    }
-    for pair in &discrete.model.pairs {
-        let numbers = pair.position.as_flattened().iter().chain(&pair.weight).chain(&pair.gap);
-        numbers.for_each(|number| digest.update(number.to_le_bytes()));
-    }
-    hex(digest)
-}
-
-fn hex(digest: Sha256) -> String {
-    digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    let bodies = discrete.bodies.iter().map(|body| (&body.name, body.nodes, body.cells, body.dofs));
+    let pairs = discrete.model.pairs.iter().map(|pair| (&pair.position, &pair.weight, &pair.gap));
+    digest(&(bodies.collect::<Vec<_>>(), pairs.collect::<Vec<_>>()))
 }

@@ -5,6 +5,7 @@ use crate::ddm::Outcome;
 use crate::discretize::Discrete;
 use crate::output::{Color, ConvergenceSeries, Plot, Series, Style};
 use crate::problem::units::label;
+use crate::report::body::bounds;
 use crate::run::stages::Done;
 use crate::scene::Scene;
 
@@ -40,10 +41,8 @@ pub fn pressure_plot(title: &str, scene: &Scene, pair: &ContactPair, curves: Vec
 
 /// The coordinate along which a pair's points spread most, and its name.
 fn main_axis(pair: &ContactPair) -> (usize, &'static str) {
-    let spread = |k: usize| {
-        let values = pair.position.iter().map(|x| x[k]);
-        values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
-    };
+    let [low, high] = bounds(pair.position.iter());
+    let spread = |k: usize| high[k] - low[k];
     let axis = (0..3).max_by(|&i, &j| spread(i).total_cmp(&spread(j)).then(j.cmp(&i))).unwrap_or(0);
     (axis, ["x", "y", "z"][axis])
 }

@@ -1,5 +1,6 @@
 //! `winkler mesh`: makes the mesh of a scene, or finds it, and says what is in it.
 
+use super::typed::flags;
 use crate::error::{Error, Kind, Result};
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
@@ -14,15 +15,23 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// What the user typed.
+#[derive(clap::Args)]
 pub struct Request {
-    /// Scene file.
-    pub scene: PathBuf,
-    /// Overrides of scene keys.
-    pub overrides: Vec<String>,
-    /// File to write, `.msh` or `.vtu`.
-    pub output: Option<PathBuf>,
-    /// Whether to print JSON.
-    pub json: bool,
+    /// Scene file (TOML)
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+    /// Replace a key of the scene, for example mesh.set.n=64; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Run the mesh's .geo script even if it can start programs or write files
+    #[arg(long)]
+    trust_geo: bool,
+    /// File to write: .msh or .vtu
+    #[arg(short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Print it as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 /// Makes the mesh of a scene or finds it in the cache, prints its bodies and groups with the shape of their cells, and
@@ -32,7 +41,9 @@ pub struct Request {
 /// Refusals of scene and mesh, a body without cells, a file that cannot be written.
 pub fn mesh(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     interrupt.hold();
-    let scene = crate::scene::load(&request.scene, &request.overrides)?;
+    let overrides: Vec<String> =
+        request.overrides.iter().cloned().chain(flags([(request.trust_geo, "--trust-geo")])).collect();
+    let scene = crate::scene::load(&request.scene, &overrides)?;
     match scene.dimension.value {
         2 => show::<2>(&scene, interrupt, request),
         _ => show::<3>(&scene, interrupt, request),
@@ -42,7 +53,7 @@ pub fn mesh(interrupt: &Interrupt, request: &Request) -> Result<i32> {
 fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let began = Instant::now();
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let loaded = crate::mesh::load_unless::<D>(&scene.mesh, order, interrupt)?;
+    let loaded = crate::mesh::load::<D>(&scene.mesh, order, interrupt)?;
     let seconds = began.elapsed().as_secs_f64();
     if let Some(path) = &request.output {
         write(path, &loaded)?;

@@ -16,6 +16,7 @@ mod shown;
 pub mod solve;
 pub mod surfaces;
 pub mod sweep;
+mod typed;
 pub mod write;
 
 use crate::error::Result;
@@ -26,8 +27,11 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 /// Folder of results: `-o`, else what the scene says, else `results/<case>`.
-pub fn folder_of(scene: &Scene, typed: Option<PathBuf>) -> PathBuf {
-    typed.or_else(|| scene.output.dir.clone()).unwrap_or_else(|| PathBuf::from("results").join(case_of(&scene.path)))
+pub fn folder_of(scene: &Scene, typed: Option<&PathBuf>) -> PathBuf {
+    typed
+        .cloned()
+        .or_else(|| scene.output.dir.clone())
+        .unwrap_or_else(|| PathBuf::from("results").join(case_of(&scene.path)))
 }
 
 /// Name of a scene's case: the folder of a file called `scene.toml`, else the file's name.

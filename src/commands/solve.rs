@@ -2,6 +2,7 @@
 
 use super::adapt::Plan;
 use super::checkpoint::{self, Checkpoint};
+use super::typed::{Manner, SceneArgs, flags};
 use super::write::{Writing, to_json};
 use super::{folder_of, load, said, series};
 use crate::ddm::{Observer, Row, Status};
@@ -20,19 +21,38 @@ use crate::run::{self, measure, report};
 use std::path::{Path, PathBuf};
 
 /// What the user typed.
+#[derive(clap::Args)]
 pub struct Request {
-    /// Scene file.
-    pub scene: PathBuf,
-    /// Folder of results, if typed.
-    pub folder: Option<PathBuf>,
-    /// Folder of an earlier run to go on from.
-    pub restart: Option<PathBuf>,
-    /// Overrides of scene keys.
-    pub overrides: Vec<String>,
-    /// Whether to print the report as JSON instead of the table.
-    pub json: bool,
-    /// How much to say.
-    pub verbosity: Verbosity,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Folder for the results [default: output.dir of the scene, else results/CASE]
+    #[arg(short, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Write displacements and stresses of the bodies for ParaView (short for --set output.vtu=true)
+    #[arg(long)]
+    vtu: bool,
+    /// Write displacements, stresses and contact pressures as views for Gmsh (short for --set output.msh=true)
+    #[arg(long)]
+    msh: bool,
+    /// Write a page with pictures and tables of the run, report.html (short for --set output.report=true)
+    #[arg(long)]
+    report: bool,
+    /// Minutes between checkpoints (short for --set output.checkpoint=T)
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
+    checkpoint: Option<String>,
+    /// Go on from the checkpoint in a folder of results
+    #[arg(long, value_name = "DIR")]
+    restart: Option<PathBuf>,
+    #[command(flatten)]
+    manner: Manner,
+}
+
+impl Request {
+    fn overrides(&self) -> Vec<String> {
+        let flags = flags([(self.vtu, "--vtu"), (self.msh, "--msh"), (self.report, "--report")]);
+        let checkpoint = self.checkpoint.iter().map(|minutes| format!("--checkpoint {minutes}"));
+        self.scene.overrides().into_iter().chain(flags).chain(checkpoint).collect()
+    }
 }
 
 /// Solves a scene, writes its results and returns the exit code.
@@ -40,26 +60,27 @@ pub struct Request {
 /// # Errors
 /// Everything that keeps the run from starting, and failures of the file system. Not converging is an exit code, and all
 /// that was computed is written.
-pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Result<i32> {
+pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let first = session.rank() == 0;
-    let is_loud = first && !request.json && request.verbosity != Verbosity::Quiet;
+    let (json, verbosity) = (request.scene.json, request.manner.verbosity());
+    let is_loud = first && !json && verbosity != Verbosity::Quiet;
     let mut clock = said::watched(is_loud);
-    let scene = load(session, &request.scene, &request.overrides)?;
+    let scene = load(session, &request.scene.scene, &request.overrides())?;
     let read = |folder: &PathBuf| Checkpoint::read(folder, &scene);
     let kept = agree(session, request.restart.as_ref().map(read).transpose())?;
-    let folder = agree(session, Folder::create(folder_of(&scene, request.folder)))?;
+    let folder = agree(session, Folder::create(folder_of(&scene, request.output.as_ref())))?;
     let path = folder.path();
     let mut plan = Plan::new(session, scene, kept, interrupt, &mut clock)?;
     // one rank has the clock
     let asking = Asking::new(interrupt, plan.scene.output.checkpoint.filter(|_| first));
-    let mut saved = request.restart.is_some_and(|from| from.canonicalize().ok() == path.canonicalize().ok());
+    let mut saved = request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == path.canonicalize().ok());
     let (done, estimate, failed) = loop {
         let built = run::build(session, plan.scene.clone(), interrupt, &mut clock)?;
         let begin = agree(session, plan.begin(&built))?;
         let ready = run::set_up(session, built, begin, &mut clock)?;
         let all = session.options().all()?;
         let monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
-        if request.verbosity == Verbosity::Verbose {
+        if verbosity == Verbosity::Verbose {
             let decided = said::decisions(session, &ready)?;
             decided.iter().filter(|_| first).for_each(|line| eprintln!("{line}"));
         }
@@ -123,12 +144,12 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
             // nothing is left to go on from; one that is gone already is as well
             let _ = std::fs::remove_file(&file);
         }
-        if request.json {
+        if json {
             say(to_json(&report)?.trim_end())?;
         } else {
             let again = if saved && code > 1 { "; --restart with this folder goes on" } else { "" };
             let results = format!("  results in {}{again}", path.display());
-            say(match request.verbosity {
+            say(match verbosity {
                 Verbosity::Quiet => said::briefly(&report, code, &results),
                 _ => {
                     let solvers: Vec<String> = report.bodies.iter().map(|body| body.solver.clone()).collect();
@@ -189,10 +210,6 @@ impl Observer for Watchers<'_> {
         if let Some(history) = &mut self.history {
             history.row(row);
         }
-    }
-
-    fn note(&mut self, text: &str) {
-        self.table.note(text);
     }
 
     fn asked(&self) -> u8 {

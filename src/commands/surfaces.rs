@@ -18,7 +18,7 @@ fn of_contact(built: &Built, spec: &ContactSpec) -> Vec<Arc<Data>> {
     let mut data: Vec<Arc<Data>> = spec.gap.data().cloned().collect();
     match &spec.layer {
         LayerSpec::Form { values, .. } => data.extend(values.iter().flat_map(|field| field.data().cloned())),
-        LayerSpec::Pressure { law, .. } => data.extend(law.plain().data().cloned()),
+        LayerSpec::Pressure { law, .. } => data.extend(law.data().cloned()),
         LayerSpec::Asperities(spec) => {
             data.extend(spec.data.iter().filter_map(|name| built.scene.data.get(name).cloned()));
         }

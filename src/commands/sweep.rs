@@ -1,5 +1,6 @@
 //! `winkler sweep`: a scene over values of its keys, one row a run.
 
+use super::typed::{Manner, SceneArgs};
 use super::{curves, folder_of, reuse, said};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
@@ -22,19 +23,18 @@ use std::path::PathBuf;
 use std::rc::Rc;
 
 /// What the user typed.
+#[derive(clap::Args)]
 pub struct Request {
-    /// Scene file.
-    pub scene: PathBuf,
-    /// Folder of results, if typed.
-    pub folder: Option<PathBuf>,
-    /// Overrides of scene keys for every run.
-    pub overrides: Vec<String>,
-    /// `KEY=V1,V2,...`; several make all combinations, the last one fastest.
-    pub over: Vec<String>,
-    /// Whether to print the reports as a JSON list.
-    pub json: bool,
-    /// How much to say.
-    pub verbosity: Verbosity,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Folder for the results [default: output.dir of the scene, else results/CASE]
+    #[arg(short, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Key and its values, for example method.gamma=0.3,0.6; may be repeated
+    #[arg(long, value_name = "KEY=V1,V2,...", required = true)]
+    over: Vec<String>,
+    #[command(flatten)]
+    manner: Manner,
 }
 
 /// Runs a scene for every combination of values and writes `sweep.csv`, `convergence.svg` and `pressure.svg`; returns the
@@ -42,16 +42,16 @@ pub struct Request {
 ///
 /// # Errors
 /// Refusals of any scene of the sweep, before the first run; failures of the file system.
-pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Result<i32> {
+pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let axes = agree(session, request.over.iter().map(|text| axis(text)).collect::<Result<Vec<_>>>())?;
     let runs = combinations(&axes);
     let load = |values: &[String]| {
-        let mut overrides = request.overrides.clone();
+        let mut overrides = request.scene.overrides();
         overrides.extend(values.iter().zip(&axes).map(|(value, (key, _))| format!("--over {key}={value}")));
-        crate::scene::load(&request.scene, &overrides).map(Rc::new)
+        crate::scene::load(&request.scene.scene, &overrides).map(Rc::new)
     };
     let scenes = agree(session, runs.iter().map(|values| load(values)).collect::<Result<Vec<_>>>())?;
-    let folder = agree(session, Folder::create(folder_of(&scenes[0], request.folder.clone())))?;
+    let folder = agree(session, Folder::create(folder_of(&scenes[0], request.output.as_ref())))?;
     let first = session.rank() == 0;
     let (mut table, mut columns) = (None, None);
     let mut exit = 0;
@@ -60,7 +60,8 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
     let mut shown = None;
     let mut before = None;
     let mut watched = Watched(Asking::new(interrupt, None));
-    let is_loud = first && !request.json && request.verbosity != Verbosity::Quiet;
+    let (json, verbosity) = (request.scene.json, request.manner.verbosity());
+    let is_loud = first && !json && verbosity != Verbosity::Quiet;
     let bar = progress::runs(runs.len(), is_loud);
     for (scene, values) in scenes.iter().zip(&runs) {
         let mut clock = Clock::default();
@@ -69,7 +70,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         let header = header(&axes, &built);
         agree(session, same(columns.get_or_insert_with(|| header.clone()), &header, &label(&axes, values)))?;
         let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
-        if request.verbosity == Verbosity::Verbose {
+        if verbosity == Verbosity::Verbose {
             let decided = said::decisions(session, &ready)?;
             bar.suspend(|| decided.iter().filter(|_| first).for_each(|line| eprintln!("{line}")));
         }
@@ -94,7 +95,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         table.check()?;
         bar.inc(1);
         // with `-q` runs that are solved say nothing
-        if is_loud || (!request.json && report::exit_code(&done) != 0) {
+        if is_loud || (!json && report::exit_code(&done) != 0) {
             let (status, iterations) = (&report.status, report.iterations);
             let residual = sci(report.residual.unwrap_or(f64::NAN), 2);
             bar.suspend(|| say(format_args!("{label}: {status}, {iterations} iterations, residual {residual}")))?;
@@ -120,7 +121,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: Request) -> Resu
         if scenes[0].output.plots {
             plots(&folder, &scenes[0].title, &histories, pressures, reference)?;
         }
-        if request.json {
+        if json {
             let list = serde_json::to_string_pretty(&reports).map_err(|cause| {
                 Error::new(Kind::File, "the reports cannot be written as JSON").because(cause.to_string())
             })?;

@@ -2,9 +2,10 @@
 
 use super::grid::{Axis, Grid};
 use super::knots::Knots;
-use super::rows::{Fault, Rows};
+use super::rows::Rows;
 use super::rule::{DataSpec, Interpolation, Outside};
 use super::scattered::Scattered;
+use crate::error::Result;
 
 /// A function of a place.
 #[derive(Debug, Clone)]
@@ -22,13 +23,13 @@ pub enum Shape {
 const ROUNDED: f64 = 1e-2;
 
 /// Arranges the numbers of a file.
-pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Shape, Fault> {
+pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Shape> {
     match (spec.points, rows.columns) {
-        _ if rows.values.is_empty() => Err(Fault::new("has no numbers", "write heights in rows")),
+        _ if rows.values.is_empty() => Err(spec.refuse("has no numbers", "write heights in rows")),
         (false, _) => matrix(spec, rows),
         (true, 2) => profile(spec, &rows),
         (true, 3) => surface(spec, &rows),
-        (true, columns) => Err(Fault::new(
+        (true, columns) => Err(spec.refuse(
             format!("has {columns} numbers in a row"),
             "a point is x and a height, or x, y and a height; for heights in rows and columns leave `points` away",
         )),
@@ -36,34 +37,34 @@ pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Shape, Fault> {
 }
 
 /// Heights in rows and columns; a single row or column is a profile.
-fn matrix(spec: &DataSpec, rows: Rows) -> Result<Shape, Fault> {
+fn matrix(spec: &DataSpec, rows: Rows) -> Result<Shape> {
     let mut counts = [rows.columns, rows.count()];
     if counts[0] == 1 {
         counts.swap(0, 1);
     }
     if counts[0] < 2 {
-        return Err(Fault::new("has one number", "two points or more make a function"));
+        return Err(spec.refuse("has one number", "two points or more make a function"));
     }
     let values = rows.values.iter().map(|value| spec.unit * value).collect();
     let axes = [0, 1].map(|d| Axis { origin: spec.origin[d], spacing: spec.spacing[d], count: counts[d] });
     grid(spec, axes, values)
 }
 
-fn grid(spec: &DataSpec, axes: [Axis; 2], values: Vec<f64>) -> Result<Shape, Fault> {
+fn grid(spec: &DataSpec, axes: [Axis; 2], values: Vec<f64>) -> Result<Shape> {
     let thin = |axis: &Axis| axis.count != 1 && axis.count < 3;
     if spec.interpolation == Interpolation::Cubic && axes.iter().any(thin) {
-        return Err(Fault::new("has two points in a direction", "cubic interpolation needs three: take \"linear\""));
+        return Err(spec.refuse("has two points in a direction", "cubic interpolation needs three: take \"linear\""));
     }
     Ok(Shape::Grid(Grid { axes, values, interpolation: spec.interpolation, outside: spec.outside }))
 }
 
 /// Points (x, height) in any order.
-fn profile(spec: &DataSpec, rows: &Rows) -> Result<Shape, Fault> {
+fn profile(spec: &DataSpec, rows: &Rows) -> Result<Shape> {
     let points = rows.values.chunks_exact(2).map(|point| placed(spec, [point[0], 0.0], point[1]));
     let points: Vec<[f64; 3]> = points.collect();
-    refuse_twins(&points, rows)?;
+    refuse_twins(spec, &points, rows)?;
     if points.len() < 2 {
-        return Err(Fault::new("has one point", "two points or more make a function"));
+        return Err(spec.refuse("has one point", "two points or more make a function"));
     }
     if let Some(axis) = regular(points.iter().map(|point| point[0])).filter(|axis| axis.count == points.len()) {
         let mut values = vec![0.0; axis.count];
@@ -77,10 +78,10 @@ fn profile(spec: &DataSpec, rows: &Rows) -> Result<Shape, Fault> {
 }
 
 /// Points (x, y, height) in any order.
-fn surface(spec: &DataSpec, rows: &Rows) -> Result<Shape, Fault> {
+fn surface(spec: &DataSpec, rows: &Rows) -> Result<Shape> {
     let points = rows.values.chunks_exact(3).map(|point| placed(spec, [point[0], point[1]], point[2]));
     let points: Vec<[f64; 3]> = points.collect();
-    refuse_twins(&points, rows)?;
+    refuse_twins(spec, &points, rows)?;
     let axes = [0, 1].map(|d| regular(points.iter().map(|point| point[d])));
     if let [Some(across), Some(down)] = axes
         && across.count.checked_mul(down.count) == Some(points.len())
@@ -101,7 +102,7 @@ fn surface(spec: &DataSpec, rows: &Rows) -> Result<Shape, Fault> {
     });
     match Scattered::new(&points) {
         Some(scattered) => Ok(Shape::Scattered(scattered, range)),
-        None => Err(Fault::new("has points on one line alone", "a surface needs three points that make a triangle")),
+        None => Err(spec.refuse("has points on one line alone", "a surface needs three points that make a triangle")),
     }
 }
 
@@ -112,19 +113,19 @@ fn placed(spec: &DataSpec, place: [f64; 2], height: f64) -> [f64; 3] {
 }
 
 /// What only a regular grid has.
-fn only_linear(spec: &DataSpec) -> Result<(), Fault> {
+fn only_linear(spec: &DataSpec) -> Result<()> {
     const HELP: &str = "scattered points have interpolate = \"linear\" and outside = \"clamp\" or \"error\"; or resample them on a grid";
     match (spec.interpolation, spec.outside) {
         (Interpolation::Cubic, _) => {
-            Err(Fault::new("has points that are on no regular grid: no cubic interpolation", HELP))
+            Err(spec.refuse("has points that are on no regular grid: no cubic interpolation", HELP))
         }
-        (_, Outside::Periodic) => Err(Fault::new("has points that are on no regular grid: no period", HELP)),
+        (_, Outside::Periodic) => Err(spec.refuse("has points that are on no regular grid: no period", HELP)),
         _ => Ok(()),
     }
 }
 
 /// Two points at one place have no height there.
-fn refuse_twins(points: &[[f64; 3]], rows: &Rows) -> Result<(), Fault> {
+fn refuse_twins(spec: &DataSpec, points: &[[f64; 3]], rows: &Rows) -> Result<()> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     let compare = |&a: &usize, &b: &usize| {
         let (a, b) = (points[a], points[b]);
@@ -136,7 +137,7 @@ fn refuse_twins(points: &[[f64; 3]], rows: &Rows) -> Result<(), Fault> {
         Some(two) => {
             let (first, second) = (two[0].min(two[1]), two[0].max(two[1]));
             let what = format!("{} is at the place of {}", rows.line(second), rows.line(first));
-            Err(Fault::new(what, "every point needs a place of its own"))
+            Err(spec.refuse(what, "every point needs a place of its own"))
         }
     }
 }

@@ -33,12 +33,7 @@ impl Data {
         if self.shape.get().is_some() {
             return Ok(());
         }
-        let DataSpec { name, file, place, .. } = &self.spec;
-        let rows = read::rows(file).map_err(|error| error.at(place))?;
-        let shape = rows.and_then(|rows| arrange::shape(&self.spec, rows)).map_err(|fault| {
-            let error = Error::scene(place, format!("data `{name}`: {} {}", file.display(), fault.what));
-            if fault.help.is_empty() { error } else { error.help(fault.help) }
-        })?;
+        let shape = arrange::shape(&self.spec, read::rows(&self.spec)?)?;
         self.shape.get_or_init(|| shape);
         Ok(())
     }

@@ -1,6 +1,8 @@
 //! Arrays of NumPy: `.npy`.
 
-use super::rows::{Fault, Rows};
+use super::rows::Rows;
+use super::rule::DataSpec;
+use crate::error::Result;
 use npyz::{DType, Deserialize, NpyFile, NpyHeader, Order, TypeChar};
 
 const HELP: &str = "save the heights as they come from NumPy: np.save(\"surface.npy\", heights)";
@@ -11,23 +13,23 @@ pub fn is_ours(bytes: &[u8]) -> bool {
 }
 
 /// An array of one direction, which becomes a column, or two.
-pub fn rows(bytes: &[u8]) -> Result<Rows, Fault> {
-    let damaged = |cause: std::io::Error| Fault::new(format!("is no file of NumPy: {cause}"), HELP);
+pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
+    let damaged = |cause: std::io::Error| spec.refuse(format_args!("is no file of NumPy: {cause}"), HELP);
     let mut rest = bytes;
     let file = NpyHeader::from_reader(&mut rest).map_err(damaged)?;
     let shape: Vec<usize> = file.shape().iter().map(|&length| length as usize).collect();
     let (count, columns) = match shape[..] {
         [count] => (count, 1),
         [count, columns] => (count, columns),
-        _ => return Err(Fault::new(format!("has an array of {} directions", shape.len()), "one or two are needed")),
+        _ => return Err(spec.refuse(format!("has an array of {} directions", shape.len()), "one or two are needed")),
     };
     let DType::Plain(kind) = file.dtype() else {
-        return Err(Fault::new("has records, not numbers", HELP));
+        return Err(spec.refuse("has records, not numbers", HELP));
     };
     // also a header that is wrong must not ask for memory
     let size = kind.num_bytes().unwrap_or(1).max(1);
     if count.checked_mul(columns).and_then(|all| all.checked_mul(size)).is_none_or(|all| all > rest.len()) {
-        return Err(Fault::new(format!("ends before its {count} x {columns} numbers"), "copy it once more"));
+        return Err(spec.refuse(format!("ends before its {count} x {columns} numbers"), "copy it once more"));
     }
     let order = file.order();
     let kind = kind.clone();
@@ -41,7 +43,7 @@ pub fn rows(bytes: &[u8]) -> Result<Rows, Fault> {
         (TypeChar::Uint, 1) => numbers::<u8>(file),
         (TypeChar::Uint, 2) => numbers::<u16>(file),
         (TypeChar::Uint, 4) => numbers::<u32>(file),
-        _ => return Err(Fault::new(format!("has numbers of the kind {kind}"), "convert them: heights.astype(\"f8\")")),
+        _ => return Err(spec.refuse(format!("has numbers of the kind {kind}"), "convert them: heights.astype(\"f8\")")),
     };
     let values = values.map_err(damaged)?;
     let values = match order {

@@ -1,6 +1,7 @@
 //! What is asked of data, and what comes back.
 
-use crate::error::Place;
+use crate::error::{Error, Place};
+use std::fmt::Display;
 use std::path::PathBuf;
 
 /// How values between the points are found.
@@ -69,4 +70,12 @@ pub struct DataSpec {
     pub interpolation: Interpolation,
     /// What is beyond them.
     pub outside: Outside,
+}
+
+impl DataSpec {
+    /// The refusal of its file: `what` continues "data `name`: file", `help` is the way out.
+    pub(super) fn refuse(&self, what: impl Display, help: &str) -> Error {
+        let Self { name, file, place, .. } = self;
+        Error::scene(place, format!("data `{name}`: {} {what}", file.display())).help(help)
+    }
 }

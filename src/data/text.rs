@@ -4,13 +4,15 @@
 //! alone: the first line). With the first two a decimal comma is read, too. Lines that begin with `#`, and lines before the first number,
 //! are skipped.
 
-use super::rows::{Fault, Rows};
+use super::rows::Rows;
+use super::rule::DataSpec;
+use crate::error::Result;
 
 /// Reads a text.
-pub fn rows(bytes: &[u8]) -> Result<Rows, Fault> {
+pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     if bytes.contains(&0) {
-        return Err(Fault::new("is neither text nor a file of NumPy", "export the heights as CSV or text in UTF-8"));
+        return Err(spec.refuse("is neither text nor a file of NumPy", "export the heights as CSV or text in UTF-8"));
     }
     let is_row = |line: &&[u8]| !line.is_empty() && !line.starts_with(b"#");
     let is_end = |byte: &u8| *byte == b'\n';
@@ -37,7 +39,7 @@ pub fn rows(bytes: &[u8]) -> Result<Rows, Fault> {
                     true => format!("line {line} lacks a number between two separators"),
                     false => format!("line {line}: `{}` is not a number", String::from_utf8_lossy(field)),
                 };
-                Fault::new(what, "lines that are no data begin with #; decimal commas need fields parted by ; or tabs")
+                spec.refuse(what, "lines that are no data begin with #; decimal commas need fields parted by ; or tabs")
             })?;
             rows.values.push(value);
         }
@@ -47,7 +49,7 @@ pub fn rows(bytes: &[u8]) -> Result<Rows, Fault> {
         }
         if found != rows.columns {
             let what = format!("line {line} has {found} numbers, lines before it {}", rows.columns);
-            return Err(Fault::new(what, "every row needs as many"));
+            return Err(spec.refuse(what, "every row needs as many"));
         }
         rows.lines.push(line);
     }

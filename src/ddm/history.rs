@@ -1,7 +1,9 @@
 //! The history of a run: one row per iteration, shown to an observer while it runs.
 
+use serde::{Deserialize, Serialize};
+
 /// One row of the iteration history: iterate u^k and the step that leads on from it.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Load step, from 1 on; 0 where there are none.
     pub step: usize,
@@ -47,8 +49,6 @@ pub trait Observer {
     fn asked(&self) -> u8 {
         0
     }
-    /// Something worth a line of its own (a warning, a change of method).
-    fn note(&mut self, _text: &str) {}
 }
 
 /// Nobody watches.

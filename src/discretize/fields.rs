@@ -45,17 +45,17 @@ pub fn error_maker<const D: usize>(
 ) -> Result<Option<ErrorMaker>> {
     let Some(exact) = spec.exact.clone() else { return Ok(None) };
     for (component, &x) in exact.iter().flat_map(|u| space.nodes.iter().map(move |x| (u, x))) {
-        let value = component.plain().eval(&x);
+        let value = component.eval(&x);
         if !value.is_finite() {
             let message = format!("the known displacement is {value} at {}", point(contact::pad(x)));
-            return Err(Error::scene(component.plain().place(), message)
+            return Err(Error::scene(component.place(), message)
                 .help("mind roots of negative numbers and divisions by zero in the expression"));
         }
     }
     let (space, elasticity) = (space.clone(), elasticity.clone());
     Ok(Some(Box::new(move |u| {
         let at = |x: [f64; D]| norms::Known {
-            value: std::array::from_fn(|i| exact[i].plain().eval(&x)),
+            value: std::array::from_fn(|i| exact[i].eval(&x)),
             gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, &x).1)),
         };
         let [error, whole] = norms::error(&space, &elasticity, u, &at);

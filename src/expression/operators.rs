@@ -1,54 +1,101 @@
-//! The operators and functions of expressions, on plain `f64`.
+//! The operators and functions of expressions, each with its derivatives.
 //!
 //! Truth is a number: comparisons give 1 or 0, and a number > 0 is true. Nothing hides a NaN, so that a value
 //! outside the domain of a function can be refused where it is used.
 
-use super::program::Number;
-use crate::data::Data;
+/// A sign or a function of one value.
+#[derive(Debug)]
+pub(super) struct Unary {
+    /// How it is written.
+    pub name: &'static str,
+    /// What it makes of a value.
+    pub value: fn(f64) -> f64,
+    /// Its derivative, by the value put in and that which came out; none of what is constant between its jumps.
+    pub slope: Option<fn(f64, f64) -> f64>,
+}
 
-type Unary = fn(f64) -> f64;
-type Binary = fn(f64, f64) -> f64;
+/// An operator or a function of two values.
+#[derive(Debug)]
+pub(super) struct Binary {
+    /// How it is written.
+    pub name: &'static str,
+    /// What it makes of them.
+    pub kind: Two,
+}
 
-/// Functions of one value, by name.
-pub(super) const UNARY: &[(&str, Unary)] = &[
-    ("abs", f64::abs),
-    ("acos", f64::acos),
-    ("asin", f64::asin),
-    ("atan", f64::atan),
-    ("ceil", f64::ceil),
-    ("cos", f64::cos),
-    ("cosh", f64::cosh),
-    ("exp", f64::exp),
-    ("floor", f64::floor),
-    ("log", f64::ln),
-    ("log10", f64::log10),
-    ("sign", sign),
-    ("sin", f64::sin),
-    ("sinh", f64::sinh),
-    ("sqrt", f64::sqrt),
-    ("tan", f64::tan),
-    ("tanh", f64::tanh),
+/// What is made of two values.
+#[derive(Debug)]
+pub(super) enum Two {
+    /// A number, with its derivatives by both, by the values put in and that which came out.
+    Smooth(fn(f64, f64) -> f64, fn(f64, f64, f64) -> [f64; 2]),
+    /// A truth.
+    Truth(fn(f64, f64) -> f64),
+    /// The first, if this is so, or the second.
+    Pick(fn(f64, f64) -> bool),
+}
+
+const fn smooth(name: &'static str, value: fn(f64) -> f64, slope: fn(f64, f64) -> f64) -> Unary {
+    Unary { name, value, slope: Some(slope) }
+}
+
+const fn steps(name: &'static str, value: fn(f64) -> f64) -> Unary {
+    Unary { name, value, slope: None }
+}
+
+/// Functions of one value.
+pub(super) static UNARY: [Unary; 17] = [
+    smooth("abs", f64::abs, |a, _| a.signum()),
+    smooth("acos", f64::acos, |a, _| -1.0 / (1.0 - a * a).sqrt()),
+    smooth("asin", f64::asin, |a, _| 1.0 / (1.0 - a * a).sqrt()),
+    smooth("atan", f64::atan, |a, _| 1.0 / (1.0 + a * a)),
+    steps("ceil", f64::ceil),
+    smooth("cos", f64::cos, |a, _| -a.sin()),
+    smooth("cosh", f64::cosh, |a, _| a.sinh()),
+    smooth("exp", f64::exp, |_, value| value),
+    steps("floor", f64::floor),
+    smooth("log", f64::ln, |a, _| 1.0 / a),
+    smooth("log10", f64::log10, |a, _| 1.0 / (a * std::f64::consts::LN_10)),
+    // 0 for 0
+    steps("sign", |a| if a == 0.0 { 0.0 } else { a.signum() }),
+    smooth("sin", f64::sin, |a, _| a.cos()),
+    smooth("sinh", f64::sinh, |a, _| a.cosh()),
+    smooth("sqrt", f64::sqrt, |_, value| 0.5 / value),
+    smooth("tan", f64::tan, |_, value| 1.0 + value * value),
+    smooth("tanh", f64::tanh, |_, value| 1.0 - value * value),
 ];
 
-/// Functions of two values, by name; `min` and `max` take more, one after the other.
-pub(super) const BINARY: &[(&str, Binary)] = &[("atan2", f64::atan2), ("max", max), ("min", min)];
+/// Signs.
+pub(super) static SIGNS: [Unary; 2] = [smooth("-", |a| -a, |_, _| -1.0), steps("!", |a| compare(a, a, a <= 0.0))];
 
-/// Binary operators: symbol, binding power (higher binds tighter), value.
-pub(super) const INFIX: &[(&str, u8, Binary)] = &[
-    ("||", 1, or),
-    ("&&", 2, and),
-    ("==", COMPARISON, |a, b| compare(a, b, a == b)),
-    ("!=", COMPARISON, |a, b| compare(a, b, a != b)),
-    ("<=", COMPARISON, |a, b| compare(a, b, a <= b)),
-    (">=", COMPARISON, |a, b| compare(a, b, a >= b)),
-    ("<", COMPARISON, |a, b| compare(a, b, a < b)),
-    (">", COMPARISON, |a, b| compare(a, b, a > b)),
-    ("+", 4, |a, b| a + b),
-    ("-", 4, |a, b| a - b),
-    ("*", 5, |a, b| a * b),
-    ("/", 5, |a, b| a / b),
-    ("^", POWER, f64::powf),
+/// Functions of two values; `min` and `max` take more, one after the other, and unlike those of `f64` they keep a NaN.
+pub(super) static BINARY: [Binary; 3] = [
+    two("atan2", Two::Smooth(f64::atan2, |a, b, _| [b, -a].map(|x| x / (a * a + b * b)))),
+    two("max", Two::Pick(|a, b| a.is_nan() || a > b)),
+    two("min", Two::Pick(|a, b| a.is_nan() || a < b)),
 ];
+
+/// Operators with their binding powers: higher binds tighter.
+pub(super) static INFIX: [(u8, Binary); 13] = [
+    // true if one side is, whatever the other
+    (1, two("||", Two::Truth(|a, b| if a > 0.0 || b > 0.0 { 1.0 } else { compare(a, b, false) }))),
+    // false if one side is, whatever the other: `x > 0 && log(x) > 1` is defined for all x
+    (2, two("&&", Two::Truth(|a, b| if a <= 0.0 || b <= 0.0 { 0.0 } else { compare(a, b, true) }))),
+    (COMPARISON, two("==", Two::Truth(|a, b| compare(a, b, a == b)))),
+    (COMPARISON, two("!=", Two::Truth(|a, b| compare(a, b, a != b)))),
+    (COMPARISON, two("<=", Two::Truth(|a, b| compare(a, b, a <= b)))),
+    (COMPARISON, two(">=", Two::Truth(|a, b| compare(a, b, a >= b)))),
+    (COMPARISON, two("<", Two::Truth(|a, b| compare(a, b, a < b)))),
+    (COMPARISON, two(">", Two::Truth(|a, b| compare(a, b, a > b)))),
+    (4, two("+", Two::Smooth(|a, b| a + b, |_, _, _| [1.0, 1.0]))),
+    (4, two("-", Two::Smooth(|a, b| a - b, |_, _, _| [1.0, -1.0]))),
+    (5, two("*", Two::Smooth(|a, b| a * b, |a, b, _| [b, a]))),
+    (5, two("/", Two::Smooth(|a, b| a / b, |_, b, value| [1.0 / b, -value / b]))),
+    (POWER, two("^", Two::Smooth(f64::powf, |a, b, value| [b * a.powf(b - 1.0), value * a.ln()]))),
+];
+
+const fn two(name: &'static str, kind: Two) -> Binary {
+    Binary { name, kind }
+}
 
 /// Binding power of comparisons, which do not chain.
 pub(super) const COMPARISON: u8 = 3;
@@ -57,81 +104,11 @@ pub(super) const SIGN: u8 = 6;
 /// Binding power of `^`, which groups to the right.
 pub(super) const POWER: u8 = 7;
 
-/// Signs: what they make of a value.
-const SIGNS: [(&str, Unary); 2] = [("-", |a| -a), ("!", not)];
-
-/// The sign or function of one value that has a name.
-pub(super) fn unary(name: &str) -> Option<Unary> {
-    UNARY.iter().chain(&SIGNS).find(|(known, _)| *known == name).map(|(_, apply)| *apply)
-}
-
-/// The operator or function of two values that has a name.
-pub(super) fn binary(name: &str) -> Option<Binary> {
-    let infix = INFIX.iter().map(|(symbol, _, apply)| (symbol, apply));
-    BINARY
-        .iter()
-        .map(|(known, apply)| (known, apply))
-        .chain(infix)
-        .find(|(known, _)| **known == name)
-        .map(|found| *found.1)
-}
-
 /// Names of the functions.
 pub(super) fn functions() -> impl Iterator<Item = &'static str> {
-    UNARY.iter().map(|(name, _)| *name).chain(BINARY.iter().map(|(name, _)| *name))
+    UNARY.iter().map(|function| function.name).chain(BINARY.iter().map(|function| function.name))
 }
 
-impl Number for f64 {
-    fn constant(value: f64) -> Self {
-        value
-    }
-
-    fn unary(name: &str) -> Option<Unary> {
-        unary(name)
-    }
-
-    fn binary(name: &str) -> Option<Binary> {
-        binary(name)
-    }
-
-    fn data(data: &Data, place: &[f64]) -> f64 {
-        data.sample(place).value
-    }
-}
-
-fn number(truth: bool) -> f64 {
-    if truth { 1.0 } else { 0.0 }
-}
-
-pub(super) fn compare(a: f64, b: f64, truth: bool) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { number(truth) }
-}
-
-/// False if one side is, whatever the other: `x > 0 && log(x) > 1` is defined for all x.
-pub(super) fn and(a: f64, b: f64) -> f64 {
-    if a <= 0.0 || b <= 0.0 { 0.0 } else { compare(a, b, true) }
-}
-
-/// True if one side is, whatever the other.
-pub(super) fn or(a: f64, b: f64) -> f64 {
-    if a > 0.0 || b > 0.0 { 1.0 } else { compare(a, b, false) }
-}
-
-pub(super) fn not(a: f64) -> f64 {
-    compare(a, a, a <= 0.0)
-}
-
-/// Sign of a number, 0 for 0.
-pub(super) fn sign(a: f64) -> f64 {
-    if a == 0.0 { 0.0 } else { a.signum() }
-}
-
-/// Larger of two numbers; unlike `f64::max` it keeps a NaN.
-pub(super) fn max(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
-}
-
-/// Smaller of two numbers; unlike `f64::min` it keeps a NaN.
-pub(super) fn min(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a < b { a } else { b }
+fn compare(a: f64, b: f64, truth: bool) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { f64::from(u8::from(truth)) }
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::data::{DataSpec, Interpolation, Outside};
 use crate::error::Source;
 
 const VARIABLES: &[&str] = &["x", "y", "z", "k"];
@@ -222,4 +223,91 @@ fn fields_without_variables_are_constants() {
     assert_eq!(error.message(), "unknown variable `z`");
     let error = Field::parse("x*k", &place("x*k"), 3, false, &Library::new()).expect_err("k in a gap");
     assert_eq!(error.message(), "unknown variable `k`");
+}
+
+/// A law of c and x.
+fn law(text: &str) -> Expression {
+    Expression::parse(text, &place(text), Scope::of(&["c", "x"])).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn derivatives_agree_with_differences() {
+    let functions = operators::UNARY.iter().map(|function| function.name).map(|name| format!("{name}(0.3*c*x) + c"));
+    let others = [
+        "3*c^2.5 + x*c",
+        "2^c/(1 + c^x)",
+        "max(c, x) - min(c, 2*x, 1) + max(-c, -2)",
+        "atan2(c, x) + atan2(x, c)",
+        "c*(c > x) + !(c >= x)*c^2 + (c < x || c != 1 && x <= 2)*c",
+        "-c^2 - -c/x - (c == 3)",
+        "(1 - c)^2",
+    ];
+    for text in functions.chain(others.map(String::from)) {
+        let law = law(&text);
+        for (c, x) in [(0.7, 1.1), (1.3, 0.6), (1e-3, 0.9)] {
+            let h = 1e-6 * c;
+            let (value, slope) = law.eval_by(0, &[c, x]);
+            let [low, high] = [c - h, c + h].map(|c| law.eval(&[c, x]));
+            assert!((value - law.eval(&[c, x])).abs() <= 1e-15 * value.abs(), "{text}");
+            let difference = (high - low) / (2.0 * h);
+            assert!(
+                (slope - difference).abs() < 1e-7 * (1.0 + slope.abs()) + 1e-9 / c,
+                "{text} at {c}, {x}: {slope} {difference}"
+            );
+        }
+    }
+}
+
+/// Of data by the chain rule, whatever their places depend on.
+#[test]
+fn derivatives_of_data_agree_with_differences() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("heights.csv");
+    std::fs::write(&file, "1,3,2,7\n4,1,5,2\n0,2,6,3\n1,1,4,8\n").unwrap();
+    let source = Source { name: "scene.toml".into(), text: "\"f(c*x, 1 + x - 0.5*c)^2 + c*f(1, c)\"".into() };
+    let place = Place { span: 0..source.text.len(), source: Arc::new(source) };
+    let spec = DataSpec {
+        name: "f".into(),
+        file,
+        place: place.clone(),
+        points: false,
+        origin: [0.0; 2],
+        spacing: [0.5, 0.8],
+        unit: 1.0,
+        interpolation: Interpolation::Cubic,
+        outside: Outside::Error,
+    };
+    let library = Library::from([("f".to_owned(), Arc::new(Data::new(spec)))]);
+    let text = "f(c*x, 1 + x - 0.5*c)^2 + c*f(1, c)";
+    let law = Expression::parse(text, &place, Scope { variables: &["c", "x"], data: &library }).unwrap();
+    for values in [[0.7, 1.1], [1.2, 0.3]] {
+        for variable in 0..2 {
+            let (value, slope) = law.eval_by(variable, &values);
+            let h = 1e-6;
+            let [low, high] = [-h, h].map(|h| {
+                let mut moved = values;
+                moved[variable] += h;
+                law.eval(&moved)
+            });
+            assert_eq!(value, law.eval(&values));
+            assert!((slope - (high - low) / (2.0 * h)).abs() < 1e-7 * (1.0 + slope.abs()), "{values:?}: {slope}");
+        }
+    }
+}
+
+#[test]
+fn derivatives_do_not_hide_nan() {
+    for text in ["max(c, log(-1))", "max(log(-1), c)", "min(c, log(-1))", "min(log(-1), c)", "max(0, sqrt(-c))"] {
+        assert!(law(text).eval_by(0, &[1.0, 1.0]).0.is_nan(), "{text}");
+    }
+}
+
+#[test]
+fn slopes_at_zero_are_those_of_the_formula() {
+    assert_eq!(law("c^2").eval_by(0, &[0.0, 0.0]), (0.0, 0.0));
+    assert_eq!(law("(x - 2)^2*c").eval_by(0, &[0.0, 1.0]).1, 1.0);
+    assert_eq!(law("(x - 2)^2*c").eval_by(1, &[3.0, 1.0]).1, -6.0);
+    assert_eq!(law("1e5*c + c^1.5").eval_by(0, &[0.0, 0.0]), (0.0, 1e5));
+    assert_eq!(law("sqrt(c)").eval_by(0, &[0.0, 0.0]).1, f64::INFINITY);
+    assert!(law("log(c)").eval_by(0, &[-1.0, 0.0]).0.is_nan());
 }

@@ -1,7 +1,8 @@
 //! Words of an expression.
 
 use super::operators::INFIX;
-use super::slip::Slip;
+use super::text::Text;
+use crate::error::Result;
 use std::ops::Range;
 
 /// One word of an expression.
@@ -15,7 +16,8 @@ pub(super) enum Token<'a> {
 }
 
 /// The word at or after `start`, and where it stands.
-pub(super) fn next(text: &str, start: usize) -> Result<(Token<'_>, Range<usize>), Slip> {
+pub(super) fn next<'a>(whole: &Text<'a>, start: usize) -> Result<(Token<'a>, Range<usize>)> {
+    let text = whole.text;
     let start = text.len() - text[start..].trim_start().len();
     let rest = &text[start..];
     let Some(first) = rest.chars().next() else {
@@ -25,27 +27,27 @@ pub(super) fn next(text: &str, start: usize) -> Result<(Token<'_>, Range<usize>)
         let span = start..start + number_length(rest);
         return match text[span.clone()].parse::<f64>() {
             Ok(value) if value.is_finite() => Ok((Token::Number(value), span)),
-            Ok(_) => Err(Slip::new(span, "the number is too large")),
-            Err(_) => Err(Slip::new(span, "not a number").help("write numbers like 2, 0.5 or 1e-3")),
+            Ok(_) => Err(whole.refuse(span, "the number is too large")),
+            Err(_) => Err(whole.refuse(span, "not a number").help("write numbers like 2, 0.5 or 1e-3")),
         };
     }
     if first.is_alphabetic() || first == '_' {
         let length = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
         return Ok((Token::Name(&rest[..length]), start..start + length));
     }
-    let symbols = INFIX.iter().map(|(symbol, ..)| *symbol).chain(["(", ")", ",", "!"]);
+    let symbols = INFIX.iter().map(|(_, operator)| operator.name).chain(["(", ")", ",", "!"]);
     match symbols.filter(|symbol| rest.starts_with(symbol)).max_by_key(|symbol| symbol.len()) {
         Some("*") if rest.starts_with("**") => {
-            Err(Slip::new(start..start + 2, "unknown operator `**`").help("write a power as x^2"))
+            Err(whole.refuse(start..start + 2, "unknown operator `**`").help("write a power as x^2"))
         }
         Some(symbol) => Ok((Token::Symbol(symbol), start..start + symbol.len())),
         None => {
-            let slip = Slip::new(start..start + first.len_utf8(), format!("unexpected `{first}`"));
+            let error = whole.refuse(start..start + first.len_utf8(), format!("unexpected `{first}`"));
             Err(match first {
-                '=' => slip.help("compare with =="),
-                '&' => slip.help("\"and\" is written &&"),
-                '|' => slip.help("\"or\" is written ||, an absolute value abs(x)"),
-                _ => slip,
+                '=' => error.help("compare with =="),
+                '&' => error.help("\"and\" is written &&"),
+                '|' => error.help("\"or\" is written ||, an absolute value abs(x)"),
+                _ => error,
             })
         }
     }

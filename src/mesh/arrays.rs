@@ -58,13 +58,8 @@ fn group<const D: usize>(arrays: &GroupArrays, points: &[[f64; 3]], order: Order
     }
     let mut connectivity = connectivity.clone();
     for (index, simplex) in connectivity.chunks_exact_mut(stride).enumerate() {
-        let vertices: Vec<[f64; 3]> = simplex[..corners].iter().map(|&point| points[point as usize]).collect();
-        let measure = simplex::measure(&vertices, D);
-        if simplex::is_degenerate(&vertices, measure) {
+        if !simplex::turn(simplex, points, *dimension, D) {
             return Err(refuse(format!("has no extent in its simplex {index}, of the points {simplex:?}")));
-        }
-        if *dimension == D && measure < 0.0 {
-            simplex::mirror(simplex);
         }
     }
     let tags = (0..(connectivity.len() / stride) as u64).collect();

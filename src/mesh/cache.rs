@@ -1,36 +1,20 @@
 //! The cache of meshes that Gmsh made: one file for each script, set of numbers, order, dimension and Gmsh.
 
 use crate::error::{Error, Kind, Result};
-use sha2::{Digest, Sha256};
+use crate::file::digest;
+use serde::Serialize;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// What a mesh was made from, digested piece by piece.
-pub struct Key(Sha256);
-
-impl Key {
-    /// The empty key; changes with how this program calls Gmsh.
-    pub fn new() -> Key {
-        let mut key = Key(Sha256::new());
-        key.add(b"winkler mesh 1");
-        key
-    }
-
-    /// Adds a piece; its length goes in, too, so that pieces do not run together.
-    pub fn add(&mut self, piece: &[u8]) {
-        self.0.update((piece.len() as u64).to_le_bytes());
-        self.0.update(piece);
-    }
-
-    /// Name of the file in the cache, beginning with a word that people recognise.
-    pub fn file_name(self, stem: &str) -> String {
-        // 128 bits are plenty.
-        let digest: String = self.0.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect();
-        format!("{stem}-{digest}.msh")
-    }
+/// Name of the file in the cache for what a mesh was made from, beginning with that of its script. It changes with how this program calls
+/// Gmsh.
+pub fn file_name(made_from: impl Serialize, path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    // 128 bits are plenty.
+    format!("{stem}-{:.32}.msh", digest(&("winkler mesh 2", made_from)))
 }
 
 /// Folders that may hold the cache, best first: $WINKLER_CACHE alone, or else $XDG_CACHE_HOME/winkler,
@@ -164,18 +148,6 @@ impl Drop for Workshop {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn pieces_of_a_key_do_not_run_together() {
-        let name = |pieces: &[&str]| {
-            let mut key = Key::new();
-            pieces.iter().for_each(|piece| key.add(piece.as_bytes()));
-            key.file_name("groove")
-        };
-        assert_eq!(name(&["ab", "c"]), name(&["ab", "c"]));
-        assert_ne!(name(&["ab", "c"]), name(&["a", "bc"]));
-        assert!(name(&[]).starts_with("groove-") && name(&[]).ends_with(".msh"));
-    }
 
     #[test]
     fn an_explicit_folder_stands_alone() {

@@ -113,8 +113,6 @@ impl Block<'_> {
         let Kind { dimension, stride, .. } = self.kind;
         let mut connectivity = Vec::with_capacity(self.count * stride);
         let mut tags = Vec::with_capacity(self.count);
-        let mut vertices = [[0.0; 3]; 4];
-        let vertices = &mut vertices[..dimension + 1];
         let mut points = vec![0; self.split.map_or(stride, |split| split.stride)];
         for _ in 0..self.count {
             cursor.begin();
@@ -144,18 +142,11 @@ impl Block<'_> {
                 }
             };
             for points in simplices.chunks_exact_mut(stride) {
-                for (vertex, point) in vertices.iter_mut().zip(&*points) {
-                    *vertex = nodes.points[*point as usize];
-                }
-                let measure = simplex::measure(vertices, D);
-                if simplex::is_degenerate(vertices, measure) {
+                if !simplex::turn(points, &nodes.points, dimension, D) {
                     let size = ["", "length", "area", "volume"][dimension];
                     let part = if self.split.is_some() { "a part of " } else { "" };
                     let message = format!("{part}element {tag} of group `{}` has zero {size}", self.name);
                     return Err(cursor.error_at(start, message).help("mend the geometry there, or mesh it again"));
-                }
-                if dimension == D && measure < 0.0 {
-                    simplex::mirror(points);
                 }
                 connectivity.extend_from_slice(points);
                 tags.push(tag);

@@ -3,7 +3,6 @@
 use super::trust::is_kind;
 use super::{abaqus, unv};
 use crate::error::{Error, Located, Result};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Kinds of file with the shape of bodies.
@@ -15,13 +14,6 @@ const MESHES: [&str; 6] = ["unv", "bdf", "nas", "mesh", "med", "inp"];
 /// Whether a file has the shape of bodies, by its name.
 pub fn is_shape(path: &Path) -> bool {
     is_kind(path, &SHAPES)
-}
-
-/// Whether a file is a mesh that Gmsh converts first; one that cannot be read is none.
-pub fn is_other(path: &Path) -> bool {
-    let mut head = [0; 32];
-    let read = std::fs::File::open(path).and_then(|mut file| file.read(&mut head));
-    read.is_ok_and(|count| is_mesh(path, &head[..count]))
 }
 
 /// Whether the bytes of a file are a mesh that Gmsh converts first: one of another program, or of another version of its own format.

@@ -25,8 +25,6 @@ pub struct Task<'a> {
     pub shown: &'a Path,
     /// Numbers to set in it.
     pub set: &'a [(String, f64)],
-    /// How many times as large elements are to be as the script asks for.
-    pub times: f64,
     /// Whether the script is a mesh already, which is only to be written in another form.
     pub is_mesh: bool,
     /// Dimension of the cells.
@@ -77,9 +75,6 @@ impl Gmsh {
         command.args(["-format", "msh41", "-bin", "-v", "2"]);
         if let Some(threads) = task.guard.threads {
             command.args(["-algo", "hxt", "-nt", &threads.to_string()]);
-        }
-        if task.times != 1.0 {
-            command.args(["-clscale", &task.times.to_string()]);
         }
         for (name, value) in task.set {
             command.args(["-setnumber", name, &value.to_string()]);

@@ -1,13 +1,14 @@
 //! From what the scene names to a mesh: Gmsh, or the cache, or a file.
 
-use super::cache::{Key, Workshop, folders};
+use super::cache::{Workshop, file_name, folders};
 use super::gmsh::{Gmsh, Task};
 use super::msh::Maker;
 use super::script::Script;
 use super::{Mesh, foreign, msh};
-use crate::error::{Error, Located, Result};
+use crate::error::{Error, Located, Place, Result};
+use crate::file::digest_of_bytes;
 use crate::interrupt::Interrupt;
-use crate::problem::mesh::{Guard, MeshSource, Sizing};
+use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::order::Order;
 use std::path::{Path, PathBuf};
 
@@ -33,35 +34,22 @@ pub enum Origin {
     Gmsh,
 }
 
-/// Loads the mesh of a scene for displacements of an order.
+/// Loads the mesh of a scene for displacements of an order, unless a signal ends it.
 ///
 /// A `.geo` script is meshed with that order by Gmsh, unless the cache has the result. A `.msh` file of order 2 serves
 /// order 1 without its mid-edge points.
 ///
 /// # Errors
 /// A file that cannot be read, a number that the script does not take, Gmsh missing or failing, a mesh that is not one
-/// of named simplices in `D` dimensions (see [`read`](super::read)), or of too low an order.
-pub fn load<const D: usize>(source: &MeshSource, order: Order) -> Result<Loaded<D>> {
-    load_unless(source, order, &Interrupt::default())
-}
-
-/// [`load`], unless a signal ends it.
-///
-/// # Errors
-/// Those of [`load`], and the signal.
-pub fn load_unless<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
+/// of named simplices in `D` dimensions (see [`read`](super::read)), or of too low an order; the signal.
+pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes, guard } => {
             if let (true, Some(place)) = (foreign::is_shape(&file.value), places.first()) {
                 return Err(Error::scene(place, "numbers for a shape of another program, which has none")
                     .help("give sizes of elements by mesh = { geo = \"...\", size = 0.1 }, or a script (.geo) that merges the file"));
             }
-            let script = (!set.is_empty()).then(|| Script::read(&file.value)).transpose();
-            let script = script.map_err(|error| error.at(&file.place))?;
-            for (script, ((name, _), place)) in script.iter().cycle().zip(set.iter().zip(places)) {
-                script.check(name, &Located::new(file.value.clone(), place.clone()))?;
-            }
-            from_script(file, set, sizes.as_ref(), order, (guard, interrupt), &folders())?
+            from_script(file, (set, places), sizes.as_deref(), order, (guard, interrupt), &folders())?
         }
         MeshSource::Msh { file } => from_file(file, order, interrupt)?,
         MeshSource::Arrays(arrays) => {
@@ -78,7 +66,7 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     let path = &file.value;
     let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
     let mut loaded = match foreign::is_mesh(path, &bytes) {
-        true => converted(file, &bytes, interrupt, &folders())?,
+        true => converted(file, &bytes, interrupt)?,
         false => Loaded { mesh: msh::parse(path, &bytes, Maker::User)?, origin: Origin::File, file: path.clone() },
     };
     loaded.mesh = match (loaded.mesh.order, order) {
@@ -96,20 +84,12 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     Ok(loaded)
 }
 
-/// A mesh of another program, or of another version of Gmsh's format, as Gmsh writes it; with the cache in one of `folders`.
-fn converted<const D: usize>(
-    file: &Located<PathBuf>,
-    bytes: &[u8],
-    interrupt: &Interrupt,
-    folders: &[PathBuf],
-) -> Result<Loaded<D>> {
+/// A mesh of another program, or of another version of Gmsh's format, as Gmsh writes it.
+fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &Interrupt) -> Result<Loaded<D>> {
     let path = &file.value;
     let gmsh = Gmsh::find()?;
-    let mut key = Key::new();
-    [&b"converted"[..], gmsh.identity().as_bytes(), path.extension().unwrap_or_default().as_encoded_bytes(), bytes]
-        .iter()
-        .for_each(|piece| key.add(piece));
-    let name = key.file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    let name = file_name(("converted", gmsh.identity(), ending, digest_of_bytes(bytes)), path);
     let parse = |bytes: &[u8]| {
         msh::parse(path, bytes, Maker::Other).map_err(|error| match error.advice() {
             // what helps a script helps nobody here
@@ -117,29 +97,45 @@ fn converted<const D: usize>(
             _ => error.help(format!("see what Gmsh makes of it: gmsh {}", path.display())),
         })
     };
+    let guard = &Guard::default();
+    let make = |work: &Path, made: &Path| {
+        let script = &foreign::mesh(file, bytes, work)?;
+        let task =
+            Task { script, shown: path, set: &[], is_mesh: true, dimension: D, order: Order::P1, guard, interrupt };
+        gmsh.run(&task, made, work)
+    };
+    kept(&name, &folders(), parse, make).map_err(|error| error.at(&file.place))
+}
+
+/// The mesh of this name in the cache, which is in one of `folders`; or what `make` makes of it in a folder to work in, and in a file there.
+fn kept<const D: usize>(
+    name: &str,
+    folders: &[PathBuf],
+    parse: impl Fn(&[u8]) -> Result<Mesh<D>>,
+    make: impl FnOnce(&Path, &Path) -> Result<()>,
+) -> Result<Loaded<D>> {
+    // A file of the cache that cannot be read or is damaged is as good as none.
     for folder in folders {
-        let cached = folder.join(&name);
+        let cached = folder.join(name);
         if let Some(mesh) = std::fs::read(&cached).ok().and_then(|bytes| parse(&bytes).ok()) {
             return Ok(Loaded { mesh, origin: Origin::Cache, file: cached });
         }
     }
     let workshop = Workshop::open(folders)?;
-    let (script, made) = (foreign::mesh(file, bytes, workshop.path())?, workshop.path().join(&name));
-    let guard = &Guard::default();
-    let (set, times, is_mesh) = (&[], 1.0, true);
-    let task =
-        Task { script: &script, shown: path, set, times, is_mesh, dimension: D, order: Order::P1, guard, interrupt };
-    let ran = gmsh.run(&task, &made, workshop.path());
-    let read = ran.and_then(|()| std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause)));
-    let mesh = read.and_then(|bytes| parse(&bytes)).map_err(|error| workshop.blame(error).at(&file.place))?;
-    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })
+    let made = workshop.path().join(name);
+    let read = || std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause));
+    let mesh = make(workshop.path(), &made).and_then(|()| parse(&read()?));
+    // half a file is no fault of the script
+    let mesh = mesh.map_err(|error| workshop.blame(error))?;
+    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, name)? })
 }
 
-/// Meshes a script, with the cache in one of `folders`.
+/// Meshes a script, with the cache in one of `folders`; `set` are the numbers set in it, and where they stand if that is not where the
+/// script is named.
 pub(super) fn from_script<const D: usize>(
     file: &Located<PathBuf>,
-    set: &[(String, f64)],
-    sizes: Option<&Sizing>,
+    (set, places): (&[(String, f64)], &[Place]),
+    sizes: Option<&str>,
     order: Order,
     (guard, interrupt): (&Guard, &Interrupt),
     folders: &[PathBuf],
@@ -148,42 +144,32 @@ pub(super) fn from_script<const D: usize>(
     let is_shape = foreign::is_shape(path);
     let script = if is_shape { Script::of_shape(path) } else { Script::read(path) };
     let script = script.map_err(|error| error.at(&file.place))?;
+    for (number, (name, _)) in set.iter().enumerate() {
+        script.check(name, path, places.get(number).unwrap_or(&file.place))?;
+    }
     if !guard.trusted {
         script.judge(file)?;
     }
-    for (name, _) in set {
-        script.check(name, file)?;
-    }
     let gmsh = Gmsh::find()?;
-    let name = file_name::<D>(path, &script, set, sizes, order, guard, &gmsh);
-
-    // A file of the cache that cannot be read or is damaged is as good as none.
-    for folder in folders {
-        let cached = folder.join(&name);
-        let mesh = std::fs::read(&cached).ok().and_then(|bytes| checked(path, &bytes, order).ok());
-        if let Some(mesh) = mesh {
-            return Ok(Loaded { mesh, origin: Origin::Cache, file: cached });
-        }
-    }
-    let workshop = Workshop::open(folders)?;
-    let made = workshop.path().join(&name);
-    let drawn = match is_shape {
-        true => Some(foreign::script(path, &script.files[0], D, guard.size, workshop.path())?),
-        false => None,
+    // one thread or many: the same algorithm
+    let asked = (D, order.degree(), guard.threads.is_some(), guard.size, set, sizes);
+    let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
+    let name = file_name((gmsh.identity(), asked, files, script.is_ended()), path);
+    let make = |work: &Path, made: &Path| {
+        let own = match is_shape {
+            true => foreign::script(path, &script.files[0], D, guard.size, work)?,
+            false => path.clone(),
+        };
+        let sized = match sizes {
+            Some(view) => {
+                Some(super::sizes::script(&Located::new(own.clone(), file.place.clone()), &script, view, work)?)
+            }
+            None => ended(&own, &script, work)?,
+        };
+        let script = sized.as_deref().unwrap_or(&own);
+        gmsh.run(&Task { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt }, made, work)
     };
-    let own = drawn.as_ref().map_or(file.clone(), |drawn| Located::new(drawn.clone(), file.place.clone()));
-    let (sized, times) = match sizes {
-        Some(Sizing::View(view)) => (Some(super::sizes::script(&own, &script, view, workshop.path())?), 1.0),
-        Some(Sizing::Times(times)) => (ended(&own.value, &script, workshop.path())?, *times),
-        None => (ended(&own.value, &script, workshop.path())?, 1.0),
-    };
-    let script = sized.as_deref().unwrap_or(&own.value);
-    let task = Task { script, shown: path, set, times, is_mesh: false, dimension: D, order, guard, interrupt };
-    let ran = gmsh.run(&task, &made, workshop.path());
-    let read = ran.and_then(|()| std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause)));
-    // half a file is no fault of the script
-    let mesh = read.and_then(|bytes| checked(path, &bytes, order)).map_err(|error| workshop.blame(error))?;
-    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, &name)? })
+    kept(&name, folders, |bytes| checked(path, bytes, order), make)
 }
 
 /// For a script whose last line is not ended: one in the folder `work` that includes it.
@@ -216,43 +202,7 @@ pub fn recall_final(purpose: &str) -> Option<String> {
 }
 
 fn final_name(purpose: &str) -> String {
-    let mut key = Key::new();
-    key.add(purpose.as_bytes());
-    key.file_name("sizes") + ".pos"
-}
-
-/// Name of the mesh in the cache: it changes with everything that changes the mesh.
-fn file_name<const D: usize>(
-    path: &Path,
-    script: &Script,
-    set: &[(String, f64)],
-    sizes: Option<&Sizing>,
-    order: Order,
-    guard: &Guard,
-    gmsh: &Gmsh,
-) -> String {
-    let mut key = Key::new();
-    key.add(gmsh.identity().as_bytes());
-    key.add(&[D as u8, order as u8]);
-    // one thread or many: the same algorithm
-    key.add(&[u8::from(guard.threads.is_some())]);
-    guard.size.iter().for_each(|size| key.add(&size.to_le_bytes()));
-    for (name, value) in set {
-        key.add(name.as_bytes());
-        key.add(&value.to_le_bytes());
-    }
-    for text in &script.files {
-        key.add(text);
-    }
-    if !script.is_ended() {
-        key.add(b"ended");
-    }
-    match sizes {
-        Some(Sizing::View(view)) => key.add(view.as_bytes()),
-        Some(Sizing::Times(times)) => key.add(&times.to_le_bytes()),
-        None => {}
-    }
-    key.file_name(&path.file_stem().unwrap_or_default().to_string_lossy())
+    file_name(purpose, Path::new("sizes")) + ".pos"
 }
 
 /// The mesh in bytes that Gmsh made from a script, of the order asked for.

@@ -32,12 +32,12 @@ mod trust;
 mod unv;
 
 pub use check::{Asked, Checked, Duty, Parts};
-pub use foreign::{is_other, is_shape};
+pub use foreign::is_shape;
 pub use groups::{Group, Groups};
-pub use load::{Loaded, Origin, keep_final, load, load_unless, recall_final};
+pub use load::{Loaded, Origin, keep_final, load, recall_final};
 pub use msh::{Maker, parse, read};
 pub use quality::Quality;
-pub use sizes::{follows, unstructured, view};
+pub use sizes::{unstructured, view};
 pub use told::Told;
 pub use trust::{Breach, breach};
 

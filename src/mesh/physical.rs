@@ -82,23 +82,14 @@ impl Physical {
                 let message = format!("two names for physical {} {tag}", thing.to_lowercase());
                 return Err(cursor.error_at(start, message));
             }
-            // The stride is final once the first elements of the group are seen.
-            self.groups.push(Group {
-                name: name.to_owned(),
-                dimension,
-                stride: dimension + 1,
-                connectivity: Vec::new(),
-                tags: Vec::new(),
-            });
+            self.groups.push(empty(name.to_owned(), dimension));
         }
         Ok(())
     }
 
     /// A group called by its kind and number; its place.
     fn call(&mut self, dimension: usize, number: i32) -> usize {
-        let name = format!("{}_{number}", THINGS[dimension].to_lowercase());
-        let group = Group { name, dimension, stride: dimension + 1, connectivity: Vec::new(), tags: Vec::new() };
-        self.groups.push(group);
+        self.groups.push(empty(format!("{}_{number}", THINGS[dimension].to_lowercase()), dimension));
         self.group_of.insert((dimension, number), self.groups.len() - 1);
         self.groups.len() - 1
     }
@@ -169,6 +160,11 @@ impl Physical {
         }
         Ok(())
     }
+}
+
+/// A group without elements; its stride is final once the first of them are seen.
+fn empty(name: String, dimension: usize) -> Group {
+    Group { name, dimension, stride: dimension + 1, connectivity: Vec::new(), tags: Vec::new() }
 }
 
 /// A name as bodies have it.

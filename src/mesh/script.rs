@@ -5,7 +5,7 @@
 
 use super::tokens::{Token, tokens};
 use super::trust;
-use crate::error::{Error, Located, Result, nearest};
+use crate::error::{Error, Located, Place, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -139,12 +139,12 @@ impl Script {
     ///
     /// # Errors
     /// A name that the script never mentions, or one that it overwrites.
-    pub fn check(&self, name: &str, file: &Located<PathBuf>) -> Result<()> {
+    pub fn check(&self, name: &str, file: &Path, place: &Place) -> Result<()> {
         if self.settable.contains(name) {
             return Ok(());
         }
-        let error = |message: String| Error::scene(&file.place, message);
-        let shown = file.value.display();
+        let error = |message: String| Error::scene(place, message);
+        let shown = file.display();
         if let Some((_, label)) = self.aliases.iter().find(|(constant, _)| constant == name) {
             return Err(error(format!("Gmsh knows `{name}` of {shown} as `{label}`"))
                 .help(format!("set `\"{label}\"`, or write `Name \"{name}\"` in the script")));
@@ -156,36 +156,25 @@ impl Script {
         if self.mentioned.contains(name) {
             return Ok(());
         }
-        let error = error(format!("{shown} has no number `{name}` to set"));
-        Err(match nearest(name, self.settable.iter().map(String::as_str)) {
-            Some(near) => error.help(format!("did you mean `{near}`?")),
-            None if self.settable.is_empty() => {
-                error.help(format!("write `DefineConstant[ {name} = {{..., Name \"{name}\"}} ];` in the script"))
-            }
-            None => {
-                let known: Vec<&str> = self.settable.iter().map(String::as_str).collect();
-                error.help(format!("it has: {}", known.join(", ")))
-            }
-        })
+        let known: Vec<&str> = self.settable.iter().map(String::as_str).collect();
+        let otherwise = || match known.is_empty() {
+            true => format!("write `DefineConstant[ {name} = {{..., Name \"{name}\"}} ];` in the script"),
+            false => format!("it has: {}", known.join(", ")),
+        };
+        Err(error(format!("{shown} has no number `{name}` to set")).suggest(name, known.iter().copied(), otherwise))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::{Place, Source};
-
-    fn located(path: &Path) -> Located<PathBuf> {
-        let source = Source { name: "scene.toml".into(), text: "mesh".into() };
-        Located::new(path.to_owned(), Place { source: source.into(), span: 0..4 })
-    }
 
     fn verdict(text: &str, name: &str) -> Option<String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.geo");
         std::fs::write(&path, text).unwrap();
         let script = Script::read(&path).unwrap();
-        script.check(name, &located(&path)).err().map(|error| error.to_string())
+        script.check(name, &path, &Place::here("mesh")).err().map(|error| error.to_string())
     }
 
     const SCRIPT: &str = r#"

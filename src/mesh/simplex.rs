@@ -1,6 +1,7 @@
 //! Facts about single simplices: sizes, orientation, Gmsh's numbering.
 
 use crate::problem::order::Order;
+use nalgebra::Vector3;
 
 /// What Gmsh calls things of dimension 0 to 3, as in `Physical Surface`.
 pub const THINGS: [&str; 4] = ["Point", "Curve", "Surface", "Volume"];
@@ -75,7 +76,7 @@ pub fn from_gmsh_order(simplex: &mut [u32]) {
 }
 
 /// Turns a cell inside out: exchanges its last two vertices and the mid-edges that go with them.
-pub fn mirror(cell: &mut [u32]) {
+fn mirror(cell: &mut [u32]) {
     match cell.len() {
         3 => cell.swap(1, 2),
         4 => cell.swap(2, 3),
@@ -92,42 +93,45 @@ pub fn mirror(cell: &mut [u32]) {
     }
 }
 
+/// Turns a simplex of these points to positive volume if it is a cell of `space`; false if it has no extent.
+pub fn turn(simplex: &mut [u32], points: &[[f64; 3]], dimension: usize, space: usize) -> bool {
+    let mut vertices = [[0.0; 3]; 4];
+    vertices.iter_mut().zip(&simplex[..=dimension]).for_each(|(vertex, point)| *vertex = points[*point as usize]);
+    let vertices = &vertices[..=dimension];
+    let measure = measure(vertices, space);
+    if is_degenerate(vertices, measure) {
+        return false;
+    }
+    if dimension == space && measure < 0.0 {
+        mirror(simplex);
+    }
+    true
+}
+
 /// Signed measure of the simplex on these vertices, times the factorial of its dimension. The sign means something
 /// for cells alone: triangles if `space` is 2, tetrahedra if it is 3. Coordinates are (x, y, z), z unused in planes.
 pub fn measure(vertices: &[[f64; 3]], space: usize) -> f64 {
-    let edge = |to: usize| std::array::from_fn(|k| vertices[to][k] - vertices[0][k]);
+    let edge = |to: usize| Vector3::from(vertices[to]) - Vector3::from(vertices[0]);
     match vertices.len() {
-        2 => norm(edge(1)),
-        3 if space == 2 => cross(edge(1), edge(2))[2],
-        3 => norm(cross(edge(1), edge(2))),
-        4 => dot(cross(edge(1), edge(2)), edge(3)),
+        2 => edge(1).norm(),
+        3 if space == 2 => edge(1).cross(&edge(2)).z,
+        3 => edge(1).cross(&edge(2)).norm(),
+        4 => edge(1).cross(&edge(2)).dot(&edge(3)),
         _ => 1.0,
     }
 }
 
 /// Whether a simplex of this [`measure`] has, to rounding, no extent: true for numbers that overflowed, too.
-pub fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
+fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
     let mut longest = 0.0_f64;
     for (i, a) in vertices.iter().enumerate() {
         for b in &vertices[..i] {
-            longest = longest.max(norm(std::array::from_fn(|k| a[k] - b[k])));
+            longest = longest.max((Vector3::from(*a) - Vector3::from(*b)).norm());
         }
     }
     let smallest = 1e-12 * longest.powi(vertices.len() as i32 - 1);
     // Overflow leaves infinity or NaN; a point has measure 1 and passes.
     !measure.is_finite() || measure.abs() <= smallest
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn norm(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
 }
 
 #[cfg(test)]

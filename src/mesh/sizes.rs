@@ -3,7 +3,6 @@
 use super::script::Script;
 use super::tokens::{Token, tokens};
 use crate::error::{Error, Located, Result};
-use crate::problem::mesh::MeshSource;
 use std::path::{Path, PathBuf};
 
 /// Writes the script that meshes another one to a field of sizes into the folder `work`; gives its path. `field` is a view of
@@ -35,15 +34,6 @@ pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: 
         sizes.display()
     );
     write("sized.geo", &text)
-}
-
-/// Whether the meshes of a scene keep to the sizes of elements that they are told: a script without commands for structured
-/// meshes. A script that cannot be read does not.
-pub fn follows(source: &MeshSource) -> bool {
-    let MeshSource::Geo { file, .. } = source else { return false };
-    let Ok(script) = Script::read(&file.value) else { return false };
-    let texts = script.files.iter().map(|bytes| String::from_utf8_lossy(bytes));
-    texts.into_iter().all(|text| unstructured(&text) == text)
 }
 
 /// The script without the commands that ask for structured meshes, from the word to the semicolon.

@@ -40,33 +40,6 @@ impl PairRow {
     }
 }
 
-/// Columns in their order.
-const COLUMNS: [&str; 23] = [
-    "a",
-    "b",
-    "surface_a",
-    "surface_b",
-    "points",
-    "closed",
-    "force_x",
-    "force_y",
-    "force_z",
-    "peak_pressure",
-    "peak_x",
-    "peak_y",
-    "peak_z",
-    "contact",
-    "open",
-    "gap_least",
-    "gap_mean",
-    "gap_largest",
-    "opening_mean",
-    "opening_largest",
-    "energy",
-    "table",
-    "plot",
-];
-
 /// Writes the pairs in the order of the scene; returns the path.
 ///
 /// # Errors
@@ -77,17 +50,41 @@ pub fn save(folder: &Folder, pairs: &[PairReport], rows: &[PairRow]) -> Result<P
 
 fn write(out: &mut dyn Write, pairs: &[PairReport], rows: &[PairRow]) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(COLUMNS)?;
+    csv.write_record(fields(&PairReport::default(), &PairRow::default()).map(|(column, _)| column))?;
     for (pair, row) in pairs.iter().zip(rows) {
-        let names = pair.bodies.iter().chain(&pair.surfaces).cloned();
-        let counts = [pair.points, row.closed].map(|count| count.to_string());
-        let [force, _] = pair.force;
-        let numbers = force.into_iter().chain([pair.peak_pressure]).chain(pair.peak_at);
-        let numbers = numbers.chain([pair.extent.contact(), pair.extent.open()]).chain(row.gap).chain(row.opening);
-        let numbers = numbers.chain([pair.layer_energy]).map(field);
-        csv.write_record(names.chain(counts).chain(numbers).chain([row.table.clone(), row.plot.clone()]))?;
+        csv.write_record(fields(pair, row).map(|(_, text)| text))?;
     }
     csv.flush()
+}
+
+/// The columns in their order, and what a pair has in them.
+fn fields(pair: &PairReport, row: &PairRow) -> [(&'static str, String); 23] {
+    let [force, _] = pair.force;
+    [
+        ("a", pair.bodies[0].clone()),
+        ("b", pair.bodies[1].clone()),
+        ("surface_a", pair.surfaces[0].clone()),
+        ("surface_b", pair.surfaces[1].clone()),
+        ("points", pair.points.to_string()),
+        ("closed", row.closed.to_string()),
+        ("force_x", field(force[0])),
+        ("force_y", field(force[1])),
+        ("force_z", field(force[2])),
+        ("peak_pressure", field(pair.peak_pressure)),
+        ("peak_x", field(pair.peak_at[0])),
+        ("peak_y", field(pair.peak_at[1])),
+        ("peak_z", field(pair.peak_at[2])),
+        ("contact", field(pair.extent.contact())),
+        ("open", field(pair.extent.open())),
+        ("gap_least", field(row.gap[0])),
+        ("gap_mean", field(row.gap[1])),
+        ("gap_largest", field(row.gap[2])),
+        ("opening_mean", field(row.opening[0])),
+        ("opening_largest", field(row.opening[1])),
+        ("energy", field(pair.layer_energy)),
+        ("table", row.table.clone()),
+        ("plot", row.plot.clone()),
+    ]
 }
 
 #[cfg(test)]

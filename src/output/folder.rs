@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use std::cell::RefCell;
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -11,9 +11,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    files: RefCell<Vec<PathBuf>>,
-    /// The same, to be looked up.
-    known: RefCell<HashSet<PathBuf>>,
+    files: RefCell<BTreeSet<PathBuf>>,
 }
 
 impl Folder {
@@ -32,7 +30,7 @@ impl Folder {
             Error::file(&path, "write to the folder", &cause)
                 .help("give yourself write permission, or name another folder with `-o FOLDER`")
         })?;
-        Ok(Self { path, files: RefCell::default(), known: RefCell::default() })
+        Ok(Self { path, files: RefCell::default() })
     }
 
     /// The folder as it was named.
@@ -40,9 +38,9 @@ impl Folder {
         &self.path
     }
 
-    /// The files written so far, in order, each once; paths begin with [`Folder::path`].
+    /// The files written so far, by name, each once; paths begin with [`Folder::path`].
     pub fn files(&self) -> Vec<PathBuf> {
-        self.files.borrow().clone()
+        self.files.borrow().iter().cloned().collect()
     }
 
     /// Writes a whole file `name`, replacing one of this name; returns its path.
@@ -54,7 +52,7 @@ impl Folder {
     pub fn write(&self, name: &str, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<PathBuf> {
         let path = self.path.join(name);
         write_whole(&path, fill)?;
-        self.add(&path);
+        self.files.borrow_mut().insert(path.clone());
         Ok(path)
     }
 
@@ -65,7 +63,7 @@ impl Folder {
     pub fn open(&self, name: &str) -> Result<(PathBuf, File)> {
         let path = self.path.join(name);
         let file = File::create(&path).map_err(|cause| failed(&path, &cause))?;
-        self.add(&path);
+        self.files.borrow_mut().insert(path.clone());
         Ok((path, file))
     }
 
@@ -78,12 +76,6 @@ impl Folder {
         fs::create_dir_all(&path).map_err(|cause| Error::file(&path, "create the folder", &cause))?;
         remove_parts(&path);
         Ok(())
-    }
-
-    fn add(&self, path: &Path) {
-        if self.known.borrow_mut().insert(path.to_owned()) {
-            self.files.borrow_mut().push(path.to_owned());
-        }
     }
 }
 

@@ -25,14 +25,12 @@ pub enum Verbosity {
 pub struct IterationTable {
     /// Where the table goes; `None` prints no table.
     table: Option<Box<dyn Write>>,
-    /// Where notes go.
-    notes: Box<dyn Write>,
     bar: ProgressBar,
     target: String,
     /// Residual that ends the iteration, for the time that is left.
     tolerance: Option<f64>,
     first: Option<(f64, f64)>,
-    columns: Option<Columns>,
+    columns: Option<Vec<Column>>,
     /// Last row, as long as it is not printed.
     waiting: Option<Row>,
 }
@@ -54,13 +52,13 @@ impl IterationTable {
         };
         let stdout = io::stdout();
         let table = (loud && stdout.is_terminal()).then(|| Box::new(stdout) as Box<dyn Write>);
-        let mut table = Self::on(table, Box::new(io::stderr()), bar, target);
+        let mut table = Self::on(table, bar, target);
         table.tolerance = tolerance;
         table
     }
 
-    fn on(table: Option<Box<dyn Write>>, notes: Box<dyn Write>, bar: ProgressBar, target: &str) -> Self {
-        Self { table, notes, bar, target: target.into(), tolerance: None, first: None, columns: None, waiting: None }
+    fn on(table: Option<Box<dyn Write>>, bar: ProgressBar, target: &str) -> Self {
+        Self { table, bar, target: target.into(), tolerance: None, first: None, columns: None, waiting: None }
     }
 
     /// Prints the last row, if it is not there yet, and takes the progress line away. Dropping does the same.
@@ -75,20 +73,16 @@ impl IterationTable {
         let Some(table) = &mut self.table else { return };
         let mut text = String::new();
         let columns = self.columns.get_or_insert_with(|| {
-            let columns = Columns::new(row);
-            text = columns.header() + "\n";
+            let columns = columns(row);
+            text = line(&columns, |(heading, ..)| (*heading).to_owned()) + "\n";
             columns
         });
-        text += &columns.line(row);
-        put(&self.bar, table, &text);
+        text += &line(columns, |(.., of)| of(row));
+        // above the progress line; a terminal that is gone is no reason to stop computing
+        self.bar.suspend(|| {
+            let _ = writeln!(table, "{text}").and_then(|()| table.flush());
+        });
     }
-}
-
-/// Prints a line above the progress line. A terminal that is gone is no reason to stop computing.
-fn put(bar: &ProgressBar, out: &mut dyn Write, text: &str) {
-    bar.suspend(|| {
-        let _ = writeln!(out, "{text}").and_then(|()| out.flush());
-    });
 }
 
 impl Observer for IterationTable {
@@ -109,11 +103,6 @@ impl Observer for IterationTable {
             self.waiting = Some(row.clone());
         }
     }
-
-    /// Prints the line on standard error, where it does not mix with results.
-    fn note(&mut self, text: &str) {
-        put(&self.bar, &mut self.notes, text);
-    }
 }
 
 impl Drop for IterationTable {
@@ -133,50 +122,30 @@ fn shown(k: usize) -> bool {
     k <= 20 || k <= 200 && k.is_multiple_of(10) || k.is_multiple_of(100)
 }
 
-/// Columns of the table, fixed by the first row.
-struct Columns {
-    /// Width of the column closed: contact points with pressure out of all.
-    contact: usize,
-    /// Whether there are inner iterations to show.
-    inner: bool,
+/// A column: its heading, its width, and what it has of a row.
+type Column = (&'static str, usize, fn(&Row) -> String);
+
+/// The columns of a table that begins with this row: one of inner iterations where there are any.
+fn columns(first: &Row) -> Vec<Column> {
+    // contact points with pressure out of all
+    let closed = (2 * first.points.to_string().len() + 1).max("closed".len());
+    let all: [Column; 9] = [
+        ("k", 5, |row| row.iteration.to_string()),
+        ("residual", 9, |row| sci(row.residual, 3)),
+        ("increment", 9, |row| sci(row.increment, 3)),
+        ("gamma", 6, |row| if row.gamma.is_nan() { "-".into() } else { format!("{:.4}", row.gamma) }),
+        ("F1", 13, |row| sci(row.energy, 6)),
+        ("closed", closed, |row| format!("{}/{}", row.closed, row.points)),
+        ("factored", 8, |row| row.factorizations.to_string()),
+        ("inner", 7, |row| row.inner_iterations.to_string()),
+        ("seconds", 7, |row| seconds(row.seconds)),
+    ];
+    all.into_iter().filter(|(heading, ..)| *heading != "inner" || first.inner_iterations > 0).collect()
 }
 
-impl Columns {
-    fn new(first: &Row) -> Self {
-        let digits = first.points.to_string().len();
-        Self { contact: (2 * digits + 1).max("closed".len()), inner: first.inner_iterations > 0 }
-    }
-
-    fn header(&self) -> String {
-        self.join(["k", "residual", "increment", "gamma", "F1", "closed", "factored"], "inner", "seconds")
-    }
-
-    fn line(&self, row: &Row) -> String {
-        let gamma = if row.gamma.is_nan() { "-".into() } else { format!("{:.4}", row.gamma) };
-        self.join(
-            [
-                &row.iteration.to_string(),
-                &sci(row.residual, 3),
-                &sci(row.increment, 3),
-                &gamma,
-                &sci(row.energy, 6),
-                &format!("{}/{}", row.closed, row.points),
-                &row.factorizations.to_string(),
-            ],
-            &row.inner_iterations.to_string(),
-            &seconds(row.seconds),
-        )
-    }
-
-    fn join(&self, fields: [&str; 7], inner: &str, seconds: &str) -> String {
-        let [k, residual, increment, gamma, energy, contact, factored] = fields;
-        let width = self.contact;
-        let inner = if self.inner { format!("  {inner:>7}") } else { String::new() };
-        format!(
-            "{k:>5}  {residual:>9}  {increment:>9}  {gamma:>6}  {energy:>13}  {contact:>width$}  \
-             {factored:>8}{inner}  {seconds:>7}"
-        )
-    }
+/// A line of the table.
+fn line(columns: &[Column], text: impl Fn(&Column) -> String) -> String {
+    columns.iter().map(|column| format!("{:>1$}", text(column), column.1)).collect::<Vec<_>>().join("  ")
 }
 
 #[cfg(test)]
@@ -221,12 +190,7 @@ mod tests {
 
     fn run(iterations: usize, first_inner: usize) -> Vec<String> {
         let screen = Screen::default();
-        let mut table = IterationTable::on(
-            Some(Box::new(screen.clone())),
-            Box::new(screen.clone()),
-            ProgressBar::hidden(),
-            "residual < 1e-8",
-        );
+        let mut table = IterationTable::on(Some(Box::new(screen.clone())), ProgressBar::hidden(), "residual < 1e-8");
         for k in 0..=iterations {
             table.row(&Row { inner_iterations: first_inner * (k + 1), ..row(k) });
         }
@@ -274,16 +238,5 @@ mod tests {
         assert_eq!(iterations(&lines), expected);
         assert_eq!(iterations(&run(30, 0)).last(), Some(&30));
         assert_eq!(iterations(&run(30, 0)).len(), 22);
-    }
-
-    #[test]
-    fn without_a_terminal_only_notes() {
-        let screen = Screen::default();
-        let mut table = IterationTable::on(None, Box::new(screen.clone()), ProgressBar::hidden(), "");
-        table.row(&row(0));
-        table.note("body `upper` is held by contact alone");
-        table.row(&row(1));
-        drop(table);
-        assert_eq!(screen.lines(), ["body `upper` is held by contact alone"]);
     }
 }

@@ -1,7 +1,6 @@
 //! A preconditioner in Rust around one of PETSc (PCSHELL).
 
 use super::library::petsc;
-use super::matrix::same;
 use super::vector::Vector;
 use super::{Matrix, ffi};
 use crate::error::{Error, Result};
@@ -40,13 +39,8 @@ struct Inner {
 impl Inner {
     /// z = M r.
     fn apply(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
-        same("r", r.len(), self.vectors[0].len())?;
-        same("z", z.len(), self.vectors[1].len())?;
-        // SAFETY: the slices are as long as the vectors and outlive the call, which reads one and writes to the other.
-        unsafe {
-            let (r, z) = (self.vectors[0].place(r.as_ptr())?, self.vectors[1].place(z.as_mut_ptr())?);
-            petsc!(PCApply(self.pc, r.vec(), z.vec()))
-        }
+        // SAFETY: the preconditioner reads one and writes to the other.
+        self.vectors[0].map(("r", r), &self.vectors[1], ("z", z), |r, z| unsafe { petsc!(PCApply(self.pc, r, z)) })
     }
 }
 

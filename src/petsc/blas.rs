@@ -5,46 +5,27 @@ use crate::error::{Error, Kind, Result};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::path::PathBuf;
 
-/// What `dladdr` fills in.
-#[repr(C)]
-struct Location {
-    file: *const c_char,
-    base: *mut c_void,
-    symbol: *const c_char,
-    address: *mut c_void,
-}
-
-unsafe extern "C" {
-    fn dlsym(library: *mut c_void, name: *const c_char) -> *mut c_void;
-    fn dladdr(address: *const c_void, location: *mut Location) -> c_int;
-}
-
 /// Address of a function of the BLAS and LAPACK in use, null if there is none.
 ///
 /// MUMPS is linked and brings them; PETSc, opened later, gets the same ones. The linker leaves MUMPS out of a program that does not
 /// name it.
 pub(super) fn address(name: &CStr) -> *mut c_void {
     std::hint::black_box(super::ffi::mumps::dmumps_c as *const c_void);
-    // SAFETY: a null library means the default search order, and the name ends with a zero byte.
-    unsafe { dlsym(std::ptr::null_mut(), name.as_ptr()) }
+    // SAFETY: the name ends with a zero byte.
+    unsafe { libc::dlsym(libc::RTLD_DEFAULT, name.as_ptr()) }
 }
 
 /// File of the library that the name `dgemm_` leads to in this process, with links resolved: of several BLAS in the
 /// memory map it is the one in use.
 fn file() -> Option<PathBuf> {
-    let mut found = Location {
-        file: std::ptr::null(),
-        base: std::ptr::null_mut(),
-        symbol: std::ptr::null(),
-        address: std::ptr::null_mut(),
-    };
     let address = address(c"dgemm_");
-    // SAFETY: dladdr fills `found` with texts that live as long as the library is loaded.
+    // SAFETY: plain C data, which dladdr fills with texts that live as long as the library is loaded.
     let file = unsafe {
-        if address.is_null() || dladdr(address, &mut found) == 0 || found.file.is_null() {
+        let mut found: libc::Dl_info = std::mem::zeroed();
+        if address.is_null() || libc::dladdr(address, &mut found) == 0 || found.dli_fname.is_null() {
             return None;
         }
-        CStr::from_ptr(found.file)
+        CStr::from_ptr(found.dli_fname)
     };
     let path = PathBuf::from(file.to_string_lossy().into_owned());
     Some(path.canonicalize().unwrap_or(path))

@@ -72,6 +72,17 @@ pub(super) unsafe fn string(text: *const c_char) -> String {
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
+/// A copy of the text that a call gives; none if it fails or gives none.
+///
+/// # Safety
+/// The call sets the pointer to null or to a text that ends with a zero byte.
+pub(super) unsafe fn told(call: impl FnOnce(&mut *const c_char) -> Result<()>) -> Option<String> {
+    let mut text = std::ptr::null();
+    call(&mut text).ok()?;
+    // SAFETY: the caller's promise.
+    (!text.is_null()).then(|| unsafe { string(text) })
+}
+
 /// The handler given to `PetscPushErrorHandler`.
 ///
 /// # Safety

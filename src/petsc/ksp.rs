@@ -1,17 +1,15 @@
 //! Linear solvers.
 
 use super::around::Around;
-use super::error::string;
+use super::error::told;
 use super::library::petsc;
-use super::matrix::same;
 use super::mumps::ROOM;
 use super::table::text;
 use super::vector::Vector;
 use super::{ConvergedReason, FAMILIES, Int, Matrix, Scope, Session, ffi, print};
 use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
-use std::ffi::c_char;
-use std::ptr::{null, null_mut};
+use std::ptr::null_mut;
 use std::rc::Rc;
 
 /// What a linear solve reached.
@@ -63,7 +61,6 @@ pub struct Ksp {
     pub(super) ksp: ffi::KSP,
     /// Right-hand side and solution, made with the operator.
     vectors: Option<[Vector; 2]>,
-    rows: usize,
     /// Number of updates of the matrix.
     pub(super) updates: Rc<Cell<u64>>,
     /// That number when the preconditioner failed, if it did.
@@ -97,7 +94,6 @@ impl Ksp {
         let solver = Ksp {
             ksp,
             vectors: None,
-            rows: 0,
             updates: Rc::default(),
             failed_at: Cell::new(None),
             writes_to_b: false,
@@ -123,7 +119,7 @@ impl Ksp {
     pub(super) fn factored(session: &Session, matrix: ffi::Mat, rows: usize) -> Result<Ksp> {
         let mut solver = Self::of(session, Scope::Process, "")?;
         let new = || Vector::new(session, Scope::Process, rows, 1);
-        (solver.vectors, solver.rows) = (Some([new()?, new()?]), rows);
+        solver.vectors = Some([new()?, new()?]);
         let pc = solver.pc()?;
         // SAFETY: solver and preconditioner of this wrapper, which take references to the matrix.
         unsafe {
@@ -146,10 +142,9 @@ impl Ksp {
         }
         // SAFETY: the solver takes references to the matrix.
         unsafe { petsc!(KSPSetOperators(self.ksp, matrix.raw(), matrix.raw())) }?;
-        if self.vectors.is_none() || self.rows != matrix.rows() {
+        if self.vectors.as_ref().is_none_or(|[vector, _]| vector.len() != matrix.rows()) {
             let new = || Vector::new(&self.session, self.scope, matrix.rows(), matrix.block_size());
             self.vectors = Some([new()?, new()?]);
-            self.rows = matrix.rows();
         }
         self.updates = matrix.updates();
         // A failure with another matrix says nothing about this one.
@@ -257,8 +252,6 @@ impl Ksp {
         let Some([right, left]) = &self.vectors else {
             return Err(Error::new(Kind::Solver, "a linear solver was called before it had a matrix"));
         };
-        same("b", b.len(), self.rows)?;
-        same("x", x.len(), self.rows)?;
         // Nothing in PETSc writes to the right-hand side but this preconditioner, which restores it.
         let copy = self.writes_to_b.then(|| b.to_vec());
         let b = copy.as_deref().unwrap_or(b);
@@ -269,14 +262,11 @@ impl Ksp {
             x.fill(0.0);
         }
         self.recover()?;
-        // SAFETY: both slices are as long as the vectors and outlive the solve, which reads `b` (a copy where it is written to) and writes
-        // to `x`.
-        unsafe {
-            let right = right.place(b.as_ptr())?;
-            let left = left.place(x.as_mut_ptr())?;
-            petsc!(KSPSolve(self.ksp, right.vec(), left.vec()))
-                .map_err(|error| self.around.iter().find_map(Around::failure).unwrap_or(error))?;
-        }
+        // SAFETY: the solver reads `b` (a copy where it is written to) and writes to `x`.
+        let solve = |b, x| unsafe { petsc!(KSPSolve(self.ksp, b, x)) };
+        right
+            .map(("b", b), left, ("x", x), solve)
+            .map_err(|error| self.around.iter().find_map(Around::failure).unwrap_or(error))?;
         self.note_failure()?;
         let (mut iterations, mut reason, mut residual) = (0, 0, 0.0);
         // SAFETY: the solver of this wrapper.
@@ -299,17 +289,11 @@ impl Ksp {
         let Some([right, left]) = &self.vectors else {
             return Err(Error::new(Kind::Solver, "a preconditioner was applied before it had a matrix"));
         };
-        same("r", r.len(), self.rows)?;
-        same("z", z.len(), self.rows)?;
         self.set_up()?;
         let copy = self.writes_to_b.then(|| r.to_vec());
         let pc = self.whole_pc()?;
         // SAFETY: as in `solve`.
-        unsafe {
-            let right = right.place(copy.as_deref().unwrap_or(r).as_ptr())?;
-            let left = left.place(z.as_mut_ptr())?;
-            petsc!(PCApply(pc, right.vec(), left.vec()))
-        }
+        right.map(("r", copy.as_deref().unwrap_or(r)), left, ("z", z), |r, z| unsafe { petsc!(PCApply(pc, r, z)) })
     }
 
     /// Sets the relative tolerance.
@@ -337,31 +321,21 @@ impl Ksp {
 
     /// Type of the solver, such as `cg`; empty before it is known (after the options or the set-up).
     pub fn ksp_type(&self) -> String {
-        let mut name: *const c_char = null();
-        // SAFETY: null, or PETSc's text, which is copied.
-        unsafe { petsc!(KSPGetType(self.ksp, &mut name)).map_or(String::new(), |()| string(name)) }
+        // SAFETY: null, or PETSc's text.
+        unsafe { told(|name| petsc!(KSPGetType(self.ksp, name))) }.unwrap_or_default()
     }
 
     /// Type of the preconditioner, such as `gamg`; empty before it is known (after the options or the set-up).
     pub fn pc_type(&self) -> String {
-        let mut name: *const c_char = null();
-        // SAFETY: null, or PETSc's text, which is copied.
-        unsafe {
-            let asked = self.pc().and_then(|pc| petsc!(PCGetType(pc, &mut name)));
-            asked.map_or(String::new(), |()| string(name))
-        }
+        // SAFETY: as above.
+        unsafe { told(|name| self.pc().and_then(|pc| petsc!(PCGetType(pc, name)))) }.unwrap_or_default()
     }
 
     /// Package that factors, such as `mumps`; `None` for a preconditioner that is no factorisation, or before the
     /// set-up.
     pub fn factor_package(&self) -> Option<String> {
-        let mut name: *const c_char = null();
-        let pc = self.pc().ok()?;
-        // SAFETY: null, or PETSc's text, which is copied.
-        unsafe {
-            petsc!(PCFactorGetMatSolverType(pc, &mut name)).ok()?;
-            (!name.is_null()).then(|| string(name))
-        }
+        // SAFETY: as above.
+        unsafe { told(|name| self.pc().and_then(|pc| petsc!(PCFactorGetMatSolverType(pc, name)))) }
     }
 
     /// Keeps the preconditioner as it is while the matrix changes, or not.

@@ -2,11 +2,9 @@
 
 use super::library::petsc;
 use super::rows::{Rows, attach, free};
-use super::vector::Vector;
+use super::vector::{Vector, same};
 use super::{Int, Scope, Session, ffi};
 use crate::error::{Error, Kind, Result};
-use mpi::collective::SystemOperation;
-use mpi::traits::CommunicatorCollectives;
 use std::cell::Cell;
 use std::ops::Range;
 use std::ptr::null_mut;
@@ -224,13 +222,7 @@ impl Matrix {
         }
         let (scope, session) = (self.scope, &self.session);
         let comm = scope.comm(session);
-        let sum = |values: &mut [f64]| {
-            if scope == Scope::World {
-                let mine = values.to_vec();
-                session.world().all_reduce_into(&mine[..], values, SystemOperation::sum());
-            }
-        };
-        let vectors: Vec<Vector> = orthonormal(modes, &sum)
+        let vectors: Vec<Vector> = orthonormal(modes, &|values| scope.sum(session, values))
             .iter()
             .map(|mode| Vector::owned(session, scope, mode, self.block_size))
             .collect::<Result<_>>()?;
@@ -250,14 +242,8 @@ impl Matrix {
     /// # Errors
     /// When `x` or `y` has not one entry a row.
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) -> Result<()> {
-        same("x", x.len(), self.rows())?;
-        same("y", y.len(), self.rows())?;
-        // SAFETY: both slices are as long as the vectors and outlive the product, which reads one and writes to the other.
-        unsafe {
-            let x = self.x.place(x.as_ptr())?;
-            let y = self.y.place(y.as_mut_ptr())?;
-            petsc!(MatMult(self.mat, x.vec(), y.vec()))
-        }
+        // SAFETY: the product reads one and writes to the other.
+        self.x.map(("x", x), &self.y, ("y", y), |x, y| unsafe { petsc!(MatMult(self.mat, x, y)) })
     }
 
     /// `y = A x` for the values that `change` makes, which `restore` takes back to the bit: solvers of the matrix do not see it.
@@ -333,14 +319,6 @@ fn orthonormal(vectors: &[Vec<f64>], sum: &dyn Fn(&mut [f64])) -> Vec<Vec<f64>> 
         }
     }
     basis
-}
-
-/// Checks the length of a slice.
-pub(super) fn same(what: &str, length: usize, rows: usize) -> Result<()> {
-    if length == rows {
-        return Ok(());
-    }
-    Err(Error::new(Kind::Solver, format!("{what} has {length} entries for a matrix of {rows} rows")))
 }
 
 #[cfg(test)]

@@ -4,18 +4,13 @@
 //! PETSc loads, have functions of the same names with other arguments.
 
 use crate::error::{Error, Kind, Result};
-use std::ffi::{CStr, c_char, c_int, c_void};
+use libloading::Library;
+use std::ffi::c_int;
 use std::ptr::null_mut;
+use std::sync::OnceLock;
 
-unsafe extern "C" {
-    fn dlopen(file: *const c_char, flags: c_int) -> *mut c_void;
-    fn dlsym(library: *mut c_void, name: *const c_char) -> *mut c_void;
-}
-
-/// The library whose version has the arguments of [`NodeNd`].
-const LIBRARY: &CStr = c"libmetis.so.5";
-/// Symbols are found at once; other libraries do not see them.
-const RTLD_NOW: c_int = 2;
+/// The library whose version has the arguments of [`NodeNd`]; other libraries do not see its symbols.
+const LIBRARY: &str = "libmetis.so.5";
 
 type NodeNd = unsafe extern "C" fn(*mut i32, *mut i32, *mut i32, *mut i32, *mut i32, *mut i32, *mut i32) -> c_int;
 
@@ -37,16 +32,18 @@ type Kway = unsafe extern "C" fn(
 ) -> c_int;
 
 /// A function of METIS by its name.
-fn function(name: &CStr) -> Result<*mut c_void> {
-    // SAFETY: the names end with a zero byte; a library stays loaded.
-    let function = unsafe {
-        let library = dlopen(LIBRARY.as_ptr(), RTLD_NOW);
-        if library.is_null() { null_mut() } else { dlsym(library, name.as_ptr()) }
-    };
-    match function.is_null() {
-        false => Ok(function),
-        true => Err(Error::new(Kind::Solver, format!("METIS ({}) was not found", LIBRARY.to_string_lossy()))),
-    }
+///
+/// # Safety
+/// It has this type.
+unsafe fn function<T: Copy>(name: &str) -> Result<T> {
+    static METIS: OnceLock<Option<Library>> = OnceLock::new();
+    // SAFETY: the initialisers are those of any program that links it; it stays loaded.
+    let library = METIS.get_or_init(|| unsafe { Library::new(LIBRARY) }.ok());
+    // SAFETY: the caller's promise.
+    let function = library.as_ref().and_then(|library| unsafe { library.get::<T>(name.as_bytes()) }.ok());
+    function
+        .map(|function| *function)
+        .ok_or_else(|| Error::new(Kind::Solver, format!("METIS ({LIBRARY}) was not found")))
 }
 
 /// Deals the nodes of a graph out to `parts` of about the same sum of `weight` (one a node, from 1), with few edges between them: the
@@ -61,17 +58,16 @@ pub fn partition(ptr: &mut [i32], col: &mut [i32], weight: &mut [i32], parts: us
     if parts < 2 || nodes == 0 {
         return Ok(vec![0; nodes]);
     }
-    let function = function(c"METIS_PartGraphKway").map_err(|error| {
+    // SAFETY: METIS 5 has these arguments.
+    let kway = unsafe { function::<Kway>("METIS_PartGraphKway") }.map_err(|error| {
         error
             .because("it deals the bodies out to several ranks")
             .help("`apt-get install libmetis5`, or run on one rank")
     })?;
     let (mut count, mut constraints, mut wanted, mut cut) = (nodes as i32, 1, parts as i32, 0);
     let mut part = vec![-1; nodes];
-    // SAFETY: METIS 5 has these arguments, null for what is left to it; it reads the graph and the weights, and writes one number a
-    // node to the last.
+    // SAFETY: null is what is left to METIS; it reads the graph and the weights, and writes one number a node to the last.
     let code = unsafe {
-        let kway: Kway = std::mem::transmute(function);
         kway(
             &mut count,
             &mut constraints,
@@ -110,15 +106,15 @@ pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
         // METIS refuses graphs without edges
         return Ok((0..nodes as i32).collect());
     }
-    let function = function(c"METIS_NodeND").map_err(|error| {
+    // SAFETY: METIS 5 has these arguments.
+    let node_nd = unsafe { function::<NodeNd>("METIS_NodeND") }.map_err(|error| {
         error
             .because("the condensed solver takes the elimination order of large bodies from it")
             .help("`apt-get install libmetis5`, or take MUMPS' own order: -mat_mumps_icntl_7 0")
     })?;
     let (mut count, mut order, mut position) = (nodes as i32, vec![-1; nodes], vec![-1; nodes]);
-    // SAFETY: METIS 5 has these arguments; it reads the graph and writes one number a node to each of the last two.
+    // SAFETY: it reads the graph and writes one number a node to each of the last two.
     let code = unsafe {
-        let node_nd: NodeNd = std::mem::transmute(function);
         node_nd(
             &mut count,
             ptr.as_mut_ptr(),

@@ -14,8 +14,6 @@ use super::library::petsc;
 use super::vector::Vector;
 use super::{Int, Ksp, Matrix, Scope, Session, ffi};
 use crate::error::Result;
-use mpi::collective::SystemOperation;
-use mpi::traits::CommunicatorCollectives;
 use std::ptr::{null, null_mut};
 
 /// What the preconditioner around another needs.
@@ -117,17 +115,9 @@ impl Patch {
         }))
     }
 
-    /// Adds up what the processes have.
-    fn sum(&self, values: &mut [f64]) {
-        if self.scope == Scope::World {
-            let mine = values.to_vec();
-            self.session.world().all_reduce_into(&mine[..], values, SystemOperation::sum());
-        }
-    }
-
     /// (P'AP)^-1 of what the processes have of a vector over P, altogether.
     fn solve(&self, mut part: Vec<f64>) -> Result<Vec<f64>> {
-        self.sum(&mut part);
+        self.scope.sum(&self.session, &mut part);
         let mut y = vec![0.0; part.len()];
         self.solver.solve(&part, &mut y)?;
         Ok(y)
@@ -140,11 +130,9 @@ impl Subspace for Patch {
         self.own.iter().for_each(|&(i, k)| residual[k] = r[i]);
         let y = self.solve(residual)?;
         let mut part = vec![0.0; self.rows.len()];
-        // SAFETY: the slices are as long as the vectors they are placed in and outlive the call, which reads one and writes to the other.
-        unsafe {
-            let (y, part) = (self.parts[1].place(y.as_ptr())?, self.parts[0].place(part.as_mut_ptr())?);
-            petsc!(MatMult(self.columns, y.vec(), part.vec()))?;
-        }
+        // SAFETY: the product reads one and writes to the other.
+        let product = |y, part| unsafe { petsc!(MatMult(self.columns, y, part)) };
+        self.parts[1].map(("y", &y), &self.parts[0], ("A y", &mut part), product)?;
         self.rows.iter().zip(&part).for_each(|(&i, ay)| r[i] -= ay);
         self.own.iter().for_each(|&(i, k)| x[i] += y[k]);
         Ok(())
@@ -154,10 +142,8 @@ impl Subspace for Patch {
         let part: Vec<f64> = self.rows.iter().map(|&i| z[i]).collect();
         let mut az = vec![0.0; self.parts[1].len()];
         // SAFETY: as above.
-        unsafe {
-            let (part, az) = (self.parts[0].place(part.as_ptr())?, self.parts[1].place(az.as_mut_ptr())?);
-            petsc!(MatMultTranspose(self.columns, part.vec(), az.vec()))?;
-        }
+        let product = |part, az| unsafe { petsc!(MatMultTranspose(self.columns, part, az)) };
+        self.parts[0].map(("z", &part), &self.parts[1], ("A z", &mut az), product)?;
         let y = self.solve(az)?;
         self.own.iter().for_each(|&(i, k)| z[i] -= y[k]);
         Ok(())

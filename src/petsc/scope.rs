@@ -1,8 +1,10 @@
 //! Which processes own an object together.
 
 use super::Session;
+use mpi::collective::SystemOperation;
 use mpi::ffi::{MPI_Comm, RSMPI_COMM_SELF};
 use mpi::raw::AsRaw;
+use mpi::traits::CommunicatorCollectives;
 
 /// The processes that own an object; calls on one of all processes are collective.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,6 +22,14 @@ impl Scope {
             // SAFETY: the constant of MPI itself.
             Scope::Process => unsafe { RSMPI_COMM_SELF },
             Scope::World => session.world().as_raw(),
+        }
+    }
+
+    /// Adds up what its processes have.
+    pub(super) fn sum(self, session: &Session, values: &mut [f64]) {
+        if self == Scope::World {
+            let mine = values.to_vec();
+            session.world().all_reduce_into(&mine[..], values, SystemOperation::sum());
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::library::petsc;
 use super::{Int, Scope, Session, ffi};
-use crate::error::Result;
+use crate::error::{Error, Kind, Result};
 use std::ptr::{null, null_mut};
 
 /// PETSC_DETERMINE: the sum over the processes.
@@ -16,7 +16,7 @@ pub(super) struct Vector {
 }
 
 impl Vector {
-    /// A vector without memory of its own, for [`place`](Self::place).
+    /// A vector without memory of its own, for [`map`](Self::map).
     pub(super) fn new(session: &Session, scope: Scope, rows: usize, block_size: usize) -> Result<Vector> {
         let (comm, mut vec) = (scope.comm(session), null_mut());
         let (block, len, rows) = (block_size as Int, rows, rows as Int);
@@ -58,15 +58,22 @@ impl Vector {
         self.len
     }
 
-    /// Lets the vector use memory of the caller until the guard is dropped.
+    /// Has `call` read the slice `x` as this vector and write to the slice `y` as another one; both have their names in messages.
     ///
-    /// # Safety
-    /// The memory is as long as the vector, lives as long as the guard, and is writable and nobody else's if PETSc will write to the
-    /// vector.
-    pub(super) unsafe fn place(&self, values: *const f64) -> Result<Placed<'_>> {
-        // SAFETY: the caller's promise.
-        unsafe { petsc!(VecPlaceArray(self.vec, values)) }?;
-        Ok(Placed(self))
+    /// # Errors
+    /// A slice that is not as long as its vector; those of the call.
+    pub(super) fn map(
+        &self,
+        (x_name, x): (&str, &[f64]),
+        to: &Vector,
+        (y_name, y): (&str, &mut [f64]),
+        call: impl FnOnce(ffi::Vec, ffi::Vec) -> Result<()>,
+    ) -> Result<()> {
+        same(x_name, x.len(), self.len)?;
+        same(y_name, y.len(), to.len)?;
+        let _read = Placed::new(self, x.as_ptr())?;
+        let _written = Placed::new(to, y.as_mut_ptr())?;
+        call(self.vec, to.vec)
     }
 }
 
@@ -77,12 +84,14 @@ impl Drop for Vector {
     }
 }
 
-/// A vector over memory of the caller.
-pub(super) struct Placed<'a>(&'a Vector);
+/// A vector over memory as long as it is, until this is dropped.
+struct Placed<'a>(&'a Vector);
 
-impl Placed<'_> {
-    pub(super) fn vec(&self) -> ffi::Vec {
-        self.0.vec
+impl<'a> Placed<'a> {
+    fn new(vector: &'a Vector, values: *const f64) -> Result<Self> {
+        // SAFETY: nothing is read or written before a call of PETSc, which [`Vector::map`] makes while the slices live.
+        unsafe { petsc!(VecPlaceArray(vector.vec, values)) }?;
+        Ok(Placed(vector))
     }
 }
 
@@ -91,4 +100,12 @@ impl Drop for Placed<'_> {
         // SAFETY: an array was placed, or there were no guard.
         let _ = unsafe { petsc!(VecResetArray(self.0.vec)) };
     }
+}
+
+/// Checks the length of a slice.
+pub(super) fn same(what: &str, length: usize, rows: usize) -> Result<()> {
+    if length == rows {
+        return Ok(());
+    }
+    Err(Error::new(Kind::Solver, format!("{what} has {length} entries for a matrix of {rows} rows")))
 }

@@ -3,7 +3,7 @@
 use super::elasticity::{Constants, ElasticitySpec, RegionSpec};
 use super::order::Order;
 use crate::error::{Located, Place};
-use crate::expression::{Differentiable, Field};
+use crate::expression::{Expression, Field};
 use crate::petsc::{begins_options, is_family};
 
 /// A body: a named group of cells, its elasticity, supports and loads; or, in a scene, as many bodies as its name, a
@@ -29,7 +29,7 @@ pub struct BodySpec {
     /// Factor of the body force at a step of a history; 1 without one.
     pub force_factor: f64,
     /// A known displacement to compare with, if any: as many components as the scene has dimensions, of x, y (z).
-    pub exact: Option<Vec<Differentiable>>,
+    pub exact: Option<Vec<Expression>>,
 }
 
 impl BodySpec {

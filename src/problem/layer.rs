@@ -1,6 +1,6 @@
 //! Laws of layers: their forms and parameters.
 
-use crate::expression::{Differentiable, Field};
+use crate::expression::{Expression, Field};
 use std::sync::Arc;
 
 /// Law of a Winkler layer.
@@ -22,7 +22,7 @@ pub enum LayerSpec {
     /// An expression p(c), which may also use the coordinates.
     Pressure {
         /// The expression; its first variable is c.
-        law: Differentiable,
+        law: Expression,
         /// Compression beyond which p goes on linearly, if given.
         up_to: Option<f64>,
     },

@@ -6,15 +6,6 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Sizes of elements other than those that a Gmsh script asks for.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Sizing {
-    /// A field of sizes for Gmsh to follow: a view of its own (`.pos`).
-    View(Arc<str>),
-    /// This many times those of the script. Structured meshes stay as they are.
-    Times(f64),
-}
-
 /// What a Gmsh script may take and do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Guard {
@@ -48,8 +39,8 @@ pub enum MeshSource {
         set: Vec<(String, f64)>,
         /// Where each name stands.
         places: Vec<Place>,
-        /// Sizes of elements instead of the script's own; no scene file has them.
-        sizes: Option<Sizing>,
+        /// Sizes of elements for Gmsh to follow instead of the script's own, a view of Gmsh (`.pos`); no scene file has them.
+        sizes: Option<Arc<str>>,
         /// What it may take and do.
         guard: Guard,
     },

@@ -1,6 +1,6 @@
 //! What a Rust program adds to a scene by name: laws of layers, rules for gamma.
 
-use crate::error::{Error, Kind, Result, nearest};
+use crate::error::{Error, Kind, Result};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::rc::Rc;
@@ -21,10 +21,8 @@ impl<T: ?Sized> Own<T> {
     pub fn get(&self, what: &str, name: &str) -> Result<&T> {
         self.0.get(name).map(|own| &**own).ok_or_else(|| {
             let error = Error::new(Kind::Scene, format!("no {what} is called `{name}`"));
-            match nearest(name, self.0.keys().map(String::as_str)) {
-                Some(near) => error.help(format!("did you mean `{near}`?")),
-                None => error.help(format!("give the scene a {what} of this name")),
-            }
+            let known = self.0.keys().map(String::as_str);
+            error.suggest(name, known, || format!("give the scene a {what} of this name"))
         })
     }
 }

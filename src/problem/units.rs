@@ -1,6 +1,6 @@
 //! Names of the units of a scene: words for labels. Nothing is converted.
 
-use crate::error::nearest;
+use crate::error::suggestion;
 
 /// What a unit is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,12 +47,9 @@ impl Units {
     pub fn parse(text: &str) -> Result<Self, (String, String)> {
         let known = |name: &str| {
             KNOWN.iter().find(|unit| unit.0 == name).ok_or_else(|| {
-                let all = || KNOWN.map(|unit| unit.0);
-                let near = nearest(name, all()).map(|near| format!("did you mean `{near}`?"));
-                (
-                    format!("no unit is called `{name}`"),
-                    near.unwrap_or_else(|| format!("known are {}", all().join(", "))),
-                )
+                let all = KNOWN.map(|unit| unit.0);
+                let advice = suggestion(name, all).unwrap_or_else(|| format!("known are {}", all.join(", ")));
+                (format!("no unit is called `{name}`"), advice)
             })
         };
         let example = || "for example \"mm, MPa\"".to_owned();

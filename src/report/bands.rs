@@ -1,7 +1,7 @@
 //! Bands of equal value on deformed bodies of the plane, as SVG.
 
 use super::body::{Part, bounds};
-use minijinja::{Environment, context};
+use minijinja::context;
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 use serde::Serialize;
 use std::collections::{HashMap, HashSet};
@@ -91,9 +91,7 @@ impl Canvas {
         alone: bool,
     ) -> Result<String, minijinja::Error> {
         let [width, height] = [0, 1].map(|k| (self.high[k] - self.low[k]) / self.pixel);
-        let mut environment = Environment::new();
-        environment.add_filter("num", super::words::number_of);
-        environment.render_named_str(
+        super::words::environment().render_named_str(
             "bands.svg.html",
             include_str!("bands.svg"),
             context! {

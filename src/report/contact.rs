@@ -5,7 +5,7 @@ use super::body::{Part, bounds};
 use crate::error::{Error, Kind, Result};
 use crate::output::{Plot, Series, Style};
 use crate::problem::units::{Units, label};
-use minijinja::{Environment, context};
+use minijinja::context;
 use serde::Serialize;
 use std::collections::HashMap;
 use std::path::Path;
@@ -99,17 +99,17 @@ fn map(
     let [_, most] = range(pressures.iter());
     let every = places.len().div_ceil(POINTS).max(1);
     let point = |(x, &p): (&[f64; 3], &f64)| {
-        let band = if p > 0.0 { ((p / most * BANDS as f64) as i64).min(BANDS as i64 - 1) } else { -1 };
+        let band = if p > 0.0 { bands::band(p, [0.0, most], false) as i64 } else { -1 };
         ((x[axes[0]] - low[axes[0]]) / pixel, (high[axes[1]] - x[axes[1]]) / pixel, band)
     };
     let points: Vec<_> = places.iter().zip(pressures).step_by(every).map(point).collect();
     // discs that cover their share of the box
     let radius = (width.max(1.0) * height.max(1.0) / points.len() as f64).sqrt().clamp(1.0, 12.0) * 0.62;
-    let mut environment = Environment::new();
-    environment.add_filter("num", super::words::number_of);
     let levels: Vec<f64> = (0..=BANDS).map(|band| most * band as f64 / BANDS as f64).collect();
     let context = context! { title, alone, points, radius, width, height, levels, colors => colors().to_vec() };
-    let svg = environment.render_named_str("map.svg.html", include_str!("map.svg"), context).map_err(failed)?;
+    let svg = super::words::environment()
+        .render_named_str("map.svg.html", include_str!("map.svg"), context)
+        .map_err(failed)?;
     let note = (every > 1).then(|| format!("One of {every} contact points; the table has all."));
     Ok(Picture { kind: "map", svg, note })
 }

@@ -3,7 +3,7 @@
 use super::contact::failed;
 use super::page::Results;
 use super::raster;
-use crate::error::{Error, Kind, Result, nearest};
+use crate::error::{Error, Kind, Result};
 use crate::output::write_whole;
 use std::path::{Path, PathBuf};
 
@@ -17,9 +17,11 @@ const WHAT: [&str; 5] = ["stress", "displacement", "pressure", "convergence", "a
 /// [`Kind::Usage`] for another word or ending; [`Kind::File`] when the folder lacks what is to be drawn.
 pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf>> {
     if !WHAT.contains(&what) {
-        let near = nearest(what, WHAT).map(|near| format!("did you mean `{near}`?"));
-        return Err(Error::new(Kind::Usage, format!("there is no picture called `{what}`"))
-            .help(near.unwrap_or_else(|| format!("there are {}", WHAT.join(", ")))));
+        return Err(Error::new(Kind::Usage, format!("there is no picture called `{what}`")).suggest(
+            what,
+            WHAT,
+            || format!("there are {}", WHAT.join(", ")),
+        ));
     }
     let path = out.map_or_else(|| folder.join(format!("{what}.svg")), Path::to_owned);
     let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();

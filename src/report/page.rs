@@ -6,7 +6,7 @@ use super::{bands, solid, space, words};
 use crate::error::{Error, Kind, Result};
 use crate::output::{Axis, Plot, Series, Style, safe_name, write_whole};
 use crate::problem::units::{Units, label};
-use minijinja::{Environment, UndefinedBehavior, context};
+use minijinja::{UndefinedBehavior, context};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -199,12 +199,9 @@ impl Results {
             Some(folder) => format!("cd {folder}\n{command}"),
             None => command,
         };
-        let mut environment = Environment::new();
+        let mut environment = words::environment();
         // reports of other versions may lack keys
         environment.set_undefined_behavior(UndefinedBehavior::Chainable);
-        environment.add_filter("num", words::number_of);
-        environment.add_filter("words", words::words_of);
-        environment.add_filter("without", words::without);
         let known = context! {
             report,
             units => self.units.as_ref().map(|u| context! { length => u.length, stress => u.stress, force => u.force }),

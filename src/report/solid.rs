@@ -2,6 +2,7 @@
 
 use super::bands::{BANDS, Canvas, Piece, band, range};
 use super::body::{Part, bounds};
+use nalgebra::Vector3;
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 use std::fmt::Write;
 
@@ -27,24 +28,24 @@ pub fn svg(
     scale: f64,
     alone: bool,
 ) -> Result<String, minijinja::Error> {
-    let towards = unit(TOWARDS);
-    let right = unit(cross([0.0, 0.0, 1.0], towards));
-    let axes = [right, cross(towards, right), towards];
-    let seen: Vec<Vec<[f64; 3]>> =
-        parts.iter().map(|part| part.moved(scale).iter().map(|&x| axes.map(|axis| dot(axis, x))).collect()).collect();
+    let towards = Vector3::from(TOWARDS).normalize();
+    let right = Vector3::z().cross(&towards).normalize();
+    let axes = [right, towards.cross(&right), towards];
+    let turned = |&x: &[f64; 3]| axes.map(|axis| axis.dot(&Vector3::from(x)));
+    let seen: Vec<Vec<[f64; 3]>> = parts.iter().map(|part| part.moved(scale).iter().map(turned).collect()).collect();
     let canvas = Canvas::new(bounds(seen.iter().flatten()), range(values.iter().flatten()), squares);
     let mut triangles: Vec<(f64, usize, [[i64; 2]; 3])> = Vec::new();
     for ((part, seen), values) in parts.iter().zip(&seen).zip(values) {
         for corners in &part.triangles {
             let [a, b, c] = corners.map(|corner| seen[corner as usize]);
-            let along = |to: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| to[k] - a[k]) };
-            let normal = unit(cross(along(b), along(c)));
+            let along = |to: [f64; 3]| Vector3::from(to) - Vector3::from(a);
+            let normal = along(b).cross(&along(c)).normalize();
             // what turns away is hidden by what does not
-            if normal[2] <= 0.0 || normal[2].is_nan() {
+            if normal.z <= 0.0 || normal.z.is_nan() {
                 continue;
             }
             let value = corners.iter().map(|&corner| values[corner as usize]).sum::<f64>() / 3.0;
-            let shade = ((normal[2] * SHADES as f64) as usize).min(SHADES - 1);
+            let shade = ((normal.z * SHADES as f64) as usize).min(SHADES - 1);
             let color = band(value, canvas.range, squares) * SHADES + shade;
             triangles.push((a[2] + b[2] + c[2], color, [a, b, c].map(|x| canvas.place(&x).map(|x| x.round() as i64))));
         }
@@ -68,19 +69,6 @@ fn color(number: usize) -> String {
     let share = RIM + (1.0 - RIM) * shade as f64 / (SHADES - 1) as f64;
     let [r, g, b] = [color.0, color.1, color.2].map(|part| (f64::from(part) * share).round() as u8);
     format!("#{r:02x}{g:02x}{b:02x}")
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn unit(a: [f64; 3]) -> [f64; 3] {
-    let length = dot(a, a).sqrt();
-    a.map(|x| x / length)
 }
 
 #[cfg(test)]

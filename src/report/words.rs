@@ -1,10 +1,19 @@
-//! Values of a report as words and numbers for people.
+//! Values of a report as words and numbers for people, and the templates that have them as filters.
 
-use minijinja::Value;
 use minijinja::value::{Rest, ValueKind};
+use minijinja::{Environment, Value};
+
+/// An environment of templates with the filters `num`, `words` and `without`.
+pub fn environment() -> Environment<'static> {
+    let mut environment = Environment::new();
+    environment.add_filter("num", number);
+    environment.add_filter("words", words);
+    environment.add_filter("without", without);
+    environment
+}
 
 /// A number with five digits; a dash for what is none.
-pub fn number(value: &Value) -> String {
+fn number(value: &Value) -> String {
     let Ok(value) = f64::try_from(value.clone()) else { return "–".to_owned() };
     match value.abs() {
         0.0 => "0".to_owned(),
@@ -20,23 +29,13 @@ pub fn number(value: &Value) -> String {
     }
 }
 
-/// [`number`] as a filter of templates.
-pub fn number_of(value: Value) -> String {
-    number(&value)
-}
-
-/// [`words`] as a filter of templates.
-pub fn words_of(value: Value) -> String {
-    words(&value)
-}
-
 /// Without zeros at the end of a fraction.
 fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
 /// A table as `key = value, ...`, a list as `(a, b)`; numbers as [`number`] has them.
-pub fn words(value: &Value) -> String {
+fn words(value: &Value) -> String {
     let list = || value.try_iter().into_iter().flatten();
     match value.kind() {
         ValueKind::Map => {
@@ -57,7 +56,7 @@ pub fn words(value: &Value) -> String {
 }
 
 /// A table without some of its keys.
-pub fn without(value: Value, keys: Rest<String>) -> Value {
+fn without(value: &Value, keys: Rest<String>) -> Value {
     let kept =
         value.try_iter().into_iter().flatten().filter(|key| !keys.iter().any(|other| key.as_str() == Some(other)));
     kept.map(|key| (key.to_string(), value.get_item(&key).unwrap_or_default())).collect()
@@ -77,7 +76,7 @@ mod tests {
         assert_eq!(super::number(&Value::from(())), "–");
         assert_eq!(words(&Value::from(false)), "false");
         let value = Value::from_serialize(serde_json::json!({ "power": { "B": 1e-3, "a": 0.5 }, "at": [1, 2.5] }));
-        assert_eq!(words(&without(value.clone(), Rest(vec!["at".into()]))), "power: B = 0.001, a = 0.5");
+        assert_eq!(words(&without(&value, Rest(vec!["at".into()]))), "power: B = 0.001, a = 0.5");
         assert_eq!(words(&value.get_attr("at").unwrap()), "(1, 2.5)");
     }
 }

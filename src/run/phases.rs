@@ -153,7 +153,7 @@ fn verified<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interr
     interrupt.hold();
     let mut first = None;
     let read = || {
-        let loaded = crate::mesh::load_unless::<D>(&scene.mesh, order, interrupt)?;
+        let loaded = crate::mesh::load::<D>(&scene.mesh, order, interrupt)?;
         interrupt.release()?;
         let verified = first.insert(discretize::verify(scene, loaded.mesh)?);
         Ok((session.size() > 1).then(|| verified.findings()))

@@ -233,10 +233,6 @@ impl Observer for Steps<'_> {
     fn asked(&self) -> u8 {
         self.keep.asked()
     }
-
-    fn note(&mut self, text: &str) {
-        self.keep.note(text);
-    }
 }
 
 impl Keep for Steps<'_> {

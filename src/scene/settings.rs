@@ -143,7 +143,7 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
     map["order"] = json!(body.order.degree());
     (map["fix"], map["load"], map["spring"]) = (fix.collect(), load.collect(), spring.collect());
     map["force"] = json!(body.force.as_ref().map(|force| vector(force, dimension)));
-    let exact = body.exact.as_ref().map(|exact| exact.iter().map(|u| u.plain().text()).collect::<Vec<_>>());
+    let exact = body.exact.as_ref().map(|exact| exact.iter().map(|u| u.text()).collect::<Vec<_>>());
     map["exact"] = json!(exact);
     given(map)
 }
@@ -176,7 +176,7 @@ fn contact(contact: &ContactSpec) -> Value {
         LayerSpec::Table(points) => json!({ "table": points }),
         LayerSpec::Own(name) => json!({ "own": name }),
         LayerSpec::Asperities(spec) => json!({ "asperities": asperities(spec) }),
-        LayerSpec::Pressure { law, up_to } => given(json!({ "pressure": law.plain().text(), "up_to": up_to })),
+        LayerSpec::Pressure { law, up_to } => given(json!({ "pressure": law.text(), "up_to": up_to })),
     };
     given(json!({
         "between": contact.between.each_ref().map(|name| &name.value),

@@ -60,22 +60,28 @@ impl Table {
     }
 
     /// With a key that may be left out.
-    pub fn key(mut self, name: &'static str, form: Form, about: impl Into<Cow<'static, str>>) -> Self {
-        self.keys.push(Key { name, form, about: about.into(), must: false });
-        self
+    pub fn key(self, name: &'static str, form: Form, about: impl Into<Cow<'static, str>>) -> Self {
+        self.with(Key { name, form, about: about.into(), must: false })
     }
 
     /// With a key that must be there.
-    pub fn must(mut self, name: &'static str, form: Form, about: impl Into<Cow<'static, str>>) -> Self {
-        self.keys.push(Key { name, form, about: about.into(), must: true });
+    pub fn must(self, name: &'static str, form: Form, about: impl Into<Cow<'static, str>>) -> Self {
+        self.with(Key { name, form, about: about.into(), must: true })
+    }
+
+    fn with(mut self, key: Key) -> Self {
+        self.keys.push(key);
         self
     }
 
     /// Of these keys only one can hold.
-    pub fn apart(mut self, names: &[&'static str]) -> Self {
-        for (place, one) in names.iter().enumerate() {
-            self.apart.extend(names[place + 1..].iter().map(|other| [*one, *other]));
-        }
+    pub fn apart(self, names: &[&'static str]) -> Self {
+        (1..names.len()).fold(self, |table, end| table.against(&names[end - 1..end], &names[end..]))
+    }
+
+    /// Each of some keys excludes each of others.
+    pub fn against(mut self, some: &[&'static str], others: &[&'static str]) -> Self {
+        self.apart.extend(some.iter().flat_map(|one| others.iter().map(|other| [*one, *other])));
         self
     }
 

@@ -3,12 +3,12 @@
 use super::plan::Case;
 use super::request::{Request, usage};
 use crate::error::{Error, Kind, Result};
+use crate::file::digest;
 use crate::interrupt::{self, Interrupt};
 use crate::output::safe_name;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
-use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -211,9 +211,8 @@ pub(super) fn folder_of(runs: &Path, key: &[String]) -> PathBuf {
     if name.len() <= NAME {
         return runs.join(name);
     }
-    let digest: String = Sha256::digest(&name).iter().take(6).map(|byte| format!("{byte:02x}")).collect();
     let start: String = name.chars().take(NAME / 2).collect();
-    runs.join(format!("{start}-{digest}"))
+    runs.join(format!("{start}-{:.12}", digest(&name)))
 }
 
 /// How a process ended.

@@ -4,42 +4,51 @@ use super::plan::{Case, LINEAR, Plan};
 use super::process::{RUNS, Run};
 use super::request::Request;
 use crate::error::{Error, Result};
-use crate::output::{Folder, sci, seconds};
+use crate::output::{Folder, RowFile, sci, seconds};
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::PathBuf;
 
 /// Columns of words and of the number of runs, after the key.
 const WORDS: [&str; 4] = ["runs", "status", "message", "method"];
 
+/// Where a number of a row comes from.
+enum Of {
+    /// The reports of all runs, of which it is the median.
+    Runs(&'static str),
+    /// The report of the first run.
+    First(&'static str),
+    /// Anything else.
+    Other,
+}
+
 /// Columns with a number, after the words.
-pub(super) const NUMBERS: [&str; 25] = [
-    "dofs",
-    "points",
-    "theta",
-    "seconds",
-    "spread",
-    "mesh_seconds",
-    "discretize_seconds",
-    "set_up_seconds",
-    "iterate_seconds",
-    "factor_seconds",
-    "solve_seconds",
-    "cpu_seconds",
-    "memory_mb",
-    "iterations",
-    "sweeps",
-    "inner_iterations",
-    "factorizations",
-    "dense_factorizations",
-    "residual",
-    "peak_pressure",
-    "linear_seconds",
-    "linear_solves",
-    "error",
-    "error_h1",
-    "error_energy",
+const NUMBERS: [(&str, Of); 25] = [
+    ("dofs", Of::First("/dofs")),
+    ("points", Of::Other),
+    ("theta", Of::Other),
+    ("seconds", Of::Other),
+    ("spread", Of::Other),
+    ("mesh_seconds", Of::Runs("/times/mesh")),
+    ("discretize_seconds", Of::Runs("/times/discretize")),
+    ("set_up_seconds", Of::Runs("/times/set-up")),
+    ("iterate_seconds", Of::Runs("/times/iterate")),
+    ("factor_seconds", Of::Runs("/inner_times/factor")),
+    ("solve_seconds", Of::Runs("/inner_times/solve")),
+    ("cpu_seconds", Of::Other),
+    ("memory_mb", Of::Other),
+    ("iterations", Of::First("/iterations")),
+    ("sweeps", Of::First("/sweeps")),
+    ("inner_iterations", Of::First("/inner_iterations")),
+    ("factorizations", Of::First("/factorizations")),
+    ("dense_factorizations", Of::First("/dense_factorizations")),
+    ("residual", Of::First("/residual")),
+    ("peak_pressure", Of::Other),
+    ("linear_seconds", Of::Other),
+    ("linear_solves", Of::Other),
+    ("error", Of::Other),
+    ("error_h1", Of::Other),
+    ("error_energy", Of::Other),
 ];
 
 /// One combination and what was measured.
@@ -68,7 +77,7 @@ pub(super) struct Table<'a> {
     pub rows: Vec<Row>,
     /// Rows of an earlier benchmark that are kept.
     old: Vec<Row>,
-    file: csv::Writer<File>,
+    file: RowFile,
 }
 
 /// The file of the rows.
@@ -107,26 +116,12 @@ impl Row {
         put("cpu_seconds", &|run| Some(run.cpu));
         put("memory_mb", &|run| Some(run.memory as f64 / 1e6));
         let at = |run: &Run, path: &str| run.report.pointer(path).and_then(Value::as_f64);
-        for (name, path) in [
-            ("mesh_seconds", "/times/mesh"),
-            ("discretize_seconds", "/times/discretize"),
-            ("set_up_seconds", "/times/set-up"),
-            ("iterate_seconds", "/times/iterate"),
-            ("factor_seconds", "/inner_times/factor"),
-            ("solve_seconds", "/inner_times/solve"),
-        ] {
-            put(name, &|run| at(run, path));
-        }
-        for (name, path) in [
-            ("dofs", "/dofs"),
-            ("iterations", "/iterations"),
-            ("sweeps", "/sweeps"),
-            ("inner_iterations", "/inner_iterations"),
-            ("factorizations", "/factorizations"),
-            ("dense_factorizations", "/dense_factorizations"),
-            ("residual", "/residual"),
-        ] {
-            row.numbers.extend(at(first, path).map(|value| (name, value)));
+        for (name, of) in NUMBERS {
+            match of {
+                Of::Runs(path) => put(name, &|run| at(run, path)),
+                Of::First(path) => put(name, &|_| at(first, path)),
+                Of::Other => {}
+            }
         }
         let pairs = first.report["pairs"].as_array().map_or(&[][..], Vec::as_slice);
         if !pairs.is_empty() {
@@ -247,7 +242,9 @@ impl Row {
     fn fields(&self) -> Vec<String> {
         let mut fields = self.key.clone();
         fields.extend([self.runs.to_string(), self.status.clone(), self.message.clone(), self.method.clone()]);
-        fields.extend(NUMBERS.iter().map(|name| self.number(name).map_or(String::new(), |value| format!("{value}"))));
+        fields.extend(
+            NUMBERS.iter().map(|(name, _)| self.number(name).map_or(String::new(), |value| format!("{value}"))),
+        );
         fields.push(self.error_of.clone());
         fields
     }
@@ -277,7 +274,7 @@ impl<'a> Table<'a> {
     pub fn open(folder: &'a Folder, plan: &Plan, request: &Request) -> Result<Self> {
         let mut columns = plan.columns();
         columns.extend(WORDS.map(str::to_owned));
-        columns.extend(NUMBERS.map(str::to_owned));
+        columns.extend(NUMBERS.map(|(name, _)| name.to_owned()));
         columns.push("error_of".to_owned());
         let settings = format!(
             "winkler {}\n--set {:?}\nPETSc {:?}\n--repeat {}\n--timeout {}\n--against {:?}\n",
@@ -291,11 +288,8 @@ impl<'a> Table<'a> {
         let known = std::fs::read_to_string(folder.path().join(SETTINGS)).is_ok_and(|old| old == settings);
         let old = if request.resume && known { read(folder, &columns) } else { Vec::new() };
         folder.write(SETTINGS, |out| out.write_all(settings.as_bytes()))?;
-        let mut table =
-            Self { folder, columns, rows: Vec::new(), old, file: csv::Writer::from_writer(folder.open(FILE)?.1) };
-        let header = table.columns.clone();
-        table.put(&header)?;
-        Ok(table)
+        let file = RowFile::create(folder, FILE, &columns)?;
+        Ok(Self { folder, columns, rows: Vec::new(), old, file })
     }
 
     /// The row of a case that an earlier benchmark made.
@@ -317,14 +311,9 @@ impl<'a> Table<'a> {
     /// # Errors
     /// A file that cannot be written.
     pub fn add(&mut self, row: Row) -> Result<()> {
-        self.put(&row.fields())?;
+        self.file.push(&row.fields());
         self.rows.push(row);
-        Ok(())
-    }
-
-    fn put(&mut self, fields: &[String]) -> Result<()> {
-        let written = self.file.write_record(fields).map_err(std::io::Error::from).and_then(|()| self.file.flush());
-        written.map_err(|cause| Error::file(&self.folder.path().join(FILE), "write", &cause))
+        self.file.check()
     }
 
     /// Writes all rows anew, with what only the whole table could tell.
@@ -380,7 +369,7 @@ fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
     let keys = columns.len() - NUMBERS.len() - WORDS.len() - 1;
     let row = |record: csv::StringRecord| {
         let numbers = NUMBERS.iter().enumerate();
-        let numbers = numbers.filter_map(|(k, &name)| Some((name, record[keys + WORDS.len() + k].parse().ok()?)));
+        let numbers = numbers.filter_map(|(k, &(name, _))| Some((name, record[keys + WORDS.len() + k].parse().ok()?)));
         Row {
             key: record.iter().take(keys).map(str::to_owned).collect(),
             runs: record[keys].parse().unwrap_or(0),

@@ -27,7 +27,7 @@ pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<R
         LayerSpec::Pressure { law, up_to } => {
             let size = extent(position);
             let at = |&x: &[f64; 3]| Typed::new(law, x, *up_to, size);
-            match law.plain().uses_only_first() {
+            match law.uses_only_first() {
                 true => Ok(Rc::new(at(&position[0])?)),
                 false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
             }

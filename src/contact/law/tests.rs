@@ -1,6 +1,6 @@
 use super::*;
 use crate::error::{Place, Source};
-use crate::expression::{Differentiable, Scope};
+use crate::expression::{Expression, Scope};
 use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -33,10 +33,10 @@ fn check(law: &dyn LayerLaw, scale: f64) {
     }
 }
 
-fn expression(text: &str) -> Differentiable {
+fn expression(text: &str) -> Expression {
     let source = Source { name: "scene.toml".into(), text: format!("pressure = \"{text}\"\n") };
     let place = Place { span: 11..13 + text.len(), source: Arc::new(source) };
-    Differentiable::parse(text, &place, Scope::of(&["c", "x", "y"])).unwrap_or_else(|error| panic!("{error}"))
+    Expression::parse(text, &place, Scope::of(&["c", "x", "y"])).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn typed(text: &str, end: Option<f64>) -> crate::error::Result<Typed> {

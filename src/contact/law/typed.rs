@@ -4,12 +4,12 @@ use super::quadrature::integral;
 use super::root::{meeting, root};
 use super::{LayerLaw, Response};
 use crate::error::{Error, Result, shown};
-use crate::expression::Differentiable;
+use crate::expression::Expression;
 
 /// An expression p(c) at one place, continued as a straight line beyond its end.
 #[derive(Debug, Clone)]
 pub struct Typed {
-    law: Differentiable,
+    law: Expression,
     /// Where it holds (x, y, z).
     place: [f64; 3],
     /// Compression from which it is a straight line, and the law there; infinite if it never is.
@@ -31,7 +31,7 @@ impl Typed {
     ///
     /// # Errors
     /// A refusal that points at the expression and names the compression.
-    pub fn new(law: &Differentiable, place: [f64; 3], end: Option<f64>, size: f64) -> Result<Self> {
+    pub fn new(law: &Expression, place: [f64; 3], end: Option<f64>, size: f64) -> Result<Self> {
         let mut typed = Self { law: law.clone(), place, end: f64::INFINITY, at_end: Response::default() };
         let top = end.unwrap_or(size);
         typed.refuse_outside(0.0)?;
@@ -89,24 +89,24 @@ impl Typed {
     /// p and p'.
     fn value(&self, c: f64) -> (f64, f64) {
         let [x, y, z] = self.place;
-        self.law.eval(&[c, x, y, z])
+        self.law.eval_by(0, &[c, x, y, z])
     }
 
     /// p of the expression, without its continuation.
     fn curve(&self, c: f64) -> f64 {
         let [x, y, z] = self.place;
-        self.law.plain().eval(&[c, x, y, z])
+        self.law.eval(&[c, x, y, z])
     }
 
     /// Refuses a compression for which data have no value.
     fn refuse_outside(&self, c: f64) -> Result<()> {
         let [x, y, z] = self.place;
-        self.law.plain().outside("the pressure of the layer", &[c, x, y, z]).map_or(Ok(()), Err)
+        self.law.outside("the pressure of the layer", &[c, x, y, z]).map_or(Ok(()), Err)
     }
 
     fn refuse(&self, what: String, advice: &str) -> Error {
         let [x, y, z] = self.place;
-        Error::scene(self.law.plain().place(), format!("this is no law of a layer: {what}"))
+        Error::scene(self.law.place(), format!("this is no law of a layer: {what}"))
             .because(format!("looked at ({x}, {y}, {z})"))
             .help(advice)
     }

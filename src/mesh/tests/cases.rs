@@ -11,7 +11,7 @@ fn case(script: &str, set: &[(&str, f64)]) -> Mesh<2> {
     let set: Vec<(String, f64)> = set.iter().map(|(name, value)| (name.to_string(), *value)).collect();
     let loaded: Loaded<2> = from_script(
         &located(file),
-        &set,
+        (&set, &[]),
         None,
         Order::P1,
         (&Guard::default(), &Interrupt::default()),

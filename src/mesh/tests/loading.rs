@@ -3,8 +3,8 @@
 use super::*;
 use crate::interrupt::Interrupt;
 use crate::mesh::load::from_script;
-use crate::mesh::{Origin, follows, load, view};
-use crate::problem::mesh::{MeshSource, Sizing};
+use crate::mesh::{Origin, load, view};
+use crate::problem::mesh::MeshSource;
 
 #[test]
 fn scripts_are_meshed_once_for_each_key() {
@@ -17,7 +17,7 @@ fn scripts_are_meshed_once_for_each_key() {
     let run = |n: f64, order| {
         from_script::<2>(
             &located(geo.clone()),
-            &[("n".into(), n)],
+            (&[("n".into(), n)], &[]),
             None,
             order,
             (&Guard::default(), &Interrupt::default()),
@@ -61,50 +61,15 @@ fn the_last_line_of_a_script_need_not_end() {
     let geo = folder.path().join("main.geo");
     std::fs::write(folder.path().join("part.geo"), SQUARE.trim_end()).unwrap();
     let corners = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
-    let sizes = Sizing::View(view(3, &corners, &[0.5; 3]).into());
+    let sizes = view(3, &corners, &[0.5; 3]);
     for script in [SQUARE.trim_end(), "Include 'part.geo';"] {
         std::fs::write(&geo, script).unwrap();
-        for sizes in [None, Some(&sizes)].into_iter().take(if script.contains("Include") { 1 } else { 2 }) {
+        for sizes in [None, Some(&sizes[..])].into_iter().take(if script.contains("Include") { 1 } else { 2 }) {
             let guard = (&Guard::default(), &Interrupt::default());
-            let loaded = from_script::<2>(&located(geo.clone()), &[], sizes, Order::P1, guard, &cache).unwrap();
+            let loaded = from_script::<2>(&located(geo.clone()), (&[], &[]), sizes, Order::P1, guard, &cache).unwrap();
             assert!(loaded.mesh.group("outside").is_some(), "{script}");
         }
     }
-}
-
-/// Elements twice as large are another mesh, if the script leaves them free.
-#[test]
-fn larger_elements() {
-    let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
-    let geo = folder.path().join("free.geo");
-    let run = |sizes: Option<&Sizing>| {
-        let loaded = from_script::<2>(
-            &located(geo.clone()),
-            &[],
-            sizes,
-            Order::P1,
-            (&Guard::default(), &Interrupt::default()),
-            &cache,
-        )
-        .unwrap();
-        let follows = follows(&MeshSource::Geo {
-            file: located(geo.clone()),
-            set: vec![],
-            places: vec![],
-            sizes: None,
-            guard: Guard::default(),
-        });
-        (loaded.origin, loaded.mesh.group("left").unwrap().len(), follows)
-    };
-    let free = "Rectangle(1) = {0, 0, 0, 1, 1};\nMeshSize{:} = 0.125;\nPhysical Surface(\"all\") = {1};\n\
-                Physical Curve(\"left\") = {4};\n";
-    std::fs::write(&geo, format!("SetFactory(\"OpenCASCADE\");\n{free}")).unwrap();
-    assert_eq!(run(None), (Origin::Gmsh, 8, true));
-    assert_eq!(run(Some(&Sizing::Times(2.0))), (Origin::Gmsh, 4, true));
-    assert_eq!(run(Some(&Sizing::Times(2.0))), (Origin::Cache, 4, true));
-    std::fs::write(&geo, format!("SetFactory(\"OpenCASCADE\");\n{free}Transfinite Curve{{1:4}} = 9;\n")).unwrap();
-    assert_eq!(run(Some(&Sizing::Times(2.0))), (Origin::Gmsh, 8, false));
 }
 
 #[test]
@@ -114,7 +79,7 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
     let refuse = |script: &str, set: &[(String, f64)], order| {
         let geo = folder.path().join("a.geo");
         std::fs::write(&geo, script).unwrap();
-        from_script::<2>(&located(geo), set, None, order, (&Guard::default(), &Interrupt::default()), &cache)
+        from_script::<2>(&located(geo), (set, &[]), None, order, (&Guard::default(), &Interrupt::default()), &cache)
             .unwrap_err()
             .to_string()
     };
@@ -141,12 +106,13 @@ fn mesh_files_serve_lower_orders_but_not_higher_ones() {
     for order in ["1", "2"] {
         std::fs::write(folder.path().join(order), gmsh(SQUARE, &["-2", "-order", order])).unwrap();
     }
-    let loaded = load::<2>(&source("2"), Order::P1).unwrap();
+    let load = |name: &str, order| load::<2>(&source(name), order, &Interrupt::default());
+    let loaded = load("2", Order::P1).unwrap();
     assert_eq!((loaded.origin, loaded.mesh.order, loaded.mesh.points.len()), (Origin::File, Order::P1, 15));
-    assert_eq!(load::<2>(&source("2"), Order::P2).unwrap().mesh.order, Order::P2);
-    let message = load::<2>(&source("1"), Order::P2).unwrap_err().to_string();
+    assert_eq!(load("2", Order::P2).unwrap().mesh.order, Order::P2);
+    let message = load("1", Order::P2).unwrap_err().to_string();
     assert!(message.contains("the mesh is of order 1") && message.contains("scene.toml"), "{message}");
-    let message = load::<2>(&source("3"), Order::P2).unwrap_err().to_string();
+    let message = load("3", Order::P2).unwrap_err().to_string();
     assert!(message.contains("cannot read") && message.contains("scene.toml"), "{message}");
 }
 
@@ -159,7 +125,7 @@ fn loads_at_the_same_time_do_not_meet() {
     let load = || {
         from_script::<2>(
             &located(geo.clone()),
-            &[],
+            (&[], &[]),
             None,
             Order::P1,
             (&Guard::default(), &Interrupt::default()),
@@ -189,7 +155,7 @@ fn free_meshes_in_space_by_threads() {
     let run = |threads: Option<usize>| {
         let guard = Guard { threads, ..Guard::default() };
         let limits = (&guard, &Interrupt::default());
-        let loaded = from_script::<3>(&located(geo.clone()), &[], None, Order::P1, limits, &cache).unwrap();
+        let loaded = from_script::<3>(&located(geo.clone()), (&[], &[]), None, Order::P1, limits, &cache).unwrap();
         (loaded.origin, loaded.mesh.points.len())
     };
     let ((_, usual), (origin, parallel)) = (run(None), run(Some(1)));

@@ -41,12 +41,7 @@ fn support() -> Table {
         .key("normal", Form::Field, "displacement along the outer normal of a plane surface")
         .key("symmetry", Form::Flag, "whether a plane surface slides in its plane: normal = 0")
         .key("path", Form::Text, "column of the table of load steps with its factor")
-        .apart(&["x", "normal"])
-        .apart(&["y", "normal"])
-        .apart(&["z", "normal"])
-        .apart(&["x", "symmetry"])
-        .apart(&["y", "symmetry"])
-        .apart(&["z", "symmetry"])
+        .against(&["x", "y", "z"], &["normal", "symmetry"])
         .apart(&["normal", "symmetry"])
 }
 
@@ -88,7 +83,7 @@ impl Decoder<'_> {
             spring: items("spring")?.iter().map(|item| self.spring(item)).collect::<Result<_>>()?,
             force: keys.get("force").map(|force| self.vector(force)).transpose()?,
             force_factor: 1.0,
-            exact: keys.get("exact").map(|exact| self.smooth_vector(exact)).transpose()?,
+            exact: keys.get("exact").map(|exact| self.expressions(exact)).transpose()?,
         })
     }
 

@@ -1,8 +1,8 @@
 //! What all tables need: numbers, expressions, vectors, words, files.
 
 use crate::data::Library;
-use crate::error::{Error, Located, Result, nearest};
-use crate::expression::{Differentiable, Field, Scope};
+use crate::error::{Error, Located, Result};
+use crate::expression::{Expression, Field, Scope};
 use crate::problem::pattern::Pattern;
 use crate::scene::read::{Node, Value};
 use std::path::{Path, PathBuf};
@@ -36,14 +36,12 @@ impl Decoder<'_> {
         Ok(vector)
     }
 
-    /// A vector that can be differentiated.
-    pub fn smooth_vector(&self, node: &Node) -> Result<Vec<Differentiable>> {
+    /// A vector of expressions alone.
+    pub fn expressions(&self, node: &Node) -> Result<Vec<Expression>> {
         let scope = Scope { variables: &["x", "y", "z"][..self.dimension], data: &self.data };
         let component = |item: &Node| match &item.value {
-            Value::Integer(_) | Value::Float(_) => {
-                Differentiable::parse(&item.number()?.to_string(), &item.place, scope)
-            }
-            Value::String(text) => Differentiable::parse(text, &item.place, scope),
+            Value::Integer(_) | Value::Float(_) => Expression::parse(&item.number()?.to_string(), &item.place, scope),
+            Value::String(text) => Expression::parse(text, &item.place, scope),
             _ => Err(item.expected("a number or an expression", "")),
         };
         self.components(node)?.iter().map(component).collect()
@@ -73,12 +71,10 @@ pub fn file(folder: &Path, node: &Node) -> Result<Located<PathBuf>> {
             let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
             let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
             let wanted = path.file_name().unwrap_or_default().to_string_lossy();
-            Err(node.refuse(format!("there is no file {}", path.display())).label("not there").help(
-                match nearest(&wanted, names.iter().map(String::as_str)) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => "paths are relative to the folder of the scene file".to_owned(),
-                },
-            ))
+            let error = node.refuse(format!("there is no file {}", path.display())).label("not there");
+            Err(error.suggest(&wanted, names.iter().map(String::as_str), || {
+                "paths are relative to the folder of the scene file".to_owned()
+            }))
         }
         Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
     }
@@ -91,10 +87,8 @@ pub fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Resul
         return Ok(choice.clone());
     }
     let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
-    Err(node.refuse(format!("unknown {what} `{word}`")).help(match nearest(word, names.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("it is one of {}", names.join(", ")),
-    }))
+    let otherwise = || format!("it is one of {}", names.join(", "));
+    Err(node.refuse(format!("unknown {what} `{word}`")).suggest(word, names.iter().copied(), otherwise))
 }
 
 /// The name of a group, or a pattern of such names.

@@ -16,8 +16,7 @@ pub(super) fn keys(table: Table) -> Table {
         .key("anisotropic", Form::Field.list(), UPPER)
         .key("axes", axes().form(), AXES)
         .apart(&["young", "orthotropic", "anisotropic"])
-        .apart(&["poisson", "orthotropic"])
-        .apart(&["poisson", "anisotropic"])
+        .against(&["poisson"], &["orthotropic", "anisotropic"])
 }
 
 /// The shape of `[[body.region]]`.
@@ -39,8 +38,7 @@ fn axes() -> Table {
         .key("second", Form::Field.list(), "direction on the side of axis 2")
         .key("angle", Form::Field, "angle (radian) by which x, y, z are turned")
         .key("axis", Form::Field.list(), "axis of the turn; z in the plane")
-        .apart(&["first", "angle"])
-        .apart(&["second", "angle"])
+        .against(&["first", "second"], &["angle"])
         .apart(&["first", "axis"])
 }
 

@@ -1,7 +1,7 @@
 //! `steps` of the method: shares of all loads, or a table of factors.
 
 use super::{Decoder, file};
-use crate::error::{Error, Kind, Located, Place, Result, Source, joined, nearest};
+use crate::error::{Error, Kind, Located, Place, Result, Source, joined};
 use crate::problem::body::BodySpec;
 use crate::problem::history::{COMMON, History, Step, has_common, paths};
 use crate::scene::read::{Keys, Node, Value};
@@ -45,10 +45,8 @@ impl Decoder<'_> {
         for path in bodies.iter().flat_map(paths) {
             if history.names.iter().all(|name| *name != path.value) {
                 let message = format!("the table of load steps has no column `{}`", path.value);
-                return Err(Error::scene(&path.place, message).help(match nearest(&path.value, columns()) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("its columns are {}", joined(history.names.iter().map(String::as_str))),
-                }));
+                let otherwise = || format!("its columns are {}", joined(history.names.iter().map(String::as_str)));
+                return Err(Error::scene(&path.place, message).suggest(&path.value, columns(), otherwise));
             }
         }
         if let Some(idle) = columns().find(|name| bodies.iter().flat_map(paths).all(|path| path.value != **name)) {

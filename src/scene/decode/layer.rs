@@ -2,8 +2,8 @@
 
 use super::Decoder;
 use crate::data::{Grid, Summits};
-use crate::error::{Error, Result, nearest};
-use crate::expression::{Differentiable, Scope};
+use crate::error::{Error, Result};
+use crate::expression::{Expression, Scope};
 use crate::problem::layer::{AsperitySpec, Depths, FORMS, LawForm, LayerSpec, Parameter};
 use crate::scene::read::{Keys, Node};
 use crate::scene::shape::{Form, Table};
@@ -43,10 +43,7 @@ fn asperities() -> Table {
         .key("radius", Number, "their radius")
         .key("deviation", Number, "standard deviation of their heights")
         .key("highest", Number, "height of the highest above the mean; 4 deviations")
-        .apart(&["data", "density"])
-        .apart(&["data", "radius"])
-        .apart(&["data", "deviation"])
-        .apart(&["data", "highest"])
+        .against(&["data"], &["density", "radius", "deviation", "highest"])
 }
 
 impl Decoder<'_> {
@@ -65,7 +62,7 @@ impl Decoder<'_> {
         if let Some(law) = keys.get("pressure") {
             let names: &[&'static str] = if self.dimension == 3 { &["c", "x", "y", "z"] } else { &["c", "x", "y"] };
             let scope = Scope { variables: names, data: &self.data };
-            let law = Differentiable::parse(law.string()?, &law.place, scope)?;
+            let law = Expression::parse(law.string()?, &law.place, scope)?;
             let up_to = keys.get("up_to").map(Node::number).transpose()?;
             return Ok(LayerSpec::Pressure { law, up_to });
         }
@@ -103,11 +100,9 @@ impl Decoder<'_> {
         };
         let name = named.string()?;
         let Some(data) = self.data.get(name) else {
+            let otherwise = || format!("write [data.{name}] and below it file = \"surface.csv\"");
             let error = named.refuse(format!("there are no data `{name}`"));
-            return Err(match nearest(name, self.data.keys().map(String::as_str)) {
-                Some(near) => error.help(format!("did you mean `{near}`?")),
-                None => error.help(format!("write [data.{name}] and below it file = \"surface.csv\"")),
-            });
+            return Err(error.suggest(name, self.data.keys().map(String::as_str), otherwise));
         };
         data.load()?;
         let Some(summits) = data.grid().and_then(Grid::summits) else {

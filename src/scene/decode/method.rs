@@ -1,7 +1,7 @@
 //! `[method]`: the outer iteration.
 
 use super::{Decoder, choose, history};
-use crate::error::{Result, nearest};
+use crate::error::Result;
 use crate::expression::Field;
 use crate::problem::method::{Gamma, Linear, MethodName, MethodSpec, Start};
 use crate::problem::robin::{RobinRule, Zone};
@@ -90,7 +90,6 @@ impl Decoder<'_> {
     }
 
     fn zone(&self, node: &Node) -> Result<Zone> {
-        const WORDS: [&str; 3] = ["none", "full", "active"];
         let text = node.string()?;
         match text {
             "none" => return Ok(Zone::None),
@@ -100,11 +99,9 @@ impl Decoder<'_> {
         }
         // A lone long word is a slip of one of the three, not of a variable.
         if text.len() > 2 && text.chars().all(char::is_alphabetic) {
+            let otherwise = || "psi is none, full, active, or a condition such as \"x > 1 && k < 5\"".to_owned();
             let error = node.refuse(format!("unknown zone `{text}`"));
-            return Err(match nearest(text, WORDS) {
-                Some(near) => error.help(format!("did you mean `{near}`?")),
-                None => error.help("psi is none, full, active, or a condition such as \"x > 1 && k < 5\""),
-            });
+            return Err(error.suggest(text, ["none", "full", "active"], otherwise));
         }
         Field::parse(text, &node.place, self.dimension, true, &self.data).map(Zone::Subset)
     }
