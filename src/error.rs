@@ -1,6 +1,6 @@
 //! The one error type of the program: what went wrong, where, and what to do about it.
 //!
-//! Rooms make errors as data; `cli` prints them, once (see [`Error::render`]). Not converging is not an
+//! Modules make errors as data; `cli` prints them, once (see [`Error::render`]). Not converging is not an
 //! error but a [`Status`](crate::ddm::Status) of a run.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};

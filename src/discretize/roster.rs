@@ -84,10 +84,10 @@ fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Ve
         patterns.iter().enumerate().filter(|(_, p)| p.is_plural()).map(|(table, p)| (table, p, p.rank())).collect();
     let mut members = vec![Vec::new(); patterns.len()];
     named.iter().for_each(|(&name, &table)| members[table].push(name));
-    let mut in_vain: BTreeSet<usize> = plural.iter().map(|&(table, ..)| table).collect();
+    let mut unmatched: BTreeSet<usize> = plural.iter().map(|&(table, ..)| table).collect();
     for name in mesh.group_names(D) {
         let matching: Vec<_> = plural.iter().filter(|(_, pattern, _)| pattern.matches(name)).collect();
-        in_vain.retain(|table| matching.iter().all(|(own, ..)| own != table));
+        unmatched.retain(|table| matching.iter().all(|(own, ..)| own != table));
         let Some(narrowest) = matching.iter().map(|(.., rank)| rank).max().filter(|_| !named.contains_key(name)) else {
             continue;
         };
@@ -104,7 +104,7 @@ fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Ve
         }
         members[own].push(name);
     }
-    match in_vain.first().map(|&table| &scene.bodies[table].name) {
+    match unmatched.first().map(|&table| &scene.bodies[table].name) {
         None => Ok(members),
         Some(name) => {
             let message = format!("no group of cells matches `{}`", name.value);
@@ -205,14 +205,14 @@ impl<const D: usize> Lines<'_, D> {
             }
             let after: usize = dealt.iter().map(Vec::len).sum();
             if before == after && !dealt.is_empty() {
-                return Err(self.in_vain(&name, what, kinds(line)));
+                return Err(self.acts_nowhere(&name, what, kinds(line)));
             }
         }
         Ok(dealt)
     }
 
     /// The refusal of a line that acts on no body.
-    fn in_vain(&self, on: &Located<String>, what: &str, kinds: &[usize]) -> Error {
+    fn acts_nowhere(&self, on: &Located<String>, what: &str, kinds: &[usize]) -> Error {
         if let (false, Err(error)) = (is_open(&on.value), find_group(self.mesh, on, kinds, what)) {
             return error;
         }
