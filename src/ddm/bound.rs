@@ -15,58 +15,8 @@ use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::linear::Solution;
 
-/// What an iterate in equilibrium misses.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Gap {
-    /// The gap, energy. At points of negative pressure, whose gap is infinite, the work of what the new places change there.
-    pub energy: f64,
-    /// Whether no pressure is negative, so that it is a bound.
-    pub is_bound: bool,
-    /// Largest |p - p(c)|.
-    pub mismatch: f64,
-    /// [`change`] to the new places.
-    pub change: f64,
-    /// The largest of it at a point, per area.
-    pub largest: f64,
-    /// sum omega |p - p_q| over sum omega p_q.
-    pub share: f64,
-}
-
-impl Gap {
-    /// Of compressions c and equilibrium pressures p, n each, with the places that lines of slope `rho` lead to.
-    pub fn new(model: &Model, compression: &[f64], pressure: &[f64], places: &Layer, rho: &[f64]) -> Self {
-        let mut gap = Self { is_bound: true, change: change(model, pressure, places, rho), ..Self::default() };
-        let mut apart = 0.0;
-        for (i, pair) in model.pairs.iter().enumerate() {
-            for q in model.range(i) {
-                let (point, weight) = (q - model.offset[i], model.weight[q]);
-                let (c, p) = (compression[q], pressure[q]);
-                let moved = p - places.pressure[q];
-                apart += weight * moved.abs();
-                gap.largest = gap.largest.max(moved * moved / rho[q]);
-                gap.mismatch = gap.mismatch.max((p - pair.law.pressure(point, c)).abs());
-                if p < 0.0 {
-                    gap.is_bound = false;
-                    gap.energy += weight * moved * moved / rho[q];
-                } else {
-                    gap.energy += weight * pair.law.duality_gap(point, c, p);
-                }
-            }
-        }
-        let all: f64 = places.force.iter().sum();
-        gap.share = if apart == 0.0 { 0.0 } else { apart / all };
-        gap
-    }
-}
-
-/// sum omega (p - p_q)^2/rho of pressures p to the places p_q, n each: the work of what a step changes.
-pub(super) fn change(model: &Model, pressure: &[f64], places: &Layer, rho: &[f64]) -> f64 {
-    let at = |q: usize| model.weight[q] * (pressure[q] - places.pressure[q]).powi(2) / rho[q];
-    (0..rho.len()).map(at).sum()
-}
-
 /// The relative errors by which a run of Newton's method ends.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Reached {
     /// Error in the energy norm: of the layers by the gap, of the linear step by its solver.
     pub error: f64,
@@ -77,6 +27,10 @@ pub struct Reached {
     pub pressure: f64,
     /// Share of its contact forces that a body lacks in balance, the most over all.
     pub imbalance: f64,
+    /// sum omega (p - p_q)^2/rho, an energy: what the new places change.
+    pub change: f64,
+    /// The largest of it at a point, per area.
+    pub largest: f64,
 }
 
 /// Energy that the pressures give the layers and the surfaces under them, sum omega p^2 (1/kappa + 1/rho0): that of the bodies as a
@@ -88,26 +42,42 @@ pub(super) fn contact_energy(model: &Model, places: &Layer) -> f64 {
 }
 
 impl Reached {
-    /// Of an iterate with u'Ku = `strain` and the pressures p, whose layers miss `gap`, after the linear step `step`.
+    /// Of an iterate with u'Ku = `strain` after the linear step `step`: compressions c and equilibrium pressures p, n each, and the
+    /// places that lines of slope `rho` lead to. At points of negative pressure, whose gap is infinite, the work of what the new
+    /// places change there stands for it.
     pub(super) fn new(
-        model: &Model,
-        scale: &Scale,
+        (model, scale): (&Model, &Scale),
         strain: f64,
-        gap: &Gap,
         step: &Solution,
-        p: &[f64],
+        (compression, pressure): (&[f64], &[f64]),
         places: &Layer,
+        rho: &[f64],
     ) -> Self {
+        let (mut gap, mut mismatch, mut is_bound) = (0.0, 0.0f64, step.is_exact);
+        let (mut change, mut largest) = (0.0, 0.0f64);
+        for (i, pair) in model.pairs.iter().enumerate() {
+            for q in model.range(i) {
+                let (point, weight, c, p) = (q - model.offset[i], model.weight[q], compression[q], pressure[q]);
+                let changed = (p - places.pressure[q]).powi(2) / rho[q];
+                change += weight * changed;
+                largest = largest.max(changed);
+                mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
+                gap += weight * if p < 0.0 { changed } else { pair.law.duality_gap(point, c, p) };
+                is_bound &= p >= 0.0;
+            }
+        }
         let linear = step.error;
-        let absolute = (2.0 * gap.energy).sqrt() + linear;
+        let absolute = (2.0 * gap).sqrt() + linear;
         let contact = if linear > 0.0 { contact_energy(model, places) } else { 0.0 };
         let missed = if linear > 0.0 { scale.relative(linear * linear, contact) } else { 0.0 };
-        let mismatch = if gap.mismatch == 0.0 { 0.0 } else { gap.mismatch / scale.peak(&places.pressure) };
+        let mismatch = if mismatch == 0.0 { 0.0 } else { mismatch / scale.peak(&places.pressure) };
         Self {
             error: scale.relative(absolute * absolute, strain + places.work),
-            is_bound: gap.is_bound && step.is_exact,
+            is_bound,
             pressure: mismatch.max(missed),
-            imbalance: scale.imbalance(model, &model.forces(p)),
+            imbalance: scale.imbalance(model, &model.forces(pressure)),
+            change,
+            largest,
         }
     }
 
@@ -144,21 +114,22 @@ mod tests {
     #[test]
     fn a_gap_in_closed_form() {
         let model = two_pairs();
+        // with p = 2, 4, 4, 1
         let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
-        let (c, rho) = ([0.5, 1.0, 2.0, 3.0], [2.0, 0.5, 0.25, 3.0]);
-        let p = [2.0, 5.0, 1.0, 9.0];
-        let gap = Gap::new(&model, &c, &p, &places, &rho);
-        close(gap.energy, 2.0 / 8.0 + 3.0 * (8.0 / 3.0 + 2.0 / 3.0 - 2.0));
-        assert!(gap.is_bound);
-        close(gap.mismatch, 3.0);
-        // places have p = 2, 4, 4, 1
-        close(gap.change, 2.0 * 1.0 / 0.5 + 3.0 * 9.0 / 0.25 + 0.25 * 64.0 / 3.0);
-        close(gap.share, (2.0 * 1.0 + 3.0 * 3.0 + 0.25 * 8.0) / (1.0 + 8.0 + 12.0 + 0.25));
+        let (c, rho, scale) = ([0.5, 1.0, 2.0, 3.0], [2.0, 0.5, 0.25, 3.0], Scale::default());
+        let exact = step(vec![0.0; 8], 0.0, 0.0);
+        let of = |p: [f64; 4]| Reached::new((&model, &scale), 5.0, &exact, (&c, &p), &places, &rho);
+        let energy = |reached: &Reached| reached.error.powi(2) * (5.0 + places.work) / 2.0;
+        let beside = of([2.0, 5.0, 1.0, 9.0]);
+        close(energy(&beside), 2.0 / 8.0 + 3.0 * (8.0 / 3.0 + 2.0 / 3.0 - 2.0));
+        assert!(beside.is_bound && beside.imbalance == 0.0);
+        close(beside.pressure, 3.0 / 4.0);
+        close(beside.change, 2.0 * 1.0 / 0.5 + 3.0 * 9.0 / 0.25 + 0.25 * 64.0 / 3.0);
+        close(beside.largest, 9.0 / 0.25);
         // a negative pressure leaves no bound, and counts by the work of its change
-        let gap = Gap::new(&model, &c, &[2.0, 4.0, 4.0, -1.0], &places, &rho);
-        assert!(!gap.is_bound);
-        close(gap.energy, 0.25 * 4.0 / 3.0);
-        assert_eq!(Gap::new(&model, &places.compression, &places.pressure, &places, &rho).share, 0.0);
+        let negative = of([2.0, 4.0, 4.0, -1.0]);
+        assert!(!negative.is_bound);
+        close(energy(&negative), 0.25 * 4.0 / 3.0);
     }
 
     #[test]
@@ -169,26 +140,31 @@ mod tests {
         let at = |q: usize| WEIGHT[q] * places.pressure[q].powi(2) * (1.0 / places.tangent[q] + 1.0 / slopes[q]);
         let contact = contact_energy(&model, &places);
         close(contact, at(0) + at(2) + at(3));
-        let (gap, scale) = (Gap { energy: 0.08, is_bound: true, mismatch: 0.2, ..Gap::default() }, Scale::default());
-        let work: f64 = 0.5 * 2.0 * 0.5 + 3.0 * 4.0 * 2.0 + 0.25;
-        let inexact = Reached::new(&model, &scale, 5.0, &gap, &step(vec![0.0; 8], 0.0, 0.3), &[0.0; 4], &places);
-        close(inexact.error, (0.4 + 0.3) / (5.0 + work).sqrt());
-        close(inexact.pressure, f64::max(0.2 / 4.0, 0.3 / contact.sqrt()));
-        assert!(!inexact.is_bound && inexact.imbalance == 0.0);
-        let mut exact = Reached::new(&model, &scale, 5.0, &gap, &step(vec![0.0; 8], 0.0, 0.0), &[0.0; 4], &places);
-        close(exact.error, 0.4 / (5.0 + work).sqrt());
-        close(exact.pressure, 0.05);
+        // of the first point the law has 4 c - 0.4
+        let (scale, p, rho) = (Scale::default(), [1.6, 0.0, 4.0, 1.0], [1.0; 4]);
+        let (gap, all): (f64, f64) = (0.5 * 0.4f64.powi(2) / 8.0, 5.0 + 0.5 * 1.0 + 3.0 * 8.0 + 0.25);
+        let of = |error| {
+            let step = step(vec![0.0; 8], 0.0, error);
+            Reached::new((&model, &scale), 5.0, &step, (&places.compression, &p), &places, &rho)
+        };
+        let inexact = of(0.3);
+        close(inexact.error, ((2.0 * gap).sqrt() + 0.3) / all.sqrt());
+        close(inexact.pressure, f64::max(0.4 / 4.0, 0.3 / contact.sqrt()));
+        assert!(!inexact.is_bound);
+        let mut exact = of(0.0);
+        close(exact.error, (2.0 * gap / all).sqrt());
+        close(exact.pressure, 0.1);
         assert!(exact.is_bound);
         // a further step that closes the points by 0.01, -0.03, 0 and 0.02
         let more = step(vec![0.01, -0.01, 0.0, 0.0, 0.0, -0.02, 0.0, 0.02], 0.05, 0.1);
         exact.add_rounding(&scale, 5.0, &more, &places, &places);
-        close(exact.error, (0.4 + 0.06f64.sqrt()) / (5.0 + work).sqrt());
-        close(exact.pressure, 0.05 + 0.04 / 4.0);
+        close(exact.error, ((2.0 * gap).sqrt() + 0.06f64.sqrt()) / all.sqrt());
+        close(exact.pressure, 0.1 + 0.04 / 4.0);
     }
 
     #[test]
     fn the_worst_of_all_errors() {
-        let of = |error, pressure, imbalance| Reached { error, is_bound: true, pressure, imbalance }.worst();
+        let of = |error, pressure, imbalance| Reached { error, pressure, imbalance, ..Reached::default() }.worst();
         assert_eq!([of(3.0, 1.0, 2.0), of(1.0, 3.0, 2.0), of(1.0, 2.0, 3.0)], [3.0; 3]);
         assert!(of(f64::NAN, 1.0, 2.0).is_nan() && of(1.0, 2.0, f64::NAN).is_nan() && of(1.0, f64::NAN, 2.0).is_nan());
     }

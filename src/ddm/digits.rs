@@ -1,6 +1,6 @@
 //! Digits that pressures lose where displacements are far larger than compressions.
 
-use super::start::surface_slopes;
+use super::start::{in_series, surface_slopes};
 use crate::model::{Layer, Model};
 
 /// What rounding of the gap and of both displacements, a trace vector, can make of a pressure, as a share of the largest pressure: the
@@ -13,8 +13,7 @@ pub(super) fn lost(model: &Model, trace: &[f64], layer: &Layer) -> f64 {
     let (points, slopes) = (model.points(), surface_slopes(model));
     let error = |q: usize| {
         let terms = trace[q].abs() + trace[points + q].abs() + model.gap[q].abs();
-        let spring = (layer.tangent[q].recip() + slopes[q].recip()).recip();
-        spring * f64::EPSILON * terms
+        in_series(layer.tangent[q], slopes[q]) * f64::EPSILON * terms
     };
     let most = (0..points).filter(|&q| layer.pressure[q] > 0.0).map(error).fold(0.0, f64::max);
     if most > 0.0 { most / layer.peak() } else { 0.0 }

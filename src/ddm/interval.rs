@@ -3,6 +3,7 @@
 //! The theorem asks for constants of F1' over all displacements. A layer has them on bounded ranges only, so they are taken over
 //! the level set {F1 <= F1(u0)} of the start, which an iteration that descends never leaves.
 
+use super::line::zero;
 use super::sweep::Sweeper;
 use super::sweeps::gradients;
 use crate::contact::law::LayerLaw;
@@ -91,35 +92,22 @@ fn loads(model: &Model) -> Vec<Vec<f64>> {
     model.bodies.iter().enumerate().map(load).collect()
 }
 
+/// Accuracy of the ends of a range: all but rounding.
+const DIGITS: f64 = 1e-13;
+
 /// Compressions that a point can have in the level set. F1 is convex, and what it exceeds its minimum by is at least what any
 /// one point does by itself: P(c) - P(c0) - p(c0) (c - c0) <= `excess`, the same per area.
 fn range(law: &dyn LayerLaw, point: usize, c: f64, excess: f64) -> (f64, f64) {
     let here = law.response(point, c);
     let rise = |other: f64| law.response(point, other).energy - here.energy - here.pressure * (other - c);
-    let within = |other: f64| rise(other) <= excess;
     // nothing changes below zero: an open point is open
-    let low = if c <= 0.0 { c } else { edge(|way| within(c - way), c) };
-    let first = c.max(0.0);
-    let mut way = f64::MIN_POSITIVE.sqrt().max(f64::EPSILON * first);
-    while within(first + way) && way.is_finite() {
-        way *= 4.0;
-    }
-    let high = edge(|way| within(first + way), way);
-    ((c - low).max(0.0), first + high)
-}
-
-/// The largest way up to `most` that is still inside, by bisection.
-fn edge(inside: impl Fn(f64) -> bool, most: f64) -> f64 {
-    if inside(most) {
-        return most;
-    }
-    let (mut low, mut high) = (0.0, most);
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if inside(middle) { low = middle } else { high = middle }
-    }
-    // one that is just outside: a bound must not be too small
-    high
+    let (first, open) = (c.max(0.0), c <= 0.0 || rise(0.0) <= excess);
+    let way = |side: f64| {
+        let beyond = |way: f64| rise(first + side * way) - excess;
+        zero(beyond, beyond(0.0), DIGITS).unwrap_or(f64::INFINITY)
+    };
+    let low = if open { 0.0 } else { c - way(-1.0) };
+    (low, first + way(1.0))
 }
 
 /// Least and largest p' over a range of compressions.

@@ -1,7 +1,6 @@
 //! What a run remembers of its iterates beside the last one: how far and how fast it came. It decides when a run ends and how exact
 //! inner solvers are, not what the solution is, so a run that goes on from a file begins without it.
 
-use super::history::Row;
 use super::progress::Progress;
 use super::steady::Steady;
 use super::stop::{Cycle, Floor};
@@ -26,9 +25,8 @@ pub(super) struct Last {
 pub struct Memory {
     pub(super) cycle: Cycle,
     pub(super) floor: Floor,
-    /// Pressures of earlier sweeps, and of the last.
+    /// Pressures of earlier sweeps.
     pub(super) steady: Steady,
-    pub(super) before: Option<Vec<f64>>,
     /// Of Newton's method.
     pub(super) progress: Progress,
     /// Places of the next step where a run paused: not on the laws if they have a barrier.
@@ -43,20 +41,18 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Of a run with these rows behind it and nothing else, at the floor of rounding after `patience` iterations without progress.
-    pub(super) fn new(patience: usize, rows: &[Row], foreign: usize) -> Self {
-        let earlier = rows.last().map_or(0, |row| row.sweeps);
+    /// Of a run at the floor of rounding after `patience` iterations without progress, by a solver that had made so many sweeps before.
+    pub(super) fn new(patience: usize, foreign: usize) -> Self {
         Self {
             cycle: Cycle::default(),
             floor: Floor::new(patience),
             steady: Steady::default(),
-            before: None,
             progress: Progress::default(),
             places: None,
-            sweeper: Sweeper { sweeps: earlier, solves_skipped: 0 },
+            sweeper: Sweeper::default(),
             last: None,
             sweep: None,
-            earlier,
+            earlier: 0,
             foreign,
         }
     }

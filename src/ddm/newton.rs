@@ -10,7 +10,7 @@
 //!
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
-use super::bound::{Gap, Reached};
+use super::bound::Reached;
 use super::forcing::Forcing;
 use super::line::Line;
 use super::linear::resisting;
@@ -53,10 +53,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let p = places.linear(&c);
         let met = start::meet(run.model, &c, &p, &rho);
 
-        let gap = Gap::new(run.model, &c, &p, &met, &rho);
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
         let mut measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
-        let mut reached = Reached::new(run.model, &run.scale, measured.strain, &gap, &x, &p, &met);
+        let mut reached = Reached::new((run.model, &run.scale), measured.strain, &x, (&c, &p), &met, &rho);
         exact = true;
         if run.is_enough(&reached) {
             // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
@@ -72,7 +71,8 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
                 exact = run.is_enough(&reached);
             }
         }
-        if let Some(status) = run.end_of_step(&u, &x.field, &measured, &reached, &met, linear)? {
+        let at = run.after_step((&u, &x.field), measured, &reached, &met, linear);
+        if let Some(status) = run.end_at(&at, linear)? {
             return Ok(run.end(status, u, met, linear));
         }
         // a step that knew of no contact runs through the other body
@@ -80,7 +80,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         if blind {
             search(run.model, &mut u, &x.field)?;
         }
-        let barrier = run.memory.progress.barrier(gap.change, gap.largest);
+        let barrier = run.memory.progress.barrier(reached.change, reached.largest);
         if exact {
             places = match barrier {
                 _ if blind => Layer::at(run.model, &u.trace),

@@ -10,7 +10,7 @@
 use super::acceleration::{Acceleration, Here, Step};
 use super::coefficient::{Coefficient, underconstrained};
 use super::memory::Last;
-use super::run::{End, Run, Swept};
+use super::run::{End, Run};
 use super::stop::Status;
 use super::sweep::Sweeper;
 use crate::error::Result;
@@ -51,10 +51,12 @@ pub(super) fn iterate(
             }
         };
         if k == run.rows.len() {
-            let reached = last.as_ref().map(|last| (&last.moved[..], last.length));
-            let (amplification, sweeps) = (acceleration.amplification().sqrt(), run.memory.sweeper.sweeps);
-            let swept = Swept { k, u: &u, layer: &layer, sweep: &sweep, last: reached, amplification, sweeps };
-            if let Some(status) = run.end_of_sweep(&swept, linear)? {
+            let reached = last.as_ref().map_or((None, f64::NAN), |last| (Some(&last.moved[..]), last.length));
+            let at = run.after_sweep(&u, &layer, &sweep, reached, acceleration.amplification().sqrt());
+            let paused = (at.measured.asked != 0).then_some(Status::Paused { asked: at.measured.asked });
+            let failed = sweep.failed.clone().map(Status::InnerSolver);
+            let ended = run.end_at(&at, linear)?;
+            if let Some(status) = failed.or(ended).or(paused) {
                 run.memory.sweep = Some(sweep);
                 return end(status, u, layer, weight, run);
             }

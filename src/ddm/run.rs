@@ -7,7 +7,6 @@ use super::history::{Observer, Row};
 use super::memory::Memory;
 use super::origin::Origin;
 use super::scale::Scale;
-use super::steady::most_apart;
 use super::stop::{Status, relative_increment};
 use super::sweep::Sweep;
 use crate::error::Result;
@@ -15,7 +14,7 @@ use crate::model::Model;
 use crate::model::body::Energy;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
-use crate::model::linear::{Failure, LinearStep};
+use crate::model::linear::LinearStep;
 use crate::problem::stop::StopRule;
 use std::time::Instant;
 
@@ -88,37 +87,6 @@ impl Run<'_> {
         }
     }
 
-    /// The row of iterate number `k`, reached by moving its traces by `moved` (none for a start), without its errors.
-    pub fn row(&self, k: usize, u: &Field, moved: Option<&[f64]>, measured: &Measured, closed: usize) -> Row {
-        let mut trace = u.trace.clone();
-        if let Some(origin) = &self.origin {
-            crate::linalg::axpy(1.0, origin.trace(), &mut trace);
-        }
-        let of = |body: usize| match moved {
-            None => f64::NAN,
-            Some(moved) => relative_increment(&self.model.of_body(body, moved), &self.model.of_body(body, &trace)),
-        };
-        let increments: Vec<f64> = (0..self.model.bodies.len()).map(of).collect();
-        Row {
-            iteration: k,
-            increment: increments.iter().copied().fold(f64::NAN, f64::max),
-            increments,
-            energy: measured.f1 + self.origin.as_ref().map_or(0.0, |origin| origin.energy),
-            closed,
-            points: self.model.points(),
-            factorizations: measured.factorizations,
-            inner_iterations: measured.inner_iterations,
-            seconds: self.earlier + self.began.elapsed().as_secs_f64(),
-            ..Row::default()
-        }
-    }
-
-    /// Shows a row and keeps it.
-    pub fn push(&mut self, row: Row) {
-        self.observer.row(&row);
-        self.rows.push(row);
-    }
-
     /// The end of Newton's method at an iterate with its layers.
     pub fn end(&self, status: Status, iterate: Field, layer: Layer, linear: &dyn LinearStep) -> End {
         End { status, iterate, layer, weight: Vec::new(), sweeps: self.sweeps(linear), skipped: 0 }
@@ -134,141 +102,170 @@ impl Run<'_> {
         self.stop.residual.is_some_and(|tolerance| reached.worst() <= tolerance)
     }
 
-    /// Ends a step of Newton's method along x to u: its row, and the status if the run ends there.
+    /// Shows and keeps the row of an iterate; the status if the run ends there.
     ///
     /// # Errors
     /// Failures of the solver library.
-    pub fn end_of_step(
-        &mut self,
-        u: &Field,
-        x: &Field,
-        measured: &Measured,
-        reached: &Reached,
-        places: &Layer,
-        linear: &mut dyn LinearStep,
-    ) -> Result<Option<Status>> {
-        let k = self.rows.len() + 1;
-        let mut row = self.row(k, u, Some(&x.trace), measured, places.closed);
-        (row.residual, row.error, row.is_bound) = (reached.worst(), reached.error, reached.is_bound);
-        (row.gamma, row.sweeps) = (1.0, self.sweeps(linear));
+    pub fn end_at(&mut self, at: &Iterate, linear: &mut dyn LinearStep) -> Result<Option<Status>> {
+        let row = self.row(at);
         let increment = row.increment;
-        self.push(row);
-        let worst = reached.worst();
-        // pressures of compressions that are far away may be beyond the range of numbers: the places are not
-        if let Some(body) = not_finite(self.model, x, if worst.is_nan() { worst } else { 0.0 }) {
+        self.observer.row(&row);
+        self.rows.push(row);
+        let broken = |body: &usize| self.model.trace_ranges(*body).flatten().any(|i| !at.step.trace[i].is_finite());
+        let broken = (0..self.model.bodies.len()).find(broken);
+        if let Some(body) = broken.or((!at.is_finite).then_some(0)) {
             return Ok(Some(Status::NotFinite { body }));
         }
-        if self.stop.is_met(worst, increment) {
+        if at.is_still && self.stop.is_met(at.residual, increment) {
             return Ok(Some(Status::Converged));
         }
         if let Some(balance) = &mut self.balance
-            && balance.is_met(self.model, linear, u, places, reached.error)?
+            && balance.is_met(self.model, linear, at.u, at.layer, at.error)?
         {
             return Ok(Some(Status::Converged));
         }
-        if self.memory.floor.is_reached(worst) {
-            let floor = rounding(self.model, u, places).sqrt();
-            let reference = self.scale.energy(measured.strain + places.work).sqrt();
-            if reached.error * reference <= floor {
-                return Ok(Some(Status::RoundoffLimited));
-            }
+        if let Some(period) = at.period {
+            return Ok(Some(Status::Cycle { period }));
         }
-        Ok((k >= self.stop.iterations).then_some(Status::IterationLimit))
+        if self.memory.floor.is_reached(at.residual) && at.missed <= rounding(self.model, at.u, at.layer) {
+            return Ok(Some(Status::RoundoffLimited));
+        }
+        Ok((at.k >= self.stop.iterations).then_some(Status::IterationLimit))
+    }
+
+    fn row(&self, at: &Iterate) -> Row {
+        let mut trace = at.u.trace.clone();
+        if let Some(origin) = &self.origin {
+            crate::linalg::axpy(1.0, origin.trace(), &mut trace);
+        }
+        let of = |body: usize| match at.moved {
+            None => f64::NAN,
+            Some(moved) => relative_increment(&self.model.of_body(body, moved), &self.model.of_body(body, &trace)),
+        };
+        let increments: Vec<f64> = (0..self.model.bodies.len()).map(of).collect();
+        Row {
+            step: 0,
+            iteration: at.k,
+            residual: at.residual,
+            increment: increments.iter().copied().fold(f64::NAN, f64::max),
+            error: at.error,
+            is_bound: at.is_bound,
+            increments,
+            gamma: at.length,
+            energy: at.measured.f1 + self.origin.as_ref().map_or(0.0, |origin| origin.energy),
+            closed: at.layer.closed,
+            points: self.model.points(),
+            sweeps: at.sweeps,
+            factorizations: at.measured.factorizations,
+            inner_iterations: at.measured.inner_iterations,
+            seconds: self.earlier + self.began.elapsed().as_secs_f64(),
+        }
+    }
+
+    /// What is known of an iterate of Newton's method after a step x to u.
+    pub fn after_step<'a>(
+        &self,
+        (u, x): (&'a Field, &'a Field),
+        measured: Measured,
+        reached: &Reached,
+        places: &'a Layer,
+        linear: &dyn LinearStep,
+    ) -> Iterate<'a> {
+        let residual = reached.worst();
+        Iterate {
+            k: self.rows.len() + 1,
+            u,
+            layer: places,
+            step: x,
+            moved: Some(&x.trace),
+            length: 1.0,
+            measured,
+            residual,
+            error: reached.error,
+            is_bound: reached.is_bound,
+            missed: reached.error.powi(2) * self.scale.energy(measured.strain + places.work),
+            sweeps: self.sweeps(linear),
+            // pressures of compressions that are far away may be beyond the range of numbers: the places are not
+            is_finite: !residual.is_nan(),
+            is_still: true,
+            period: None,
+        }
+    }
+
+    /// What is known of an iterate u at which the bodies were swept, reached by moving its traces by `moved` in a step of some length; the error
+    /// is the residual times `amplification`, as far as that is known.
+    pub fn after_sweep<'a>(
+        &mut self,
+        u: &'a Field,
+        layer: &'a Layer,
+        sweep: &'a Sweep,
+        (moved, length): (Option<&'a [f64]>, f64),
+        amplification: f64,
+    ) -> Iterate<'a> {
+        let strain: f64 = sweep.energy.iter().map(|energy| energy.strain).sum();
+        let potential: f64 = sweep.energy.iter().map(|energy| energy.potential).sum();
+        let missed = sweep.decrement.iter().sum();
+        let (factorizations, inner_iterations, asked) = (sweep.factorizations, sweep.inner_iterations, sweep.asked);
+        let f1 = potential + layer.energy.iter().sum::<f64>();
+        let residual = self.scale.relative(missed, strain + layer.work);
+        // a small residual of a slow mode is no small error: the pressures stand still, too
+        let is_balanced = |tolerance: f64| self.scale.imbalance(self.model, &layer.force) <= SPARE * tolerance;
+        let peak = self.scale.peak(&layer.pressure);
+        let steady = &self.memory.steady;
+        let is_still =
+            |tolerance| steady.is_still(residual, &layer.pressure, peak, tolerance) && is_balanced(tolerance);
+        let is_still = self.stop.residual.is_none_or(is_still) && self.stop.increment.is_none_or(is_balanced);
+        self.memory.steady.note(residual, &layer.pressure);
+        let closed = layer.compression.iter().map(|&c| c > 0.0);
+        Iterate {
+            k: self.rows.len(),
+            u,
+            layer,
+            step: &sweep.correction,
+            moved,
+            length,
+            measured: Measured { strain, f1, factorizations, inner_iterations, asked },
+            residual,
+            error: residual * amplification,
+            is_bound: false,
+            missed,
+            sweeps: self.memory.sweeper.sweeps,
+            is_finite: residual.is_finite(),
+            is_still,
+            period: self.memory.cycle.period(&u.trace, closed, residual, f1),
+        }
     }
 }
 
-/// A sweep at an iterate, and how the iterate was reached.
-pub(super) struct Swept<'a> {
-    /// Number of the iterate.
+/// An iterate, and what a loop knows of it.
+pub(super) struct Iterate<'a> {
+    /// Its number.
     pub k: usize,
     pub u: &'a Field,
     pub layer: &'a Layer,
-    pub sweep: &'a Sweep,
-    /// Change of the traces that led to it, and the length of the step.
-    pub last: Option<(&'a [f64], f64)>,
-    /// Error over residual, as far as it is known.
-    pub amplification: f64,
+    /// Where a number that is not finite shows: the last step, or the correction of the sweep.
+    pub step: &'a Field,
+    /// Change of the traces that led to it, none for a start, and the length of the step.
+    pub moved: Option<&'a [f64]>,
+    pub length: f64,
+    pub measured: Measured,
+    /// See [`Row::residual`], [`Row::error`], [`Row::is_bound`].
+    pub residual: f64,
+    pub error: f64,
+    pub is_bound: bool,
+    /// What it misses, a squared energy norm, to be compared with rounding.
+    pub missed: f64,
     /// Sweeps so far.
     pub sweeps: usize,
+    pub is_finite: bool,
+    /// Whether a small residual is a small error.
+    pub is_still: bool,
+    /// That of a cycle.
+    pub period: Option<usize>,
 }
-
-impl Run<'_> {
-    /// Ends a sweep: the row of its iterate, and the status if the run ends there.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    pub fn end_of_sweep(&mut self, swept: &Swept, linear: &mut dyn LinearStep) -> Result<Option<Status>> {
-        let Swept { k, u, layer, sweep, last, .. } = *swept;
-        let strain: f64 = sweep.energy.iter().map(|energy| energy.strain).sum();
-        let potential: f64 = sweep.energy.iter().map(|energy| energy.potential).sum();
-        let decrement: f64 = sweep.decrement.iter().sum();
-        let measured = Measured {
-            strain,
-            f1: potential + layer.energy.iter().sum::<f64>(),
-            factorizations: sweep.factorizations,
-            inner_iterations: sweep.inner_iterations,
-            asked: sweep.asked,
-        };
-        let mut row = self.row(k, u, last.map(|last| last.0), &measured, layer.closed);
-        row.residual = self.scale.relative(decrement, strain + layer.work);
-        row.error = row.residual * swept.amplification;
-        row.gamma = last.map_or(f64::NAN, |last| last.1);
-        row.sweeps = swept.sweeps;
-        let (residual, error, increment) = (row.residual, row.error, row.increment);
-        self.push(row);
-        if let Some((body, reason)) = &sweep.failed {
-            let failure = Failure { body: Some(*body), reason: reason.clone() };
-            return Ok(Some(Status::InnerSolver(failure)));
-        }
-        if let Some(body) = not_finite(self.model, &sweep.correction, residual) {
-            return Ok(Some(Status::NotFinite { body }));
-        }
-        let imbalance = self.scale.imbalance(self.model, &layer.force);
-        // a small residual of a slow mode is no small error: the pressures stand still, too
-        let steady = self.stop.residual.is_none_or(|tolerance| {
-            let before = self.memory.before.replace(layer.pressure.clone());
-            let moved = before.map_or(0.0, |before| most_apart(&before, &layer.pressure));
-            let peak = self.scale.peak(&layer.pressure);
-            let missing = self.memory.steady.missing(residual, &layer.pressure, peak);
-            moved <= MOVED * tolerance * peak && missing <= tolerance * peak && imbalance <= SPARE * tolerance
-        });
-        let steady = steady && self.stop.increment.is_none_or(|tolerance| imbalance <= SPARE * tolerance);
-        if self.stop.is_met(residual, increment) && steady {
-            return Ok(Some(Status::Converged));
-        }
-        self.memory.steady.note(residual, &layer.pressure);
-        if let Some(balance) = &mut self.balance
-            && balance.is_met(self.model, linear, u, layer, error)?
-        {
-            return Ok(Some(Status::Converged));
-        }
-        let closed = layer.compression.iter().map(|&c| c > 0.0);
-        if let Some(period) = self.memory.cycle.period(&u.trace, closed, residual, measured.f1) {
-            return Ok(Some(Status::Cycle { period }));
-        }
-        if self.memory.floor.is_reached(residual) && decrement <= rounding(self.model, u, layer) {
-            return Ok(Some(Status::RoundoffLimited));
-        }
-        if k >= self.stop.iterations {
-            return Ok(Some(Status::IterationLimit));
-        }
-        Ok((measured.asked != 0).then_some(Status::Paused { asked: measured.asked }))
-    }
-}
-
-/// How far the last step may have moved a pressure, relative to the largest, in units of the residual that is asked for. If a sweep
-/// leaves the share f of an error, its step is (1 - f)/f times what is left: at most 3 times, unless f is below a quarter.
-const MOVED: f64 = 3.0;
 
 /// Factor on the tolerance of the residual for the balance of forces, which is measured by motions and not by energy.
 const SPARE: f64 = 10.0;
-
-/// A body in which a number is not finite, if the error is none.
-pub(super) fn not_finite(model: &Model, step: &Field, error: f64) -> Option<usize> {
-    let broken = |body: &usize| model.trace_ranges(*body).flatten().any(|i| !step.trace[i].is_finite());
-    let first = (0..model.bodies.len()).find(broken);
-    if error.is_finite() { first } else { first.or(Some(0)) }
-}
 
 /// What rounding alone can make of an iterate, squared energy norm: of K u, of forces, and of compressions, which a stiff layer
 /// answers with forces of its own.

@@ -159,66 +159,87 @@ pub fn solve(
         Start::Found(rigid) => Ok((**rigid).clone()),
         _ => infeasible(model),
     };
-    let rigid = match found {
-        Ok(rigid) => rigid,
-        Err(status) => return Ok(Outcome::early(status, model, method)),
-    };
-    let floats = model.bodies.iter().any(|slot| !slot.motions.is_empty());
-    let begin = std::mem::take(&mut settings.start);
-    let mut trace = rigid.trace.clone();
-    if let Start::Trace(given) = &begin {
-        trace.clone_from(given);
-    }
-    let scale = Scale::new(model, &[&vec![0.0; 2 * model.points()], &trace]);
-    let places = places(model, &begin, &rigid);
-    // an estimate of the discretisation's error needs the iterates whole
-    let origin = if floats && settings.balance.is_none() { Origin::take(model, &rigid.amounts) } else { None };
+    let (begin, balance) = (std::mem::take(&mut settings.start), settings.balance.take());
     let patience = PATIENCE[usize::from(matches!(method, Method::Sweeps { .. }))];
-    let (mut rows, mut memory) = (Vec::new(), None);
-    let resumed = match begin {
-        Start::Resume(field) => Some(field),
-        Start::Continue(state) => {
-            (rows, memory) = (state.rows, state.memory);
-            trace.clone_from(&state.field.trace);
-            if memory.is_some() || fits(model, &state.field) { Some(state.field) } else { None }
-        }
-        _ => None,
-    };
-    let relative = |mut field| {
-        origin.iter().for_each(|origin| origin.take_from(model, &mut field));
-        field
-    };
-    let resumed = resumed.map(relative);
     let foreign = method.linear().sweeps();
     let mut run = Run {
         model,
         stop: &settings.stop,
-        balance: settings.balance.take().map(Balance::new),
+        balance: balance.map(Balance::new),
         observer,
         began,
-        earlier: rows.last().map_or(0.0, |row: &Row| row.seconds),
-        origin,
-        scale,
-        memory: memory.unwrap_or_else(|| Memory::new(patience, &rows, foreign)),
-        rows,
+        earlier: 0.0,
+        origin: None,
+        scale: Scale::default(),
+        memory: Memory::new(patience, foreign),
+        rows: Vec::new(),
     };
-    let end = match method {
-        Method::Newton(linear) => {
-            let start = |origin: &mut Origin| std::mem::take(&mut origin.rest);
-            let u = resumed.or_else(|| run.origin.as_mut().map(start)).unwrap_or_else(|| Field::rest(run.model));
-            newton::iterate(&mut run, &mut **linear, u, places)?
-        }
-        Method::Sweeps { acceleration, coefficient, linear } => {
-            if let Some(origin) = &run.origin {
-                crate::linalg::axpy(-1.0, origin.trace(), &mut trace);
-            }
-            match resumed.map_or_else(|| extend(run.model, &trace), |field| Ok(Ok(field)))? {
-                Ok(u) => robin::iterate(&mut run, &mut **acceleration, coefficient, &mut **linear, u)?,
-                Err(failure) => run.end(Status::InnerSolver(failure), Field::rest(run.model), places, &**linear),
-            }
+    let end = match found {
+        Ok(rigid) => run.begin(method, begin, rigid)?,
+        Err(status) => {
+            let rest = Field::rest(run.model);
+            let layer = Layer::at(run.model, &rest.trace);
+            run.end(status, rest, layer, method.linear())
         }
     };
-    run.conclude(end, method, settings)
+    run.conclude(end, method, settings.interval)
+}
+
+impl Run<'_> {
+    /// Runs from a start.
+    fn begin(&mut self, method: &mut Method, begin: Start, rigid: RigidStart) -> Result<End> {
+        let mut trace = match &begin {
+            Start::Trace(given) => given.clone(),
+            _ => rigid.trace.clone(),
+        };
+        self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &trace]);
+        let places = places(self.model, &begin, &rigid);
+        let floats = self.model.bodies.iter().any(|slot| !slot.motions.is_empty());
+        // an estimate of the discretisation's error needs the iterates whole
+        if floats && self.balance.is_none() {
+            self.origin = Origin::take(self.model, &rigid.amounts);
+        }
+        let resumed = match begin {
+            Start::Resume(field) => Some(field),
+            Start::Continue(state) => {
+                self.earlier = state.rows.last().map_or(0.0, |row| row.seconds);
+                trace.clone_from(&state.field.trace);
+                let whole = state.memory.is_some() || fits(self.model, &state.field);
+                match state.memory {
+                    Some(memory) => self.memory = memory,
+                    None => {
+                        self.memory.earlier = state.rows.last().map_or(0, |row| row.sweeps);
+                        self.memory.sweeper.sweeps = self.memory.earlier;
+                    }
+                }
+                self.rows = state.rows;
+                whole.then_some(state.field)
+            }
+            _ => None,
+        };
+        let resumed = resumed.map(|mut field| {
+            self.origin.iter().for_each(|origin| origin.take_from(self.model, &mut field));
+            field
+        });
+        match method {
+            Method::Newton(linear) => {
+                let start = |origin: &mut Origin| std::mem::take(&mut origin.rest);
+                let u = resumed.or_else(|| self.origin.as_mut().map(start)).unwrap_or_else(|| Field::rest(self.model));
+                newton::iterate(self, &mut **linear, u, places)
+            }
+            Method::Sweeps { acceleration, coefficient, linear } => {
+                if let Some(origin) = &self.origin {
+                    crate::linalg::axpy(-1.0, origin.trace(), &mut trace);
+                }
+                match resumed.map_or_else(|| extend(self.model, &trace), |field| Ok(Ok(field)))? {
+                    Ok(u) => robin::iterate(self, &mut **acceleration, coefficient, &mut **linear, u),
+                    Err(failure) => {
+                        Ok(self.end(Status::InnerSolver(failure), Field::rest(self.model), places, &**linear))
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// Whether a field has the states that the bodies work with: as long, and with its traces to half the digits. Collective.
@@ -287,41 +308,19 @@ impl Outcome {
         let Self { iterate: field, layer, rows, memory, .. } = self;
         Box::new(State { field, compression: layer.compression, rows, memory })
     }
-
-    /// Of a run that ended before its first iterate.
-    fn early(status: Status, model: &Model, method: &Method) -> Self {
-        let iterate = Field::rest(model);
-        Self {
-            status,
-            iterations: 0,
-            sweeps: 0,
-            solves_skipped: 0,
-            layer: Layer::at(model, &iterate.trace),
-            iterate,
-            rows: Vec::new(),
-            memory: None,
-            method: method.name(),
-            joint: BodyCounts::default(),
-            linear_step: String::new(),
-            spectrum: None,
-            rounding: 0.0,
-            forecast: None,
-            interval: None,
-        }
-    }
 }
 
 impl Run<'_> {
     /// The result of a loop's end.
-    fn conclude(self, end: End, method: &mut Method, settings: &Settings) -> Result<Outcome> {
-        let Run { model, rows, origin, memory, .. } = self;
+    fn conclude(self, end: End, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
+        let Run { model, stop, rows, origin, memory, .. } = self;
         let End { status, mut iterate, layer, weight, sweeps, skipped } = end;
         let mut found = None;
         let (spectrum, factor, updates) = match method {
             Method::Newton(linear) => (linear.spectrum(), None, rows.len()),
             Method::Sweeps { acceleration, .. } => {
                 acceleration.conclude(model, &layer, &weight);
-                if let ([first, .., last], true) = (&rows[..], settings.interval && status.is_solved()) {
+                if let ([first, .., last], true) = (&rows[..], wants_interval && status.is_solved()) {
                     found = interval(model, &layer, first.energy - last.energy)?;
                 }
                 (acceleration.spectrum(), acceleration.factor(), rows.len().saturating_sub(1))
@@ -339,7 +338,7 @@ impl Run<'_> {
             iterate,
             layer,
             rounding,
-            forecast: settings.stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
+            forecast: stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
             rows,
             memory: Some(memory),
             method: method.name(),

@@ -72,11 +72,8 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
             let slope = slopes(model, |q| approach[q] > 0.0);
             let settled = slope.iter().zip(&rigid.slope).all(|(new, old)| (new - old).abs() <= SETTLED * old);
             // a contact that opens as a whole keeps its slope
-            slope
-                .into_iter()
-                .zip(&mut rigid.slope)
-                .filter(|(new, _)| new.is_finite())
-                .for_each(|(new, old)| *old = new);
+            let found = slope.into_iter().zip(&mut rigid.slope).filter(|(new, _)| new.is_finite());
+            found.for_each(|(new, old)| *old = new);
             if settled {
                 break;
             }
@@ -162,6 +159,12 @@ fn slopes(model: &Model, closed: impl Fn(usize) -> bool) -> Vec<f64> {
     slopes
 }
 
+/// Stiffness of two springs in a row, either of which may be zero or infinite.
+pub fn in_series(a: f64, b: f64) -> f64 {
+    (a.recip() + b.recip()).recip()
+}
+
+#[derive(Clone)]
 struct Rigid<'a> {
     model: &'a Model,
     motions: &'a Motions<'a>,
@@ -200,15 +203,7 @@ impl Rigid<'_> {
 
     /// omega Pi'': springs of law and surfaces in series.
     fn springs(&self, places: &Layer) -> Vec<f64> {
-        let series = |q: usize| {
-            let (law, surface) = (places.tangent[q], self.slope[q]);
-            let slope = match (law.is_finite(), surface.is_finite()) {
-                (true, true) => law * surface / (law + surface),
-                (true, false) => law,
-                _ => surface,
-            };
-            self.model.weight[q] * slope
-        };
+        let series = |q: usize| self.model.weight[q] * in_series(places.tangent[q], self.slope[q]);
         (0..self.slope.len()).map(series).collect()
     }
 
@@ -322,8 +317,7 @@ impl Rigid<'_> {
         let mut gap = self.gap.clone();
         let mut bare = vec![false; gap.len()];
         idle.iter().for_each(|&q| (gap[q], bare[q]) = (gap[q] - room, true));
-        let (work, slope) = (self.work.clone(), self.slope.clone());
-        let wider = Rigid { model: self.model, motions: self.motions, work, slope, gap, bare, grounded: true };
+        let wider = Rigid { gap, bare, ..self.clone() };
         // layers that are soft at first would open slowly
         if let Ok(moved) = wider.descend(amounts.clone()) {
             let approach = self.approach(&moved);

@@ -11,16 +11,27 @@ const FALLEN: f64 = 0.1;
 /// Share of the last kept residual at which another iterate is kept.
 const NEXT: f64 = 0.3;
 
-/// Pressures of earlier iterates, with residuals that fall from each to the next.
+/// How far the last step may have moved a pressure, in units of the error that is asked for. If a sweep leaves the share f of an error,
+/// its step is (1 - f)/f times what is left: at most 3 times, unless f is below a quarter.
+const MOVED: f64 = 3.0;
+
+/// Pressures of earlier iterates, with residuals that fall from each to the next, and those of the last one.
 #[derive(Debug, Default, Clone)]
 pub struct Steady {
     past: Vec<(f64, Vec<f64>)>,
+    last: Option<Vec<f64>>,
 }
 
 impl Steady {
+    /// Whether the pressures `now` of an iterate with this residual have come to rest within a share `tolerance` of their `peak`.
+    pub fn is_still(&self, residual: f64, now: &[f64], peak: f64, tolerance: f64) -> bool {
+        let moved = self.last.as_ref().map_or(0.0, |last| most_apart(last, now));
+        moved <= MOVED * tolerance * peak && self.missing(residual, now, peak) <= tolerance * peak
+    }
+
     /// Largest estimated error of the pressures `now` of an iterate with this residual; zero if it is the first one. An error larger
     /// than their `peak` is no measure of those that follow: laws are far from linear there.
-    pub fn missing(&self, residual: f64, now: &[f64], peak: f64) -> f64 {
+    fn missing(&self, residual: f64, now: &[f64], peak: f64) -> f64 {
         let left = |(then, before): &(f64, Vec<f64>)| {
             let moved = most_apart(before, now).min(peak);
             // a residual that has not fallen tells that nothing is known
@@ -37,11 +48,12 @@ impl Steady {
         if self.past.last().is_none_or(|(then, _)| residual <= NEXT * then) {
             self.past.push((residual, pressure.to_vec()));
         }
+        self.last = Some(pressure.to_vec());
     }
 }
 
 /// Largest difference of two sets of pressures.
-pub fn most_apart(before: &[f64], now: &[f64]) -> f64 {
+fn most_apart(before: &[f64], now: &[f64]) -> f64 {
     before.iter().zip(now).fold(0.0, |most, (before, now)| most.max((now - before).abs()))
 }
 

@@ -7,6 +7,7 @@ use crate::model::Model;
 use crate::model::body::{Energy, Solved};
 use crate::model::field::{Field, residuals};
 use crate::model::layer::Layer;
+use crate::model::linear::Failure;
 
 /// Numbers that a body adds to the message of a sweep: decrement, strain, potential, failed, skipped,
 /// factorisations, inner iterations, and a product with another residual.
@@ -23,8 +24,8 @@ pub struct Sweep {
     pub decrement: Vec<f64>,
     /// Energies of the iterate in each body.
     pub energy: Vec<Energy>,
-    /// Body whose inner solver failed, with its reason where that is known.
-    pub failed: Option<(usize, String)>,
+    /// The first body whose inner solver failed, with its reason where that is known.
+    pub failed: Option<Failure>,
     /// Numeric factorisations so far, all bodies.
     pub factorizations: usize,
     /// Krylov iterations so far, all bodies.
@@ -168,7 +169,7 @@ impl Sweeper {
             sweep.decrement.push(scalars[0]);
             sweep.energy.push(Energy { strain: scalars[1], potential: scalars[2] });
             if scalars[3] != 0.0 && sweep.failed.is_none() {
-                sweep.failed = Some((index, reasons[index].clone()));
+                sweep.failed = Some(Failure { body: Some(index), reason: reasons[index].clone() });
             }
             self.solves_skipped += usize::from(scalars[4] != 0.0);
             sweep.factorizations += scalars[5] as usize;

@@ -1,19 +1,20 @@
 //! The linear step by conjugate gradients over the Robin sweep: every iteration solves each body once, independently.
 //!
-//! One iteration tells a body of its neighbours alone, so the rigid motions E that supports leave free are deflated: with the matrix
-//! H of (35) and A = E'HE, a correction z = G^-1 r becomes (I - E A^- E'H) z, what is left of it when whole bodies have moved so that
-//! they are in balance again. As K E = 0, E'H and A are sums over contact points, which every rank knows: no message, no solve.
+//! One iteration tells a body of its neighbours alone, so the rigid motions Z that supports leave free are deflated ([`Coarse`]): with the
+//! matrix H of (35), a correction z = G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z, what is left of it when whole bodies have moved so that
+//! they are in balance again. Every rank knows the contact points: no message, no solve.
 
 use super::coefficient::Coefficient;
 use super::sweep::Sweeper;
 use crate::error::Result;
-use crate::linalg::Factor;
-use crate::linalg::{axpy, dot, fit};
+use crate::linalg::{axpy, dot};
 use crate::model::Model;
+use crate::model::coarse::{Coarse, Space};
 use crate::model::field::{Field, add_forces, apply_stiffness, local_dot};
 use crate::model::linear::{Enough, Failure, LinearStep, Solution, Solved, System, Trial};
-use crate::model::rigid::{Motions, TOLERANCE};
+use crate::model::rigid::Motions;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use std::rc::Rc;
 
 /// Iterations at most: conjugate gradients lose their directions to rounding long before.
 const MOST: usize = 400;
@@ -115,16 +116,24 @@ pub(super) fn gradients(
     (enough, most): (&mut Enough, usize),
     least: f64,
 ) -> Result<std::result::Result<Found, Failure>> {
-    let coarse = Coarse::new(model, springs);
-    let mut r = residual.to_vec();
-    let mut x = Field::zero(model);
-    let mut lanczos = Lanczos { energy: coarse.start(model, &mut r, &mut x), least, ..Lanczos::default() };
+    let coarse = Coarse::new(Rc::new(Space::of(model, None)), springs);
+    // v += s Z y
+    let add = |model: &Model, s: f64, y: &DVector<f64>, v: &mut Field| {
+        coarse.add(s, y, &mut v.states);
+        axpy(s, &Motions::of(model).trace(model, y), &mut v.trace);
+    };
+    let (mut r, mut x) = (residual.to_vec(), Field::zero(model));
+    let (y, energy) = coarse.solve(&r);
+    add(model, 1.0, &y, &mut x);
+    let push: Vec<f64> = coarse.forces(&y).iter().map(|force| -force).collect();
+    add_forces(model, &push, &mut r);
+    let mut lanczos = Lanczos { energy, least, ..Lanczos::default() };
     let mut last: Option<(Field, f64, Vec<Vec<f64>>)> = None;
     let squared = loop {
         let before = last.as_ref().map_or(&r, |(_, _, r)| r);
         let sweep = sweeper.precondition(model, r.clone(), before)?;
-        if let Some((body, reason)) = sweep.failed {
-            return Ok(Err(Failure { body: Some(body), reason }));
+        if let Some(failure) = sweep.failed {
+            return Ok(Err(failure));
         }
         let rz: f64 = sweep.decrement.iter().sum();
         let error = lanczos.squared_error(rz);
@@ -133,7 +142,7 @@ pub(super) fn gradients(
             break error;
         }
         let mut p = sweep.correction;
-        coarse.deflate(model, &mut p);
+        add(model, -1.0, &coarse.part(&p.closing(), false), &mut p);
         // the flexible rule: the preconditioner may be an inexact solve
         if let Some((mut direction, old, _)) = last.take() {
             let beta = ((rz - sweep.product) / old).max(0.0);
@@ -226,62 +235,5 @@ impl Lanczos {
         let values = SymmetricEigen::new(t).eigenvalues;
         let (low, high) = (values.min(), values.max());
         (low > 0.0 && high.is_finite()).then_some((low, high))
-    }
-}
-
-/// E and A^- for springs at the contact points. Motions are numbered through body by body.
-struct Coarse<'a> {
-    springs: &'a [f64],
-    /// For each body that lives here, each of its motions as the end of a state.
-    amounts: Vec<Vec<Vec<f64>>>,
-    inverse: Factor,
-}
-
-impl<'a> Coarse<'a> {
-    fn new(model: &Model, springs: &'a [f64]) -> Self {
-        let amounts = model.bodies.iter().map(|slot| match slot.local.as_ref().and_then(|body| body.matrices()) {
-            Some(matrices) => slot.motions.iter().map(|motion| fit(matrices.traces, &motion.trace)).collect(),
-            None => Vec::new(),
-        });
-        Self { springs, amounts: amounts.collect(), inverse: Motions::of(model).springs(springs).factor(TOLERANCE) }
-    }
-
-    /// x = E A^- E'r and r -= H x; returns the squared energy norm of x. One message.
-    fn start(&self, model: &Model, r: &mut [Vec<f64>], x: &mut Field) -> f64 {
-        let mut load = Vec::new();
-        for (body, slot) in model.bodies.iter().enumerate() {
-            match self.amounts[body].is_empty() {
-                true => load.resize(load.len() + slot.motions.len(), 0.0),
-                false => load.extend(self.amounts[body].iter().map(|a| dot(a, &r[body][r[body].len() - a.len()..]))),
-            }
-        }
-        model.exchange.sum(&mut load);
-        let load = DVector::from_vec(load);
-        let motion = self.inverse.solve(&load);
-        self.add(model, 1.0, &motion, x);
-        let push: Vec<f64> = self.springs.iter().zip(x.closing()).map(|(w, s)| -w * s).collect();
-        add_forces(model, &push, r);
-        motion.dot(&load)
-    }
-
-    /// v += s E `motion`.
-    fn add(&self, model: &Model, s: f64, motion: &DVector<f64>, v: &mut Field) {
-        axpy(s, &Motions::of(model).trace(model, motion), &mut v.trace);
-        let mut first = 0;
-        for (body, slot) in model.bodies.iter().enumerate() {
-            for (amounts, i) in self.amounts[body].iter().zip(first..) {
-                let state = &mut v.states[body];
-                let end = state.len() - amounts.len();
-                axpy(s * motion[i], amounts, &mut state[end..]);
-            }
-            first += slot.motions.len();
-        }
-    }
-
-    /// z <- (I - E A^- E'H) z.
-    fn deflate(&self, model: &Model, z: &mut Field) {
-        let spring: Vec<f64> = self.springs.iter().zip(z.closing()).map(|(w, s)| w * s).collect();
-        let motion = self.inverse.solve(&Motions::of(model).work(&spring));
-        self.add(model, -1.0, &motion, z);
     }
 }

@@ -4,6 +4,7 @@
 //! point, first all of side a, then all of side b: `trace[side * points + offset[pair] + q]`.
 
 pub mod body;
+pub mod coarse;
 pub mod distribution;
 pub mod exchange;
 pub mod field;
