@@ -236,7 +236,7 @@ fn same_sweeps(ranks: &[usize], scene: &str, words: &[&str], to: f64) {
 /// bodies out, and find what one rank finds.
 #[test]
 fn bodies_of_sweeps_are_dealt_out() {
-    let cubes = |words: &[&'static str]| [&CUBES, words].concat();
+    let cubes = |words: &[&'static str]| [&["--set", "mesh.set={nl=10,nu=5}"], &CUBES[2..], words].concat();
     let newton = ["--method", "newton-robin", "--set", "solver=hypre"];
     same_sweeps(&[2, 5], "patch-3d", &cubes(&newton), 1e-8);
     same_sweeps(&[2], "patch-3d", &cubes(&["--method", "robin", "--set", "solver=hypre"]), 1e-7);
