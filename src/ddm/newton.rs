@@ -80,7 +80,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         if blind {
             search(run.model, &mut u, &x.field)?;
         }
-        let barrier = run.memory.progress.barrier(reached.change, reached.largest, run.model);
+        let barrier = run.memory.progress.barrier(reached.change, reached.largest);
         if exact {
             places = match barrier {
                 _ if blind => Layer::at(run.model, &u.trace),

@@ -1,7 +1,5 @@
 //! Steps of Newton's method that lead nowhere.
 
-use crate::model::Model;
-
 /// Recognises contact sets that follow each other in a circle, or one point at a time: of 4879 random scenes of stiff layers on few
 /// quadratic elements two came into a cycle. Then the laws have a barrier, until a step changes less than half of all before.
 #[derive(Debug, Clone)]
@@ -30,11 +28,11 @@ impl Default for Progress {
 }
 
 impl Progress {
-    /// The barrier after a step that changed this work, sum omega (p - p_q)(c_q - c), at most `largest` of it per area: on a law with a
-    /// barrier mu, p times the gap is mu where the layer is open, so it begins at the mean over the area, and falls with each step. Where that
-    /// ends without progress, it begins again where no point changes more, however few of all they are, and falls slower: close enough to the
-    /// path of the solutions over mu, Newton's method follows it.
-    pub fn barrier(&mut self, change: f64, largest: f64, model: &Model) -> f64 {
+    /// The barrier after a step that changed this work, sum omega (p - p_q)(c_q - c), and at most `largest` of it per area: on a law with a
+    /// barrier mu, p times the gap is mu where the layer is open, so it begins where no point changes more, however few of all they are, and
+    /// falls with each step. Where that ends without progress, it begins again and falls slower: close enough to the path of the solutions over
+    /// mu, Newton's method follows it.
+    pub fn barrier(&mut self, change: f64, largest: f64) -> f64 {
         self.since = if change < 0.5 * self.best { 0 } else { self.since + 1 };
         self.best = self.best.min(change);
         if self.since == 0 {
@@ -42,11 +40,10 @@ impl Progress {
         } else if self.barrier > f64::EPSILON.sqrt() * self.first {
             self.barrier *= self.rate;
         } else if self.since >= PATIENCE {
-            self.first = change / model.weight.iter().sum::<f64>();
             if self.barrier > 0.0 {
                 self.rate = self.rate.sqrt();
-                self.first = largest;
             }
+            self.first = largest;
             self.barrier = self.first;
         }
         self.barrier
