@@ -133,6 +133,15 @@ fn ranks_without_nodes() {
     assert!(!parallel.warnings().contains("no body"), "{}", parallel.warnings());
 }
 
+/// The nodes of a rigid surface are assembled where their master is, and so are cells that touch one of them alone.
+#[test]
+fn tied_nodes_on_many_ranks() {
+    let scene = ("coating", &[][..]);
+    let (serial, parallel) = (run(1, scene, "mumps"), run(12, scene, "mumps"));
+    let apart = pressures(&serial).into_iter().zip(pressures(&parallel)).map(|(a, b)| (a - b).abs());
+    assert!(apart.fold(0.0, f64::max) <= 1e-8 * serial.number("pairs/0/peak_pressure"));
+}
+
 /// What is recovered inside the bodies, their balance, and the estimate of the mesh's error are those of one rank.
 #[test]
 fn bodies_are_recovered_whole() {
