@@ -55,23 +55,6 @@ use std::rc::Rc;
 pub use surface::ContactSurface;
 pub use verify::{Findings, Verified, verify};
 
-/// What the check of the mesh of a body counted.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct FacetCounts {
-    /// Facets between two cells.
-    pub inner: usize,
-    /// Facets of the boundary.
-    pub outer: usize,
-    /// Parts that no facet joins.
-    pub parts: usize,
-}
-
-impl FacetCounts {
-    fn of(checked: &Checked) -> Self {
-        Self { inner: checked.inner, outer: checked.outer, parts: checked.parts.count }
-    }
-}
-
 /// What is known of a body besides its matrices.
 pub struct BodyInfo {
     /// Name in the scene.
@@ -83,7 +66,7 @@ pub struct BodyInfo {
     /// Cells.
     pub cells: usize,
     /// What the check of its mesh counted.
-    pub facets: FacetCounts,
+    pub facets: Checked,
     /// Degrees of freedom, supported ones included.
     pub dofs: usize,
     /// Supported degrees of freedom.
@@ -315,7 +298,7 @@ pub fn discretize<const D: usize>(
             nodes,
             points: part.known.points,
             cells,
-            facets: FacetCounts::of(&checked[index]),
+            facets: checked[index].counted(),
             dofs: D * nodes,
             supported: held.supported(),
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),

@@ -4,7 +4,6 @@ use crate::error::{Error, Kind, Result};
 use crate::model::Exchange;
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
-use mpi::datatype::PartitionMut;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -20,6 +19,19 @@ impl Ranks {
     /// The ranks of a session.
     pub fn new(session: &Session) -> Self {
         Self { session: session.clone(), messages: Cell::new(0) }
+    }
+}
+
+impl Ranks {
+    /// The bytes of one rank, on all.
+    fn from(&self, rank: usize, mut bytes: Vec<u8>) -> Vec<u8> {
+        let world = self.session.world();
+        let root = world.process_at_rank(rank as i32);
+        let mut length = bytes.len() as u64;
+        root.broadcast_into(&mut length);
+        bytes.resize(length as usize, 0);
+        bytes.chunks_mut(CHUNK).for_each(|chunk| root.broadcast_into(chunk));
+        bytes
     }
 }
 
@@ -45,28 +57,12 @@ impl Exchange for Ranks {
             return vec![mine];
         }
         self.messages.set(self.messages.get() + 1);
-        let world = self.session.world();
-        let mut counts = vec![0; self.session.size()];
-        world.all_gather_into(&(mine.len() as i32), &mut counts[..]);
-        let ends = counts.iter().scan(0, |end, count| {
-            *end += count;
-            Some(*end)
-        });
-        let ends: Vec<i32> = ends.collect();
-        let starts: Vec<i32> = ends.iter().zip(&counts).map(|(end, count)| end - count).collect();
-        let mut all = vec![0; ends.last().map_or(0, |&end| end as usize)];
-        world.all_gather_varcount_into(&mine[..], &mut PartitionMut::new(&mut all[..], &counts[..], &starts[..]));
-        starts.iter().zip(ends).map(|(&start, end)| all[start as usize..end as usize].to_vec()).collect()
+        let of_rank = |rank| self.from(rank, if rank == self.session.rank() { mine.clone() } else { Vec::new() });
+        (0..self.session.size()).map(of_rank).collect()
     }
 
-    fn tell(&self, mut mine: Vec<u8>) -> Vec<u8> {
-        let root = self.session.world();
-        let root = root.process_at_rank(0);
-        let mut length = mine.len() as u64;
-        root.broadcast_into(&mut length);
-        mine.resize(length as usize, 0);
-        mine.chunks_mut(CHUNK).for_each(|chunk| root.broadcast_into(chunk));
-        mine
+    fn tell(&self, mine: Vec<u8>) -> Vec<u8> {
+        self.from(0, mine)
     }
 
     fn deal(&self, of_rank: &mut dyn FnMut(usize) -> Vec<u8>) -> Vec<u8> {
@@ -98,7 +94,7 @@ const CHUNK: usize = 1 << 30;
 
 /// What each rank knows, in their order; collective.
 pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: &T) -> Vec<T> {
-    exchange.share(pack(mine)).iter().filter_map(|bytes| unpack(bytes)).collect()
+    exchange.share(pack(mine)).iter().filter_map(|bytes| unpack(bytes).ok()).collect()
 }
 
 /// What the first rank has found; `mine` is there alone, and is asked for nowhere else. Collective.
@@ -113,12 +109,14 @@ pub fn tell<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: impl
         }
         return found;
     }
-    let told: Option<Result<T, i32>> = unpack(&exchange.tell(Vec::new()));
-    told.unwrap_or(Err(Kind::Solver.exit_code())).map_err(Error::silent)
+    unpack::<Result<T, i32>>(&exchange.tell(Vec::new()))?.map_err(Error::silent)
 }
 
 /// What the first rank makes for each rank; `of_rank` is called there alone. Collective.
-pub fn deal<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, of_rank: impl Fn(usize) -> T) -> Option<T> {
+///
+/// # Errors
+/// A message that cannot be read.
+pub fn deal<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, of_rank: impl Fn(usize) -> T) -> Result<T> {
     unpack(&exchange.deal(&mut |rank| pack(&of_rank(rank))))
 }
 
@@ -127,8 +125,10 @@ fn pack<T: Serialize>(value: &T) -> Vec<u8> {
     postcard::to_allocvec(value).unwrap_or_default()
 }
 
-fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
-    postcard::from_bytes(bytes).ok()
+fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T> {
+    postcard::from_bytes(bytes).map_err(|cause| {
+        Error::new(Kind::Solver, "a message of another rank cannot be read").because(cause.to_string())
+    })
 }
 
 /// Owner of each body: whole bodies, largest first, each to the rank with the least load so far.

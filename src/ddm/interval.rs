@@ -92,13 +92,13 @@ fn loads(model: &Model) -> Vec<Vec<f64>> {
     model.bodies.iter().enumerate().map(load).collect()
 }
 
-/// Accuracy of the ends of a range: all but rounding.
+/// Accuracy of the ends of a range, as a share of the excess, which is a difference of energies of sixteen digits; a range ends outside.
 const DIGITS: f64 = 1e-13;
 
 /// Compressions that a point can have in the level set. F1 is convex, and what it exceeds its minimum by is at least what any
 /// one point does by itself: P(c) - P(c0) - p(c0) (c - c0) <= `excess`, the same per area.
 fn range(law: &dyn LayerLaw, point: usize, c: f64, excess: f64) -> (f64, f64) {
-    let here = law.response(point, c);
+    let (here, excess) = (law.response(point, c), excess * (1.0 + DIGITS));
     let rise = |other: f64| law.response(point, other).energy - here.energy - here.pressure * (other - c);
     // nothing changes below zero: an open point is open
     let (first, open) = (c.max(0.0), c <= 0.0 || rise(0.0) <= excess);

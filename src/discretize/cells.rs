@@ -51,7 +51,7 @@ struct Cells {
     /// Their nodes.
     nodes: Vec<u32>,
     /// Number of the constants of each; empty if the body has no regions.
-    regions: Vec<u32>,
+    regions: Vec<usize>,
 }
 
 /// Gives every rank the cells that it needs, which `parts` have afterwards, and their elasticity. `whole` is the elasticity of all cells, on the
@@ -87,7 +87,7 @@ pub fn deal<const D: usize>(
         };
         bodies.map(of_body).collect()
     };
-    let dealt = parallel::deal(exchange, of_rank).unwrap_or_default();
+    let dealt = parallel::deal(exchange, of_rank)?;
     let take = |(part, Cells { nodes, regions }): (&mut Part<D>, Cells)| {
         part.space.cells = nodes;
         elastic::of_regions(part.spec, regions, D, plane)
@@ -119,6 +119,6 @@ fn some<const D: usize>(part: &Part<D>, elasticity: &Elasticity, cells: impl Ite
     let regions = cells.clone().filter(|_| !part.spec.regions.is_empty());
     Cells {
         nodes: cells.flat_map(of_cell).collect(),
-        regions: regions.map(|cell| elasticity.region(cell as usize) as u32).collect(),
+        regions: regions.map(|cell| elasticity.region(cell as usize)).collect(),
     }
 }

@@ -29,7 +29,7 @@ pub struct Draft<const D: usize> {
 
 /// The rigid motions that supports and springs leave to a body.
 pub struct Loose<const D: usize> {
-    /// As they are.
+    /// Combinations of those of the free body.
     pub left: Vec<RigidMotion<D>>,
     /// As contact and loads see them.
     pub motions: Vec<Motion>,

@@ -31,18 +31,14 @@ pub fn of<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, pla
             of_cell[cell] = number + 1;
         }
     }
-    made(spec, of_cell, D, plane)
+    of_regions(spec, of_cell, D, plane)
 }
 
 /// The elasticity of some cells of a body by the numbers of their constants; empty if the body has no regions.
 ///
 /// # Errors
 /// Constants that make no material.
-pub fn of_regions(spec: &BodySpec, of_cell: Vec<u32>, dimension: usize, plane: Plane) -> Result<Elasticity> {
-    made(spec, of_cell.into_iter().map(|number| number as usize).collect(), dimension, plane)
-}
-
-fn made(spec: &BodySpec, of_cell: Vec<usize>, dimension: usize, plane: Plane) -> Result<Elasticity> {
+pub fn of_regions(spec: &BodySpec, of_cell: Vec<usize>, dimension: usize, plane: Plane) -> Result<Elasticity> {
     let specs: Vec<&ElasticitySpec> = specs(spec).collect();
     Elasticity::new(&specs, of_cell, dimension, plane).map_err(|(number, flaw)| refusal(spec, number, None, &flaw))
 }
@@ -85,18 +81,16 @@ pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw)
     }
 }
 
-/// Mean moduli of a body against pressure along x, y, z. Cells whose constants make no material at their middle count as nothing: assembly
+/// Mean moduli of a body of this volume against pressure along x, y, z. Cells whose constants make no material at their middle count as nothing: assembly
 /// refuses them.
-pub fn moduli<const D: usize>(space: &Space<D>, elasticity: &Elasticity) -> [f64; 3] {
+pub fn moduli<const D: usize>(space: &Space<D>, elasticity: &Elasticity, volume: f64) -> [f64; 3] {
     let in_cell = |cell: usize| elasticity.moduli(cell, pad(space.centroid(cell))).unwrap_or_default();
     if elasticity.is_constant() {
         return in_cell(0);
     }
-    let (mut sum, mut volume) = ([0.0; 3], 0.0);
+    let mut sum = [0.0; 3];
     for cell in 0..space.cell_count() {
-        let share = space.share(cell);
-        crate::contact::add(&mut sum, in_cell(cell).map(|modulus| share * modulus));
-        volume += share;
+        crate::contact::add(&mut sum, in_cell(cell).map(|modulus| space.share(cell) * modulus));
     }
     sum.map(|sum| sum / volume)
 }

@@ -82,13 +82,14 @@ fn read<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, wanted: Wanted) -> Resu
     }
     let elasticity = elastic::of(spec, &space, mesh, wanted.plane)?;
     let points = space.points();
+    let volume = (0..space.cell_count()).map(|cell| space.share(cell)).sum();
     let on_surface = |node: &&u32| wanted.on_surface[points[**node as usize] as usize];
     let is_behind = |cell: &&[u32]| cell[..=D].iter().filter(on_surface).count() >= D;
     let cells = space.cells.chunks_exact(space.stride);
     let known = Known {
         cells: space.cell_count(),
-        volume: (0..space.cell_count()).map(|cell| space.share(cell)).sum(),
-        moduli: elastic::moduli(&space, &elasticity),
+        volume,
+        moduli: elastic::moduli(&space, &elasticity, volume),
         force: part::body_force(spec, &space, Parts::Whole)?,
         corners: interpolation::corners(&space),
         boundary: if wanted.boundaries { space.boundary().nodes } else { Vec::new() },

@@ -54,11 +54,7 @@ impl<const D: usize> Verified<D> {
         let held = self.bodies.iter().flat_map(|body| &body.fix).map(|fix| fix.on.value.as_str());
         let held: HashSet<&str> = held.collect();
         let mesh = self.mesh.told(|name| held.contains(name));
-        let counted = |checked: &Checked| Checked {
-            parts: Parts { count: checked.parts.count, of_cell: Vec::new() },
-            ..*checked
-        };
-        Findings { mesh, checked: self.checked.iter().map(counted).collect(), lying: self.lying.clone() }
+        Findings { mesh, checked: self.checked.iter().map(Checked::counted).collect(), lying: self.lying.clone() }
     }
 
     /// What the first rank has found, on another one.

@@ -90,8 +90,7 @@ pub fn left_by_supports(
     prescribed: &[(usize, f64)],
 ) -> Vec<DVector<f64>> {
     let rows = DMatrix::from_fn(prescribed.len(), count, |i, j| value(j, prescribed[i].0));
-    let free = Blocks::free(&(rows.transpose() * &rows), prescribed.len().max(1) as f64, TOLERANCE);
-    free.into_iter().map(scaled).collect()
+    Blocks::free(&(rows.transpose() * &rows), prescribed.len().max(1) as f64, TOLERANCE)
 }
 
 /// Stiffness of springs in terms of `count` motions; `at` is the displacement of a node.
@@ -119,12 +118,7 @@ pub fn left_by_springs(left: Vec<DVector<f64>>, stiffness: &DMatrix<f64>) -> Vec
     }
     let left = DMatrix::from_columns(&left);
     let free = Blocks::free(&(left.transpose() * stiffness * &left), scale, TOLERANCE);
-    free.into_iter().map(|weights| scaled(&left * weights)).collect()
-}
-
-fn scaled(weights: DVector<f64>) -> DVector<f64> {
-    let largest = weights.amax();
-    weights / largest
+    free.into_iter().map(|weights| &left * weights).collect()
 }
 
 /// Combination of motions about the same centre, its largest weight one; named after the parts that matter.

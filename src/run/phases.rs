@@ -160,8 +160,8 @@ fn verified<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interr
     };
     let findings = parallel::tell(&Ranks::new(session), read).and_then(|found| interrupt.release().map(|()| found));
     match (first, agree(session, findings)?) {
-        (None, Some(findings)) => agree(session, Verified::told(scene, findings)),
-        (Some(verified), _) => agree(session, Ok(verified)),
+        (None, Some(findings)) => Verified::told(scene, findings),
+        (Some(verified), _) => Ok(verified),
         (None, None) => unreachable!("the first rank has read the mesh, and tells others"),
     }
 }

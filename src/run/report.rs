@@ -141,7 +141,7 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
                 cells: info.cells,
                 inner_facets: info.facets.inner,
                 boundary_facets: info.facets.outer,
-                parts: info.facets.parts,
+                parts: info.facets.parts.count,
                 dofs: info.dofs,
                 solver: solver.clone(),
                 rank: info.rank,

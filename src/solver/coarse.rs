@@ -8,13 +8,13 @@ use crate::petsc::Subspace;
 use std::rc::Rc;
 
 /// The coarse space, of the rows of this rank.
-pub struct Frame {
+pub struct RigidSpace {
     space: Rc<Space>,
     /// B of the rows of A here: a row a contact point.
     rows: Csr,
 }
 
-impl Frame {
+impl RigidSpace {
     /// Of the bodies of a model, whose rows begin at `offset` in a vector here; `rows` are B of all bodies together and `first` is the number
     /// of the first row here. `None` if no two bodies in contact move freely: what moves alone is no frame.
     pub fn of(model: &Model, offset: &[usize], rows: &Csr, first: usize) -> Option<Self> {
@@ -34,26 +34,26 @@ impl Frame {
 
     /// The space for these springs, one entry a contact point.
     pub fn with(self: &Rc<Self>, springs: &[f64]) -> Box<dyn Subspace> {
-        Box::new(Sprung { coarse: Coarse::new(self.space.clone(), springs), frame: self.clone() })
+        Box::new(Sprung { coarse: Coarse::new(self.space.clone(), springs), around: self.clone() })
     }
 }
 
 struct Sprung {
     coarse: Coarse,
-    frame: Rc<Frame>,
+    around: Rc<RigidSpace>,
 }
 
 impl Subspace for Sprung {
     fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
         let (y, _) = self.coarse.solve(&[&*r]);
         self.coarse.add(1.0, &y, &mut [x]);
-        self.frame.rows.add_transpose(-1.0, &self.coarse.forces(&y), r);
+        self.around.rows.add_transpose(-1.0, &self.coarse.forces(&y), r);
         Ok(())
     }
 
     fn project(&self, z: &mut [f64]) -> Result<()> {
-        let mut closing = vec![0.0; self.frame.rows.rows()];
-        self.frame.rows.multiply(z, &mut closing);
+        let mut closing = vec![0.0; self.around.rows.rows()];
+        self.around.rows.multiply(z, &mut closing);
         self.coarse.add(-1.0, &self.coarse.part(&closing, true), &mut [z]);
         Ok(())
     }

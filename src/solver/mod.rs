@@ -17,7 +17,7 @@ mod robin;
 mod sparse;
 mod split;
 
-pub use coarse::Frame;
+pub use coarse::RigidSpace;
 pub use condensed::CondensedBody;
 pub use dense::Dense;
 pub use krylov::Krylov;

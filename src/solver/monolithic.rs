@@ -4,7 +4,7 @@
 //! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Of bodies that are dealt out over ranks each
 //! rank has its rows; of bodies that live whole on several ranks, condensed ones, every rank has the matrix and solves for itself.
 
-use super::{Frame, InnerSolver, Krylov, RobinMatrix};
+use super::{InnerSolver, Krylov, RigidSpace, RobinMatrix};
 use crate::error::Result;
 use crate::linalg::{Csr, axpy, countable, dot};
 use crate::model::linear::{Failure, LinearStep, Solution, Solved, System, Trial};
@@ -34,7 +34,7 @@ pub struct Union {
     /// b diag(K) b' of each row b.
     row_stiffness: Vec<f64>,
     /// Rigid motions, if the rows of nodes leave them in v.
-    coarse: Option<Frame>,
+    coarse: Option<RigidSpace>,
     /// Whether every rank has the whole matrix and some of the bodies.
     is_redundant: bool,
 }
@@ -70,7 +70,7 @@ impl Union {
         let parts = parts.collect::<Option<Vec<_>>>();
         let Some(parts) = parts else { return Ok(None) };
         let union = Self::new(model, &parts)?;
-        let coarse = Frame::of(model, &union.offset, &union.rows, union.start.unwrap_or(0));
+        let coarse = RigidSpace::of(model, &union.offset, &union.rows, union.start.unwrap_or(0));
         Ok(Some(Self { coarse, ..union }))
     }
 

@@ -1,6 +1,6 @@
 //! The matrix of a linear system with springs at contact points, G = K + B' diag(d) B, and what solves it.
 
-use super::{Change, Frame, InnerSolver, Seen};
+use super::{Change, InnerSolver, RigidSpace, Seen};
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::{BodyCounts, Solved};
@@ -23,7 +23,7 @@ pub struct RobinMatrix<S> {
     soft: Vec<f64>,
     coupling: Coupling,
     /// Rigid motions around the preconditioner, if G is of several bodies.
-    coarse: Option<Rc<Frame>>,
+    coarse: Option<Rc<RigidSpace>>,
     counts: BodyCounts,
     /// The factorisations of the solver before the counts began.
     before: [usize; 3],
@@ -57,7 +57,7 @@ impl<S: InnerSolver> RobinMatrix<S> {
     }
 
     /// With rigid motions around the preconditioner.
-    pub fn with_coarse(self, coarse: Option<Frame>) -> Self {
+    pub fn with_coarse(self, coarse: Option<RigidSpace>) -> Self {
         Self { coarse: coarse.map(Rc::new), ..self }
     }
 

@@ -68,6 +68,13 @@ pub struct Checked {
     pub parts: Parts,
 }
 
+impl Checked {
+    /// The same without the part of each cell.
+    pub fn counted(&self) -> Self {
+        Self { parts: Parts { of_cell: Vec::new(), ..self.parts }, ..*self }
+    }
+}
+
 impl<const D: usize> Mesh<D> {
     /// Checks the bodies that are asked for, with the groups that serve them; `contacts` serve any body, and with `shared` bodies
     /// may have nodes in common. Names that are no groups of the mesh are left to others, which know where they stand.
