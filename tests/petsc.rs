@@ -373,7 +373,7 @@ fn the_order_of_elimination_goes_with_the_size_and_not_into_the_complement() {
             let mut schur = Schur::analyse(&session, body, 2, dofs, &grids(side), &retained)?;
             assert_eq!(schur.ordering(), order, "{body}");
             schur.factor()?;
-            for row in schur.complement().chunks_exact(retained.len()) {
+            for row in schur.take_complement().chunks_exact(retained.len()) {
                 let force: f64 = row.iter().sum();
                 assert!((force * side as f64 - 1.0).abs() < 1e-10, "{body}: {force}");
             }

@@ -252,6 +252,7 @@ impl Factor {
     }
 
     /// Number of entries of the factor that are stored: what it costs.
+    #[cfg(test)]
     pub fn entries(&self) -> usize {
         self.columns.iter().map(|column| column.panel.len()).sum()
     }
@@ -262,6 +263,7 @@ impl Factor {
     }
 
     /// The unknowns left out, one for each kernel vector.
+    #[cfg(test)]
     pub fn left_out(&self) -> &[usize] {
         &self.left_out
     }

@@ -41,7 +41,7 @@ pub enum Origin {
 ///
 /// # Errors
 /// A file that cannot be read, a number that the script does not take, Gmsh missing or failing, a mesh that is not one
-/// of named simplices in `D` dimensions (see [`read`](super::read)), or of too low an order; the signal.
+/// of named simplices in `D` dimensions (see [`parse`](super::parse)), or of too low an order; the signal.
 pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes, guard } => {

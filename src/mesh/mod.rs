@@ -35,7 +35,7 @@ pub use check::{Asked, Checked, Duty, Parts};
 pub use foreign::is_shape;
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, recall_final};
-pub use msh::{Maker, parse, read};
+pub use msh::{Maker, parse};
 pub use quality::Quality;
 pub use sizes::{unstructured, view};
 pub use told::Told;

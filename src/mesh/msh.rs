@@ -20,20 +20,11 @@ pub enum Maker {
     Other,
 }
 
-/// Reads a `.msh` file.
+/// Reads the bytes of a `.msh` file; `path` stands in messages: what `maker` made the bytes from.
 ///
 /// # Errors
 /// Everything that makes the file no mesh of named simplices in `D` dimensions is a [`Kind::Mesh`](crate::error::Kind)
 /// error with the line or byte and a way out.
-pub fn read<const D: usize>(path: &Path) -> Result<Mesh<D>> {
-    let bytes = crate::file::read(path)?;
-    parse(path, &bytes, Maker::User)
-}
-
-/// Reads the bytes of a `.msh` file; `path` stands in messages: what `maker` made the bytes from.
-///
-/// # Errors
-/// Those of [`read`].
 pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<Mesh<D>> {
     const { assert!(D == 2 || D == 3) };
     let cursor = &mut Cursor::new(path, bytes, maker != Maker::User);
@@ -58,7 +49,7 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<
             }
             "PartitionedEntities" => {
                 let error = cursor.error_at(start, "the mesh is partitioned");
-                return Err(error.help("save it in one piece: the program shares the work out itself"));
+                return Err(error.help("save it in one piece: the program divides it among the ranks itself"));
             }
             _ => {
                 cursor.skip_section()?;

@@ -20,9 +20,11 @@ pub trait Exchange {
 }
 
 /// One process: nothing to exchange.
+#[cfg(test)]
 #[derive(Debug, Default)]
 pub struct Serial;
 
+#[cfg(test)]
 impl Exchange for Serial {
     fn sum(&self, _values: &mut [f64]) {}
     fn ranks(&self) -> usize {

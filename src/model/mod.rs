@@ -16,7 +16,9 @@ pub mod rigid;
 
 pub use body::{Body, BodyCounts, Energy, Loads, Matrices, Solved};
 pub use distribution::Distribution;
-pub use exchange::{Exchange, Serial};
+pub use exchange::Exchange;
+#[cfg(test)]
+pub use exchange::Serial;
 pub use field::Field;
 pub use joint::Joint;
 pub use layer::Layer;

@@ -6,7 +6,7 @@ use super::library::petsc;
 use super::mumps::ROOM;
 use super::table::text;
 use super::vector::Vector;
-use super::{ConvergedReason, FAMILIES, Int, Matrix, Scope, Session, ffi, print};
+use super::{ConvergedReason, FAMILIES, Int, Matrix, Scope, Session, ffi};
 use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
 use std::ptr::null_mut;
@@ -43,7 +43,6 @@ pub struct Solved {
 /// assert!((x[0] - 1.0 / 11.0).abs() < 1e-12 && (x[1] - 7.0 / 11.0).abs() < 1e-12);
 /// assert!(solved.iterations == 2 && solved.reason.converged());
 /// assert_eq!((ksp.ksp_type(), ksp.pc_type(), ksp.factor_package()), ("cg".into(), "jacobi".into(), None));
-/// assert!(ksp.describe()?.contains("type: cg"));
 ///
 /// ksp.set_tolerance(0.9)?;
 /// assert_eq!(ksp.tolerance(), 0.9);
@@ -351,21 +350,6 @@ impl Ksp {
         }
         // SAFETY: the solver of this wrapper.
         unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, reuse as ffi::PetscBool)) }
-    }
-
-    /// All about the solver and its preconditioner, as `-ksp_view` prints it.
-    ///
-    /// # Errors
-    /// When PETSc cannot show the solver.
-    pub fn describe(&self) -> Result<String> {
-        let comm = self.scope.comm(&self.session);
-        // SAFETY: the viewer of standard output belongs to PETSc.
-        let (viewed, text) = print::caught(|| unsafe {
-            let mut viewer = null_mut();
-            petsc!(PetscViewerASCIIGetStdout(comm, &mut viewer))?;
-            petsc!(KSPView(self.ksp, viewer))
-        });
-        viewed.map(|()| text)
     }
 
     /// Whether the solver applies its preconditioner once and calls that the solution.

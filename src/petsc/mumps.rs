@@ -41,7 +41,7 @@ const OWN: [(usize, &str); 8] = [
 /// let lower = [(0, 0, 2.0), (1, 0, -1.0), (1, 1, 2.0), (2, 1, -1.0), (2, 2, 2.0)];
 /// let mut schur = Schur::analyse(&session, "up", 1, 3, &lower, &[2])?;
 /// schur.factor()?;
-/// assert!((schur.complement()[0] - (2.0 - 2.0 / 3.0)).abs() < 1e-14);
+/// assert!((schur.take_complement()[0] - (2.0 - 2.0 / 3.0)).abs() < 1e-14);
 /// let condensed = schur.condense(&[3.0, 0.0, 1.0])?;
 /// assert!((condensed[0] - 2.0).abs() < 1e-14);
 /// let x = schur.expand(&[3.0, 0.0, 1.0], &[1.5])?;
@@ -153,12 +153,7 @@ impl Schur {
         Ok(())
     }
 
-    /// S, all of it, row by row, in the order of the retained dofs.
-    pub fn complement(&self) -> &[f64] {
-        &self.complement
-    }
-
-    /// Takes S out, which nothing here needs any more.
+    /// Takes S out, all of it, row by row, in the order of the retained dofs; nothing here needs it any more.
     pub fn take_complement(&mut self) -> Vec<f64> {
         std::mem::take(&mut self.complement)
     }
