@@ -87,7 +87,7 @@ fn pressed_together_by_opposite_loads() {
             let run = solve(&scene, &["--method", method, "--set", "method.robin=auto"]).converged();
             (0..2).for_each(|pair| uniform(&run, pair, 10.0));
             let named = format!(
-                "bodies `b1`, `b2` and `b3`: nothing holds them together in their {motions}, no load works on it"
+                "bodies `b1`, `b2` and `b3`: nothing holds them together in their {motions}, and no load works on it"
             );
             assert!(run.warnings().contains(&named), "{}", run.warnings());
         }
@@ -151,7 +151,7 @@ fn rows_and_columns_of_a_grid_slide() {
     let scene = Scene::new(blocks([rows, columns], &vec![""; rows * columns], &contacts));
     let said = winkler(&["check", &scene.path.display().to_string()]).stdout;
     let slide = |axis: &str| {
-        said.matches(&format!(": nothing holds them together in their translation along {axis}, no load")).count()
+        said.matches(&format!(": nothing holds them together in their translation along {axis}, and no load")).count()
     };
     assert_eq!((slide("x"), slide("y")), (rows - 1, columns - 1), "{said}");
     assert!(

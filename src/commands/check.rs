@@ -1,7 +1,7 @@
 //! `winkler check`: builds everything, solves nothing, says what is there.
 
 use super::typed::SceneArgs;
-use super::{load, surfaces};
+use super::{load, said, surfaces};
 use crate::contact::{ContactPair, Left};
 use crate::discretize::BodyInfo;
 use crate::error::Result;
@@ -10,7 +10,6 @@ use crate::output::report::warning_lines;
 use crate::output::{Folder, LISTED, say, sci};
 use crate::petsc::Session;
 use crate::run;
-use crate::run::clock::Clock;
 use crate::run::preflight::Coupling;
 use crate::run::stages::Built;
 use crate::run::words::in_words;
@@ -35,13 +34,15 @@ pub struct Request {
 /// # Errors
 /// Refusals of scene and mesh; pictures that cannot be written.
 pub fn check(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
-    let mut clock = Clock::default();
+    let mut clock = said::watched(session.rank() == 0 && !request.scene.json);
     let mut scene = load(session, &request.scene.scene, &request.scene.overrides())?;
     let settings = scene.settings();
     if scene.method.steps.is_table() {
         Rc::make_mut(&mut scene).method.steps = scene.method.steps.heaviest();
     }
     let built = run::build(session, scene, interrupt, &mut clock)?;
+    // nothing is solved: no line for what would follow
+    clock.watch = None;
     clock.total();
     let shared = report::Shared::gather(&built.discrete);
     if session.rank() != 0 {
@@ -180,10 +181,12 @@ fn each_pair(built: &Built) -> Vec<String> {
         ));
         let coupling = preflight::coupling(built, i);
         lines.push(match coupling.pressure == 0.0 {
-            true => {
-                "    the loads push no body as a whole: pressure and sweeps cannot be estimated from them".to_owned()
-            }
-            false => format!("    mean pressure {}, {}", sci(coupling.pressure, 3), expected(&coupling)),
+            true => "    no load of its bodies presses it: pressure and sweeps cannot be estimated".to_owned(),
+            false => format!(
+                "    mean pressure {} if it carries the load alone, {}",
+                sci(coupling.pressure, 3),
+                expected(&coupling)
+            ),
         });
         lines.extend(surfaces::of_pair(built, i));
     }
@@ -194,7 +197,7 @@ fn each_pair(built: &Built) -> Vec<String> {
 fn expected(coupling: &Coupling) -> String {
     let sweeps = coupling.sweeps.iter().map(|(method, count)| match count.is_finite() {
         true => format!("{method} {count:.0}"),
-        false => format!("{method} no end in sight"),
+        false => format!("{method} does not converge"),
     });
     let [a, b] = coupling.theta;
     let sweeps = sweeps.collect::<Vec<_>>().join(", ");

@@ -4,7 +4,9 @@ use super::typed::flags;
 use crate::error::{Error, Kind, Result};
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
-use crate::mesh::{Loaded, Origin};
+use crate::mesh::{Group, Loaded, Mesh, Origin};
+use crate::output::progress::Line;
+use crate::output::report::readable;
 use crate::output::vtu::Encoding;
 use crate::output::{CellKind, Grid, say, write_whole};
 use crate::problem::order::Order;
@@ -53,7 +55,9 @@ pub fn mesh(interrupt: &Interrupt, request: &Request) -> Result<i32> {
 fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let began = Instant::now();
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
+    let line = (!request.json).then(|| Line::new("mesh", None));
     let loaded = crate::mesh::load::<D>(&scene.mesh, order, interrupt)?;
+    drop(line);
     let seconds = began.elapsed().as_secs_f64();
     if let Some(path) = &request.output {
         write(path, &loaded)?;
@@ -93,7 +97,10 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
     let groups: Vec<Value> = mesh
         .groups
         .iter()
-        .map(|group| json!({ "name": group.name, "dimension": group.dimension, "simplices": group.len() }))
+        .map(|group| {
+            let [low, high] = corners(mesh, group).map(Vec::from);
+            json!({ "name": group.name, "dimension": group.dimension, "simplices": group.len(), "low": low, "high": high })
+        })
         .collect();
     Ok(json!({
         "title": scene.title,
@@ -111,6 +118,15 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
         "bodies": bodies,
         "groups": groups,
     }))
+}
+
+/// Least and largest coordinates of a group.
+fn corners<const D: usize>(mesh: &Mesh<D>, group: &Group) -> [[f64; D]; 2] {
+    let grow = |[low, high]: [[f64; D]; 2], &point: &u32| {
+        let x = mesh.points[point as usize];
+        [std::array::from_fn(|c| low[c].min(x[c])), std::array::from_fn(|c| high[c].max(x[c]))]
+    };
+    group.connectivity.iter().fold([[f64::INFINITY; D], [f64::NEG_INFINITY; D]], grow)
 }
 
 fn print(facts: &Value) -> Result<()> {
@@ -143,7 +159,17 @@ fn print(facts: &Value) -> Result<()> {
     let cells = facts["dimension"].clone();
     for group in list("groups").iter().filter(|group| group["dimension"] != cells) {
         let kind = ["points", "lines", "triangles"][number(&group["dimension"]) as usize];
-        say(format_args!("  group {}: {} {kind}", text(&group["name"]), group["simplices"]))?;
+        let corner = |key: &str| {
+            let x = group[key].as_array().into_iter().flatten().filter_map(Value::as_f64);
+            x.map(|x| readable(x, 4)).collect::<Vec<_>>().join(", ")
+        };
+        let name = text(&group["name"]);
+        say(format_args!(
+            "  group {name}: {} {kind}, ({}) to ({})",
+            group["simplices"],
+            corner("low"),
+            corner("high")
+        ))?;
     }
     Ok(())
 }

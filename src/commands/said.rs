@@ -14,13 +14,14 @@ use crate::run::stages::Ready;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// A clock; if it is `loud` a line on the terminal says which phase is under way between the mesh and the first iteration.
+/// A clock; if it is `loud` a line on the terminal says which phase is under way up to the first iteration.
 pub fn watched(loud: bool) -> Clock {
     let line = RefCell::new(None);
     let next = move |ended: &str, estimate: Option<f64>| {
         // one line goes before the next one begins
         drop(line.borrow_mut().take());
         *line.borrow_mut() = match ended {
+            "" => Some(Line::new("mesh", None)),
             "mesh" => Some(Line::new("bodies and contact points", None)),
             "discretize" => Some(Line::new("factorisations and start", estimate)),
             _ => None,

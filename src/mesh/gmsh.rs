@@ -94,7 +94,7 @@ impl Gmsh {
                 command.env_remove(&name);
             }
         }
-        let end = guard::run(&mut command, task.guard.seconds, &said, task.interrupt, "Gmsh is meshing")
+        let end = guard::run(&mut command, task.guard.seconds, &said, task.interrupt)
             .map_err(|cause| Error::file(&self.program, "run", &cause))?;
         let refuse = |message: String| Error::mesh(task.shown, None, message);
         let status = match end {
@@ -104,7 +104,7 @@ impl Gmsh {
                 ));
             }
             End::Talked => {
-                let repeated = "Gmsh does not stop to repeat its errors about this script".to_owned();
+                let repeated = "Gmsh repeats its errors about this script without end".to_owned();
                 let help = "end each file that it merges with a line break, without which Gmsh reads beyond the end";
                 return Err(because(refuse(repeated), &complaints(&words(&said))).help(help));
             }

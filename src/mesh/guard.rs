@@ -55,29 +55,19 @@ pub fn command(program: &Path, bytes: Option<u64>) -> Command {
     command
 }
 
-/// Seconds after which a terminal is told what it waits for.
-#[cfg(feature = "cli")]
-const QUIET: Duration = Duration::from_secs(1);
-
 /// Longest pause between two looks at the program.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// Bytes that a program may say: half a million lines. Gmsh repeats some errors for ever, 25 MB of them in a second.
 const MOST_SAID: u64 = 1 << 25;
 
-/// Runs a command, whose words go to the file `said`, to its end, to a signal, or to `limit` seconds; `doing` says what it does
-/// ("Gmsh is meshing").
+/// Runs a command, whose words go to the file `said`, to its end, to a signal, or to `limit` seconds.
 ///
 /// # Errors
 /// The program cannot be started.
-pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt, doing: &str) -> io::Result<End> {
+pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt) -> io::Result<End> {
     let began = Instant::now();
     let mut child = command.spawn()?;
-    // a library shows nothing
-    #[cfg(not(feature = "cli"))]
-    let _ = doing;
-    #[cfg(feature = "cli")]
-    let mut bar: Option<indicatif::ProgressBar> = None;
     let end = loop {
         if let Some(status) = child.try_wait()? {
             break End::Itself(status);
@@ -91,30 +81,10 @@ pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt
             child.wait()?;
             break end;
         }
-        #[cfg(feature = "cli")]
-        if elapsed >= QUIET {
-            let bar = bar.get_or_insert_with(line);
-            bar.set_message(format!("{doing}, {} s", elapsed.as_secs()));
-            bar.tick();
-        }
         // a twentieth of the time so far is lost at most
         std::thread::sleep((elapsed / 20).clamp(Duration::from_millis(1), PAUSE));
     };
-    #[cfg(feature = "cli")]
-    if let Some(bar) = bar {
-        bar.finish_and_clear();
-    }
     Ok(end)
-}
-
-/// A line on standard error, if that is a terminal.
-#[cfg(feature = "cli")]
-fn line() -> indicatif::ProgressBar {
-    let bar = indicatif::ProgressBar::new_spinner();
-    if let Ok(style) = indicatif::ProgressStyle::with_template("{spinner} {wide_msg}") {
-        bar.set_style(style);
-    }
-    bar
 }
 
 #[cfg(test)]
@@ -131,7 +101,7 @@ mod tests {
     fn what_takes_too_long_or_too_much_is_ended() {
         let began = Instant::now();
         let silent = Path::new("");
-        let ended = |command: &mut Command, limit| run(command, limit, silent, &Interrupt::default(), "");
+        let ended = |command: &mut Command, limit| run(command, limit, silent, &Interrupt::default());
         assert!(matches!(ended(&mut sleep(None), 0.1), Ok(End::TimedOut)));
         assert!(began.elapsed() < Duration::from_secs(4));
         // no program can be loaded into a hundred kilobytes
@@ -145,7 +115,7 @@ mod tests {
         let said = tempfile::NamedTempFile::new().expect("a file");
         let mut yes = command(Path::new("/usr/bin/yes"), None);
         yes.stdout(said.reopen().expect("a file"));
-        assert!(matches!(run(&mut yes, 60.0, said.path(), &Interrupt::default(), ""), Ok(End::Talked)));
+        assert!(matches!(run(&mut yes, 60.0, said.path(), &Interrupt::default()), Ok(End::Talked)));
     }
 
     /// The system ends a program with the thread that started it, as it does when the whole process is killed.

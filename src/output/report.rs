@@ -208,6 +208,8 @@ pub struct BodyReport {
     pub max_von_mises: Option<f64>,
     /// Where it is (x, y, z).
     pub max_von_mises_at: Option<[f64; 3]>,
+    /// Largest displacement at the nodes.
+    pub max_displacement: Option<f64>,
     /// Largest and least principal stress at the nodes.
     pub principal_range: Option<[f64; 2]>,
     /// Error against the scene's `exact` over its own norm: of displacements in L2.
@@ -313,6 +315,7 @@ impl Report {
             self.dofs,
             seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
         ));
+        lines.extend(self.settings["units"].as_str().map(|units| format!("  units: {units}")));
         if !self.rounds.is_empty() {
             lines.push(
                 "  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds".to_owned(),
@@ -387,9 +390,11 @@ impl Report {
         }
         for body in self.bodies.iter().filter(|_| self.residual.is_some() && self.bodies.len() <= LISTED) {
             let BalanceReport { supports, springs, rigid, force_imbalance, moment_imbalance, .. } = &body.balance;
-            let all = supports.iter().chain(springs).chain(rigid);
-            let held: Vec<_> = all.map(|part| format!("{} {}", part.on, vector(part.force))).collect();
-            let held = if held.is_empty() { String::new() } else { format!("held by {}; ", held.join(", ")) };
+            let named = |verb: &str, parts: &mut dyn Iterator<Item = &ForceReport>| {
+                let all: Vec<_> = parts.map(|part| format!("{} {}", part.on, vector(part.force))).collect();
+                if all.is_empty() { String::new() } else { format!("{verb} {}; ", all.join(", ")) }
+            };
+            let held = named("held by", &mut supports.iter().chain(springs)) + &named("rigid", &mut rigid.iter());
             lines.push(format!(
                 "  {}: {held}imbalance {} of forces, {} of moments",
                 body.name,
@@ -422,7 +427,7 @@ fn vector(v: [f64; 3]) -> String {
 }
 
 /// A number with `digits` after the point, or with an exponent where that would not show it.
-fn readable(value: f64, digits: usize) -> String {
+pub fn readable(value: f64, digits: usize) -> String {
     let size = value.abs();
     if value == 0.0 || (1e-3..1e6).contains(&size) { format!("{value:.digits$}") } else { sci(value, digits) }
 }

@@ -15,11 +15,11 @@ pub struct Clock {
     pub memory: BTreeMap<String, f64>,
     /// Seconds of set-up and iteration by the estimate that chose the solvers, where one was made.
     pub estimate: Option<f64>,
-    /// Hears which phase has ended, and the estimate.
+    /// Called at the end of each phase with its name, at the beginning of the first with none.
     pub watch: Option<Rc<Watch>>,
 }
 
-/// What hears the end of a phase: its name, and the estimate.
+/// Called with the name of a phase that has ended, and the estimate.
 pub type Watch = dyn Fn(&str, Option<f64>);
 
 impl Default for Clock {
@@ -31,6 +31,11 @@ impl Default for Clock {
 }
 
 impl Clock {
+    /// Begins the first phase of a mesh.
+    pub fn begin(&self) {
+        self.watch.iter().for_each(|watch| watch("", None));
+    }
+
     /// Ends a phase.
     pub fn phase(&mut self, name: &str) {
         let now = Instant::now();

@@ -72,6 +72,7 @@ fn build_in<const D: usize>(
     clock: &mut Clock,
 ) -> Result<Built> {
     let stage = session.stage("mesh");
+    clock.begin();
     let mut verified = verified::<D>(session, &scene, interrupt)?;
     clock.phase("mesh");
     drop(stage);
@@ -183,8 +184,10 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
     }
     for body in discrete.bodies.iter().filter(|body| !body.gauged.is_empty()) {
         let motions = body.gauged.join("; ");
-        warnings
-            .push(format!("body {}: nothing holds its {motions}, no load works on it: fixed at one node", body.name));
+        warnings.push(format!(
+            "body {}: nothing holds its {motions}, and no load works on it: it is fixed at one node",
+            body.name
+        ));
     }
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
@@ -232,8 +235,8 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
     let name = |&body: &usize| &discrete.bodies[body].name;
     let bodies = in_words(mechanism.bodies.iter().map(name));
     let end = match mechanism.fixed.as_ref().map(name) {
-        Some(body) => format!("no load works on it: fixed at nodes of `{body}`"),
-        None if mechanism.work == 0.0 => "no load works on it: displacements are free up to it".to_owned(),
+        Some(body) => format!("and no load works on it: they are fixed at nodes of `{body}`"),
+        None if mechanism.work == 0.0 => "and no load works on it: displacements are free up to it".to_owned(),
         None => "and loads work on it: there is no solution".to_owned(),
     };
     format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.motion)

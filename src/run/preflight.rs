@@ -33,7 +33,9 @@ pub fn coupling(built: &Built, i: usize) -> Coupling {
         let normal: [f64; 3] =
             std::array::from_fn(|c| (0..pair.len()).map(|q| pair.weight[q] * pair.normal[q][c]).sum());
         let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
-        (0..3).map(|c| load[c] * normal[c]).sum::<f64>().abs() / size.max(f64::MIN_POSITIVE)
+        let along = (0..3).map(|c| load[c] * normal[c]).sum::<f64>().abs() / size.max(f64::MIN_POSITIVE);
+        // what rounding leaves of a load across the normal is none
+        if along > 1e-9 * load.iter().map(|f| f.abs()).sum::<f64>() { along } else { 0.0 }
     };
     let pressure = pair.bodies.map(pushed).into_iter().fold(0.0, f64::max) / length;
     let tangent = tangent_at(pair, pressure);
