@@ -204,7 +204,8 @@ fn bodies_in_space_and_contact_surfaces_are_drawn_as_svg_and_png() {
 /// The curve of contact over force has a mark for each load step, and an area in space is called one, in tables too.
 #[test]
 fn contact_over_force() {
-    let sets = ["--set", "mesh.set.n=4", "--set", "method.steps=3", "--set", "output.vtu=false"];
+    let sets =
+        ["--set", "mesh.set.n=4", "--set", "method.steps=3", "--set", "output.vtu=false", "--set", "units=mm, MPa"];
     for (name, column) in [("groove-held", "contact_length"), ("rough", "contact_area")] {
         let run = solve(case(name), &sets).converged();
         let header = fs::read_to_string(run.folder.join("steps.csv")).expect("steps.csv");
@@ -216,6 +217,11 @@ fn contact_over_force() {
         assert_eq!(steps[2]["pairs"][0][column], run.report["pairs"][0][column]);
         let folder = run.folder.to_str().expect("a name");
         assert_eq!(winkler(&["plot", folder, "area"]).code, 0);
+        assert_eq!(winkler(&["report", folder]).code, 0);
+        let page = fs::read_to_string(run.folder.join("report.html")).expect("a page");
+        assert!(page.contains("<h2>Load steps</h2>") && page.contains("contact force, N"), "{name}");
+        // in the plane for each length of thickness
+        assert_eq!(page.contains("contact force, N/mm"), name == "groove-held");
         let drawn = fs::read_to_string(run.folder.join("area.svg")).expect("a picture");
         assert_eq!(drawn.matches("<polygon").count(), 3, "{name}");
         assert!(drawn.contains("contact force") && drawn.contains(&column.replace("contact_", "")), "{name}");

@@ -6,6 +6,8 @@ use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::output::{Folder, LISTED, PairRow, Plot, Report, StepReport, busiest, contacts};
 use crate::petsc::Session;
+use crate::problem::elasticity::Plane;
+use crate::problem::units::force_labels;
 use crate::run::clock::Clock;
 use crate::run::results;
 use crate::run::stages::Done;
@@ -170,7 +172,9 @@ impl Plots {
         if done.steps.len() > 1 {
             let names = measure::pair_names(&done.built);
             let curves = self.shown.iter().map(|&i| (names[i].as_str(), approach(&done.steps, i)));
-            let plot = Plot::approach(&scene.title, curves);
+            let is_whole = scene.dimension.value == 3 || scene.plane == Plane::Axisymmetric;
+            let units = scene.units.clone().map(|units| if is_whole { units } else { units.per_thickness() });
+            let plot = Plot::approach(&scene.title, force_labels(units.as_ref()), curves);
             folder.write("force-approach.svg", |out| plot.write(out))?;
         }
         for &(i, ref file) in &self.plotted {

@@ -113,14 +113,18 @@ impl Plot {
         }
     }
 
-    /// Contact force of pairs over their approach, step by step; a curve without a name if there is one.
-    pub fn approach<'a>(title: &str, pairs: impl ExactSizeIterator<Item = (&'a str, Vec<(f64, f64)>)>) -> Self {
+    /// Contact force of pairs over their approach, step by step, with the labels of both; a curve without a name if there is one.
+    pub fn approach<'a>(
+        title: &str,
+        [x, y]: [String; 2],
+        pairs: impl ExactSizeIterator<Item = (&'a str, Vec<(f64, f64)>)>,
+    ) -> Self {
         let one = pairs.len() == 1;
         let curve = |(name, points)| Series::new(if one { "" } else { name }, points, Style::LineMarkers);
         Self {
             title: title.into(),
-            x: Axis { label: "approach".into(), log: false },
-            y: Axis { label: "contact force".into(), log: false },
+            x: Axis { label: x, log: false },
+            y: Axis { label: y, log: false },
             series: pairs.map(curve).collect(),
         }
     }

@@ -35,7 +35,7 @@ pub struct Units {
     pub length: &'static str,
     /// Of stresses, pressures and moduli.
     pub stress: &'static str,
-    /// Of forces: stress times length squared.
+    /// Of forces: stress times length squared, in the plane per length of thickness.
     pub force: String,
 }
 
@@ -83,10 +83,21 @@ impl Units {
         Ok(Self { length: length.0, stress: stress.0, force })
     }
 
+    /// For bodies of the plane, whose forces are per length of thickness.
+    pub fn per_thickness(self) -> Self {
+        Self { force: format!("{}/{}", self.force, self.length), ..self }
+    }
+
     /// As a scene has it.
     pub fn text(&self) -> String {
         format!("{}, {}", self.length, self.stress)
     }
+}
+
+/// Labels of an approach and a contact force.
+pub fn force_labels(units: Option<&Units>) -> [String; 2] {
+    let (length, force) = units.map(|units| (units.length, units.force.as_str())).unzip();
+    [label("approach", length), label("contact force", force)]
 }
 
 /// A label with its unit, if there is one.

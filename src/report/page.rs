@@ -4,14 +4,27 @@ use super::body::{Part, magnification};
 use super::contact::{Picture, failed, pictures, rows, value};
 use super::{bands, solid, space, words};
 use crate::error::{Error, Kind, Result};
-use crate::output::{Axis, Plot, Series, Style, safe_name, write_whole};
-use crate::problem::units::{Units, label};
+use crate::output::{Axis, LISTED, Plot, Series, Style, safe_name, write_whole};
+use crate::problem::units::{Units, force_labels, label};
 use minijinja::{UndefinedBehavior, context};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Name of the page in the folder of results.
 pub const FILE: &str = "report.html";
+
+/// A name and its points.
+type Curve = (String, Vec<(f64, f64)>);
+
+/// A number of a report.
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or(f64::NAN)
+}
+
+/// Size of the contact force of a pair in a load step.
+fn force(pair: &Value) -> f64 {
+    pair["force"].as_array().into_iter().flatten().map(|f| number(f).powi(2)).sum::<f64>().sqrt()
+}
 
 /// Writes the page of the results in `folder` to `out`, or to [`FILE`] in the folder; returns its path.
 ///
@@ -55,7 +68,10 @@ impl Results {
                 return Err(refuse(format!("it has no `{key}`")));
             }
         }
-        let units = report["settings"]["units"].as_str().and_then(|text| Units::parse(text).ok());
+        let settings = &report["settings"];
+        let units = settings["units"].as_str().and_then(|text| Units::parse(text).ok());
+        let is_whole = settings["dimension"] == 3 || settings["plane"] == "axisymmetric";
+        let units = if is_whole { units } else { units.map(Units::per_thickness) };
         Ok(Self { folder: folder.to_owned(), report, units })
     }
 
@@ -128,28 +144,44 @@ impl Results {
         Ok((!series.is_empty()).then(|| Plot { title, x: axis("iteration", false), y: axis("relative", true), series }))
     }
 
-    /// What is in contact over the contact force, a curve of the load steps for each pair; none without steps.
-    pub fn area(&self) -> Option<Plot> {
+    /// A curve of the load steps for each pair, with its name; none without steps.
+    fn curves(&self, point: impl Fn(&Value) -> (f64, f64)) -> Option<Vec<Curve>> {
         let steps = self.report["steps"].as_array().filter(|steps| !steps.is_empty())?;
-        let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
-        let point = |pair: &Value| {
-            let force = pair["force"].as_array().into_iter().flatten().map(|f| number(f).powi(2)).sum::<f64>().sqrt();
-            (force, number(pair.get("contact_area").unwrap_or(&pair["contact_length"])))
-        };
         let curve = |(i, pair): (usize, &Value)| {
             let names: Vec<&str> = pair["bodies"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
-            let points = steps.iter().map(|step| point(&step["pairs"][i])).collect();
-            Series::new(names.join(" - "), points, Style::LineMarkers)
+            (names.join(" - "), steps.iter().map(|step| point(&step["pairs"][i])).collect())
         };
-        let series: Vec<Series> = self.report["pairs"].as_array()?.iter().enumerate().map(curve).collect();
-        let is_area = steps[0]["pairs"][0].get("contact_area").is_some();
-        let size = match self.units.as_ref().map(|units| units.length) {
-            Some(length) if is_area => label("area in contact", Some(&format!("{length}^2"))),
-            length => label(if is_area { "area in contact" } else { "length in contact" }, length),
-        };
+        Some(self.report["pairs"].as_array()?.iter().enumerate().map(curve).collect())
+    }
+
+    /// What is in contact over the contact force, a curve of the load steps for each pair; none without steps.
+    pub fn area(&self) -> Option<Plot> {
+        let curves =
+            self.curves(|pair| (force(pair), number(pair.get("contact_area").unwrap_or(&pair["contact_length"]))))?;
+        let series = curves.into_iter().map(|(name, points)| Series::new(name, points, Style::LineMarkers)).collect();
+        let size = if self.is_area() { "area in contact" } else { "length in contact" };
+        let size = label(size, self.size_unit().as_deref());
         let axis = |label: String| Axis { label, log: false };
         let title = String::new();
         Some(Plot { title, x: axis(self.label("contact force", |units| &units.force)), y: axis(size), series })
+    }
+
+    /// Contact force over approach, likewise; none of more pairs than one looks through.
+    fn approach(&self) -> Option<Plot> {
+        let curves =
+            self.curves(|pair| (number(&pair["approach"]), force(pair))).filter(|curves| curves.len() <= LISTED)?;
+        let curves = curves.iter().map(|(name, points)| (name.as_str(), points.clone()));
+        Some(Plot::approach("", force_labels(self.units.as_ref()), curves))
+    }
+
+    /// Whether contact has an area, as in space, and no length.
+    fn is_area(&self) -> bool {
+        self.report["pairs"][0].get("contact_area").is_some()
+    }
+
+    /// The unit of this area or length.
+    fn size_unit(&self) -> Option<String> {
+        self.units.as_ref().map(|units| format!("{}{}", units.length, if self.is_area() { "²" } else { "" }))
     }
 
     /// A picture of the pressure of each pair that touches and has a table.
@@ -207,11 +239,14 @@ impl Results {
             units => self.units.as_ref().map(|u| context! { length => u.length, stress => u.stress, force => u.force }),
             stress_unit => unit(|units| units.stress),
             length_unit => unit(|units| units.length),
-            force_unit => if self.is_space() { unit(|units| &units.force) } else { String::new() },
+            force_unit => unit(|units| &units.force),
+            size_unit => label("", self.size_unit().as_deref()),
+            is_area => self.is_area(),
             view,
             pictures => drawn,
             pressures => self.pressures(false)?,
             convergence,
+            approach => self.approach().map(|plot| plot.svg().map_err(failed)).transpose()?,
             phases => phases.into_iter().filter(timed).chain(["total"]).collect::<Vec<_>>(),
             command,
             settings => serde_json::to_string_pretty(&report["settings"]).unwrap_or_default(),

@@ -41,7 +41,15 @@
   const size = Math.hypot(...data.low.map((low, k) => data.high[k] - low)) || 1;
   const colors = data.colors.flatMap(c => [1, 3, 5].map(k => parseInt(c.slice(k, k + 2), 16) / 255));
   const eye = {};
-  const reset = () => Object.assign(eye, { turn: -0.9, rise: 0.45, zoom: 1, right: 0, up: 0 });
+  const reset = () => {
+    const turn = -0.9, rise = 0.45, aspect = canvas.clientWidth / canvas.clientHeight || 1;
+    // half of the box along a direction, and a tenth more for displacements
+    const half = v => 0.55 * data.low.reduce((sum, low, k) => sum + Math.abs(v[k]) * (data.high[k] - low), 0);
+    const right = half([Math.sin(turn), Math.cos(turn), 0]);
+    const up = half([Math.sin(rise) * Math.cos(turn), Math.sin(rise) * Math.sin(turn), Math.cos(rise)]);
+    const fits = aspect > 1 ? Math.max(up, right / aspect) : Math.max(right, up * aspect);
+    Object.assign(eye, { turn, rise, zoom: 0.5 * size / fits || 1, right: 0, up: 0 });
+  };
   const what = figure.querySelector("select"), scale = figure.querySelector("input[type=range]");
   const shown = figure.querySelector("output"), bar = figure.querySelector(".bar");
   const factor = () => scale.value / 50 * data.scale;
@@ -56,7 +64,7 @@
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
-    const m4 = twgl.m4, aspect = canvas.width / canvas.height, half = 0.42 * size / eye.zoom;
+    const m4 = twgl.m4, aspect = canvas.width / canvas.height, half = 0.5 * size / eye.zoom;
     const [w, h] = aspect > 1 ? [half * aspect, half] : [half, half / aspect];
     const toward = [Math.cos(eye.rise) * Math.cos(eye.turn), Math.cos(eye.rise) * Math.sin(eye.turn), Math.sin(eye.rise)];
     const camera = m4.lookAt(middle.map((x, k) => x + 2 * size * toward[k]), middle, [0, 0, 1]);
@@ -96,7 +104,7 @@
       const apart = f => Math.hypot(f.clientX - other.clientX, f.clientY - other.clientY) || 1;
       eye.zoom *= apart(e) / apart(before);
     } else if (e.shiftKey || e.buttons & 2) {
-      const pixel = 0.84 * size / eye.zoom / Math.min(canvas.clientWidth, canvas.clientHeight);
+      const pixel = size / eye.zoom / Math.min(canvas.clientWidth, canvas.clientHeight);
       eye.right -= dx * pixel;
       eye.up += dy * pixel;
     } else {
