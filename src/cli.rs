@@ -32,7 +32,7 @@ struct Cli {
 const EXIT_CODES: &str = "Exit codes: 0 converged, 1 not converged (results are written), 2 command line, 3 scene, 4 mesh, \
 5 solver or PETSc option, 6 file system, 130, 143 or 129 ended by SIGINT, SIGTERM or SIGHUP (results are written).";
 
-const SOLVE: &str = "PETSc options go behind the scene, with one dash: for all bodies (-ksp_type cg -pc_type hypre), for the body `upper` \
+const SOLVE: &str = "PETSc options follow the scene, with one dash: for all bodies (-ksp_type cg -pc_type hypre), for the body `upper` \
 (-upper_ksp_type cg), or for the matrix of all bodies in Newton's method (-newton_pc_type hypre). -help lists them; with -v the run \
 says which options each body has.
 
@@ -64,7 +64,7 @@ enum Command {
     /// Compare meshes, orders, inner solvers, methods and ranks: time, memory, counts and errors
     #[command(after_help = BENCH)]
     Bench(bench::Request),
-    /// Make the mesh of a scene, or find it in the cache, and say what is in it
+    /// Make the mesh of a scene, or find it in the cache, and print what it has
     Mesh(mesh::Request),
     /// Write a page with pictures and tables of a run, from its files alone: one HTML file
     Report {
@@ -118,7 +118,7 @@ enum Solving {
     /// Solve a scene and write its results
     #[command(after_help = SOLVE)]
     Solve(solve::Request),
-    /// Build a scene's problem, solve nothing, and say what is there
+    /// Build the problem of a scene and print what it has, without solving it
     #[command(after_help = CHECK)]
     Check(check::Request),
     /// Solve a scene for every combination of values of its keys
@@ -151,6 +151,10 @@ pub fn run(words: Vec<OsString>) -> i32 {
         let error = Error::new(Kind::Usage, format!("PETSc knows no option -{flag}"));
         return complain(&error.help(format!("did you mean --{flag}?")));
     }
+    if let Some(flag) = program.iter().chain(&petsc).find(|word| matches!(word.as_str(), "-n" | "-np")) {
+        let error = Error::new(Kind::Usage, format!("`{flag}`: the number of ranks is an option of mpiexec"));
+        return complain(&error.help("mpiexec -n 2 winkler solve SCENE"));
+    }
     let bare_help = program.is_empty() && petsc.iter().any(|word| word == "-help");
     let program = if bare_help { vec!["--help".to_owned()] } else { program };
     let cli = match Cli::try_parse_from(std::iter::once(name).chain(program)) {
@@ -161,6 +165,11 @@ pub fn run(words: Vec<OsString>) -> i32 {
             if let Some(bare) = word.strip_prefix("--").filter(|bare| bare.contains('_')) {
                 let error = Error::new(Kind::Usage, format!("`{word}`: PETSc options take one dash"));
                 return complain(&error.help(format!("did you mean -{bare}?")));
+            }
+            let command = refusal.get(ContextKind::InvalidSubcommand).map(ToString::to_string).unwrap_or_default();
+            if command.ends_with(".toml") {
+                let error = Error::new(Kind::Usage, format!("`{command}` is no command"));
+                return complain(&error.help(format!("did you mean `winkler solve {command}`?")));
             }
             // nothing that the program takes would help behind `--`
             refusal.remove(ContextKind::Suggested);

@@ -31,6 +31,54 @@ fn a_new_scene_works() {
     assert!(nameless.code == 2 && nameless.stderr.contains("name"), "{}", nameless.stderr);
 }
 
+/// What a beginner gets wrong most easily.
+#[test]
+fn first_mistakes_have_advice() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    assert_eq!(winkler(&["new", &path("press")]).code, 0);
+    let (scene, script) = (path("press/scene.toml"), path("press/press.geo"));
+    // places of groups: is `lower_top` the curve that is meant?
+    let mesh = winkler(&["mesh", &scene]);
+    assert!(mesh.stdout.contains("group lower_top: 20 lines, (0.0000, 1.0000) to (2.0000, 1.0000)"), "{}", mesh.said());
+    // a gap of five times the height of a block
+    let warnings =
+        |set: &str| solve(&scene, &["--set", "output.vtu=false", "--set", set]).report["warnings"].to_string();
+    assert!(
+        warnings("contact.0.gap=5").contains("more than a tenth of the body's size: upper"),
+        "{}",
+        warnings("contact.0.gap=5")
+    );
+    assert_eq!(warnings("contact.0.gap=0.1"), "[]");
+    let refused = |file: &str, advice: &str| {
+        let run = winkler(&["check", file]);
+        assert!(run.code == 3 && run.stderr.contains(advice), "{}", run.said());
+    };
+    refused(&script, "a scene is a TOML file that names its script");
+    let text = fs::read_to_string(&scene).expect("a scene");
+    for (name, from, to, advice) in [
+        ("single.toml", "[[body]]", "[body]", "each body begins with two brackets: [[body]]"),
+        ("slip.toml", "on = \"lower_bottom\"", "on = \"lower_botom\"", "no group `lower_botom` for this support"),
+        ("kind.toml", "[\"lower_top\", ", "[\"lower\", ", "`lower` is a group of cells there"),
+    ] {
+        fs::write(folder.path().join("press").join(name), text.replace(from, to)).expect("a scene");
+        refused(&path(&format!("press/{name}")), advice);
+    }
+    for (words, advice) in [
+        (&[scene.as_str()][..], "did you mean `winkler solve "),
+        (&["solve", &scene, "-n", "4"], "the number of ranks is an option of mpiexec"),
+        (&["solve", &scene, "-np", "4"], "mpiexec -n 2 winkler solve"),
+    ] {
+        let run = winkler(words);
+        assert!(run.code == 2 && run.stderr.contains(advice), "{}", run.said());
+    }
+    // a group whose name cannot begin PETSc options
+    let geo = fs::read_to_string(&script).expect("a script");
+    fs::write(&script, geo.replace("(\"upper\")", "(\"Upper\")")).expect("a script");
+    let run = winkler(&["check", &scene]);
+    assert!(run.code == 3 && run.stderr.contains("rename the group `Upper` of the mesh: `upper`"), "{}", run.said());
+}
+
 #[test]
 fn shells_and_man_know_the_commands() {
     let script = winkler(&["completions", "bash"]);

@@ -273,7 +273,12 @@ fn refusals() {
     refused(fix, &twice, "1e-3*x", &["two values of the y displacement", "is on `lower_face`, line 12"]);
     let root = fixed("{ on = \"lower_face\", y = \"sqrt(x - 1)\" }");
     refused(fix, &root, "sqrt", &["the displacement of this support is not a finite number at x = 0"]);
-    refused(fix, &fixed("{ on = \"lower\", symmetry = true }"), "symmetry", &["no curve `lower`", "is a region"]);
+    refused(
+        fix,
+        &fixed("{ on = \"lower\", symmetry = true }"),
+        "symmetry",
+        &["no curve `lower`", "is a group of cells"],
+    );
     let load = "load = [{ on = \"upper_face\", pressure = 10 }]";
     let pushed = "load = [{ on = \"upper_face\", force = [1, -40], rigid = true }]";
     refused(load, pushed, "rigid = true", &["on `upper_face` pushes against the support on `upper_axis`", "line 19"]);

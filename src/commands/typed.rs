@@ -7,10 +7,10 @@ use std::path::PathBuf;
 /// How much a command says.
 #[derive(Args)]
 pub struct Manner {
-    /// Say errors, warnings and the folder of the results only
+    /// Print errors, warnings and the folder of the results only
     #[arg(short, long, conflicts_with_all = ["verbose", "json"])]
     quiet: bool,
-    /// Say what is decided and why, with the PETSc options of each body, on standard error
+    /// Print what is decided and why, with the PETSc options of each body, on standard error
     #[arg(short, long)]
     verbose: bool,
 }

@@ -31,7 +31,7 @@ pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Shape> {
         (true, 3) => surface(spec, &rows),
         (true, columns) => Err(spec.refuse(
             format!("has {columns} numbers in a row"),
-            "a point is x and a height, or x, y and a height; for heights in rows and columns leave `points` away",
+            "a point is x and a height, or x, y and a height; for heights in rows and columns leave out `points`",
         )),
     }
 }

@@ -49,7 +49,7 @@ pub fn error_maker<const D: usize>(
         if !value.is_finite() {
             let message = format!("the known displacement is {value} at {}", point(contact::pad(x)));
             return Err(Error::scene(component.place(), message)
-                .help("mind roots of negative numbers and divisions by zero in the expression"));
+                .help("look for roots of negative numbers and divisions by zero in the expression"));
         }
     }
     let (space, elasticity) = (space.clone(), elasticity.clone());

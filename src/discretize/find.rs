@@ -19,23 +19,26 @@ pub fn find_group<'m, const D: usize>(
         return Ok(group);
     }
     let of = |dimension: usize| mesh.groups.iter().filter(move |group| group.dimension == dimension);
-    let known: Vec<&str> = dimensions.iter().flat_map(|&d| of(d)).map(|group| group.name.as_str()).collect();
+    let known = || dimensions.iter().flat_map(|&d| of(d)).map(|group| group.name.as_str());
     let kind = |dimension: usize| match (D - dimension, dimension) {
-        (0, _) => "region",
-        (1, 1) => "curve",
-        (1, _) => "surface",
-        (_, 0) => "point group",
-        _ => "curve",
+        (0, _) => "group of cells",
+        (_, 0) => "group of points",
+        (_, 1) => "curve",
+        _ => "surface",
     };
-    let error =
-        Error::scene(&name.place, format!("the mesh has no {} `{}` for this {what}", kind(dimensions[0]), name.value))
-            .because(format!("mesh {}", mesh.path.display()));
+    let wanted = if let [one] = dimensions { kind(*one) } else { "group" };
+    let error = Error::scene(&name.place, format!("the mesh has no {wanted} `{}` for this {what}", name.value))
+        .because(format!("mesh {}", mesh.path.display()));
     if let Some(other) = named {
         return Err(error.help(format!("`{}` is a {} there", name.value, kind(other.dimension))));
     }
-    Err(match crate::error::nearest(&name.value, known.iter().copied()) {
-        Some(near) => error.help(format!("did you mean `{near}`?")),
-        None => error.help(format!("physical groups of that kind: {}", few(known).join(", "))),
+    let odd = |near: &&str| what == "body" && !near.bytes().all(|b| matches!(b, b'a'..=b'z' | b'0'..=b'9' | b'_'));
+    Err(match crate::error::nearest(&name.value, known()).filter(odd) {
+        Some(near) => error.help(format!("rename the group `{near}` of the mesh: `{}`", name.value)),
+        None => error.suggest(&name.value, known(), || match few(known()) {
+            none if none.is_empty() => format!("the mesh has no {wanted} at all"),
+            names => format!("it has: {}", names.join(", ")),
+        }),
     })
 }
 

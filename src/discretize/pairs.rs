@@ -130,7 +130,7 @@ fn refuse(spec: &ContactSpec, fault: Fault) -> Error {
                 &spec.between[0].place,
                 format!("`{}` and `{}` do not face each other anywhere", names[0], names[1]),
             )
-            .help("a pair needs surfaces whose outer normals point at each other; look at the mesh with `gmsh`")
+            .help("a pair needs surfaces that lie opposite each other, with outer normals that point at each other; `winkler mesh` has their places")
         }
         Fault::Gap(x) => {
             spec.gap.eval_finite("the gap", x).err().map(|error| error.because(of_pair(spec))).unwrap_or_else(|| {

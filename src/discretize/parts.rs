@@ -76,7 +76,7 @@ fn read<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, wanted: Wanted) -> Resu
         if let Some(x) = space.nodes.iter().find(|x| x[0] < 0.0) {
             let message = format!("body `{}` has a negative radius at {}", spec.name.value, point(pad(*x)));
             return Err(Error::mesh(&mesh.path, None, message).help(
-                "axisymmetric bodies are drawn as meridians, x >= 0 with the axis at x = 0: leave one half away",
+                "axisymmetric bodies are drawn as meridians, x >= 0 with the axis at x = 0: leave out one half",
             ));
         }
     }

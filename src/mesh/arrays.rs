@@ -18,7 +18,7 @@ const NAME: &str = "mesh arrays";
 pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>> {
     let MeshArrays { points, order: own, groups } = arrays;
     if *own < order {
-        return Err(refuse("the mesh is of order 1, the scene asks for order 2").help("bring mid-edge points as well"));
+        return Err(refuse("the mesh is of order 1, the scene asks for order 2").help("give mid-edge points, too"));
     }
     let largest = points.iter().flatten().fold(0.0_f64, |size, x| size.max(x.abs()));
     if let Some(number) = points.iter().position(|x| x.iter().any(|x| !x.is_finite())) {
@@ -49,7 +49,7 @@ fn group<const D: usize>(arrays: &GroupArrays, points: &[[f64; 3]], order: Order
     if connectivity.is_empty() || connectivity.len() % stride != 0 {
         let count = connectivity.len();
         return Err(refuse(format!("has {count} numbers of points, its simplices have {stride} each"))
-            .help("bring one number a corner, and for order 2 also one a mid-edge point"));
+            .help("give one number a corner, and for order 2 one a mid-edge point, too"));
     }
     if let Some(number) = connectivity.iter().find(|number| **number as usize >= points.len()) {
         return Err(

@@ -146,7 +146,7 @@ impl Block<'_> {
                     let size = ["", "length", "area", "volume"][dimension];
                     let part = if self.split.is_some() { "a part of " } else { "" };
                     let message = format!("{part}element {tag} of group `{}` has zero {size}", self.name);
-                    return Err(cursor.error_at(start, message).help("mend the geometry there, or mesh it again"));
+                    return Err(cursor.error_at(start, message).help("correct the geometry there, or mesh it again"));
                 }
                 connectivity.extend_from_slice(points);
                 tags.push(tag);

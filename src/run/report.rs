@@ -84,7 +84,8 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
         ..headline(session, &done.built, &shared.solvers, clock)
     };
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::of_steps(&done.steps)));
-    results::fill(discrete, recovered, &mut report.bodies);
+    let moved = results::fill(discrete, recovered, &mut report.bodies);
+    report.warnings.extend(moved);
     let approaches = measure::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = balance::gather(done, recovered);

@@ -2,7 +2,7 @@
 
 use super::stages::Done;
 use crate::discretize::{BodyInfo, Discrete};
-use crate::error::Result;
+use crate::error::{Result, few};
 use crate::output::BodyReport;
 use crate::output::vtu::BodyField;
 use std::cell::OnceCell;
@@ -57,10 +57,11 @@ pub fn recover(done: &Done) -> All {
 }
 
 /// Numbers of a body in the message.
-const NUMBERS: usize = 9;
+const NUMBERS: usize = 11;
 
-/// Puts largest stresses and errors of all bodies into their reports; null where there is none. Collective.
-pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) {
+/// Puts largest stresses, displacements and errors of all bodies into their reports; null where there is none. Collective.
+/// Returns a warning of displacements that are too large for the theory.
+pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) -> Option<String> {
     let mut message = vec![0.0; NUMBERS * reports.len()];
     let bodies = discrete.bodies.iter().zip(recovered);
     for (mine, (info, recovered)) in message.chunks_exact_mut(NUMBERS).zip(bodies) {
@@ -75,7 +76,10 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) {
                 mine[1..4].copy_from_slice(&field.points[largest]);
                 mine[4] = field.principal.iter().map(|s| s[0]).fold(f64::NEG_INFINITY, f64::max);
                 mine[5] = field.principal.iter().map(|s| s[2]).fold(f64::INFINITY, f64::min);
-                mine[6..].copy_from_slice(&info.post().errors(&recovered.state).unwrap_or([f64::NAN; 3]));
+                mine[6..9].copy_from_slice(&info.post().errors(&recovered.state).unwrap_or([f64::NAN; 3]));
+                mine[9] =
+                    field.displacement.iter().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
+                mine[10] = diagonal(&field.points);
             }
         }
     }
@@ -89,5 +93,29 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) {
         report.error_l2 = finite(numbers[6]);
         report.error_h1 = finite(numbers[7]);
         report.error_energy = finite(numbers[8]);
+        report.max_displacement = finite(numbers[9]).filter(|_| stressed);
     }
+    let moved =
+        |(report, numbers): (&BodyReport, &[f64])| (numbers[9] > SMALL * numbers[10]).then(|| report.name.clone());
+    let moved: Vec<String> = reports.iter().zip(message.chunks_exact(NUMBERS)).filter_map(moved).collect();
+    (!moved.is_empty()).then(|| {
+        format!(
+            "displacements of more than a tenth of the body's size: {}. The theory is that of small ones: look at the gaps, the units and \
+             the supports",
+            few(moved).join(", ")
+        )
+    })
+}
+
+/// Displacements up to this share of a body are small: a turn by it changes lengths along and across by half a per cent.
+const SMALL: f64 = 0.1;
+
+/// Diagonal of the box around points.
+fn diagonal(points: &[[f64; 3]]) -> f64 {
+    let side = |c: usize| {
+        let (low, high) =
+            points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x[c]), b.max(x[c])));
+        (high - low) * (high - low)
+    };
+    (0..3).map(side).sum::<f64>().sqrt()
 }

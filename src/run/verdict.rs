@@ -36,7 +36,7 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
     // what turns the step shorter in the paper's iteration; other methods choose it themselves
     let other = if outcome.method == "robin" { "a smaller method.gamma, or --method auto" } else { "another --method" };
     match &outcome.status {
-        Status::Converged => format!("converged in {k} iterations"),
+        Status::Converged => format!("converged in {k} iteration{}", if k == 1 { "" } else { "s" }),
         Status::RoundoffLimited => {
             format!("{} {} after {k} iterations: rounding allows no less", measure(outcome), sci(residual, 1))
         }

@@ -134,8 +134,12 @@ impl Scene {
         method_is_good(&at("method"), &self.method)?;
         if let Some(adapt) = &self.adapt {
             at("adapt.error").positive("the error", adapt.error)?;
+            if adapt.error >= 1.0 {
+                let message = format!("the error is {}", shown(adapt.error));
+                return at("adapt.error").refuse(message, "must be less than 1", "it is a share: 0.01 is one per cent");
+            }
             if !self.method.steps.is_empty() {
-                let help = "leave `adapt` or `method.steps` away";
+                let help = "leave out `adapt` or `method.steps`";
                 return at("adapt").refuse("an adapted mesh and load steps in one scene", "", help);
             }
         }

@@ -79,7 +79,7 @@ fn solver_table() -> Table {
 
 fn adapt_table() -> Table {
     Table::new("`adapt`")
-        .must("error", Form::Number, "largest relative error of pressures and displacements")
+        .must("error", Form::Number, "largest relative error of pressures and displacements: 0.01 is one per cent")
         .key("cells", Form::Count, "most cells of a mesh; 1000000")
         .key("rounds", Form::Count, "most meshes; 10")
 }

@@ -55,10 +55,16 @@ fn syntax(source: &Arc<Source>, offset: usize, error: &toml::de::Error) -> Error
     let marked = &source.text[place.span.clone()];
     let refusal = Error::scene(&place, format!("this is not TOML: {}", error.message()));
     let quotable = !marked.is_empty() && !marked.contains(['"', '\'', '\n', '=', '[', '{']);
-    let after_equals = source.text[..place.span.start].trim_end().ends_with(['=', '[', ',']);
-    match quotable && after_equals {
-        true => refusal.help(format!("texts and expressions need quotes: \"{marked}\"")),
-        false => refusal,
+    let before = source.text[..place.span.start].trim_end();
+    let repeats = matches!(marked, "body" | "contact") && before.lines().next_back().is_some_and(|line| line == "[");
+    if repeats {
+        refusal.help(format!("each {marked} begins with two brackets: [[{marked}]]"))
+    } else if source.name.ends_with(".geo") {
+        refusal.help("a scene is a TOML file that names its script: mesh = \"part.geo\"; `winkler new` writes both")
+    } else if quotable && before.ends_with(['=', '[', ',']) {
+        refusal.help(format!("texts and expressions need quotes: \"{marked}\""))
+    } else {
+        refusal
     }
 }
 

@@ -51,7 +51,7 @@ pub struct Request {
     /// Run the meshes' .geo scripts even if they can start programs or write files
     #[arg(long)]
     pub trust_geo: bool,
-    /// Say errors, warnings and the folder of the results only
+    /// Print errors, warnings and the folder of the results only
     #[arg(short, long)]
     pub quiet: bool,
     /// PETSc options for every run.

@@ -41,7 +41,7 @@ pub fn check<const D: usize>(cells: &Cells<D>, surface: &Surface<D>) -> Result<(
         let counts: Vec<i32> = INSIDE.iter().filter_map(|weights| covers(surface, inside(weights))).collect();
         if counts.iter().all(|&count| count != 1) && !counts.is_empty() {
             let what = format!("{} cells lie over each other", counts[0].max(2));
-            let help = "a part of the body was meshed twice: mend the geometry, or make bodies of its parts";
+            let help = "a part of the body was meshed twice: correct the geometry, or make bodies of its parts";
             return Err(cells.refuse(&what, &[cell], inside(&INSIDE[0])).help(help));
         }
     }

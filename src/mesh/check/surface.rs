@@ -159,7 +159,7 @@ impl<'a, const D: usize> Surface<'a, D> {
                 .help("cells must share whole facets: mesh the body in one piece (in the script: `Coherence;`)");
         }
         let what = "the boundary of the body crosses itself, so that cells overlap";
-        self.cells.refuse(what, &cells, self.cells.at(self.facet(i)[0])).help("mend the geometry, or mesh it again")
+        self.cells.refuse(what, &cells, self.cells.at(self.facet(i)[0])).help("correct the geometry, or mesh it again")
     }
 }
 

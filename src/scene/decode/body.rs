@@ -58,7 +58,7 @@ fn load() -> Table {
         .must("on", Form::Text, "boundary, or a pattern of such")
         .key("pressure", Form::Field, "pressure against the outer normal")
         .key("traction", Form::Field.list(), "force per area, one for each component")
-        .key("force", Form::Field.list(), "force on the whole boundary, numbers")
+        .key("force", Form::Field.list(), "total force on the whole boundary, numbers: [FX, FY], in space [FX, FY, FZ]")
         .key("rigid", Form::Flag, "whether the boundary moves as one under the force; false")
         .key("path", Form::Text, "column of the table of load steps with its factor")
         .apart(&["pressure", "traction", "force"])

@@ -220,6 +220,7 @@ fn refusals_of_overrides_point_into_them() {
 fn refusals_of_short_options_point_into_what_was_typed() {
     for (text, marked, message) in [
         ("--tolerance -1", "-1", "the error is -1"),
+        ("--tolerance 5", "5", "the error is 5"),
         ("--tolerance ", "", "the value is missing"),
         ("--tolerance much", "much", "expected a number, found a string"),
         ("--method newtn", "newtn", "unknown method `newtn`"),
