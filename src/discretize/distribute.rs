@@ -77,6 +77,8 @@ pub struct Dealt {
     pub distribution: Distribution,
     /// The rank that speaks for the body.
     pub leader: usize,
+    /// The ranks that have nodes of it.
+    pub ranks: Vec<usize>,
     /// Number of each node in the matrix that has its rows.
     number: Vec<u32>,
     /// Its coarse nodes; none where no interpolation is wanted.
@@ -139,7 +141,8 @@ fn of_deal<'a, const D: usize>(
             leads: leader == rank,
             exchange: exchange.clone(),
         };
-        Dealt { distribution, leader, number, coarse }
+        let ranks = (0..ranks).filter(|&rank| counts[rank] > 0).collect();
+        Dealt { distribution, leader, ranks, number, coarse }
     };
     drafts.map(of_body).collect()
 }
