@@ -3,6 +3,7 @@
 mod approach;
 mod auto;
 mod balance;
+mod bisect;
 mod carried;
 mod cells;
 mod distribute;
@@ -43,7 +44,7 @@ use balance::Forces;
 pub use balance::{Balance, Resultant};
 use carried::{Supported, supported};
 use cells::Needs;
-pub use distribute::{Deal, Graph};
+use distribute::Deal;
 use draft::{Draft, Loose};
 pub use factory::{Assembled, Factory, Outline};
 use local::Local;
@@ -194,11 +195,11 @@ pub fn discretize<const D: usize>(
         graph,
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
-    let graph = |bodies: &[usize]| {
-        let bodies: Vec<_> = bodies.iter().map(|&body| (lazy[body](), &drafts[body])).collect();
-        distribute::graph::<D>(&bodies, &pairs)
+    let deal = |bodies: Vec<usize>| {
+        let nodes: Vec<[f64; D]> = bodies.iter().flat_map(|&body| &parts[body].space.nodes).copied().collect();
+        Deal { bodies, owner: bisect::parts(&nodes, exchange.ranks()) }
     };
-    let deals = factory.deal_out(&graph)?;
+    let deals: Vec<Deal> = factory.dealt_out().into_iter().map(deal).collect();
     let coarse = |body: usize| match factory.wants_interpolation(&parts[body].spec.name.value) {
         true => parts[body].coarse_nodes(),
         false => Vec::new(),
