@@ -134,7 +134,8 @@ impl Solution {
         report::contact_table(&self.done, self.estimate.as_ref(), pair)
     }
 
-    /// Displacements and stresses at the nodes of a body, in the order of the scene; none on ranks that do not speak for it.
+    /// Displacements and stresses at the nodes of a body, in the order of the scene; none on ranks that have no part of it. Of a body that is
+    /// dealt out over ranks each has those of its part: every cell is in one of them, nodes between parts are in several.
     ///
     /// # Errors
     /// The failure of a solver that should have found the interior of the body.
@@ -149,7 +150,7 @@ impl Solution {
         }
     }
 
-    /// The number of each node of a body among the points of the mesh: of [`MeshArrays::points`], or of the points in a file that a
+    /// The number of each node of [`Solution::body`] among the points of the mesh: of [`MeshArrays::points`], or of the points in a file that a
     /// group uses.
     ///
     /// # Panics

@@ -3,6 +3,7 @@
 mod approach;
 mod auto;
 mod balance;
+mod bisect;
 mod carried;
 mod cells;
 mod distribute;
@@ -13,6 +14,7 @@ mod fields;
 mod find;
 mod gauge;
 mod known;
+mod local;
 mod mechanism;
 pub mod meshes;
 mod pairs;
@@ -29,7 +31,7 @@ mod verify;
 use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
-use crate::fem::assemble::NodeGraph;
+use crate::fem::assemble::{NodalBlock, NodeGraph};
 use crate::fem::rigid::{FreeMotion, RigidMotion};
 use crate::linalg::{Csr, axpy, dot};
 use crate::mesh::Checked;
@@ -42,9 +44,10 @@ use balance::Forces;
 pub use balance::{Balance, Resultant};
 use carried::{Supported, supported};
 use cells::Needs;
-pub use distribute::{Deal, Graph};
+use distribute::Deal;
 use draft::{Draft, Loose};
 pub use factory::{Assembled, Factory, Outline};
+use local::Local;
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
@@ -61,7 +64,7 @@ pub struct BodyInfo {
     pub name: String,
     /// Nodes.
     pub nodes: usize,
-    /// Number of each node among the points of the mesh.
+    /// Number among the points of the mesh of each node of the cells that this rank shows.
     pub points: Vec<u32>,
     /// Cells.
     pub cells: usize,
@@ -84,8 +87,10 @@ pub struct BodyInfo {
     pub stiffness: f64,
     /// Sum of its loads; in a body of revolution radial ones add up as if they had one direction.
     pub load: [f64; 3],
-    /// Rank that owns the body.
+    /// Rank that owns the body, or most of it.
     pub rank: usize,
+    /// Ranks that have a part of it.
+    pub ranks: Vec<usize>,
     /// Names of the groups of its supports.
     pub supports: Vec<String>,
     /// Names of the groups of its springs.
@@ -99,9 +104,9 @@ impl BodyInfo {
     /// What the body says of its displacements.
     ///
     /// # Panics
-    /// On ranks that do not speak for the body.
+    /// On ranks that have no part of the body.
     pub fn post(&self) -> &Post {
-        self.post.as_ref().unwrap_or_else(|| unreachable!("only the rank that speaks for a body recovers it"))
+        self.post.as_ref().unwrap_or_else(|| unreachable!("only ranks that have a part of a body recover it"))
     }
 }
 
@@ -190,11 +195,11 @@ pub fn discretize<const D: usize>(
         graph,
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
-    let graph = |bodies: &[usize]| {
-        let bodies: Vec<_> = bodies.iter().map(|&body| (lazy[body](), &drafts[body])).collect();
-        distribute::graph::<D>(&bodies, &pairs)
+    let deal = |bodies: Vec<usize>| {
+        let nodes: Vec<[f64; D]> = bodies.iter().flat_map(|&body| &parts[body].space.nodes).copied().collect();
+        Deal { bodies, owner: bisect::parts(&nodes, exchange.ranks()) }
     };
-    let deals = factory.deal_out(&graph)?;
+    let deals: Vec<Deal> = factory.dealt_out().into_iter().map(deal).collect();
     let coarse = |body: usize| match factory.wants_interpolation(&parts[body].spec.name.value) {
         true => parts[body].coarse_nodes(),
         false => Vec::new(),
@@ -216,6 +221,10 @@ pub fn discretize<const D: usize>(
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
         let is_owner = owner[index] == rank;
+        let ranks = dealt.as_ref().map_or_else(|| vec![owner[index]], |dealt| dealt.ranks.clone());
+        let owns = dealt
+            .as_ref()
+            .map(|dealt| (0..part.space.nodes.len()).map(|node| dealt.is_own::<D>(node)).collect::<Vec<_>>());
         let Draft { segments, rows, nodal_load, load, .. } = draft;
         let Supported { carried, prescribed } = supported;
         let mut offset = vec![0.0; rows.rows()];
@@ -283,20 +292,29 @@ pub fn discretize<const D: usize>(
         }
         let unloaded = if keep { part.unloaded(mesh, &nodal_load)? } else { Vec::new() };
         let warning = elastic::warning(part.spec, &part.space, scene.plane);
-        let outer = if is_owner { Some(approach::outer_maker(&part, mesh)?) } else { None };
         let (nodes, cells) = (part.space.nodes.len(), part.known.cells);
         let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
-        let post = |outer| {
-            let rows = nodal_rows(&segments, &pairs, D * nodes);
-            let (space, held, elasticity) = (space.clone(), held.clone(), elasticity.clone());
-            let (springs, supports) = (part.springs, part.spec.fix.len());
-            let forces = Forces { space, elasticity, held, springs, supports, load: nodal_load, rows };
-            Post::new(part.spec, outer, forces)
-        };
+        let (mut points, mut post) = (Vec::new(), None);
+        if owns.is_some() || is_owner {
+            let is_own = |node| owns.as_ref().is_none_or(|owns| owns[held.frame.node(node) as usize]);
+            let local = Rc::new(Local::new(space.clone(), cells, is_own));
+            let (_, shown) = local.space.part(local.told());
+            points = shown.iter().map(|&node| part.known.points[local.nodes[node as usize] as usize]).collect();
+            let forces = Forces {
+                rows: nodal_rows(&segments, &pairs, &local),
+                springs: part.springs.iter().map(|blocks| here(blocks, &local)).collect(),
+                supports: part.spec.fix.len(),
+                load: local.values(&nodal_load),
+                held: held.clone(),
+                elasticity: elasticity.clone(),
+                part: local,
+            };
+            post = Some(Post::new(part.spec, part.known.outer, forces)?);
+        }
         infos.push(BodyInfo {
             name: name.clone(),
             nodes,
-            points: part.known.points,
+            points,
             cells,
             facets: checked[index].counted(),
             dofs: D * nodes,
@@ -308,10 +326,11 @@ pub fn discretize<const D: usize>(
             stiffness,
             load: resultant,
             rank: owner[index],
+            ranks,
             supports: part.spec.fix.iter().map(|support| support.on.value.clone()).collect(),
             springs: part.spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
             rigid: held.rigid.iter().map(|(load, _)| part.spec.load[*load].on.value.clone()).collect(),
-            post: outer.map(post).transpose()?,
+            post,
         });
         if keep {
             shapes.push(Shape { space, elasticity, modulus, held, unloaded });
@@ -387,13 +406,22 @@ fn free<const D: usize>(
     left.iter().map(|motion| FreeMotion::new(part.dofs_of(motion), prescribed, load)).collect()
 }
 
-/// The rows of these segments for displacements of the nodes.
-fn nodal_rows(segments: &[Segment], pairs: &[ContactPair], dofs: usize) -> Csr {
-    let mut rows = Csr::new(dofs);
+/// The rows of these segments for displacements of the nodes of a part.
+fn nodal_rows<const D: usize>(segments: &[Segment], pairs: &[ContactPair], part: &Local<D>) -> Csr {
+    let mut rows = Csr::new(part.space.dofs());
+    let here = |(dof, value): (usize, f64)| Some((D * part.node((dof / D) as u32)? as usize + dof % D, value));
     for &Segment { pair, side } in segments {
-        (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].nodal[side].row(q)));
+        (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].nodal[side].row(q).filter_map(here)));
     }
     rows
+}
+
+/// Springs of a body between nodes of a part.
+fn here<const D: usize>(blocks: &[NodalBlock<D>], part: &Local<D>) -> Vec<NodalBlock<D>> {
+    let here = |NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
+        Some(NodalBlock { nodes: [part.node(*a)?, part.node(*b)?], block: *block })
+    };
+    blocks.iter().filter_map(here).collect()
 }
 
 /// Mean squared components of the normals on the contact surfaces of a body.

@@ -153,6 +153,38 @@ fn the_pieces_of_sources_in_the_documents_are_those_of_the_sources() {
     assert!(seen > 10, "{seen}");
 }
 
+/// The job scripts of the documents run, with `mpiexec` in the place of `srun`, and save their state before their time is over.
+#[test]
+fn the_job_scripts_work() {
+    let text = fs::read_to_string(root().join("docs/cluster.md")).expect("a document");
+    let scripts: Vec<&str> = text.split("```text\n").filter_map(|block| block.split("```").next()).collect();
+    let scripts: Vec<&str> = scripts.into_iter().filter(|script| script.starts_with("#!/bin/bash\n#SBATCH")).collect();
+    assert_eq!(scripts.len(), 2);
+    for script in scripts {
+        let option = |name: &str| script.split_once(name).and_then(|(_, rest)| rest.split_whitespace().next());
+        let time: Vec<u32> = option("--time=").expect("a time").split(':').map(|n| n.parse().expect("time")).collect();
+        if let Some(minutes) = option("--checkpoint ") {
+            let minutes: u32 = minutes.parse().expect("minutes");
+            assert!(2 * minutes <= 60 * time[0] + time[1], "checkpoints every {minutes} minutes in {time:?}");
+        }
+        let folder = scratch();
+        let base = folder.path();
+        let srun = base.join("bin/srun");
+        fs::write(&srun, "#!/bin/sh\nshift\nexec mpiexec --oversubscribe -n 2 \"$@\"\n").expect("a script");
+        fs::set_permissions(&srun, fs::Permissions::from_mode(0o755)).expect("a script that runs");
+        let mut job = Command::new("bash");
+        common::environment(&mut job);
+        job.env("PATH", format!("{}:{}", base.join("bin").display(), std::env::var("PATH").unwrap_or_default()));
+        job.envs([("SLURM_JOB_ID", "7"), ("SLURM_ARRAY_JOB_ID", "7"), ("SLURM_ARRAY_TASK_ID", "1")]);
+        job.env("SLURM_SUBMIT_DIR", base).env("OMPI_MCA_orte_tmpdir_base", base).current_dir(base).args(["-c", script]);
+        let (status, _, complaint) = output(job, Duration::from_secs(120));
+        assert!(status.success(), "{script}\nended with {status}\n{complaint}");
+        let reports = fs::read_dir(base.join("results")).into_iter().flatten().flatten();
+        assert_eq!(reports.filter(|folder| folder.path().join("report.json").is_file()).count(), 1, "{script}");
+        assert!(base.join("cache").is_dir(), "{script}");
+    }
+}
+
 /// A command that fails is told of, with its place.
 #[test]
 fn a_wrong_command_fails() {

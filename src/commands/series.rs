@@ -1,7 +1,9 @@
 //! Fields of a history: files of each load step, and the collection that gives them their times.
 
 use super::shown;
+use crate::discretize::BodyInfo;
 use crate::error::Result;
+use crate::output::BodyField;
 use crate::output::collection::{Entry, write_pvd};
 use crate::output::gmsh::Tags;
 use crate::output::{Folder, safe_name};
@@ -13,10 +15,37 @@ use std::io::Write;
 /// Folder of the files of steps but the last.
 const FOLDER: &str = "steps";
 
-/// Name of a file in a step before the last, numbered from 1 on.
-fn file_of(name: &str, step: usize, steps: usize) -> String {
+/// Name of a file in a step before the last without its ending, numbered from 1 on.
+fn stem_of(name: &str, step: usize, steps: usize) -> String {
     let digits = steps.to_string().len();
-    format!("{FOLDER}/{}-{step:0digits$}.vtu", safe_name(name))
+    format!("{FOLDER}/{}-{step:0digits$}", safe_name(name))
+}
+
+/// The file of a rank's part of a body.
+fn part(stem: &str, info: &BodyInfo, rank: usize, ending: &str) -> String {
+    match info.ranks.len() {
+        1 => format!("{stem}.{ending}"),
+        _ => format!("{stem}-r{rank}.{ending}"),
+    }
+}
+
+/// Ending of the file that has all of a body.
+fn ending(info: &BodyInfo) -> &'static str {
+    if info.ranks.len() == 1 { "vtu" } else { "pvtu" }
+}
+
+/// The files of the bodies at the end of a run, those of other ranks included.
+pub fn of_bodies(done: &Done) -> Vec<String> {
+    let output = &done.built.scene.output;
+    let mut files = Vec::new();
+    for info in &done.built.discrete.bodies {
+        let stem = safe_name(&info.name);
+        for (_, ending) in [(output.vtu, "vtu"), (output.msh, "msh")].iter().filter(|(is_written, _)| *is_written) {
+            files.extend(info.ranks.iter().map(|&rank| part(&stem, info, rank, ending)));
+        }
+        files.extend(output.vtu.then(|| format!("{stem}.{}", ending(info))));
+    }
+    files
 }
 
 /// Bodies, then contact surfaces.
@@ -25,43 +54,53 @@ fn names(done: &Done) -> Vec<String> {
     bodies.chain(shown::stems(done)).collect()
 }
 
-/// Writes the fields of the step that has ended: each rank its bodies, one rank the contact surfaces and the collection of all steps so far.
+/// Writes the fields of the step that has ended: each rank its parts of bodies, one rank the contact surfaces and what joins all.
 ///
 /// # Errors
 /// Files that cannot be written; the failure of a solver that should have found the interior of a body.
-pub fn write(done: &Done, recovered: &All, folder: &Folder, first: bool) -> Result<()> {
+pub fn write(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
     folder.subfolder(FOLDER)?;
     let (step, steps) = (done.steps.len(), done.built.scene.method.steps.steps.len());
-    fields(done, recovered, folder, first, &|name| file_of(name, step, steps))?;
-    if first { collection(done, folder, false) } else { Ok(()) }
+    fields(done, recovered, folder, &|name| stem_of(name, step, steps))?;
+    collection(done, folder, false)
 }
 
 /// Writes the fields of the end of a run, likewise.
 ///
 /// # Errors
 /// Those of [`write`].
-pub fn write_last(done: &Done, recovered: &All, folder: &Folder, first: bool) -> Result<()> {
+pub fn write_last(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
     if done.built.scene.output.msh {
-        views(done, recovered, folder, first)?;
+        views(done, recovered, folder)?;
     }
     if !done.built.scene.output.vtu {
         return Ok(());
     }
-    fields(done, recovered, folder, first, &|name| format!("{}.vtu", safe_name(name)))?;
-    if first { collection(done, folder, true) } else { Ok(()) }
+    fields(done, recovered, folder, &safe_name)?;
+    collection(done, folder, true)
+}
+
+/// The rank that writes, and whether it is the first.
+fn writer(done: &Done) -> (usize, bool) {
+    let rank = done.model().exchange.rank();
+    (rank, rank == 0)
 }
 
 /// Writes bodies and contact surfaces for Gmsh, each file with tags of its own.
-fn views(done: &Done, recovered: &All, folder: &Folder, first: bool) -> Result<()> {
+fn views(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
     let discrete = &done.built.discrete;
+    let (rank, first) = writer(done);
     let mut tags = Tags::default();
     for (info, recovered) in discrete.bodies.iter().zip(recovered) {
-        if let Some(Ok(recovered)) = recovered {
-            let recovered: &Recovered = recovered;
-            let write = |out: &mut dyn Write| recovered.field(info).clone().into_grid()?.write_msh(tags, out);
-            folder.write(&format!("{}.msh", safe_name(&info.name)), write)?;
+        for &owner in &info.ranks {
+            if let (true, Some(Ok(recovered))) = (owner == rank, recovered) {
+                let recovered: &Recovered = recovered;
+                let write = |out: &mut dyn Write| recovered.field(info).clone().into_grid()?.write_msh(tags, out);
+                folder.write(&part(&safe_name(&info.name), info, rank, "msh"), write)?;
+            }
+            // room for the whole body: other ranks know no better of a part
+            tags = Tags { entity: tags.entity + 1, points: tags.points + info.nodes, cells: tags.cells + info.cells };
         }
-        tags = Tags { entity: tags.entity + 1, points: tags.points + info.nodes, cells: tags.cells + info.cells };
     }
     for (i, name) in shown::stems(done).into_iter().enumerate().filter(|_| first) {
         let grid = report::contact_surface(&name, done, i);
@@ -72,34 +111,50 @@ fn views(done: &Done, recovered: &All, folder: &Folder, first: bool) -> Result<(
     Ok(())
 }
 
-fn fields(done: &Done, recovered: &All, folder: &Folder, first: bool, file: &dyn Fn(&str) -> String) -> Result<()> {
+fn fields(done: &Done, recovered: &All, folder: &Folder, stem: &dyn Fn(&str) -> String) -> Result<()> {
     let encoding = done.built.scene.output.encoding;
+    let (rank, first) = writer(done);
     for (info, recovered) in done.built.discrete.bodies.iter().zip(recovered) {
-        if let Some(Ok(recovered)) = recovered {
+        if let (true, Some(Ok(recovered))) = (info.ranks.contains(&rank), recovered) {
             let recovered: &Recovered = recovered;
-            folder.write(&file(&info.name), |out| recovered.field(info).clone().write(encoding, out))?;
+            let file = part(&stem(&info.name), info, rank, "vtu");
+            folder.write(&file, |out| recovered.field(info).clone().write(encoding, out))?;
+        }
+        if first && info.ranks.len() > 1 {
+            let stem = stem(&info.name);
+            let beside = stem.rsplit('/').next().unwrap_or(&stem);
+            let parts: Vec<String> = info.ranks.iter().map(|&rank| part(beside, info, rank, "vtu")).collect();
+            folder.write(&format!("{stem}.pvtu"), |out| BodyField::join(&parts, encoding, out))?;
         }
     }
     for (i, name) in shown::stems(done).into_iter().enumerate().filter(|_| first) {
-        folder.write(&file(&name), |out| report::contact_surface(&name, done, i).write(encoding, out))?;
+        let file = format!("{}.vtu", stem(&name));
+        folder.write(&file, |out| report::contact_surface(&name, done, i).write(encoding, out))?;
     }
     Ok(())
 }
 
-/// The collection of all steps so far; `ended` tells that the last of them has files at the top.
+/// Writes the collection of all steps so far, on the first rank; `ended` tells that the last of them has files at the top.
 fn collection(done: &Done, folder: &Folder, ended: bool) -> Result<()> {
+    if !writer(done).1 {
+        return Ok(());
+    }
+    let bodies = &done.built.discrete.bodies;
     let history = &done.built.scene.method.steps.steps;
     let names = names(done);
     let mut entries = Vec::new();
     for step in 0..done.steps.len().max(1) {
         let is_last = step + 1 >= done.steps.len();
         for (part, name) in names.iter().enumerate() {
-            let file = match is_last && ended {
-                true => format!("{}.vtu", safe_name(name)),
-                false => file_of(name, step + 1, history.len()),
+            let stem = match is_last && ended {
+                true => safe_name(name),
+                false => stem_of(name, step + 1, history.len()),
             };
-            // steps of another process may have their files elsewhere
-            if is_last || folder.path().join(&file).is_file() {
+            let here = bodies.get(part).map_or("vtu", ending);
+            // steps of another process may have been on more ranks or fewer, and may have their files elsewhere
+            let is_there = |ending: &&str| is_last || folder.path().join(format!("{stem}.{ending}")).is_file();
+            if let Some(ending) = [here, "vtu", "pvtu"].into_iter().find(is_there) {
+                let file = format!("{stem}.{ending}");
                 entries.push(Entry { time: history.get(step).map_or(0.0, |step| step.time), part, name, file });
             }
         }

@@ -247,7 +247,7 @@ impl Keep for Watchers<'_> {
         }
         let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
         if scene.output.vtu && !ends {
-            let written = series::write(done, recovered, self.folder, self.session.rank() == 0);
+            let written = series::write(done, recovered, self.folder);
             self.note_failure("a field of a load step", written);
         }
     }

@@ -67,7 +67,7 @@ impl Writing<'_> {
             written = written.and(plots.write(done, &folder));
         }
         if fields {
-            written = written.and(series::write_last(done, &recovered, &folder, first));
+            written = written.and(series::write_last(done, &recovered, &folder));
         }
         clock.phase("output");
         clock.total();
@@ -111,11 +111,7 @@ impl Writing<'_> {
             names.push(crate::report::FILE.to_owned());
         }
         if fields {
-            let output = &self.done.built.scene.output;
-            for (_, ending) in [(output.vtu, "vtu"), (output.msh, "msh")].iter().filter(|(is_written, _)| *is_written) {
-                let bodies = &self.done.built.discrete.bodies;
-                names.extend(bodies.iter().map(|body| format!("{}.{ending}", body.name)));
-            }
+            names.extend(series::of_bodies(self.done));
         }
         names.extend(["history.csv", "report.json"].map(str::to_owned));
         names.extend(Some("steps.csv".to_owned()).filter(|_| !self.done.steps.is_empty()));

@@ -1,23 +1,21 @@
 //! How a body moves as seen from its contact: the mean displacement of where it is loaded or held.
 
 use super::find::find_group;
-use super::part::Part;
 use crate::contact::{add, pad};
 use crate::error::Result;
 use crate::fem::quadrature::Parts;
 use crate::fem::{Facets, Space, assemble, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
-use crate::problem::body::{LoadKind, SpringKind};
-
-/// Displacements of all nodes, a direction -> mean displacement of the body.
-pub type OuterMaker = Box<dyn Fn(&[f64], [f64; 3]) -> [f64; 3]>;
+use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
+use serde::{Deserialize, Serialize};
 
 /// Cosine of the largest angle between a force or a held direction and the contact's normal at which the place counts: the 60 degrees up to
 /// which facets are pairs without the key `angle`.
 const ALONG: f64 = 0.5;
 
 /// A surface or a set of nodes on which the body is loaded or held.
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Place {
     /// Unit vectors: the force, or the directions that are held.
     directions: Vec<[f64; 3]>,
@@ -42,52 +40,69 @@ impl Place {
     }
 }
 
-/// Finds where a body is loaded, and where it is held. The mean is over all surfaces with loads that push along the direction; without
-/// them over supports and springs that hold it; without these over the whole body.
-///
-/// # Errors
-/// Groups that are not there.
-pub fn outer_maker<const D: usize>(part: &Part<D>, mesh: &Mesh<D>) -> Result<OuterMaker> {
-    let (space, spec) = (&part.space, part.spec);
-    let (mut loaded, mut held) = (Vec::new(), Vec::new());
-    for load in &spec.load {
-        let group = find_group(mesh, &load.on, &[D - 1], "load")?;
-        let force = match load.kind {
-            LoadKind::Force { total, .. } => total,
-            _ => part.resultant(load, mesh)?,
-        };
-        loaded.push(Place::new(space, group, unit(force).into_iter().collect()));
+/// Where a body is loaded, and where it is held.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct Outer {
+    loaded: Vec<Place>,
+    held: Vec<Place>,
+    /// Integrals of the shape functions over a body that nothing loads or holds.
+    whole: Vec<(u32, f64)>,
+}
+
+impl Outer {
+    /// Of a body of which all cells are here; `resultant` sums a load.
+    ///
+    /// # Errors
+    /// Groups that are not there.
+    pub fn new<const D: usize>(
+        spec: &BodySpec,
+        space: &Space<D>,
+        mesh: &Mesh<D>,
+        resultant: &dyn Fn(&Load) -> Result<[f64; 3]>,
+    ) -> Result<Self> {
+        let mut outer = Self::default();
+        for load in &spec.load {
+            let group = find_group(mesh, &load.on, &[D - 1], "load")?;
+            let force = match load.kind {
+                LoadKind::Force { total, .. } => total,
+                _ => resultant(load)?,
+            };
+            outer.loaded.push(Place::new(space, group, unit(force).into_iter().collect()));
+        }
+        let axes = |c: usize| std::array::from_fn(|k| if k == c { 1.0 } else { 0.0 });
+        for fix in &spec.fix {
+            let group = find_group(mesh, &fix.on, &(0..=D).rev().collect::<Vec<_>>(), "support")?;
+            let components = (0..D).filter(|&c| fix.value[c].is_some()).map(axes);
+            let normal = fix.normal.as_ref().and_then(|_| normal(space, group));
+            outer.held.push(Place::new(space, group, components.chain(normal).collect()));
+        }
+        for spring in &spec.spring {
+            let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
+            let directions = match &spring.kind {
+                SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axes).collect(),
+                SpringKind::Normal(_) => normal(space, group).into_iter().collect(),
+            };
+            outer.held.push(Place::new(space, group, directions));
+        }
+        if outer.loaded.is_empty() && outer.held.is_empty() {
+            outer.whole = volumes(space);
+        }
+        Ok(outer)
     }
-    let axes = |c: usize| std::array::from_fn(|k| if k == c { 1.0 } else { 0.0 });
-    for fix in &spec.fix {
-        let group = find_group(mesh, &fix.on, &(0..=D).rev().collect::<Vec<_>>(), "support")?;
-        let components = (0..D).filter(|&c| fix.value[c].is_some()).map(axes);
-        let normal = fix.normal.as_ref().and_then(|_| normal(space, group));
-        held.push(Place::new(space, group, components.chain(normal).collect()));
-    }
-    for spring in &spec.spring {
-        let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
-        let directions = match &spring.kind {
-            SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axes).collect(),
-            SpringKind::Normal(_) => normal(space, group).into_iter().collect(),
-        };
-        held.push(Place::new(space, group, directions));
-    }
-    let whole = if loaded.is_empty() && held.is_empty() { Some(volumes(space)) } else { None };
-    let nodes = space.nodes.len() as u32;
-    Ok(Box::new(move |u, n| {
+
+    /// Mean displacement, from those of all nodes: over all surfaces with loads that push along a direction; without them over supports and
+    /// springs that hold it; without these over the whole body.
+    pub fn mean<const D: usize>(&self, u: &[f64], direction: [f64; 3]) -> [f64; 3] {
         let chosen = |places: &[Place]| {
-            let along = || places.iter().filter(|place| place.acts_along(n));
+            let along = || places.iter().filter(|place| place.acts_along(direction));
             let surfaces = along().any(|place| place.has_area);
             let chosen = along().filter(|place| place.has_area || !surfaces);
             mean::<D>(u, chosen.flat_map(|place| place.weights.iter().copied()))
         };
-        let whole = || match &whole {
-            Some(weights) => mean::<D>(u, weights.iter().copied()),
-            None => mean::<D>(u, (0..nodes).map(|node| (node, 1.0))),
-        };
-        chosen(&loaded).or_else(|| chosen(&held)).or_else(whole).unwrap_or_default()
-    }))
+        let nodes = || (0..(u.len() / D) as u32).map(|node| (node, 1.0));
+        let whole = || mean::<D>(u, self.whole.iter().copied()).or_else(|| mean::<D>(u, nodes()));
+        chosen(&self.loaded).or_else(|| chosen(&self.held)).or_else(whole).unwrap_or_default()
+    }
 }
 
 /// A mean of nodal displacements; none without nodes.

@@ -1,11 +1,11 @@
 //! Forces and moments on a body at the end: loads, contacts, supports, springs, rigid surfaces, and what their sum lacks.
 
+use super::local::Local;
 use super::supports::Held;
 use crate::contact::{add, pad};
 use crate::fem::assemble::{self, NodalBlock, NodeGraph};
 use crate::fem::{Elasticity, Frame, Space};
 use crate::linalg::Csr;
-use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// A force and its moment about the origin (x, y, z).
@@ -35,32 +35,33 @@ pub struct Balance {
     pub size: [f64; 2],
 }
 
-/// What it takes to find the forces on a body.
+/// What it takes to find the forces on the own nodes of a part of a body.
 pub struct Forces<const D: usize> {
-    /// Its space.
-    pub space: Rc<Space<D>>,
+    /// The part.
+    pub part: Rc<Local<D>>,
     /// Its elasticity.
     pub elasticity: Rc<Elasticity>,
     /// Its supports and rigid surfaces.
     pub held: Rc<Held<D>>,
-    /// Its springs.
+    /// Its springs, between nodes of the part.
     pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Number of supports in the scene.
     pub supports: usize,
-    /// Nodal forces of its loads.
+    /// Nodal forces of its loads, node by node of the part.
     pub load: Vec<f64>,
-    /// Its contact rows for nodal displacements.
+    /// Its contact rows for displacements of these nodes.
     pub rows: Csr,
 }
 
 impl<const D: usize> Forces<D> {
-    /// The balance at displacements of all nodes, under the forces omega p of the contact rows.
+    /// The share of own nodes in the balance, at displacements of the nodes of the part, under the forces omega p of the contact rows.
     ///
     /// Reactions are the internal forces of the cells around the held nodes less all that is known to act there.
     pub fn balance(&self, u: &[f64], force: &[f64]) -> Balance {
         let mut contact = vec![0.0; u.len()];
         self.rows.add_transpose(-1.0, force, &mut contact);
-        let mut sum = Sum { size: [0.0; 2], space: &self.space };
+        let space = &*self.part.space;
+        let mut sum = Sum { size: [0.0; 2], part: &self.part };
         let parts = vec![sum.of(&self.load), sum.of(&contact)];
         let mut known: Vec<f64> = self.load.iter().zip(&contact).map(|(load, contact)| load + contact).collect();
         let mut springs = Vec::new();
@@ -79,11 +80,12 @@ impl<const D: usize> Forces<D> {
         let mut rigid = vec![Resultant::default(); self.held.rigid.len()];
         for (node, reaction) in self.reactions(u, &known) {
             sum.grow(node, reaction);
-            match self.held.rigid.iter().position(|(_, nodes)| nodes.binary_search(&node).is_ok()) {
-                Some(surface) => rigid[surface].add(&self.space, node, reaction),
+            let of_body = self.part.nodes[node as usize];
+            match self.held.rigid.iter().position(|(_, nodes)| nodes.binary_search(&of_body).is_ok()) {
+                Some(surface) => rigid[surface].add(space, node, reaction),
                 None => {
-                    for (support, part) in self.held.split(node, reaction) {
-                        supports[support].add(&self.space, node, part);
+                    for (support, part) in self.held.split(of_body, reaction) {
+                        supports[support].add(space, node, part);
                     }
                 }
             }
@@ -91,32 +93,38 @@ impl<const D: usize> Forces<D> {
         Balance { parts: [parts, supports, springs, rigid].concat(), size: sum.size }
     }
 
-    /// What holds the nodes of supports and rigid surfaces.
-    fn reactions(&self, u: &[f64], known: &[f64]) -> BTreeMap<u32, [f64; D]> {
-        let mut held = vec![false; self.space.nodes.len()];
-        self.held.nodes().for_each(|node| held[node as usize] = true);
-        let (around, cells) = self.space.around(&held);
+    /// What holds the own nodes of supports and rigid surfaces, in their order.
+    fn reactions(&self, u: &[f64], known: &[f64]) -> Vec<(u32, [f64; D])> {
+        let Local { space, own, .. } = &*self.part;
+        let mut held = vec![false; own.len()];
+        let nodes = self.held.nodes().filter_map(|node| self.part.node(node)).filter(|&node| own[node as usize]);
+        nodes.for_each(|node| held[node as usize] = true);
+        let touched = |cell: &[u32]| cell.iter().any(|&node| held[node as usize]);
+        let cells = space.cells.chunks_exact(space.stride).enumerate().filter(|(_, cell)| touched(cell));
+        let cells: Vec<usize> = cells.map(|(number, _)| number).collect();
+        let (around, nodes) = space.part(cells.iter().copied());
         let elasticity = self.elasticity.of_cells(&cells);
         let graph = NodeGraph::new(&around, &[], &Frame::default());
-        let Ok(stiffness) = assemble::stiffness(&around, &graph, &elasticity) else { return BTreeMap::new() };
-        let force = |row: usize| stiffness.row(row).map(|(j, k)| k * u[j]).sum::<f64>() - known[row];
-        let at = |node: u32| (node, std::array::from_fn(|c| force(D * node as usize + c)));
-        self.held.nodes().map(at).collect()
+        let Ok(stiffness) = assemble::stiffness(&around, &graph, &elasticity) else { return Vec::new() };
+        let dof = |row: usize| D * nodes[row / D] as usize + row % D;
+        let force = |row: usize| stiffness.row(row).map(|(j, k)| k * u[dof(j)]).sum::<f64>() - known[dof(row)];
+        let at = |place: usize| (nodes[place], std::array::from_fn(|c| force(D * place + c)));
+        (0..nodes.len()).filter(|&place| held[nodes[place] as usize]).map(at).collect()
     }
 }
 
-/// Sums nodal forces.
+/// Sums forces at own nodes.
 struct Sum<'a, const D: usize> {
     size: [f64; 2],
-    space: &'a Space<D>,
+    part: &'a Local<D>,
 }
 
 impl<const D: usize> Sum<'_, D> {
     fn of(&mut self, forces: &[f64]) -> Resultant {
         let mut resultant = Resultant::default();
-        for (node, force) in forces.chunks_exact(D).enumerate() {
+        for (node, force) in forces.chunks_exact(D).enumerate().filter(|(node, _)| self.part.own[*node]) {
             let force: [f64; D] = std::array::from_fn(|c| force[c]);
-            resultant.add(self.space, node as u32, force);
+            resultant.add(&self.part.space, node as u32, force);
             self.grow(node as u32, force);
         }
         resultant
@@ -124,8 +132,8 @@ impl<const D: usize> Sum<'_, D> {
 
     fn grow(&mut self, node: u32, force: [f64; D]) {
         let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let size = length(self.space.net_force(force));
+        let size = length(self.part.space.net_force(force));
         self.size[0] += size;
-        self.size[1] += size * length(pad(self.space.nodes[node as usize]));
+        self.size[1] += size * length(pad(self.part.space.nodes[node as usize]));
     }
 }

@@ -1,4 +1,4 @@
-//! The cells of bodies, from the rank that has read them to those that assemble their nodes or speak for the body.
+//! The cells of bodies, from the rank that has read them to those that assemble their nodes.
 
 use super::distribute::Deal;
 use super::draft::Draft;
@@ -15,13 +15,10 @@ use serde::{Deserialize, Serialize};
 pub enum Needs<'a> {
     /// Every rank needs all.
     Everywhere,
-    /// One rank needs all of them, others those at the nodes that they have.
-    Owners {
-        /// The rank that speaks for the body.
-        leader: usize,
-        /// The rank of each node; none where the leader has them all.
-        of_node: Option<&'a [u32]>,
-    },
+    /// This rank has the body.
+    Whole(usize),
+    /// These ranks have its nodes: each needs the cells at its own ones, and those next to them.
+    Owners(&'a [u32]),
 }
 
 impl<'a> Needs<'a> {
@@ -30,15 +27,15 @@ impl<'a> Needs<'a> {
         (0..bodies).map(|_| Needs::Everywhere).collect()
     }
 
-    /// Of bodies with these `leaders`, some of which are dealt out.
+    /// Of bodies of these `leaders`, some of which are dealt out.
     pub fn of<const D: usize>(leaders: &[usize], drafts: &[Draft<D>], deals: &'a [Deal]) -> Vec<Self> {
-        let mut needs: Vec<Self> = leaders.iter().map(|&leader| Needs::Owners { leader, of_node: None }).collect();
+        let mut needs: Vec<Self> = leaders.iter().map(|&leader| Needs::Whole(leader)).collect();
         for Deal { bodies, owner } in deals {
             let mut rest = &owner[..];
             for &body in bodies {
                 let own;
                 (own, rest) = rest.split_at(drafts[body].rows.columns / D);
-                needs[body] = Needs::Owners { leader: leaders[body], of_node: Some(own) };
+                needs[body] = Needs::Owners(own);
             }
         }
         needs
@@ -70,20 +67,16 @@ pub fn deal<const D: usize>(
     if ranks == 1 {
         return Ok(whole.unwrap_or_default());
     }
-    let at_nodes: Vec<Vec<Vec<u32>>> = match &whole {
-        Some(_) => parts.iter().zip(needs).map(|(part, needs)| at_nodes(part, needs, ranks)).collect(),
+    let near: Vec<Vec<Vec<u32>>> = match &whole {
+        Some(_) => parts.iter().zip(needs).map(|(part, needs)| near(part, needs, ranks)).collect(),
         None => Vec::new(),
     };
     let of_rank = |rank: usize| -> Vec<Cells> {
-        let bodies = parts.iter().zip(needs).zip(whole.iter().flatten()).zip(&at_nodes);
-        let of_body = |(((part, needs), elasticity), at_nodes): (((&Part<D>, &Needs), _), &Vec<Vec<u32>>)| {
-            let all = 0..part.known.cells as u32;
-            match needs {
-                Needs::Owners { leader, .. } if *leader != rank => {
-                    some(part, elasticity, at_nodes[rank].iter().copied())
-                }
-                _ => some(part, elasticity, all),
-            }
+        let bodies = parts.iter().zip(needs).zip(whole.iter().flatten()).zip(&near);
+        let of_body = |(((part, needs), elasticity), near): (((&Part<D>, &Needs), _), &Vec<Vec<u32>>)| match needs {
+            Needs::Owners(_) => some(part, elasticity, near[rank].iter().copied()),
+            Needs::Whole(owner) if *owner != rank => some(part, elasticity, 0..0),
+            _ => some(part, elasticity, 0..part.known.cells as u32),
         };
         bodies.map(of_body).collect()
     };
@@ -95,21 +88,38 @@ pub fn deal<const D: usize>(
     parts.iter_mut().zip(dealt).map(take).collect()
 }
 
-/// Numbers of the cells at the nodes of each rank that does not need all cells.
-fn at_nodes<const D: usize>(part: &Part<D>, needs: &Needs, ranks: usize) -> Vec<Vec<u32>> {
-    let mut at_nodes = vec![Vec::new(); ranks];
-    let Needs::Owners { leader, of_node: Some(of_node) } = needs else { return at_nodes };
-    for (cell, nodes) in part.space.cells.chunks_exact(part.space.stride).enumerate() {
-        for &node in nodes {
-            // tied nodes are assembled where their master is
-            let of_rank = &mut at_nodes[of_node[part.held.frame.node(node) as usize] as usize];
-            if of_rank.last() != Some(&(cell as u32)) {
-                of_rank.push(cell as u32);
+/// Numbers of the cells that each rank needs of a body whose nodes are dealt out: those that touch a cell at one of its own nodes, so that
+/// it knows all that meets at the nodes of the latter.
+fn near<const D: usize>(part: &Part<D>, needs: &Needs, ranks: usize) -> Vec<Vec<u32>> {
+    let mut near = vec![Vec::new(); ranks];
+    let Needs::Owners(of_node) = needs else { return near };
+    // tied nodes are assembled where their master is
+    let owner = |&node: &u32| of_node[part.held.frame.node(node) as usize];
+    let cells = || part.space.cells.chunks_exact(part.space.stride);
+    // ranks that have a node next to one of another rank
+    let next = |cell: &'_ [u32]| {
+        let mut next = Vec::new();
+        for rank in cell.iter().map(owner) {
+            next.extend(cell.iter().filter(|node| owner(node) != rank).map(|&node| (node, rank)));
+        }
+        next
+    };
+    let mut others: Vec<(u32, u32)> = cells().flat_map(next).collect();
+    others.sort_unstable();
+    others.dedup();
+    for (number, cell) in (0..).zip(cells()) {
+        for node in cell {
+            let first = others.partition_point(|(other, _)| other < node);
+            let others = others[first..].iter().take_while(|(other, _)| other == node).map(|(_, rank)| *rank);
+            for rank in std::iter::once(owner(node)).chain(others) {
+                let near = &mut near[rank as usize];
+                if near.last() != Some(&number) {
+                    near.push(number);
+                }
             }
         }
     }
-    at_nodes[*leader] = Vec::new();
-    at_nodes
+    near
 }
 
 /// Some of the cells of a body of which this rank has all.

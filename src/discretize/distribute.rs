@@ -1,22 +1,10 @@
 //! The dofs of all bodies over the ranks: a partition of their nodes, and what each rank knows of it.
 
 use super::draft::Draft;
-use crate::contact::ContactPair;
-use crate::fem::assemble::NodeGraph;
 use crate::fem::{Couplings, ElasticBody, Interpolation};
 use crate::linalg::Csr;
 use crate::model::{Distribution, Exchange};
 use std::rc::Rc;
-
-/// A graph whose nodes are to be dealt out: compressed rows of neighbours, both ways, without the node itself.
-pub struct Graph {
-    /// Row starts.
-    pub ptr: Vec<i32>,
-    /// Neighbours.
-    pub col: Vec<i32>,
-    /// Work of each node: the entries of its row of K, in blocks.
-    pub weight: Vec<i32>,
-}
 
 /// Bodies whose rows of K are in one matrix of all ranks.
 pub struct Deal {
@@ -26,57 +14,14 @@ pub struct Deal {
     pub owner: Vec<u32>,
 }
 
-/// The nodes of bodies, body by body, joined where K couples them, and at contact points.
-pub fn graph<const D: usize>(bodies: &[(&NodeGraph, &Draft<D>)], pairs: &[ContactPair]) -> Graph {
-    let mut first = vec![0];
-    bodies.iter().for_each(|(graph, _)| first.push(first[first.len() - 1] + graph.ptr.len() - 1));
-    // a contact point joins the first node on its one side with the first on the other
-    let mut ends: Vec<[Option<i32>; 2]> = Vec::new();
-    let mut begin = vec![0];
-    for pair in pairs {
-        ends.resize(ends.len() + pair.len(), [None; 2]);
-        begin.push(ends.len());
-    }
-    for (body, (_, draft)) in bodies.iter().enumerate() {
-        let mut row = 0;
-        for segment in &draft.segments {
-            for at in begin[segment.pair]..begin[segment.pair + 1] {
-                let node = draft.rows.row(row).next().map(|(dof, _)| (first[body] + dof / D) as i32);
-                ends[at][segment.side] = node;
-                row += 1;
-            }
-        }
-    }
-    let mut joined: Vec<(i32, i32)> = ends.into_iter().filter_map(|[a, b]| Some((a?, b?))).collect();
-    joined.extend(joined.clone().into_iter().map(|(a, b)| (b, a)));
-    joined.sort_unstable();
-    joined.dedup();
-    let mut joined = joined.into_iter().peekable();
-    let mut all = Graph { ptr: vec![0], col: Vec::new(), weight: Vec::new() };
-    for ((graph, _), &first) in bodies.iter().zip(&first) {
-        for node in 0..graph.ptr.len() - 1 {
-            let neighbours = &graph.col[graph.ptr[node] as usize..graph.ptr[node + 1] as usize];
-            all.weight.push(neighbours.len() as i32);
-            let own = (first + node) as i32;
-            all.col.extend(neighbours.iter().map(|&other| first as i32 + other as i32).filter(|&other| other != own));
-            while let Some((_, other)) = joined.next_if(|edge| edge.0 == own) {
-                // in a body that touches itself K may couple the two, or they are one
-                let inside =
-                    u32::try_from(other - first as i32).is_ok_and(|other| neighbours.binary_search(&other).is_ok());
-                all.col.extend(Some(other).filter(|_| !inside));
-            }
-            all.ptr.push(all.col.len() as i32);
-        }
-    }
-    all
-}
-
 /// A body that is dealt out, as one rank sees it.
 pub struct Dealt {
     /// The dofs of this rank.
     pub distribution: Distribution,
     /// The rank that speaks for the body.
     pub leader: usize,
+    /// The ranks that have nodes of it.
+    pub ranks: Vec<usize>,
     /// Number of each node in the matrix that has its rows.
     number: Vec<u32>,
     /// Its coarse nodes; none where no interpolation is wanted.
@@ -139,7 +84,8 @@ fn of_deal<'a, const D: usize>(
             leads: leader == rank,
             exchange: exchange.clone(),
         };
-        Dealt { distribution, leader, number, coarse }
+        let ranks = (0..ranks).filter(|&rank| counts[rank] > 0).collect();
+        Dealt { distribution, leader, ranks, number, coarse }
     };
     drafts.map(of_body).collect()
 }

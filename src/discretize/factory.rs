@@ -1,6 +1,5 @@
 //! What bodies need to become solvers, and who makes them.
 
-use super::distribute::{Deal, Graph};
 use crate::error::Result;
 use crate::fem::assemble::NodeGraph;
 use crate::fem::rigid::FreeMotion;
@@ -38,12 +37,9 @@ pub trait Factory {
     /// Failures of PETSc's options.
     fn plan(&mut self, outlines: &[Outline]) -> Result<()>;
 
-    /// Deals the nodes of those bodies out to the ranks whose solvers want that, after the plan: bodies that share a matrix together; none for
-    /// bodies that stay whole. Collective; the `graph` of the bodies with these numbers is made on one rank.
-    ///
-    /// # Errors
-    /// When the partitioner fails.
-    fn deal_out(&mut self, graph: &dyn Fn(&[usize]) -> Graph) -> Result<Vec<Deal>>;
+    /// Numbers, in increasing order, of bodies whose nodes are to be dealt out over the ranks, after the plan: those that share a matrix together;
+    /// none for bodies that stay whole.
+    fn dealt_out(&self) -> Vec<Vec<usize>>;
 
     /// Whether the interpolation of a body from linear displacements is wanted, after the plan.
     fn wants_interpolation(&self, name: &str) -> bool;

@@ -3,6 +3,7 @@
 //! Nodes, surfaces, supports and loads are known everywhere, so that every rank finds the same contact points, rigid motions and
 //! numbers; cells go, once dofs are dealt out, to the ranks that assemble their nodes ([`cells`](super::cells)).
 
+use super::approach::Outer;
 use crate::fem::{Facets, Space};
 use crate::mesh::Mesh;
 use crate::problem::body::BodySpec;
@@ -30,6 +31,8 @@ pub struct Known {
     pub behind: Vec<u32>,
     /// Area (volume) of the cells by their corners.
     pub measure: f64,
+    /// Where it is loaded and held.
+    pub outer: Outer,
 }
 
 impl Known {

@@ -1,5 +1,6 @@
 //! The bodies of a scene on its mesh, which one rank has read.
 
+use super::approach::Outer;
 use super::elastic;
 use super::find::{find_group, point};
 use super::known::Known;
@@ -34,7 +35,8 @@ pub fn parts<'a, const D: usize>(
         let (mut parts, mut elasticities) = (Vec::new(), Vec::new());
         for (index, spec) in bodies.iter().enumerate() {
             let (space, elasticity, known) = read(spec, mesh, wanted)?;
-            let part = Part::new(spec, mesh, space, known)?;
+            let mut part = Part::new(spec, mesh, space, known)?;
+            part.known.outer = Outer::new(spec, &part.space, mesh, &|load| part.resultant(load, mesh))?;
             verify::held(&part, &checked[index].parts, mesh)?;
             parts.push(part);
             elasticities.push(elasticity);
@@ -100,6 +102,7 @@ fn read<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, wanted: Wanted) -> Resu
         },
         measure: space.measure(),
         points,
+        outer: Outer::default(),
     };
     Ok((space, elasticity, known))
 }

@@ -83,22 +83,23 @@ impl<const D: usize> Space<D> {
         }
     }
 
-    /// The same nodes with the cells alone that touch one of those `marked`, and the numbers that these cells have here.
-    pub fn around(&self, marked: &[bool]) -> (Self, Vec<usize>) {
-        let cell = |index: usize| &self.cells[index * self.stride..(index + 1) * self.stride];
-        let touching = |index: &usize| cell(*index).iter().any(|&node| marked[node as usize]);
-        let kept: Vec<usize> = (0..self.cell_count()).filter(touching).collect();
-        let cells = kept.iter().flat_map(|&index| cell(index)).copied().collect();
-        (
-            Space {
-                nodes: self.nodes.clone(),
-                cells,
-                from_mesh: Numbering::default(),
-                measure: OnceCell::new(),
-                ..*self
-            },
-            kept,
-        )
+    /// Some of the cells, in this order, with their nodes alone in the order that they have here; and which nodes these are, sorted. Surfaces
+    /// of the mesh are not known there.
+    pub fn part(&self, cells: impl Iterator<Item = usize>) -> (Self, Vec<u32>) {
+        let cells: Vec<u32> =
+            cells.flat_map(|cell| &self.cells[cell * self.stride..(cell + 1) * self.stride]).copied().collect();
+        let mut number = vec![u32::MAX; self.nodes.len()];
+        cells.iter().for_each(|&node| number[node as usize] = 0);
+        let nodes: Vec<u32> = (0..).zip(&number).filter(|(_, number)| **number == 0).map(|(node, _)| node).collect();
+        (0..).zip(&nodes).for_each(|(place, &node)| number[node as usize] = place);
+        let space = Space {
+            nodes: nodes.iter().map(|&node| self.nodes[node as usize]).collect(),
+            cells: cells.into_iter().map(|node| number[node as usize]).collect(),
+            from_mesh: Numbering::default(),
+            measure: OnceCell::new(),
+            ..*self
+        };
+        (space, nodes)
     }
 
     /// The meridian of a body of revolution. Nodes whose radius is rounding of the largest one get the radius zero.

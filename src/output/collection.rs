@@ -30,7 +30,8 @@ pub fn write_pvd(entries: &[Entry], out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "</VTKFile>")
 }
 
-fn escape(text: &str) -> String {
+/// A text as the value of an attribute.
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 

@@ -56,7 +56,8 @@ fn named(tag: &[u8]) -> Vec<u8> {
     let mut text = String::from_utf8_lossy(tag).into_owned();
     for (array, components) in COMPONENTS {
         let name = format!(" Name=\"{array}\"");
-        if let Some(at) = text.find(&name).filter(|_| text.starts_with("<DataArray ")) {
+        let is_array = text.starts_with("<DataArray ") || text.starts_with("<PDataArray ");
+        if let Some(at) = text.find(&name).filter(|_| is_array) {
             let names =
                 components.iter().enumerate().map(|(i, component)| format!(" ComponentName{i}=\"{component}\""));
             text.insert_str(at + name.len(), &names.collect::<String>());

@@ -1,5 +1,6 @@
 //! `<body>.vtu`, for ParaView.
 
+use super::collection::escape;
 use super::tags::Whole;
 use std::io::{self, Write};
 use vtkio::model::{
@@ -100,6 +101,9 @@ pub struct BodyField {
 }
 
 impl BodyField {
+    /// Arrays at the points and their components, in the order of the files.
+    const ARRAYS: [(&'static str, u32); 4] = [("displacement", 3), ("stress", 6), ("von_mises", 1), ("principal", 3)];
+
     /// Writes VTK's XML format with binary (base64) data: point arrays `displacement` (3 components), `stress` (6),
     /// `von_mises` (1) and `principal` (3).
     ///
@@ -115,19 +119,39 @@ impl BodyField {
     /// `InvalidInput` when the arrays do not fit each other.
     pub fn into_grid(self) -> io::Result<Grid> {
         self.check().map_err(|what| io::Error::new(io::ErrorKind::InvalidInput, what))?;
+        let (displacement, stress) = (self.displacement.into_flattened(), self.stress.into_flattened());
+        let values = [displacement, stress, self.von_mises, self.principal.into_flattened()];
+        let arrays = Self::ARRAYS.into_iter().zip(values);
         Ok(Grid {
             title: self.name,
             points: self.points,
             cell: self.cell,
             connectivity: self.connectivity,
-            at_points: vec![
-                ("displacement".to_owned(), 3, self.displacement.into_flattened()),
-                ("stress".to_owned(), 6, self.stress.into_flattened()),
-                ("von_mises".to_owned(), 1, self.von_mises),
-                ("principal".to_owned(), 3, self.principal.into_flattened()),
-            ],
+            at_points: arrays.map(|((name, components), values)| (name.to_owned(), components, values)).collect(),
             at_cells: Vec::new(),
         })
+    }
+
+    /// Writes the file that joins the fields of the parts of a body in these files of the same folder.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn join(files: &[String], encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
+        let kind = if encoding.single { "Float32" } else { "Float64" };
+        let mut out = Whole::new(out);
+        let order = if cfg!(target_endian = "big") { "BigEndian" } else { "LittleEndian" };
+        writeln!(out, "<?xml version=\"1.0\"?>")?;
+        writeln!(out, "<VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"{order}\">")?;
+        writeln!(out, "  <PUnstructuredGrid GhostLevel=\"0\">\n    <PPointData>")?;
+        for (name, components) in Self::ARRAYS {
+            writeln!(out, "      <PDataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\"/>")?;
+        }
+        writeln!(out, "    </PPointData>\n    <PPoints>")?;
+        writeln!(out, "      <PDataArray type=\"{kind}\" NumberOfComponents=\"3\"/>\n    </PPoints>")?;
+        for file in files {
+            writeln!(out, "    <Piece Source=\"{}\"/>", escape(file))?;
+        }
+        writeln!(out, "  </PUnstructuredGrid>\n</VTKFile>")
     }
 
     /// Says what does not fit: ParaView would crash on it, or show another body's values.

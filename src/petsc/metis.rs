@@ -1,4 +1,4 @@
-//! Nested dissection and partitions by METIS: Debian's MUMPS is built without it.
+//! Nested dissection by METIS: Debian's MUMPS is built without it.
 //!
 //! The library is loaded when it is first needed: its header belongs to another package, and libraries of SCOTCH, which
 //! PETSc loads, have functions of the same names with other arguments.
@@ -14,84 +14,16 @@ const LIBRARY: &str = "libmetis.so.5";
 
 type NodeNd = unsafe extern "C" fn(*mut i32, *mut i32, *mut i32, *mut i32, *mut i32, *mut i32, *mut i32) -> c_int;
 
-/// Nodes, constraints, graph (2), weights of nodes, sizes, weights of edges, parts, their shares, imbalance, options, cut, part.
-type Kway = unsafe extern "C" fn(
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut f32,
-    *mut f32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-) -> c_int;
-
-/// A function of METIS by its name.
-///
-/// # Safety
-/// It has this type.
-unsafe fn function<T: Copy>(name: &str) -> Result<T> {
+/// The function of METIS.
+fn node_nd() -> Result<NodeNd> {
     static METIS: OnceLock<Option<Library>> = OnceLock::new();
     // SAFETY: the initialisers are those of any program that links it; it stays loaded.
     let library = METIS.get_or_init(|| unsafe { Library::new(LIBRARY) }.ok());
-    // SAFETY: the caller's promise.
-    let function = library.as_ref().and_then(|library| unsafe { library.get::<T>(name.as_bytes()) }.ok());
+    // SAFETY: METIS 5 has these arguments.
+    let function = library.as_ref().and_then(|library| unsafe { library.get::<NodeNd>(b"METIS_NodeND") }.ok());
     function
         .map(|function| *function)
         .ok_or_else(|| Error::new(Kind::Solver, format!("METIS ({LIBRARY}) was not found")))
-}
-
-/// Deals the nodes of a graph out to `parts` of about the same sum of `weight` (one a node, from 1), with few edges between them: the
-/// part of each node. A part may be empty.
-///
-/// The neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`, without `i` itself; the graph is symmetric.
-///
-/// # Errors
-/// When METIS is not installed, or does not return parts.
-pub fn partition(ptr: &mut [i32], col: &mut [i32], weight: &mut [i32], parts: usize) -> Result<Vec<u32>> {
-    let nodes = ptr.len() - 1;
-    if parts < 2 || nodes == 0 {
-        return Ok(vec![0; nodes]);
-    }
-    // SAFETY: METIS 5 has these arguments.
-    let kway = unsafe { function::<Kway>("METIS_PartGraphKway") }.map_err(|error| {
-        error
-            .because("it deals the bodies out to several ranks")
-            .help("`apt-get install libmetis5`, or run on one rank")
-    })?;
-    let (mut count, mut constraints, mut wanted, mut cut) = (nodes as i32, 1, parts as i32, 0);
-    let mut part = vec![-1; nodes];
-    // SAFETY: null is what is left to METIS; it reads the graph and the weights, and writes one number a node to the last.
-    let code = unsafe {
-        kway(
-            &mut count,
-            &mut constraints,
-            ptr.as_mut_ptr(),
-            col.as_mut_ptr(),
-            weight.as_mut_ptr(),
-            null_mut(),
-            null_mut(),
-            &mut wanted,
-            null_mut(),
-            null_mut(),
-            null_mut(),
-            &mut cut,
-            part.as_mut_ptr(),
-        )
-    };
-    // a METIS with 64-bit numbers would not return this
-    let part: Vec<u32> = part.into_iter().map(|part: i32| part as u32).collect();
-    if code != 1 || part.iter().any(|&part| part as usize >= parts) {
-        return Err(Error::new(Kind::Solver, "METIS returned no partition")
-            .because(format!("METIS_PartGraphKway returned {code}"))
-            .help("run on one rank"));
-    }
-    Ok(part)
 }
 
 /// Elimination order of a graph's nodes by nested dissection: position of each node, from 0.
@@ -106,8 +38,7 @@ pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
         // METIS refuses graphs without edges
         return Ok((0..nodes as i32).collect());
     }
-    // SAFETY: METIS 5 has these arguments.
-    let node_nd = unsafe { function::<NodeNd>("METIS_NodeND") }.map_err(|error| {
+    let node_nd = node_nd().map_err(|error| {
         error
             .because("the condensed solver takes the elimination order of large bodies from it")
             .help("`apt-get install libmetis5`, or take MUMPS' own order: -mat_mumps_icntl_7 0")
@@ -141,7 +72,7 @@ pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{nested_dissection, partition};
+    use super::nested_dissection;
 
     /// A chain of nodes: the separator in its middle comes last.
     #[test]
@@ -155,21 +86,5 @@ mod tests {
         let last = position.iter().position(|&at| at == 400).expect("a permutation");
         assert!((100..300).contains(&last), "{last}");
         assert_eq!(nested_dissection(&mut [0, 0, 0], &mut []).expect("no edges"), [0, 1]);
-    }
-
-    /// A chain whose first nodes are heavy is cut where the weights are equal, once.
-    #[test]
-    fn parts_have_equal_weights() {
-        let (mut ptr, mut col) = (vec![0], Vec::new());
-        for i in 0..400i32 {
-            col.extend([i - 1, i + 1].into_iter().filter(|j| (0..400).contains(j)));
-            ptr.push(col.len() as i32);
-        }
-        let mut weight: Vec<i32> = (0..400).map(|i| if i < 100 { 3 } else { 1 }).collect();
-        let part = partition(&mut ptr, &mut col, &mut weight, 2).expect("METIS");
-        let sum: i32 = (0..400).filter(|&i| part[i] == 0).map(|i| weight[i]).sum();
-        assert!((280..=320).contains(&sum), "{sum}");
-        assert_eq!(part.windows(2).filter(|pair| pair[0] != pair[1]).count(), 1);
-        assert_eq!(partition(&mut [0, 0], &mut [], &mut [1], 1).expect("one part"), [0]);
     }
 }

@@ -60,7 +60,7 @@ pub use ffi::Int;
 pub use heap::{Heap, give_back, keep_apart, leave};
 pub use ksp::{Ksp, Solved};
 pub use matrix::Matrix;
-pub use metis::{nested_dissection, partition};
+pub use metis::nested_dissection;
 pub use mumps::Schur;
 pub use options::{FAMILIES, Options};
 pub use reason::ConvergedReason;

@@ -27,81 +27,45 @@ const QUADRATIC: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
 const FACES: [[usize; 6]; 4] = [[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]];
 
 impl Part {
-    /// Reads a file with the array `value` at its points, as float32 or float64, compressed or not.
+    /// Reads a file with the array `value` at its points, as float32 or float64, compressed or not; or those that a `.pvtu` joins.
     ///
     /// # Errors
-    /// [`Kind::File`] when the file is not there, is no VTU file or lacks the array.
+    /// [`Kind::File`] when a file is not there, is no VTU file or lacks the array.
     pub fn read(path: &Path, name: &str, value: &str) -> Result<Self> {
-        let refuse = |cause: String| {
+        let refuse = |path: &Path, cause: String| {
             Error::new(Kind::File, format!("{} cannot be read as VTU", path.display()))
                 .because(cause)
                 .help("solve the scene again with --vtu")
         };
-        let bytes = crate::file::read(path)?;
-        let vtk = Vtk::parse_xml(bytes.as_slice()).map_err(|cause| refuse(cause.to_string()))?;
-        let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
-            return Err(refuse("it has no unstructured grid".to_owned()));
+        let pieces = |path: &Path| {
+            let bytes = crate::file::read(path)?;
+            let vtk = Vtk::parse_xml(bytes.as_slice()).map_err(|cause| refuse(path, cause.to_string()))?;
+            let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
+                return Err(refuse(path, "it has no unstructured grid".to_owned()));
+            };
+            Ok(pieces)
         };
-        let Some(Piece::Inline(piece)) = pieces.into_iter().next() else {
-            return Err(refuse("it has no piece".to_owned()));
-        };
-        Self::from_piece(*piece, name, value).map_err(refuse)
-    }
-
-    fn from_piece(piece: UnstructuredGridPiece, name: &str, value: &str) -> std::result::Result<Self, String> {
-        let array = |name: &str| {
-            piece.data.point.iter().find_map(|attribute| match attribute {
-                Attribute::DataArray(array) if array.name == name => array.data.cast_into::<f64>(),
-                _ => None,
-            })
-        };
-        let points = piece.points.cast_into::<f64>().ok_or("its points are no numbers")?;
-        let points: Vec<[f64; 3]> = points.as_chunks().0.to_vec();
-        let value = array(value).ok_or_else(|| format!("it has no array `{value}` at its points"))?;
-        let displacement = array("displacement").map_or(vec![[0.0; 3]; points.len()], |all| all.as_chunks().0.to_vec());
-        if value.len() != points.len() || displacement.len() != points.len() {
-            return Err(format!("{} points, but {} values", points.len(), value.len()));
+        let mut points = Points::default();
+        let all = pieces(path)?;
+        if all.is_empty() {
+            return Err(refuse(path, "it has no piece".to_owned()));
         }
-        let is_solid = piece.cells.types.iter().any(|kind| matches!(kind, CellType::Tetra | CellType::QuadraticTetra));
-        let types = piece.cells.types;
-        let (connectivity, offsets) = piece.cells.cell_verts.into_xml();
-        let mut triangles: Vec<[usize; 3]> = Vec::new();
-        let mut faces: HashMap<[usize; 3], Option<Vec<usize>>> = HashMap::new();
-        let mut start = 0;
-        for (kind, &end) in types.iter().zip(&offsets) {
-            let nodes = connectivity.get(start..end as usize).ok_or("a cell ends beyond the list of cells")?;
-            let cell: Vec<usize> = nodes.iter().map(|&node| node as usize).collect();
-            if cell.iter().any(|&node| node >= points.len()) {
-                return Err("a cell has a point that is not there".to_owned());
-            }
-            start = end as usize;
-            match (kind, cell.len()) {
-                (CellType::Triangle, 3) => triangles.push([cell[0], cell[1], cell[2]]),
-                (CellType::QuadraticTriangle, 6) => triangles.extend(QUADRATIC.map(|corners| corners.map(|k| cell[k]))),
-                (CellType::Tetra, 4) | (CellType::QuadraticTetra, 10) => {
-                    for face in FACES {
-                        let face: Vec<usize> =
-                            face[..if cell.len() == 4 { 3 } else { 6 }].iter().map(|&k| cell[k]).collect();
-                        let mut key = [face[0], face[1], face[2]];
-                        key.sort_unstable();
-                        // a face of two cells lies inside
-                        faces.entry(key).and_modify(|known| *known = None).or_insert(Some(face));
-                    }
+        for piece in all {
+            let (file, pieces) = match piece {
+                // beside this file
+                Piece::Source(file, _) => {
+                    let file = path.with_file_name(Path::new(&file).file_name().unwrap_or_default());
+                    let pieces = pieces(&file)?;
+                    (file, pieces)
                 }
-                // lines are contact surfaces of the plane
-                _ => {}
+                piece => (path.to_owned(), vec![piece]),
+            };
+            for piece in pieces {
+                let Piece::Inline(piece) = piece else { return Err(refuse(&file, "it has no piece".to_owned())) };
+                points.add(*piece, value).map_err(|cause| refuse(&file, cause))?;
             }
         }
-        let mut outer: Vec<Vec<usize>> = faces.into_values().flatten().collect();
-        outer.sort_unstable();
-        for face in outer {
-            match face[..] {
-                [a, b, c] => triangles.push([a, b, c]),
-                _ => triangles.extend(QUADRATIC.map(|corners| corners.map(|k| face[k]))),
-            }
-        }
-        Ok(Self { name: name.to_owned(), points, triangles: Vec::new(), displacement, value, is_solid }
-            .with(&triangles))
+        Ok(points.part(name))
     }
 
     /// The part with these triangles and the points that they have.
@@ -131,6 +95,92 @@ impl Part {
     /// Length of the displacement at each point.
     pub fn travel(&self) -> Vec<f64> {
         self.displacement.iter().map(|u| u.iter().map(|u| u * u).sum::<f64>().sqrt()).collect()
+    }
+}
+
+/// The points and cells of a body from the files of its parts.
+#[derive(Default)]
+struct Points {
+    points: Vec<[f64; 3]>,
+    displacement: Vec<[f64; 3]>,
+    value: Vec<f64>,
+    cells: Vec<(CellType, Vec<usize>)>,
+    /// Where these points lie.
+    places: HashMap<[u64; 3], usize>,
+}
+
+impl Points {
+    /// Adds a part; a point that lies where an earlier part has one is that point.
+    fn add(&mut self, piece: UnstructuredGridPiece, value: &str) -> std::result::Result<(), String> {
+        let array = |name: &str| {
+            piece.data.point.iter().find_map(|attribute| match attribute {
+                Attribute::DataArray(array) if array.name == name => array.data.cast_into::<f64>(),
+                _ => None,
+            })
+        };
+        let points = piece.points.cast_into::<f64>().ok_or("its points are no numbers")?;
+        let points: Vec<[f64; 3]> = points.as_chunks().0.to_vec();
+        let value = array(value).ok_or_else(|| format!("it has no array `{value}` at its points"))?;
+        let displacement = array("displacement").map_or(vec![[0.0; 3]; points.len()], |all| all.as_chunks().0.to_vec());
+        if value.len() != points.len() || displacement.len() != points.len() {
+            return Err(format!("{} points, but {} values", points.len(), value.len()));
+        }
+        let bits = |x: &[f64; 3]| x.map(f64::to_bits);
+        let mut number = Vec::new();
+        for ((x, u), value) in points.iter().zip(&displacement).zip(&value) {
+            number.push(self.places.get(&bits(x)).copied().unwrap_or(self.points.len()));
+            if number.last() == Some(&self.points.len()) {
+                self.points.push(*x);
+                self.displacement.push(*u);
+                self.value.push(*value);
+            }
+        }
+        self.places.extend(points.iter().map(bits).zip(number.iter().copied()));
+        let types = piece.cells.types;
+        let (connectivity, offsets) = piece.cells.cell_verts.into_xml();
+        let mut start = 0;
+        for (kind, &end) in types.into_iter().zip(&offsets) {
+            let nodes = connectivity.get(start..end as usize).ok_or("a cell ends beyond the list of cells")?;
+            let cell: Option<Vec<usize>> = nodes.iter().map(|&node| number.get(node as usize).copied()).collect();
+            self.cells.push((kind, cell.ok_or("a cell has a point that is not there")?));
+            start = end as usize;
+        }
+        Ok(())
+    }
+
+    /// The triangles.
+    fn part(self, name: &str) -> Part {
+        let Self { points, displacement, value, cells, .. } = self;
+        let is_solid = cells.iter().any(|(kind, _)| matches!(kind, CellType::Tetra | CellType::QuadraticTetra));
+        let mut triangles: Vec<[usize; 3]> = Vec::new();
+        let mut faces: HashMap<[usize; 3], Option<Vec<usize>>> = HashMap::new();
+        for (kind, cell) in &cells {
+            match (kind, cell.len()) {
+                (CellType::Triangle, 3) => triangles.push([cell[0], cell[1], cell[2]]),
+                (CellType::QuadraticTriangle, 6) => triangles.extend(QUADRATIC.map(|corners| corners.map(|k| cell[k]))),
+                (CellType::Tetra, 4) | (CellType::QuadraticTetra, 10) => {
+                    for face in FACES {
+                        let face: Vec<usize> =
+                            face[..if cell.len() == 4 { 3 } else { 6 }].iter().map(|&k| cell[k]).collect();
+                        let mut key = [face[0], face[1], face[2]];
+                        key.sort_unstable();
+                        // a face of two cells lies inside
+                        faces.entry(key).and_modify(|known| *known = None).or_insert(Some(face));
+                    }
+                }
+                // lines are contact surfaces of the plane
+                _ => {}
+            }
+        }
+        let mut outer: Vec<Vec<usize>> = faces.into_values().flatten().collect();
+        outer.sort_unstable();
+        for face in outer {
+            match face[..] {
+                [a, b, c] => triangles.push([a, b, c]),
+                _ => triangles.extend(QUADRATIC.map(|corners| corners.map(|k| face[k]))),
+            }
+        }
+        Part { name: name.to_owned(), points, triangles: Vec::new(), displacement, value, is_solid }.with(&triangles)
     }
 }
 

@@ -110,7 +110,8 @@ impl Results {
         let files = self.report["files"].as_array()?;
         let written = |name: &String| files.iter().any(|file| file == name);
         // the name of a file is no path that leads elsewhere
-        let stems = stems.iter().map(|stem| format!("{stem}.vtu")).filter(|name| !name.contains('/'));
+        let stems = stems.iter().flat_map(|stem| ["pvtu", "vtu"].map(|ending| format!("{stem}.{ending}")));
+        let stems = stems.filter(|name| !name.contains('/'));
         let path = stems.filter(written).map(|name| self.folder.join(name)).next();
         path.filter(|path| path.exists())
     }

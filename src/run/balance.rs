@@ -1,8 +1,8 @@
-//! Forces on every body, from the ranks that own them to the report.
+//! Forces on every body, from the ranks that have parts of them to the report.
 
 use super::results::{All, Recovered};
 use super::stages::Done;
-use crate::discretize::Balance;
+use crate::discretize::{Balance, BodyInfo};
 use crate::output::{BalanceReport, ForceReport};
 
 /// Numbers of a resultant.
@@ -12,26 +12,35 @@ const WIDTH: usize = 6;
 pub fn gather(done: &Done, recovered: &All) -> Vec<BalanceReport> {
     let discrete = &done.built.discrete;
     let model = &discrete.model;
-    let mut reports = Vec::new();
+    let names = |info: &BodyInfo| {
+        let all = info.supports.iter().chain(&info.springs).chain(&info.rigid).cloned();
+        ["loads", "contacts"].map(str::to_owned).into_iter().chain(all).collect::<Vec<_>>()
+    };
+    let mut message = Vec::new();
     for (index, info) in discrete.bodies.iter().enumerate() {
-        let mut names = vec!["loads".to_owned(), "contacts".to_owned()];
-        names.extend(info.supports.iter().chain(&info.springs).chain(&info.rigid).cloned());
-        let mut message = vec![0.0; WIDTH * names.len() + 2];
+        let mut mine = vec![0.0; WIDTH * names(info).len() + 2];
         match &recovered[index] {
             None => {}
             // a solver that fails here leaves the forces unknown; the run itself is over
-            Some(Err(_)) => message.fill(f64::NAN),
+            Some(Err(_)) => mine.fill(f64::NAN),
             Some(Ok(Recovered { bent, .. })) => {
                 // bodies know of full loads alone
                 let full = |v: &[f64]| v.iter().map(|v| v / done.share).collect::<Vec<_>>();
                 let force = model.at_rows(index, &done.outcome.layer.force);
                 let Balance { parts, size } = info.post().balance(&full(bent), &full(&force));
                 let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
-                message.iter_mut().zip(numbers).for_each(|(place, number)| *place = done.share * number);
+                mine.iter_mut().zip(numbers).for_each(|(place, number)| *place = done.share * number);
             }
         }
-        model.exchange.sum(&mut message);
-        let (numbers, size) = message.split_at(WIDTH * names.len());
+        message.extend(mine);
+    }
+    model.exchange.sum(&mut message);
+    let (mut rest, mut reports) = (&message[..], Vec::new());
+    for info in &discrete.bodies {
+        let names = names(info);
+        let (numbers, size);
+        (numbers, rest) = rest.split_at(WIDTH * names.len());
+        (size, rest) = rest.split_at(2);
         let mut parts: Vec<ForceReport> = names
             .into_iter()
             .zip(numbers.chunks_exact(WIDTH))

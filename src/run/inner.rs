@@ -6,14 +6,14 @@
 use super::deal::dealt_out;
 use super::plan::{DENSE, Plan, agree};
 use super::words::in_words;
-use crate::discretize::{Assembled, Deal, Factory, Graph, Outline};
+use crate::discretize::{Assembled, Factory, Outline};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Interpolation;
 use crate::fem::assemble::NodeGraph;
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot};
-use crate::parallel::{Ranks, agree as agreed, tell};
-use crate::petsc::{Rows, Session, partition};
+use crate::parallel::{Ranks, tell};
+use crate::petsc::{Rows, Session};
 use crate::problem::method::{Linear, MethodName};
 use crate::problem::order::Order;
 use crate::problem::solver::Preset;
@@ -23,7 +23,7 @@ use crate::solver::options::{Chosen, Typed};
 use crate::solver::preset::{self, Size, Smoother};
 use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory};
 use mpi::collective::SystemOperation;
-use mpi::traits::{Communicator, CommunicatorCollectives, Root};
+use mpi::traits::CommunicatorCollectives;
 use std::collections::{BTreeMap, HashMap};
 
 /// Prefix of the PETSc options of the matrix of all bodies.
@@ -356,30 +356,15 @@ impl Factory for Inner<'_> {
         Ok(())
     }
 
-    fn deal_out(&mut self, graph: &dyn Fn(&[usize]) -> Graph) -> Result<Vec<Deal>> {
+    fn dealt_out(&self) -> Vec<Vec<usize>> {
         let bodies = 0..self.plans.len();
         // a condensed body lives on one rank, and all of them can have what is left of it
         let is_whole = self.plans.iter().any(|plan| plan.preset == Preset::Condensed);
-        let together: Vec<Vec<usize>> = match self.linear {
+        match self.linear {
             Linear::Sweeps => bodies.filter(|&body| self.dealt[body]).map(|body| vec![body]).collect(),
             Linear::Direct | Linear::Multigrid if self.session.size() > 1 && !is_whole => vec![bodies.collect()],
             _ => Vec::new(),
-        };
-        let deal = |bodies: Vec<usize>| {
-            let mut owner = Ok(Vec::new());
-            if self.session.rank() == 0 {
-                let Graph { mut ptr, mut col, mut weight } = graph(&bodies);
-                owner = partition(&mut ptr, &mut col, &mut weight, self.session.size());
-            }
-            let mut owner = agreed(self.session, owner)?;
-            let world = self.session.world();
-            let mut nodes = owner.len();
-            world.process_at_rank(0).broadcast_into(&mut nodes);
-            owner.resize(nodes, 0);
-            world.process_at_rank(0).broadcast_into(&mut owner[..]);
-            Ok(Deal { bodies, owner })
-        };
-        together.into_iter().map(deal).collect()
+        }
     }
 
     fn wants_interpolation(&self, name: &str) -> bool {

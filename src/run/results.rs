@@ -5,9 +5,11 @@ use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Result, few};
 use crate::output::BodyReport;
 use crate::output::vtu::BodyField;
+use crate::parallel::share;
+use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 
-/// The end of a run in one body that this rank speaks for.
+/// The end of a run in one body that this rank has a part of.
 pub struct Recovered {
     /// Displacements of all nodes.
     pub state: Vec<f64>,
@@ -17,7 +19,7 @@ pub struct Recovered {
 }
 
 impl Recovered {
-    /// Displacements and stresses at the nodes, made when they are first asked for.
+    /// Displacements and stresses of the cells that this rank shows, made when they are first asked for.
     pub fn field(&self, info: &BodyInfo) -> &BodyField {
         self.field.get_or_init(|| info.post().field(&self.state, &self.bent))
     }
@@ -27,7 +29,7 @@ impl Recovered {
 /// interior of a body.
 pub type All = Vec<Option<Result<Recovered>>>;
 
-/// Recovers the bodies that this rank speaks for. Collective.
+/// Recovers the bodies that this rank has a part of. Collective.
 pub fn recover(done: &Done) -> All {
     let bodies = done.model().bodies.iter().zip(&done.outcome.iterate.states);
     bodies
@@ -39,65 +41,118 @@ pub fn recover(done: &Done) -> All {
             let state: Vec<f64> = state.iter().map(|u| u / done.share).collect();
             let mut still = state.clone();
             still[state.len() - rigid..].fill(0.0);
-            let recover = || -> Result<Option<Recovered>> {
+            let recover = || -> Result<Recovered> {
                 let mut bent = body.recover(&still)?;
                 // the rigid motion is the same on all ranks, so that they agree on this
                 let is_still = state[state.len() - rigid..].iter().all(|a| *a == 0.0);
                 let mut state = if is_still { bent.clone() } else { body.recover(&state)? };
-                if !body.leads() {
-                    return Ok(None);
-                }
                 state.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
                 bent.iter_mut().chain(&mut state).for_each(|u| *u *= done.share);
-                Ok(Some(Recovered { state, bent, field: OnceCell::new() }))
+                Ok(Recovered { state, bent, field: OnceCell::new() })
             };
-            recover().transpose()
+            Some(recover())
         })
         .collect()
 }
 
-/// Numbers of a body in the message.
-const NUMBERS: usize = 11;
+/// What a rank finds in its part of a body.
+#[derive(Serialize, Deserialize)]
+struct Found {
+    /// Largest von Mises stress; NaN where a solver failed.
+    von_mises: f64,
+    /// Where it is.
+    at: [f64; 3],
+    /// Least and largest principal stress.
+    principal: [f64; 2],
+    /// Largest displacement, and the box around the points: least and largest coordinates.
+    displacement: f64,
+    extent: [[f64; 3]; 2],
+    /// Norms of the error and of the known displacements.
+    norms: Option<[[f64; 3]; 2]>,
+}
+
+impl Found {
+    fn new(info: &BodyInfo, recovered: &Result<Recovered>) -> Self {
+        let mut found = Self {
+            von_mises: f64::NEG_INFINITY,
+            at: [0.0; 3],
+            principal: [f64::INFINITY, f64::NEG_INFINITY],
+            displacement: 0.0,
+            extent: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
+            norms: None,
+        };
+        let Ok(recovered) = recovered else { return Self { von_mises: f64::NAN, ..found } };
+        let field = recovered.field(info);
+        if let Some(largest) =
+            (0..field.points.len()).max_by(|&i, &j| field.von_mises[i].total_cmp(&field.von_mises[j]))
+        {
+            (found.von_mises, found.at) = (field.von_mises[largest], field.points[largest]);
+        }
+        for s in &field.principal {
+            found.principal = [found.principal[0].min(s[2]), found.principal[1].max(s[0])];
+        }
+        let length = |u: &[f64; 3]| u.iter().map(|x| x * x).sum::<f64>().sqrt();
+        found.displacement = field.displacement.iter().map(length).fold(0.0, f64::max);
+        for x in &field.points {
+            found.extent = box_of(found.extent, [*x, *x]);
+        }
+        found.norms = info.post().errors(&recovered.state);
+        found
+    }
+
+    /// What two parts of a body come to.
+    fn with(self, other: Self) -> Self {
+        let ([low, high], [least, largest]) = (self.principal, other.principal);
+        let norms = self
+            .norms
+            .zip(other.norms)
+            .map(|(a, b)| std::array::from_fn(|of| std::array::from_fn(|norm| f64::hypot(a[of][norm], b[of][norm]))));
+        let displacement = self.displacement.max(other.displacement);
+        let extent = box_of(self.extent, other.extent);
+        // NaN is above all numbers
+        let larger = if other.von_mises.total_cmp(&self.von_mises).is_gt() { other } else { self };
+        Self { principal: [low.min(least), high.max(largest)], displacement, extent, norms, ..larger }
+    }
+}
+
+/// The box around two boxes.
+fn box_of(a: [[f64; 3]; 2], b: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+    [std::array::from_fn(|c| a[0][c].min(b[0][c])), std::array::from_fn(|c| a[1][c].max(b[1][c]))]
+}
+
+/// Displacements up to this share of a body are small: a turn by it changes lengths along and across by half a per cent.
+const SMALL: f64 = 0.1;
 
 /// Puts largest stresses, displacements and errors of all bodies into their reports; null where there is none. Collective.
 /// Returns a warning of displacements that are too large for the theory.
 pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) -> Option<String> {
-    let mut message = vec![0.0; NUMBERS * reports.len()];
-    let bodies = discrete.bodies.iter().zip(recovered);
-    for (mine, (info, recovered)) in message.chunks_exact_mut(NUMBERS).zip(bodies) {
-        match recovered {
-            None => {}
-            Some(Err(_)) => mine.fill(f64::NAN),
-            Some(Ok(recovered)) => {
-                let field = recovered.field(info);
-                let von_mises = &field.von_mises;
-                let largest = (0..von_mises.len()).max_by(|&i, &j| von_mises[i].total_cmp(&von_mises[j])).unwrap_or(0);
-                mine[0] = von_mises[largest];
-                mine[1..4].copy_from_slice(&field.points[largest]);
-                mine[4] = field.principal.iter().map(|s| s[0]).fold(f64::NEG_INFINITY, f64::max);
-                mine[5] = field.principal.iter().map(|s| s[2]).fold(f64::INFINITY, f64::min);
-                mine[6..9].copy_from_slice(&info.post().errors(&recovered.state).unwrap_or([f64::NAN; 3]));
-                mine[9] =
-                    field.displacement.iter().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
-                mine[10] = diagonal(&field.points);
-            }
-        }
+    let bodies = discrete.bodies.iter().zip(recovered).enumerate();
+    let mine: Vec<(usize, Found)> =
+        bodies.filter_map(|(index, (info, recovered))| Some((index, Found::new(info, recovered.as_ref()?)))).collect();
+    let mut all: Vec<Option<Found>> = reports.iter().map(|_| None).collect();
+    for (body, found) in share(&*discrete.model.exchange, &mine).into_iter().flatten() {
+        let found = match all[body].take() {
+            Some(before) => before.with(found),
+            None => found,
+        };
+        all[body] = Some(found);
     }
-    discrete.model.exchange.sum(&mut message);
     let finite = |value: f64| value.is_finite().then_some(value);
-    for (report, numbers) in reports.iter_mut().zip(message.chunks_exact(NUMBERS)) {
-        let stressed = numbers[0].is_finite();
-        report.max_von_mises = finite(numbers[0]);
-        report.max_von_mises_at = stressed.then_some([numbers[1], numbers[2], numbers[3]]);
-        report.principal_range = stressed.then_some([numbers[4], numbers[5]]);
-        report.error_l2 = finite(numbers[6]);
-        report.error_h1 = finite(numbers[7]);
-        report.error_energy = finite(numbers[8]);
-        report.max_displacement = finite(numbers[9]).filter(|_| stressed);
+    let mut moved = Vec::new();
+    for (report, found) in reports.iter_mut().zip(all) {
+        let Some(found) = found.filter(|found| found.von_mises.is_finite()) else { continue };
+        report.max_displacement = Some(found.displacement);
+        let [low, high] = found.extent;
+        let diagonal = (0..3).map(|c| (high[c] - low[c]).powi(2)).sum::<f64>().sqrt();
+        if found.displacement > SMALL * diagonal {
+            moved.push(report.name.clone());
+        }
+        report.max_von_mises = Some(found.von_mises);
+        report.max_von_mises_at = Some(found.at);
+        report.principal_range = Some([found.principal[1], found.principal[0]]);
+        let error = |norm: usize| found.norms.and_then(|[error, whole]| finite(error[norm] / whole[norm]));
+        (report.error_l2, report.error_h1, report.error_energy) = (error(0), error(1), error(2));
     }
-    let moved =
-        |(report, numbers): (&BodyReport, &[f64])| (numbers[9] > SMALL * numbers[10]).then(|| report.name.clone());
-    let moved: Vec<String> = reports.iter().zip(message.chunks_exact(NUMBERS)).filter_map(moved).collect();
     (!moved.is_empty()).then(|| {
         format!(
             "displacements of more than a tenth of the body's size: {}. The theory is that of small ones: look at the gaps, the units and \
@@ -105,17 +160,4 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) ->
             few(moved).join(", ")
         )
     })
-}
-
-/// Displacements up to this share of a body are small: a turn by it changes lengths along and across by half a per cent.
-const SMALL: f64 = 0.1;
-
-/// Diagonal of the box around points.
-fn diagonal(points: &[[f64; 3]]) -> f64 {
-    let side = |c: usize| {
-        let (low, high) =
-            points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x[c]), b.max(x[c])));
-        (high - low) * (high - low)
-    };
-    (0..3).map(side).sum::<f64>().sqrt()
 }

@@ -6,28 +6,43 @@ use crate::error::Result;
 /// Corners of a cell on the face opposite each of its corners, in an order that turns the normal outwards.
 const OUTWARD: [&[[usize; 3]]; 2] = [&[[1, 2, 0], [2, 0, 0], [0, 1, 0]], &[[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]];
 
-/// A face of a cell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+/// A face of a cell, in twelve bytes: there are two a cell and more, most of the memory of a check.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Face<const D: usize> {
-    /// Corners, sorted.
-    key: [u32; D],
-    /// The cell.
-    pub cell: u32,
-    /// Which corner of the cell it lacks.
-    opposite: u8,
-    /// Whether it takes an odd permutation from `key` to the order that turns the normal out of the cell.
-    odd: bool,
+    /// Corners but the least, sorted; in the plane there is one.
+    rest: [u32; 2],
+    /// Four times the cell, and which of its corners it lacks.
+    place: u32,
 }
 
 impl<const D: usize> Face<D> {
+    /// The cell.
+    pub fn cell(&self) -> usize {
+        (self.place / 4) as usize
+    }
+
+    /// Its corners, sorted, and whether it takes an odd permutation from these to the order that turns the normal out of the cell.
+    fn sorted(&self, cells: &Cells<D>) -> ([u32; D], bool) {
+        let (mut key, mut odd) = (self.corners().map(|i| cells.cell(self.cell())[i]), false);
+        for end in (1..D).rev() {
+            for i in 0..end {
+                if key[i] > key[i + 1] {
+                    key.swap(i, i + 1);
+                    odd = !odd;
+                }
+            }
+        }
+        (key, odd)
+    }
+
     /// Places of its corners in the cell, the normal outwards.
     pub fn corners(&self) -> [usize; D] {
-        std::array::from_fn(|i| OUTWARD[D - 2][self.opposite as usize][i])
+        std::array::from_fn(|i| OUTWARD[D - 2][self.place as usize % 4][i])
     }
 
     /// Its nodes, the normal outwards: corners, then between 01, 12, 02 the mid-edge nodes of quadratic ones.
     pub fn nodes(&self, cells: &Cells<D>) -> impl Iterator<Item = u32> {
-        let (cell, corners) = (self.cell as usize, self.corners());
+        let (cell, corners) = (self.cell(), self.corners());
         let ends = [[0, 1], [1, 2], [0, 2]].map(|[i, j]: [usize; 2]| [corners[i % D], corners[j % D]]);
         let edges = if cells.is_quadratic() { D * (D - 1) / 2 } else { 0 };
         let ends = ends.into_iter().take(edges);
@@ -36,7 +51,7 @@ impl<const D: usize> Face<D> {
 
     /// Mean of its corners.
     fn centre(&self, cells: &Cells<D>) -> [f64; 3] {
-        let corners = self.key.map(|node| cells.at(node));
+        let corners = self.sorted(cells).0.map(|node| cells.at(node));
         std::array::from_fn(|c| corners.iter().map(|x| x[c]).sum::<f64>() / D as f64)
     }
 }
@@ -52,27 +67,20 @@ pub struct Faces<const D: usize> {
 impl<const D: usize> Faces<D> {
     /// Sorts the faces of a body by their corners, in linear time: few have the same least one.
     pub fn new(cells: &Cells<D>) -> Self {
+        // the least corner, and the face
         let face = |cell: usize, opposite: usize| {
-            let mut face = Face { key: [0; D], cell: cell as u32, opposite: opposite as u8, odd: false };
-            face.key = face.corners().map(|i| cells.cell(cell)[i]);
-            for end in (1..D).rev() {
-                for i in 0..end {
-                    if face.key[i] > face.key[i + 1] {
-                        face.key.swap(i, i + 1);
-                        face.odd = !face.odd;
-                    }
-                }
-            }
-            face
+            let mut face = Face { rest: [0; 2], place: (4 * cell + opposite) as u32 };
+            let (key, _) = face.sorted(cells);
+            face.rest[..D - 1].copy_from_slice(&key[1..]);
+            (key[0] as usize, face)
         };
         let all = || (0..cells.count()).flat_map(|cell| (0..=D).map(move |opposite| face(cell, opposite)));
         let mut first = vec![0; cells.points.len() + 1];
-        all().for_each(|face| first[face.key[0] as usize + 1] += 1);
+        all().for_each(|(least, _)| first[least + 1] += 1);
         (1..first.len()).for_each(|i| first[i] += first[i - 1]);
-        let empty = Face { key: [0; D], cell: 0, opposite: 0, odd: false };
-        let (mut list, mut next) = (vec![empty; cells.count() * (D + 1)], first.clone());
-        for face in all() {
-            let next = &mut next[face.key[0] as usize];
+        let (mut list, mut next) = (vec![Face::default(); cells.count() * (D + 1)], first.clone());
+        for (least, face) in all() {
+            let next = &mut next[least];
             list[*next as usize] = face;
             *next += 1;
         }
@@ -82,7 +90,8 @@ impl<const D: usize> Faces<D> {
 
     /// Faces with the same corners.
     fn alike(&self) -> impl Iterator<Item = &[Face<D>]> {
-        self.list.chunk_by(|a, b| a.key == b.key)
+        let of_least = self.first.windows(2).map(|ends| &self.list[ends[0] as usize..ends[1] as usize]);
+        of_least.flat_map(|faces| faces.chunk_by(|a, b| a.rest == b.rest))
     }
 
     /// Faces between two cells, with both.
@@ -97,17 +106,19 @@ impl<const D: usize> Faces<D> {
 
     /// How many cells have a facet with these nodes: corners, then mid-edge nodes if there are any.
     pub fn cells_at(&self, cells: &Cells<D>, facet: &[u32]) -> usize {
-        let mut key = std::array::from_fn(|i| facet[i]);
+        let mut key: [u32; D] = std::array::from_fn(|i| facet[i]);
         key.sort_unstable();
         let [from, to] = [0, 1].map(|next| self.first[key[0] as usize + next] as usize);
-        let same = |face: &&Face<D>| face.key == key && face.nodes(cells).skip(D).all(|node| facet.contains(&node));
+        let same = |face: &&Face<D>| {
+            face.rest[..D - 1] == key[1..] && face.nodes(cells).skip(D).all(|node| facet.contains(&node))
+        };
         self.list[from..to].iter().filter(same).count()
     }
 
     /// Two cells at most share a face, they lie on its two sides, and the nodes between its corners are the same for both.
     pub fn check(&self, cells: &Cells<D>) -> Result<()> {
         for alike in self.alike() {
-            let of = || alike.iter().map(|face| face.cell as usize).collect::<Vec<_>>();
+            let of = || alike.iter().map(Face::cell).collect::<Vec<_>>();
             let [a, b] = alike else {
                 if alike.len() > 2 {
                     let what = format!("{} cells share the facet", alike.len());
@@ -115,7 +126,7 @@ impl<const D: usize> Faces<D> {
                 }
                 continue;
             };
-            if a.odd == b.odd {
+            if a.sorted(cells).1 == b.sorted(cells).1 {
                 let what = "two cells overlap: both lie on the same side of the facet that they share";
                 return Err(cells.refuse(what, &of(), a.centre(cells)).help(AGAIN));
             }

@@ -30,7 +30,7 @@ pub fn check<const D: usize>(cells: &Cells<D>, surface: &Surface<D>) -> Result<(
         !std::mem::replace(&mut seen[class], true)
     });
     for i in first.collect::<Vec<_>>() {
-        let cell = surface.faces[i].cell as usize;
+        let cell = surface.faces[i].cell();
         let inside = |weights: &[f64; 4]| -> Point {
             let sum: f64 = weights[..=D].iter().sum();
             let corners = cells.cell(cell)[..=D].iter().zip(weights);

@@ -20,7 +20,7 @@ pub struct Parts {
 /// Parts that share nodes: an edge or a corner alone does not join elastic bodies.
 pub fn parts<const D: usize>(cells: &Cells<D>, faces: &Faces<D>) -> Result<Parts> {
     let mut joined = Joined::new(cells.count());
-    faces.inner().for_each(|[a, b]| joined.join(a.cell, b.cell));
+    faces.inner().for_each(|[a, b]| joined.join(a.cell() as u32, b.cell() as u32));
     let parts = joined.classes();
     if parts.count == 1 {
         return Ok(Parts { of_cell: Vec::new(), ..parts });

