@@ -27,10 +27,6 @@ pub struct Reached {
     pub pressure: f64,
     /// Share of its contact forces that a body lacks in balance, the most over all.
     pub imbalance: f64,
-    /// sum omega (p - p_q)^2/rho, an energy: what the new places change.
-    pub change: f64,
-    /// The largest of it at a point, per area.
-    pub largest: f64,
 }
 
 /// Energy that the pressures give the layers and the surfaces under them, sum omega p^2 (1/kappa + 1/rho0): that of the bodies as a
@@ -54,13 +50,10 @@ impl Reached {
         rho: &[f64],
     ) -> Self {
         let (mut gap, mut mismatch, mut is_bound) = (0.0, 0.0f64, step.is_exact);
-        let (mut change, mut largest) = (0.0, 0.0f64);
         for (i, pair) in model.pairs.iter().enumerate() {
             for q in model.range(i) {
                 let (point, weight, c, p) = (q - model.offset[i], model.weight[q], compression[q], pressure[q]);
                 let changed = (p - places.pressure[q]).powi(2) / rho[q];
-                change += weight * changed;
-                largest = largest.max(changed);
                 mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
                 gap += weight * if p < 0.0 { changed } else { pair.law.duality_gap(point, c, p) };
                 is_bound &= p >= 0.0;
@@ -76,8 +69,6 @@ impl Reached {
             is_bound,
             pressure: mismatch.max(missed),
             imbalance: scale.imbalance(model, &model.forces(pressure)),
-            change,
-            largest,
         }
     }
 
@@ -124,8 +115,6 @@ mod tests {
         close(energy(&beside), 2.0 / 8.0 + 3.0 * (8.0 / 3.0 + 2.0 / 3.0 - 2.0));
         assert!(beside.is_bound && beside.imbalance == 0.0);
         close(beside.pressure, 3.0 / 4.0);
-        close(beside.change, 2.0 * 1.0 / 0.5 + 3.0 * 9.0 / 0.25 + 0.25 * 64.0 / 3.0);
-        close(beside.largest, 9.0 / 0.25);
         // a negative pressure leaves no bound, and counts by the work of its change
         let negative = of([2.0, 4.0, 4.0, -1.0]);
         assert!(!negative.is_bound);

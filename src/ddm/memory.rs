@@ -29,7 +29,7 @@ pub struct Memory {
     pub(super) steady: Steady,
     /// Of Newton's method.
     pub(super) progress: Progress,
-    /// Places of the next step where a run paused: not on the laws if they have a barrier.
+    /// Places of the next step where a run paused.
     pub(super) places: Option<Layer>,
     /// Of sweeps: what was done, the last step, and the sweep at the iterate where a run paused.
     pub(super) sweeper: Sweeper,

@@ -7,7 +7,6 @@
 pub mod acceleration;
 mod asks;
 mod balance;
-mod barrier;
 mod bound;
 mod coefficient;
 mod digits;

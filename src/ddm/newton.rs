@@ -12,11 +12,10 @@
 
 use super::bound::Reached;
 use super::forcing::Forcing;
-use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
+use super::start;
 use super::stop::Status;
-use super::{barrier, start};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
@@ -28,7 +27,8 @@ use crate::model::linear::{LinearStep, System, Trial};
 /// # Errors
 /// Failures of the solver library. Not converging is a status.
 pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
-    let rho = meeting_slopes(run.model);
+    let slopes = meeting_slopes(run.model);
+    let mut rho = run.memory.progress.slopes(&slopes);
     // whether the last step solved its linear system as well as it seemed
     let mut exact = true;
     loop {
@@ -36,21 +36,29 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
         let (r, _) = residual(run.model, &u, &force);
         let before = run.model.compression(&u.trace);
-        let mut forcing = Forcing::new(&places, before, &rho, (run.stop.residual, &run.scale), linear.roughest());
+        let mut forcing =
+            Forcing::new(&places, before.clone(), &rho, (run.stop.residual, &run.scale), linear.roughest());
         let mut enough = |model: &Model, trial: &Trial| match exact {
             true => forcing.is_enough(model, trial),
             false => trial.is_within(CORRECTED),
         };
         let system = System { model: run.model, places: &places, springs: &springs, residual: &r, enough: &mut enough };
-        let x = match linear.solve(system)? {
+        let mut x = match linear.solve(system)? {
             Ok(solution) => solution,
             Err(failure) => return Ok(run.end(Status::InnerSolver(failure), u, places, linear)),
         };
+        let end: Vec<f64> = before.iter().zip(x.field.closing()).map(|(c, closing)| c + closing).collect();
+        let share = match exact {
+            true => run.memory.progress.share(run.model, &rho, &before, (&end, &places.linear(&end))),
+            false => 1.0,
+        };
+        rho = run.memory.progress.slopes(&slopes);
+        x.field.scale(share);
         u.add(1.0, &x.field);
         u.retrace(run.model);
 
         let c = run.model.compression(&u.trace);
-        let p = places.linear(&c);
+        let p = run.memory.progress.go(share, places.linear(if share < 1.0 { &end } else { &c }));
         let met = start::meet(run.model, &c, &p, &rho);
 
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
@@ -75,18 +83,10 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         if let Some(status) = run.end_at(&at, linear)? {
             return Ok(run.end(status, u, met, linear));
         }
-        // a step that knew of no contact runs through the other body
-        let blind = places.closed == 0 && met.closed > 0;
-        if blind {
-            search(run.model, &mut u, &x.field)?;
-        }
-        let barrier = run.memory.progress.barrier(reached.change, reached.largest);
         if exact {
-            places = match barrier {
-                _ if blind => Layer::at(run.model, &u.trace),
-                0.0 => met.clone(),
-                barrier => barrier::meet(run.model, &c, &p, &rho, barrier),
-            };
+            // a step that knew of no contact leaves bodies in each other as rigid ones of their shapes would be
+            let blind = places.closed == 0 && met.closed > 0;
+            places = if blind { start::at(run.model, &u.trace) } else { met.clone() };
         }
         if measured.asked != 0 {
             run.memory.places = Some(places);
@@ -97,15 +97,3 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
 
 /// Error of a step that corrects the linear error of the one before, as a share of it: a digit.
 const CORRECTED: f64 = 0.1;
-
-/// Replaces a step x that led to u by the exact search on F1 along it.
-fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<()> {
-    u.add(-1.0, x);
-    u.retrace(model);
-    let layer = Layer::at(model, &u.trace);
-    let (r, _) = residual(model, u, &layer.force);
-    let line = Line::new(model, &layer, &r, x);
-    u.add(line.minimize(1e-2).unwrap_or(0.0), x);
-    u.retrace(model);
-    Ok(())
-}

@@ -1,51 +1,109 @@
-//! Steps of Newton's method that lead nowhere.
+//! How far a step of Newton's method goes.
+//!
+//! States (c, p) in equilibrium are an affine set, so that those on the way of a step need no solve. A state is off its places (c_q, p_q) on the
+//! laws by e = p - p_q = -rho (c - c_q). The step goes to a state c' on the tangents, so that with s = c' - c_q it begins with
+//!
+//! ```text
+//! dc = s + e/rho,   dp = kappa s - e,   dp_q = kappa/(1 + kappa/rho) (dc + dp/rho) = kappa s,   de = dp - dp_q = -e
+//! ```
+//!
+//! and sum omega e^2/rho falls, with any weights and any rho, until a law turns a corner. Where the whole step is no nearer to the laws, a shorter
+//! one is; where that is too short, the tangents belong to the wrong side of a corner, and places on lines of another slope are on other sides.
 
-/// Recognises contact sets that follow each other in a circle, or one point at a time: of 4879 random scenes of stiff layers on few
-/// quadratic elements two came into a cycle. Then the laws have a barrier, until a step changes less than half of all before.
-#[derive(Debug, Clone)]
+use crate::model::Model;
+use crate::model::layer::Layer;
+
+/// What Newton's method remembers of its steps.
+#[derive(Debug, Clone, Default)]
 pub(super) struct Progress {
-    /// Least work that a step changed, and the steps since one has halved it.
-    best: f64,
-    since: usize,
-    /// Energy per area, now and where it began.
-    barrier: f64,
-    first: f64,
-    /// What it falls to in a step.
-    rate: f64,
+    /// Pressures in equilibrium with the iterate, n; empty before the first.
+    pressure: Vec<f64>,
+    /// Steps in a row that came no nearer to the laws, and all of them.
+    row: usize,
+    failures: usize,
 }
 
-/// What the barrier falls to in a step: the usual 0.1 of barrier methods (Nocedal and Wright, Numerical Optimization, 2006, section 19.3). Where
-/// that is too fast it becomes its root.
-const RATE: f64 = 0.1;
+/// How often a step is halved: to less than a hundredth. From 3 to 20 times 3500 random scenes took the same number of steps within a per cent.
+const HALVINGS: usize = 7;
 
-/// Steps in a row without progress before there is a barrier: contact that has just been found may take one.
-const PATIENCE: usize = 2;
+/// Share of its first slope by which a descent must be felt (Armijo; Nocedal and Wright, Numerical Optimization, 2006, section 3.1).
+const FELT: f64 = 1e-4;
 
-impl Default for Progress {
-    fn default() -> Self {
-        Self { best: f64::INFINITY, since: 0, barrier: 0.0, first: 0.0, rate: RATE }
+/// Slopes of the lines, in those of [`meeting_slopes`](crate::model::layer::meeting_slopes), one after the other: the range in which random scenes take the
+/// same steps.
+const SLOPES: [f64; 3] = [1.0, 10.0, 0.1];
+
+impl Progress {
+    /// rho, n: slopes on which places are met now.
+    pub fn slopes(&self, rho: &[f64]) -> Vec<f64> {
+        rho.iter().map(|rho| SLOPES[self.failures % SLOPES.len()] * rho).collect()
+    }
+
+    /// The share of the way from compressions `from` to the state (c, p), n each, that a step goes. Where no slope brought it nearer to the laws,
+    /// which rounding and motions without resistance do, it goes all the way.
+    pub fn share(&mut self, model: &Model, rho: &[f64], from: &[f64], (c, p): (&[f64], &[f64])) -> f64 {
+        if self.pressure.is_empty() {
+            return 1.0;
+        }
+        let off = |t: f64| {
+            let (c, p) = (between(from, c, t), between(&self.pressure, p, t));
+            let met = Layer::meet(model, &c, &p, rho);
+            (0..c.len()).map(|q| model.weight[q] * (p[q] - met.pressure[q]).powi(2) / rho[q]).sum::<f64>()
+        };
+        let here = off(0.0);
+        let mut shares = (0..=HALVINGS as i32).map(|halvings| 0.5f64.powi(halvings));
+        if let Some(share) = shares.find(|&t| off(t) <= (1.0 - 2.0 * FELT * t) * here) {
+            self.row = 0;
+            return share;
+        }
+        self.failures += 1;
+        self.row = (self.row + 1) % SLOPES.len();
+        if self.row == 0 { 1.0 } else { 0.5f64.powi(HALVINGS as i32) }
+    }
+
+    /// The pressures a share of the way to `pressure`, n, which are those of the iterate from now on.
+    pub fn go(&mut self, share: f64, pressure: Vec<f64>) -> Vec<f64> {
+        self.pressure = if share < 1.0 { between(&self.pressure, &pressure, share) } else { pressure };
+        self.pressure.clone()
     }
 }
 
-impl Progress {
-    /// The barrier after a step that changed this work, sum omega (p - p_q)(c_q - c), and at most `largest` of it per area: on a law with a
-    /// barrier mu, p times the gap is mu where the layer is open, so it begins where no point changes more, however few of all they are, and
-    /// falls with each step. Where that ends without progress, it begins again and falls slower: close enough to the path of the solutions over
-    /// mu, Newton's method follows it.
-    pub fn barrier(&mut self, change: f64, largest: f64) -> f64 {
-        self.since = if change < 0.5 * self.best { 0 } else { self.since + 1 };
-        self.best = self.best.min(change);
-        if self.since == 0 {
-            self.barrier = 0.0;
-        } else if self.barrier > f64::EPSILON.sqrt() * self.first {
-            self.barrier *= self.rate;
-        } else if self.since >= PATIENCE {
-            if self.barrier > 0.0 {
-                self.rate = self.rate.sqrt();
-            }
-            self.first = largest;
-            self.barrier = self.first;
-        }
-        self.barrier
+fn between(from: &[f64], to: &[f64], t: f64) -> Vec<f64> {
+    from.iter().zip(to).map(|(from, to)| from + t * (to - from)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::sample::two_pairs;
+
+    /// Of points with p = 4 c and p = c^2, n = 4: a step on the tangents goes all the way, one that passes the corner and comes back as far on the
+    /// other side a part of it, one away from the laws almost none of it, with another slope next, and the third of these all.
+    #[test]
+    fn a_step_goes_as_far_as_it_comes_nearer() {
+        let model = two_pairs();
+        let rho = [2.0, 0.5, 0.25, 3.0];
+        let mut progress = Progress::default();
+        let (from, start) = ([0.5, 0.5, 1.0, 1.0], vec![2.0, 4.0, 1.0, 1.0]);
+        assert_eq!(
+            progress.share(&model, &rho, &from, (&[9.0; 4], &[0.0; 4])),
+            1.0,
+            "the first step has no pressures to begin with"
+        );
+        assert_eq!(progress.go(1.0, start.clone()), start);
+        // the second point is on p = 4 c then
+        assert_eq!(progress.share(&model, &rho, &from, (&[0.5, 0.75, 1.0, 1.0], &[2.0, 3.0, 1.0, 1.0])), 1.0);
+        // it leaves the law as far below as it was above, and much farther
+        let (to, pressure) = ([0.5, 1.5, 1.0, 1.0], [2.0, -4.0, 1.0, 1.0]);
+        assert_eq!(progress.share(&model, &rho, &from, (&to, &pressure)), 0.5);
+        assert_eq!(progress.go(0.5, pressure.to_vec()), [2.0, 0.0, 1.0, 1.0]);
+        assert_eq!(progress.slopes(&rho), rho);
+        let away = |progress: &mut Progress| {
+            progress.share(&model, &rho, &[0.5, 1.0, 1.0, 1.0], (&[0.5, 2.0, 1.0, 1.0], &[2.0, -9.0, 1.0, 1.0]))
+        };
+        assert_eq!([away(&mut progress), away(&mut progress)], [0.5f64.powi(7); 2]);
+        assert_eq!(progress.slopes(&rho), rho.map(|rho| 0.1 * rho));
+        assert_eq!(away(&mut progress), 1.0);
+        assert_eq!(progress.slopes(&rho), rho);
     }
 }

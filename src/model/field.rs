@@ -34,6 +34,13 @@ impl Field {
         axpy(t, &other.trace, &mut self.trace);
     }
 
+    /// self = t self.
+    pub fn scale(&mut self, t: f64) {
+        if t != 1.0 {
+            self.states.iter_mut().flatten().chain(&mut self.trace).for_each(|x| *x *= t);
+        }
+    }
+
     /// self = other + t self.
     pub fn add_to(&mut self, t: f64, other: &Field) {
         let update = |mine: &mut [f64], other: &[f64]| {
