@@ -137,8 +137,12 @@ fn steps(session: &Session, case: &str, more: &[&str], law: Option<&str>) -> Vec
 fn bounds_hold_and_are_sharp() {
     let session = Session::start(&[]).expect("one session in this process");
     let held = ["mesh.set.n=8", "method.start={normal=3e-4}"];
-    let cases: [(&str, &[&str]); 3] =
-        [("groove-held", &["mesh.set.n=8"]), ("groove-held", &held), ("groove", &["mesh.set.n=8", "body.1.order=2"])];
+    let cases: [(&str, &[&str]); 4] = [
+        ("groove-held", &["mesh.set.n=8"]),
+        ("groove-held", &["mesh.set.n=16", "body.1.order=2"]),
+        ("groove-held", &held),
+        ("groove", &["mesh.set.n=8", "body.1.order=2"]),
+    ];
     let known = |law: Option<&str>, all: &[(&str, &[&str])]| {
         let mut known = 0;
         for (case, more) in all {

@@ -207,7 +207,7 @@ fn refused(scene: &Scene, words: &[&str]) {
 #[test]
 fn regions_that_cannot_be() {
     let region = |on: &str| format!("[[body.region]]\non = \"{on}\"\nyoung = 7e4\npoisson = 0\n");
-    refused(&layered(&region("cor")).0, &["no region `cor`", "did you mean `core`?"]);
+    refused(&layered(&region("cor")).0, &["no group of cells `cor` for this region", "did you mean `core`?"]);
     refused(&layered(&region("upper")).0, &["`upper` does not touch body `lower`"]);
     refused(&layered(&(region("core") + &region("half"))).0, &["the regions `core` and `half` share the cell at ("]);
 }

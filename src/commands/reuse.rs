@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::parallel::Ranks;
 use crate::petsc::Session;
+use crate::problem::method::{MethodName, MethodSpec};
 use crate::run;
 use crate::run::clock::Clock;
 use crate::run::stages::{Built, Done};
@@ -31,6 +32,11 @@ pub fn build(
     let condensed = last.condensed.len() == last.discrete.bodies.len();
     // an estimate of the error needs the meshes, which are kept only for it
     let meshes = |scene: &Scene| scene.estimate || scene.method.stop.balanced;
+    // how linear steps are solved was chosen for the method
+    let joined = |MethodSpec { name, linear, .. }: &MethodSpec| {
+        matches!(name, MethodName::Auto | MethodName::Newton).then_some((*name, *linear))
+    };
+    let is_full = is_full && joined(&last.scene.method) == joined(&scene.method);
     if condensed && meshes(&last.scene) == meshes(&scene) && is_full && same(|_| ()) {
         let discrete = &mut last.discrete;
         discrete.model.exchange = Rc::new(Ranks::new(session));
