@@ -298,8 +298,13 @@ pub fn discretize<const D: usize>(
         if owns.is_some() || is_owner {
             let is_own = |node| owns.as_ref().is_none_or(|owns| owns[held.frame.node(node) as usize]);
             let local = Rc::new(Local::new(space.clone(), cells, is_own));
-            let (_, shown) = local.space.part(local.told());
-            points = shown.iter().map(|&node| part.known.points[local.nodes[node as usize] as usize]).collect();
+            points = match &owns {
+                None => part.known.points,
+                Some(_) => {
+                    let (_, shown) = local.space.part(local.told());
+                    shown.iter().map(|&node| part.known.points[local.nodes[node as usize] as usize]).collect()
+                }
+            };
             let forces = Forces {
                 rows: nodal_rows(&segments, &pairs, &local),
                 springs: part.springs.iter().map(|blocks| here(blocks, &local)).collect(),

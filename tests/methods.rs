@@ -83,7 +83,7 @@ fn the_default_is_fast() {
     };
     let held = plain("groove-held");
     let hard = ["--set", "contact.0.layer.power={B=1e-6, a=0.1}"];
-    for (scene, more, steps) in [(&plain("groove"), &[][..], 9), (&held, &[], 4), (&held, &hard, 3)] {
+    for (scene, more, steps) in [(&plain("groove"), &[][..], 6), (&held, &[], 4), (&held, &hard, 3)] {
         let run = solved(scene, more);
         assert_eq!((run.text("method"), run.count("iterations"), run.count("sweeps")), ("newton", steps, 0));
         // K is eliminated once a body, the joint matrix is factored once a step, and no body is solved for

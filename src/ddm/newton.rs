@@ -12,6 +12,7 @@
 
 use super::bound::Reached;
 use super::forcing::Forcing;
+use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
 use super::start;
@@ -48,8 +49,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             Err(failure) => return Ok(run.end(Status::InnerSolver(failure), u, places, linear)),
         };
         let end: Vec<f64> = before.iter().zip(x.field.closing()).map(|(c, closing)| c + closing).collect();
+        let pressure = places.linear(&end);
         let share = match exact {
-            true => run.memory.progress.share(run.model, &rho, &before, (&end, &places.linear(&end))),
+            true => run.memory.progress.share(run.model, &rho, &before, (&end, &pressure)),
             false => 1.0,
         };
         rho = run.memory.progress.slopes(&slopes);
@@ -58,7 +60,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         u.retrace(run.model);
 
         let c = run.model.compression(&u.trace);
-        let p = run.memory.progress.go(share, places.linear(if share < 1.0 { &end } else { &c }));
+        let p = run.memory.progress.go(share, if share < 1.0 { pressure } else { places.linear(&c) });
         let met = start::meet(run.model, &c, &p, &rho);
 
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
@@ -79,14 +81,18 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
                 exact = run.is_enough(&reached);
             }
         }
-        let at = run.after_step((&u, &x.field), measured, &reached, &met, linear);
+        let at = run.after_step((&u, &x.field, share), measured, &reached, &met, linear);
         if let Some(status) = run.end_at(&at, linear)? {
             return Ok(run.end(status, u, met, linear));
         }
+        // a step that knew of no contact runs through the other body
+        let blind = places.closed == 0 && met.closed > 0;
+        if blind {
+            search(run.model, &mut u, &x.field)?;
+            run.memory.progress.forget();
+        }
         if exact {
-            // a step that knew of no contact leaves bodies in each other as rigid ones of their shapes would be
-            let blind = places.closed == 0 && met.closed > 0;
-            places = if blind { start::at(run.model, &u.trace) } else { met.clone() };
+            places = if blind { Layer::at(run.model, &u.trace) } else { met.clone() };
         }
         if measured.asked != 0 {
             run.memory.places = Some(places);
@@ -97,3 +103,15 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
 
 /// Error of a step that corrects the linear error of the one before, as a share of it: a digit.
 const CORRECTED: f64 = 0.1;
+
+/// Replaces a step x that led to u by the exact search on F1 along it.
+fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<()> {
+    u.add(-1.0, x);
+    u.retrace(model);
+    let layer = Layer::at(model, &u.trace);
+    let (r, _) = residual(model, u, &layer.force);
+    let line = Line::new(model, &layer, &r, x);
+    u.add(line.minimize(1e-2).unwrap_or(0.0), x);
+    u.retrace(model);
+    Ok(())
+}

@@ -62,6 +62,11 @@ impl Progress {
         if self.row == 0 { 1.0 } else { 0.5f64.powi(HALVINGS as i32) }
     }
 
+    /// Forgets the pressures of an iterate that was left.
+    pub fn forget(&mut self) {
+        self.pressure.clear();
+    }
+
     /// The pressures a share of the way to `pressure`, n, which are those of the iterate from now on.
     pub fn go(&mut self, share: f64, pressure: Vec<f64>) -> Vec<f64> {
         self.pressure = if share < 1.0 { between(&self.pressure, &pressure, share) } else { pressure };
@@ -78,8 +83,8 @@ mod tests {
     use super::*;
     use crate::model::sample::two_pairs;
 
-    /// Of points with p = 4 c and p = c^2, n = 4: a step on the tangents goes all the way, one that passes the corner and comes back as far on the
-    /// other side a part of it, one away from the laws almost none of it, with another slope next, and the third of these all.
+    /// Of points with p = 4 c and p = c^2, n = 4: a step to the laws goes all the way, one that goes far beyond a part of it, one away from the
+    /// laws almost none of it, with another slope next, and the third of these all.
     #[test]
     fn a_step_goes_as_far_as_it_comes_nearer() {
         let model = two_pairs();
@@ -94,7 +99,7 @@ mod tests {
         assert_eq!(progress.go(1.0, start.clone()), start);
         // the second point is on p = 4 c then
         assert_eq!(progress.share(&model, &rho, &from, (&[0.5, 0.75, 1.0, 1.0], &[2.0, 3.0, 1.0, 1.0])), 1.0);
-        // it leaves the law as far below as it was above, and much farther
+        // from p = 4 to p = -4 where the law has 6
         let (to, pressure) = ([0.5, 1.5, 1.0, 1.0], [2.0, -4.0, 1.0, 1.0]);
         assert_eq!(progress.share(&model, &rho, &from, (&to, &pressure)), 0.25);
         assert_eq!(progress.go(0.25, pressure.to_vec()), [2.0, 2.0, 1.0, 1.0]);

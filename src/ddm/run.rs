@@ -162,10 +162,10 @@ impl Run<'_> {
         }
     }
 
-    /// What is known of an iterate of Newton's method after a step x to u.
+    /// What is known of an iterate of Newton's method after a step x, a share of a whole one, to u.
     pub fn after_step<'a>(
         &self,
-        (u, x): (&'a Field, &'a Field),
+        (u, x, share): (&'a Field, &'a Field, f64),
         measured: Measured,
         reached: &Reached,
         places: &'a Layer,
@@ -178,7 +178,7 @@ impl Run<'_> {
             layer: places,
             step: x,
             moved: Some(&x.trace),
-            length: 1.0,
+            length: share,
             measured,
             residual,
             error: reached.error,

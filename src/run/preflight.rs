@@ -35,7 +35,7 @@ pub fn coupling(built: &Built, i: usize) -> Coupling {
         let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
         let along = (0..3).map(|c| load[c] * normal[c]).sum::<f64>().abs() / size.max(f64::MIN_POSITIVE);
         // what rounding leaves of a load across the normal is none
-        if along > 1e-9 * load.iter().map(|f| f.abs()).sum::<f64>() { along } else { 0.0 }
+        if along > f64::EPSILON.sqrt() * load.iter().map(|f| f.abs()).sum::<f64>() { along } else { 0.0 }
     };
     let pressure = pair.bodies.map(pushed).into_iter().fold(0.0, f64::max) / length;
     let tangent = tangent_at(pair, pressure);
