@@ -11,6 +11,7 @@
 
 use super::scale::Scale;
 use super::start::surface_slopes;
+use crate::contact::LayerLaw;
 use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::linear::Solution;
@@ -37,22 +38,30 @@ pub(super) fn contact_energy(model: &Model, places: &Layer) -> f64 {
     (0..slopes.len()).filter(|&q| places.force[q] > 0.0).map(at).sum()
 }
 
+/// The compression within c -+ `digits` at which the pressure of a law is nearest to p.
+fn nearest(law: &dyn LayerLaw, point: usize, (c, digits): (f64, f64), p: f64) -> f64 {
+    let apart = if p > 0.0 { law.compression(point, p) - c } else { c.min(0.0) - c };
+    if apart.is_finite() { c + apart.clamp(-digits, digits) } else { c }
+}
+
 impl Reached {
-    /// Of an iterate with u'Ku = `strain` after the linear step `step`: compressions c and equilibrium pressures p, n each, and the
-    /// places that lines of slope `rho` lead to. At points of negative pressure, whose gap is infinite, the work of what the new
+    /// Of an iterate with u'Ku = `strain` after the linear step `step`: compressions c, known to their `digits`, and equilibrium pressures p, n
+    /// each, and the places that lines of slope `rho` lead to. Of all compressions that have these digits the one nearest to the law counts: the
+    /// others' distance would be rounding, which a stiff law answers with any pressure. At points of negative pressure, whose gap is infinite, the work of what the new
     /// places change there stands for it.
     pub(super) fn new(
         (model, scale): (&Model, &Scale),
         strain: f64,
         step: &Solution,
-        (compression, pressure): (&[f64], &[f64]),
+        (compression, digits, pressure): (&[f64], &[f64], &[f64]),
         places: &Layer,
         rho: &[f64],
     ) -> Self {
         let (mut gap, mut mismatch, mut is_bound) = (0.0, 0.0f64, step.is_exact);
         for (i, pair) in model.pairs.iter().enumerate() {
             for q in model.range(i) {
-                let (point, weight, c, p) = (q - model.offset[i], model.weight[q], compression[q], pressure[q]);
+                let (point, weight, p) = (q - model.offset[i], model.weight[q], pressure[q]);
+                let c = nearest(&*pair.law, point, (compression[q], digits[q]), p);
                 let changed = (p - places.pressure[q]).powi(2) / rho[q];
                 mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
                 gap += weight * if p < 0.0 { changed } else { pair.law.duality_gap(point, c, p) };
@@ -72,12 +81,22 @@ impl Reached {
         }
     }
 
-    /// Adds what rounding left of the equilibrium of an exact step from `before` to `places`: one `more` step with its matrix.
-    pub(super) fn add_rounding(&mut self, scale: &Scale, strain: f64, more: &Solution, before: &Layer, places: &Layer) {
+    /// Adds what rounding left of the equilibrium of an exact step from `before` to `places`: one `more` step with its matrix. Returns how
+    /// much the largest of the errors grew.
+    pub(super) fn add_rounding(
+        &mut self,
+        scale: &Scale,
+        strain: f64,
+        more: &Solution,
+        before: &Layer,
+        places: &Layer,
+    ) -> f64 {
+        let exact = self.worst();
         self.error += scale.relative(more.energy + more.error * more.error, strain + places.work);
         let closing = more.field.closing();
         let off = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
         self.pressure += if off == 0.0 { 0.0 } else { off / scale.peak(&places.pressure) };
+        self.worst() - exact
     }
 
     /// The largest of the errors.
@@ -109,7 +128,7 @@ mod tests {
         let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
         let (c, rho, scale) = ([0.5, 1.0, 2.0, 3.0], [2.0, 0.5, 0.25, 3.0], Scale::default());
         let exact = step(vec![0.0; 8], 0.0, 0.0);
-        let of = |p: [f64; 4]| Reached::new((&model, &scale), 5.0, &exact, (&c, &p), &places, &rho);
+        let of = |p: [f64; 4]| Reached::new((&model, &scale), 5.0, &exact, (&c, &[0.0; 4], &p), &places, &rho);
         let energy = |reached: &Reached| reached.error.powi(2) * (5.0 + places.work) / 2.0;
         let beside = of([2.0, 5.0, 1.0, 9.0]);
         close(energy(&beside), 2.0 / 8.0 + 3.0 * (8.0 / 3.0 + 2.0 / 3.0 - 2.0));
@@ -134,7 +153,7 @@ mod tests {
         let (gap, all): (f64, f64) = (0.5 * 0.4f64.powi(2) / 8.0, 5.0 + 0.5 * 1.0 + 3.0 * 8.0 + 0.25);
         let of = |error| {
             let step = step(vec![0.0; 8], 0.0, error);
-            Reached::new((&model, &scale), 5.0, &step, (&places.compression, &p), &places, &rho)
+            Reached::new((&model, &scale), 5.0, &step, (&places.compression, &[0.0; 4], &p), &places, &rho)
         };
         let inexact = of(0.3);
         close(inexact.error, ((2.0 * gap).sqrt() + 0.3) / all.sqrt());
@@ -149,6 +168,15 @@ mod tests {
         exact.add_rounding(&scale, 5.0, &more, &places, &places);
         close(exact.error, ((2.0 * gap).sqrt() + 0.06f64.sqrt()) / all.sqrt());
         close(exact.pressure, 0.1 + 0.04 / 4.0);
+    }
+
+    /// Of p = 4 c, and of an open point, whose law has nothing at any c < 0.
+    #[test]
+    fn compressions_are_known_to_their_digits() {
+        let law = &*two_pairs().pairs[0].law;
+        let all = [((1.0, 0.1), 4.2), ((1.0, 0.1), 5.0), ((1.0, 0.1), -1.0), ((0.05, 0.1), 0.0), ((-1.0, 0.1), 0.0)];
+        assert_eq!(all.map(|(c, p)| nearest(law, 0, c, p)), [1.05, 1.1, 0.9, 0.0, -1.0]);
+        assert!(nearest(law, 0, (f64::NAN, 0.1), 1.0).is_nan());
     }
 
     #[test]

@@ -11,6 +11,7 @@
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
 
 use super::bound::Reached;
+use super::digits::of_compressions;
 use super::forcing::Forcing;
 use super::line::Line;
 use super::linear::resisting;
@@ -30,8 +31,8 @@ use crate::model::linear::{LinearStep, System, Trial};
 pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
     let slopes = meeting_slopes(run.model);
     let mut rho = run.memory.progress.slopes(&slopes);
-    // whether the last step solved its linear system as well as it seemed
-    let mut exact = true;
+    // what rounding left of the last step, if that was too much
+    let mut left: Option<f64> = None;
     loop {
         let springs = resisting(run.model, places.springs(run.model));
         let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
@@ -39,9 +40,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let before = run.model.compression(&u.trace);
         let mut forcing =
             Forcing::new(&places, before.clone(), &rho, (run.stop.residual, &run.scale), linear.roughest());
-        let mut enough = |model: &Model, trial: &Trial| match exact {
-            true => forcing.is_enough(model, trial),
-            false => trial.is_within(CORRECTED),
+        let mut enough = |model: &Model, trial: &Trial| match left {
+            None => forcing.is_enough(model, trial),
+            Some(_) => trial.is_within(CORRECTED),
         };
         let system = System { model: run.model, places: &places, springs: &springs, residual: &r, enough: &mut enough };
         let mut x = match linear.solve(system)? {
@@ -50,9 +51,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         };
         let end: Vec<f64> = before.iter().zip(x.field.closing()).map(|(c, closing)| c + closing).collect();
         let pressure = places.linear(&end);
-        let share = match exact {
-            true => run.memory.progress.share(run.model, &rho, &before, (&end, &pressure)),
-            false => 1.0,
+        let share = match left {
+            None => run.memory.progress.share(run.model, &rho, &before, (&end, &pressure)),
+            Some(_) => 1.0,
         };
         rho = run.memory.progress.slopes(&slopes);
         x.field.scale(share);
@@ -65,8 +66,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
 
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
         let mut measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
-        let mut reached = Reached::new((run.model, &run.scale), measured.strain, &x, (&c, &p), &met, &rho);
-        exact = true;
+        let digits = of_compressions(run.model, &u.trace);
+        let mut reached = Reached::new((run.model, &run.scale), measured.strain, &x, (&c, &digits, &p), &met, &rho);
+        let (mut is_floor, corrected) = (false, left.take());
         if run.is_enough(&reached) {
             // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
             let mut enough = |_: &Model, trial: &Trial| trial.is_within(0.5);
@@ -77,13 +79,20 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             measured.inner_iterations += linear.counts().inner_iterations - before.inner_iterations;
             measured.factorizations += linear.counts().factorizations - before.factorizations;
             if let Ok(more) = more {
-                reached.add_rounding(&run.scale, measured.strain, &more, &places, &met);
-                exact = run.is_enough(&reached);
+                let lost = reached.add_rounding(&run.scale, measured.strain, &more, &places, &met);
+                if !run.is_enough(&reached) {
+                    // a correction gains a digit, unless rounding gives as much again
+                    is_floor = corrected.is_some_and(|before| lost > 0.5 * before);
+                    left = Some(lost);
+                }
             }
         }
         let at = run.after_step((&u, &x.field, share), measured, &reached, &met, linear);
         if let Some(status) = run.end_at(&at, linear)? {
             return Ok(run.end(status, u, met, linear));
+        }
+        if is_floor {
+            return Ok(run.end(Status::RoundoffLimited, u, met, linear));
         }
         // a step that knew of no contact runs through the other body
         let blind = places.closed == 0 && met.closed > 0;
@@ -91,7 +100,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             search(run.model, &mut u, &x.field)?;
             run.memory.progress.forget();
         }
-        if exact {
+        if left.is_none() {
             places = if blind { Layer::at(run.model, &u.trace) } else { met.clone() };
         }
         if measured.asked != 0 {

@@ -3,6 +3,7 @@
 use super::asks::{ASKS, joined, numbers};
 use super::balance::Balance;
 use super::bound::Reached;
+use super::digits;
 use super::history::{Observer, Row};
 use super::memory::Memory;
 use super::origin::Origin;
@@ -271,7 +272,6 @@ const SPARE: f64 = 10.0;
 /// answers with forces of its own.
 pub(super) fn rounding(model: &Model, u: &Field, layer: &Layer) -> f64 {
     let mut floor = [0.0];
-    let points = model.points();
     for (index, slot) in model.bodies.iter().enumerate() {
         if let Some(body) = &slot.local {
             floor[0] += body.rounding(&u.states[index], &model.at_rows(index, &layer.force));
@@ -279,9 +279,8 @@ pub(super) fn rounding(model: &Model, u: &Field, layer: &Layer) -> f64 {
     }
     model.exchange.sum(&mut floor);
     // a force omega kappa e at a point is resisted by springs omega kappa at least
-    for q in 0..points {
-        let terms = u.trace[q].abs() + u.trace[points + q].abs() + model.gap[q].abs();
-        floor[0] += model.weight[q] * layer.tangent[q] * (f64::EPSILON * terms).powi(2);
+    for (q, digits) in digits::of_compressions(model, &u.trace).into_iter().enumerate() {
+        floor[0] += model.weight[q] * layer.tangent[q] * digits.powi(2);
     }
     ROUNDING * floor[0]
 }

@@ -265,7 +265,9 @@ fn grid(mut random: Random, kind: Kind, root: &Path) -> Made {
         }
     }
     let hanging = rows * columns > 1;
-    let expect = expect(&draft, hold, springs, weight);
+    // a ring that is pulled outwards holds itself
+    let holds_itself = kind == Kind::Rings && rows == 1;
+    let expect = if holds_itself { Expect::Solution } else { expect(&draft, hold, springs, weight) };
     // a weight holds nothing sideways
     let expect = if columns > 1 && draft.load == 0.0 && springs != Springs::All { Expect::Gauge } else { expect };
     Made { draft, expect, hanging }
