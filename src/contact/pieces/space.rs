@@ -28,7 +28,7 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
     let search = Search::new(b);
     let facets_b: Vec<Facet> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
-    let rule = quadrature::simplex::<3>(if quadratic { 5 } else { 2 });
+    let rule = quadrature::simplex(3, if quadratic { 5 } else { 2 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
@@ -49,7 +49,7 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
             for part in &free {
                 for triangle in polygon::fan(part) {
                     let share = 2.0 * polygon::area(&triangle);
-                    for (l, weight) in rule.points.iter().zip(&rule.weights) {
+                    for (l, weight) in rule.iter() {
                         let [u, v] = [0, 1].map(|c| (0..3).map(|k| l[k] * triangle[k][c]).sum());
                         let at_a = [1.0 - u - v, u, v];
                         let normal = facet.normal(u, v);
