@@ -199,20 +199,8 @@ fn header(axes: &[(String, Vec<String>)], built: &Built) -> Vec<String> {
     let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
     let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
     let mut header: Vec<String> = axes.iter().map(|(key, _)| key.clone()).collect();
-    let columns = [
-        "status",
-        "iterations",
-        "sweeps",
-        "factorizations",
-        "dense_factorizations",
-        "inner_iterations",
-        "residual",
-        "increment",
-        "F1",
-        "dofs",
-        "seconds",
-    ];
-    header.extend(columns.map(str::to_owned));
+    let columns = "status iterations sweeps factorizations dense_factorizations inner_iterations residual increment F1 dofs seconds";
+    header.extend(columns.split_whitespace().map(str::to_owned));
     for pair in &pairs {
         header.extend(["peak_pressure", &contact_column(measure), "layer_energy"].map(|what| format!("{what} {pair}")));
         header.extend(vector_columns("force", pair, dimension));

@@ -60,9 +60,8 @@ impl Chart<'_> {
     }
 
     fn plot(&self, x: &str, y: &str, series: Vec<Series>) -> Option<Plot> {
-        let axis = |label: &str| Axis { label: label.to_owned(), log: true };
         let has_points = series.iter().any(|series| !series.points.is_empty());
-        has_points.then(|| Plot { title: self.title.to_owned(), x: axis(x), y: axis(y), series })
+        has_points.then(|| Plot { title: self.title.to_owned(), x: Axis::log(x), y: Axis::log(y), series })
     }
 
     /// Time against error: who reaches an accuracy first. The dashed line joins the runs that no other one beats in both.
