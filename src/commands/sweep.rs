@@ -1,6 +1,7 @@
 //! `winkler sweep`: a scene over values of its keys, one row a run.
 
 use super::typed::{Manner, SceneArgs};
+use super::write::to_json;
 use super::{curves, folder_of, reuse, said};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
@@ -122,10 +123,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
             plots(&folder, &scenes[0].title, &histories, pressures, reference)?;
         }
         if json {
-            let list = serde_json::to_string_pretty(&reports).map_err(|cause| {
-                Error::new(Kind::File, "the reports cannot be written as JSON").because(cause.to_string())
-            })?;
-            say(format_args!("{list}"))?;
+            say(to_json(&reports)?.trim_end())?;
         } else {
             say(format_args!("results in {}", folder.path().display()))?;
         }
