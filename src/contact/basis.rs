@@ -58,7 +58,7 @@ impl PressureBasis {
     /// The basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes, of which `chunk` covers what side b faces.
     pub fn on<const D: usize>(order: Order, count: usize, chunk: &[Shared<D>]) -> Self {
         if order == Order::P2 && D == 3 {
-            return Self::on_quadratic_triangle(chunk);
+            return Self::MidEdges.or_hats(order, D..2 * D, chunk);
         }
         let mut mass = DMatrix::zeros(count, count);
         let mut integral = vec![0.0; count];
@@ -77,10 +77,6 @@ impl PressureBasis {
             row *= integral[i];
         }
         Self::Dual(dual).or_hats(order, 0..count, chunk)
-    }
-
-    fn on_quadratic_triangle<const D: usize>(chunk: &[Shared<D>]) -> Self {
-        Self::MidEdges.or_hats(Order::P2, D..2 * D, chunk)
     }
 
     /// This basis, if the means of the functions of these nodes are steady on the covered part; else the hats.

@@ -234,6 +234,15 @@ mod tests {
         }
     }
 
+    /// The grid of a file.
+    fn read(bytes: &[u8]) -> UnstructuredGridPiece {
+        let DataSet::UnstructuredGrid { mut pieces, .. } = Vtk::parse_xml(bytes).unwrap().data else {
+            panic!("not an unstructured grid")
+        };
+        let (Some(Piece::Inline(piece)), true) = (pieces.pop(), pieces.is_empty()) else { panic!("not one piece") };
+        *piece
+    }
+
     #[test]
     fn every_value_reads_back() {
         for (cell, code) in [
@@ -248,10 +257,7 @@ mod tests {
             let body = body(cell);
             let mut bytes = Vec::new();
             body.clone().write(encoding, &mut bytes).unwrap();
-            let DataSet::UnstructuredGrid { pieces, .. } = Vtk::parse_xml(bytes.as_slice()).unwrap().data else {
-                panic!("not an unstructured grid")
-            };
-            let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
+            let piece = read(&bytes);
             let points: IOBuffer = body.points.into_flattened().into();
             assert_eq!(piece.points, points);
             assert_eq!(piece.cells.types, [code]);
@@ -307,10 +313,7 @@ mod tests {
                 for (i, name) in ["xx", "yy", "zz", "xy", "yz", "xz"].iter().enumerate() {
                     assert!(tag.contains(&format!(" ComponentName{i}=\"{name}\"")), "{tag}");
                 }
-                let DataSet::UnstructuredGrid { pieces, .. } = Vtk::parse_xml(&bytes[..]).unwrap().data else {
-                    panic!()
-                };
-                let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
+                let piece = read(&bytes);
                 let Attribute::DataArray(stress) = &piece.data.point[0] else { panic!("a field") };
                 assert_eq!((stress.num_comp(), matches!(stress.data, IOBuffer::F32(_))), (6, single));
                 let read: Vec<f64> = stress.data.cast_into().unwrap();
