@@ -6,7 +6,8 @@ use std::fmt;
 /// Why a linear solver stopped; shown as a sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConvergedReason {
-    raw: ffi::KSPConvergedReason,
+    /// PETSc's number of it, positive for a good ending.
+    pub number: ffi::KSPConvergedReason,
     text: String,
 }
 
@@ -37,12 +38,12 @@ impl ConvergedReason {
             raw if raw > 0 => &format!("PETSc converged for its reason {raw}"),
             raw => &format!("PETSc diverged for its reason {raw}"),
         };
-        Self { raw, text: text.to_owned() }
+        Self { number: raw, text: text.to_owned() }
     }
 
     /// Whether the solution is to the tolerance asked for. An iteration that has not ended is no good ending.
     pub fn converged(&self) -> bool {
-        self.raw > 0
+        self.number > 0
     }
 }
 
