@@ -5,7 +5,7 @@
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 use winkler::error::Result;
-use winkler::petsc::{ConvergedReason, Int, Ksp, Matrix, Rows, Schur, Scope, Session};
+use winkler::petsc::{Int, Ksp, Matrix, Rows, Schur, Scope, Session};
 use winkler::solver::options::{Typed, UnreadKind, unread};
 
 /// After this, ranks that wait for each other are ended.
@@ -105,7 +105,11 @@ fn a_failed_factorisation_is_a_reason_and_not_the_end() {
             let (b, mut x) = ([1.0, 1.0], [0.0; 2]);
             let solved = ksp.solve(&b, &mut x)?;
             println!("REASON {}", solved.reason);
-            assert!(matches!(solved.reason, ConvergedReason::PreconditionerFailed(_)), "{}", solved.reason);
+            assert!(
+                solved.reason.to_string().starts_with("the preconditioner could not be made: "),
+                "{}",
+                solved.reason
+            );
             // Repaired, it works again.
             matrix.update(|values| values.copy_from_slice(&[2.0, -1.0, -1.0, 2.0]))?;
             assert!(ksp.solve(&b, &mut x)?.reason.converged());

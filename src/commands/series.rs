@@ -95,7 +95,7 @@ fn views(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
         for &owner in &info.ranks {
             if let (true, Some(Ok(recovered))) = (owner == rank, recovered) {
                 let recovered: &Recovered = recovered;
-                let write = |out: &mut dyn Write| recovered.field(info).clone().into_grid()?.write_msh(tags, out);
+                let write = |out: &mut dyn Write| recovered.field(info).clone().into_grid().write_msh(tags, out);
                 folder.write(&part(&safe_name(&info.name), info, rank, "msh"), write)?;
             }
             // room for the whole body: other ranks know no better of a part

@@ -1,8 +1,8 @@
 //! The files of pairs of surfaces: their names, and which pairs have none of their own.
 
 use crate::output::{PairReport, safe_name};
+use crate::run::measure::pair_names;
 use crate::run::stages::Done;
-use crate::run::words::numbered;
 
 /// What the pairs lack that are not `shown` and how to get it, in words; none if all are.
 pub fn left_out(pairs: &[PairReport], shown: &[usize]) -> Option<String> {
@@ -17,10 +17,5 @@ pub fn left_out(pairs: &[PairReport], shown: &[usize]) -> Option<String> {
 
 /// `contact-<a>-<b>` of each pair, safe as a file name, with a number from the second pair of the same bodies on.
 pub fn stems(done: &Done) -> Vec<String> {
-    let model = done.model();
-    let names = (0..model.pairs.len()).map(|i| {
-        let [a, b] = done.built.discrete.sides(i).map(|side| &model.bodies[model.pairs[i].bodies[side]].name);
-        format!("contact-{}-{}", safe_name(a), safe_name(b))
-    });
-    numbered(names)
+    pair_names(&done.built).into_iter().map(|name| format!("contact-{}", safe_name(&name))).collect()
 }

@@ -188,8 +188,8 @@ pub fn draw(built: &Built, folder: &Folder) -> Result<()> {
             let units = built.scene.units.as_ref();
             let plot = Plot {
                 title: format!("Layer of asperities of {}", pairs[pair].surfaces.join(" - ")),
-                x: Axis { label: label("compression", units.map(|units| units.length)), log: false },
-                y: Axis { label: label("pressure", units.map(|units| units.stress)), log: false },
+                x: Axis::linear(label("compression", units.map(|units| units.length))),
+                y: Axis::linear(label("pressure", units.map(|units| units.stress))),
                 series: vec![Series::new("", points, Style::Line)],
             };
             folder.write(&format!("{stem}.svg"), |out| plot.write(out))?;
@@ -212,6 +212,5 @@ fn profiles(data: &Data, built: &Built) -> Option<Plot> {
     }
     // data can be heights, moduli or loads
     let (x, y) = (label("place", built.scene.units.as_ref().map(|units| units.length)), data.spec.name.clone());
-    let axis = |label: String| Axis { label, log: false };
-    Some(Plot { title: format!("Data {y}"), x: axis(x), y: axis(y), series })
+    Some(Plot { title: format!("Data {y}"), x: Axis::linear(x), y: Axis::linear(y), series })
 }

@@ -1,6 +1,7 @@
 //! `winkler sweep`: a scene over values of its keys, one row a run.
 
 use super::typed::{Manner, SceneArgs};
+use super::write::to_json;
 use super::{curves, folder_of, reuse, said};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
@@ -122,10 +123,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
             plots(&folder, &scenes[0].title, &histories, pressures, reference)?;
         }
         if json {
-            let list = serde_json::to_string_pretty(&reports).map_err(|cause| {
-                Error::new(Kind::File, "the reports cannot be written as JSON").because(cause.to_string())
-            })?;
-            say(format_args!("{list}"))?;
+            say(to_json(&reports)?.trim_end())?;
         } else {
             say(format_args!("results in {}", folder.path().display()))?;
         }
@@ -199,20 +197,8 @@ fn header(axes: &[(String, Vec<String>)], built: &Built) -> Vec<String> {
     let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
     let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
     let mut header: Vec<String> = axes.iter().map(|(key, _)| key.clone()).collect();
-    let columns = [
-        "status",
-        "iterations",
-        "sweeps",
-        "factorizations",
-        "dense_factorizations",
-        "inner_iterations",
-        "residual",
-        "increment",
-        "F1",
-        "dofs",
-        "seconds",
-    ];
-    header.extend(columns.map(str::to_owned));
+    let columns = "status iterations sweeps factorizations dense_factorizations inner_iterations residual increment F1 dofs seconds";
+    header.extend(columns.split_whitespace().map(str::to_owned));
     for pair in &pairs {
         header.extend(["peak_pressure", &contact_column(measure), "layer_energy"].map(|what| format!("{what} {pair}")));
         header.extend(vector_columns("force", pair, dimension));

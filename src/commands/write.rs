@@ -13,6 +13,7 @@ use crate::run::results;
 use crate::run::stages::Done;
 use crate::run::words::numbered;
 use crate::run::{measure, report};
+use serde::Serialize;
 use std::path::Path;
 
 /// What is to be written, and where.
@@ -121,11 +122,11 @@ impl Writing<'_> {
     }
 }
 
-/// A report as JSON text, ended by a newline.
+/// A report, or several, as JSON text, ended by a newline.
 ///
 /// # Errors
 /// None in practice: a report holds nothing that JSON cannot hold.
-pub fn to_json(report: &Report) -> Result<String> {
+pub fn to_json(report: &impl Serialize) -> Result<String> {
     serde_json::to_string_pretty(report)
         .map(|text| text + "\n")
         .map_err(|cause| Error::new(Kind::File, "the report cannot be written as JSON").because(cause.to_string()))

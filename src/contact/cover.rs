@@ -40,14 +40,14 @@ impl Cover {
     pub(super) fn of<const D: usize>(a: &Side<D>, common: &Common<D>, carriers: &[Option<Carriers>]) -> Vec<Self> {
         let mut covered = vec![0.0; a.facets.count()];
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
-        let rule = quadrature::simplex::<D>(if a.facets.order == Order::P2 { 5 } else { 2 });
+        let rule = quadrature::simplex(D, if a.facets.order == Order::P2 { 5 } else { 2 });
         let measure = |i: usize| -> f64 {
             let x = a.facets.coordinates(i, a.space);
-            let at = |l: &[f64; D]| {
+            let at = |l: &[f64]| {
                 let here = assemble::interpolate(&x, &element::values(a.facets.order, l));
                 length(area_vector(a.facets.order, &x, l)) * a.space.circle(&here)
             };
-            rule.points.iter().zip(&rule.weights).map(|(l, weight)| weight * at(l)).sum()
+            rule.iter().map(|(l, weight)| weight * at(l)).sum()
         };
         let of_facet = |i: usize| {
             let share = covered[i] / measure(i);

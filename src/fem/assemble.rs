@@ -166,21 +166,10 @@ pub enum Defect {
 /// # Errors
 /// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity.
 pub fn stiffness<const D: usize>(space: &Space<D>, graph: &NodeGraph, elasticity: &Elasticity) -> Result<Csr, Defect> {
-    match D {
-        2 => stiffness_on::<D, 3>(space, graph, elasticity),
-        _ => stiffness_on::<D, 4>(space, graph, elasticity),
-    }
-}
-
-fn stiffness_on<const D: usize, const N: usize>(
-    space: &Space<D>,
-    graph: &NodeGraph,
-    elasticity: &Elasticity,
-) -> Result<Csr, Defect> {
     let mut matrix = graph.matrix::<D>();
-    let affine = quadrature::simplex::<N>(if space.order == Order::P1 { 1 } else { 2 });
-    let curved = quadrature::simplex::<N>(5);
-    let varying = quadrature::simplex::<N>(if space.order == Order::P1 { 2 } else { 5 });
+    let affine = quadrature::simplex(D + 1, if space.order == Order::P1 { 1 } else { 2 });
+    let curved = quadrature::simplex(D + 1, 5);
+    let varying = quadrature::simplex(D + 1, if space.order == Order::P1 { 2 } else { 5 });
     let mut hoop = Vec::new();
     let stride = space.stride;
     let mut local = vec![[[0.0; D]; D]; stride * stride];
@@ -195,15 +184,15 @@ fn stiffness_on<const D: usize, const N: usize>(
             *x = space.nodes[node as usize];
         }
         let constant = elasticity.constant_in(index);
-        let rule = match (constant, is_straight(&x, N)) {
+        let rule = match (constant, is_straight(&x, D + 1)) {
             (None, _) => &varying,
             _ if space.axisymmetric => &varying,
             (_, true) => &affine,
             _ => &curved,
         };
         local.fill([[0.0; D]; D]);
-        for (l, weight) in rule.points.iter().zip(&rule.weights) {
-            let (gradient, measure) = element::gradients::<D, N>(space.order, &x, l).ok_or(Defect::Inverted(index))?;
+        for (l, weight) in rule.iter() {
+            let (gradient, measure) = element::gradients(space.order, &x, l).ok_or(Defect::Inverted(index))?;
             let gradient = &gradient[..stride];
             let mut weight = weight * measure;
             if space.axisymmetric {
@@ -265,28 +254,16 @@ pub fn body_force<const D: usize>(
     density: &dyn Fn([f64; D]) -> [f64; D],
     load: &mut [f64],
 ) {
-    match D {
-        2 => body_force_on::<D, 3>(space, parts, density, load),
-        _ => body_force_on::<D, 4>(space, parts, density, load),
-    }
-}
-
-fn body_force_on<const D: usize, const N: usize>(
-    space: &Space<D>,
-    parts: Parts,
-    density: &dyn Fn([f64; D]) -> [f64; D],
-    load: &mut [f64],
-) {
     let low = space.order == Order::P1 && !space.axisymmetric;
-    let mut rule = quadrature::simplex::<N>(if low { 2 } else { 5 });
+    let mut rule = quadrature::simplex(D + 1, if low { 2 } else { 5 });
     if parts == Parts::Halves {
         rule = rule.on_parts();
     }
     for index in 0..space.cell_count() {
         let x = space.cell_nodes(index);
         let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
-        for (l, weight) in rule.points.iter().zip(&rule.weights) {
-            let Some((_, measure)) = element::gradients::<D, N>(space.order, &x, l) else { continue };
+        for (l, weight) in rule.iter() {
+            let Some((_, measure)) = element::gradients(space.order, &x, l) else { continue };
             let phi = element::values(space.order, l);
             let at = interpolate(&x, &phi);
             let force = density(at);

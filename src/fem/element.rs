@@ -27,16 +27,17 @@ pub fn node_count(vertices: usize, order: Order) -> usize {
 }
 
 /// Values of the shape functions at barycentric point `l`; the first `node_count` entries are set.
-pub fn values<const N: usize>(order: Order, l: &[f64; N]) -> [f64; MOST] {
+pub fn values(order: Order, l: &[f64]) -> [f64; MOST] {
+    let vertices = l.len();
     let mut phi = [0.0; MOST];
     match order {
-        Order::P1 => phi[..N].copy_from_slice(l),
+        Order::P1 => phi[..vertices].copy_from_slice(l),
         Order::P2 => {
-            for i in 0..N {
+            for i in 0..vertices {
                 phi[i] = l[i] * (2.0 * l[i] - 1.0);
             }
-            for (k, &(i, j)) in EDGES[..N * (N - 1) / 2].iter().enumerate() {
-                phi[N + k] = 4.0 * l[i] * l[j];
+            for (k, &(i, j)) in EDGES[..vertices * (vertices - 1) / 2].iter().enumerate() {
+                phi[vertices + k] = 4.0 * l[i] * l[j];
             }
         }
     }
@@ -44,57 +45,46 @@ pub fn values<const N: usize>(order: Order, l: &[f64; N]) -> [f64; MOST] {
 }
 
 /// Derivatives of the shape functions with respect to the barycentric coordinates (as independent
-/// variables) at `l`: entry `[node][coordinate]`.
-pub fn derivatives<const N: usize>(order: Order, l: &[f64; N]) -> [[f64; N]; MOST] {
-    let mut d = [[0.0; N]; MOST];
+/// variables) at `l`: entry `[node][coordinate]`, zero beyond the coordinates of `l`.
+pub fn derivatives(order: Order, l: &[f64]) -> [[f64; 4]; MOST] {
+    let vertices = l.len();
+    let mut d = [[0.0; 4]; MOST];
     match order {
         Order::P1 => {
-            for i in 0..N {
+            for i in 0..vertices {
                 d[i][i] = 1.0;
             }
         }
         Order::P2 => {
-            for i in 0..N {
+            for i in 0..vertices {
                 d[i][i] = 4.0 * l[i] - 1.0;
             }
-            for (k, &(i, j)) in EDGES[..N * (N - 1) / 2].iter().enumerate() {
-                d[N + k][i] = 4.0 * l[j];
-                d[N + k][j] = 4.0 * l[i];
+            for (k, &(i, j)) in EDGES[..vertices * (vertices - 1) / 2].iter().enumerate() {
+                d[vertices + k][i] = 4.0 * l[j];
+                d[vertices + k][j] = 4.0 * l[i];
             }
         }
     }
     d
 }
 
+/// Barycentric coordinates of a node of an element with so many vertices.
+pub fn place(vertices: usize, node: usize) -> [f64; 4] {
+    let ends = node.checked_sub(vertices).map_or((node, node), |edge| EDGES[edge]);
+    std::array::from_fn(|k| 0.5 * f64::from(u8::from(k == ends.0) + u8::from(k == ends.1)))
+}
+
 /// Barycentric coordinates of the nodes of an element.
 pub fn nodes<const N: usize>(order: Order) -> Vec<[f64; N]> {
-    let vertex = |i: usize| {
-        let mut l = [0.0; N];
-        l[i] = 1.0;
-        l
-    };
-    let mut all: Vec<_> = (0..N).map(vertex).collect();
-    if order == Order::P2 {
-        for &(i, j) in &EDGES[..N * (N - 1) / 2] {
-            let mut l = [0.0; N];
-            l[i] = 0.5;
-            l[j] = 0.5;
-            all.push(l);
-        }
-    }
-    all
+    (0..node_count(N, order)).map(|node| std::array::from_fn(|k| place(N, node)[k])).collect()
 }
 
 /// Gradients in space of the shape functions of a cell at barycentric point `l`, and the volume measure
 /// there (area or volume of the whole simplex if it were affine with this Jacobian).
 ///
-/// `N = D + 1`; `x` are the coordinates of the element's nodes (isoparametric). `None` if the map is singular
+/// `l` has D + 1 entries; `x` are the coordinates of the element's nodes (isoparametric). `None` if the map is singular
 /// or inverted there.
-pub fn gradients<const D: usize, const N: usize>(
-    order: Order,
-    x: &[[f64; D]],
-    l: &[f64; N],
-) -> Option<([[f64; D]; MOST], f64)> {
+pub fn gradients<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> Option<([[f64; D]; MOST], f64)> {
     let d = derivatives(order, l);
     // columns of the Jacobian: derivative along L_{c+1} - L_0
     let mut jacobian = [[0.0; D]; D];

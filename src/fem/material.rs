@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Matrix6};
 /// Component behind each Voigt number 11 22 33 23 13 12.
 const VOIGT: [usize; 6] = [0, 1, 2, 4, 5, 3];
 
-/// Share of a diagonal entry that elimination must leave of it: less is zero in double precision.
+/// Least eigenvalue of a matrix with ones on its diagonal: less is zero in double precision.
 const SINGULAR: f64 = 1e-13;
 
 /// Entries of C below this share of the largest one are rounding of turned axes.
@@ -84,20 +84,9 @@ impl Tensor {
 
     /// Whether C eps : eps > 0 for every strain (4), beyond rounding.
     pub fn is_coercive(&self) -> bool {
-        let mut c = self.0;
-        for k in 0..6 {
-            // also false for NaN
-            if !(c[k][k] > SINGULAR * self.0[k][k] && c[k][k] < f64::INFINITY) {
-                return false;
-            }
-            for i in k + 1..6 {
-                let factor = c[i][k] / c[k][k];
-                for j in k + 1..6 {
-                    c[i][j] -= factor * c[k][j];
-                }
-            }
-        }
-        true
+        // scaled to ones on the diagonal; none for NaN
+        let scaled = Matrix6::from_fn(|i, j| self.0[i][j] / (self.0[i][i] * self.0[j][j]).sqrt());
+        (scaled - SINGULAR * Matrix6::identity()).cholesky().is_some()
     }
 
     /// The least C eps : eps over strains with eps : eps = 1, in any axes the same; NaN if C is not finite.

@@ -1,39 +1,48 @@
 //! Quadrature on reference simplices, in barycentric coordinates.
 
-/// A quadrature rule on the simplex with `N` vertices: barycentric points and weights that sum to one
-/// (multiply by length, area or volume).
-#[derive(Debug, Clone)]
-pub struct Rule<const N: usize> {
-    /// Barycentric coordinates of each point.
-    pub points: Vec<[f64; N]>,
+/// A quadrature rule on a simplex: barycentric points and weights that sum to one (multiply by length, area or volume).
+#[derive(Debug, Clone, Default)]
+pub struct Rule {
+    /// Barycentric coordinates of each point, one a vertex.
+    pub points: Vec<Vec<f64>>,
     /// Weight of each point.
     pub weights: Vec<f64>,
 }
 
-impl<const N: usize> Rule<N> {
+impl Rule {
+    fn add(&mut self, point: &[f64], weight: f64) {
+        self.points.push(point.to_vec());
+        self.weights.push(weight);
+    }
+
+    /// Points and their weights.
+    pub fn iter(&self) -> impl Iterator<Item = (&[f64], f64)> {
+        self.points.iter().map(Vec::as_slice).zip(self.weights.iter().copied())
+    }
+
     /// The same rule on each of the equal parts, half as wide, of which a simplex of two to four vertices is made.
     pub fn on_parts(&self) -> Self {
-        let middle = |i: usize, j: usize| -> [f64; N] {
-            std::array::from_fn(|k| 0.5 * (f64::from(u8::from(k == i)) + f64::from(u8::from(k == j))))
+        let n = self.points[0].len();
+        let middle = |&(i, j): &(usize, usize)| -> Vec<f64> {
+            (0..n).map(|k| 0.5 * (f64::from(u8::from(k == i)) + f64::from(u8::from(k == j)))).collect()
         };
         // at each vertex one; in a triangle one more, in a tetrahedron four around a diagonal of the octahedron that is left
-        let mut parts: Vec<[[f64; N]; N]> = (0..N).map(|i| std::array::from_fn(|j| middle(i, j))).collect();
-        let mut add = |vertices: &[(usize, usize)]| {
-            parts.push(std::array::from_fn(|k| vertices.get(k).map_or([0.0; N], |&(i, j)| middle(i, j))));
-        };
-        match N {
-            3 => add(&[(0, 1), (1, 2), (2, 0)]),
-            4 => [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1)]
-                .windows(2)
-                .for_each(|ring| add(&[(0, 2), (1, 3), ring[0], ring[1]])),
+        let mut parts: Vec<Vec<(usize, usize)>> = (0..n).map(|i| (0..n).map(|j| (i, j)).collect()).collect();
+        match n {
+            3 => parts.push(vec![(0, 1), (1, 2), (2, 0)]),
+            4 => {
+                let rings = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1)];
+                parts.extend(rings.windows(2).map(|ring| vec![(0, 2), (1, 3), ring[0], ring[1]]));
+            }
             _ => {}
         }
         let share = 1.0 / parts.len() as f64;
-        let mut rule = Self { points: Vec::new(), weights: Vec::new() };
+        let mut rule = Self::default();
         for part in parts {
-            for (l, weight) in self.points.iter().zip(&self.weights) {
-                rule.points.push(std::array::from_fn(|k| (0..N).map(|vertex| l[vertex] * part[vertex][k]).sum()));
-                rule.weights.push(share * weight);
+            let part: Vec<Vec<f64>> = part.iter().map(middle).collect();
+            for (l, weight) in self.iter() {
+                let point = |k: usize| (0..n).map(|vertex| l[vertex] * part[vertex][k]).sum();
+                rule.add(&(0..n).map(point).collect::<Vec<f64>>(), share * weight);
             }
         }
         rule
@@ -71,20 +80,15 @@ pub fn gauss(count: usize) -> Vec<(f64, f64)> {
     rule
 }
 
-/// Rule on the `N`-vertex simplex, exact for polynomials of `degree` up to 5 (lines: 9, triangles: 5,
+/// Rule on the simplex with so many vertices, exact for polynomials of `degree` up to 5 (lines: 9, triangles: 5,
 /// tetrahedra: 5).
 ///
 /// # Panics
-/// For other `N` than 1 to 4; the degree is limited by the callers, which are elements of order two.
-pub fn simplex<const N: usize>(degree: usize) -> Rule<N> {
-    let mut rule = Rule { points: Vec::new(), weights: Vec::new() };
-    let mut add = |bary: &[f64], weight: f64| {
-        let mut point = [0.0; N];
-        point.copy_from_slice(bary);
-        rule.points.push(point);
-        rule.weights.push(weight);
-    };
-    match N {
+/// For other numbers of vertices than 1 to 4; the degree is limited by the callers, which are elements of order two.
+pub fn simplex(vertices: usize, degree: usize) -> Rule {
+    let mut rule = Rule::default();
+    let mut add = |point: &[f64], weight: f64| rule.add(point, weight);
+    match vertices {
         1 => add(&[1.0], 1.0),
         2 => {
             for (x, w) in gauss(degree / 2 + 1) {
@@ -155,26 +159,22 @@ mod tests {
     }
 
     /// The mean of a monomial in barycentric coordinates over a simplex is n! prod(a_i!) / (n + sum a)!.
-    fn check<const N: usize>(degree: usize) {
-        check_rule(degree, &simplex::<N>(degree));
-        check_rule(degree, &simplex::<N>(degree).on_parts());
+    fn check(vertices: usize, degree: usize) {
+        check_rule(vertices, degree, &simplex(vertices, degree));
+        check_rule(vertices, degree, &simplex(vertices, degree).on_parts());
     }
 
-    fn check_rule<const N: usize>(degree: usize, rule: &Rule<N>) {
-        let mut powers = [0usize; N];
+    fn check_rule(n: usize, degree: usize, rule: &Rule) {
+        let mut powers = vec![0usize; n];
         loop {
             if powers.iter().sum::<usize>() <= degree {
-                let exact = factorial(N - 1) * powers.iter().map(|&a| factorial(a)).product::<f64>()
-                    / factorial(N - 1 + powers.iter().sum::<usize>());
-                let sum: f64 = rule
-                    .points
-                    .iter()
-                    .zip(&rule.weights)
-                    .map(|(x, w)| w * (0..N).map(|i| x[i].powi(powers[i] as i32)).product::<f64>())
-                    .sum();
-                assert!((sum - exact).abs() < 1e-14, "{N} {degree} {powers:?}: {sum} {exact}");
+                let exact = factorial(n - 1) * powers.iter().map(|&a| factorial(a)).product::<f64>()
+                    / factorial(n - 1 + powers.iter().sum::<usize>());
+                let sum: f64 =
+                    rule.iter().map(|(x, w)| w * (0..n).map(|i| x[i].powi(powers[i] as i32)).product::<f64>()).sum();
+                assert!((sum - exact).abs() < 1e-14, "{n} {degree} {powers:?}: {sum} {exact}");
             }
-            let Some(i) = (0..N).find(|&i| powers[i] < degree) else { break };
+            let Some(i) = (0..n).find(|&i| powers[i] < degree) else { break };
             powers[..i].fill(0);
             powers[i] += 1;
         }
@@ -183,27 +183,24 @@ mod tests {
     #[test]
     fn rules_are_exact_to_their_degree() {
         for degree in [1, 2, 3, 4, 5] {
-            check::<2>(degree);
-            check::<3>(degree);
-            check::<4>(degree);
+            (2..=4).for_each(|vertices| check(vertices, degree));
         }
-        check::<2>(9);
+        check(2, 9);
     }
 
     /// Of the degree 4 a rule for 2 or 3 on parts half as wide misses a sixteenth.
     #[test]
     fn parts_cover_the_simplex() {
-        fn missed<const N: usize>(rule: &Rule<N>) -> f64 {
-            let exact = 24.0 * factorial(N - 1) / factorial(N + 3);
-            let sum: f64 = rule.points.iter().zip(&rule.weights).map(|(x, w)| w * x[0].powi(4)).sum();
+        let missed = |rule: Rule| -> f64 {
+            let n = rule.points[0].len();
+            let exact = 24.0 * factorial(n - 1) / factorial(n + 3);
+            let sum: f64 = rule.iter().map(|(x, w)| w * x[0].powi(4)).sum();
             sum - exact
-        }
-        let ratio = missed(&simplex::<2>(2)) / missed(&simplex::<2>(2).on_parts());
+        };
+        let ratio = missed(simplex(2, 2)) / missed(simplex(2, 2).on_parts());
         assert!((ratio - 16.0).abs() < 1e-9, "{ratio}");
-        for (whole, parts) in [
-            (missed(&simplex::<3>(2)), missed(&simplex::<3>(2).on_parts())),
-            (missed(&simplex::<4>(2)), missed(&simplex::<4>(2).on_parts())),
-        ] {
+        for vertices in [3, 4] {
+            let (whole, parts) = (missed(simplex(vertices, 2)), missed(simplex(vertices, 2).on_parts()));
             assert!(parts.abs() < 0.25 * whole.abs(), "{whole} {parts}");
         }
     }

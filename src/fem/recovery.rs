@@ -19,7 +19,6 @@ use super::space::Space;
 use crate::problem::order::Order;
 use bubble::Bubble;
 use patch::{Monomials, Patch};
-use std::collections::HashMap;
 
 /// Stress (xx yy zz xy yz xz) in a cell at a point of a strain (xx yy zz, and 2 eps of xy yz xz).
 pub type Law<'a, const D: usize> = &'a dyn Fn(usize, [f64; D], &[f64; 6]) -> [f64; 6];
@@ -37,59 +36,35 @@ pub struct Recovery<'a, const D: usize> {
 impl<'a, const D: usize> Recovery<'a, D> {
     /// Recovers the gradient of the displacement `u`, one entry a dof.
     pub fn new(space: &'a Space<D>, u: &'a [f64]) -> Self {
-        match D {
-            2 => Self::on::<3>(space, u),
-            _ => Self::on::<4>(space, u),
-        }
-    }
-
-    fn cell(&self, index: usize) -> &'a [u32] {
-        &self.space.cells[index * self.space.stride..(index + 1) * self.space.stride]
-    }
-
-    fn on<const N: usize>(space: &'a Space<D>, u: &'a [f64]) -> Self {
         let degree = if space.order == Order::P1 { 2 } else { 3 };
         let mut recovery = Self { space, displacement: u, patches: Vec::new(), monomials: Monomials::new(D, degree) };
         let mut around: Vec<Vec<u32>> = vec![Vec::new(); space.nodes.len()];
-        let mut facets: HashMap<[u32; D], usize> = HashMap::new();
         for index in 0..space.cell_count() {
-            let cell = recovery.cell(index);
-            for (opposite, &node) in cell[..N].iter().enumerate() {
-                around[node as usize].push(index as u32);
-                let mut key: [u32; D] = std::array::from_fn(|k| cell[if k < opposite { k } else { k + 1 }]);
-                // beyond the axis a body of revolution goes on
-                if key.iter().all(|&node| space.on_axis(node)) {
-                    continue;
-                }
-                key.sort_unstable();
-                *facets.entry(key).or_default() += 1;
-            }
+            recovery.vertices(index).iter().for_each(|&node| around[node as usize].push(index as u32));
         }
         let mut outer = vec![false; space.nodes.len()];
-        for (key, _) in facets.into_iter().filter(|(_, cells)| *cells == 1) {
-            key.iter().for_each(|&node| outer[node as usize] = true);
+        for (index, opposite) in space.lone_facets() {
+            let facet = || (0..=D).filter(|&k| k != opposite).map(|k| recovery.cell(index)[k]);
+            // beyond the axis a body of revolution goes on
+            if !facet().all(|node| space.on_axis(node)) {
+                facet().for_each(|node| outer[node as usize] = true);
+            }
         }
         let lower: Vec<Monomials> = (0..degree).rev().map(|degree| Monomials::new(D, degree)).collect();
         let (mut cells, mut nodes) = (Marked::new(space.cell_count()), Marked::new(space.nodes.len()));
         let mut patch = |node: usize| {
             cells.clear();
-            around[node].iter().for_each(|&cell| cells.add(cell));
+            cells.extend(&around[node]);
             let mut rings = if outer[node] { 2 } else { 1 };
             loop {
                 while rings > 1 {
                     nodes.clear();
-                    cells
-                        .list
-                        .iter()
-                        .for_each(|&cell| recovery.cell(cell as usize)[..N].iter().for_each(|&n| nodes.add(n)));
-                    nodes
-                        .list
-                        .iter()
-                        .for_each(|&other| around[other as usize].iter().for_each(|&cell| cells.add(cell)));
+                    cells.list.iter().for_each(|&cell| nodes.extend(recovery.vertices(cell as usize)));
+                    nodes.list.iter().for_each(|&other| cells.extend(&around[other as usize]));
                     rings -= 1;
                 }
                 nodes.clear();
-                cells.list.iter().for_each(|&cell| recovery.cell(cell as usize).iter().for_each(|&n| nodes.add(n)));
+                cells.list.iter().for_each(|&cell| nodes.extend(recovery.cell(cell as usize)));
                 let fit = |monomials| Patch::fit(space, u, space.nodes[node], &nodes.list, monomials);
                 let fitted = fit(&recovery.monomials);
                 // a body of few cells: what its nodes determine
@@ -105,6 +80,14 @@ impl<'a, const D: usize> Recovery<'a, D> {
         recovery
     }
 
+    fn cell(&self, index: usize) -> &'a [u32] {
+        &self.space.cells[index * self.space.stride..(index + 1) * self.space.stride]
+    }
+
+    fn vertices(&self, index: usize) -> &'a [u32] {
+        &self.cell(index)[..=D]
+    }
+
     fn patch(&self, node: u32) -> &Patch<D> {
         match &self.patches[node as usize] {
             Some(patch) => patch,
@@ -114,21 +97,19 @@ impl<'a, const D: usize> Recovery<'a, D> {
 
     /// Strain of the recovered displacement less the discrete one in a cell, as products l_k l_m have it, k <= m: the gradient of a parabola is linear,
     /// coordinates are so in linear elements, and all products sum to one.
-    fn strain_errors<const N: usize>(&self, cell: &[u32], gradient: &[[f64; D]]) -> Vec<[f64; 6]> {
+    fn strain_errors(&self, cell: &[u32], gradient: &[[f64; D]]) -> Vec<[f64; 6]> {
         let discrete = self.space.slope(cell, &[0.0; D], &[], gradient, self.displacement);
-        let corners: [[f64; D]; N] = std::array::from_fn(|k| self.space.nodes[cell[k] as usize]);
-        let slopes = cell.iter().map(|&node| {
-            let patch = self.patch(node);
-            corners.map(|at| patch.slope_of_parabola(&self.monomials, &at))
-        });
-        let slopes: Vec<[[[f64; D]; D]; N]> = slopes.collect();
-        let mut errors = Vec::with_capacity(N * (N + 1) / 2);
-        for k in 0..N {
-            for m in k..N {
-                let mut slope = Slope { h: slopes[k][m], hoop: 0.0 };
+        let recovered = |node: usize, at: usize| {
+            let at = &self.space.nodes[cell[at] as usize];
+            Slope { h: self.patch(cell[node]).slope_of_parabola(&self.monomials, at), hoop: 0.0 }
+        };
+        let mut errors = Vec::new();
+        for k in 0..=D {
+            for m in k..=D {
+                let mut slope = recovered(k, m);
                 slope.add(-1.0, &discrete);
                 if m > k {
-                    slope.add(1.0, &Slope { h: slopes[m][k], hoop: 0.0 });
+                    slope.add(1.0, &recovered(m, k));
                     slope.add(-1.0, &discrete);
                 }
                 errors.push(slope.strain());
@@ -145,14 +126,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
 
     /// Squared energy norm of the difference of recovered and discrete stress on each cell.
     pub fn energy_errors(&self, law: Law<D>) -> Vec<f64> {
-        match D {
-            2 => self.energy_errors_on::<3>(law),
-            _ => self.energy_errors_on::<4>(law),
-        }
-    }
-
-    fn energy_errors_on<const N: usize>(&self, law: Law<D>) -> Vec<f64> {
-        let rule = quadrature::simplex::<N>(5);
+        let rule = quadrature::simplex(D + 1, 5);
         let is_linear = self.space.order == Order::P1 && !self.space.axisymmetric;
         let density = |index: usize, at: [f64; D], strain: &[f64; 6]| -> f64 {
             law(index, at, strain).iter().zip(strain).map(|(s, e)| s * e).sum()
@@ -161,12 +135,10 @@ impl<'a, const D: usize> Recovery<'a, D> {
             let (cell, x) = (self.cell(index), self.space.cell_nodes(index));
             let mut sum = 0.0;
             if is_linear {
-                let Some((gradient, measure)) = element::gradients::<D, N>(Order::P1, &x, &rule.points[0]) else {
-                    return 0.0;
-                };
-                let errors = self.strain_errors::<N>(cell, &gradient[..N]);
-                for (l, weight) in rule.points.iter().zip(&rule.weights) {
-                    let products = (0..N).flat_map(|k| (k..N).map(move |m| l[k] * l[m]));
+                let Some((gradient, measure)) = element::gradients(Order::P1, &x, &rule.points[0]) else { return 0.0 };
+                let errors = self.strain_errors(cell, &gradient[..=D]);
+                for (l, weight) in rule.iter() {
+                    let products = (0..=D).flat_map(|k| (k..=D).map(move |m| l[k] * l[m]));
                     let mut strain = [0.0; 6];
                     for (product, error) in products.zip(&errors) {
                         (0..6).for_each(|i| strain[i] += product * error[i]);
@@ -175,8 +147,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
                 }
                 return sum;
             }
-            for (l, weight) in rule.points.iter().zip(&rule.weights) {
-                let Some((gradient, measure)) = element::gradients::<D, N>(self.space.order, &x, l) else { continue };
+            for (l, weight) in rule.iter() {
+                let Some((gradient, measure)) = element::gradients(self.space.order, &x, l) else { continue };
                 let phi = element::values(self.space.order, l);
                 let at = interpolate(&x, &phi);
                 let mut difference = Slope::ZERO;
@@ -194,30 +166,23 @@ impl<'a, const D: usize> Recovery<'a, D> {
     ///
     /// With b the error of the nodal interpolant, a displacement w with this residual is what the nodal values lack.
     pub fn interpolation_residual(&self, law: Law<D>) -> Vec<f64> {
-        match D {
-            2 => self.interpolation_residual_on::<3>(law),
-            _ => self.interpolation_residual_on::<4>(law),
-        }
-    }
-
-    fn interpolation_residual_on<const N: usize>(&self, law: Law<D>) -> Vec<f64> {
         // a bubble has one degree more than the elements, and both factors are gradients
-        let rule = quadrature::simplex::<N>(if self.space.order == Order::P1 { 2 } else { 5 });
+        let rule = quadrature::simplex(D + 1, if self.space.order == Order::P1 { 2 } else { 5 });
         let mut residual = vec![0.0; self.space.dofs()];
         let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
         for index in 0..self.space.cell_count() {
             let (cell, x) = (self.cell(index), self.space.cell_nodes(index));
-            let bubbles = self.bubbles(&cell[..N], |_| true);
-            for (l, weight) in rule.points.iter().zip(&rule.weights) {
-                let Some((gradient, measure)) = element::gradients::<D, N>(self.space.order, &x, l) else { continue };
-                let Some((hats, _)) = element::gradients::<D, N>(Order::P1, &x[..N], l) else { continue };
+            let bubbles = self.bubbles(&cell[..=D], |_| true);
+            for (l, weight) in rule.iter() {
+                let Some((gradient, measure)) = element::gradients(self.space.order, &x, l) else { continue };
+                let Some((hats, _)) = element::gradients(Order::P1, &x[..=D], l) else { continue };
                 let phi = element::values(self.space.order, l);
                 let at = interpolate(&x, &phi);
                 let mut slope = Slope::<D>::ZERO;
                 for (bubble, coefficient) in &bubbles {
                     let d = bubble.slopes(l);
                     for j in 0..D {
-                        let along: f64 = (0..N).map(|k| d[k] * hats[k][j]).sum();
+                        let along: f64 = (0..=D).map(|k| d[k] * hats[k][j]).sum();
                         (0..D).for_each(|c| slope.h[c][j] += coefficient[c] * along);
                     }
                     slope.hoop += self.space.hoop(&at, bubble.value(l) * coefficient[0]);
@@ -239,7 +204,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// Error of the nodal interpolant at barycentric point `l` of a simplex with these vertices, by the recovered
     /// derivatives: b with u = I u + b. It has the polynomial degree of the elements and one more, vanishes at all nodes, and is
     /// continuous.
-    pub fn bubble<const N: usize>(&self, vertices: &[u32], l: &[f64; N]) -> [f64; D] {
+    pub fn bubble(&self, vertices: &[u32], l: &[f64]) -> [f64; D] {
         let mut sum = [0.0; D];
         // most vanish on a facet
         for (bubble, coefficient) in self.bubbles(vertices, |bubble| bubble.value(l) != 0.0) {
@@ -309,9 +274,11 @@ impl Marked {
         Self { list: Vec::new(), is_in: vec![false; count] }
     }
 
-    fn add(&mut self, number: u32) {
-        if !std::mem::replace(&mut self.is_in[number as usize], true) {
-            self.list.push(number);
+    fn extend(&mut self, numbers: &[u32]) {
+        for &number in numbers {
+            if !std::mem::replace(&mut self.is_in[number as usize], true) {
+                self.list.push(number);
+            }
         }
     }
 

@@ -291,6 +291,11 @@ impl<const D: usize> Space<D> {
 
     /// All facets that bound one cell only, oriented outwards.
     pub fn boundary(&self) -> Facets<D> {
+        self.facets_of(self.lone_facets())
+    }
+
+    /// The same facets, each by its cell and the vertex opposite to it.
+    pub fn lone_facets(&self) -> impl Iterator<Item = (usize, usize)> + use<D> {
         let mut faces: Vec<([u32; D], u32)> = Vec::with_capacity(self.cell_count() * (D + 1));
         for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
             faces
@@ -300,11 +305,11 @@ impl<const D: usize> Space<D> {
         let lone = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1);
         let mut places: Vec<u32> = lone.map(|group| group[0].1).collect();
         places.sort_unstable();
-        self.facets_of(places.into_iter().map(|place| (place as usize / (D + 1), place as usize % (D + 1))))
+        places.into_iter().map(|place| (place as usize / (D + 1), place as usize % (D + 1)))
     }
 
     /// The facets opposite a vertex of a cell each, oriented out of the cell.
-    fn facets_of(&self, places: impl Iterator<Item = (usize, usize)>) -> Facets<D> {
+    pub fn facets_of(&self, places: impl Iterator<Item = (usize, usize)>) -> Facets<D> {
         let mut nodes = Vec::new();
         for (index, opposite) in places {
             let cell = &self.cells[index * self.stride..(index + 1) * self.stride];
@@ -364,11 +369,10 @@ impl<const D: usize> Facets<D> {
 
     /// Outer unit normals at the corners of all facets.
     pub fn normals(&self, space: &Space<D>) -> Vec<[f64; D]> {
-        let corner = |at: usize| std::array::from_fn(|c| if c == at { 1.0 } else { 0.0 });
         let normals = |i: usize| {
             let x = self.coordinates(i, space);
             (0..D).map(move |at| {
-                let area = area_vector(self.order, &x, &corner(at));
+                let area = area_vector(self.order, &x, &element::place(D, at)[..D]);
                 let size = area.iter().map(|a| a * a).sum::<f64>().sqrt();
                 area.map(|a| a / size)
             })
@@ -390,7 +394,7 @@ impl<const D: usize> Facets<D> {
 
 /// Outer normal times length (2D) or area (3D) measure of a facet with node coordinates `x`, at barycentric
 /// point `l`: integrate with weights that sum to one.
-pub fn area_vector<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64; D]) -> [f64; D] {
+pub fn area_vector<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> [f64; D] {
     let d = element::derivatives(order, l);
     let tangent =
         |c: usize| -> [f64; D] { std::array::from_fn(|i| (0..x.len()).map(|n| (d[n][c] - d[n][0]) * x[n][i]).sum()) };

@@ -12,27 +12,21 @@ use nalgebra::Matrix3;
 /// `u` has one entry a dof; the result one (xx yy zz xy yz xz) a node. Where the elasticity has no value at a node (the axis
 /// of cylindrical axes, say), that of an integration point of the cell serves.
 pub fn nodal<const D: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64]) -> Vec<[f64; 6]> {
-    match D {
-        2 => nodal_on::<D, 3>(space, elasticity, u),
-        _ => nodal_on::<D, 4>(space, elasticity, u),
-    }
-}
-
-fn nodal_on<const D: usize, const N: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64]) -> Vec<[f64; 6]> {
-    let inside = quadrature::simplex::<N>(if space.order == Order::P1 { 2 } else { 5 }).points[0];
+    let rule = quadrature::simplex(D + 1, if space.order == Order::P1 { 2 } else { 5 });
+    let inside = element::values(space.order, &rule.points[0]);
     let mut sum = vec![[0.0; 6]; space.nodes.len()];
     let mut volume = vec![0.0; space.nodes.len()];
-    let places = element::nodes::<N>(space.order);
     for index in 0..space.cell_count() {
         let x = space.cell_nodes(index);
         let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
-        for (l, &node) in places.iter().zip(cell) {
-            let Some((gradient, measure)) = element::gradients::<D, N>(space.order, &x, l) else { continue };
+        for (place, &node) in cell.iter().enumerate() {
+            let l = &element::place(D + 1, place)[..=D];
+            let Some((gradient, measure)) = element::gradients(space.order, &x, l) else { continue };
             let at = space.nodes[node as usize];
             let slope = space.slope(cell, &at, &element::values(space.order, l), &gradient, u);
-            let material = elasticity.at(index, pad(at)).or_else(|_| {
-                elasticity.at(index, pad(assemble::interpolate(&x, &element::values(space.order, &inside))))
-            });
+            let material = elasticity
+                .at(index, pad(at))
+                .or_else(|_| elasticity.at(index, pad(assemble::interpolate(&x, &inside))));
             // assembly was there: it has a value
             let Ok(material) = material else { continue };
             let stress = material.stress(&slope.strain());

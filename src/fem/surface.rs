@@ -30,13 +30,13 @@ type Visit<'a, const D: usize> = dyn FnMut(&[u32], &[f64], f64, [f64; D], [f64; 
 
 /// Visits the integration points of a surface.
 fn on_facets<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts, visit: &mut Visit<D>) {
-    let mut rule = quadrature::simplex::<D>(if space.order == Order::P1 { 3 } else { 5 });
+    let mut rule = quadrature::simplex(D, if space.order == Order::P1 { 3 } else { 5 });
     if parts == Parts::Halves {
         rule = rule.on_parts();
     }
     for index in 0..facets.count() {
         let x = facets.coordinates(index, space);
-        for (l, weight) in rule.points.iter().zip(&rule.weights) {
+        for (l, weight) in rule.iter() {
             let area = area_vector(space.order, &x, l);
             let measure = area.iter().map(|a| a * a).sum::<f64>().sqrt();
             let normal = area.map(|a| a / measure);

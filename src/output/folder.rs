@@ -195,17 +195,6 @@ mod tests {
     }
 
     #[test]
-    fn a_file_in_place_of_the_folder_is_refused() {
-        let base = tempfile::tempdir().unwrap();
-        let path = base.path().join("taken");
-        fs::write(&path, "").unwrap();
-        let error = Folder::create(&path).unwrap_err();
-        assert_eq!(error.kind(), Kind::File);
-        assert!(error.message().contains("taken"), "{error}");
-        assert!(error.advice().unwrap().contains("-o"));
-    }
-
-    #[test]
     fn names_stay_in_the_folder() {
         assert_eq!(safe_name("upper bottom/../x"), "upper_bottom_.._x");
         assert_eq!(safe_name("..\\x"), "_.._x");

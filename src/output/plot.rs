@@ -73,6 +73,18 @@ impl Series {
     }
 }
 
+impl Axis {
+    /// An axis with even steps.
+    pub fn linear(label: impl Into<String>) -> Self {
+        Self { label: label.into(), log: false }
+    }
+
+    /// A logarithmic axis.
+    pub fn log(label: impl Into<String>) -> Self {
+        Self { label: label.into(), log: true }
+    }
+}
+
 /// The history of one run, for [`Plot::convergence`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvergenceSeries {
@@ -105,12 +117,7 @@ impl Plot {
             }
         }
         let y = if has_increments { "relative residual, increment" } else { "relative residual" };
-        Self {
-            title: title.into(),
-            x: Axis { label: "iteration".into(), log: false },
-            y: Axis { label: y.into(), log: true },
-            series,
-        }
+        Self { title: title.into(), x: Axis::linear("iteration"), y: Axis::log(y), series }
     }
 
     /// Contact force of pairs over their approach, step by step, with the labels of both; a curve without a name if there is one.
@@ -121,20 +128,14 @@ impl Plot {
     ) -> Self {
         let one = pairs.len() == 1;
         let curve = |(name, points)| Series::new(if one { "" } else { name }, points, Style::LineMarkers);
-        Self {
-            title: title.into(),
-            x: Axis { label: x, log: false },
-            y: Axis { label: y, log: false },
-            series: pairs.map(curve).collect(),
-        }
+        Self { title: title.into(), x: Axis::linear(x), y: Axis::linear(y), series: pairs.map(curve).collect() }
     }
 
     /// Contact pressure along a surface from curves of (place, pressure) in any order; dashed references on top.
     pub fn pressure(title: &str, x: &str, y: &str, mut series: Vec<Series>) -> Self {
         series.iter_mut().for_each(|series| series.points.sort_by(|a, b| a.0.total_cmp(&b.0)));
         series.sort_by_key(|series| series.style == Style::Dashed);
-        let axis = |label: &str| Axis { label: label.into(), log: false };
-        Self { title: title.into(), x: axis(x), y: axis(y), series }
+        Self { title: title.into(), x: Axis::linear(x), y: Axis::linear(y), series }
     }
 }
 

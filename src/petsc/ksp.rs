@@ -6,7 +6,7 @@ use super::library::petsc;
 use super::mumps::ROOM;
 use super::table::text;
 use super::vector::Vector;
-use super::{ConvergedReason, FAMILIES, Int, Matrix, Scope, Session, ffi};
+use super::{ConvergedReason, Int, Matrix, Scope, Session, ffi, is_of_family};
 use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
 use std::ptr::null_mut;
@@ -170,7 +170,7 @@ impl Ksp {
         let start = self.own_options();
         let own = typed.iter().filter_map(|(name, value)| {
             let bare = name.strip_prefix(&start)?;
-            FAMILIES.iter().any(|family| bare.starts_with(family)).then_some((bare, value.as_deref()))
+            is_of_family(bare).then_some((bare, value.as_deref()))
         });
         self.writes_to_b = own.clone().any(|(_, value)| value == Some("eisenstat"));
         for (name, value) in own {

@@ -7,17 +7,8 @@
 use std::env;
 
 /// One of these is set by whatever starts several ranks.
-const LAUNCHERS: [&str; 9] = [
-    "OMPI_COMM_WORLD_SIZE",
-    "PMIX_RANK",
-    "PMI_RANK",
-    "PMI_SIZE",
-    "SLURM_PROCID",
-    "PALS_RANKID",
-    "ALPS_APP_PE",
-    "FLUX_TASK_RANK",
-    "MPI_LOCALRANKID",
-];
+const LAUNCHERS: &str = "OMPI_COMM_WORLD_SIZE PMIX_RANK PMI_RANK PMI_SIZE SLURM_PROCID PALS_RANKID ALPS_APP_PE FLUX_TASK_RANK \
+    MPI_LOCALRANKID";
 
 /// What Open MPI is told when it runs alone.
 ///
@@ -52,7 +43,7 @@ fn are_together() -> bool {
 
 /// Whether a launcher such as `mpiexec` started this process.
 pub(super) fn seen() -> bool {
-    LAUNCHERS.iter().any(|name| env::var_os(name).is_some())
+    LAUNCHERS.split_whitespace().any(|name| env::var_os(name).is_some())
 }
 
 /// Runs `start` with the settings of a lone process, or of one among others on its machine, if the user set none of them.

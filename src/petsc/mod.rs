@@ -62,7 +62,7 @@ pub use ksp::{Ksp, Solved};
 pub use matrix::Matrix;
 pub use metis::nested_dissection;
 pub use mumps::Schur;
-pub use options::{FAMILIES, Options};
+pub use options::Options;
 pub use reason::ConvergedReason;
 pub use rows::Rows;
 pub use scope::Scope;
@@ -70,7 +70,7 @@ pub use session::Session;
 pub use stage::Stage;
 pub use until::{Enough, Iterate};
 pub use waiting::Entry;
-pub use words::{begins_options, is_family, is_global};
+pub use words::{begins_options, is_family, is_global, is_of_family};
 
 /// Runs `action` and returns its result and all that PETSc printed meanwhile, which is not shown.
 ///

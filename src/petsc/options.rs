@@ -9,27 +9,6 @@ use std::collections::BTreeMap;
 use std::ffi::c_char;
 use std::ptr::null_mut;
 
-/// How the options of a solver begin after its prefix: objects, and objects nested in them.
-pub const FAMILIES: [&str; 17] = [
-    "ksp_",
-    "pc_",
-    "mat_",
-    "sub_",
-    "mg_",
-    "fieldsplit_",
-    "vec_",
-    "esteig_",
-    "redundant_",
-    "telescope_",
-    "deflation_",
-    "hpddm_",
-    "lsc_",
-    "matmatmult_",
-    "matproduct_",
-    "matptap_",
-    "mattransposematmult_",
-];
-
 /// PETSc's table of options, filled from the command line, `PETSC_OPTIONS`, `.petscrc` and `-options_file`.
 ///
 /// Names may be given with or without their dash and come back with it; PETSc does not tell capital from small letters

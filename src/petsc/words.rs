@@ -1,6 +1,8 @@
 //! Words that begin options of PETSc, and options of PETSc as a whole, which belong to no solver.
 
-use super::FAMILIES;
+/// How the options of a solver begin after its prefix: objects, and objects nested in them.
+const FAMILIES: &str = "ksp pc mat sub mg fieldsplit vec esteig redundant telescope deflation hpddm lsc matmatmult matproduct \
+    matptap mattransposematmult";
 
 /// Options of PETSc as a whole, some of which it reads only at its end.
 const GLOBAL: &str = "log log_all log_exclude log_exclude_actions log_exclude_objects log_mpe log_nvtx log_perfstubs \
@@ -16,54 +18,38 @@ const GLOBAL: &str = "log log_all log_exclude log_exclude_actions log_exclude_ob
     splitreduction_async vecscatter_view build_twosided";
 
 /// First words of options that PETSc reads when it makes a device, a window or a file.
-const GLOBAL_WORDS: [&str; 8] = ["draw", "drawaxis", "viewer", "device", "cuda", "hip", "lg", "prefix"];
+const GLOBAL_WORDS: &str = "draw drawaxis viewer device cuda hip lg prefix";
 
 /// Words that begin options of PETSc, besides [`FAMILIES`] and those of PETSc as a whole.
-const MORE_WORDS: [&str; 29] = [
-    "snes",
-    "ts",
-    "tao",
-    "dm",
-    "is",
-    "da",
-    "dmda",
-    "dmplex",
-    "petscspace",
-    "petscfv",
-    "petscds",
-    "sf",
-    "sfnode",
-    "partitioner",
-    "petscpartitioner",
-    "vecscatter",
-    "ao",
-    "pf",
-    "ps",
-    "eps",
-    "svd",
-    "st",
-    "bv",
-    "hypre",
-    "mumps",
-    "npc",
-    "no",
-    "not",
-    "winklerprobe",
-];
+const MORE_WORDS: &str = "snes ts tao dm is da dmda dmplex petscspace petscfv petscds sf sfnode partitioner petscpartitioner \
+    vecscatter ao pf ps eps svd st bv hypre mumps npc no not winklerprobe";
+
+fn has(words: &str, word: &str) -> bool {
+    words.split_whitespace().any(|known| known == word)
+}
+
+/// First word of an option without its dash.
+fn first(name: &str) -> &str {
+    name.split('_').next().unwrap_or(name)
+}
 
 /// Whether an option, without its dash, is one of PETSc as a whole.
 pub fn is_global(name: &str) -> bool {
-    GLOBAL.split_whitespace().any(|known| known == name)
-        || name.split('_').next().is_some_and(|first| GLOBAL_WORDS.contains(&first))
+    has(GLOBAL, name) || has(GLOBAL_WORDS, first(name))
 }
 
 /// Whether options of PETSc begin with this word.
 pub fn begins_options(word: &str) -> bool {
-    let of_whole = || GLOBAL.split_whitespace().any(|name| name.split('_').next() == Some(word));
-    is_family(word) || GLOBAL_WORDS.contains(&word) || MORE_WORDS.contains(&word) || of_whole()
+    let of_whole = || GLOBAL.split_whitespace().any(|name| first(name) == word);
+    [FAMILIES, GLOBAL_WORDS, MORE_WORDS].iter().any(|words| has(words, word)) || of_whole()
 }
 
 /// Whether a word is that of an object family, alone or between two `_` (`-sub_ksp_type`).
 pub fn is_family(word: &str) -> bool {
-    FAMILIES.iter().any(|family| family.strip_suffix('_') == Some(word))
+    has(FAMILIES, word)
+}
+
+/// Whether an option, without its dash and the prefix of its solver, is one of an object family.
+pub fn is_of_family(bare: &str) -> bool {
+    bare.split_once('_').is_some_and(|(first, _)| is_family(first))
 }

@@ -140,9 +140,8 @@ impl Results {
             curve("increment", "increment", Style::Dashed),
         ];
         let series: Vec<Series> = series.into_iter().flatten().collect();
-        let axis = |label: &str, log| Axis { label: label.to_owned(), log };
-        let title = String::new();
-        Ok((!series.is_empty()).then(|| Plot { title, x: axis("iteration", false), y: axis("relative", true), series }))
+        let (title, x, y) = (String::new(), Axis::linear("iteration"), Axis::log("relative"));
+        Ok((!series.is_empty()).then_some(Plot { title, x, y, series }))
     }
 
     /// A curve of the load steps for each pair, with its name; none without steps.
@@ -162,9 +161,8 @@ impl Results {
         let series = curves.into_iter().map(|(name, points)| Series::new(name, points, Style::LineMarkers)).collect();
         let size = if self.is_area() { "area in contact" } else { "length in contact" };
         let size = label(size, self.size_unit().as_deref());
-        let axis = |label: String| Axis { label, log: false };
-        let title = String::new();
-        Some(Plot { title, x: axis(self.label("contact force", |units| &units.force)), y: axis(size), series })
+        let force = self.label("contact force", |units| &units.force);
+        Some(Plot { title: String::new(), x: Axis::linear(force), y: Axis::linear(size), series })
     }
 
     /// Contact force over approach, likewise; none of more pairs than one looks through.

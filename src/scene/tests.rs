@@ -61,46 +61,6 @@ fn isotropic(body: &BodySpec) -> (f64, f64) {
 }
 
 #[test]
-fn the_groove_is_read() {
-    let scene = load_text(GROOVE, &[]).unwrap();
-    assert_eq!(scene.title, "Groove with a nonlinear Winkler layer");
-    assert_eq!((scene.dimension.value, scene.plane), (2, Plane::Strain));
-    let MeshSource::Geo { file, set, .. } = &scene.mesh else { panic!("{:?}", scene.mesh) };
-    assert_eq!(file.value, scene.path.parent().unwrap().join("groove.geo"));
-    assert_eq!(set, &[("n".to_owned(), 32.0)]);
-
-    let [lower, upper] = &scene.bodies[..] else { panic!("{:?}", scene.bodies) };
-    assert_eq!((isotropic(lower), lower.order), ((2.1e5, 0.3), Order::P1));
-    assert!(matches!(lower.fix[0].value, [Some(Field::Constant(0.0)), None, None]));
-    assert_eq!(lower.fix[1].on.value, "lower_end");
-    assert!(matches!(lower.load[0].kind, LoadKind::Pressure(Field::Constant(10.0))));
-    assert!(lower.force.is_none());
-    let force = upper.force.as_ref().unwrap();
-    assert_eq!(force.each_ref().map(|component| component.eval([0.0, 1.0, 0.0])), [0.0, -9.81e-6 * 2.0, 0.0]);
-    let LoadKind::Traction(traction) = &upper.load[0].kind else { panic!("{:?}", upper.load) };
-    assert_eq!(traction.each_ref().map(|component| component.eval([3.0, 1.0, 0.0])), [6.0, -10.0, 0.0]);
-
-    let [contact] = &scene.contacts[..] else { panic!("{:?}", scene.contacts) };
-    assert_eq!(contact.between[1].value, "upper_bottom");
-    assert_eq!(contact.between[1].place.source.text[contact.between[1].place.span.clone()], *"\"upper_bottom\"");
-    assert_eq!(contact.gap.eval([4.0, 0.0, 0.0]), 5e-4);
-    assert_eq!(contact.gap.eval([5.5, 0.0, 0.0]), 0.0);
-    let LayerSpec::Form { form, values } = &contact.layer else { panic!("{:?}", contact.layer) };
-    assert_eq!(form.kind, LawKind::Power);
-    assert!(matches!(values[..], [Field::Constant(2.5e-5), Field::Constant(0.5)]));
-
-    assert!(matches!(scene.method.psi, Zone::Active));
-    assert_eq!(scene.method.gamma, Gamma::Stationary(0.7));
-    assert!(matches!(scene.method.start, Start::Normal(Field::Constant(1e-4))));
-    assert_eq!(
-        scene.method.stop,
-        StopRule { residual: None, increment: Some(1e-3), balanced: false, iterations: 2000 }
-    );
-    assert_eq!(scene.solver, SolverSpec { preset: None, options: vec![] });
-    assert_eq!(scene.output, OutputSpec::default());
-}
-
-#[test]
 fn defaults_and_a_scene_in_space() {
     let text = "dimension = 3\nmesh = 'groove.msh'\n[[body]]\nname='a1'\nyoung=1\npoisson=0\norder=2\nforce=['z',0,1]\n\
                 fix=[{on='s',z=0.5}]\n[solver]\npreset='hypre'\noptions='-ksp_rtol 1e-10'\n[output]\ndir='out'\nvtu=true\n";
@@ -219,19 +179,12 @@ fn inline(value: &serde_json::Value) -> String {
 }
 
 #[test]
-fn files_that_are_no_scene() {
+fn a_scene_is_utf_8() {
     let folder = tempfile::tempdir().unwrap();
-    let error = load(folder.path(), &[]).expect_err("a folder");
-    assert_eq!(error.kind(), Kind::File);
-    assert!(error.message().ends_with("is a folder, not a scene file"), "{error}");
     std::fs::write(folder.path().join("scene.toml"), b"title = \"a\"\nx = \"\xff\"\n").unwrap();
-    assert!(load(folder.path(), &[]).expect_err("a folder").advice().unwrap().contains("scene.toml"));
     let error = load(&folder.path().join("scene.toml"), &[]).expect_err("Latin-1");
     assert_eq!(error.kind(), Kind::File);
     assert!(error.message().ends_with("is not UTF-8 text, see line 2"), "{error}");
-    let error = load(&folder.path().join("other.toml"), &[]).expect_err("nothing");
-    assert_eq!(error.kind(), Kind::File);
-    assert!(error.message().starts_with("cannot read "), "{error}");
 }
 
 mod refusals;

@@ -2,6 +2,7 @@
 
 use super::plan::{ASKED, Plan, part};
 use super::table::{Row, Table};
+use crate::linalg::fit;
 use crate::output::{Axis, Color, Plot, Series, Style};
 
 /// All plots that the rows have numbers for, with their file names; those of several scenes have the scene in it.
@@ -60,9 +61,8 @@ impl Chart<'_> {
     }
 
     fn plot(&self, x: &str, y: &str, series: Vec<Series>) -> Option<Plot> {
-        let axis = |label: &str| Axis { label: label.to_owned(), log: true };
         let has_points = series.iter().any(|series| !series.points.is_empty());
-        has_points.then(|| Plot { title: self.title.to_owned(), x: axis(x), y: axis(y), series })
+        has_points.then(|| Plot { title: self.title.to_owned(), x: Axis::log(x), y: Axis::log(y), series })
     }
 
     /// Time against error: who reaches an accuracy first. The dashed line joins the runs that no other one beats in both.
@@ -145,15 +145,9 @@ fn exponent(points: &[(f64, f64)]) -> Option<f64> {
     if places.len() < SIZES {
         return None;
     }
-    let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
-    let count = logs.len() as f64;
-    let mean = logs.iter().fold((0.0, 0.0), |sum, log| (sum.0 + log.0 / count, sum.1 + log.1 / count));
-    let (mut xx, mut xy) = (0.0, 0.0);
-    for (x, y) in logs {
-        xx += (x - mean.0).powi(2);
-        xy += (x - mean.0) * (y - mean.1);
-    }
-    let slope = xy / xx;
+    let [x, y] = [|point: &(f64, f64)| point.0.ln(), |point: &(f64, f64)| point.1.ln()]
+        .map(|log| points.iter().map(log).collect::<Vec<f64>>());
+    let slope = fit(&[vec![1.0; x.len()], x], &y)[1];
     slope.is_finite().then_some(slope)
 }
 

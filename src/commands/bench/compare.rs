@@ -6,6 +6,7 @@ use crate::error::{Error, Kind, Result};
 use crate::scene::Scene;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
+use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Contact points of one pair with their weights and pressures, in the order of the file.
@@ -16,6 +17,16 @@ pub(super) struct Points {
     at: Vec<[f64; 3]>,
     weight: Vec<f64>,
     pressure: Vec<f64>,
+}
+
+/// What is read of a row of the file.
+#[derive(Deserialize)]
+struct Point {
+    x: f64,
+    y: f64,
+    z: f64,
+    weight: Option<f64>,
+    pressure: f64,
 }
 
 /// What `--against` names.
@@ -74,23 +85,16 @@ impl Points {
                 .help("it needs the columns x, y, z and pressure of a contact-*.csv")
         };
         let bytes = crate::file::read(path)?;
-        let mut file = csv::Reader::from_reader(&bytes[..]);
-        let header = file.headers().map_err(|cause| refuse(cause.to_string()))?.clone();
-        let place = |name: &str| header.iter().position(|column| column == name);
-        let columns = ["x", "y", "z", "pressure"]
-            .map(|name| place(name).ok_or_else(|| refuse(format!("there is no column `{name}`"))));
-        let [x, y, z, p] = columns;
-        let (places, weight) = ([x?, y?, z?, p?], place("weight"));
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut points = Self { name, ..Self::default() };
-        for record in file.records() {
-            let record = record.map_err(|cause| refuse(cause.to_string()))?;
-            let number = |column: usize| {
-                record[column].parse::<f64>().map_err(|_| refuse(format!("`{}` is no number", &record[column])))
-            };
-            points.at.push([number(places[0])?, number(places[1])?, number(places[2])?]);
-            points.pressure.push(number(places[3])?);
-            points.weight.push(weight.map_or(Ok(1.0), number)?);
+        for point in csv::Reader::from_reader(&bytes[..]).deserialize() {
+            let Point { x, y, z, weight, pressure } = point.map_err(|cause| refuse(cause.to_string()))?;
+            points.at.push([x, y, z]);
+            points.weight.push(weight.unwrap_or(1.0));
+            points.pressure.push(pressure);
+        }
+        if points.at.is_empty() {
+            return Err(refuse("it has no rows".to_owned()));
         }
         Ok(points)
     }

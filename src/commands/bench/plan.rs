@@ -95,28 +95,18 @@ impl Plan {
     /// All cases of a scene for some values of the keys.
     fn add(&mut self, index: usize, request: &Request, values: &[String], solvers: &[Solver]) {
         let scene = &self.scenes[index];
-        let orders: Vec<Option<usize>> = if request.orders.is_empty() {
-            vec![None]
-        } else {
-            request.orders.iter().map(|&order| Some(order)).collect()
-        };
-        let mut methods: Vec<Option<&str>> = if request.methods.is_empty() {
-            vec![None]
-        } else {
-            request.methods.iter().map(|name| Some(name.as_str())).collect()
-        };
+        let (orders, mut methods) = (choices(&request.orders), choices(&request.methods));
         if request.linear {
-            methods.insert(0, Some(LINEAR));
+            methods.insert(0, Some(LINEAR.to_owned()));
         }
-        let mut cases = Vec::new();
         for order in orders {
             let mut mesh = request.all_overrides();
             mesh.extend(self.keys.iter().zip(values).map(|(key, value)| format!("{key}={value}")));
             if let Some(order) = order {
                 mesh.extend((0..scene.bodies.len()).map(|body| format!("body.{body}.order={order}")));
             }
-            for (&method, solver) in
-                methods.iter().flat_map(|method| solvers.iter().map(move |solver| (method, solver)))
+            for (method, solver) in
+                methods.iter().flat_map(|method| solvers.iter().map(move |solver| (method.as_deref(), solver)))
             {
                 if method == Some(LINEAR) && !solver.whole {
                     continue;
@@ -140,7 +130,7 @@ impl Plan {
                         }
                         name => format!("method.name={name}"),
                     }));
-                    cases.push(Case {
+                    self.cases.push(Case {
                         scene: scene.path.clone(),
                         key,
                         parts: Vec::new(),
@@ -152,7 +142,6 @@ impl Plan {
                 }
             }
         }
-        self.cases.append(&mut cases);
     }
 
     /// The scene of a name.
@@ -180,6 +169,11 @@ impl Plan {
             }
         }
     }
+}
+
+/// What was asked for, one by one; once what the scene says if nothing was.
+fn choices<T: Clone>(asked: &[T]) -> Vec<Option<T>> {
+    if asked.is_empty() { vec![None] } else { asked.iter().cloned().map(Some).collect() }
 }
 
 /// Words for the yardstick: a solve that ends at 1e-8, unless another tolerance is typed.

@@ -6,14 +6,10 @@
 //!
 //! p(c) = 4/3 E* sqrt(R) eta int_0^c (c - s)^(3/2) f(s) ds,  p'(c) = 2 E* sqrt(R) eta int_0^c (c - s)^(1/2) f(s) ds.
 
+use super::Table;
 use super::quadrature::integral;
-use super::{LayerLaw, Response, Table};
 use crate::problem::layer::{AsperitySpec, Depths};
 use std::f64::consts::PI;
-
-/// The law, as the curve of a table with exact slopes at its points.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Asperities(Table);
 
 /// Even steps of the curve from first touch to its end. A cubic piece of length h with exact slopes is off by h^4/384 of the fourth derivative.
 /// For heights up to 4 standard deviations h is a fiftieth of one; in the tail the law grows by e in a quarter of it: (4/50)^4/384 = 1e-7.
@@ -26,30 +22,28 @@ const BEYOND: f64 = 8.5;
 /// The first point as a share of an even step: below it, where the law is a straight line, pressures are under (1e-8)^(3/2) of that of a step.
 const LEAST: f64 = 1e-8;
 
-impl Asperities {
-    /// The law for the summits of a scene.
-    pub fn new(spec: &AsperitySpec) -> Self {
-        let end = match &spec.depths {
-            Depths::Normal { highest, .. } => 2.0 * highest,
-            Depths::Measured(depths) => depths.last().copied().unwrap_or_default(),
-        };
-        // a single summit, or many of one height
-        let end = if end > 0.0 { end } else { spec.radius };
-        let step = end / STEPS;
-        // where all summits touch the law is smooth again, up to where they are flat
-        let next = |c: &f64| match *c {
-            c if c < end => Some(c + step.min(SHARE * c)),
-            c if c < spec.radius => Some(c * (1.0 + SHARE)),
-            _ => None,
-        };
-        let places = std::iter::successors(Some(LEAST * step), next);
-        let stiffness = spec.modulus * spec.radius.sqrt() * spec.density;
-        let point = |c: f64| {
-            let [of_p, of_slope] = moments(&spec.depths, c);
-            [c, 4.0 / 3.0 * stiffness * of_p, 2.0 * stiffness * of_slope]
-        };
-        Self(Table::with_slopes(places.map(point)))
-    }
+/// The law for the summits of a scene, as the curve of a table with exact slopes at its points.
+pub fn asperities(spec: &AsperitySpec) -> Table {
+    let end = match &spec.depths {
+        Depths::Normal { highest, .. } => 2.0 * highest,
+        Depths::Measured(depths) => depths.last().copied().unwrap_or_default(),
+    };
+    // a single summit, or many of one height
+    let end = if end > 0.0 { end } else { spec.radius };
+    let step = end / STEPS;
+    // where all summits touch the law is smooth again, up to where they are flat
+    let next = |c: &f64| match *c {
+        c if c < end => Some(c + step.min(SHARE * c)),
+        c if c < spec.radius => Some(c * (1.0 + SHARE)),
+        _ => None,
+    };
+    let places = std::iter::successors(Some(LEAST * step), next);
+    let stiffness = spec.modulus * spec.radius.sqrt() * spec.density;
+    let point = |c: f64| {
+        let [of_p, of_slope] = moments(&spec.depths, c);
+        [c, 4.0 / 3.0 * stiffness * of_p, 2.0 * stiffness * of_slope]
+    };
+    Table::with_slopes(places.map(point))
 }
 
 /// int_0^c (c - s)^power f(s) ds for the powers 3/2 and 1/2.
@@ -73,23 +67,10 @@ fn moments(depths: &Depths, c: f64) -> [f64; 2] {
     }
 }
 
-impl LayerLaw for Asperities {
-    fn compressed(&self, point: usize, c: f64) -> Response {
-        self.0.compressed(point, c)
-    }
-
-    fn meet_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
-        self.0.meet_loaded(point, s, rho)
-    }
-
-    fn compression_loaded(&self, point: usize, pressure: f64) -> f64 {
-        self.0.compression_loaded(point, pressure)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::law::{LayerLaw, Response};
     use std::sync::Arc;
 
     fn spec(depths: Depths) -> AsperitySpec {
@@ -100,7 +81,7 @@ mod tests {
     #[test]
     fn the_curve_is_the_sum_over_summits() {
         let (deviation, highest, many) = (1e-4, 4e-4, 400_000);
-        let law = Asperities::new(&spec(Depths::Normal { deviation, highest }));
+        let law = asperities(&spec(Depths::Normal { deviation, highest }));
         // heights at equal steps of probability, by the trapezoidal rule for the distribution function
         let (mut depths, mut share, mut z) = (Vec::new(), 0.0, -highest);
         let h = 1e-4 * deviation;
@@ -126,7 +107,7 @@ mod tests {
     #[test]
     fn the_curve_is_the_integral_between_its_points() {
         let depths = Depths::Normal { deviation: 1e-4, highest: 4e-4 };
-        let law = Asperities::new(&spec(depths.clone()));
+        let law = asperities(&spec(depths.clone()));
         let stiffness = 4.0 / 3.0 * 1e5 * 0.02_f64.sqrt() * 300.0;
         for k in 0..70 {
             let c = 9e-3 * 10_f64.powf(-0.117 * f64::from(k));
@@ -139,7 +120,7 @@ mod tests {
     /// One summit is Hertz' contact; it needs no distribution.
     #[test]
     fn one_summit_is_hertz() {
-        let law = Asperities::new(&spec(Depths::Measured(Arc::new([0.0]))));
+        let law = asperities(&spec(Depths::Measured(Arc::new([0.0]))));
         for c in [1e-7_f64, 3.3e-6, 1.7e-4, 5e-3] {
             let exact = 4.0 / 3.0 * 1e5 * 0.02_f64.sqrt() * 300.0 * c.powf(1.5);
             let found = law.response(0, c).pressure;

@@ -1,7 +1,8 @@
 //! The law that a scene asks for, at the points of a pair.
 
+use super::asperities::asperities;
 use super::own::{self, OwnLaws};
-use super::{Asperities, Cubic, Exponential, LayerLaw, Linear, PerPoint, Power, Table, Typed};
+use super::{Cubic, Exponential, LayerLaw, Linear, PerPoint, Power, Table, Typed};
 use crate::error::{Error, Kind, Result, shown};
 use crate::expression::Field;
 use crate::problem::layer::{LawForm, LawKind, LayerSpec};
@@ -21,7 +22,7 @@ pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<R
             LawKind::Exponential => formed(form, values, position, |v| Exponential::new(v[0], v[1])),
             LawKind::Cubic => formed(form, values, position, |v| Cubic { k1: v[0], k3: v[1] }),
         },
-        LayerSpec::Asperities(spec) => Ok(Rc::new(Asperities::new(spec))),
+        LayerSpec::Asperities(spec) => Ok(Rc::new(asperities(spec))),
         LayerSpec::Own(name) => own::make(laws, name, position, extent(position)),
         LayerSpec::Table(points) => Ok(Rc::new(Table::new(points))),
         LayerSpec::Pressure { law, up_to } => {

@@ -26,7 +26,6 @@ mod table;
 mod tests;
 mod typed;
 
-pub use asperities::Asperities;
 pub use cubic::Cubic;
 pub use exponential::Exponential;
 pub use linear::Linear;

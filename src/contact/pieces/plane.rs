@@ -3,6 +3,7 @@
 use super::{Common, ON_FACET, Reach, Refused, SNAP, Search, Shared};
 use crate::contact::side::{Side, length, unit};
 use crate::fem::{element, quadrature};
+use crate::linalg::dot;
 use crate::problem::order::Order;
 
 /// The common pieces of two plane curves.
@@ -160,7 +161,7 @@ struct Piece {
 
 impl Piece {
     fn between(a: &Curve, b: Curve, index: usize) -> Option<Self> {
-        if dot(a.direction, b.direction) >= 0.0 {
+        if dot(&a.direction, &b.direction) >= 0.0 {
             return None;
         }
         // between these places the normals of a either all meet b or all miss it; the foot of an end that lies behind the
@@ -180,10 +181,6 @@ impl Piece {
         let gap = meets(range.0, range.1)?;
         Some(Self { range, index, other: b, gap })
     }
-}
-
-fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
 }
 
 #[cfg(test)]

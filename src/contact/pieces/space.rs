@@ -9,7 +9,8 @@ use super::polygon::{self, Polygon};
 use super::{Common, Reach, Refused, SNAP, Search, Shared};
 use crate::contact::side::{Side, length, unit};
 use crate::fem::space::area_vector;
-use crate::fem::{assemble, element, quadrature};
+use crate::fem::{assemble, cross, element, quadrature};
+use crate::linalg::dot;
 use crate::problem::order::Order;
 
 /// Pieces smaller than this share of a facet are rounding.
@@ -28,7 +29,7 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
     let search = Search::new(b);
     let facets_b: Vec<Facet> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
-    let rule = quadrature::simplex::<3>(if quadratic { 5 } else { 2 });
+    let rule = quadrature::simplex(3, if quadratic { 5 } else { 2 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
@@ -49,7 +50,7 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
             for part in &free {
                 for triangle in polygon::fan(part) {
                     let share = 2.0 * polygon::area(&triangle);
-                    for (l, weight) in rule.points.iter().zip(&rule.weights) {
+                    for (l, weight) in rule.iter() {
                         let [u, v] = [0, 1].map(|c| (0..3).map(|k| l[k] * triangle[k][c]).sum());
                         let at_a = [1.0 - u - v, u, v];
                         let normal = facet.normal(u, v);
@@ -115,7 +116,7 @@ impl Facet {
     /// Where the line x + t n meets the surface: barycentric coordinates and t. `None` if it does not.
     fn hit(&self, x: [f64; 3], n: [f64; 3]) -> Option<([f64; 3], f64)> {
         let middle = self.at(1.0 / 3.0, 1.0 / 3.0);
-        let [u, v, t] = newton(dot(minus(middle, x), n) / dot(n, n), |[u, v, t]| {
+        let [u, v, t] = newton(dot(&minus(middle, x), &n) / dot(&n, &n), |[u, v, t]| {
             let here = self.at(u, v);
             let [along_u, along_v] = self.tangents(u, v);
             let miss = std::array::from_fn(|c| here[c] - x[c] - t * n[c]);
@@ -131,7 +132,7 @@ impl Facet {
         let turns = [minus(m, n), minus(o, n)];
         let third = 1.0 / 3.0;
         let (middle, normal) = (self.at(third, third), self.normal(third, third));
-        let [u, v, _] = newton(dot(minus(x, middle), normal) / dot(normal, normal), |[u, v, t]| {
+        let [u, v, _] = newton(dot(&minus(x, middle), &normal) / dot(&normal, &normal), |[u, v, t]| {
             let (here, n, tangents) = (self.at(u, v), self.normal(u, v), self.tangents(u, v));
             let column = |k: usize| std::array::from_fn(|c| tangents[k][c] + t * turns[k][c]);
             (std::array::from_fn(|c| here[c] + t * n[c] - x[c]), [column(0), column(1), n])
@@ -147,8 +148,8 @@ fn newton(t: f64, system: impl Fn([f64; 3]) -> ([f64; 3], [[f64; 3]; 3])) -> Opt
     let mut last = f64::INFINITY;
     for _ in 0..30 {
         let (value, [p, q, r]) = system(at);
-        let det = dot(cross(p, q), r);
-        let step = [dot(cross(q, r), value), dot(cross(r, p), value), dot(cross(p, q), value)].map(|d| d / det);
+        let det = dot(&cross(p, q), &r);
+        let step = [cross(q, r), cross(r, p), cross(p, q)].map(|column| dot(&column, &value) / det);
         at = minus(at, step);
         let moved = step[0].abs().max(step[1].abs());
         if !moved.is_finite() || !at[2].is_finite() || at[0].abs().max(at[1].abs()) > 1e3 {
@@ -163,16 +164,8 @@ fn newton(t: f64, system: impl Fn([f64; 3]) -> ([f64; 3], [[f64; 3]; 3])) -> Opt
     None
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|c| a[c] * b[c]).sum()
-}
-
 fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| a[c] - b[c])
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Part of a facet of side a that faces (a part of) one facet of side b.
@@ -184,7 +177,7 @@ struct Piece {
 
 impl Piece {
     fn between(a: &Facet, b: &Facet, index: usize) -> Vec<Self> {
-        if dot(a.direction, b.direction) >= 0.0 {
+        if dot(&a.direction, &b.direction) >= 0.0 {
             return Vec::new();
         }
         let flat = |n: &[f64; 3]| length(minus(*n, a.normals[0])) < SNAP;

@@ -13,7 +13,7 @@ pub(super) enum Bubble {
 
 impl Bubble {
     /// Value at a barycentric point.
-    pub fn value<const N: usize>(self, l: &[f64; N]) -> f64 {
+    pub fn value(self, l: &[f64]) -> f64 {
         match self {
             Self::Edge(i, j) => l[i] * l[j],
             Self::OddEdge(i, j) => l[i] * l[j] * (l[i] - l[j]),
@@ -21,9 +21,9 @@ impl Bubble {
         }
     }
 
-    /// Derivatives with respect to the barycentric coordinates.
-    pub fn slopes<const N: usize>(self, l: &[f64; N]) -> [f64; N] {
-        let mut d = [0.0; N];
+    /// Derivatives with respect to the barycentric coordinates, of which there are at most four.
+    pub fn slopes(self, l: &[f64]) -> [f64; 4] {
+        let mut d = [0.0; 4];
         match self {
             Self::Edge(i, j) => (d[i], d[j]) = (l[j], l[i]),
             Self::OddEdge(i, j) => {

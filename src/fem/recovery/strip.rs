@@ -23,12 +23,15 @@ const EXPLAINED: f64 = 0.9;
 /// Straight facets with what the boundary rises over their edges, in the order of [`EDGES`]: positive outwards.
 struct Strip<const D: usize> {
     facets: Facets<D>,
+    /// The cell that each facet bounds.
+    cells: Vec<usize>,
     rise: Vec<Vector3<f64>>,
 }
 
 impl<const D: usize> Strip<D> {
     fn of(space: &Space<D>) -> Self {
-        let all = space.boundary();
+        let places: Vec<(usize, usize)> = space.lone_facets().collect();
+        let all = space.facets_of(places.iter().copied());
         let straight = |i: &usize| assemble::is_straight(&all.coordinates(*i, space), D);
         // quadratic facets have the boundary of the mesh: where one is curved, the straight ones are so
         let is_known = space.order == Order::P2 && !(0..all.count()).all(|i| straight(&i));
@@ -37,7 +40,8 @@ impl<const D: usize> Strip<D> {
         let rises: Vec<_> =
             (0..all.count()).map(|i| if is_known || inside(i) { None } else { around.rise(i) }).collect();
         let keep: Vec<bool> = rises.iter().map(Option::is_some).collect();
-        Self { facets: all.only(&keep), rise: rises.into_iter().flatten().collect() }
+        let cells = places.iter().zip(&keep).filter(|(_, is_kept)| **is_kept).map(|((cell, _), _)| *cell).collect();
+        Self { facets: all.only(&keep), cells, rise: rises.into_iter().flatten().collect() }
     }
 
     fn is_empty(&self) -> bool {
@@ -155,20 +159,19 @@ impl<const D: usize> Recovery<'_, D> {
         if strip.is_empty() {
             return;
         }
-        let cells = self.cells_behind(&strip.facets);
-        let (rule, order) = (quadrature::simplex::<D>(5), self.space.order);
+        let (rule, order) = (quadrature::simplex(D, 5), self.space.order);
         let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
         for (i, rise) in strip.rise.iter().enumerate() {
             let (nodes, x) = (strip.facets.facet(i), strip.facets.coordinates(i, self.space));
             let area = area_vector(Order::P1, &x[..D], &[1.0 / D as f64; D]);
             let size = dot(&area, &area).sqrt();
             let (normal, dual) = (area.map(|a| a / size), dual(&x));
-            for (l, weight) in rule.points.iter().zip(&rule.weights) {
+            for (l, weight) in rule.iter() {
                 let (phi, slopes) = (element::values(order, l), element::derivatives(order, l));
                 let at = assemble::interpolate(&x, &phi);
                 let mut slope = super::Slope::ZERO;
                 l.iter().zip(nodes).for_each(|(l, &node)| slope.add(*l, &self.recovered(node, &at)));
-                let stress = law(cells[i], at, &slope.strain());
+                let stress = law(strip.cells[i], at, &slope.strain());
                 let of = |c: usize, j: usize| stress[place[c][j]];
                 let pressing: f64 = (0..D).map(|c| (0..D).map(|j| normal[c] * of(c, j) * normal[j]).sum::<f64>()).sum();
                 let weight = weight * size * self.space.circle(&at) * rise.dot(&products(l));
@@ -184,35 +187,11 @@ impl<const D: usize> Recovery<'_, D> {
             }
         }
     }
-
-    /// The cell that each facet bounds.
-    fn cells_behind(&self, facets: &Facets<D>) -> Vec<usize> {
-        let mut outer = vec![false; self.space.nodes.len()];
-        let key = |nodes: &[u32]| {
-            let mut key: [u32; D] = std::array::from_fn(|k| nodes[k]);
-            key.sort_unstable();
-            key
-        };
-        let wanted: HashMap<[u32; D], usize> = (0..facets.count()).map(|i| (key(facets.facet(i)), i)).collect();
-        facets.nodes.iter().for_each(|&node| outer[node as usize] = true);
-        let mut behind = vec![0; facets.count()];
-        for index in 0..self.space.cell_count() {
-            let corners = &self.cell(index)[..=D];
-            if corners.iter().filter(|&&node| outer[node as usize]).count() < D {
-                continue;
-            }
-            for opposite in 0..=D {
-                let face: [u32; D] = std::array::from_fn(|k| corners[if k < opposite { k } else { k + 1 }]);
-                wanted.get(&key(&face)).into_iter().for_each(|&i| behind[i] = index);
-            }
-        }
-        behind
-    }
 }
 
 /// l_i l_j of the edges of a facet.
-fn products<const D: usize>(l: &[f64; D]) -> Vector3<f64> {
-    let edges = D * (D - 1) / 2;
+fn products(l: &[f64]) -> Vector3<f64> {
+    let edges = l.len() * (l.len() - 1) / 2;
     Vector3::from_fn(|k, _| if k < edges { l[EDGES[k].0] * l[EDGES[k].1] } else { 0.0 })
 }
 

@@ -148,18 +148,24 @@ const CASES: &[Case] = &[
     ("n = 32", "\"n m\" = 32", "\"n m\"", "`n m` is no name of a Gmsh number", ""),
 ];
 
+/// Asserts that a scene with these overrides is refused with a caret under `marked` and these words; returns what is shown.
+fn refused(text: &str, overrides: &[&str], change: &str, [marked, message, help]: [&str; 3]) -> String {
+    let error = load_text(text, overrides).expect_err(change);
+    assert_eq!(error.kind(), Kind::Scene);
+    assert!(error.message().contains(message), "{change}: not {message:?} in\n{error}");
+    assert!(error.advice().unwrap_or_default().contains(help), "{change}: not {help:?} in\n{error}");
+    if !marked.is_empty() {
+        assert_eq!(caret(&error), marked, "{change}:\n{error}");
+    }
+    error.render(false)
+}
+
 #[test]
 fn refusals_point_at_the_word() {
-    for (from, to, marked, message, help) in CASES {
+    for &(from, to, marked, message, help) in CASES {
         assert!(GROOVE.contains(from), "{from}");
-        let error = load_text(&GROOVE.replacen(from, to, 1), &[]).expect_err(to);
-        assert_eq!(error.kind(), Kind::Scene);
-        assert!(error.message().contains(message), "{from} -> {to}: not {message:?} in\n{error}");
-        assert!(error.advice().unwrap_or_default().contains(help), "{from} -> {to}: not {help:?} in\n{error}");
-        if !marked.is_empty() {
-            assert_eq!(&caret(&error), marked, "{from} -> {to}:\n{error}");
-        }
-        assert!(error.render(false).contains("scene.toml:"), "{error}");
+        let shown = refused(&GROOVE.replacen(from, to, 1), &[], &format!("{from} -> {to}"), [marked, message, help]);
+        assert!(shown.contains("scene.toml:"), "{shown}");
     }
 }
 
@@ -202,15 +208,8 @@ fn refusals_of_overrides_point_into_them() {
         ("title.main=x", "main", "expected a string, found a table", ""),
     ];
     for (text, marked, message, help) in cases {
-        let error = load_text(GROOVE, &[text]).expect_err(text);
-        assert_eq!(error.kind(), Kind::Scene);
-        assert!(error.message().contains(message), "{text}: not {message:?} in\n{error}");
-        assert!(error.advice().unwrap_or_default().contains(help), "{text}: not {help:?} in\n{error}");
-        if !marked.is_empty() {
-            assert_eq!(caret(&error), marked, "{text}:\n{error}");
-        }
-        let shown = error.render(false);
-        assert!(shown.contains(format!("1 | --set {text}").trim_end()) && !shown.contains("-->"), "{error}");
+        let shown = refused(GROOVE, &[text], text, [marked, message, help]);
+        assert!(shown.contains(format!("1 | --set {text}").trim_end()) && !shown.contains("-->"), "{shown}");
     }
     let error = load_text(GROOVE, &["gamma"]).expect_err("no =");
     assert_eq!(error.kind(), Kind::Usage);
@@ -226,10 +225,8 @@ fn refusals_of_short_options_point_into_what_was_typed() {
         ("--method newtn", "newtn", "unknown method `newtn`"),
         ("--over method.gamma=-1", "-1", "gamma is -1"),
     ] {
-        let error = load_text(GROOVE, &[text]).expect_err(text);
-        assert!(error.message().contains(message), "{text}: {error}");
-        assert_eq!(caret(&error), marked, "{text}:\n{error}");
-        assert!(error.render(false).contains(&format!("1 | {}", text.trim_end())), "{error}");
+        let shown = refused(GROOVE, &[text], text, [marked, message, ""]);
+        assert!(shown.contains(&format!("1 | {}", text.trim_end())), "{shown}");
     }
 }
 

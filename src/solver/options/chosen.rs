@@ -2,7 +2,7 @@
 
 use super::looks;
 use crate::error::Result;
-use crate::petsc::{FAMILIES, Session};
+use crate::petsc::{Session, is_of_family};
 use std::collections::BTreeMap;
 
 /// Why a solver has an option.
@@ -115,7 +115,7 @@ impl Chosen {
     /// ```
     pub fn asks_for_ksp(&self) -> bool {
         self.choices.values().filter(|choice| choice.origin != Origin::Default).any(|Choice { name, .. }| {
-            FAMILIES.iter().any(|family| name.starts_with(family))
+            is_of_family(name)
                 && !looks(name)
                 && !["mat_mumps_icntl_", "mat_mumps_cntl_"].iter().any(|control| name.starts_with(control))
         })

@@ -4,15 +4,8 @@
 const WORDS: [&str; 6] = ["view", "monitor", "print", "printstat", "statprint", "log"];
 
 /// Names, or their ends, of options that print without such a word.
-const NAMES: [&str; 7] = [
-    "ksp_converged_reason",
-    "ksp_converged_rate",
-    "ksp_compute_singularvalues",
-    "ksp_compute_eigenvalues",
-    "ksp_compute_eigenvalues_explicitly",
-    "ksp_final_residual",
-    "mat_umfpack_prl",
-];
+const NAMES: &str = "ksp_converged_reason ksp_converged_rate ksp_compute_singularvalues ksp_compute_eigenvalues \
+    ksp_compute_eigenvalues_explicitly ksp_final_residual mat_umfpack_prl";
 
 /// Whether an option of an object, named without dash and prefix of a body, prints or draws and does not change what is computed.
 ///
@@ -27,5 +20,7 @@ const NAMES: [&str; 7] = [
 /// ```
 pub fn looks(name: &str) -> bool {
     name.split('_').any(|word| WORDS.contains(&word))
-        || NAMES.iter().any(|known| name.strip_suffix(known).is_some_and(|nest| nest.is_empty() || nest.ends_with('_')))
+        || NAMES
+            .split_whitespace()
+            .any(|known| name.strip_suffix(known).is_some_and(|nest| nest.is_empty() || nest.ends_with('_')))
 }

@@ -23,18 +23,8 @@ const PRECONDITIONERS: &str = "none jacobi pbjacobi vpbjacobi sor eisenstat ilu 
     lu:factor_mat_solver_type=umfpack cholesky:factor_mat_solver_type=cholmod lu:factor_mat_solver_type=klu";
 
 /// Options that objects read without telling so in their help.
-const SILENT: [&str; 10] = [
-    "mat_type",
-    "mat_view",
-    "mat_no_inode",
-    "mat_inode_limit",
-    "mat_product_algorithm",
-    "matmatmult_via",
-    "matptap_via",
-    "vec_type",
-    "vec_view",
-    "ksp_converged_reason",
-];
+const SILENT: &str = "mat_type mat_view mat_no_inode mat_inode_limit mat_product_algorithm matmatmult_via matptap_via vec_type \
+    vec_view ksp_converged_reason";
 
 /// The option names of solvers.
 pub(super) struct Names {
@@ -47,7 +37,7 @@ impl Names {
     /// prefix: their types are tried first, as they are combined there.
     pub(super) fn collect(session: &Session, in_use: &[Vec<Entry>]) -> Result<Names> {
         let matrix = tiny(session)?;
-        let mut names: BTreeSet<String> = SILENT.map(String::from).into();
+        let mut names: BTreeSet<String> = SILENT.split_whitespace().map(String::from).collect();
         let mut combinations: Vec<Vec<Entry>> = in_use.iter().map(|options| types_of(options)).collect();
         combinations.dedup();
         let entry = |name: &str, value: &str| (name.to_owned(), Some(value.to_owned()));

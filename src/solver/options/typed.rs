@@ -2,7 +2,7 @@
 
 use super::{Chosen, looks};
 use crate::error::Result;
-use crate::petsc::{Entry, FAMILIES, Session};
+use crate::petsc::{Entry, Session, is_of_family};
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
@@ -35,10 +35,6 @@ impl<'a> Prefixes<'a> {
     pub(super) fn is_plain(&self, name: &str) -> bool {
         self.split(name).is_none() && is_of_family(name.trim_start_matches('-'))
     }
-}
-
-fn is_of_family(bare: &str) -> bool {
-    FAMILIES.iter().any(|family| bare.starts_with(family))
 }
 
 /// Sets an option that stands in the scene, unless the command line says something else: that option, or the plain one for
