@@ -121,8 +121,6 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     let case = wide::scene(132118, 113, Path::new(env!("CARGO_MANIFEST_DIR")));
     let answer = &bench.solve(case, &["auto"]).0[0].1;
     assert!(answer.status == "roundoff-limited" && answer.iterations <= 10, "{} {}", answer.iterations, answer.message);
-    // the law at the rounded compression is 4e-8 off, at one with the same digits it is not
-    assert_eq!(bench.run(443092, 1219, &["auto"]).0[0].1.status, "converged");
     // the residual is met, but a body is not in balance yet: that is neither converged nor rounding
     let answer = &bench.run(1, 123, &["0.6"]).0[0].1;
     assert_eq!(answer.status, "iteration-limit");
