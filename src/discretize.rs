@@ -3,7 +3,6 @@
 mod approach;
 mod auto;
 mod balance;
-mod bisect;
 mod carried;
 mod cells;
 mod distribute;
@@ -56,7 +55,7 @@ pub use post::Post;
 use std::cell::OnceCell;
 use std::rc::Rc;
 pub use surface::ContactSurface;
-pub use verify::{Findings, Verified, verify};
+pub use verify::{Verified, verify};
 
 /// What is known of a body besides its matrices.
 pub struct BodyInfo {
@@ -157,9 +156,9 @@ pub fn discretize<const D: usize>(
     exchange: Rc<dyn Exchange>,
     factory: &mut dyn Factory,
 ) -> Result<Discrete> {
-    let Verified { mesh, checked, .. } = verified;
-    let rank = exchange.rank();
-    let (mut parts, whole) = parts(scene, verified, bodies, &*exchange)?;
+    let Verified { portion, checked, .. } = verified;
+    let (mesh, rank, alone) = (&portion.mesh, exchange.rank(), exchange.ranks() == 1);
+    let (mut parts, stocks) = parts(scene, verified, bodies, &*exchange)?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
     for found in pairs::all(scene, mesh, cut, &parts, keep)? {
@@ -177,9 +176,12 @@ pub fn discretize<const D: usize>(
     let supported: Vec<Supported> =
         parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
     let graphs: Vec<OnceCell<NodeGraph>> = parts.iter().map(|_| OnceCell::new()).collect();
-    let lazy = parts.iter().zip(&drafts).zip(&graphs);
-    let lazy: Vec<_> =
-        lazy.map(|((part, draft), graph)| move || graph.get_or_init(|| part.graph(&draft.rows))).collect();
+    let lazy = parts.iter().zip(&drafts).zip(&stocks).zip(&graphs);
+    let others = &*exchange;
+    let lazy = lazy.map(|(((part, draft), stock), graph)| {
+        move || graph.get_or_init(|| cells::graph(part, stock, &draft.rows, others))
+    });
+    let lazy: Vec<_> = lazy.collect();
     let motions = parts.iter().zip(&drafts);
     let motions: Vec<_> =
         motions.map(|(part, draft)| move |k: usize, dof: usize| part.dof_of(&draft.free[k], dof)).collect();
@@ -197,7 +199,7 @@ pub fn discretize<const D: usize>(
     factory.plan(&outlines.collect::<Vec<_>>())?;
     let deal = |bodies: Vec<usize>| {
         let nodes: Vec<[f64; D]> = bodies.iter().flat_map(|&body| &parts[body].space.nodes).copied().collect();
-        Deal { bodies, owner: bisect::parts(&nodes, exchange.ranks()) }
+        Deal { bodies, owner: crate::mesh::bisect::<D, D>(&nodes, exchange.ranks()) }
     };
     let deals: Vec<Deal> = factory.dealt_out().into_iter().map(deal).collect();
     let coarse = |body: usize| match factory.wants_interpolation(&parts[body].spec.name.value) {
@@ -212,7 +214,7 @@ pub fn discretize<const D: usize>(
         .zip(&mut owner)
         .for_each(|(dealt, owner)| *owner = dealt.as_ref().map_or(*owner, |dealt| dealt.leader));
     let needs = if keep { Needs::everywhere(parts.len()) } else { Needs::of(&owner, &drafts, &deals) };
-    let elasticities = cells::deal(&mut parts, whole, &needs, scene.plane, &*exchange)?;
+    let elasticities = cells::deal(&mut parts, stocks, &needs, scene.plane, &*exchange)?;
     drop(needs);
     drop(deals);
     let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt);
@@ -261,7 +263,7 @@ pub fn discretize<const D: usize>(
             assemblies_avoided += 1;
         } else if is_owner || dealt.is_some() {
             let left = free(&part, &left, &prescribed, &load);
-            let mut graph = graph.into_inner().unwrap_or_else(|| part.graph(&rows));
+            let mut graph = graph.into_inner().filter(|_| alone).unwrap_or_else(|| part.graph(&part.space, &rows));
             if let Some(dealt) = &dealt {
                 graph = graph.of(|node| dealt.is_own::<D>(node));
             }
@@ -299,7 +301,7 @@ pub fn discretize<const D: usize>(
             let is_own = |node| owns.as_ref().is_none_or(|owns| owns[held.frame.node(node) as usize]);
             let local = Rc::new(Local::new(space.clone(), cells, is_own));
             points = match &owns {
-                None => part.known.points,
+                None => part.known.points.to_vec(),
                 Some(_) => {
                     let (_, shown) = local.space.part(local.told());
                     shown.iter().map(|&node| part.known.points[local.nodes[node as usize] as usize]).collect()
@@ -321,7 +323,7 @@ pub fn discretize<const D: usize>(
             nodes,
             points,
             cells,
-            facets: checked[index].counted(),
+            facets: checked[index].clone(),
             dofs: D * nodes,
             supported: held.supported(),
             left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),

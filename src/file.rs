@@ -3,18 +3,29 @@
 use crate::error::{Error, Kind, Result};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::Read;
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
-/// All bytes of a regular file. Devices and pipes may have no end, or keep a reader waiting for ever.
+/// All bytes of a regular file.
+///
+/// # Errors
+/// Those of [`open`].
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    let (mut file, mut bytes) = (open(path)?, Vec::new());
+    file.read_to_end(&mut bytes).map_err(|cause| Error::file(path, "read", &cause)).map(|_| bytes)
+}
+
+/// Opens a regular file. Devices and pipes may have no end, or keep a reader waiting for ever.
 ///
 /// # Errors
 /// [`Kind::File`]: it is none, or cannot be read.
-pub fn read(path: &Path) -> Result<Vec<u8>> {
+pub fn open(path: &Path) -> Result<File> {
     let failed = |cause| Error::file(path, "read", &cause);
     let kind = std::fs::metadata(path).map_err(failed)?.file_type();
     let odd = match () {
-        _ if kind.is_file() => return std::fs::read(path).map_err(failed),
+        _ if kind.is_file() => return File::open(path).map_err(failed),
         _ if kind.is_dir() => "a folder",
         _ if kind.is_fifo() => "a pipe",
         _ if kind.is_socket() => "a socket",

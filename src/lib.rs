@@ -23,6 +23,7 @@ pub mod ddm;
 pub mod discretize;
 pub mod error;
 pub mod estimate;
+pub mod exchange;
 pub mod expression;
 pub mod fem;
 pub mod file;

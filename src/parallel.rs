@@ -1,12 +1,12 @@
 //! Which rank owns which body, and what ranks tell each other, over the `mpi` crate.
 
-use crate::error::{Error, Kind, Result};
-use crate::model::Exchange;
+use crate::error::{Error, Result};
+use crate::exchange::Exchange;
+pub use crate::exchange::{share, tell};
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
+use mpi::point_to_point::send_receive_into;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use std::cell::Cell;
 
 /// The ranks of a run.
@@ -65,22 +65,45 @@ impl Exchange for Ranks {
         self.from(0, mine)
     }
 
-    fn deal(&self, of_rank: &mut dyn FnMut(usize) -> Vec<u8>) -> Vec<u8> {
-        let world = self.session.world();
-        if self.session.rank() == 0 {
-            for rank in 1..self.session.size() {
-                let (bytes, other) = (of_rank(rank), world.process_at_rank(rank as i32));
-                other.send(&(bytes.len() as u64));
-                bytes.chunks(CHUNK).for_each(|chunk| other.send(chunk));
+    fn trade(&self, mut mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
+        let (world, rank, ranks) = (self.session.world(), self.session.rank(), self.session.size());
+        self.messages.set(self.messages.get() + 1);
+        let lengths: Vec<u64> = mine.iter().map(|bytes| bytes.len() as u64).collect();
+        let mut theirs = vec![0_u64; ranks];
+        world.all_to_all_into(&lengths[..], &mut theirs[..]);
+        // rounds are the same for all, however long the messages of each
+        let (mine_most, mut most) = (lengths.iter().copied().max().unwrap_or(0), 0u64);
+        world.all_reduce_into(&mine_most, &mut most, SystemOperation::max());
+        let mut all = vec![Vec::new(); ranks];
+        all[rank] = std::mem::take(&mut mine[rank]);
+        for step in 1..ranks {
+            let [to, from] = [(rank + step) % ranks, (rank + ranks - step) % ranks];
+            let (sent, mut got) = (std::mem::take(&mut mine[to]), vec![0; theirs[from] as usize]);
+            let ends = [to, from].map(|rank| world.process_at_rank(rank as i32));
+            // a message of several chunks meets one of others, or empty ones
+            for chunk in 0..(most as usize).div_ceil(CHUNK) {
+                let part = |length: usize| (chunk * CHUNK).min(length)..((chunk + 1) * CHUNK).min(length);
+                let part_of_got = part(got.len());
+                send_receive_into(&sent[part(sent.len())], &ends[0], &mut got[part_of_got], &ends[1]);
             }
-            return of_rank(0);
+            all[from] = got;
         }
-        let root = world.process_at_rank(0);
-        let (length, _) = root.receive::<u64>();
+        all
+    }
+
+    fn send(&self, to: usize, bytes: &[u8]) {
+        let to = self.session.world().process_at_rank(to as i32);
+        to.send(&(bytes.len() as u64));
+        bytes.chunks(CHUNK).for_each(|chunk| to.send(chunk));
+    }
+
+    fn receive(&self, from: usize) -> Vec<u8> {
+        let from = self.session.world().process_at_rank(from as i32);
+        let (length, _) = from.receive::<u64>();
         let mut bytes = vec![0; length as usize];
-        for chunk in bytes.chunks_mut(CHUNK) {
-            root.receive_into(chunk);
-        }
+        bytes.chunks_mut(CHUNK).for_each(|chunk| {
+            from.receive_into(chunk);
+        });
         bytes
     }
 
@@ -91,45 +114,6 @@ impl Exchange for Ranks {
 
 /// Bytes of one message: MPI counts them by 31 bits.
 const CHUNK: usize = 1 << 30;
-
-/// What each rank knows, in their order; collective.
-pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: &T) -> Vec<T> {
-    exchange.share(pack(mine)).iter().filter_map(|bytes| unpack(bytes).ok()).collect()
-}
-
-/// What the first rank has found; `mine` is there alone, and is asked for nowhere else. Collective.
-///
-/// # Errors
-/// That of the first rank, there; elsewhere one of the same kind without words.
-pub fn tell<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: impl FnOnce() -> Result<T>) -> Result<T> {
-    if exchange.rank() == 0 {
-        let found = mine();
-        if exchange.ranks() > 1 {
-            exchange.tell(pack(&found.as_ref().map_err(|error| error.kind().exit_code())));
-        }
-        return found;
-    }
-    unpack::<Result<T, i32>>(&exchange.tell(Vec::new()))?.map_err(Error::silent)
-}
-
-/// What the first rank makes for each rank; `of_rank` is called there alone. Collective.
-///
-/// # Errors
-/// A message that cannot be read.
-pub fn deal<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, of_rank: impl Fn(usize) -> T) -> Result<T> {
-    unpack(&exchange.deal(&mut |rank| pack(&of_rank(rank))))
-}
-
-/// Plain data as bytes, numbers with all their digits.
-fn pack<T: Serialize>(value: &T) -> Vec<u8> {
-    postcard::to_allocvec(value).unwrap_or_default()
-}
-
-fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T> {
-    postcard::from_bytes(bytes).map_err(|cause| {
-        Error::new(Kind::Solver, "a message of another rank cannot be read").because(cause.to_string())
-    })
-}
 
 /// Owner of each body: whole bodies, largest first, each to the rank with the least load so far.
 pub fn owners(loads: &[usize], ranks: usize) -> Vec<usize> {
@@ -155,7 +139,9 @@ pub fn agree<T>(session: &Session, result: Result<T>) -> Result<T> {
         return result;
     }
     let silent = i32::MAX;
-    let mine = if result.is_err() { session.rank() as i32 } else { silent };
+    // who has no words has them from another one
+    let has_words = result.as_ref().is_err_and(|error| !error.is_silent());
+    let mine = if has_words { session.rank() as i32 } else { silent };
     let mut first = silent;
     session.world().all_reduce_into(&mine, &mut first, SystemOperation::min());
     if first == silent {

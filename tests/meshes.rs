@@ -2,12 +2,13 @@
 
 mod common;
 
-use common::{Run, Scene, output, root, solve, text_of};
+use common::{Run, Scene, output, root, solve, solve_on, text_of};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use winkler::mesh::{Asked, Duty, Maker, Mesh, parse};
+use winkler::exchange::Serial;
+use winkler::mesh::{Asked, Duty, Maker, Mesh, Portion, parse};
 use winkler::problem::order::Order;
 
 /// The mesh of a script as Gmsh writes it.
@@ -21,7 +22,7 @@ fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
     std::fs::read(out).expect("a mesh")
 }
 
-/// Solves the patch of two blocks on a mesh of these bytes, with one text of its scene replaced.
+/// Solves the patch of two blocks on a mesh of these bytes, with one text of its scene replaced; two and three ranks find what one does.
 fn on_mesh(bytes: &[u8], from: &str, to: &str) -> Run {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mesh = folder.path().join("a.msh");
@@ -30,7 +31,25 @@ fn on_mesh(bytes: &[u8], from: &str, to: &str) -> Run {
     let line = text.lines().find(|line| line.starts_with("mesh =")).expect("a mesh");
     let text = text.replace(line, &format!("mesh = \"{}\"", mesh.display()));
     assert!(from.is_empty() || text.matches(from).count() == 1, "`{from}`");
-    solve(Scene::new(if from.is_empty() { text } else { text.replace(from, to) }), &[])
+    let scene = Scene::new(if from.is_empty() { text } else { text.replace(from, to) });
+    let serial = solve(&scene, &[]);
+    for ranks in [2, 3] {
+        let parallel = solve_on(ranks, &scene, &[]);
+        assert_eq!(parallel.code, serial.code, "{}", parallel.said());
+        match serial.code {
+            0 => {
+                for body in [0, 1] {
+                    for what in ["cells", "nodes", "inner_facets", "boundary_facets", "parts"] {
+                        let [one, other] = [&serial, &parallel].map(|run| run.count(&format!("bodies/{body}/{what}")));
+                        assert_eq!(one, other, "{what} on {ranks} ranks");
+                    }
+                }
+            }
+            // then mpiexec has words of its own
+            _ => assert!(parallel.stderr.starts_with(&serial.stderr), "{}\n{}", serial.said(), parallel.said()),
+        }
+    }
+    serial
 }
 
 fn refused(run: &Run, words: &[&str]) {
@@ -121,6 +140,20 @@ fn bodies_in_parts() {
     assert_eq!((run.code, run.count("bodies/1/parts")), (0, 2), "{}", run.said());
 }
 
+/// Damage that shows while the file is read.
+#[test]
+fn files_that_are_damaged() {
+    let mesh = String::from_utf8(gmsh(&script(), &[])).expect("text");
+    let lost = element(&mesh, 2, 2, 0, |nodes| vec![nodes[0], nodes[1], 9999]);
+    refused(&on_mesh(lost.as_bytes(), "", ""), &["uses node 9999, which does not exist"]);
+    let flat = element(&mesh, 2, 1, 1, |nodes| vec![nodes[0], nodes[1], nodes[1]]);
+    refused(&on_mesh(flat.as_bytes(), "", ""), &["of group `lower` has zero area"]);
+    let end = mesh.find("$EndElements").expect("an end");
+    refused(&on_mesh(&mesh.as_bytes()[..end - 8], "", ""), &["a.msh:"]);
+    let binary = gmsh(&script(), &["-bin"]);
+    refused(&on_mesh(&binary[..binary.len() - 200], "", ""), &["it was cut short"]);
+}
+
 #[test]
 fn bodies_that_share_nodes() {
     let joined = script().replace("Physical Surface(\"lower\")", "Coherence;\nPhysical Surface(\"lower\")");
@@ -190,7 +223,8 @@ fn kind(bytes: &[u8], good: &Mesh<2>, known: &Used) -> Kind {
         body("lower", &[("lower_face", Duty::Holds), ("lower_sides", Duty::Holds), ("lower_pin", Duty::Holds)]),
         body("upper", &[("upper_face", Duty::Acts), ("upper_sides", Duty::Acts), ("upper_pin", Duty::Holds)]),
     ];
-    if mesh.check(&bodies, &["lower_top", "upper_bottom"], false).is_err() {
+    let portion = Portion::whole(mesh.clone());
+    if portion.check(&bodies, &["lower_top", "upper_bottom"], false, &Serial).is_err() {
         return Kind::Refused;
     }
     let found = used(&mesh);

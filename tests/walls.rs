@@ -10,8 +10,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The modules from the ground up; each may use those below it.
-const MODULES: [&str; 25] = [
+const MODULES: [&str; 26] = [
     "error",
+    "exchange",
     "file",
     "interrupt",
     "linalg",
@@ -40,12 +41,25 @@ const MODULES: [&str; 25] = [
 
 /// Modules that may use less than what lies below them.
 const NARROW: [(&str, &[&str]); 4] = [
-    ("model", &["error", "linalg", "contact"]),
+    ("model", &["error", "exchange", "linalg", "contact"]),
     ("ddm", &["error", "linalg", "contact", "problem", "model"]),
     ("output", &["error", "ddm"]),
     (
         "discretize",
-        &["error", "linalg", "expression", "problem", "mesh", "fem", "contact", "model", "parallel", "output", "scene"],
+        &[
+            "error",
+            "exchange",
+            "linalg",
+            "expression",
+            "problem",
+            "mesh",
+            "fem",
+            "contact",
+            "model",
+            "parallel",
+            "output",
+            "scene",
+        ],
     ),
 ];
 

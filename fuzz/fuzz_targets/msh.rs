@@ -3,7 +3,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
-use winkler::mesh::{Asked, Duty, Maker, Mesh, parse};
+use winkler::exchange::Serial;
+use winkler::mesh::{Asked, Duty, Maker, Mesh, Portion, parse};
 
 fuzz_target!(|bytes: &[u8]| {
     read::<2>(bytes);
@@ -26,7 +27,7 @@ fn read<const D: usize>(bytes: &[u8]) {
     let asked = |name| Asked { name, order: mesh.order, groups: groups.clone() };
     let bodies: Vec<Asked> = mesh.group_names(D).map(asked).collect();
     for shared in [false, true] {
-        match mesh.check(&bodies, &[], shared) {
+        match Portion::whole(mesh.clone()).check(&bodies, &[], shared, &Serial) {
             Ok(checked) => {
                 assert_eq!(checked.len(), bodies.len());
                 for (found, body) in checked.iter().zip(&bodies) {

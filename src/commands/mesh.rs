@@ -2,9 +2,10 @@
 
 use super::typed::flags;
 use crate::error::{Error, Kind, Result};
+use crate::exchange::Serial;
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
-use crate::mesh::{Group, Loaded, Mesh, Origin};
+use crate::mesh::{Group, Loaded, Mesh, Origin, Portion};
 use crate::output::progress::Line;
 use crate::output::report::readable;
 use crate::output::vtu::Encoding;
@@ -74,8 +75,8 @@ fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request)
 /// All that is said about a mesh.
 fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Result<Value> {
     let Loaded { mesh, origin, file } = loaded;
-    let verified = crate::discretize::verify(scene, mesh)?;
-    let mesh = &verified.mesh;
+    let verified = crate::discretize::verify(scene, Portion::whole(mesh), &Serial)?;
+    let mesh = &verified.portion.mesh;
     let mut checked = verified.checked.iter();
     let mut bodies = Vec::new();
     for body in &verified.bodies {

@@ -1,21 +1,21 @@
 //! How a body moves as seen from its contact: the mean displacement of where it is loaded or held.
 
-use super::find::find_group;
+use super::find::{find_group, nodes_on};
 use crate::contact::{add, pad};
 use crate::error::Result;
 use crate::fem::quadrature::Parts;
 use crate::fem::{Facets, Space, assemble, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
+use crate::model::Exchange;
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
-use serde::{Deserialize, Serialize};
 
 /// Cosine of the largest angle between a force or a held direction and the contact's normal at which the place counts: the 60 degrees up to
 /// which facets are pairs without the key `angle`.
 const ALONG: f64 = 0.5;
 
 /// A surface or a set of nodes on which the body is loaded or held.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 struct Place {
     /// Unit vectors: the force, or the directions that are held.
     directions: Vec<[f64; 3]>,
@@ -27,11 +27,16 @@ struct Place {
 
 impl Place {
     /// The nodes of a group.
-    fn new<const D: usize>(space: &Space<D>, group: &crate::mesh::Group, directions: Vec<[f64; 3]>) -> Self {
+    fn new<const D: usize>(
+        space: &Space<D>,
+        group: &crate::mesh::Group,
+        directions: Vec<[f64; 3]>,
+        exchange: &dyn Exchange,
+    ) -> Self {
         let facets = if group.dimension + 1 == D { Some(space.facets(group)) } else { None };
         let areas = facets.map_or(Vec::new(), |facets| areas(space, &facets));
         let has_area = !areas.is_empty();
-        let nodes = || space.nodes_on(group).into_iter().map(|node| (node, 1.0)).collect();
+        let nodes = || nodes_on(space, group, exchange).into_iter().map(|node| (node, 1.0)).collect();
         Self { directions, weights: if has_area { areas } else { nodes() }, has_area }
     }
 
@@ -41,7 +46,7 @@ impl Place {
 }
 
 /// Where a body is loaded, and where it is held.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default)]
 pub struct Outer {
     loaded: Vec<Place>,
     held: Vec<Place>,
@@ -50,7 +55,8 @@ pub struct Outer {
 }
 
 impl Outer {
-    /// Of a body of which all cells are here; `resultant` sums a load.
+    /// Of a body whose cells behind surfaces are here; `resultant` sums a load, `volumes` are the [integrals](volumes) of the shape functions over all
+    /// cells where nothing loads or holds it. Collective.
     ///
     /// # Errors
     /// Groups that are not there.
@@ -59,6 +65,8 @@ impl Outer {
         space: &Space<D>,
         mesh: &Mesh<D>,
         resultant: &dyn Fn(&Load) -> Result<[f64; 3]>,
+        volumes: Vec<f64>,
+        exchange: &dyn Exchange,
     ) -> Result<Self> {
         let mut outer = Self::default();
         for load in &spec.load {
@@ -67,14 +75,14 @@ impl Outer {
                 LoadKind::Force { total, .. } => total,
                 _ => resultant(load)?,
             };
-            outer.loaded.push(Place::new(space, group, unit(force).into_iter().collect()));
+            outer.loaded.push(Place::new(space, group, unit(force).into_iter().collect(), exchange));
         }
         let axes = |c: usize| std::array::from_fn(|k| if k == c { 1.0 } else { 0.0 });
         for fix in &spec.fix {
             let group = find_group(mesh, &fix.on, &(0..=D).rev().collect::<Vec<_>>(), "support")?;
             let components = (0..D).filter(|&c| fix.value[c].is_some()).map(axes);
             let normal = fix.normal.as_ref().and_then(|_| normal(space, group));
-            outer.held.push(Place::new(space, group, components.chain(normal).collect()));
+            outer.held.push(Place::new(space, group, components.chain(normal).collect(), exchange));
         }
         for spring in &spec.spring {
             let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
@@ -82,10 +90,10 @@ impl Outer {
                 SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axes).collect(),
                 SpringKind::Normal(_) => normal(space, group).into_iter().collect(),
             };
-            outer.held.push(Place::new(space, group, directions));
+            outer.held.push(Place::new(space, group, directions, exchange));
         }
         if outer.loaded.is_empty() && outer.held.is_empty() {
-            outer.whole = volumes(space);
+            outer.whole = first_components::<D>(&volumes);
         }
         Ok(outer)
     }
@@ -128,11 +136,11 @@ fn areas<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> Vec<(u32, f64)
     first_components::<D>(&all)
 }
 
-/// Integrals of the shape functions over the body.
-fn volumes<const D: usize>(space: &Space<D>) -> Vec<(u32, f64)> {
+/// Integrals of the shape functions over cells, at the first dof of each node.
+pub fn volumes<const D: usize>(space: &Space<D>) -> Vec<f64> {
     let mut all = vec![0.0; space.dofs()];
     assemble::body_force(space, Parts::Whole, &|_| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }), &mut all);
-    first_components::<D>(&all)
+    all
 }
 
 fn first_components<const D: usize>(all: &[f64]) -> Vec<(u32, f64)> {

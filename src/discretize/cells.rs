@@ -1,13 +1,16 @@
-//! The cells of bodies, from the rank that has read them to those that assemble their nodes.
+//! The cells of bodies, from the ranks that have their points to those that assemble their nodes.
 
 use super::distribute::Deal;
 use super::draft::Draft;
 use super::elastic;
 use super::part::Part;
+use super::parts::Stock;
 use crate::error::Result;
-use crate::fem::Elasticity;
+use crate::exchange::trade;
+use crate::fem::{Elasticity, NodeGraph};
+use crate::linalg::Csr;
+use crate::mesh::Key;
 use crate::model::Exchange;
-use crate::parallel;
 use crate::problem::elasticity::Plane;
 use serde::{Deserialize, Serialize};
 
@@ -43,64 +46,86 @@ impl<'a> Needs<'a> {
 }
 
 /// Cells of a body.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Default, Serialize, Deserialize)]
 struct Cells {
+    keys: Vec<Key>,
     /// Their nodes.
     nodes: Vec<u32>,
     /// Number of the constants of each; empty if the body has no regions.
     regions: Vec<usize>,
 }
 
-/// Gives every rank the cells that it needs, which `parts` have afterwards, and their elasticity. `whole` is the elasticity of all cells, on the
-/// first rank. Collective.
+/// Gives every rank the cells that it needs, which `parts` have afterwards, and their elasticity. Each rank has `stocks`. Collective.
 ///
 /// # Errors
-/// None that the first rank has not found before.
+/// None that were not found before.
 pub fn deal<const D: usize>(
     parts: &mut [Part<D>],
-    whole: Option<Vec<Elasticity>>,
+    stocks: Vec<Stock<D>>,
     needs: &[Needs],
     plane: Plane,
     exchange: &dyn Exchange,
 ) -> Result<Vec<Elasticity>> {
-    let ranks = exchange.ranks();
-    if ranks == 1 {
-        return Ok(whole.unwrap_or_default());
-    }
-    let near: Vec<Vec<Vec<u32>>> = match &whole {
-        Some(_) => parts.iter().zip(needs).map(|(part, needs)| near(part, needs, ranks)).collect(),
-        None => Vec::new(),
-    };
-    let of_rank = |rank: usize| -> Vec<Cells> {
-        let bodies = parts.iter().zip(needs).zip(whole.iter().flatten()).zip(&near);
-        let of_body = |(((part, needs), elasticity), near): (((&Part<D>, &Needs), _), &Vec<Vec<u32>>)| match needs {
-            Needs::Owners(_) => some(part, elasticity, near[rank].iter().copied()),
-            Needs::Whole(owner) if *owner != rank => some(part, elasticity, 0..0),
-            _ => some(part, elasticity, 0..part.known.cells as u32),
+    let (rank, ranks) = (exchange.rank(), exchange.ranks());
+    let mut elasticities = Vec::new();
+    for ((part, stock), needs) in parts.iter_mut().zip(stocks).zip(needs) {
+        if ranks == 1 {
+            elasticities.push(stock.elasticity);
+            continue;
+        }
+        let home = |wanted: bool| stock.home(rank).filter(move |_| wanted).map(|cell| cell as u32);
+        let of_rank: Vec<Cells> = match needs {
+            Needs::Owners(_) => near(part, &stock, needs, ranks)
+                .into_iter()
+                .map(|cells| some(part, &stock, cells.into_iter()))
+                .collect(),
+            Needs::Whole(owner) => (0..ranks).map(|rank| some(part, &stock, home(rank == *owner))).collect(),
+            Needs::Everywhere => vec![some(part, &stock, home(true)); ranks],
         };
-        bodies.map(of_body).collect()
-    };
-    let dealt = parallel::deal(exchange, of_rank)?;
-    let take = |(part, Cells { nodes, regions }): (&mut Part<D>, Cells)| {
-        part.space.cells = nodes;
-        elastic::of_regions(part.spec, regions, D, plane)
-    };
-    parts.iter_mut().zip(dealt).map(take).collect()
+        drop(stock);
+        let dealt = trade(exchange, of_rank);
+        // cells at points of several ranks come from each of these
+        let mut order: Vec<(Key, usize, usize)> = Vec::new();
+        for (from, cells) in dealt.iter().enumerate() {
+            order.extend(cells.keys.iter().zip(0..).map(|(&key, number)| (key, from, number)));
+        }
+        order.sort_unstable();
+        order.dedup_by_key(|(key, ..)| *key);
+        let stride = part.space.stride;
+        let nodes = order.iter().flat_map(|&(_, from, number)| &dealt[from].nodes[number * stride..][..stride]);
+        part.space.cells = nodes.copied().collect();
+        let regions = order.iter().filter_map(|&(_, from, number)| dealt[from].regions.get(number)).copied();
+        elasticities.push(elastic::of_regions(part.spec, regions.collect(), D, plane)?);
+    }
+    Ok(elasticities)
 }
 
-/// Numbers of the cells that each rank needs of a body whose nodes are dealt out: those that touch a cell at one of its own nodes, so that
+/// Which nodes of a body K couples; of several ranks the first has the graph, and all cells meanwhile. Collective.
+pub fn graph<const D: usize>(part: &Part<D>, stock: &Stock<D>, rows: &Csr, exchange: &dyn Exchange) -> NodeGraph {
+    if exchange.ranks() == 1 {
+        return part.graph(&part.space, rows);
+    }
+    let mut mine = vec![Vec::new(); exchange.ranks()];
+    mine[0] = some(part, stock, stock.home(exchange.rank()).map(|cell| cell as u32)).nodes;
+    let (space, _) = part.space.clone().of_cells(trade(exchange, mine).concat(), 0.0);
+    part.graph(&space, rows)
+}
+
+/// Numbers of the cells at own points that each rank needs of a body whose nodes are dealt out: those that touch a cell at one of its nodes, so that
 /// it knows all that meets at the nodes of the latter.
-fn near<const D: usize>(part: &Part<D>, needs: &Needs, ranks: usize) -> Vec<Vec<u32>> {
+fn near<const D: usize>(part: &Part<D>, stock: &Stock<D>, needs: &Needs, ranks: usize) -> Vec<Vec<u32>> {
     let mut near = vec![Vec::new(); ranks];
     let Needs::Owners(of_node) = needs else { return near };
     // tied nodes are assembled where their master is
     let owner = |&node: &u32| of_node[part.held.frame.node(node) as usize];
-    let cells = || part.space.cells.chunks_exact(part.space.stride);
+    // all cells at an own point are here
+    let is_own = |node: &u32| stock.is_own(part.known.points[*node as usize]);
+    let cells = || stock.nodes.chunks_exact(part.space.stride);
     // ranks that have a node next to one of another rank
     let next = |cell: &'_ [u32]| {
         let mut next = Vec::new();
         for rank in cell.iter().map(owner) {
-            next.extend(cell.iter().filter(|node| owner(node) != rank).map(|&node| (node, rank)));
+            next.extend(cell.iter().filter(|node| owner(node) != rank && is_own(node)).map(|&node| (node, rank)));
         }
         next
     };
@@ -108,7 +133,7 @@ fn near<const D: usize>(part: &Part<D>, needs: &Needs, ranks: usize) -> Vec<Vec<
     others.sort_unstable();
     others.dedup();
     for (number, cell) in (0..).zip(cells()) {
-        for node in cell {
+        for node in cell.iter().filter(|node| is_own(node)) {
             let first = others.partition_point(|(other, _)| other < node);
             let others = others[first..].iter().take_while(|(other, _)| other == node).map(|(_, rank)| *rank);
             for rank in std::iter::once(owner(node)).chain(others) {
@@ -122,13 +147,14 @@ fn near<const D: usize>(part: &Part<D>, needs: &Needs, ranks: usize) -> Vec<Vec<
     near
 }
 
-/// Some of the cells of a body of which this rank has all.
-fn some<const D: usize>(part: &Part<D>, elasticity: &Elasticity, cells: impl Iterator<Item = u32> + Clone) -> Cells {
+/// Some of the cells of a body that are here.
+fn some<const D: usize>(part: &Part<D>, stock: &Stock<D>, cells: impl Iterator<Item = u32> + Clone) -> Cells {
     let stride = part.space.stride;
-    let of_cell = |cell: u32| part.space.cells[cell as usize * stride..][..stride].iter().copied();
+    let of_cell = |cell: u32| stock.nodes[cell as usize * stride..][..stride].iter().copied();
     let regions = cells.clone().filter(|_| !part.spec.regions.is_empty());
     Cells {
+        keys: cells.clone().map(|cell| stock.keys()[cell as usize]).collect(),
+        regions: regions.map(|cell| stock.elasticity.region(cell as usize)).collect(),
         nodes: cells.flat_map(of_cell).collect(),
-        regions: regions.map(|cell| elasticity.region(cell as usize)).collect(),
     }
 }

@@ -3,33 +3,46 @@
 use super::find::{find_group, not_on_body, of_body, point};
 use crate::contact::pad;
 use crate::error::{Error, Result, shown};
+use crate::exchange::first;
 use crate::fem::Space;
 use crate::fem::elasticity::{Elasticity, Flaw};
-use crate::mesh::Mesh;
+use crate::mesh::{Key, Mesh};
+use crate::model::Exchange;
 use crate::problem::body::BodySpec;
 use crate::problem::elasticity::{Constants, ElasticitySpec, Plane};
 use crate::problem::order::Order;
 
-/// The elasticity of a body.
+/// The elasticity of the cells of a body that are here; `key` puts those of all ranks into an order. Collective.
 ///
 /// # Errors
 /// Regions that are not there, lie elsewhere or overlap, and constants that make no material.
-pub fn of<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, plane: Plane) -> Result<Elasticity> {
+pub fn of<const D: usize>(
+    spec: &BodySpec,
+    space: &Space<D>,
+    mesh: &Mesh<D>,
+    plane: Plane,
+    (key, exchange): (&dyn Fn(usize) -> Key, &dyn Exchange),
+) -> Result<Elasticity> {
     let mut of_cell = vec![0; if spec.regions.is_empty() { 0 } else { space.cell_count() }];
     for (number, region) in spec.regions.iter().enumerate() {
         let cells = space.cells_in(find_group(mesh, &region.on, &[D], "region")?);
-        if cells.is_empty() {
+        let mut count = [cells.len() as f64];
+        exchange.sum(&mut count);
+        if count == [0.0] {
             return Err(not_on_body(&region.on, &spec.name.value));
         }
+        let mut found = Ok(());
         for cell in cells {
-            if of_cell[cell] != 0 {
+            if of_cell[cell] != 0 && found.is_ok() {
                 let (first, second) = (&spec.regions[of_cell[cell] - 1].on.value, &region.on.value);
                 let at = point(pad(space.centroid(cell)));
                 let message = format!("the regions `{first}` and `{second}` share the cell at {at}");
-                return Err(Error::scene(&region.on.place, message).help("let each cell be in one region at most"));
+                let error = Error::scene(&region.on.place, message).help("let each cell be in one region at most");
+                found = Err((key(cell), error));
             }
             of_cell[cell] = number + 1;
         }
+        first(exchange, found)?;
     }
     of_regions(spec, of_cell, D, plane)
 }
@@ -81,18 +94,19 @@ pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw)
     }
 }
 
-/// Mean moduli of a body of this volume against pressure along x, y, z. Cells whose constants make no material at their middle count as nothing: assembly
-/// refuses them.
-pub fn moduli<const D: usize>(space: &Space<D>, elasticity: &Elasticity, volume: f64) -> [f64; 3] {
-    let in_cell = |cell: usize| elasticity.moduli(cell, pad(space.centroid(cell))).unwrap_or_default();
-    if elasticity.is_constant() {
-        return in_cell(0);
-    }
+/// Moduli against pressure along x, y, z, integrated over some cells. Cells whose constants make no material at their middle count as nothing:
+/// assembly refuses them.
+pub fn moduli<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    cells: impl Iterator<Item = usize>,
+) -> [f64; 3] {
     let mut sum = [0.0; 3];
-    for cell in 0..space.cell_count() {
-        crate::contact::add(&mut sum, in_cell(cell).map(|modulus| space.share(cell) * modulus));
+    for cell in cells {
+        let moduli = elasticity.moduli(cell, pad(space.centroid(cell))).unwrap_or_default();
+        crate::contact::add(&mut sum, moduli.map(|modulus| space.share(cell) * modulus));
     }
-    sum.map(|sum| sum / volume)
+    sum
 }
 
 /// What the user should know: linear elements are too stiff where the volume can hardly change.

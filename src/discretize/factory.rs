@@ -24,14 +24,14 @@ pub struct Outline<'a> {
     pub motions: usize,
     /// What one of them does at a dof.
     pub motion: &'a dyn Fn(usize, usize) -> f64,
-    /// Which of its nodes K couples, made when it is first asked for.
+    /// Which of its nodes K couples, made when it is first asked for; of several ranks the first has the graph. Collective.
     pub graph: &'a dyn Fn() -> &'a NodeGraph,
 }
 
 /// Gives bodies their inner solvers.
 pub trait Factory {
-    /// Decides on the solvers of all bodies, in the order of the scene. Collective, once; graphs are made on the first rank alone, which has all
-    /// cells.
+    /// Decides on the solvers of all bodies, in the order of the scene. Collective, once; where there are several ranks, graphs are asked for on all,
+    /// and the first has them.
     ///
     /// # Errors
     /// Failures of PETSc's options.

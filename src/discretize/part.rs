@@ -15,6 +15,7 @@ use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, support, surface};
 use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
+use crate::model::Exchange;
 use crate::problem::body::{BodySpec, Load, LoadKind};
 use nalgebra::{DMatrix, DVector};
 
@@ -33,12 +34,18 @@ pub struct Part<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Part<'a, D> {
-    /// Applies the supports and springs of a body.
+    /// Applies the supports and springs of a body. Collective.
     ///
     /// # Errors
     /// Refusals of the scene against its mesh.
-    pub fn new(spec: &'a BodySpec, mesh: &Mesh<D>, space: Space<D>, known: Known) -> Result<Self> {
-        let held = Held::new(spec, &space, mesh)?;
+    pub fn new(
+        spec: &'a BodySpec,
+        mesh: &Mesh<D>,
+        space: Space<D>,
+        known: Known,
+        exchange: &dyn Exchange,
+    ) -> Result<Self> {
+        let held = Held::new(spec, &space, mesh, exchange)?;
         let springs =
             spec.spring.iter().map(|spring| springs::blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
         Ok(Self { spec, space, held, springs, known })
@@ -191,8 +198,8 @@ impl<'a, const D: usize> Part<'a, D> {
         load
     }
 
-    /// Which nodes K couples: those of a cell, and those of a contact row.
-    pub fn graph(&self, rows: &Csr) -> NodeGraph {
+    /// Which nodes K couples: those of a cell of a space, and those of a contact row.
+    pub fn graph(&self, space: &Space<D>, rows: &Csr) -> NodeGraph {
         let coupled: Vec<Vec<u32>> = (0..rows.rows())
             .map(|q| {
                 let mut nodes: Vec<u32> = rows.row(q).map(|(dof, _)| (dof / D) as u32).collect();
@@ -201,7 +208,7 @@ impl<'a, const D: usize> Part<'a, D> {
             })
             .filter(|nodes| nodes.len() > 1)
             .collect();
-        NodeGraph::new(&self.space, &coupled, &self.held.frame)
+        NodeGraph::new(space, &coupled, &self.held.frame)
     }
 
     /// The nodes that linear displacements have, sorted.

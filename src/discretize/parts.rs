@@ -1,6 +1,6 @@
-//! The bodies of a scene on its mesh, which one rank has read.
+//! The bodies of a scene on its mesh, of which every rank has some cells.
 
-use super::approach::Outer;
+use super::approach::{self, Outer};
 use super::elastic;
 use super::find::{find_group, point};
 use super::known::Known;
@@ -8,72 +8,117 @@ use super::part::{self, Part};
 use super::verify::{self, Verified};
 use crate::contact::pad;
 use crate::error::{Error, Result};
+use crate::exchange::first;
 use crate::fem::quadrature::Parts;
 use crate::fem::{Elasticity, Space, interpolation};
-use crate::mesh::Mesh;
+use crate::mesh::{Key, Mesh, Portion};
 use crate::model::Exchange;
-use crate::parallel;
+use crate::parallel::share;
 use crate::problem::body::BodySpec;
 use crate::problem::elasticity::Plane;
+use crate::problem::order::Order;
 use crate::scene::Scene;
+use std::sync::Arc;
 
-/// The bodies with their spaces, supports and springs, as the first rank has read them, with the elasticity of their cells there. Collective.
+/// The cells of a body that a rank has of the mesh: those at its own points, with their elasticity.
+pub struct Stock<'a, const D: usize> {
+    portion: &'a Portion<D>,
+    /// The place of its group.
+    group: usize,
+    /// Nodes of the cells; empty where one rank has all, as these are those of the body's space.
+    pub nodes: Vec<u32>,
+    /// Elasticity of each.
+    pub elasticity: Elasticity,
+}
+
+impl<const D: usize> Stock<'_, D> {
+    /// Keys of the cells.
+    pub fn keys(&self) -> &[Key] {
+        self.portion.keys(self.group)
+    }
+
+    /// Whether a point of the mesh is one of this rank.
+    pub fn is_own(&self, point: u32) -> bool {
+        self.portion.is_own(point)
+    }
+
+    /// Numbers of the cells that this rank speaks for: each is one of one rank.
+    pub fn home(&self, rank: usize) -> impl Iterator<Item = usize> + Clone {
+        home(self.portion, self.group, rank)
+    }
+}
+
+fn home<const D: usize>(portion: &Portion<D>, group: usize, rank: usize) -> impl Iterator<Item = usize> + Clone {
+    let cells = portion.mesh.groups[group].simplices().enumerate();
+    cells.filter(move |(_, cell)| portion.home(cell[0]) == rank).map(|(number, _)| number)
+}
+
+/// The bodies with their spaces, supports and springs, and the cells that this rank has of them. Where there are several ranks, the spaces have the
+/// cells behind surfaces, which say which side of a facet is out. Collective.
 ///
 /// # Errors
 /// Refusals of the scene against its mesh.
 pub fn parts<'a, const D: usize>(
     scene: &Scene,
-    verified: &Verified<D>,
+    verified: &'a Verified<D>,
     bodies: &'a [BodySpec],
     exchange: &dyn Exchange,
-) -> Result<(Vec<Part<'a, D>>, Option<Vec<Elasticity>>)> {
-    let Verified { mesh, checked, .. } = verified;
-    let mut first = None;
-    let read = || {
-        let on_surface = if exchange.ranks() > 1 { on_surfaces(mesh) } else { Vec::new() };
-        let wanted = Wanted { plane: scene.plane, boundaries: !scene.auto.is_empty(), on_surface: &on_surface };
-        let (mut parts, mut elasticities) = (Vec::new(), Vec::new());
-        for (index, spec) in bodies.iter().enumerate() {
-            let (space, elasticity, known) = read(spec, mesh, wanted)?;
-            let mut part = Part::new(spec, mesh, space, known)?;
-            part.known.outer = Outer::new(spec, &part.space, mesh, &|load| part.resultant(load, mesh))?;
-            verify::held(&part, &checked[index].parts, mesh)?;
-            parts.push(part);
-            elasticities.push(elasticity);
+) -> Result<(Vec<Part<'a, D>>, Vec<Stock<'a, D>>)> {
+    let Verified { portion, checked, .. } = verified;
+    let mesh = &portion.mesh;
+    let on_surface = if exchange.ranks() > 1 { on_surfaces(mesh) } else { Vec::new() };
+    let wanted = Wanted { plane: scene.plane, boundaries: !scene.auto.is_empty() };
+    let (mut parts, mut stocks) = (Vec::new(), Vec::new());
+    for (index, spec) in bodies.iter().enumerate() {
+        find_group(mesh, &spec.name, &[D], "body")?;
+        let group = mesh.groups.place(&spec.name.value).unwrap_or_default();
+        let points = &checked[index].points;
+        let (mut space, elasticity, known) = read(spec, (portion, group), points, wanted, exchange)?;
+        let mut volumes = Vec::new();
+        if spec.load.is_empty() && spec.fix.is_empty() && spec.spring.is_empty() {
+            volumes = summed(approach::volumes(&space), points, portion, exchange);
         }
-        let known = parts.iter_mut().map(|part| std::mem::take(&mut part.known)).collect();
-        first = Some((parts, elasticities));
-        Ok(known)
-    };
-    let known: Vec<Known> = parallel::tell(exchange, read)?;
-    if let Some((mut parts, elasticities)) = first {
-        parts.iter_mut().zip(known).for_each(|(part, known)| part.known = known);
-        return Ok((parts, Some(elasticities)));
+        let mut nodes = Vec::new();
+        if exchange.ranks() > 1 {
+            let behind = behind(&space, points, (portion, group), &on_surface, exchange);
+            (space, nodes) = space.of_cells(behind, known.measure);
+        }
+        let mut part = Part::new(spec, mesh, space, known, exchange)?;
+        let resultant = |load: &_| part.resultant(load, mesh);
+        part.known.outer = Outer::new(spec, &part.space, mesh, &resultant, volumes, exchange)?;
+        verify::held(&part, &checked[index].parts, mesh)?;
+        parts.push(part);
+        stocks.push(Stock { portion, group, nodes, elasticity });
     }
-    let of_body =
-        |(spec, known): (&'a BodySpec, Known)| Part::new(spec, mesh, known.space(spec, mesh, scene.plane), known);
-    Ok((bodies.iter().zip(known).map(of_body).collect::<Result<_>>()?, None))
+    Ok((parts, stocks))
 }
 
 /// What a scene asks of all bodies.
 #[derive(Clone, Copy)]
-struct Wanted<'a> {
+struct Wanted {
     /// Kind of a plane problem.
     plane: Plane,
     /// Whether contacts are to be found on whole boundaries.
     boundaries: bool,
-    /// Whether each point of the mesh is on a surface; empty where one rank has all cells.
-    on_surface: &'a [bool],
 }
 
-/// The space and the elasticity of a body of which this rank has all cells, and what others are told of it.
+/// The space of a body with the cells that are here, their elasticity, and what all ranks know of it. Collective.
 ///
 /// # Errors
 /// Refusals of the scene against its mesh, and bodies of revolution with points of negative radius.
-fn read<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, wanted: Wanted) -> Result<(Space<D>, Elasticity, Known)> {
-    let group = find_group(mesh, &spec.name, &[D], "body")?;
-    let mut space = Space::new(mesh, group, spec.order);
-    if wanted.plane == Plane::Axisymmetric {
+fn read<const D: usize>(
+    spec: &BodySpec,
+    (portion, group): (&Portion<D>, usize),
+    points: &Arc<Vec<u32>>,
+    Wanted { plane, boundaries }: Wanted,
+    exchange: &dyn Exchange,
+) -> Result<(Space<D>, Elasticity, Known)> {
+    let (mesh, keys, cells) = (&portion.mesh, portion.keys(group), &portion.mesh.groups[group]);
+    let mut space = match exchange.ranks() {
+        1 => Space::new(mesh, cells, spec.order),
+        _ => Space::of_points(mesh, points, cells, spec.order),
+    };
+    if plane == Plane::Axisymmetric {
         space = space.revolved();
         if let Some(x) = space.nodes.iter().find(|x| x[0] < 0.0) {
             let message = format!("body `{}` has a negative radius at {}", spec.name.value, point(pad(*x)));
@@ -82,29 +127,85 @@ fn read<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, wanted: Wanted) -> Resu
             ));
         }
     }
-    let elasticity = elastic::of(spec, &space, mesh, wanted.plane)?;
-    let points = space.points();
-    let volume = (0..space.cell_count()).map(|cell| space.share(cell)).sum();
-    let on_surface = |node: &&u32| wanted.on_surface[points[**node as usize] as usize];
-    let is_behind = |cell: &&[u32]| cell[..=D].iter().filter(on_surface).count() >= D;
-    let cells = space.cells.chunks_exact(space.stride);
-    let known = Known {
-        cells: space.cell_count(),
-        volume,
-        moduli: elastic::moduli(&space, &elasticity, volume),
-        force: part::body_force(spec, &space, Parts::Whole)?,
-        corners: interpolation::corners(&space),
-        boundary: if wanted.boundaries { space.boundary().nodes } else { Vec::new() },
-        behind: if wanted.on_surface.is_empty() {
-            Vec::new()
-        } else {
-            cells.filter(is_behind).flatten().copied().collect()
-        },
-        measure: space.measure(),
-        points,
-        outer: Outer::default(),
-    };
+    let key = |cell: usize| keys.get(cell).copied().unwrap_or((0, cell as u32));
+    let elasticity = elastic::of(spec, &space, mesh, plane, (&key, exchange))?;
+    let home = || home(portion, group, exchange.rank());
+    let mut sums =
+        [home().count() as f64, home().map(|i| space.share(i)).sum(), home().map(|i| space.cell_measure(i)).sum()];
+    exchange.sum(&mut sums);
+    let [count, volume, measure] = sums;
+    let mut moduli = elasticity.moduli(0, [0.0; 3]).unwrap_or_default();
+    if !elasticity.is_constant() {
+        moduli = elastic::moduli(&space, &elasticity, home());
+        exchange.sum(&mut moduli);
+        moduli = moduli.map(|sum| sum / volume);
+    }
+    let force = part::body_force(spec, &space, Parts::Whole).map_err(|error| (exchange.rank(), error));
+    let force = summed(first(exchange, force)?, points, portion, exchange);
+    let (mut corners, mut boundary) = (interpolation::corners(&space), Vec::new());
+    if boundaries {
+        boundary = outside(&space, points, portion, &key, exchange);
+    }
+    if exchange.ranks() > 1 && space.order == Order::P2 {
+        corners = share(exchange, &corners).concat();
+        corners.sort_unstable();
+        corners.dedup();
+    }
+    let (points, outer) = (points.clone(), Outer::default());
+    let known = Known { cells: count as usize, volume, moduli, force, corners, boundary, measure, points, outer };
     Ok((space, elasticity, known))
+}
+
+/// Sums at the dofs of nodes, of which ranks have found those at their own points. Collective.
+fn summed<const D: usize>(mut at: Vec<f64>, points: &[u32], portion: &Portion<D>, exchange: &dyn Exchange) -> Vec<f64> {
+    let nodes = at.chunks_exact_mut(D).zip(points);
+    nodes.filter(|(_, point)| !portion.is_own(**point)).for_each(|(at, _)| at.fill(0.0));
+    exchange.sum(&mut at);
+    at
+}
+
+/// Nodes of the facets of the boundary. Whoever has the least corner of a facet has its cells. Collective.
+fn outside<const D: usize>(
+    space: &Space<D>,
+    points: &[u32],
+    portion: &Portion<D>,
+    key: &dyn Fn(usize) -> Key,
+    exchange: &dyn Exchange,
+) -> Vec<u32> {
+    let mut places = space.lone_facets().collect::<Vec<_>>();
+    if exchange.ranks() == 1 {
+        return space.facets_of(places.into_iter()).nodes;
+    }
+    places.retain(|&(cell, opposite)| {
+        let corners = space.cells[cell * space.stride..][..=D].iter().enumerate();
+        let least = corners.filter(|(corner, _)| *corner != opposite).map(|(_, &node)| node).min();
+        least.is_some_and(|node| portion.is_own(points[node as usize]))
+    });
+    let facets = space.facets_of(places.iter().copied());
+    let facets = places.iter().zip(facets.nodes.chunks_exact(facets.stride));
+    let mine: Vec<(Key, u8, Vec<u32>)> =
+        facets.map(|(&(cell, opposite), nodes)| (key(cell), opposite as u8, nodes.to_vec())).collect();
+    let mut all = share(exchange, &mine).concat();
+    all.sort_unstable();
+    all.into_iter().flat_map(|(.., nodes)| nodes).collect()
+}
+
+/// Nodes of the cells behind surfaces, which have all corners but one there. Collective.
+fn behind<const D: usize>(
+    space: &Space<D>,
+    points: &[u32],
+    (portion, group): (&Portion<D>, usize),
+    on_surface: &[bool],
+    exchange: &dyn Exchange,
+) -> Vec<u32> {
+    let cell = |number: usize| &space.cells[number * space.stride..][..space.stride];
+    let on_surface = |node: &&u32| on_surface[points[**node as usize] as usize];
+    let is_behind = |number: &usize| cell(*number)[..=D].iter().filter(on_surface).count() >= D;
+    let mine = home(portion, group, exchange.rank()).filter(is_behind);
+    let mine: Vec<(Key, Vec<u32>)> = mine.map(|number| (portion.keys(group)[number], cell(number).to_vec())).collect();
+    let mut all = share(exchange, &mine).concat();
+    all.sort_unstable();
+    all.into_iter().flat_map(|(_, nodes)| nodes).collect()
 }
 
 /// Whether each point of a mesh is on a surface.

@@ -2,7 +2,9 @@
 
 use super::find::find_group;
 use crate::error::{Error, Located, Place, Result, few};
-use crate::mesh::{Group, Mesh};
+use crate::mesh::{Group, Mesh, Portion};
+use crate::model::Exchange;
+use crate::parallel::share;
 use crate::problem::body::{BodySpec, LoadKind, fault};
 use crate::problem::pattern::{BODY, Pattern, Rank, is_pattern};
 use crate::scene::Scene;
@@ -124,14 +126,15 @@ pub fn tie(what: &str, [first, second]: [&str; 2], place: &Place) -> Error {
 /// Numbers of the groups that lie on each body, body by body of each table; none where no table or line stands for many.
 pub type Lying = Vec<Vec<u32>>;
 
-/// The groups that lie on each body: its own cells, and those of which it has all corners of an element.
+/// The groups that lie on each body: its own cells, and those of which it has all corners of an element. Collective.
 ///
 /// # Errors
 /// Patterns of bodies that match nothing or too much.
-pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Lying> {
+pub fn lying<const D: usize>(scene: &Scene, portion: &Portion<D>, exchange: &dyn Exchange) -> Result<Lying> {
     if !scene.bodies.iter().any(is_plural) {
         return Ok(Vec::new());
     }
+    let mesh = &portion.mesh;
     let names = members(scene, mesh)?.concat();
     let number: HashMap<&str, usize> = names.iter().copied().zip(0..).collect();
     let mut last = vec![usize::MAX; mesh.points.len()];
@@ -143,7 +146,16 @@ pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Lying> {
             }
         }
     }
+    if exchange.ranks() > 1 {
+        // the rank of a point knows all its bodies: others ask where surfaces, edges and corners lie
+        let mut is_asked = vec![false; mesh.points.len()];
+        let asked = mesh.groups.iter().filter(|group| group.dimension < D).flat_map(|group| &group.connectivity);
+        asked.for_each(|&point| is_asked[point as usize] = true);
+        let mine: Vec<_> = owners.iter().filter(|(point, _)| is_asked[*point as usize]).copied().collect();
+        owners = owners.into_iter().chain(share(exchange, &mine).concat()).collect();
+    }
     owners.sort_unstable();
+    owners.dedup();
     let of = |point: u32| {
         let first = owners.partition_point(|entry| entry.0 < point);
         owners[first..].iter().take_while(move |entry| entry.0 == point).map(|entry| entry.1)
@@ -162,7 +174,10 @@ pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Lying> {
         let bodies: BTreeSet<usize> = group.simplices().flat_map(on).collect();
         bodies.into_iter().for_each(|body| lying[body].push(place));
     }
-    Ok(lying)
+    // groups of cells lie where some rank has seen them
+    let all = share(exchange, &lying);
+    let of_body = |body: usize| all.iter().flat_map(|lying| &lying[body]).copied().collect::<BTreeSet<u32>>();
+    Ok((0..names.len()).map(|body| of_body(body).into_iter().collect()).collect())
 }
 
 /// What a table says of groups, and the groups on each of its bodies.

@@ -1,11 +1,12 @@
 //! Supports of a body: conditions on its nodes, the axes in which they are prescribed dofs, and rigid surfaces.
 
-use super::find::{earlier, find_group, not_on_body, of_body, point};
+use super::find::{earlier, find_group, nodes_on, not_on_body, of_body, point};
 use crate::contact::pad;
 use crate::error::{Error, Place, Result};
 use crate::fem::{Facets, Frame, Space};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
+use crate::model::Exchange;
 use crate::problem::body::{BodySpec, LoadKind};
 use nalgebra::{DMatrix, DVector};
 use std::collections::{BTreeMap, HashMap};
@@ -39,19 +40,19 @@ pub struct Held<const D: usize> {
 const PARALLEL: f64 = 1e-8;
 
 impl<const D: usize> Held<D> {
-    /// Collects the conditions of a body's supports on its nodes.
+    /// Collects the conditions of a body's supports on its nodes. Collective.
     ///
     /// # Errors
     /// Groups that are missing or not on the body, values that are not finite, surfaces that are no planes, and supports or
     /// rigid loads that contradict each other.
-    pub fn new(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<Self> {
+    pub fn new(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, exchange: &dyn Exchange) -> Result<Self> {
         let mut held = Held::default();
         held.tie(spec, space, mesh)?;
         let mut conditions = held.symmetry(space);
         for (support, fix) in spec.fix.iter().enumerate() {
             let dimensions: Vec<usize> = if fix.normal.is_some() { vec![D - 1] } else { (0..=D).rev().collect() };
             let group = find_group(mesh, &fix.on, &dimensions, "support")?;
-            let nodes = space.nodes_on(group);
+            let nodes = nodes_on(space, group, exchange);
             if nodes.is_empty() {
                 return Err(not_on_body(&fix.on, &spec.name.value));
             }

@@ -2,71 +2,39 @@
 
 use super::find::point;
 use super::part::Part;
-use super::roster::{self, Lying};
+use super::roster;
 use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::fem::Space;
 use crate::fem::rigid::{self, RigidMotion};
-use crate::mesh::{Asked, Checked, Duty, Mesh, Parts, Told};
+use crate::mesh::{Asked, Checked, Duty, Mesh, Parts, Portion};
+use crate::model::Exchange;
 use crate::problem::body::BodySpec;
 use crate::scene::Scene;
-use serde::{Deserialize, Serialize};
-use std::collections::HashSet;
 use std::rc::Rc;
 
 /// A mesh that holds what bodies must be.
 #[derive(Debug)]
 pub struct Verified<const D: usize> {
-    /// The mesh; on all ranks but the first without the cells of bodies.
-    pub mesh: Mesh<D>,
+    /// What this rank has of the mesh.
+    pub portion: Portion<D>,
     /// The bodies of the scene, each with a name of its own.
     pub bodies: Vec<BodySpec>,
     /// What was found of each body, in the same order; bodies that the mesh does not have are missing.
     pub checked: Rc<[Checked]>,
-    lying: Lying,
 }
 
-/// What the first rank has found of a mesh, for the others.
-#[derive(Serialize, Deserialize)]
-pub struct Findings {
-    mesh: Told,
-    checked: Vec<Checked>,
-    lying: Lying,
-}
-
-/// Finds the bodies of a scene and checks its mesh once: see `roster::bodies` and [`Mesh::check`].
+/// Finds the bodies of a scene and checks its mesh once: see `roster::bodies` and [`Portion::check`]. Collective.
 ///
 /// # Errors
 /// Patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.
-pub fn verify<const D: usize>(scene: &Scene, mesh: Mesh<D>) -> Result<Verified<D>> {
-    let lying = roster::lying(scene, &mesh)?;
-    let bodies = roster::bodies(scene, &mesh, &lying)?;
+pub fn verify<const D: usize>(scene: &Scene, portion: Portion<D>, exchange: &dyn Exchange) -> Result<Verified<D>> {
+    let lying = roster::lying(scene, &portion, exchange)?;
+    let bodies = roster::bodies(scene, &portion.mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
-    let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty())?;
-    Ok(Verified { mesh, bodies, checked: checked.into(), lying })
-}
-
-impl<const D: usize> Verified<D> {
-    /// What other ranks have to know.
-    pub fn findings(&self) -> Findings {
-        // supports may hold all nodes of a group of cells
-        let held = self.bodies.iter().flat_map(|body| &body.fix).map(|fix| fix.on.value.as_str());
-        let held: HashSet<&str> = held.collect();
-        let mesh = self.mesh.told(|name| held.contains(name));
-        Findings { mesh, checked: self.checked.iter().map(Checked::counted).collect(), lying: self.lying.clone() }
-    }
-
-    /// What the first rank has found, on another one.
-    ///
-    /// # Errors
-    /// None that [`verify`] has not found before.
-    pub fn told(scene: &Scene, findings: Findings) -> Result<Self> {
-        let Findings { mesh, checked, lying } = findings;
-        let mesh = Mesh::of(mesh);
-        let bodies = roster::bodies(scene, &mesh, &lying)?;
-        Ok(Self { mesh, bodies, checked: checked.into(), lying })
-    }
+    let checked = portion.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty(), exchange)?;
+    Ok(Verified { portion, bodies, checked: checked.into() })
 }
 
 /// A body with the groups that serve it.
@@ -87,22 +55,15 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Re
         return Ok(());
     }
     let space = &part.space;
+    let part_of = &parts.of_node;
     let mut nodes = vec![Vec::new(); parts.count];
-    for (cell, &of) in space.cells.chunks_exact(space.stride).zip(&parts.of_cell) {
-        nodes[of as usize].extend_from_slice(cell);
-    }
-    nodes.iter_mut().for_each(|nodes| {
-        nodes.sort_unstable();
-        nodes.dedup();
-    });
+    (0..).zip(part_of).for_each(|(node, &of)| nodes[of as usize].push(node));
     let motions: Vec<Vec<RigidMotion<D>>> = nodes.iter().map(|nodes| of_nodes(space, nodes)).collect();
     // a part moves, the others stay at rest
-    let mut part_of = vec![0; space.nodes.len()];
-    nodes.iter().zip(0..).for_each(|(nodes, number)| nodes.iter().for_each(|&node| part_of[node as usize] = number));
     let each: Vec<(usize, &RigidMotion<D>)> =
         motions.iter().enumerate().flat_map(|(number, own)| own.iter().map(move |motion| (number, motion))).collect();
     let left = |moving: &[(usize, &RigidMotion<D>)]| {
-        let at = |k: usize, node: u32| match moving[k].0 == part_of[node as usize] {
+        let at = |k: usize, node: u32| match moving[k].0 == part_of[node as usize] as usize {
             true => moving[k].1.at(&space.nodes[node as usize]),
             false => [0.0; D],
         };

@@ -65,22 +65,30 @@ impl<const D: usize> Space<D> {
         space
     }
 
-    /// The space on the points of a mesh, node by node, of a body of which only some `cells` (body node numbers) are here; `measure` is that of
-    /// all of them.
-    pub fn of_points(mesh: &Mesh<D>, points: &[u32], order: Order, cells: Vec<u32>, measure: f64) -> Self {
+    /// The space on the points of a mesh, node by node, of a body of which only some cells, in `group`, are here. The measure of all of them is
+    /// known [later](Self::of_cells).
+    pub fn of_points(mesh: &Mesh<D>, points: &[u32], group: &Group, order: Order) -> Self {
         let mut from_mesh = Numbering::new(points.iter().copied());
         for (node, &point) in (0..).zip(points) {
             from_mesh.number(point, node);
         }
+        let stride = element::node_count(D + 1, order);
+        let corners = group.simplices().flat_map(|cell| &cell[..stride]);
         Space {
             order,
             nodes: points.iter().map(|&point| mesh.points[point as usize]).collect(),
-            stride: element::node_count(D + 1, order),
-            cells,
+            stride,
+            cells: corners.filter_map(|&point| from_mesh.get(point)).collect(),
             axisymmetric: false,
             from_mesh,
-            measure: OnceCell::from(measure),
+            measure: OnceCell::new(),
         }
+    }
+
+    /// The space with other cells of the body, the measure of all of which is known; and the cells that it had.
+    pub fn of_cells(self, cells: Vec<u32>, measure: f64) -> (Self, Vec<u32>) {
+        let before = self.cells;
+        (Self { cells, measure: OnceCell::from(measure), ..self }, before)
     }
 
     /// Some of the cells, in this order, with their nodes alone in the order that they have here; and which nodes these are, sorted. Surfaces

@@ -1,15 +1,23 @@
 //! A place in the bytes of a `.msh` file that reads numbers, written as text or binary, and says where it is.
 
 use crate::error::{Error, Result};
+use std::cell::RefCell;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Reads a `.msh` file from front to back.
+/// Reads a `.msh` file from front to back, a window of it at a time.
 pub struct Cursor<'a> {
     /// The file that the user knows: it stands in messages.
     pub path: &'a Path,
-    /// The whole file.
-    bytes: &'a [u8],
-    /// Where the next number starts.
+    /// The file, or its bytes.
+    source: RefCell<Box<dyn Source + 'a>>,
+    /// Bytes of the whole file.
+    length: usize,
+    /// What of it is in memory.
+    window: Vec<u8>,
+    /// Where the window begins in the file.
+    first: usize,
+    /// Where the next number starts in the window.
     at: usize,
     /// Whether numbers are binary; the `$MeshFormat` section says so.
     pub binary: bool,
@@ -17,22 +25,68 @@ pub struct Cursor<'a> {
     pub section: String,
     /// Whether `path` is a script that the bytes were made from, so that lines in them mean nothing to the user.
     made: bool,
+    /// Why the file cannot be read any more.
+    failed: Option<io::Error>,
 }
+
+/// A file, or bytes like those of one.
+pub trait Source: Read + Seek {}
+
+impl<T: Read + Seek> Source for T {}
+
+/// Bytes of a window: reading is as fast as with larger ones.
+const WINDOW: usize = 1 << 20;
+
+/// Longer lines and words are not those of a mesh file, and not worth a search through the whole file.
+const LONGEST: usize = 1000;
 
 impl<'a> Cursor<'a> {
     /// A cursor at the start of a file.
-    pub fn new(path: &'a Path, bytes: &'a [u8], made: bool) -> Self {
-        Cursor { path, bytes, at: 0, binary: false, section: String::new(), made }
+    pub fn new(path: &'a Path, mut source: Box<dyn Source + 'a>, made: bool) -> Self {
+        let (length, failed) = match source.seek(SeekFrom::End(0)) {
+            Ok(length) => (length as usize, None),
+            Err(cause) => (0, Some(cause)),
+        };
+        let (source, section) = (RefCell::new(source), String::new());
+        Cursor { path, source, length, window: Vec::new(), first: 0, at: 0, binary: false, section, made, failed }
     }
 
     /// Where the next number starts.
     pub fn position(&self) -> usize {
-        self.at
+        self.first + self.at
+    }
+
+    /// The next bytes: so many at least, unless the file ends before.
+    fn ahead(&mut self, count: usize) -> &[u8] {
+        if self.window.len() - self.at < count && self.first + self.window.len() < self.length {
+            self.window.drain(..self.at);
+            self.first += self.at;
+            self.at = 0;
+            let (start, wanted) = ((self.first + self.window.len()) as u64, (WINDOW + count) as u64);
+            let source = self.source.get_mut();
+            let read =
+                source.seek(SeekFrom::Start(start)).and_then(|_| source.take(wanted).read_to_end(&mut self.window));
+            if !matches!(read, Ok(1..)) {
+                // it was cut meanwhile, or cannot be read
+                self.length = self.first + self.window.len();
+                self.failed = read.err();
+            }
+        }
+        &self.window[self.at..]
+    }
+
+    /// # Errors
+    /// The file could not be read to its end.
+    pub fn intact(&mut self) -> Result<()> {
+        self.failed.take().map_or(Ok(()), |cause| Err(Error::file(self.path, "read", &cause)))
     }
 
     /// An error at a position: it names the line of a text file, section and byte of a binary one.
     pub fn error_at(&self, position: usize, message: impl Into<String>) -> Error {
         let message = message.into();
+        if let Some(cause) = &self.failed {
+            return Error::file(self.path, "read", cause);
+        }
         if self.made {
             return Error::mesh(self.path, None, message);
         }
@@ -40,14 +94,20 @@ impl<'a> Cursor<'a> {
             let section = if self.section.is_empty() { String::new() } else { format!(" in ${}", self.section) };
             return Error::mesh(self.path, None, format!("{message}{section}, at byte {position}"));
         }
-        let before = &self.bytes[..position.min(self.bytes.len())];
-        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
-        Error::mesh(self.path, Some(line), message)
+        Error::mesh(self.path, self.line_at(position).ok(), message)
+    }
+
+    /// The line of a position, counted from the start of the file.
+    fn line_at(&self, position: usize) -> io::Result<usize> {
+        let mut source = self.source.borrow_mut();
+        source.seek(SeekFrom::Start(0))?;
+        let before = BufReader::new(source.by_ref().take(position as u64)).bytes();
+        before.filter(|byte| matches!(byte, Ok(b'\n'))).try_fold(1, |line, byte| byte.map(|_| line + 1))
     }
 
     /// An error where the cursor is.
     pub fn error(&self, message: impl Into<String>) -> Error {
-        self.error_at(self.at, message)
+        self.error_at(self.position(), message)
     }
 
     fn ends_early(&self) -> Error {
@@ -57,26 +117,30 @@ impl<'a> Cursor<'a> {
 
     /// Skips white space, lines too; tells whether the file ends there.
     pub fn at_end(&mut self) -> bool {
-        while self.bytes.get(self.at).is_some_and(u8::is_ascii_whitespace) {
-            self.at += 1;
+        loop {
+            match self.ahead(1).first() {
+                None => return true,
+                Some(byte) if byte.is_ascii_whitespace() => self.at += 1,
+                Some(_) => return false,
+            }
         }
-        self.at == self.bytes.len()
     }
 
     /// The rest of the line, trimmed, and on to the next one. Headers and names are lines in binary files too.
-    pub fn line(&mut self) -> Result<&'a str> {
-        // Longer lines are not text, and are not worth a search through the whole file.
-        const LONGEST: usize = 1000;
-        let rest = &self.bytes[self.at..];
-        let end = rest.iter().take(LONGEST).position(|byte| *byte == b'\n');
+    pub fn line(&mut self) -> Result<String> {
+        let rest = self.ahead(LONGEST);
+        let (length, end) = (rest.len(), rest.iter().take(LONGEST).position(|byte| *byte == b'\n'));
         let end = match end {
             Some(end) => end,
-            None if rest.len() < LONGEST => rest.len(),
+            None if length < LONGEST => length,
             None => return Err(self.error("this line is too long to be one of a mesh file")),
         };
-        let line = std::str::from_utf8(&rest[..end]).map_err(|_| self.error("this line is not text in UTF-8"))?;
-        self.at = self.bytes.len().min(self.at + end + 1);
-        Ok(line.trim())
+        let Ok(line) = std::str::from_utf8(&rest[..end]) else {
+            return Err(self.error("this line is not text in UTF-8"));
+        };
+        let line = line.trim().to_owned();
+        self.at += length.min(end + 1);
+        Ok(line)
     }
 
     /// Enters the section of this name.
@@ -87,7 +151,7 @@ impl<'a> Cursor<'a> {
 
     /// Leaves the section, over its closing line.
     pub fn leave(&mut self) -> Result<()> {
-        let start = self.at;
+        let start = self.position();
         let ok = !self.at_end() && self.line().is_ok_and(|line| line.strip_prefix("$End") == Some(&*self.section));
         if !ok {
             let message = format!("`$End{}` should stand here", self.section);
@@ -99,17 +163,19 @@ impl<'a> Cursor<'a> {
 
     /// Jumps over what is left of the section and leaves it.
     pub fn skip_section(&mut self) -> Result<()> {
-        let end = format!("$End{}", self.section);
-        let mut from = self.at;
-        while let Some(dollar) = self.bytes[from..].iter().position(|byte| *byte == b'$') {
-            from += dollar;
-            if self.bytes[from..].starts_with(end.as_bytes()) {
-                self.at = from;
+        let (end, start) = (format!("$End{}", self.section), self.position());
+        loop {
+            let rest = self.ahead(end.len());
+            if rest.starts_with(end.as_bytes()) {
                 return self.leave();
             }
-            from += 1;
+            let others = rest.iter().skip(1).take_while(|byte| **byte != b'$').count();
+            if rest.is_empty() {
+                let error = self.error_at(start, format!("`{end}` is missing"));
+                return Err(error.help("the file was cut short: save the mesh again with Gmsh"));
+            }
+            self.at += 1 + others;
         }
-        Err(self.error(format!("`{end}` is missing")).help("the file was cut short: save the mesh again with Gmsh"))
     }
 
     /// Goes to the start of a record: in text, over blank lines.
@@ -125,7 +191,7 @@ impl<'a> Cursor<'a> {
             return Ok(());
         }
         self.skip_blanks();
-        match self.bytes.get(self.at) {
+        match self.ahead(1).first() {
             None => Ok(()),
             Some(b'\n') => {
                 self.at += 1;
@@ -136,24 +202,24 @@ impl<'a> Cursor<'a> {
     }
 
     fn skip_blanks(&mut self) {
-        while matches!(self.bytes.get(self.at), Some(b' ' | b'\t' | b'\r')) {
+        while matches!(self.ahead(1).first(), Some(b' ' | b'\t' | b'\r')) {
             self.at += 1;
         }
     }
 
     /// The next bytes of a binary file.
     fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
-        let Some(bytes) = self.bytes[self.at..].first_chunk() else {
+        let Some(&bytes) = self.ahead(N).first_chunk() else {
             return Err(self.ends_early());
         };
         self.at += N;
-        Ok(*bytes)
+        Ok(bytes)
     }
 
-    /// The next word of a text file, on this line.
-    fn word(&mut self) -> Result<&'a str> {
+    /// The next word of a text file, on this line, as a number.
+    fn number<T: std::str::FromStr>(&mut self, what: &str) -> Result<T> {
         self.skip_blanks();
-        let rest = &self.bytes[self.at..];
+        let rest = self.ahead(LONGEST);
         let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
         if rest.is_empty() {
             return Err(self.ends_early());
@@ -161,17 +227,15 @@ impl<'a> Cursor<'a> {
         if length == 0 {
             return Err(self.error("this line has too few entries"));
         }
-        let word = std::str::from_utf8(&rest[..length]).map_err(|_| self.error("a number should stand here"))?;
-        self.at += length;
-        Ok(word)
-    }
-
-    fn number<T: std::str::FromStr>(&mut self, what: &str) -> Result<T> {
-        let word = self.word()?;
-        word.parse().map_err(|_| {
+        let Ok(word) = std::str::from_utf8(&rest[..length]) else {
+            return Err(self.error("a number should stand here"));
+        };
+        let Ok(number) = word.parse() else {
             let shown: String = word.chars().take(40).collect();
-            self.error_at(self.at - word.len(), format!("`{shown}` should be {what}"))
-        })
+            return Err(self.error(format!("`{shown}` should be {what}")));
+        };
+        self.at += length;
+        Ok(number)
     }
 
     /// The next `int`.
@@ -186,7 +250,7 @@ impl<'a> Cursor<'a> {
 
     /// The next `double`, finite.
     pub fn real(&mut self) -> Result<f64> {
-        let start = self.at;
+        let start = self.position();
         let value: f64 = if self.binary { self.take().map(f64::from_le_bytes)? } else { self.number("a number")? };
         if value.is_finite() {
             return Ok(value);
@@ -202,11 +266,11 @@ impl<'a> Cursor<'a> {
     /// The next `size_t` as the count of things that take at least so many `numbers` in text, `bytes` in binary: what
     /// the rest of the file cannot hold is refused before anything is allocated for it.
     pub fn count(&mut self, numbers: usize, bytes: usize) -> Result<usize> {
-        let start = self.at;
+        let start = self.position();
         let count = self.size()?;
         // A number in text is a digit and a separator; the last separator may be missing.
         let each = if self.binary { bytes } else { 2 * numbers };
-        let most = (self.bytes.len() - self.at + 1) / each.max(1);
+        let most = (self.length - self.position() + 1) / each.max(1);
         match usize::try_from(count) {
             Ok(count) if count <= most => Ok(count),
             _ => Err(self
@@ -218,21 +282,33 @@ impl<'a> Cursor<'a> {
     /// Skips records that nobody needs: lines of a text file, `bytes` each in a binary one.
     pub fn skip_records(&mut self, count: usize, bytes: usize) -> Result<()> {
         if self.binary {
-            let length = count.checked_mul(bytes).filter(|length| *length <= self.bytes.len() - self.at);
-            self.at += length.ok_or_else(|| self.ends_early())?;
+            let length = count.checked_mul(bytes).filter(|length| *length <= self.length - self.position());
+            let length = length.ok_or_else(|| self.ends_early())?;
+            self.rewind(self.position() + length);
             return Ok(());
         }
         for _ in 0..count {
             self.begin();
-            let rest = &self.bytes[self.at..];
-            let line = rest.iter().position(|byte| *byte == b'\n').ok_or_else(|| self.ends_early())?;
-            self.at += line + 1;
+            loop {
+                let rest = self.ahead(1);
+                match rest.iter().position(|byte| *byte == b'\n') {
+                    Some(line) => break self.at += line + 1,
+                    None if rest.is_empty() => return Err(self.ends_early()),
+                    None => self.at += rest.len(),
+                }
+            }
         }
         Ok(())
     }
 
-    /// Goes back to a position seen before, for a closer look.
+    /// Goes to another position, such as one seen before, for a closer look.
     pub fn rewind(&mut self, position: usize) {
-        self.at = position;
+        match position.checked_sub(self.first).filter(|at| *at <= self.window.len()) {
+            Some(at) => self.at = at,
+            None => {
+                self.window.clear();
+                (self.first, self.at) = (position, 0);
+            }
+        }
     }
 }

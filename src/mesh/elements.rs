@@ -17,7 +17,7 @@ use std::collections::HashSet;
 pub fn read<const D: usize>(
     cursor: &mut Cursor,
     nodes: &Nodes,
-    physical: &mut Physical,
+    physical: &mut Physical<'_, '_>,
 ) -> Result<(Option<Order>, usize)> {
     cursor.begin();
     let start = cursor.position();
@@ -62,7 +62,7 @@ pub fn read<const D: usize>(
             cursor.skip_records(count, 8 * (1 + stride))?;
             continue;
         };
-        let name = &physical.groups[*first].name;
+        let name = physical.groups[*first].name.clone();
         let split = Split::of_type(number).filter(|split| split.dimension == dimension);
         let whole = Kind::of_type(number).filter(|kind| kind.dimension == dimension);
         let Some(kind) = whole.or(split.map(|split| Kind::linear(split.dimension))) else {
@@ -73,9 +73,15 @@ pub fn read<const D: usize>(
             let message = format!("group `{name}` is of another order than the elements before it");
             return Err(cursor.error_at(head, message).help("save all elements with one order: gmsh -order 1 or 2"));
         }
-        let (connectivity, tags) = Block { kind, split, count, name }.read::<D>(cursor, nodes)?;
+        let dealt = dimension == D && physical.begin::<D>(kind.order, &nodes.points);
+        let mut rest = count;
+        while rest > 0 {
+            let slice = Block { kind, split, count: rest.min(SLICE), name: &name };
+            let (connectivity, tags) = slice.read::<D>(cursor, nodes)?;
+            physical.extend((dimension, tag), kind.stride, (&connectivity, &tags), dealt);
+            rest -= slice.count;
+        }
         in_parts += if split.is_some() { count } else { 0 };
-        physical.extend(dimension, tag, kind.stride, &connectivity, &tags);
     }
     if seen != total {
         let message = format!("$Elements announces {total} elements and holds {seen}");
@@ -96,7 +102,10 @@ pub fn read<const D: usize>(
 /// What to do about elements that are not simplices of order 1 or 2.
 const SIMPLICES: &str = "use triangles and tetrahedra of order 1 or 2, or quadrangles, hexahedra, prisms and pyramids of order 1: `gmsh -order 1`";
 
-/// The elements of one entity, all of one kind.
+/// Elements that are read before they go to their groups.
+const SLICE: usize = 1 << 14;
+
+/// Elements of one entity, all of one kind.
 struct Block<'a> {
     /// What the simplices are.
     kind: Kind,

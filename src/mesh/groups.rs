@@ -46,7 +46,17 @@ pub struct Groups {
 impl Groups {
     /// The group of a name.
     pub fn named(&self, name: &str) -> Option<&Group> {
-        self.place.get(name).map(|&place| &self.list[place])
+        self.place(name).map(|place| &self.list[place])
+    }
+
+    /// The place of the group of a name.
+    pub fn place(&self, name: &str) -> Option<usize> {
+        self.place.get(name).copied()
+    }
+
+    /// The groups alone.
+    pub fn into_list(self) -> Vec<Group> {
+        self.list
     }
 }
 
@@ -71,19 +81,23 @@ impl DerefMut for Groups {
     }
 }
 
-/// Renumbers the points that the groups use, in their old order, and gives the old number of each new one.
-/// `count` is the number of points before; every number in the groups is below it.
-pub fn compact(groups: &mut [Group], count: usize) -> impl Iterator<Item = usize> + use<> {
-    const UNUSED: u32 = u32::MAX;
-    let mut number = vec![UNUSED; count];
-    for point in groups.iter().flat_map(|group| &group.connectivity) {
-        number[*point as usize] = 0;
-    }
-    for (new, slot) in number.iter_mut().filter(|slot| **slot != UNUSED).enumerate() {
-        *slot = new as u32;
-    }
+/// Which of so many points the groups use; every number in them is below it.
+pub fn used(groups: &[Group], count: usize) -> Vec<bool> {
+    let mut used = vec![false; count];
+    groups.iter().flat_map(|group| &group.connectivity).for_each(|&point| used[point as usize] = true);
+    used
+}
+
+/// Renumbers the points that are used, in their old order, and gives the old number of each new one.
+pub fn compact(groups: &mut [Group], used: Vec<bool>) -> impl Iterator<Item = usize> + use<> {
+    let mut next = 0;
+    let number = |used: &bool| {
+        next += u32::from(*used);
+        next.wrapping_sub(1)
+    };
+    let number: Vec<u32> = used.iter().map(number).collect();
     for point in groups.iter_mut().flat_map(|group| &mut group.connectivity) {
         *point = number[*point as usize];
     }
-    (0..count).filter(move |old| number[*old] != UNUSED)
+    (0..used.len()).filter(move |old| used[*old])
 }

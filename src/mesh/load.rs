@@ -4,12 +4,15 @@ use super::cache::{Workshop, file_name, folders};
 use super::gmsh::{Gmsh, Task};
 use super::msh::Maker;
 use super::script::Script;
-use super::{Mesh, foreign, msh};
+use super::{Dealer, Mesh, foreign, msh};
 use crate::error::{Error, Located, Place, Result};
+use crate::exchange::Serial;
 use crate::file::digest_of_bytes;
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::{Guard, MeshSource};
 use crate::problem::order::Order;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A mesh and where it came from.
@@ -43,31 +46,57 @@ pub enum Origin {
 /// A file that cannot be read, a number that the script does not take, Gmsh missing or failing, a mesh that is not one
 /// of named simplices in `D` dimensions (see [`parse`](super::parse)), or of too low an order; the signal.
 pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
-    let mut loaded = match source {
+    deal(source, order, interrupt, &mut Dealer::new(&Serial, order))
+}
+
+/// The same; where there are several ranks, cells of `.msh` files that are of this order are dealt out while they are read, and the mesh lacks them.
+///
+/// # Errors
+/// Those of [`load`].
+pub fn deal<const D: usize>(
+    source: &MeshSource,
+    order: Order,
+    interrupt: &Interrupt,
+    dealer: &mut Dealer,
+) -> Result<Loaded<D>> {
+    match source {
         MeshSource::Geo { file, set, places, sizes, guard } => {
             if let (true, Some(place)) = (foreign::is_shape(&file.value), places.first()) {
                 return Err(Error::scene(place, "numbers for a shape of another program, which has none")
                     .help("give sizes of elements by mesh = { geo = \"...\", size = 0.1 }, or a script (.geo) that merges the file"));
             }
-            from_script(file, (set, places), sizes.as_deref(), order, (guard, interrupt), &folders())?
+            meshed(file, (set, places), sizes.as_deref(), order, (guard, interrupt), (&folders(), dealer))
         }
-        MeshSource::Msh { file } => from_file(file, order, interrupt)?,
+        MeshSource::Msh { file } => from_file(file, order, interrupt, dealer),
         MeshSource::Arrays(arrays) => {
-            Loaded { mesh: super::arrays::mesh(arrays, order)?, origin: Origin::File, file: PathBuf::new() }
+            Ok(Loaded { mesh: super::arrays::mesh(arrays, order)?, origin: Origin::File, file: PathBuf::new() })
         }
-    };
-    if D == 3 {
-        loaded.mesh.sort_cells();
     }
-    Ok(loaded)
 }
 
-fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
+/// Bytes by which a file shows its kind.
+const START: u64 = 1000;
+
+fn from_file<const D: usize>(
+    file: &Located<PathBuf>,
+    order: Order,
+    interrupt: &Interrupt,
+    dealer: &mut Dealer,
+) -> Result<Loaded<D>> {
     let path = &file.value;
-    let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
-    let mut loaded = match foreign::is_mesh(path, &bytes) {
-        true => converted(file, &bytes, interrupt)?,
-        false => Loaded { mesh: msh::parse(path, &bytes, Maker::User)?, origin: Origin::File, file: path.clone() },
+    let mut source = crate::file::open(path).map_err(|error| error.at(&file.place))?;
+    let mut start = Vec::new();
+    let read = source.by_ref().take(START).read_to_end(&mut start);
+    read.map_err(|cause| Error::file(path, "read", &cause).at(&file.place))?;
+    let mut loaded = match foreign::is_mesh(path, &start) {
+        true => {
+            let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
+            converted(file, &bytes, interrupt)?
+        }
+        false => {
+            let mesh = msh::read(path, Box::new(source), Maker::User, Some(dealer))?;
+            Loaded { mesh, origin: Origin::File, file: path.clone() }
+        }
     };
     loaded.mesh = match (loaded.mesh.order, order) {
         (Order::P2, Order::P1) => loaded.mesh.lower_order(),
@@ -90,8 +119,8 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
     let gmsh = Gmsh::find()?;
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     let name = file_name(("converted", gmsh.identity(), ending, digest_of_bytes(bytes)), path);
-    let parse = |bytes: &[u8]| {
-        msh::parse(path, bytes, Maker::Other).map_err(|error| match error.advice() {
+    let parse = |file: File| {
+        msh::read(path, Box::new(file), Maker::Other, None).map_err(|error| match error.advice() {
             // what helps a script helps nobody here
             Some(advice) if !advice.contains("Physical") => error,
             _ => error.help(format!("see what Gmsh makes of it: gmsh {}", path.display())),
@@ -111,34 +140,47 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
 fn kept<const D: usize>(
     name: &str,
     folders: &[PathBuf],
-    parse: impl Fn(&[u8]) -> Result<Mesh<D>>,
+    mut parse: impl FnMut(File) -> Result<Mesh<D>>,
     make: impl FnOnce(&Path, &Path) -> Result<()>,
 ) -> Result<Loaded<D>> {
     // A file of the cache that cannot be read or is damaged is as good as none.
     for folder in folders {
         let cached = folder.join(name);
-        if let Some(mesh) = std::fs::read(&cached).ok().and_then(|bytes| parse(&bytes).ok()) {
+        if let Some(mesh) = File::open(&cached).ok().and_then(|file| parse(file).ok()) {
             return Ok(Loaded { mesh, origin: Origin::Cache, file: cached });
         }
     }
     let workshop = Workshop::open(folders)?;
     let made = workshop.path().join(name);
-    let read = || std::fs::read(&made).map_err(|cause| Error::file(&made, "read", &cause));
-    let mesh = make(workshop.path(), &made).and_then(|()| parse(&read()?));
+    let open = || File::open(&made).map_err(|cause| Error::file(&made, "read", &cause));
+    let mesh = make(workshop.path(), &made).and_then(|()| parse(open()?));
     // half a file is no fault of the script
     let mesh = mesh.map_err(|error| workshop.blame(error))?;
     Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, name)? })
 }
 
+/// Meshes a script on one rank.
+#[cfg(test)]
+pub(super) fn from_script<const D: usize>(
+    file: &Located<PathBuf>,
+    numbers: (&[(String, f64)], &[Place]),
+    sizes: Option<&str>,
+    order: Order,
+    guard: (&Guard, &Interrupt),
+    folders: &[PathBuf],
+) -> Result<Loaded<D>> {
+    meshed(file, numbers, sizes, order, guard, (folders, &mut Dealer::new(&Serial, order)))
+}
+
 /// Meshes a script, with the cache in one of `folders`; `set` are the numbers set in it, and where they stand if that is not where the
 /// script is named.
-pub(super) fn from_script<const D: usize>(
+fn meshed<const D: usize>(
     file: &Located<PathBuf>,
     (set, places): (&[(String, f64)], &[Place]),
     sizes: Option<&str>,
     order: Order,
     (guard, interrupt): (&Guard, &Interrupt),
-    folders: &[PathBuf],
+    (folders, dealer): (&[PathBuf], &mut Dealer),
 ) -> Result<Loaded<D>> {
     let path = &file.value;
     let is_shape = foreign::is_shape(path);
@@ -169,7 +211,7 @@ pub(super) fn from_script<const D: usize>(
         let script = sized.as_deref().unwrap_or(&own);
         gmsh.run(&Task { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt }, made, work)
     };
-    kept(&name, folders, |bytes| checked(path, bytes, order), make)
+    kept(&name, folders, |file| checked(path, file, order, dealer), make)
 }
 
 /// For a script whose last line is not ended: one in the folder `work` that includes it.
@@ -205,9 +247,11 @@ fn final_name(purpose: &str) -> String {
     file_name(purpose, Path::new("sizes")) + ".pos"
 }
 
-/// The mesh in bytes that Gmsh made from a script, of the order asked for.
-fn checked<const D: usize>(path: &Path, bytes: &[u8], order: Order) -> Result<Mesh<D>> {
-    let mesh: Mesh<D> = msh::parse(path, bytes, Maker::Script)?;
+/// The mesh in a file that Gmsh made from a script, of the order asked for.
+fn checked<const D: usize>(path: &Path, file: File, order: Order, dealer: &mut Dealer) -> Result<Mesh<D>> {
+    // an earlier file may have been damaged
+    dealer.reset();
+    let mesh: Mesh<D> = msh::read(path, Box::new(file), Maker::Script, Some(dealer))?;
     if mesh.order == order {
         return Ok(mesh);
     }

@@ -3,14 +3,15 @@
 //! Gmsh lists tetrahedra as its Delaunay kernel found them, and nodes are numbered as cells come. A product with the stiffness
 //! matrix then jumps through memory. Along Morton's curve through the centres of the cells it does not.
 
-use super::{Group, Mesh};
+use super::{Group, Key, Mesh};
 
 /// Bits of a coordinate in a place on the curve: three of them fit 64.
 const BITS: u32 = 21;
 
 impl<const D: usize> Mesh<D> {
-    /// Sorts the cells of each group along Morton's curve. Structured meshes in the plane come in a good order already.
-    pub(super) fn sort_cells(&mut self) {
+    /// Sorts the cells of each group along Morton's curve. Structured meshes in the plane come in a good order already. Gives the
+    /// keys of cells of which `index` has the places in the file, group by group.
+    pub(super) fn sort_cells(&mut self, index: &[Vec<u32>]) -> Vec<Vec<Key>> {
         let mut corner = [[f64::INFINITY; D], [f64::NEG_INFINITY; D]];
         for (x, c) in self.points.iter().flat_map(|x| (0..D).map(move |c| (x, c))) {
             corner[0][c] = corner[0][c].min(x[c]);
@@ -18,20 +19,22 @@ impl<const D: usize> Mesh<D> {
         }
         let size = (0..D).map(|c| corner[1][c] - corner[0][c]).fold(f64::MIN_POSITIVE, f64::max);
         let scale = f64::from((1u32 << BITS) - 1) / size;
-        for group in self.groups.iter_mut().filter(|group| group.dimension == D) {
+        let points = &self.points;
+        let sorted = |(number, group): (usize, &mut Group)| {
             let place = |cell: &[u32]| {
-                let centre =
-                    |c: usize| cell[..=D].iter().map(|&p| self.points[p as usize][c]).sum::<f64>() / (D + 1) as f64;
+                let centre = |c: usize| cell[..=D].iter().map(|&p| points[p as usize][c]).sum::<f64>() / (D + 1) as f64;
                 (0..D).fold(0, |place, c| place | spread(((centre(c) - corner[0][c]) * scale) as u64) << c)
             };
-            sort(group, place);
-        }
+            let order = if group.dimension == D { sort(group, place) } else { Vec::new() };
+            index.get(number).map_or(Vec::new(), |index| order.iter().map(|&(at, i)| (at, index[i as usize])).collect())
+        };
+        self.groups.iter_mut().enumerate().map(sorted).collect()
     }
 }
 
-/// Sorts the simplices of a group by a key, equal ones as they were.
-fn sort(group: &mut Group, key: impl Fn(&[u32]) -> u64) {
-    let mut order: Vec<(u64, u32)> = group.simplices().zip(0..).map(|(simplex, i)| (key(simplex), i)).collect();
+/// Sorts the simplices of a group by a key, equal ones as they were; gives the keys with their numbers before.
+fn sort(group: &mut Group, key: impl Fn(&[u32]) -> u64) -> Vec<Key> {
+    let mut order: Vec<Key> = group.simplices().zip(0..).map(|(simplex, i)| (key(simplex), i)).collect();
     order.sort_unstable();
     let old = std::mem::take(&mut group.connectivity);
     group.connectivity =
@@ -39,6 +42,7 @@ fn sort(group: &mut Group, key: impl Fn(&[u32]) -> u64) {
     if !group.tags.is_empty() {
         group.tags = order.iter().map(|&(_, i)| group.tags[i as usize]).collect();
     }
+    order
 }
 
 /// The bits of a number with two zeros before each.
@@ -78,7 +82,7 @@ mod tests {
             .into(),
             split: 0,
         };
-        mesh.sort_cells();
+        mesh.sort_cells(&[]);
         let first: Vec<f64> = mesh.groups[0].simplices().map(|cell| mesh.points[cell[0] as usize][0]).collect();
         assert_eq!(first, [0.0, 1.0, 2.0, 3.0]);
         assert_eq!(mesh.groups[0].tags, [8, 10, 9, 7]);

@@ -6,9 +6,11 @@
 
 mod abaqus;
 mod arrays;
+mod bisect;
 mod cache;
 mod check;
 mod cursor;
+mod dealer;
 mod elements;
 mod foreign;
 mod gmsh;
@@ -19,6 +21,7 @@ mod locality;
 mod msh;
 mod nodes;
 mod physical;
+mod portion;
 mod quality;
 mod script;
 mod simplex;
@@ -27,18 +30,19 @@ mod split;
 #[cfg(test)]
 mod tests;
 mod tokens;
-mod told;
 mod trust;
 mod unv;
 
+pub use bisect::parts as bisect;
 pub use check::{Asked, Checked, Duty, Parts};
+pub use dealer::Dealer;
 pub use foreign::is_shape;
 pub use groups::{Group, Groups};
-pub use load::{Loaded, Origin, keep_final, load, recall_final};
+pub use load::{Loaded, Origin, deal, keep_final, load, recall_final};
 pub use msh::{Maker, parse};
+pub use portion::{Key, Portion};
 pub use quality::Quality;
 pub use sizes::{unstructured, view};
-pub use told::Told;
 pub use trust::{Breach, breach};
 
 use crate::problem::order::Order;
@@ -90,7 +94,8 @@ impl<const D: usize> Mesh<D> {
             group.connectivity = group.simplices().flat_map(|simplex| &simplex[..vertices]).copied().collect();
             group.stride = vertices;
         }
-        let points = groups::compact(&mut groups, self.points.len()).map(|old| self.points[old]).collect();
+        let used = groups::used(&groups, self.points.len());
+        let points = groups::compact(&mut groups, used).map(|old| self.points[old]).collect();
         Mesh { path: self.path.clone(), points, order: Order::P1, groups, split: self.split }
     }
 }

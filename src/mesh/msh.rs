@@ -1,10 +1,10 @@
 //! Reader of Gmsh's `.msh` 4.1, text and binary, into a [`Mesh`].
 
-use super::cursor::Cursor;
+use super::cursor::{Cursor, Source};
 use super::nodes::Nodes;
 use super::physical::Physical;
 use super::simplex::THINGS;
-use super::{Group, Mesh, elements, groups};
+use super::{Dealer, Mesh, elements, groups};
 use crate::error::{Error, Result};
 use crate::problem::order::Order;
 use std::path::Path;
@@ -20,32 +20,48 @@ pub enum Maker {
     Other,
 }
 
-/// Reads the bytes of a `.msh` file; `path` stands in messages: what `maker` made the bytes from.
+/// Reads the bytes of a `.msh` file; see [`read`].
+///
+/// # Errors
+/// Those of [`read`].
+pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<Mesh<D>> {
+    read(path, Box::new(std::io::Cursor::new(bytes)), maker, None)
+}
+
+/// Reads a `.msh` file from its start, some of it at a time; `path` stands in messages: what `maker` made the file from. The mesh lacks cells that a
+/// `dealer` has got, and keeps all points then.
 ///
 /// # Errors
 /// Everything that makes the file no mesh of named simplices in `D` dimensions is a [`Kind::Mesh`](crate::error::Kind)
-/// error with the line or byte and a way out.
-pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<Mesh<D>> {
+/// error with the line or byte and a way out; a file that cannot be read.
+pub fn read<const D: usize>(
+    path: &Path,
+    source: Box<dyn Source + '_>,
+    maker: Maker,
+    dealer: Option<&mut Dealer>,
+) -> Result<Mesh<D>> {
     const { assert!(D == 2 || D == 3) };
-    let cursor = &mut Cursor::new(path, bytes, maker != Maker::User);
+    let cursor = &mut Cursor::new(path, source, maker != Maker::User);
     read_format(cursor)?;
-    let mut physical = Physical::new(maker == Maker::Other);
+    let mut physical = Physical::new(maker == Maker::Other, dealer);
     let mut nodes: Option<Nodes> = None;
     let (mut order, mut split) = (None, 0);
-    let mut seen: Vec<&str> = Vec::new();
+    let mut seen: Vec<String> = Vec::new();
+    let has = |seen: &[String], section: &str| seen.iter().any(|before| before == section);
     while !cursor.at_end() {
         let start = cursor.position();
-        let Some(section) = cursor.line()?.strip_prefix('$') else {
+        let line = cursor.line()?;
+        let Some(section) = line.strip_prefix('$') else {
             return Err(cursor.error_at(start, "a section such as `$Nodes` should begin here"));
         };
         cursor.enter(section);
         match section {
             // Each needs those before it, and once.
             "PhysicalNames" | "Entities" | "Nodes" | "Elements" => {
-                if seen.contains(&section) {
+                if has(&seen, section) {
                     return Err(cursor.error_at(start, format!("the section ${section} stands twice")));
                 }
-                seen.push(section);
+                seen.push(section.to_owned());
             }
             "PartitionedEntities" => {
                 let error = cursor.error_at(start, "the mesh is partitioned");
@@ -60,7 +76,7 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<
             ("PhysicalNames", _) => physical.read_names(cursor, D)?,
             ("Entities", _) => physical.read_entities(cursor)?,
             ("Nodes", _) => nodes = Some(Nodes::read(cursor)?),
-            (_, Some(nodes)) if seen.contains(&"Entities") => {
+            (_, Some(nodes)) if has(&seen, "Entities") => {
                 (order, split) = elements::read::<D>(cursor, nodes, &mut physical)?;
             }
             _ => {
@@ -70,8 +86,9 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<
         }
         cursor.leave()?;
     }
+    cursor.intact()?;
     match nodes {
-        Some(nodes) if seen.contains(&"Elements") => finish(path, physical.finished(D), nodes, order, split),
+        Some(nodes) if has(&seen, "Elements") => finish(path, physical, nodes, order, split),
         _ => {
             let error = Error::mesh(path, None, "there are no elements");
             Err(error.help("the file was cut short, or nothing was meshed"))
@@ -86,8 +103,8 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
     };
     loop {
         let start = cursor.position();
-        let line = if cursor.at_end() { "" } else { cursor.line().unwrap_or("") };
-        match line {
+        let line = if cursor.at_end() { String::new() } else { cursor.line().unwrap_or_default() };
+        match line.as_str() {
             "$MeshFormat" => break,
             "$Comments" => {
                 cursor.enter("Comments");
@@ -104,7 +121,8 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
     }
     cursor.enter("MeshFormat");
     let start = cursor.position();
-    let words: Vec<&str> = cursor.line()?.split_whitespace().collect();
+    let line = cursor.line()?;
+    let words: Vec<&str> = line.split_whitespace().collect();
     let [version, form, size] = words[..] else {
         return Err(cursor.error_at(start, "a format such as `4.1 0 8` should stand here"));
     };
@@ -134,7 +152,7 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
 /// The mesh, once all sections are read.
 fn finish<const D: usize>(
     path: &Path,
-    mut groups: Vec<Group>,
+    physical: Physical,
     nodes: Nodes,
     order: Option<Order>,
     split: usize,
@@ -142,19 +160,27 @@ fn finish<const D: usize>(
     let fail = |message: String| Error::mesh(path, None, message);
     let (thing, cells) = (THINGS[D], THINGS[D].to_lowercase());
     let example = format!("name the bodies and their boundaries: Physical {thing}(\"lower\") = {{1}};");
+    let is_dealt = physical.is_dealt();
+    let empty = physical.empty().map(|group| (group.dimension, group.name.clone()));
+    let mut groups = physical.finished(D);
     if groups.is_empty() {
         return Err(fail("the mesh has no physical groups".into()).help(example));
     }
-    if let Some(empty) = groups.iter().find(|group| group.is_empty()) {
-        let thing = THINGS[empty.dimension];
-        let message = format!("the physical {} `{}` has no elements", thing.to_lowercase(), empty.name);
+    if let Some((dimension, name)) = empty {
+        let thing = THINGS[dimension];
+        let message = format!("the physical {} `{name}` has no elements", thing.to_lowercase());
         return Err(fail(message).help(format!("check what its `Physical {thing}` names, or remove it")));
     }
     let (Some(order), true) = (order, groups.iter().any(|group| group.dimension == D)) else {
         return Err(fail(format!("no physical group holds {cells}s, and dimension = {D}")).help(example));
     };
-    let points = groups::compact(&mut groups, nodes.points.len())
-        .map(|old| std::array::from_fn(|k| nodes.points[old][k]))
-        .collect();
+    let point = |x: [f64; 3]| std::array::from_fn(|k| x[k]);
+    let points = match is_dealt {
+        true => nodes.points.into_iter().map(point).collect(),
+        false => {
+            let used = groups::used(&groups, nodes.points.len());
+            groups::compact(&mut groups, used).map(|old| point(nodes.points[old])).collect()
+        }
+    };
     Ok(Mesh { path: path.to_owned(), points, order, groups: groups.into(), split })
 }

@@ -157,7 +157,7 @@ mod tests {
     use std::path::Path;
 
     fn nodes(text: &str) -> Result<Nodes> {
-        Nodes::read(&mut Cursor::new(Path::new("a.msh"), text.as_bytes(), false))
+        Nodes::read(&mut Cursor::new(Path::new("a.msh"), Box::new(std::io::Cursor::new(text)), false))
     }
 
     #[test]

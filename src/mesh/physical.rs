@@ -1,15 +1,16 @@
 //! Physical groups: their names, and which entities of the geometry belong to them.
 
+use super::Dealer;
 use super::Group;
 use super::cursor::Cursor;
 use super::simplex::THINGS;
 use crate::error::Result;
 use crate::problem::body::is_in_name;
+use crate::problem::order::Order;
 use std::collections::{HashMap, HashSet};
 
 /// The groups of a file, and who belongs to them.
-#[derive(Default)]
-pub struct Physical {
+pub struct Physical<'a, 'b> {
     /// The groups, empty until the elements are read.
     pub groups: Vec<Group>,
     /// From dimension and physical tag to the place in `groups`.
@@ -18,12 +19,38 @@ pub struct Physical {
     entities: HashMap<(usize, i32), Vec<usize>>,
     /// Whether groups without a name are called by their kind and number, and where a dimension has none each entity is one.
     named_by_number: bool,
+    /// Who gets cells, and the order in which they are dealt out while they are read.
+    dealer: Option<&'a mut Dealer<'b>>,
 }
 
-impl Physical {
+impl<'a, 'b> Physical<'a, 'b> {
     /// No groups yet; `named_by_number` if groups without a name are called by their kind and number.
-    pub fn new(named_by_number: bool) -> Self {
-        Self { named_by_number, ..Self::default() }
+    pub fn new(named_by_number: bool, dealer: Option<&'a mut Dealer<'b>>) -> Self {
+        Self { groups: Vec::new(), group_of: HashMap::new(), entities: HashMap::new(), named_by_number, dealer }
+    }
+
+    /// The first group without elements.
+    pub fn empty(&self) -> Option<&Group> {
+        let dealt = |place: usize| self.dealer.as_ref().map_or(0, |dealer| dealer.count(place));
+        // those of other programs are left out
+        let groups = self.groups.iter().enumerate().filter(|_| !self.named_by_number);
+        groups.into_iter().find(|(place, group)| group.is_empty() && dealt(*place) == 0).map(|(_, group)| group)
+    }
+
+    /// Whether cells are dealt out.
+    pub fn is_dealt(&self) -> bool {
+        self.dealer.as_ref().is_some_and(|dealer| dealer.has_begun())
+    }
+
+    /// Deals cells of an order out from here on, if somebody wants them; whether it is so.
+    pub fn begin<const D: usize>(&mut self, order: Option<Order>, points: &[[f64; 3]]) -> bool {
+        let Some(dealer) = self.dealer.as_mut().filter(|dealer| order.is_some_and(|order| dealer.wants(order))) else {
+            return false;
+        };
+        if !dealer.has_begun() {
+            dealer.begin::<D, 3>(points);
+        }
+        true
     }
 
     /// Places in `groups` of those that an entity belongs to; `None` if the file does not list the entity.
@@ -37,11 +64,23 @@ impl Physical {
         of.map(|(entity, _)| *entity).filter(|entity| !has(*entity)).map(|(_, tag)| tag).min()
     }
 
-    /// Adds simplices of `stride` points each, with their tags, to all groups of an entity.
-    pub fn extend(&mut self, dimension: usize, tag: i32, stride: usize, connectivity: &[u32], tags: &[u64]) {
+    /// Adds simplices of `stride` points each, with their tags, to all groups of an entity, or deals them out.
+    pub fn extend(
+        &mut self,
+        (dimension, tag): (usize, i32),
+        stride: usize,
+        (connectivity, tags): (&[u32], &[u64]),
+        dealt: bool,
+    ) {
         for member in self.entities.get(&(dimension, tag)).into_iter().flatten() {
             let group = &mut self.groups[*member];
             group.stride = stride;
+            if let Some(dealer) = self.dealer.as_mut().filter(|_| dealt) {
+                for (simplex, &tag) in connectivity.chunks_exact(stride).zip(tags) {
+                    dealer.put(*member, Some(tag), simplex);
+                }
+                continue;
+            }
             group.connectivity.extend_from_slice(connectivity);
             group.tags.extend_from_slice(tags);
         }

@@ -4,10 +4,13 @@ mod cases;
 mod damage;
 mod loading;
 
-use super::{Group, Mesh, msh, simplex};
+use super::{Dealer, Group, Maker, Mesh, Portion, msh, simplex};
 use crate::error::{Located, Place, Source};
+use crate::exchange::crowd;
 use crate::problem::mesh::Guard;
 use crate::problem::order::Order;
+use std::collections::BTreeMap;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -171,6 +174,48 @@ fn inverted_cells_are_turned_and_order_two_with_them() {
         if order == "2" {
             assert_mid_edges(&mesh);
             assert_mid_edges(&cube);
+        }
+    }
+}
+
+/// While the first rank reads, every cell goes to the ranks of its points: each has all around its own points, none has all there are. Points that
+/// no group uses are left out.
+#[test]
+fn cells_are_dealt_out_while_they_are_read() {
+    for arguments in [&["-3"][..], &["-3", "-order", "2", "-bin"], &["-3", "-save_all"]] {
+        let script = format!("{CUBE}Point(99) = {{7, 8, 9}};\n").replace("= 1/2;", "= 1/4;");
+        let bytes = gmsh(&script, arguments);
+        let whole: Mesh<3> = parse(&bytes).unwrap();
+        for ranks in [2, 5] {
+            let portions = crowd::on(ranks, |exchange| {
+                let read = |dealer: &mut Dealer| {
+                    let mesh = msh::read(Path::new("a.msh"), Box::new(Cursor::new(&bytes)), Maker::User, Some(dealer))?;
+                    assert!(mesh.groups.iter().all(|group: &Group| group.dimension < 3 || group.is_empty()));
+                    Ok(mesh)
+                };
+                let portion = Portion::<3>::read(exchange, whole.order, read).unwrap();
+                assert_eq!(portion.mesh.points, whole.points);
+                let own = (0..whole.points.len() as u32).filter(|&point| portion.is_own(point)).collect::<Vec<_>>();
+                (own, portion.mesh.groups)
+            });
+            assert_eq!(portions.iter().map(|(own, _)| own.len()).sum::<usize>(), whole.points.len());
+            let count =
+                |groups: &[Group]| groups.iter().filter(|group| group.dimension == 3).map(Group::len).sum::<usize>();
+            for (rank, (own, groups)) in portions.iter().enumerate() {
+                assert!(count(groups) < count(&whole.groups), "rank {rank} of {ranks} has all");
+                for (group, all) in groups.iter().zip(whole.groups.iter()) {
+                    let cells = |group: &Group| -> BTreeMap<u64, Vec<u32>> {
+                        group.tags.iter().copied().zip(group.simplices().map(<[u32]>::to_vec)).collect()
+                    };
+                    let (found, mut all) = (cells(group), cells(all));
+                    if group.dimension == 3 {
+                        all.retain(|_, cell| cell.iter().any(|point| own.binary_search(point).is_ok()));
+                    } else if rank > 0 {
+                        continue;
+                    }
+                    assert_eq!(found, all, "{} on rank {rank} of {ranks}", group.name);
+                }
+            }
         }
     }
 }

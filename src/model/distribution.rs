@@ -3,7 +3,7 @@
 //! A state is (v, a): v has the dofs of this rank alone, the rigid motion a is the same on all. Of forces every rank has a part, also
 //! of those on the rigid motion, so that work is a sum over ranks.
 
-use super::exchange::Exchange;
+use crate::exchange::Exchange;
 use crate::linalg::Csr;
 use std::rc::Rc;
 

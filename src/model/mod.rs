@@ -6,7 +6,6 @@
 pub mod body;
 pub mod coarse;
 pub mod distribution;
-pub mod exchange;
 pub mod field;
 pub mod joint;
 pub mod layer;
@@ -16,9 +15,6 @@ pub mod rigid;
 
 pub use body::{Body, BodyCounts, Energy, Loads, Matrices, Solved};
 pub use distribution::Distribution;
-pub use exchange::Exchange;
-#[cfg(test)]
-pub use exchange::Serial;
 pub use field::Field;
 pub use joint::Joint;
 pub use layer::Layer;
@@ -27,6 +23,9 @@ pub use rigid::{Motions, Moved};
 
 use crate::contact::ContactPair;
 use crate::error::Result;
+pub use crate::exchange::Exchange;
+#[cfg(test)]
+pub use crate::exchange::Serial;
 use nalgebra::DMatrix;
 use std::cell::RefCell;
 use std::ops::Range;

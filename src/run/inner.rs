@@ -218,7 +218,7 @@ impl<'a> Inner<'a> {
         }
     }
 
-    /// Chooses for bodies in space: for all together where Newton's method may join them. The first rank knows their graphs. Collective.
+    /// Chooses for bodies in space: for all together where Newton's method may join them. The first rank gets their graphs. Collective.
     fn choose_in_space(&mut self, plans: &mut [&mut Plan], outlines: &[&Outline]) -> Result<()> {
         let joined = self.may_join();
         let size = if joined { plans.len().max(1) } else { 1 };
@@ -228,6 +228,12 @@ impl<'a> Inner<'a> {
                 MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => Step::Swept,
                 MethodName::Robin | MethodName::Ncg | MethodName::Anderson => Step::Sweeps,
             };
+            if self.session.size() > 1 {
+                // the first rank gets the cells that others have
+                outlines.iter().for_each(|outline| {
+                    (outline.graph)();
+                });
+            }
             let compare = || {
                 let candidates = plans.iter().zip(outlines).map(|(plan, outline)| {
                     let NodeGraph { ptr, col, .. } = (outline.graph)();

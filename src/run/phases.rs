@@ -14,8 +14,9 @@ use crate::discretize::{self, ContactInfo, Discrete, Verified};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
+use crate::mesh::{self, Dealer, Portion};
 use crate::model::{BodySlot, Mechanism};
-use crate::parallel::{self, Ranks, agree};
+use crate::parallel::{Ranks, agree};
 use crate::petsc::{Session, give_back};
 use crate::problem::method::Linear;
 use crate::problem::order::Order;
@@ -76,7 +77,7 @@ fn build_in<const D: usize>(
     let mut verified = verified::<D>(session, &scene, interrupt)?;
     clock.phase("mesh");
     drop(stage);
-    verified.mesh.forget_tags();
+    verified.portion.mesh.forget_tags();
     let source = Source { session: session.clone(), scene, verified, cut };
     let history = &source.scene.method.steps;
     let begun = history.begun;
@@ -116,13 +117,13 @@ impl<const D: usize> Source<D> {
         discrete.share();
         // small fronts and several ranks lose by BLAS threads, and the short vectors of a Krylov method do; large factorisations gain
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-        let gains = D == 3 && verified.mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
+        let gains = D == 3 && verified.portion.mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
         session.set_blas_threads(if gains { cores / session.size() } else { 1 });
         clock.estimate = inner.seconds();
         clock.phase("discretize");
         drop(stage);
         let mut warnings = warnings(session, &discrete);
-        warnings.extend(in_parts(verified.mesh.split));
+        warnings.extend(in_parts(verified.portion.mesh.split));
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear(), inner.whole().clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());
@@ -148,23 +149,14 @@ fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()
     Ok(())
 }
 
-/// The mesh, checked: one rank lets Gmsh work, reads and looks, and tells the others. Collective.
+/// The mesh, checked: one rank lets Gmsh work and reads, and every one looks at its part. Collective.
 fn verified<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<Verified<D>> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
     interrupt.hold();
-    let mut first = None;
-    let read = || {
-        let loaded = crate::mesh::load::<D>(&scene.mesh, order, interrupt)?;
-        interrupt.release()?;
-        let verified = first.insert(discretize::verify(scene, loaded.mesh)?);
-        Ok((session.size() > 1).then(|| verified.findings()))
-    };
-    let findings = parallel::tell(&Ranks::new(session), read).and_then(|found| interrupt.release().map(|()| found));
-    match (first, agree(session, findings)?) {
-        (None, Some(findings)) => Verified::told(scene, findings),
-        (Some(verified), _) => Ok(verified),
-        (None, None) => unreachable!("the first rank has read the mesh, and tells others"),
-    }
+    let ranks = Ranks::new(session);
+    let read = |dealer: &mut Dealer| Ok(mesh::deal::<D>(&scene.mesh, order, interrupt, dealer)?.mesh);
+    let portion = Portion::read(&ranks, order, read).and_then(|portion| interrupt.release().map(|()| portion));
+    agree(session, discretize::verify(scene, agree(session, portion)?, &ranks))
 }
 
 fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {

@@ -1,7 +1,6 @@
 //! Quadratic cells: each mid-edge node serves one edge, and no curved cell is folded.
 
-use super::cells::Cells;
-use crate::error::Result;
+use super::cells::{Cells, Found};
 
 /// Share of the largest coefficient of a Jacobian below which it is rounding: a cell that is flat at a corner, as at the end of
 /// two edges that touch each other, has zero there.
@@ -10,31 +9,34 @@ const ROUNDING: f64 = 1e-9;
 /// Halvings of a cell until a Jacobian that was not found negative counts as positive.
 const DEPTH: usize = 12;
 
-/// Checks the mid-edge nodes of a body and the Jacobians of its curved cells.
+/// Checks the mid-edge nodes of a body and the Jacobians of its curved cells. A rank looks at its own nodes, and at all cells that it has.
 ///
 /// # Errors
-/// A mid-edge node on two edges or at a corner; a cell whose Jacobian is negative somewhere.
-pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
+/// A mid-edge node on two edges or at a corner; a cell whose Jacobian is negative somewhere; each with the cell and the place in it.
+pub fn check<const D: usize>(cells: &Cells<D>) -> Found {
     if !cells.is_quadratic() {
         return Ok(());
     }
     let mut ends = vec![None; cells.points.len()];
     for cell in 0..cells.count() {
         let nodes = cells.cell(cell);
+        let at = |place: u32| (1, cells.key(cell).0, cells.key(cell).1, place);
+        let mut place = 0;
         for j in 0..=D {
             for i in 0..=j {
+                place += 1;
                 let node = if i == j { nodes[i] } else { cells.middle(cell, [i, j]) };
                 let own = [nodes[i].min(nodes[j]), nodes[i].max(nodes[j])];
-                if *ends[node as usize].get_or_insert(own) != own {
-                    let what = "a node lies on two edges";
-                    return Err(cells.refuse(what, &[cell], cells.at(node)).help("mesh the geometry again"));
+                if cells.is_own(node) && *ends[node as usize].get_or_insert(own) != own {
+                    let error = cells.refuse("a node lies on two edges", &[cell], cells.at(node));
+                    return Err((at(place), error.help("mesh the geometry again")));
                 }
             }
         }
         let x = control_points(&cells.cell(cell).iter().map(|&node| cells.at(node)).collect::<Vec<_>>(), D);
         if folded(&x, D, DEPTH) {
             let error = cells.refuse("a curved cell is folded", &[cell], cells.at(nodes[0]));
-            return Err(error.help("refine the mesh there, or use order = 1"));
+            return Err((at(place + 1), error.help("refine the mesh there, or use order = 1")));
         }
     }
     Ok(())

@@ -3,11 +3,12 @@
 use super::cells::{Cells, NONE};
 use super::faces::Faces;
 use crate::error::{Error, Result};
+use crate::exchange::Exchange;
 use crate::mesh::{Group, Mesh};
 use std::collections::HashSet;
 
 /// What a group does for a body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Duty {
     /// Load, spring, contact: acts on the boundary of the bodies that it serves.
     Acts,
@@ -63,6 +64,18 @@ impl<'a> InUse<'a> {
                 (_, Duty::Holds) => faces.cells_at(cells, own) > 0,
             };
         }
+    }
+
+    /// Adds what other ranks have found. Collective.
+    pub fn agree(&mut self, exchange: &dyn Exchange) {
+        let mut found: Vec<f64> = self
+            .found
+            .iter()
+            .flat_map(|found| [found.serves, found.touches])
+            .map(|is| f64::from(u8::from(is)))
+            .collect();
+        exchange.sum(&mut found);
+        self.found = found.chunks_exact(2).map(|of| Found { serves: of[0] > 0.0, touches: of[1] > 0.0 }).collect();
     }
 
     /// Those edges of the body between nodes of the group, for groups of edges in space.

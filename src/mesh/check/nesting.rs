@@ -23,10 +23,10 @@ pub fn check<const D: usize>(cells: &Cells<D>, surface: &Surface<D>) -> Result<(
         let facet = surface.facet(i);
         (1..D).for_each(|k| joined.join(facet[0], facet[k]));
     }
-    let closed = joined.classes();
-    let mut seen = vec![false; closed.count];
+    let (count, closed) = joined.classes();
+    let mut seen = vec![false; count];
     let first = (0..surface.faces.len()).filter(|&i| {
-        let class = closed.of_cell[surface.facet(i)[0] as usize] as usize;
+        let class = closed[surface.facet(i)[0] as usize] as usize;
         !std::mem::replace(&mut seen[class], true)
     });
     for i in first.collect::<Vec<_>>() {

@@ -2,7 +2,7 @@
 
 use super::cells::{Cells, NONE};
 use super::distance::{self, Point};
-use super::faces::{Face, Faces};
+use super::faces::Face;
 use crate::error::Result;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
@@ -16,7 +16,7 @@ const FINE: usize = 8;
 /// Facets of the boundary of a body, found by their boxes.
 pub struct Surface<'a, const D: usize> {
     cells: &'a Cells<'a, D>,
-    /// Facets, in the order of [`Faces::outer`].
+    /// Its facets.
     pub faces: Vec<Face<D>>,
     /// Nodes of all facets.
     nodes: Vec<u32>,
@@ -34,9 +34,8 @@ struct Piece {
 }
 
 impl<'a, const D: usize> Surface<'a, D> {
-    /// The facets that bound one cell.
-    pub fn new(cells: &'a Cells<'a, D>, faces: &Faces<D>) -> Self {
-        let faces: Vec<Face<D>> = faces.outer().copied().collect();
+    /// Of the facets that bound one cell, in the order of [`Faces::outer`](super::faces::Faces::outer).
+    pub fn new(cells: &'a Cells<'a, D>, faces: Vec<Face<D>>) -> Self {
         let nodes: Vec<u32> = faces.iter().flat_map(|face| face.nodes(cells)).collect();
         let stride = if cells.is_quadratic() { D * (D + 1) / 2 } else { D };
         let boxed = |(facet, i)| {

@@ -9,15 +9,22 @@
 
 /// The part of each point, of `parts` of equal numbers of points to one: across the longest side of the box around them, then likewise on either
 /// side.
-pub fn parts<const D: usize>(points: &[[f64; D]], parts: usize) -> Vec<u32> {
+///
+/// Points may have more coordinates than the `D` that count.
+pub fn parts<const D: usize, const K: usize>(points: &[[f64; K]], parts: usize) -> Vec<u32> {
     let mut part = vec![0; points.len()];
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
-    split(points, &mut order, 0..parts, &mut part);
+    split::<D, K>(points, &mut order, 0..parts, &mut part);
     part
 }
 
 /// Deals the points of these numbers out to some parts.
-fn split<const D: usize>(points: &[[f64; D]], these: &mut [u32], parts: std::ops::Range<usize>, part: &mut [u32]) {
+fn split<const D: usize, const K: usize>(
+    points: &[[f64; K]],
+    these: &mut [u32],
+    parts: std::ops::Range<usize>,
+    part: &mut [u32],
+) {
     if parts.len() < 2 || these.is_empty() {
         these.iter().for_each(|&point| part[point as usize] = parts.start as u32);
         return;
@@ -37,13 +44,17 @@ fn split<const D: usize>(points: &[[f64; D]], these: &mut [u32], parts: std::ops
         by_place.unwrap_or(a.cmp(&b))
     });
     let (low, high) = these.split_at_mut(below);
-    split(points, low, parts.start..middle, part);
-    split(points, high, middle..parts.end, part);
+    split::<D, K>(points, low, parts.start..middle, part);
+    split::<D, K>(points, high, middle..parts.end, part);
 }
 
 #[cfg(test)]
 mod tests {
-    use super::parts;
+    use super::parts as of;
+
+    fn parts<const D: usize>(points: &[[f64; D]], count: usize) -> Vec<u32> {
+        of::<D, D>(points, count)
+    }
 
     /// A long box is cut across; points of a plane, of which a whole number of parts has not room, along the next axis; parts differ by one
     /// point at most, and are those of any order of the points.

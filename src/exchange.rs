@@ -1,0 +1,207 @@
+//! What the ranks of a run tell each other: bytes, and plain data as bytes.
+
+use crate::error::{Error, Kind, Result};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// What the ranks of a parallel run tell each other; calls are collective unless they say otherwise.
+pub trait Exchange {
+    /// Replaces `values` on every rank by the sum over the ranks: the same numbers everywhere, as MPI promises. Where every body lives
+    /// on one rank, every entry is non-zero on one only, so that sums are exact.
+    fn sum(&self, values: &mut [f64]);
+    /// Number of ranks.
+    fn ranks(&self) -> usize;
+    /// Number of this one.
+    fn rank(&self) -> usize;
+    /// The bytes of each rank, in their order.
+    fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>>;
+    /// The bytes of the first rank.
+    fn tell(&self, mine: Vec<u8>) -> Vec<u8>;
+    /// The bytes that each rank has for this one, in their order, where `mine` are those for each rank.
+    fn trade(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
+    /// Bytes for one other rank, which takes them from this one; neither is collective.
+    fn send(&self, to: usize, bytes: &[u8]);
+    /// Bytes that another rank sends to this one.
+    fn receive(&self, from: usize) -> Vec<u8>;
+    /// Sums and shares so far between several ranks.
+    fn messages(&self) -> usize;
+}
+
+/// What each rank knows, in their order; collective.
+pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: &T) -> Vec<T> {
+    exchange.share(pack(mine)).iter().filter_map(|bytes| unpack(bytes).ok()).collect()
+}
+
+/// What each rank has for this one, in their order, where `mine` is that for each rank; collective.
+pub fn trade<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: Vec<T>) -> Vec<T> {
+    if exchange.ranks() == 1 {
+        return mine;
+    }
+    // one after the other: what is packed is dropped
+    let packed = mine.into_iter().map(|mine| pack(&mine)).collect();
+    let theirs = exchange.trade(packed).into_iter();
+    theirs.map(|bytes| unpack(&bytes).unwrap_or_else(|_| unreachable!("ranks run one program"))).collect()
+}
+
+/// What the first rank has found; `mine` is there alone, and is asked for nowhere else. Collective.
+///
+/// # Errors
+/// That of the first rank, there; elsewhere one of the same kind without words.
+pub fn tell<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: impl FnOnce() -> Result<T>) -> Result<T> {
+    if exchange.rank() == 0 {
+        let found = mine();
+        if exchange.ranks() > 1 {
+            exchange.tell(pack(&found.as_ref().map_err(|error| error.kind().exit_code())));
+        }
+        return found;
+    }
+    unpack::<Result<T, i32>>(&exchange.tell(Vec::new()))?.map_err(Error::silent)
+}
+
+/// What ranks have found that looked at different parts of one thing: the error, if there is any, with the least key, which is the one that a rank
+/// would meet first that had all parts. Collective.
+///
+/// # Errors
+/// That error on the rank that has found it; elsewhere one of the same kind without words.
+pub fn first<K: Serialize + DeserializeOwned + Ord, T>(
+    exchange: &dyn Exchange,
+    found: Result<T, (K, Error)>,
+) -> Result<T> {
+    if exchange.ranks() == 1 {
+        return found.map_err(|(_, error)| error);
+    }
+    let mine = found.as_ref().err().map(|(key, error)| (key, error.kind().exit_code()));
+    let all: Vec<Option<(K, i32)>> =
+        exchange.share(pack(&mine)).iter().filter_map(|bytes| unpack(bytes).ok()).collect();
+    let errors = all.into_iter().zip(0..).filter_map(|(found, rank)| found.map(|(key, code)| (key, rank, code)));
+    match (errors.min(), found) {
+        (Some((_, rank, _)), Err((_, error))) if rank == exchange.rank() => Err(error),
+        (Some((.., code)), _) => Err(Error::silent(code)),
+        (None, found) => found.map_err(|(_, error)| error),
+    }
+}
+
+/// Plain data as bytes, numbers with all their digits.
+pub fn pack<T: Serialize>(value: &T) -> Vec<u8> {
+    postcard::to_allocvec(value).unwrap_or_default()
+}
+
+/// The data of these bytes.
+///
+/// # Errors
+/// Bytes of something else.
+pub fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T> {
+    postcard::from_bytes(bytes).map_err(|cause| {
+        Error::new(Kind::Solver, "a message of another rank cannot be read").because(cause.to_string())
+    })
+}
+
+/// One process: nothing to exchange.
+#[derive(Debug, Default)]
+pub struct Serial;
+
+impl Exchange for Serial {
+    fn sum(&self, _values: &mut [f64]) {}
+    fn ranks(&self) -> usize {
+        1
+    }
+    fn rank(&self) -> usize {
+        0
+    }
+    fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
+        vec![mine]
+    }
+    fn tell(&self, mine: Vec<u8>) -> Vec<u8> {
+        mine
+    }
+    fn trade(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
+        mine
+    }
+    fn send(&self, _to: usize, _bytes: &[u8]) {}
+    fn receive(&self, _from: usize) -> Vec<u8> {
+        Vec::new()
+    }
+    fn messages(&self) -> usize {
+        0
+    }
+}
+
+/// Ranks that are threads of a test.
+#[cfg(test)]
+pub mod crowd {
+    use super::{Exchange, pack, unpack};
+    use std::collections::{HashMap, VecDeque};
+    use std::sync::{Barrier, Condvar, Mutex};
+
+    struct Common {
+        barrier: Barrier,
+        slots: Mutex<Vec<Vec<Vec<u8>>>>,
+        sent: Mutex<HashMap<[usize; 2], VecDeque<Vec<u8>>>>,
+        news: Condvar,
+    }
+
+    struct Member<'a> {
+        rank: usize,
+        ranks: usize,
+        common: &'a Common,
+    }
+
+    /// What each of so many ranks comes to.
+    pub fn on<T: Send>(ranks: usize, work: impl Fn(&dyn Exchange) -> T + Sync) -> Vec<T> {
+        let (slots, sent) = (Mutex::new(vec![Vec::new(); ranks]), Mutex::default());
+        let common = &Common { barrier: Barrier::new(ranks), slots, sent, news: Condvar::new() };
+        let member = |rank| Member { rank, ranks, common };
+        std::thread::scope(|scope| {
+            let work = &work;
+            let threads: Vec<_> = (0..ranks).map(|rank| scope.spawn(move || work(&member(rank)))).collect();
+            threads.into_iter().map(|thread| thread.join().expect("a rank")).collect()
+        })
+    }
+
+    impl Exchange for Member<'_> {
+        fn sum(&self, values: &mut [f64]) {
+            let all = self.share(pack(&&*values));
+            values.fill(0.0);
+            for other in all {
+                let other: Vec<f64> = unpack(&other).expect("numbers");
+                assert_eq!(other.len(), values.len());
+                values.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
+            }
+        }
+        fn ranks(&self) -> usize {
+            self.ranks
+        }
+        fn rank(&self) -> usize {
+            self.rank
+        }
+        fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
+            self.trade(vec![mine; self.ranks])
+        }
+        fn tell(&self, mine: Vec<u8>) -> Vec<u8> {
+            self.share(mine).swap_remove(0)
+        }
+        fn trade(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
+            self.common.slots.lock().expect("slots")[self.rank] = mine;
+            self.common.barrier.wait();
+            let all = self.common.slots.lock().expect("slots").iter().map(|of| of[self.rank].clone()).collect();
+            self.common.barrier.wait();
+            all
+        }
+        fn send(&self, to: usize, bytes: &[u8]) {
+            self.common.sent.lock().expect("sent").entry([self.rank, to]).or_default().push_back(bytes.to_vec());
+            self.common.news.notify_all();
+        }
+        fn receive(&self, from: usize) -> Vec<u8> {
+            let mut sent = self.common.sent.lock().expect("sent");
+            loop {
+                match sent.get_mut(&[from, self.rank]).and_then(VecDeque::pop_front) {
+                    Some(bytes) => return bytes,
+                    None => sent = self.common.news.wait(sent).expect("sent"),
+                }
+            }
+        }
+        fn messages(&self) -> usize {
+            0
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! A mesh from the rank that has read it to all: points and surfaces as they are, cells in slices to the ranks of their points.
+
+use super::{Group, bisect};
+use crate::error::Result;
+use crate::exchange::{Exchange, pack, unpack};
+use crate::problem::order::Order;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// A mesh without points and cells, as plain data.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Head {
+    /// The file that the user named.
+    pub path: PathBuf,
+    /// Order of all elements.
+    pub order: Order,
+    /// Groups, those of cells empty.
+    pub groups: Vec<Group>,
+    /// Elements that were split.
+    pub split: usize,
+    /// Whether each point is used; empty where all are.
+    pub used: Vec<bool>,
+}
+
+impl Head {
+    /// What other ranks know: not the numbers of simplices in the file.
+    pub fn told(&self) -> Self {
+        let groups = self.groups.iter().map(|group| Group { tags: Vec::new(), ..group.clone() });
+        Self { groups: groups.collect(), path: self.path.clone(), used: self.used.clone(), ..*self }
+    }
+}
+
+/// Cells of a group on one rank.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct Cells {
+    /// Their places in the group as it was read.
+    pub index: Vec<u32>,
+    /// Their numbers in the file.
+    pub tags: Vec<u64>,
+    /// Their points.
+    pub nodes: Vec<u32>,
+}
+
+/// Points of one message, of 24 bytes each.
+const POINTS: usize = 1 << 16;
+
+/// Cells in all messages that the first rank has begun, of 28 bytes each or, of order 2, 52: some megabytes, however many ranks there are.
+const CELLS: usize = 1 << 17;
+
+/// In place of a group: points come next, of a mesh that is read from its start.
+const BEGIN: u32 = u32::MAX;
+
+/// Sends a mesh to all ranks while the first one reads it: points, then cells to the ranks that have their points, in messages for many.
+pub struct Dealer<'a> {
+    exchange: &'a dyn Exchange,
+    /// The order that a mesh must have to be dealt out while it is read.
+    order: Order,
+    /// The rank of each point; empty before there are points.
+    owner: Vec<u32>,
+    /// Whether each point is one of a cell.
+    used: Vec<bool>,
+    /// What each rank gets next: group and cells.
+    next: Vec<(u32, Cells)>,
+    /// Own cells of each group.
+    own: Vec<Cells>,
+    /// Number of cells of each group on all ranks.
+    counts: Vec<u32>,
+}
+
+impl<'a> Dealer<'a> {
+    /// On the first rank.
+    pub fn new(exchange: &'a dyn Exchange, order: Order) -> Self {
+        let next = vec![(0, Cells::default()); exchange.ranks()];
+        Self { exchange, order, owner: Vec::new(), used: Vec::new(), next, own: Vec::new(), counts: Vec::new() }
+    }
+
+    /// Whether cells of an order go to several ranks while they are read.
+    pub fn wants(&self, order: Order) -> bool {
+        self.order == order && self.exchange.ranks() > 1
+    }
+
+    /// Forgets a mesh that could not be read.
+    pub fn reset(&mut self) {
+        self.owner.clear();
+        self.used.clear();
+        self.own.clear();
+        self.counts.clear();
+        self.next.fill((0, Cells::default()));
+    }
+
+    /// Whether there are points.
+    pub fn has_begun(&self) -> bool {
+        !self.owner.is_empty()
+    }
+
+    /// Sends the points, of whose coordinates `D` count.
+    pub fn begin<const D: usize, const K: usize>(&mut self, points: &[[f64; K]]) {
+        self.reset();
+        for rank in 1..self.next.len() {
+            self.exchange.send(rank, &pack(&(BEGIN, Cells::default())));
+        }
+        for slice in points.chunks(POINTS) {
+            self.exchange.tell(pack(&slice.iter().flat_map(|x| &x[..D]).copied().collect::<Vec<f64>>()));
+        }
+        self.exchange.tell(pack(&Vec::<f64>::new()));
+        self.owner = bisect::parts::<D, K>(points, self.next.len());
+        self.used = vec![false; points.len()];
+    }
+
+    /// Sends a cell of a group with its number in the file and its points.
+    pub fn put(&mut self, group: usize, tag: Option<u64>, nodes: &[u32]) {
+        self.counts.resize(self.counts.len().max(group + 1), 0);
+        for (place, &node) in nodes.iter().enumerate() {
+            self.used[node as usize] = true;
+            let rank = self.owner[node as usize];
+            if nodes[..place].iter().any(|&before| self.owner[before as usize] == rank) {
+                continue;
+            }
+            let rank = rank as usize;
+            if self.next[rank].0 != group as u32 || self.next[rank].1.index.len() > CELLS / self.next.len() {
+                self.send(rank);
+            }
+            let (of, cells) = &mut self.next[rank];
+            *of = group as u32;
+            cells.index.push(self.counts[group]);
+            cells.tags.extend(tag);
+            cells.nodes.extend_from_slice(nodes);
+        }
+        self.counts[group] += 1;
+    }
+
+    /// Number of cells of a group that were sent.
+    pub fn count(&self, group: usize) -> usize {
+        self.counts.get(group).map_or(0, |&count| count as usize)
+    }
+
+    fn send(&mut self, rank: usize) {
+        let (group, cells) = std::mem::take(&mut self.next[rank]);
+        match rank {
+            _ if cells.index.is_empty() => {}
+            0 => append(&mut self.own, group, cells),
+            _ => self.exchange.send(rank, &pack(&(group, cells))),
+        }
+    }
+
+    /// Sends what is left; gives the own cells of each group, the rank of each point, and whether each point is one of a cell.
+    pub fn finish(mut self) -> (Vec<Cells>, Vec<u32>, Vec<bool>) {
+        (0..self.next.len()).for_each(|rank| self.send(rank));
+        (1..self.next.len()).for_each(|rank| self.exchange.send(rank, &pack(&(0, Cells::default()))));
+        (self.own, self.owner, self.used)
+    }
+}
+
+fn append(own: &mut Vec<Cells>, group: u32, mut cells: Cells) {
+    own.resize_with(own.len().max(group as usize + 1), Cells::default);
+    let own = &mut own[group as usize];
+    own.index.append(&mut cells.index);
+    own.tags.append(&mut cells.tags);
+    own.nodes.append(&mut cells.nodes);
+}
+
+/// Takes the points and the cells of each group that the first rank sends.
+///
+/// # Errors
+/// A message that cannot be read.
+pub fn take<const D: usize>(exchange: &dyn Exchange) -> Result<(Vec<[f64; D]>, Vec<Cells>)> {
+    let (mut points, mut own) = (Vec::new(), Vec::new());
+    loop {
+        let (group, cells): (u32, Cells) = unpack(&exchange.receive(0))?;
+        match group {
+            BEGIN => {
+                (points, own) = (Vec::new(), Vec::new());
+                loop {
+                    let slice: Vec<f64> = unpack(&exchange.tell(Vec::new()))?;
+                    if slice.is_empty() {
+                        break;
+                    }
+                    points.extend(slice.chunks_exact(D).map(|x| std::array::from_fn::<f64, D, _>(|c| x[c])));
+                }
+            }
+            _ if cells.index.is_empty() => return Ok((points, own)),
+            _ => append(&mut own, group, cells),
+        }
+    }
+}
