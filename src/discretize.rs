@@ -158,7 +158,7 @@ pub fn discretize<const D: usize>(
 ) -> Result<Discrete> {
     let Verified { portion, checked, .. } = verified;
     let (mesh, rank, alone) = (&portion.mesh, exchange.rank(), exchange.ranks() == 1);
-    let (mut parts, stocks) = parts(scene, verified, bodies, &*exchange)?;
+    let (mut parts, stocks) = parts(scene, verified, bodies)?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
     for found in pairs::all(scene, mesh, cut, &parts, keep)? {
@@ -177,7 +177,7 @@ pub fn discretize<const D: usize>(
         parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
     let graphs: Vec<OnceCell<NodeGraph>> = parts.iter().map(|_| OnceCell::new()).collect();
     let lazy = parts.iter().zip(&drafts).zip(&stocks).zip(&graphs);
-    let others = &*exchange;
+    let others = &*verified.exchange;
     let lazy = lazy.map(|(((part, draft), stock), graph)| {
         move || graph.get_or_init(|| cells::graph(part, stock, &draft.rows, others))
     });
@@ -214,7 +214,7 @@ pub fn discretize<const D: usize>(
         .zip(&mut owner)
         .for_each(|(dealt, owner)| *owner = dealt.as_ref().map_or(*owner, |dealt| dealt.leader));
     let needs = if keep { Needs::everywhere(parts.len()) } else { Needs::of(&owner, &drafts, &deals) };
-    let elasticities = cells::deal(&mut parts, stocks, &needs, scene.plane, &*exchange)?;
+    let elasticities = cells::deal(&mut parts, stocks, &needs, scene.plane, &*verified.exchange)?;
     drop(needs);
     drop(deals);
     let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt);

@@ -15,6 +15,7 @@ use crate::run::in_parts;
 use crate::scene::Scene;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::time::Instant;
 
 /// What the user typed.
@@ -75,7 +76,7 @@ fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request)
 /// All that is said about a mesh.
 fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Result<Value> {
     let Loaded { mesh, origin, file } = loaded;
-    let verified = crate::discretize::verify(scene, Portion::whole(mesh), &Serial)?;
+    let verified = crate::discretize::verify(scene, Portion::whole(mesh), Rc::new(Serial))?;
     let mesh = &verified.portion.mesh;
     let mut checked = verified.checked.iter();
     let mut bodies = Vec::new();

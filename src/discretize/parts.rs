@@ -62,9 +62,9 @@ pub fn parts<'a, const D: usize>(
     scene: &Scene,
     verified: &'a Verified<D>,
     bodies: &'a [BodySpec],
-    exchange: &dyn Exchange,
 ) -> Result<(Vec<Part<'a, D>>, Vec<Stock<'a, D>>)> {
-    let Verified { portion, checked, .. } = verified;
+    let Verified { portion, checked, exchange, .. } = verified;
+    let exchange = &**exchange;
     let mesh = &portion.mesh;
     let on_surface = if exchange.ranks() > 1 { on_surfaces(mesh) } else { Vec::new() };
     let wanted = Wanted { plane: scene.plane, boundaries: !scene.auto.is_empty() };
@@ -130,10 +130,10 @@ fn read<const D: usize>(
     let key = |cell: usize| keys.get(cell).copied().unwrap_or((0, cell as u32));
     let elasticity = elastic::of(spec, &space, mesh, plane, (&key, exchange))?;
     let home = || home(portion, group, exchange.rank());
-    let mut sums =
-        [home().count() as f64, home().map(|i| space.share(i)).sum(), home().map(|i| space.cell_measure(i)).sum()];
-    exchange.sum(&mut sums);
-    let [count, volume, measure] = sums;
+    let shares = [total(home().map(|i| space.share(i))), total(home().map(|i| space.cell_measure(i)))];
+    let [volume, measure] = totals(shares, exchange);
+    let mut count = [home().count() as f64];
+    exchange.sum(&mut count);
     let mut moduli = elasticity.moduli(0, [0.0; 3]).unwrap_or_default();
     if !elasticity.is_constant() {
         moduli = elastic::moduli(&space, &elasticity, home());
@@ -152,8 +152,26 @@ fn read<const D: usize>(
         corners.dedup();
     }
     let (points, outer) = (points.clone(), Outer::default());
-    let known = Known { cells: count as usize, volume, moduli, force, corners, boundary, measure, points, outer };
+    let known = Known { cells: count[0] as usize, volume, moduli, force, corners, boundary, measure, points, outer };
     Ok((space, elasticity, known))
+}
+
+/// A sum, and what its additions have lost: rounded together, the same in any order of the terms but for rare last digits.
+fn total(terms: impl Iterator<Item = f64>) -> [f64; 2] {
+    terms.fold([0.0; 2], |[sum, lost], term| {
+        let next = sum + term;
+        let added = next - sum;
+        [next, lost + (sum - (next - added)) + (term - added)]
+    })
+}
+
+/// Totals over all ranks. Collective.
+fn totals(mine: [[f64; 2]; 2], exchange: &dyn Exchange) -> [f64; 2] {
+    let all = share(exchange, &mine);
+    [0, 1].map(|which| {
+        let [sum, lost] = total(all.iter().flat_map(|of| of[which]));
+        sum + lost
+    })
 }
 
 /// Sums at the dofs of nodes, of which ranks have found those at their own points. Collective.

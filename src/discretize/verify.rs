@@ -14,7 +14,6 @@ use crate::scene::Scene;
 use std::rc::Rc;
 
 /// A mesh that holds what bodies must be.
-#[derive(Debug)]
 pub struct Verified<const D: usize> {
     /// What this rank has of the mesh.
     pub portion: Portion<D>,
@@ -22,19 +21,21 @@ pub struct Verified<const D: usize> {
     pub bodies: Vec<BodySpec>,
     /// What was found of each body, in the same order; bodies that the mesh does not have are missing.
     pub checked: Rc<[Checked]>,
+    /// By which ranks tell each other of cells; a run does not count these messages.
+    pub exchange: Rc<dyn Exchange>,
 }
 
 /// Finds the bodies of a scene and checks its mesh once: see `roster::bodies` and [`Portion::check`]. Collective.
 ///
 /// # Errors
 /// Patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.
-pub fn verify<const D: usize>(scene: &Scene, portion: Portion<D>, exchange: &dyn Exchange) -> Result<Verified<D>> {
-    let lying = roster::lying(scene, &portion, exchange)?;
+pub fn verify<const D: usize>(scene: &Scene, portion: Portion<D>, exchange: Rc<dyn Exchange>) -> Result<Verified<D>> {
+    let lying = roster::lying(scene, &portion, &*exchange)?;
     let bodies = roster::bodies(scene, &portion.mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
-    let checked = portion.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty(), exchange)?;
-    Ok(Verified { portion, bodies, checked: checked.into() })
+    let checked = portion.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty(), &*exchange)?;
+    Ok(Verified { portion, bodies, checked: checked.into(), exchange })
 }
 
 /// A body with the groups that serve it.

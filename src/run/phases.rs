@@ -156,7 +156,7 @@ fn verified<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interr
     let ranks = Ranks::new(session);
     let read = |dealer: &mut Dealer| Ok(mesh::deal::<D>(&scene.mesh, order, interrupt, dealer)?.mesh);
     let portion = Portion::read(&ranks, order, read).and_then(|portion| interrupt.release().map(|()| portion));
-    agree(session, discretize::verify(scene, agree(session, portion)?, &ranks))
+    agree(session, discretize::verify(scene, agree(session, portion)?, Rc::new(ranks)))
 }
 
 fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
