@@ -81,7 +81,7 @@ impl<const D: usize> Mesh<D> {
         self.groups.iter().filter(move |group| group.dimension == dimension).map(|group| group.name.as_str())
     }
 
-    /// Forgets the numbers of elements in the file, which messages of [`check`](Self::check) name.
+    /// Forgets the numbers of elements in the file, which messages of the checks name.
     pub fn forget_tags(&mut self) {
         self.groups.iter_mut().for_each(|group| group.tags = Vec::new());
     }

@@ -20,10 +20,10 @@ pub enum Maker {
     Other,
 }
 
-/// Reads the bytes of a `.msh` file; see [`read`].
+/// Reads the bytes of a `.msh` file. Cells are numbered as in the file; see the module.
 ///
 /// # Errors
-/// Those of [`read`].
+/// Input that is no mesh, with the file and the line.
 pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<Mesh<D>> {
     read(path, Box::new(std::io::Cursor::new(bytes)), maker, None)
 }
