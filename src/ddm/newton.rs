@@ -16,8 +16,9 @@ use super::forcing::Forcing;
 use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
+use super::solve::PATIENCE;
 use super::start;
-use super::stop::Status;
+use super::stop::{Floor, Status};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
@@ -31,8 +32,8 @@ use crate::model::linear::{LinearStep, System, Trial};
 pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
     let slopes = meeting_slopes(run.model);
     let mut rho = run.memory.progress.slopes(&slopes);
-    // what rounding left of the last step, if that was too much
-    let mut left: Option<f64> = None;
+    // watches what corrections gain, if rounding left too much of the last step
+    let mut left: Option<Floor> = None;
     loop {
         let springs = resisting(run.model, places.springs(run.model));
         let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
@@ -82,8 +83,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
                 let lost = reached.add_rounding(&run.scale, measured.strain, &more, &places, &met);
                 if !run.is_enough(&reached) {
                     // a correction gains a digit, unless rounding gives as much again
-                    is_floor = corrected.is_some_and(|before| lost > 0.5 * before);
-                    left = Some(lost);
+                    let mut floor = corrected.unwrap_or_else(|| Floor::new(PATIENCE[0]));
+                    is_floor = floor.is_reached(lost);
+                    left = Some(floor);
                 }
             }
         }

@@ -142,7 +142,7 @@ pub struct Outcome {
 }
 
 /// Iterations without progress after which Newton's method, and sweeps, may be at the floor of rounding.
-const PATIENCE: [usize; 2] = [2, 20];
+pub(super) const PATIENCE: [usize; 2] = [2, 20];
 
 /// Runs a method on a model from its start until a rule ends it.
 ///

@@ -135,7 +135,8 @@ fn read<const D: usize>(
     let mut count = [home().count() as f64];
     exchange.sum(&mut count);
     let mut moduli = elasticity.moduli(0, [0.0; 3]).unwrap_or_default();
-    if !elasticity.is_constant() {
+    // a rank may have no cell of it, and so none of a region
+    if !spec.regions.is_empty() || !elasticity.is_constant() {
         moduli = elastic::moduli(&space, &elasticity, home());
         exchange.sum(&mut moduli);
         moduli = moduli.map(|sum| sum / volume);
