@@ -13,7 +13,7 @@ use super::origin::Origin;
 use super::run::{End, Run};
 use super::scale::Scale;
 use super::start::{self, RigidStart};
-use super::stop::Status;
+use super::stop::{PATIENCE, Status};
 use super::{digits, newton, robin};
 use crate::error::Result;
 use crate::model::Model;
@@ -140,9 +140,6 @@ pub struct Outcome {
     /// The interval (33) of gamma, if it was asked for and can be told.
     pub interval: Option<Interval>,
 }
-
-/// Iterations without progress after which Newton's method, and sweeps, may be at the floor of rounding.
-pub(super) const PATIENCE: [usize; 2] = [2, 20];
 
 /// Runs a method on a model from its start until a rule ends it.
 ///

@@ -57,6 +57,9 @@ pub fn relative_increment(step: &[f64], now: &[f64]) -> f64 {
     if norm(step) == 0.0 { 0.0 } else { norm(step) / norm(now) }
 }
 
+/// Iterations without progress after which Newton's method, and sweeps, may be at the floor of rounding.
+pub const PATIENCE: [usize; 2] = [2, 20];
+
 /// Watches for progress: at the rounding floor the error stays where it is.
 #[derive(Debug, Clone)]
 pub struct Floor {
