@@ -30,11 +30,12 @@ mod verify;
 use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
+use crate::exchange::Exchange;
 use crate::fem::assemble::{NodalBlock, NodeGraph};
 use crate::fem::rigid::{FreeMotion, RigidMotion};
 use crate::linalg::{Csr, axpy, dot};
 use crate::mesh::Checked;
-use crate::model::{BodySlot, Exchange, Loads, Mechanism, Model, Segment};
+use crate::model::{BodySlot, Loads, Mechanism, Model, Segment};
 use crate::problem::body::BodySpec;
 use crate::problem::contact::ContactSpec;
 use crate::problem::method::Start;

@@ -29,7 +29,15 @@ pub trait Exchange {
 
 /// What each rank knows, in their order; collective.
 pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: &T) -> Vec<T> {
-    exchange.share(pack(mine)).iter().filter_map(|bytes| unpack(bytes).ok()).collect()
+    exchange.share(pack(mine)).into_iter().map(own).collect()
+}
+
+/// One list of what all ranks have, sorted; collective.
+pub fn gather<T: Serialize + DeserializeOwned + Ord>(exchange: &dyn Exchange, mine: &[T]) -> Vec<T> {
+    let mut all: Vec<T> = Vec::new();
+    exchange.share(pack(&mine)).into_iter().for_each(|bytes| all.append(&mut own(bytes)));
+    all.sort_unstable();
+    all
 }
 
 /// What each rank has for this one, in their order, where `mine` is that for each rank; collective.
@@ -39,8 +47,12 @@ pub fn trade<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: Vec
     }
     // one after the other: what is packed is dropped
     let packed = mine.into_iter().map(|mine| pack(&mine)).collect();
-    let theirs = exchange.trade(packed).into_iter();
-    theirs.map(|bytes| unpack(&bytes).unwrap_or_else(|_| unreachable!("ranks run one program"))).collect()
+    exchange.trade(packed).into_iter().map(own).collect()
+}
+
+/// The data of a message, which is dropped.
+fn own<T: DeserializeOwned>(bytes: Vec<u8>) -> T {
+    unpack(&bytes).unwrap_or_else(|_| unreachable!("ranks run one program"))
 }
 
 /// What the first rank has found; `mine` is there alone, and is asked for nowhere else. Collective.
@@ -71,9 +83,9 @@ pub fn first<K: Serialize + DeserializeOwned + Ord, T>(
         return found.map_err(|(_, error)| error);
     }
     let mine = found.as_ref().err().map(|(key, error)| (key, error.kind().exit_code()));
-    let all: Vec<Option<(K, i32)>> =
-        exchange.share(pack(&mine)).iter().filter_map(|bytes| unpack(bytes).ok()).collect();
-    let errors = all.into_iter().zip(0..).filter_map(|(found, rank)| found.map(|(key, code)| (key, rank, code)));
+    let mine = mine.map(|(key, code)| (pack(key), code));
+    let all = share(exchange, &mine).into_iter().zip(0..);
+    let errors = all.filter_map(|(found, rank)| found.map(|(key, code)| (own::<K>(key), rank, code)));
     match (errors.min(), found) {
         (Some((_, rank, _)), Err((_, error))) if rank == exchange.rank() => Err(error),
         (Some((.., code)), _) => Err(Error::silent(code)),

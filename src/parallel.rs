@@ -2,7 +2,6 @@
 
 use crate::error::{Error, Result};
 use crate::exchange::Exchange;
-pub use crate::exchange::{share, tell};
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
 use mpi::point_to_point::send_receive_into;

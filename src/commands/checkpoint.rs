@@ -6,10 +6,10 @@
 use crate::ddm::{Row, Start, State};
 use crate::discretize::Discrete;
 use crate::error::{Error, Kind, Result};
+use crate::exchange::share;
 use crate::file::digest;
 use crate::model::{BodySlot, Distribution, Field, Model};
 use crate::output::{RoundReport, StepReport, write_whole};
-use crate::parallel::share;
 use crate::run::stages::{Begin, Done};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};

@@ -59,7 +59,7 @@ impl Balance {
 mod tests {
     use super::*;
     use crate::ddm::Sweeps;
-    use crate::model::Serial;
+    use crate::exchange::Serial;
     use std::cell::Cell;
     use std::rc::Rc;
 

@@ -89,11 +89,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             }
         }
         let at = run.after_step((&u, &x.field, share), measured, &reached, &met, linear);
-        if let Some(status) = run.end_at(&at, linear)? {
+        let ended = run.end_at(&at, linear)?;
+        if let Some(status) = ended.or(is_floor.then_some(Status::RoundoffLimited)) {
             return Ok(run.end(status, u, met, linear));
-        }
-        if is_floor {
-            return Ok(run.end(Status::RoundoffLimited, u, met, linear));
         }
         // a step that knew of no contact runs through the other body
         let blind = places.closed == 0 && met.closed > 0;

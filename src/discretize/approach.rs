@@ -3,11 +3,11 @@
 use super::find::{find_group, nodes_on};
 use crate::contact::{add, pad};
 use crate::error::Result;
+use crate::exchange::Exchange;
 use crate::fem::quadrature::Parts;
 use crate::fem::{Facets, Space, assemble, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
-use crate::model::Exchange;
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
 
 /// Cosine of the largest angle between a force or a held direction and the contact's normal at which the place counts: the 60 degrees up to

@@ -6,11 +6,10 @@ use super::elastic;
 use super::part::Part;
 use super::parts::Stock;
 use crate::error::Result;
-use crate::exchange::trade;
+use crate::exchange::{Exchange, trade};
 use crate::fem::{Elasticity, NodeGraph};
 use crate::linalg::Csr;
 use crate::mesh::Key;
-use crate::model::Exchange;
 use crate::problem::elasticity::Plane;
 use serde::{Deserialize, Serialize};
 

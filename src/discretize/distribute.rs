@@ -1,9 +1,10 @@
 //! The dofs of all bodies over the ranks: a partition of their nodes, and what each rank knows of it.
 
 use super::draft::Draft;
+use crate::exchange::Exchange;
 use crate::fem::{Couplings, ElasticBody, Interpolation};
 use crate::linalg::Csr;
-use crate::model::{Distribution, Exchange};
+use crate::model::Distribution;
 use std::rc::Rc;
 
 /// Bodies whose rows of K are in one matrix of all ranks.

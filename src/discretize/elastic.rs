@@ -3,11 +3,10 @@
 use super::find::{find_group, not_on_body, of_body, point};
 use crate::contact::pad;
 use crate::error::{Error, Result, shown};
-use crate::exchange::first;
+use crate::exchange::{Exchange, first};
 use crate::fem::Space;
 use crate::fem::elasticity::{Elasticity, Flaw};
 use crate::mesh::{Key, Mesh};
-use crate::model::Exchange;
 use crate::problem::body::BodySpec;
 use crate::problem::elasticity::{Constants, ElasticitySpec, Plane};
 use crate::problem::order::Order;

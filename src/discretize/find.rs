@@ -2,11 +2,10 @@
 
 use crate::contact;
 use crate::error::{Error, Located, Result, few};
+use crate::exchange::{Exchange, gather};
 use crate::expression::Field;
 use crate::fem::Space;
 use crate::mesh::{Group, Mesh};
-use crate::model::Exchange;
-use crate::parallel::share;
 use crate::problem::body::BodySpec;
 use std::cell::RefCell;
 
@@ -49,8 +48,7 @@ pub fn find_group<'m, const D: usize>(
 pub fn nodes_on<const D: usize>(space: &Space<D>, group: &Group, exchange: &dyn Exchange) -> Vec<u32> {
     let mut nodes = space.nodes_on(group);
     if group.dimension == D && exchange.ranks() > 1 {
-        nodes = share(exchange, &nodes).concat();
-        nodes.sort_unstable();
+        nodes = gather(exchange, &nodes);
         nodes.dedup();
     }
     nodes

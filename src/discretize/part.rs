@@ -7,6 +7,7 @@ use super::springs;
 use super::supports::Held;
 use crate::contact;
 use crate::error::{Error, Result};
+use crate::exchange::Exchange;
 use crate::expression::Field;
 use crate::fem::assemble::{self, NodalBlock};
 use crate::fem::interpolation::{Interpolation, coarse_nodes, from_vertices};
@@ -15,7 +16,6 @@ use crate::fem::rigid::{self, RigidMotion};
 use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, support, surface};
 use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
-use crate::model::Exchange;
 use crate::problem::body::{BodySpec, Load, LoadKind};
 use nalgebra::{DMatrix, DVector};
 

@@ -8,12 +8,10 @@ use super::part::{self, Part};
 use super::verify::{self, Verified};
 use crate::contact::pad;
 use crate::error::{Error, Result};
-use crate::exchange::first;
+use crate::exchange::{Exchange, first, gather, share};
 use crate::fem::quadrature::Parts;
 use crate::fem::{Elasticity, Space, interpolation};
 use crate::mesh::{Key, Mesh, Portion};
-use crate::model::Exchange;
-use crate::parallel::share;
 use crate::problem::body::BodySpec;
 use crate::problem::elasticity::Plane;
 use crate::problem::order::Order;
@@ -148,8 +146,7 @@ fn read<const D: usize>(
         boundary = outside(&space, points, portion, &key, exchange);
     }
     if exchange.ranks() > 1 && space.order == Order::P2 {
-        corners = share(exchange, &corners).concat();
-        corners.sort_unstable();
+        corners = gather(exchange, &corners);
         corners.dedup();
     }
     let (points, outer) = (points.clone(), Outer::default());
@@ -204,9 +201,7 @@ fn outside<const D: usize>(
     let facets = places.iter().zip(facets.nodes.chunks_exact(facets.stride));
     let mine: Vec<(Key, u8, Vec<u32>)> =
         facets.map(|(&(cell, opposite), nodes)| (key(cell), opposite as u8, nodes.to_vec())).collect();
-    let mut all = share(exchange, &mine).concat();
-    all.sort_unstable();
-    all.into_iter().flat_map(|(.., nodes)| nodes).collect()
+    gather(exchange, &mine).into_iter().flat_map(|(.., nodes)| nodes).collect()
 }
 
 /// Nodes of the cells behind surfaces, which have all corners but one there. Collective.
@@ -222,9 +217,7 @@ fn behind<const D: usize>(
     let is_behind = |number: &usize| cell(*number)[..=D].iter().filter(on_surface).count() >= D;
     let mine = home(portion, group, exchange.rank()).filter(is_behind);
     let mine: Vec<(Key, Vec<u32>)> = mine.map(|number| (portion.keys(group)[number], cell(number).to_vec())).collect();
-    let mut all = share(exchange, &mine).concat();
-    all.sort_unstable();
-    all.into_iter().flat_map(|(_, nodes)| nodes).collect()
+    gather(exchange, &mine).into_iter().flat_map(|(_, nodes)| nodes).collect()
 }
 
 /// Whether each point of a mesh is on a surface.

@@ -2,9 +2,8 @@
 
 use super::find::find_group;
 use crate::error::{Error, Located, Place, Result, few};
+use crate::exchange::{Exchange, share};
 use crate::mesh::{Group, Mesh, Portion};
-use crate::model::Exchange;
-use crate::parallel::share;
 use crate::problem::body::{BodySpec, LoadKind, fault};
 use crate::problem::pattern::{BODY, Pattern, Rank, is_pattern};
 use crate::scene::Scene;

@@ -3,10 +3,10 @@
 use super::find::{earlier, find_group, nodes_on, not_on_body, of_body, point};
 use crate::contact::pad;
 use crate::error::{Error, Place, Result};
+use crate::exchange::Exchange;
 use crate::fem::{Facets, Frame, Space};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
-use crate::model::Exchange;
 use crate::problem::body::{BodySpec, LoadKind};
 use nalgebra::{DMatrix, DVector};
 use std::collections::{BTreeMap, HashMap};

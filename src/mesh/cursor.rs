@@ -34,11 +34,11 @@ pub trait Source: Read + Seek {}
 
 impl<T: Read + Seek> Source for T {}
 
-/// Bytes of a window: reading is as fast as with larger ones.
+/// Bytes of a window. From 2^12 to 2^24 two cubes of 48^3 are read and checked in 1.41 to 1.43 s; 2^28 takes 1.47 s and 13 MB more.
 const WINDOW: usize = 1 << 20;
 
-/// Longer lines and words are not those of a mesh file, and not worth a search through the whole file.
-const LONGEST: usize = 1000;
+/// Bytes of a line or word at most, which is what Gmsh itself reads of a line: what is longer is not worth a search through the whole file.
+const LONGEST: usize = 1024;
 
 impl<'a> Cursor<'a> {
     /// A cursor at the start of a file.

@@ -1,6 +1,7 @@
 //! The `$Elements` section: the simplices of all physical groups.
 
 use super::cursor::Cursor;
+use super::dealer::SLICE;
 use super::nodes::Nodes;
 use super::physical::Physical;
 use super::simplex::{self, Kind, THINGS};
@@ -101,9 +102,6 @@ pub fn read<const D: usize>(
 
 /// What to do about elements that are not simplices of order 1 or 2.
 const SIMPLICES: &str = "use triangles and tetrahedra of order 1 or 2, or quadrangles, hexahedra, prisms and pyramids of order 1: `gmsh -order 1`";
-
-/// Elements that are read before they go to their groups.
-const SLICE: usize = 1 << 14;
 
 /// Elements of one entity, all of one kind.
 struct Block<'a> {

@@ -16,8 +16,7 @@ pub type Key = (u64, u32);
 /// What one rank has of a mesh.
 #[derive(Debug)]
 pub struct Portion<const D: usize> {
-    /// The mesh; its groups of cells have those that touch own points, sorted by their keys. Groups of lower dimension have the numbers of their
-    /// simplices in the file on the first rank alone.
+    /// The mesh; its groups of cells have those that touch own points, sorted by their keys.
     pub mesh: Mesh<D>,
     /// The rank of each point; empty where one rank has all.
     owner: Vec<u32>,
@@ -64,19 +63,17 @@ impl<const D: usize> Portion<D> {
             (Head { path, order, groups, split, used: Vec::new() }, points)
         });
         let (cells, owner, of_cells) = dealer.finish();
-        let mut found = None;
-        tell(exchange, || {
-            let (mut head, points) = read?;
+        let mut points = Vec::new();
+        let head = tell(exchange, || {
+            let mut head;
+            (head, points) = read?;
             let mut used = groups::used(&head.groups, points.len());
             used.iter_mut().zip(of_cells).for_each(|(used, of_cell)| *used |= of_cell);
             if used.contains(&false) {
                 head.used = used;
             }
-            let told = head.told();
-            found = Some((head, points));
-            Ok(told)
+            Ok(head)
         })?;
-        let Some((head, points)) = found else { unreachable!("the first rank has read the mesh") };
         Ok(Self::of(head, cells, (points, owner), rank))
     }
 

@@ -23,9 +23,7 @@ pub use rigid::{Motions, Moved};
 
 use crate::contact::ContactPair;
 use crate::error::Result;
-pub use crate::exchange::Exchange;
-#[cfg(test)]
-pub use crate::exchange::Serial;
+use crate::exchange::Exchange;
 use nalgebra::DMatrix;
 use std::cell::RefCell;
 use std::ops::Range;
@@ -294,6 +292,6 @@ pub(crate) mod sample {
             row_stiffness: row_stiffness.to_vec(),
         };
         let bodies = vec![body(0, [8.0, 12.0, 0.0, 6.0]), body(1, [4.0, 20.0, 5.0, 7.0])];
-        Model::new(bodies, laws.into_iter().enumerate().map(pair).collect(), Rc::new(Serial))
+        Model::new(bodies, laws.into_iter().enumerate().map(pair).collect(), Rc::new(crate::exchange::Serial))
     }
 }

@@ -13,13 +13,13 @@ use crate::ddm::Status;
 use crate::discretize::Discrete;
 use crate::error::{Kind, few};
 use crate::estimate::Estimate;
+use crate::exchange::share;
 use crate::model::BodyCounts;
 use crate::output::sci;
 use crate::output::vtu::Grid;
 use crate::output::{
     BodyReport, ContactTable, EstimateReport, Extent, InnerTimes, IntervalReport, LISTED, PairReport, PairRow, Report,
 };
-use crate::parallel::share;
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -6,10 +6,10 @@
 
 use super::{InnerSolver, Krylov, RigidSpace, RobinMatrix};
 use crate::error::Result;
+use crate::exchange::share;
 use crate::linalg::{Csr, axpy, countable, dot};
 use crate::model::linear::{Failure, LinearStep, Solution, Solved, System, Trial};
 use crate::model::{Body, BodyCounts, BodySlot, Field, Joint, Matrices, Model};
-use crate::parallel::share;
 use crate::petsc::{Iterate, Rows};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;

@@ -1,7 +1,7 @@
 //! The cells of one body, their nodes numbered within it.
 
 use crate::error::Error;
-use crate::exchange::{Exchange, pack, unpack};
+use crate::exchange::{Exchange, gather};
 use crate::mesh::{Key, Portion};
 use crate::problem::order::Order;
 use std::borrow::Cow;
@@ -57,12 +57,7 @@ impl<'a, const D: usize> Cells<'a, D> {
             }
         }
         if exchange.ranks() > 1 {
-            let mut all: Vec<(Key, u8, u32)> = Vec::new();
-            for met in exchange.share(pack(&met)) {
-                all.extend(unpack::<Vec<(Key, u8, u32)>>(&met).unwrap_or_default());
-            }
-            all.sort_unstable();
-            points = all.into_iter().map(|(.., point)| point).collect();
+            points = gather::<(Key, u8, u32)>(exchange, &met).into_iter().map(|(.., point)| point).collect();
             points.iter().zip(0..).for_each(|(&point, number)| node[point as usize] = number);
         }
         let nodes = group.simplices().flat_map(|cell| &cell[..stride]).map(|&point| node[point as usize]).collect();
