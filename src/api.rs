@@ -37,8 +37,8 @@
 pub use crate::contact::law::{LayerLaw, PerPoint, Response};
 pub use crate::ddm::acceleration::Here;
 pub use crate::ddm::gamma::GammaRule;
-pub use crate::ddm::line::Unbounded;
-pub use crate::ddm::ritz::Ritz;
+pub use crate::model::line::Unbounded;
+pub use crate::robin::Ritz;
 pub use crate::ddm::{Observer, Row, Silent, Status};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;

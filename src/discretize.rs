@@ -5,6 +5,7 @@ mod auto;
 mod balance;
 mod carried;
 mod cells;
+mod couplings;
 mod distribute;
 mod draft;
 mod elastic;
@@ -200,7 +201,9 @@ pub fn discretize<const D: usize>(
     factory.plan(&outlines.collect::<Vec<_>>())?;
     let deal = |bodies: Vec<usize>| {
         let nodes: Vec<[f64; D]> = bodies.iter().flat_map(|&body| &parts[body].space.nodes).copied().collect();
-        Deal { bodies, owner: crate::mesh::bisect::<D, D>(&nodes, exchange.ranks()) }
+        let couplings = couplings::of(&bodies, (&parts, &stocks, &drafts), &pairs, others);
+        let weight = |node: u32| u64::from(couplings[node as usize]);
+        Deal { bodies, owner: crate::mesh::bisect::<D, D>(&nodes, &weight, exchange.ranks()) }
     };
     let deals: Vec<Deal> = factory.dealt_out().into_iter().map(deal).collect();
     let coarse = |body: usize| match factory.wants_interpolation(&parts[body].spec.name.value) {

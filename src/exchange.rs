@@ -55,6 +55,19 @@ fn own<T: DeserializeOwned>(bytes: Vec<u8>) -> T {
     unpack(&bytes).unwrap_or_else(|_| unreachable!("ranks run one program"))
 }
 
+/// Kinds of asking of a run from outside: bits of one number, which go as sums with messages that ranks send anyway.
+pub const ASKS: usize = 5;
+
+/// One number a kind, to be added up over the ranks.
+pub fn asks(asked: u8) -> [f64; ASKS] {
+    std::array::from_fn(|bit| f64::from(asked >> bit & 1))
+}
+
+/// What at least one rank asks, from the sums of [`asks`].
+pub fn asked(sums: &[f64]) -> u8 {
+    sums.iter().enumerate().fold(0, |all, (bit, &count)| all | u8::from(count > 0.0) << bit)
+}
+
 /// What the first rank has found; `mine` is there alone, and is asked for nowhere else. Collective.
 ///
 /// # Errors

@@ -5,8 +5,8 @@
 //! line.
 //!
 //! Data flows one way: scene file -> [`scene::Scene`], made of the types in [`problem`] -> [`mesh::Mesh`] ->
-//! [`fem`] bodies and [`contact`] pairs -> [`model::Model`] -> sweeps -> [`ddm::Outcome`] -> [`run::report`]. The
-//! loops are those of [`ddm`].
+//! [`fem`] bodies and [`contact`] pairs -> [`model::Model`] -> sweeps of [`robin`] -> [`ddm::Outcome`] -> [`run::report`].
+//! The loops are those of [`ddm`].
 #![deny(unsafe_code)]
 // indices of tensors, rows and nodes read like the formulas
 #![allow(clippy::needless_range_loop)]
@@ -38,6 +38,7 @@ pub mod petsc;
 pub mod problem;
 #[cfg(feature = "cli")]
 pub mod report;
+pub mod robin;
 pub mod run;
 pub mod scene;
 pub mod solver;

@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The modules from the ground up; each may use those below it.
-const MODULES: [&str; 26] = [
+const MODULES: [&str; 27] = [
     "error",
     "exchange",
     "file",
@@ -26,6 +26,7 @@ const MODULES: [&str; 26] = [
     "model",
     "parallel",
     "solver",
+    "robin",
     "ddm",
     "output",
     "report",
@@ -40,9 +41,10 @@ const MODULES: [&str; 26] = [
 ];
 
 /// Modules that may use less than what lies below them.
-const NARROW: [(&str, &str); 4] = [
+const NARROW: [(&str, &str); 5] = [
     ("model", "error exchange linalg contact"),
-    ("ddm", "error exchange linalg contact problem model"),
+    ("robin", "error exchange linalg contact problem model"),
+    ("ddm", "error exchange linalg contact problem model robin"),
     ("output", "error ddm"),
     ("discretize", "error exchange linalg expression problem mesh fem contact model parallel output scene"),
 ];

@@ -58,8 +58,8 @@ impl Balance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ddm::Sweeps;
     use crate::exchange::Serial;
+    use crate::robin::Sweeps;
     use std::cell::Cell;
     use std::rc::Rc;
 

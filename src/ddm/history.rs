@@ -43,7 +43,7 @@ pub struct Row {
 pub trait Observer {
     /// A row is complete.
     fn row(&mut self, row: &Row);
-    /// What is asked of the run meanwhile, as bits whose meaning is the caller's own, [`ASKS`](super::ASKS) of them; called once an
+    /// What is asked of the run meanwhile, as bits whose meaning is the caller's own, [`ASKS`](crate::exchange::ASKS) of them; called once an
     /// iterate. What one rank asks all ranks learn of, and the run ends with [`Status::Paused`](super::Status::Paused), from where
     /// it can go on.
     fn asked(&self) -> u8 {

@@ -4,8 +4,8 @@
 use super::progress::Progress;
 use super::steady::Steady;
 use super::stop::{Cycle, Floor};
-use super::sweep::{Sweep, Sweeper};
 use crate::model::layer::Layer;
+use crate::robin::{Sweep, Sweeper};
 
 /// The step of a sweep that led to an iterate.
 #[derive(Debug, Clone)]

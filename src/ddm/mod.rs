@@ -5,23 +5,17 @@
 //! PETSc.
 
 pub mod acceleration;
-mod asks;
 mod balance;
 mod bound;
-mod coefficient;
 mod digits;
-mod extend;
 mod forcing;
 pub mod forecast;
 pub mod gamma;
 pub mod history;
-pub mod interval;
-pub mod line;
 pub mod linear;
 mod memory;
 mod newton;
 mod progress;
-pub mod ritz;
 mod robin;
 mod run;
 mod scale;
@@ -29,18 +23,10 @@ pub mod solve;
 pub mod start;
 mod steady;
 pub mod stop;
-pub mod sweep;
-mod sweeps;
 
 use crate::model::origin;
-pub use asks::ASKS;
 pub use balance::{Discretisation, SHARE};
-pub use coefficient::Coefficient;
-pub use extend::prepare;
 pub use forecast::Forecast;
 pub use history::{Observer, Row, Silent};
-pub use interval::Interval;
 pub use solve::{Method, Outcome, Settings, Start, State, first_springs, solve};
 pub use stop::Status;
-pub use sweep::Sweep;
-pub use sweeps::Sweeps;

@@ -13,7 +13,6 @@
 use super::bound::Reached;
 use super::digits::of_compressions;
 use super::forcing::Forcing;
-use super::line::Line;
 use super::linear::resisting;
 use super::run::{End, Run};
 use super::start;
@@ -22,6 +21,7 @@ use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
 use crate::model::layer::{Layer, meeting_slopes};
+use crate::model::line::Line;
 use crate::model::linear::{LinearStep, System, Trial};
 
 /// Iterates from displacements and places until a rule ends it.

@@ -8,15 +8,15 @@
 //! ```
 
 use super::acceleration::{Acceleration, Here, Step};
-use super::coefficient::{Coefficient, underconstrained};
 use super::memory::Last;
 use super::run::{End, Run};
 use super::stop::Status;
-use super::sweep::Sweeper;
 use crate::error::Result;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
+use crate::robin::coefficient::{Coefficient, underconstrained};
+use crate::robin::sweep::Sweeper;
 
 /// Iterates from a displacement until a rule ends it; `linear` serves estimates of the mesh's error. A run that goes on has the row of
 /// the displacement already.

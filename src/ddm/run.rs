@@ -1,6 +1,5 @@
 //! What both loops share: the history of a run, its scales, when it ends, and who is told of it.
 
-use super::asks::{ASKS, joined, numbers};
 use super::balance::Balance;
 use super::bound::Reached;
 use super::digits;
@@ -9,14 +8,15 @@ use super::memory::Memory;
 use super::origin::Origin;
 use super::scale::Scale;
 use super::stop::{Status, relative_increment};
-use super::sweep::Sweep;
 use crate::error::Result;
+use crate::exchange::{self, ASKS, asks};
 use crate::model::Model;
 use crate::model::body::Energy;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
 use crate::problem::stop::StopRule;
+use crate::robin::Sweep;
 use std::time::Instant;
 
 /// A run under way.
@@ -71,7 +71,7 @@ impl Run<'_> {
     pub fn measure(&self, energy: Energy, layer: &Layer, linear: &dyn LinearStep) -> Measured {
         let mut sums = [0.0; SUMS + ASKS];
         (sums[0], sums[1]) = (energy.strain, energy.potential);
-        sums[SUMS..].copy_from_slice(&numbers(self.observer.asked()));
+        sums[SUMS..].copy_from_slice(&asks(self.observer.asked()));
         for body in self.model.bodies.iter().filter_map(|slot| slot.local.as_ref()).filter(|body| body.leads()) {
             let counts = body.counts();
             sums[2] += counts.factorizations as f64;
@@ -84,7 +84,7 @@ impl Run<'_> {
             f1: sums[1] + layer.energy.iter().sum::<f64>(),
             factorizations: sums[2] as usize + joint.factorizations,
             inner_iterations: sums[3] as usize + joint.inner_iterations,
-            asked: joined(&sums[SUMS..]),
+            asked: exchange::asked(&sums[SUMS..]),
         }
     }
 

@@ -2,11 +2,8 @@
 
 use super::acceleration::Acceleration;
 use super::balance::{Balance, Discretisation};
-use super::coefficient::{Coefficient, underconstrained};
-use super::extend::extend;
 use super::forecast::Forecast;
 use super::history::{Observer, Row};
-use super::interval::{Interval, interval};
 use super::linear::resisting;
 use super::memory::Memory;
 use super::origin::Origin;
@@ -22,6 +19,9 @@ use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
 use crate::problem::stop::StopRule;
+use crate::robin::coefficient::{Coefficient, underconstrained};
+use crate::robin::extend::extend;
+use crate::robin::interval::{Interval, interval};
 use std::time::Instant;
 
 /// How iterates are made.

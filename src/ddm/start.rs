@@ -17,9 +17,9 @@
 //! elastic bodies leave of it; and what a motion closes, by rounding and proximal springs. One that is felt at a meshed circle of
 //! 1000 edges closes 1e-5 of itself.
 
-use super::line::{self, Unbounded};
 use crate::linalg::{axpy, dot};
 use crate::model::layer::Layer;
+use crate::model::line::{self, Unbounded};
 use crate::model::rigid::{Motions, Moved, PART, TOLERANCE};
 use crate::model::{Model, Sprung};
 use nalgebra::DVector;

@@ -7,28 +7,35 @@
 //! 50, 52 and 49, 50, 49, 47; hertz-sphere n = 26, edge = 1, P1 54, 53, 69, 55 and 54; flange 105, 109, 104, 101 and 109, 108, 108, 111. The
 //! mean memory of a rank is the same to 3 %, that of the largest up to 10 % more.
 
-/// The part of each point, of `parts` of equal numbers of points to one: across the longest side of the box around them, then likewise on either
-/// side.
+use std::ops::Range;
+
+/// The part of each point, of `parts` of equal weight to that of one point: across the longest side of the box around them, then likewise on
+/// either side.
 ///
 /// Points may have more coordinates than the `D` that count.
-pub fn parts<const D: usize, const K: usize>(points: &[[f64; K]], parts: usize) -> Vec<u32> {
+pub fn parts<const D: usize, const K: usize>(
+    points: &[[f64; K]],
+    weight: &dyn Fn(u32) -> u64,
+    parts: usize,
+) -> Vec<u32> {
     let mut part = vec![0; points.len()];
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
-    split::<D, K>(points, &mut order, 0..parts, &mut part);
+    split::<D, K>((points, weight), &mut order, 0..parts, &mut part);
     part
 }
 
 /// Deals the points of these numbers out to some parts.
 fn split<const D: usize, const K: usize>(
-    points: &[[f64; K]],
+    all: (&[[f64; K]], &dyn Fn(u32) -> u64),
     these: &mut [u32],
-    parts: std::ops::Range<usize>,
+    parts: Range<usize>,
     part: &mut [u32],
 ) {
     if parts.len() < 2 || these.is_empty() {
         these.iter().for_each(|&point| part[point as usize] = parts.start as u32);
         return;
     }
+    let (points, weight) = all;
     let at = |point: u32| points[point as usize];
     let size = |axis: usize| {
         let along = || these.iter().map(|&point| at(point)[axis]);
@@ -37,15 +44,26 @@ fn split<const D: usize, const K: usize>(
     let longest = (0..D).rev().max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
     // planes of equal coordinates are cut along the other axes
     let key = |point: u32| std::array::from_fn::<f64, D, _>(|k| at(point)[(longest + k) % D]);
-    let middle = parts.start + parts.len() / 2;
-    let below = these.len() * (middle - parts.start) / parts.len();
-    these.select_nth_unstable_by(below, |&a, &b| {
+    let order = |&a: &u32, &b: &u32| {
         let by_place = key(a).iter().zip(&key(b)).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne());
         by_place.unwrap_or(a.cmp(&b))
-    });
-    let (low, high) = these.split_at_mut(below);
-    split::<D, K>(points, low, parts.start..middle, part);
-    split::<D, K>(points, high, middle..parts.end, part);
+    };
+    let weigh = |these: &[u32]| these.iter().map(|&point| weight(point)).sum::<u64>();
+    let middle = parts.start + parts.len() / 2;
+    let mut share = weigh(these) * (middle - parts.start) as u64 / parts.len() as u64;
+    // those before `low` are below the cut, those from `high` on above it
+    let (mut low, mut high) = (0, these.len());
+    while low < high {
+        let half = (low + high) / 2;
+        these[low..high].select_nth_unstable_by(half - low, order);
+        match share.checked_sub(weigh(&these[low..=half])) {
+            Some(rest) => (low, share) = (half + 1, rest),
+            None => high = half,
+        }
+    }
+    let (below, above) = these.split_at_mut(low);
+    split::<D, K>(all, below, parts.start..middle, part);
+    split::<D, K>(all, above, middle..parts.end, part);
 }
 
 #[cfg(test)]
@@ -53,7 +71,7 @@ mod tests {
     use super::parts as of;
 
     fn parts<const D: usize>(points: &[[f64; D]], count: usize) -> Vec<u32> {
-        of::<D, D>(points, count)
+        of::<D, D>(points, &|_| 1, count)
     }
 
     /// A long box is cut across; points of a plane, of which a whole number of parts has not room, along the next axis; parts differ by one

@@ -99,7 +99,7 @@ impl<'a> Dealer<'a> {
             self.exchange.tell(pack(&slice.iter().flat_map(|x| &x[..D]).copied().collect::<Vec<f64>>()));
         }
         self.exchange.tell(pack(&Vec::<f64>::new()));
-        self.owner = bisect::parts::<D, K>(points, self.next.len());
+        self.owner = bisect::parts::<D, K>(points, &|_| 1, self.next.len());
         self.used = vec![false; points.len()];
     }
 

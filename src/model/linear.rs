@@ -1,7 +1,7 @@
 //! The linear step: (K + B' diag(omega kappa) B) x = r over all bodies (35).
 //!
 //! How it is solved is a choice of inner solver, not a method of its own: one dense matrix of condensed bodies, one sparse
-//! factorisation, conjugate gradients with multigrid of all bodies, or with the Robin sweep (`ddm::Sweeps`). A new way is a new
+//! factorisation, conjugate gradients with multigrid of all bodies, or with the Robin sweep (`robin::Sweeps`). A new way is a new
 //! file with the trait [`LinearStep`].
 
 use super::Model;

@@ -9,6 +9,7 @@ pub mod distribution;
 pub mod field;
 pub mod joint;
 pub mod layer;
+pub mod line;
 pub mod linear;
 pub mod origin;
 pub mod rigid;

@@ -110,14 +110,14 @@ impl Ksp {
         Ok(solver)
     }
 
-    /// A factorisation by MUMPS of a symmetric positive definite matrix of this process, whatever options say. What it comes to is told by
-    /// [`failure`](Self::failure).
+    /// A factorisation by MUMPS of a symmetric positive definite matrix with so many `rows` on this process, whatever options say. What it
+    /// comes to is told by [`failure`](Self::failure).
     ///
     /// # Errors
     /// PETSc's.
-    pub(super) fn factored(session: &Session, matrix: ffi::Mat, rows: usize) -> Result<Ksp> {
-        let mut solver = Self::of(session, Scope::Process, "")?;
-        let new = || Vector::new(session, Scope::Process, rows, 1);
+    pub(super) fn factored(session: &Session, scope: Scope, matrix: ffi::Mat, rows: usize) -> Result<Ksp> {
+        let mut solver = Self::of(session, scope, "")?;
+        let new = || Vector::new(session, scope, rows, 1);
         solver.vectors = Some([new()?, new()?]);
         let pc = solver.pc()?;
         // SAFETY: solver and preconditioner of this wrapper, which take references to the matrix.

@@ -7,28 +7,27 @@
 //! y = S r_P,   z = P y + M (r - A P y),   z += P S (r - A z)_P       S = (P'AP)^-1
 //! ```
 //!
-//! Both products are with columns P alone. Of several processes each has its rows of them, and all have S.
+//! Both products are with columns P alone. Of several processes each has its rows of them, and its part of P'AP, which MUMPS factors on all.
 
 use super::around::Subspace;
 use super::library::petsc;
 use super::vector::Vector;
-use super::{Int, Ksp, Matrix, Scope, Session, ffi};
+use super::{Int, Ksp, Matrix, ffi};
 use crate::error::Result;
+use mpi::ffi::{MPI_Comm, RSMPI_COMM_SELF};
 use std::ptr::{null, null_mut};
 
 /// What the preconditioner around another needs.
 struct Patch {
-    /// The dofs P of this process: (entry of a vector here, place in P).
-    own: Vec<(usize, usize)>,
-    /// The rows here that have entries in columns P.
-    rows: Vec<usize>,
+    /// The dofs P of this process, as entries of its vectors.
+    inside: Vec<usize>,
+    /// The rows of this process that have entries in columns P, likewise.
+    touched: Vec<usize>,
     /// A in these rows and the columns P.
     columns: ffi::Mat,
     /// Vectors over the rows, and over P.
     parts: [Vector; 2],
     solver: Ksp,
-    scope: Scope,
-    session: Session,
 }
 
 impl Ksp {
@@ -82,70 +81,54 @@ impl Ksp {
 
 impl Patch {
     fn new(matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
-        let (session, scope, own) = (matrix.session().clone(), matrix.scope(), matrix.own());
-        let new = |rows| Vector::new(&session, Scope::Process, rows, 1);
-        let mut patch = Indices::new(dofs)?;
-        patch.grow(matrix, layers)?;
-        let inside = patch.get()?;
-        let mut touched = Indices::new(&inside)?;
-        touched.grow(matrix, 1)?;
-        let rows: Vec<usize> = touched.get()?.into_iter().filter(|i| own.contains(i)).collect();
+        let (session, scope, own) = (matrix.session(), matrix.scope(), matrix.own());
+        let new = |rows: &[usize]| Vector::new(session, scope, rows.len(), 1);
+        let mut inside = Indices::around(matrix, dofs, layers)?;
+        let mut touched = Indices::around(matrix, &inside, 1)?;
+        inside.retain(|i| own.contains(i));
+        touched.retain(|i| own.contains(i));
+        let parts = [new(&touched)?, new(&inside)?];
+        let patch = Indices::new(scope.comm(session), &inside)?;
         let mut block = patch.submatrix(matrix, &patch)?;
-        // SAFETY: a matrix of this process, of rows and columns of one that is positive definite.
+        // SAFETY: a matrix of rows and columns of one that is positive definite.
         unsafe {
             petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, ffi::PetscBool_PETSC_TRUE))?;
             petsc!(MatSetOption(block, ffi::MatOption_MAT_SPD, ffi::PetscBool_PETSC_TRUE))?;
         }
-        let solver = Ksp::factored(&session, block, inside.len());
+        let solver = Ksp::factored(session, scope, block, inside.len());
         // SAFETY: our reference; the solver has its own.
         unsafe { petsc!(MatDestroy(&mut block)) }?;
         let solver = solver?;
         if solver.failure().is_some() {
             return Ok(None);
         }
-        let here = |(place, dof): (usize, &usize)| own.contains(dof).then(|| (dof - own.start, place));
-        Ok(Some(Self {
-            own: inside.iter().enumerate().filter_map(here).collect(),
-            columns: Indices::new(&rows)?.submatrix(matrix, &patch)?,
-            parts: [new(rows.len())?, new(inside.len())?],
-            rows: rows.into_iter().map(|i| i - own.start).collect(),
-            solver,
-            scope,
-            session,
-        }))
-    }
-
-    /// (P'AP)^-1 of what the processes have of a vector over P, altogether.
-    fn solve(&self, mut part: Vec<f64>) -> Result<Vec<f64>> {
-        self.scope.sum(&self.session, &mut part);
-        let mut y = vec![0.0; part.len()];
-        self.solver.solve(&part, &mut y)?;
-        Ok(y)
+        let columns = Indices::new(scope.comm(session), &touched)?.submatrix(matrix, &patch)?;
+        inside.iter_mut().chain(&mut touched).for_each(|i| *i -= own.start);
+        Ok(Some(Self { inside, touched, columns, parts, solver }))
     }
 }
 
 impl Subspace for Patch {
     fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
-        let mut residual = vec![0.0; self.parts[1].len()];
-        self.own.iter().for_each(|&(i, k)| residual[k] = r[i]);
-        let y = self.solve(residual)?;
-        let mut part = vec![0.0; self.rows.len()];
+        let residual: Vec<f64> = self.inside.iter().map(|&i| r[i]).collect();
+        let (mut y, mut ay) = (vec![0.0; residual.len()], vec![0.0; self.touched.len()]);
+        self.solver.solve(&residual, &mut y)?;
         // SAFETY: the product reads one and writes to the other.
-        let product = |y, part| unsafe { petsc!(MatMult(self.columns, y, part)) };
-        self.parts[1].map(("y", &y), &self.parts[0], ("A y", &mut part), product)?;
-        self.rows.iter().zip(&part).for_each(|(&i, ay)| r[i] -= ay);
-        self.own.iter().for_each(|&(i, k)| x[i] += y[k]);
+        let product = |y, ay| unsafe { petsc!(MatMult(self.columns, y, ay)) };
+        self.parts[1].map(("y", &y), &self.parts[0], ("A y", &mut ay), product)?;
+        self.touched.iter().zip(&ay).for_each(|(&i, ay)| r[i] -= ay);
+        self.inside.iter().zip(&y).for_each(|(&i, y)| x[i] += y);
         Ok(())
     }
 
     fn project(&self, z: &mut [f64]) -> Result<()> {
-        let part: Vec<f64> = self.rows.iter().map(|&i| z[i]).collect();
-        let mut az = vec![0.0; self.parts[1].len()];
+        let part: Vec<f64> = self.touched.iter().map(|&i| z[i]).collect();
+        let (mut az, mut y) = (vec![0.0; self.inside.len()], vec![0.0; self.inside.len()]);
         // SAFETY: as above.
         let product = |part, az| unsafe { petsc!(MatMultTranspose(self.columns, part, az)) };
         self.parts[0].map(("z", &part), &self.parts[1], ("A z", &mut az), product)?;
-        let y = self.solve(az)?;
-        self.own.iter().for_each(|&(i, k)| z[i] -= y[k]);
+        self.solver.solve(&az, &mut y)?;
+        self.inside.iter().zip(&y).for_each(|(&i, y)| z[i] -= y);
         Ok(())
     }
 }
@@ -161,51 +144,41 @@ impl Drop for Patch {
 struct Indices(ffi::IS);
 
 impl Indices {
-    fn new(numbers: &[usize]) -> Result<Self> {
-        let mut numbers: Vec<Int> = numbers.iter().map(|&i| i as Int).collect();
-        numbers.sort_unstable();
-        numbers.dedup();
+    /// What each process of a communicator has of them.
+    fn new(comm: MPI_Comm, numbers: &[usize]) -> Result<Self> {
+        let numbers: Vec<Int> = numbers.iter().map(|&i| i as Int).collect();
         let (count, copy, mut is) = (numbers.len() as Int, ffi::PetscCopyMode_PETSC_COPY_VALUES, null_mut());
         // SAFETY: PETSc copies the numbers.
-        unsafe { petsc!(ISCreateGeneral(mpi::ffi::RSMPI_COMM_SELF, count, numbers.as_ptr(), copy, &mut is)) }?;
+        unsafe { petsc!(ISCreateGeneral(comm, count, numbers.as_ptr(), copy, &mut is)) }?;
         Ok(Self(is))
     }
 
-    /// Adds the columns of these rows, so many times.
-    fn grow(&mut self, matrix: &Matrix, layers: usize) -> Result<()> {
-        if layers == 0 {
-            return Ok(());
-        }
-        // SAFETY: one set, which PETSc puts a new one in the place of.
-        unsafe {
-            petsc!(MatIncreaseOverlap(matrix.raw(), 1, &mut self.0, layers as Int))?;
-            petsc!(ISSort(self.0))
-        }
-    }
-
-    fn get(&self) -> Result<Vec<usize>> {
+    /// These `rows` of a matrix and those within `layers` of its graph around them. Collective.
+    fn around(matrix: &Matrix, rows: &[usize], layers: usize) -> Result<Vec<usize>> {
+        let mut rows = rows.to_vec();
+        rows.sort_unstable();
+        rows.dedup();
+        // SAFETY: the constant of MPI itself.
+        let mut indices = Self::new(unsafe { RSMPI_COMM_SELF }, &rows)?;
         let (mut count, mut numbers) = (0, null());
-        // SAFETY: PETSc's array, read before it is given back.
+        // SAFETY: one set, in the place of which PETSc puts a new one, and its array, read before it is given back.
         unsafe {
-            petsc!(ISGetLocalSize(self.0, &mut count))?;
-            petsc!(ISGetIndices(self.0, &mut numbers))?;
+            petsc!(MatIncreaseOverlap(matrix.raw(), 1, &mut indices.0, layers as Int))?;
+            petsc!(ISSort(indices.0))?;
+            petsc!(ISGetLocalSize(indices.0, &mut count))?;
+            petsc!(ISGetIndices(indices.0, &mut numbers))?;
             let copy = (0..count as usize).map(|k| *numbers.add(k) as usize).collect();
-            petsc!(ISRestoreIndices(self.0, &mut numbers))?;
+            petsc!(ISRestoreIndices(indices.0, &mut numbers))?;
             Ok(copy)
         }
     }
 
-    /// These rows and those columns of a matrix, on this process.
+    /// These rows and those columns of a matrix, of its processes.
     fn submatrix(&self, matrix: &Matrix, columns: &Indices) -> Result<ffi::Mat> {
-        let (scall, mut list) = (ffi::MatReuse_MAT_INITIAL_MATRIX, null_mut());
-        // SAFETY: PETSc makes a list of one matrix; our reference keeps the matrix when the list goes.
-        unsafe {
-            petsc!(MatCreateSubMatrices(matrix.raw(), 1, &self.0, &columns.0, scall, &mut list))?;
-            let part = *list;
-            petsc!(PetscObjectReference(part.cast()))?;
-            petsc!(MatDestroySubMatrices(1, &mut list))?;
-            Ok(part)
-        }
+        let (scall, mut part) = (ffi::MatReuse_MAT_INITIAL_MATRIX, null_mut());
+        // SAFETY: sets of the matrix's processes.
+        unsafe { petsc!(MatCreateSubMatrix(matrix.raw(), self.0, columns.0, scall, &mut part)) }?;
+        Ok(part)
     }
 }
 

@@ -3,12 +3,13 @@
 use super::stages::Built;
 use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
-use crate::ddm::{Coefficient, Method, Start, Sweeps, first_springs};
+use crate::ddm::{Method, Start, first_springs};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Interpolation;
 use crate::model::{LinearStep, Model};
 use crate::petsc::Session;
 use crate::problem::method::{Gamma, Linear, MethodName};
+use crate::robin::{Coefficient, Sweeps};
 use crate::scene::Scene;
 use crate::solver::options::Chosen;
 use crate::solver::{Dense, Krylov, Monolithic, Union};
@@ -37,7 +38,7 @@ pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<M
         MethodName::Ncg => Box::new(Conjugate::default()),
         MethodName::Anderson => Box::new(Anderson::new(scene.method.depth)),
     };
-    crate::ddm::prepare(model)?;
+    crate::robin::prepare(model)?;
     Ok(Method::Sweeps { acceleration, coefficient: coefficient(), linear: Box::new(Sweeps::carried()) })
 }
 
@@ -51,7 +52,7 @@ fn linear_step(
     start: &mut Start,
 ) -> Result<Box<dyn LinearStep>> {
     if linear == Linear::Sweeps {
-        crate::ddm::prepare(model)?;
+        crate::robin::prepare(model)?;
         return Ok(Box::new(Sweeps::new(coefficient)));
     }
     model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.reveal())?;

@@ -1,10 +1,10 @@
 //! Anderson acceleration of the sweep, safeguarded by F1.
 
 use super::{Acceleration, Here, Step};
-use crate::ddm::line::Line;
-use crate::ddm::ritz::Ritz;
 use crate::error::Result;
 use crate::model::field::Field;
+use crate::model::line::Line;
+use crate::robin::Ritz;
 use nalgebra::{DMatrix, DVector};
 use std::collections::VecDeque;
 

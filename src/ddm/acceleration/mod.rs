@@ -10,12 +10,11 @@ pub use anderson::Anderson;
 pub use ncg::Conjugate;
 pub use relaxation::Relaxed;
 
-use super::ritz::Ritz;
-use super::sweep::Sweep;
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
+use crate::robin::{Ritz, Sweep};
 
 /// An iterate with everything that is known of it.
 pub struct Here<'a> {

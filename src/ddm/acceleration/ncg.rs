@@ -2,10 +2,10 @@
 
 use super::{Acceleration, Here, Step};
 use crate::ddm::forecast::gradients_factor;
-use crate::ddm::line::Line;
-use crate::ddm::ritz::Ritz;
 use crate::error::Result;
 use crate::model::field::{Field, local_dot};
+use crate::model::line::Line;
+use crate::robin::Ritz;
 
 /// Polak and Ribière's rule with exact line search on F1, restarted when the contact set changes.
 #[derive(Default)]

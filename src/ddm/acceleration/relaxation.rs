@@ -2,8 +2,8 @@
 
 use super::{Acceleration, Here, Step};
 use crate::ddm::gamma::GammaRule;
-use crate::ddm::ritz::Ritz;
 use crate::error::Result;
+use crate::robin::Ritz;
 
 /// The relaxed Robin-Robin iteration (41)-(42) with any rule for gamma.
 pub struct Relaxed {

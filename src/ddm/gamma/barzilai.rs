@@ -1,8 +1,8 @@
 //! The rule of Barzilai and Borwein.
 
 use super::{GammaRule, Here, Ritz, Unbounded};
-use crate::ddm::line::Line;
 use crate::linalg::dot;
+use crate::model::line::Line;
 use std::collections::VecDeque;
 
 /// Iterates over whose largest F1 no step may go.

@@ -12,9 +12,9 @@ pub use spectral::Spectral;
 
 use super::acceleration::Here;
 use super::forecast::{best_factor, relaxed_factor};
-use super::line::Unbounded;
-use super::ritz::Ritz;
+use crate::model::line::Unbounded;
 use crate::problem::own::Own;
+use crate::robin::Ritz;
 
 /// Chooses gamma^k after the sweep of iteration k.
 pub trait GammaRule {

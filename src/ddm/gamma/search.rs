@@ -1,7 +1,7 @@
 //! Exact line search.
 
 use super::{GammaRule, Here, Ritz, Unbounded, best_factor};
-use crate::ddm::line::Line;
+use crate::model::line::Line;
 
 /// gamma^k minimises F1 along the correction. F1 is convex, so every step descends.
 #[derive(Debug, Default, Clone, Copy)]

@@ -3,13 +3,13 @@
 //! The theorem asks for constants of F1' over all displacements. A layer has them on bounded ranges only, so they are taken over
 //! the level set {F1 <= F1(u0)} of the start, which an iteration that descends never leaves.
 
-use super::line::zero;
 use super::sweep::Sweeper;
 use super::sweeps::gradients;
 use crate::contact::law::LayerLaw;
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::layer::Layer;
+use crate::model::line::zero;
 use crate::model::linear::Trial;
 use crate::model::rigid::{Motions, TOLERANCE};
 

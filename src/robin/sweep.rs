@@ -1,7 +1,7 @@
 //! One sweep (41): every body solves its own linear problem, independently.
 
-use super::asks::{ASKS, joined, numbers};
 use crate::error::Result;
+use crate::exchange::{self, ASKS, asks};
 use crate::linalg::{axpy, dot};
 use crate::model::Model;
 use crate::model::body::{Energy, Solved};
@@ -120,7 +120,7 @@ impl Sweeper {
         // one message: traces, then SCALARS of each body, and what is asked
         let end = rows + SCALARS * bodies;
         let mut buffer = vec![0.0; end + ASKS];
-        buffer[end..].copy_from_slice(&numbers(asked));
+        buffer[end..].copy_from_slice(&asks(asked));
         let mut sweep = Sweep::default();
         let mut reasons = vec![String::new(); bodies];
         for index in 0..bodies {
@@ -164,7 +164,7 @@ impl Sweeper {
             sweep.correction.states.push(z);
         }
         model.exchange.sum(&mut buffer);
-        sweep.asked = joined(&buffer[end..]);
+        sweep.asked = exchange::asked(&buffer[end..]);
         for (index, scalars) in buffer[rows..end].chunks_exact(SCALARS).enumerate() {
             sweep.decrement.push(scalars[0]);
             sweep.energy.push(Energy { strain: scalars[1], potential: scalars[2] });

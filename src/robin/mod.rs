@@ -1,0 +1,16 @@
+//! The Robin form G_s = K_s + B_s' omega psi kappa B_s of every body: its coefficient, the sweep that solves with it, and what is made of sweeps
+//! alone: starts from a trace, linear steps, bounds of the spectrum of G^-1 F1''.
+
+pub mod coefficient;
+pub mod extend;
+pub mod interval;
+pub mod ritz;
+pub mod sweep;
+pub mod sweeps;
+
+pub use coefficient::Coefficient;
+pub use extend::prepare;
+pub use interval::Interval;
+pub use ritz::Ritz;
+pub use sweep::{Sweep, Sweeper};
+pub use sweeps::Sweeps;
