@@ -41,11 +41,11 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Of a run at the floor of rounding after `patience` iterations without progress, by a solver that had made so many sweeps before.
-    pub(super) fn new(patience: usize, foreign: usize) -> Self {
+    /// Of a run with this floor of rounding, by a solver that had made so many sweeps before.
+    pub(super) fn new(floor: Floor, foreign: usize) -> Self {
         Self {
             cycle: Cycle::default(),
-            floor: Floor::new(patience),
+            floor,
             steady: Steady::default(),
             progress: Progress::default(),
             places: None,

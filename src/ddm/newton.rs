@@ -16,7 +16,7 @@ use super::forcing::Forcing;
 use super::linear::resisting;
 use super::run::{End, Run};
 use super::start;
-use super::stop::{Floor, PATIENCE, Status};
+use super::stop::{Floor, Status};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
@@ -82,7 +82,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
                 let lost = reached.add_rounding(&run.scale, measured.strain, &more, &places, &met);
                 if !run.is_enough(&reached) {
                     // a correction gains a digit, unless rounding gives as much again
-                    let mut floor = corrected.unwrap_or_else(|| Floor::new(PATIENCE[0]));
+                    let mut floor = corrected.unwrap_or_else(Floor::of_steps);
                     is_floor = floor.is_reached(lost);
                     left = Some(floor);
                 }

@@ -27,9 +27,6 @@ pub(super) struct Progress {
 /// (docs/methods.md).
 const HALVINGS: usize = 7;
 
-/// Share of its first slope by which a descent must be felt (Armijo; Nocedal and Wright, Numerical Optimization, 2006, section 3.1).
-const FELT: f64 = 1e-4;
-
 /// Slopes of the lines, as multiples of [`meeting_slopes`](crate::model::layer::meeting_slopes), one after the other: the range in which random scenes take the
 /// same steps.
 const SLOPES: [f64; 3] = [1.0, 10.0, 0.1];
@@ -53,7 +50,7 @@ impl Progress {
         };
         let here = off(0.0);
         let mut shares = (0..=HALVINGS as i32).map(|halvings| 0.5f64.powi(halvings));
-        if let Some(share) = shares.find(|&t| off(t) <= (1.0 - 2.0 * FELT * t) * here) {
+        if let Some(share) = shares.find(|&t| off(t) <= here) {
             self.row = 0;
             return share;
         }

@@ -10,7 +10,7 @@ use super::origin::Origin;
 use super::run::{End, Run};
 use super::scale::Scale;
 use super::start::{self, RigidStart};
-use super::stop::{PATIENCE, Status};
+use super::stop::{Floor, Status};
 use super::{digits, newton, robin};
 use crate::error::Result;
 use crate::model::Model;
@@ -157,7 +157,7 @@ pub fn solve(
         _ => infeasible(model),
     };
     let (begin, balance) = (std::mem::take(&mut settings.start), settings.balance.take());
-    let patience = PATIENCE[usize::from(matches!(method, Method::Sweeps { .. }))];
+    let floor = if let Method::Newton(_) = method { Floor::of_steps() } else { Floor::of_sweeps() };
     let foreign = method.linear().sweeps();
     let mut run = Run {
         model,
@@ -168,7 +168,7 @@ pub fn solve(
         earlier: 0.0,
         origin: None,
         scale: Scale::default(),
-        memory: Memory::new(patience, foreign),
+        memory: Memory::new(floor, foreign),
         rows: Vec::new(),
     };
     let end = match found {

@@ -42,12 +42,6 @@ const PROXIMAL: f64 = 1e-9;
 /// Newton steps at most; random scenes and walls of 4096 bricks take 2 to 20.
 const STEPS: usize = 200;
 
-/// Problems with a new rho0 each, that of the contact found before.
-const ROUNDS: usize = 8;
-
-/// Change of rho0 below which it stays.
-const SETTLED: f64 = 0.2;
-
 /// The start of a model, or the motion along which its energy falls for ever. The surfaces of the rigid bodies have the shapes that
 /// displacements with the trace `given` (2n) give them; no motion is theirs.
 ///
@@ -66,17 +60,13 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
     // bodies that neither loads nor contacts push stay where they are: all else would be rounding
     let at_rest = motions.count() == 0 || rigid.work == amounts && rigid.approach(&amounts).iter().all(|&s| s <= 0.0);
     if !at_rest {
-        for _ in 0..ROUNDS {
+        // with rho0 of whole surfaces, then with that of the contact found
+        for _ in 0..2 {
             amounts = rigid.minimize().map_err(|motion| motions.names(&motion))?;
             let approach = rigid.approach(&amounts);
-            let slope = slopes(model, |q| approach[q] > 0.0);
-            let settled = slope.iter().zip(&rigid.slope).all(|(new, old)| (new - old).abs() <= SETTLED * old);
+            let found = slopes(model, |q| approach[q] > 0.0).into_iter().zip(&mut rigid.slope);
             // a contact that opens as a whole keeps its slope
-            let found = slope.into_iter().zip(&mut rigid.slope).filter(|(new, _)| new.is_finite());
-            found.for_each(|(new, old)| *old = new);
-            if settled {
-                break;
-            }
+            found.filter(|(new, _)| new.is_finite()).for_each(|(new, old)| *old = new);
         }
         rigid.open_idle(&mut amounts);
     }

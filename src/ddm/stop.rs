@@ -57,26 +57,28 @@ pub fn relative_increment(step: &[f64], now: &[f64]) -> f64 {
     if norm(step) == 0.0 { 0.0 } else { norm(step) / norm(now) }
 }
 
-/// Iterations without progress after which Newton's method, and sweeps, may be at the floor of rounding.
-pub const PATIENCE: [usize; 2] = [2, 20];
-
 /// Watches for progress: at the rounding floor the error stays where it is.
 #[derive(Debug, Clone)]
 pub struct Floor {
     best: f64,
     since: usize,
     patience: usize,
+    believable: f64,
 }
 
 impl Floor {
-    /// Largest error that can be called rounding: iterates that are far from any solution can have large rounding errors, too.
-    const BELIEVABLE: f64 = 1e-4;
     /// Share of the best error that an iterate must reach to be progress.
     const FALLS: f64 = 0.9;
 
-    /// Of a method that reduces the error to nine tenths at least in so many iterations.
-    pub fn new(patience: usize) -> Self {
-        Self { best: f64::INFINITY, since: 0, patience }
+    /// Of Newton's method, whose iterates are in equilibrium: two without progress may be there.
+    pub fn of_steps() -> Self {
+        Self { best: f64::INFINITY, since: 0, patience: 2, believable: f64::INFINITY }
+    }
+
+    /// Of sweeps: twenty without progress, as each may gain half a per cent, and an error of 1e-4 at most. Those far from any solution can have large
+    /// rounding errors, too.
+    pub fn of_sweeps() -> Self {
+        Self { patience: 20, believable: 1e-4, ..Self::of_steps() }
     }
 
     /// Notes an error; true when it is time to compare it with the rounding errors.
@@ -87,7 +89,7 @@ impl Floor {
         } else {
             self.since += 1;
         }
-        self.since > 0 && self.since.is_multiple_of(self.patience) && error <= Self::BELIEVABLE
+        self.since > 0 && self.since.is_multiple_of(self.patience) && error <= self.believable
     }
 }
 
@@ -227,16 +229,18 @@ mod tests {
 
     #[test]
     fn stalling_is_suspected_only_after_a_while() {
-        let mut floor = Floor::new(20);
+        let mut floor = Floor::of_sweeps();
         assert!((0..200).all(|k| !floor.is_reached(0.89f64.powi(k))));
         // at the 20th iterate without progress, and at every 20th from there on
         let reached: Vec<usize> = (1..=60).filter(|_| floor.is_reached(1e-5)).collect();
         assert_eq!(reached, [20, 40, 60]);
         assert!((1..20).all(|_| !floor.is_reached(1e-5)) && !floor.is_reached(1e-11));
         // nine tenths of the best are no progress, less is
-        let mut near = Floor::new(1);
+        let mut near = Floor { patience: 1, ..Floor::of_sweeps() };
         assert_eq!([1e-5, 0.9 * 1e-5, 0.89e-5].map(|error| near.is_reached(error)), [false, true, false]);
-        let mut far = Floor::new(2);
-        assert!((0..9).all(|_| !far.is_reached(1.1e-4)));
+        let mut far = Floor::of_sweeps();
+        assert!((0..99).all(|_| !far.is_reached(1.1e-4)));
+        let mut steps = Floor::of_steps();
+        assert_eq!([1.0; 5].map(|error| steps.is_reached(error)), [false, false, true, false, true]);
     }
 }
