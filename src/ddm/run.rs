@@ -165,7 +165,7 @@ impl Run<'_> {
 
     /// What is known of an iterate of Newton's method after a step x, a share of a whole one, to u.
     pub fn after_step<'a>(
-        &self,
+        &mut self,
         (u, x, share): (&'a Field, &'a Field, f64),
         measured: Measured,
         reached: &Reached,
@@ -173,6 +173,7 @@ impl Run<'_> {
         linear: &dyn LinearStep,
     ) -> Iterate<'a> {
         let residual = reached.worst();
+        let closed = places.compression.iter().map(|&c| c > 0.0);
         Iterate {
             k: self.rows.len() + 1,
             u,
@@ -189,7 +190,8 @@ impl Run<'_> {
             // pressures of compressions that are far away may be beyond the range of numbers: the places are not
             is_finite: !residual.is_nan(),
             is_still: true,
-            period: None,
+            // F1 of iterates of Newton's method goes up and down
+            period: self.memory.cycle.period(&u.trace, closed, residual, 0.0),
         }
     }
 
