@@ -115,6 +115,21 @@ fn rows_are_dealt_out() {
     }
 }
 
+/// A product with the matrix takes each rank as many operations, although rows of quadratic elements are longer, and those at the contact: PETSc
+/// prints the ratio of the most to the least with one decimal.
+#[test]
+fn operations_are_dealt_out() {
+    let sets = ["solver=hypre", "body.0.order=1"];
+    let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+    for ranks in [2, 3] {
+        let args = [&["--method", "newton", "-log_view"][..], &sets].concat();
+        let run = solve_on(ranks, case("hertz-sphere"), &args).converged();
+        let products = run.stdout.lines().filter(|line| line.starts_with("MatMult "));
+        let ratios: Vec<&str> = products.filter_map(|line| line.split_whitespace().nth(6)).collect();
+        assert!(!ratios.is_empty() && ratios.iter().all(|&ratio| ratio == "1.0"), "{ratios:?}");
+    }
+}
+
 /// What MUMPS takes on several ranks depends on when they answer: here its analysis foresees too little.
 #[test]
 fn mumps_gets_the_room_that_it_lacks() {

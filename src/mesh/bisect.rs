@@ -85,6 +85,10 @@ mod tests {
         let fifths = parts(&points, 5);
         let counts: Vec<usize> = (0..5).map(|part| fifths.iter().filter(|&&of| of == part).count()).collect();
         assert_eq!(counts, [96; 5]);
+        // planes of the lower half weigh twice as much: two thirds of the weight, below the ninth of 24 planes
+        let weights = |node: u32| if points[node as usize][2] < 12.0 { 2 } else { 1 };
+        let halves = of::<3, 3>(&points, &weights, 2);
+        assert!(points.iter().zip(&halves).all(|(x, &half)| (x[2] < 9.0) == (half == 0)));
         let back: Vec<[f64; 3]> = points.iter().rev().copied().collect();
         assert!(parts(&back, 5).iter().rev().eq(&fifths));
         // two points of a place may be in two parts, and more parts than points leave some empty
