@@ -37,11 +37,10 @@
 pub use crate::contact::law::{LayerLaw, PerPoint, Response};
 pub use crate::ddm::acceleration::Here;
 pub use crate::ddm::gamma::GammaRule;
-pub use crate::model::line::Unbounded;
-pub use crate::robin::Ritz;
 pub use crate::ddm::{Observer, Row, Silent, Status};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;
+pub use crate::model::line::Unbounded;
 pub use crate::output::{BodyField, ContactTable, PairReport, Report};
 pub use crate::petsc::Session;
 pub use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Support};
@@ -55,6 +54,7 @@ pub use crate::problem::order::Order;
 pub use crate::problem::robin::{RobinRule, Zone};
 pub use crate::problem::solver::{Preset, SolverSpec};
 pub use crate::problem::stop::StopRule;
+pub use crate::robin::Ritz;
 pub use crate::run::keep::Keep;
 pub use crate::scene::Scene;
 

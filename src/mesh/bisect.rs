@@ -1,11 +1,10 @@
 //! Nodes over ranks by their places: recursive bisection of coordinates.
 //!
-//! Every rank knows all nodes, so that each finds the same parts without a message; nodes of two bodies that lie together in a contact are in one
-//! part, or in parts next to each other.
+//! Every rank knows all nodes, so that each finds the same parts; nodes of two bodies that lie together in a contact are in one part, or in parts
+//! next to each other.
 //!
-//! Beside METIS on the graph of the nodes, on 2, 3, 5, 8 ranks with hypre (iterations of all linear steps, METIS first): groove3d n = 24 47, 48,
-//! 50, 52 and 49, 50, 49, 47; hertz-sphere n = 26, edge = 1, P1 54, 53, 69, 55 and 54; flange 105, 109, 104, 101 and 109, 108, 108, 111. The
-//! mean memory of a rank is the same to 3 %, that of the largest up to 10 % more.
+//! Iterations of all linear steps with hypre on 1, 2, 3, 5, 8 ranks: groove3d n = 24 50, 53, 54, 54, 54; hertz-sphere n = 26, edge = 1, P1 53, 58,
+//! 57, 52, 55; flange 110, 109, 109, 113, 107. Parts that METIS made of the graph of the nodes took as many to some per cent.
 
 use std::ops::Range;
 
