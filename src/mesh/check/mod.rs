@@ -137,8 +137,10 @@ impl<const D: usize> Portion<D> {
             checked.push(Checked { inner, outer, parts, points: cells.points });
         }
         in_use.values_mut().for_each(|group| group.agree(exchange));
-        // all have found the same
-        in_use.values().try_for_each(|group| group.judge(mesh)).map(|()| checked)
+        let judged = in_use.values().try_for_each(|group| group.judge(mesh));
+        // all have found the same; the first rank has the numbers of elements
+        first(exchange, judged.map_err(|error| (exchange.rank(), error)))?;
+        Ok(checked)
     }
 }
 
