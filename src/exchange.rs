@@ -55,7 +55,8 @@ fn own<T: DeserializeOwned>(bytes: Vec<u8>) -> T {
     unpack(&bytes).unwrap_or_else(|_| unreachable!("ranks run one program"))
 }
 
-/// Kinds of asking of a run from outside: bits of one number, which go as sums with messages that ranks send anyway.
+/// Kinds of asking of a run from outside, three signals, a snapshot and a checkpoint: bits of one number, which go as sums with messages that ranks
+/// send anyway.
 pub const ASKS: usize = 5;
 
 /// One number a kind, to be added up over the ranks.
@@ -95,14 +96,13 @@ pub fn first<K: Serialize + DeserializeOwned + Ord, T>(
     if exchange.ranks() == 1 {
         return found.map_err(|(_, error)| error);
     }
-    let mine = found.as_ref().err().map(|(key, error)| (key, error.kind().exit_code()));
-    let mine = mine.map(|(key, code)| (pack(key), code));
-    let all = share(exchange, &mine).into_iter().zip(0..);
-    let errors = all.filter_map(|(found, rank)| found.map(|(key, code)| (own::<K>(key), rank, code)));
-    match (errors.min(), found) {
-        (Some((_, rank, _)), Err((_, error))) if rank == exchange.rank() => Err(error),
-        (Some((.., code)), _) => Err(Error::silent(code)),
-        (None, found) => found.map_err(|(_, error)| error),
+    let (mine, found) = match found {
+        Ok(found) => (Vec::new(), Ok(found)),
+        Err((key, error)) => (vec![(key, exchange.rank(), error.kind().exit_code())], Err(error)),
+    };
+    match gather(exchange, &mine).first() {
+        Some((_, rank, code)) if *rank != exchange.rank() => Err(Error::silent(*code)),
+        _ => found,
     }
 }
 

@@ -1,5 +1,6 @@
 //! What is asked of a run while it iterates: to end, to write what it has, to keep its state.
 
+use crate::exchange::ASKS;
 use crate::interrupt::{self, ENDING, Interrupt};
 use std::cell::Cell;
 use std::time::{Duration, Instant};
@@ -7,6 +8,7 @@ use std::time::{Duration, Instant};
 /// Bits of [`Observer::asked`](crate::ddm::Observer::asked) behind those of [`ENDING`].
 const SNAPSHOT: u8 = 1 << ENDING.len();
 const CHECKPOINT: u8 = SNAPSHOT << 1;
+const _: () = assert!(CHECKPOINT == 1 << (ASKS - 1), "a message has as many kinds");
 
 /// Signals, and the time for the next checkpoint.
 pub struct Asking {
