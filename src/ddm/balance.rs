@@ -19,18 +19,16 @@ pub trait Discretisation {
 /// Share of the discretisation's error that the iteration's may have.
 pub const SHARE: f64 = 0.1;
 
-/// Error of the iteration from which on asking is worth its price.
-const FIRST: f64 = 0.03;
-
 /// Asks seldom: an estimate costs about as much as a Newton step.
 pub(super) struct Balance {
     rule: Box<dyn Discretisation>,
-    last: Option<f64>,
+    /// The last answer; before the first all of the solution, of which the discretisation misses a part.
+    last: f64,
 }
 
 impl Balance {
     pub fn new(rule: Box<dyn Discretisation>) -> Self {
-        Self { rule, last: None }
+        Self { rule, last: 1.0 }
     }
 
     /// Whether an iterate with this estimated error is good enough. A good last answer is confirmed at this iterate.
@@ -45,12 +43,11 @@ impl Balance {
         layer: &Layer,
         error: f64,
     ) -> Result<bool> {
-        let worth_asking = self.last.map_or(FIRST, |last| SHARE * last);
-        if error.is_nan() || error > worth_asking {
+        if error.is_nan() || error > SHARE * self.last {
             return Ok(false);
         }
         let now = self.rule.error(model, linear, iterate, layer)?;
-        self.last = Some(now);
+        self.last = now;
         Ok(error <= SHARE * now)
     }
 }

@@ -42,7 +42,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             Forcing::new(&places, before.clone(), &rho, (run.stop.residual, &run.scale), linear.roughest());
         let mut enough = |model: &Model, trial: &Trial| match left {
             None => forcing.is_enough(model, trial),
-            Some(_) => trial.is_within(CORRECTED),
+            Some(_) => trial.is_within(0.5),
         };
         let system = System { model: run.model, places: &places, springs: &springs, residual: &r, enough: &mut enough };
         let mut x = match linear.solve(system)? {
@@ -108,9 +108,6 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         }
     }
 }
-
-/// Error of a step that corrects the linear error of the one before, as a share of it: a digit.
-const CORRECTED: f64 = 0.1;
 
 /// Replaces a step x that led to u by the exact search on F1 along it.
 fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<()> {

@@ -212,11 +212,10 @@ impl Run<'_> {
         let f1 = potential + layer.energy.iter().sum::<f64>();
         let residual = self.scale.relative(missed, strain + layer.work);
         // a small residual of a slow mode is no small error: the pressures stand still, too
-        let is_balanced = |tolerance: f64| self.scale.imbalance(self.model, &layer.force) <= SPARE * tolerance;
+        let is_balanced = |tolerance: f64| self.scale.imbalance(self.model, &layer.force) <= tolerance;
         let peak = self.scale.peak(&layer.pressure);
-        let steady = &self.memory.steady;
-        let is_still =
-            |tolerance| steady.is_still(residual, &layer.pressure, peak, tolerance) && is_balanced(tolerance);
+        let missing = self.memory.steady.missing(residual, &layer.pressure, peak);
+        let is_still = |tolerance| missing <= tolerance * peak && is_balanced(tolerance);
         let is_still = self.stop.residual.is_none_or(is_still) && self.stop.increment.is_none_or(is_balanced);
         self.memory.steady.note(residual, &layer.pressure);
         let closed = layer.compression.iter().map(|&c| c > 0.0);
@@ -266,9 +265,6 @@ pub(super) struct Iterate<'a> {
     /// That of a cycle.
     pub period: Option<usize>,
 }
-
-/// Factor on the tolerance of the residual for the balance of forces, which is measured by motions and not by energy.
-const SPARE: f64 = 10.0;
 
 /// What rounding alone can make of an iterate, squared energy norm: of K u, of forces, and of compressions, which a stiff layer
 /// answers with forces of its own.

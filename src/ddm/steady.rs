@@ -8,30 +8,16 @@
 /// Share of an earlier residual below which the pressures of that iterate tell something.
 const FALLEN: f64 = 0.1;
 
-/// Share of the last kept residual at which another iterate is kept.
-const NEXT: f64 = 0.3;
-
-/// How far the last step may have moved a pressure, in units of the error that is asked for. If a sweep leaves the share f of an error,
-/// its step is (1 - f)/f times what is left: at most 3 times, unless f is below a quarter.
-const MOVED: f64 = 3.0;
-
-/// Pressures of earlier iterates, with residuals that fall from each to the next, and those of the last one.
+/// Pressures of earlier iterates, with residuals that fall from each to the next by this share or more.
 #[derive(Debug, Default, Clone)]
 pub struct Steady {
     past: Vec<(f64, Vec<f64>)>,
-    last: Option<Vec<f64>>,
 }
 
 impl Steady {
-    /// Whether the pressures `now` of an iterate with this residual have come to rest within a share `tolerance` of their `peak`.
-    pub fn is_still(&self, residual: f64, now: &[f64], peak: f64, tolerance: f64) -> bool {
-        let moved = self.last.as_ref().map_or(0.0, |last| most_apart(last, now));
-        moved <= MOVED * tolerance * peak && self.missing(residual, now, peak) <= tolerance * peak
-    }
-
     /// Largest estimated error of the pressures `now` of an iterate with this residual; zero if it is the first one. An error larger
     /// than their `peak` is no measure of those that follow: laws are far from linear there.
-    fn missing(&self, residual: f64, now: &[f64], peak: f64) -> f64 {
+    pub fn missing(&self, residual: f64, now: &[f64], peak: f64) -> f64 {
         let left = |(then, before): &(f64, Vec<f64>)| {
             let moved = most_apart(before, now).min(peak);
             // a residual that has not fallen tells that nothing is known
@@ -45,10 +31,9 @@ impl Steady {
     /// Takes an iterate into the past.
     pub fn note(&mut self, residual: f64, pressure: &[f64]) {
         self.past.retain(|(then, _)| *then > residual);
-        if self.past.last().is_none_or(|(then, _)| residual <= NEXT * then) {
+        if self.past.last().is_none_or(|(then, _)| residual <= FALLEN * then) {
             self.past.push((residual, pressure.to_vec()));
         }
-        self.last = Some(pressure.to_vec());
     }
 }
 

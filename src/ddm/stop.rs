@@ -104,17 +104,12 @@ pub struct Cycle {
 }
 
 impl Cycle {
-    /// Longest period looked for.
+    /// Longest period looked for. Contact sets must repeat for so many of the longest periods.
     const LONGEST: usize = 8;
-    /// Iterates whose contact sets must repeat: eight of the longest periods.
-    const WATCHED: usize = 64;
-    /// Share of the traces that a step must move to be one, and by which those of a period may differ: half of the digits,
-    /// and all but the rounding of sums.
-    const MOVES: f64 = 1e-7;
-    const SAME: f64 = 1e-12;
 
-    /// The period, if `trace` equals one seen 2 to 8 updates ago while the last update moved it, or if the contact sets
-    /// `closed` of the last 64 iterates repeat with that period and neither the residual nor F1 has fallen meanwhile.
+    /// The period, if the last update moved `trace` by more than half of its digits and it is that of 2 to 8 updates ago to half of the
+    /// digits of this step, or if the contact sets `closed` of the last 64 iterates repeat with that period and neither the residual nor F1 has
+    /// fallen meanwhile.
     pub fn period(
         &mut self,
         trace: &[f64],
@@ -126,11 +121,12 @@ impl Cycle {
     }
 
     fn period_of_traces(&mut self, trace: &[f64]) -> Option<usize> {
-        let size = crate::linalg::dot(trace, trace).sqrt();
-        let apart = |other: &[f64]| trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt() / size;
-        let moved = self.recent.back().is_some_and(|last| apart(last) > Self::MOVES);
+        let half = f64::EPSILON.sqrt();
+        let apart = |other: &[f64]| trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt();
+        let step = self.recent.back().map_or(0.0, |last| apart(last));
+        let moved = step > half * crate::linalg::dot(trace, trace).sqrt();
         let found = (2..=self.recent.len())
-            .find(|&period| moved && apart(&self.recent[self.recent.len() - period]) < Self::SAME);
+            .find(|&period| moved && apart(&self.recent[self.recent.len() - period]) < half * step);
         if self.recent.len() == Self::LONGEST {
             self.recent.pop_front();
         }
@@ -144,7 +140,7 @@ impl Cycle {
         let start = self.sets.is_empty();
         self.best = if start { (residual, energy) } else { (self.best.0.min(residual), self.best.1.min(energy)) };
         self.sets.push_back((hash.finish(), self.best));
-        if self.sets.len() <= Self::WATCHED {
+        if self.sets.len() <= Self::LONGEST.pow(2) {
             return None;
         }
         self.sets.pop_front();
@@ -212,12 +208,12 @@ mod tests {
         assert_eq!(first(&mut |k| traces.period(&[(k % 9) as f64, 2.0], std::iter::empty(), 1.0, 0.0)), None);
         let mut sets = Cycle::default();
         assert_eq!(first(&mut |k| sets.period(&[k as f64], [k.is_multiple_of(9), true].into_iter(), 1.0, 0.0)), None);
-        // steps of 1e-8 are none, and traces that differ by 1e-11 are others
+        // steps of 1e-8 are none, and traces that differ by 1e-7 are others
         let mut small = Cycle::default();
         assert_eq!(first(&mut |k| small.period(&[1.0 + 1e-8 * (k % 2) as f64], std::iter::empty(), 1.0, 0.0)), None);
         let mut drifting = Cycle::default();
         let mut each =
-            |k: usize| drifting.period(&[(k % 2) as f64 + 1e-11 * k as f64, 1.0], std::iter::empty(), 1.0, 0.0);
+            |k: usize| drifting.period(&[(k % 2) as f64 + 1e-7 * k as f64, 1.0], std::iter::empty(), 1.0, 0.0);
         assert_eq!(first(&mut each), None);
     }
 

@@ -8,9 +8,6 @@ use std::collections::VecDeque;
 /// Iterates over whose largest F1 no step may go.
 const WINDOW: usize = 10;
 
-/// Share of u'Ku + sum omega p c below which a growth of F1 is rounding.
-const ROUNDING: f64 = 1e-14;
-
 /// gamma^k = s'G s / s'y with s the last step and y the change of the residual: the inverse of a Rayleigh quotient of
 /// G^-1 F1''. The first step is an exact line search.
 ///
@@ -43,10 +40,9 @@ impl GammaRule for BarzilaiBorwein {
             let stiffer: Vec<f64> = here.layer.force.iter().zip(&last.force).map(|(now, then)| now - then).collect();
             last.gamma * last.decrement / (last.gamma * last.curvature + dot(&stiffer, &last.closing))
         });
-        let (decrement, residual) = (here.decrement(), here.residual);
+        let decrement = here.decrement();
         let line = Line::new(here.model, here.layer, &here.sweep.residual, &here.sweep.correction);
-        let slack = ROUNDING * decrement / (residual * residual);
-        let worst = self.recent.iter().copied().fold(0.0, f64::max) + slack;
+        let worst = self.recent.iter().copied().fold(0.0, f64::max);
         let gamma = match quotient {
             Some(gamma) if gamma > 0.0 && gamma.is_finite() && line.change(gamma) <= worst => gamma,
             _ => line.minimize(1e-6)?,
