@@ -184,11 +184,25 @@ pub fn discretize<const D: usize>(
         move || graph.get_or_init(|| cells::graph(part, stock, &draft.rows, others))
     });
     let lazy: Vec<_> = lazy.collect();
+    let coupled: Vec<OnceCell<Vec<u32>>> = parts.iter().map(|_| OnceCell::new()).collect();
+    let inside = |body: usize| {
+        let (part, stock, rows) = (&parts[body], &stocks[body], &drafts[body].rows);
+        &coupled[body].get_or_init(|| couplings::inside(part, stock, rows, others))[..]
+    };
+    let counts: Vec<_> = (0..parts.len())
+        .zip(&lazy)
+        .map(|(body, graph)| {
+            move || match alone {
+                true => graph().col.len(),
+                false => inside(body).iter().map(|&count| count as usize).sum(),
+            }
+        })
+        .collect();
     let motions = parts.iter().zip(&drafts);
     let motions: Vec<_> =
         motions.map(|(part, draft)| move |k: usize, dof: usize| part.dof_of(&draft.free[k], dof)).collect();
-    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(lazy.iter().zip(&motions));
-    let outlines = outlines.map(|(((part, draft), supported), (graph, motion))| Outline {
+    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(lazy.iter().zip(&counts).zip(&motions));
+    let outlines = outlines.map(|(((part, draft), supported), ((graph, couplings), motion))| Outline {
         name: &part.spec.name.value,
         dimension: D,
         order: part.space.order,
@@ -196,12 +210,13 @@ pub fn discretize<const D: usize>(
         prescribed: &supported.prescribed,
         motions: draft.free.len(),
         motion,
+        couplings,
         graph,
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
     let deal = |bodies: Vec<usize>| {
         let nodes: Vec<[f64; D]> = bodies.iter().flat_map(|&body| &parts[body].space.nodes).copied().collect();
-        let couplings = couplings::of(&bodies, (&parts, &stocks, &drafts), &pairs, others);
+        let couplings = couplings::of::<D>(&bodies, &inside, &pairs);
         let weight = |node: u32| u64::from(couplings[node as usize]);
         Deal { bodies, owner: crate::mesh::bisect::<D, D>(&nodes, &weight, exchange.ranks()) }
     };

@@ -24,7 +24,9 @@ pub struct Outline<'a> {
     pub motions: usize,
     /// What one of them does at a dof.
     pub motion: &'a dyn Fn(usize, usize) -> f64,
-    /// Which of its nodes K couples, made when it is first asked for; of several ranks the first has the graph. Collective.
+    /// How many of its nodes each is coupled with, itself included, summed over them: entries of K by blocks. Collective.
+    pub couplings: &'a dyn Fn() -> usize,
+    /// Which of its nodes K couples, made when it is first asked for; of several ranks the first has the graph, and all cells meanwhile. Collective.
     pub graph: &'a dyn Fn() -> &'a NodeGraph,
 }
 

@@ -10,7 +10,6 @@ use crate::discretize::{Assembled, Factory, Outline};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::tell;
 use crate::fem::Interpolation;
-use crate::fem::assemble::NodeGraph;
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot};
 use crate::parallel::Ranks;
@@ -19,7 +18,7 @@ use crate::problem::method::{Linear, MethodName};
 use crate::problem::order::Order;
 use crate::problem::solver::Preset;
 use crate::scene::Scene;
-use crate::solver::cost::{self, Candidate, Comparison, Step};
+use crate::solver::cost::{Candidate, Comparison, Step};
 use crate::solver::options::{Chosen, Typed};
 use crate::solver::preset::{self, Size, Smoother};
 use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory};
@@ -219,7 +218,8 @@ impl<'a> Inner<'a> {
         }
     }
 
-    /// Chooses for bodies in space: for all together where Newton's method may join them. The first rank gets their graphs. Collective.
+    /// Chooses for bodies in space: for all together where Newton's method may join them. The first rank gets their graphs where the
+    /// answer depends on them. Collective.
     fn choose_in_space(&mut self, plans: &mut [&mut Plan], outlines: &[&Outline]) -> Result<()> {
         let joined = self.may_join();
         let size = if joined { plans.len().max(1) } else { 1 };
@@ -229,25 +229,23 @@ impl<'a> Inner<'a> {
                 MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => Step::Swept,
                 MethodName::Robin | MethodName::Ncg | MethodName::Anderson => Step::Sweeps,
             };
-            if self.session.size() > 1 {
-                // the first rank gets the cells that others have
-                outlines.iter().for_each(|outline| {
-                    (outline.graph)();
-                });
-            }
-            let compare = || {
-                let candidates = plans.iter().zip(outlines).map(|(plan, outline)| {
-                    let NodeGraph { ptr, col, .. } = (outline.graph)();
-                    let retained = plan.retained.as_ref().filter(|_| plan.condensable);
-                    Candidate { dofs: plan.dofs, order: plan.order, retained, ptr, col }
-                });
-                Ok(cost::compare(&candidates.collect::<Vec<_>>(), step))
-            };
-            let comparison = tell(&Ranks::new(self.session), compare)?;
+            let candidates = plans.iter().zip(outlines).map(|(plan, outline)| {
+                let retained = plan.retained.as_ref().filter(|_| plan.condensable);
+                Candidate { dofs: plan.dofs, order: plan.order, retained, couplings: (outline.couplings)() }
+            });
+            let candidates: Vec<_> = candidates.collect();
             // bodies that are kept have their memory already
             let are_kept = plans.iter().all(|plan| self.kept.contains_key(&plan.name));
-            let is_direct = comparison.is_direct(if are_kept { usize::MAX } else { self.memory });
-            let Comparison { direct, multigrid } = comparison;
+            let memory = if are_kept { usize::MAX } else { self.memory };
+            let mut comparison = Comparison::of_cubes(&candidates, step);
+            if !comparison.is_known(&candidates, memory) {
+                let graphs = outlines.iter().map(|outline| (outline.graph)());
+                let graphs: Vec<(&[u32], &[u32])> = graphs.map(|graph| (&graph.ptr[..], &graph.col[..])).collect();
+                let analysed = || Ok(comparison.analysed(&candidates, &graphs));
+                comparison = tell(&Ranks::new(self.session), analysed)?;
+            }
+            let is_direct = comparison.is_direct(memory);
+            let Comparison { direct, multigrid, .. } = comparison;
             *self.seconds.get_or_insert(0.0) += if is_direct { direct.seconds } else { multigrid.seconds };
             if is_direct && !are_kept {
                 self.memory = self.memory.saturating_sub(direct.bytes as usize);

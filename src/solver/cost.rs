@@ -68,10 +68,8 @@ pub struct Candidate<'a> {
     pub order: Order,
     /// Those that it retains if it is condensed; none where every factorisation is of the whole body.
     pub retained: Option<&'a Retained>,
-    /// Which of its nodes K couples: row i is `col[ptr[i]..ptr[i + 1]]`, with i itself.
-    pub ptr: &'a [u32],
-    /// See `ptr`.
-    pub col: &'a [u32],
+    /// Pairs of its nodes that K couples, both ways, and each node with itself.
+    pub couplings: usize,
 }
 
 /// Seconds of one core and bytes.
@@ -93,12 +91,14 @@ impl Cost {
 }
 
 /// A choice for some bodies in space.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 pub struct Comparison {
     /// Condensed, or factored where nothing can be condensed.
     pub direct: Cost,
     /// Conjugate gradients with multigrid.
     pub multigrid: Cost,
+    /// The dense algebra on the contact, which `direct` has, too.
+    dense: Cost,
 }
 
 impl Comparison {
@@ -106,24 +106,35 @@ impl Comparison {
     pub fn is_direct(&self, memory: usize) -> bool {
         self.direct.seconds <= self.multigrid.seconds && self.direct.bytes <= memory as f64
     }
-}
 
-/// Compares both ways to solve for these bodies.
-///
-/// The order of elimination is asked for only where the answer depends on it: no body needs more operations than a cube of as
-/// many dofs, and the dense algebra on the contact is known.
-pub fn compare(bodies: &[Candidate], step: Step) -> Comparison {
-    let multigrid = bodies.iter().fold(Cost::default(), |sum, body| sum.and(body.multigrid(step)));
-    let retained = bodies.iter().map(|body| body.retained.map_or(0, |retained| retained.dofs.len()));
-    let retained = if step == Step::Joined { retained.sum() } else { retained.max().unwrap_or(0) } as f64;
-    let dense = Cost { seconds: STEPS * retained.powi(3) / 3.0 / RATE, bytes: 36.0 * retained * retained };
-    let mut direct = bodies.iter().fold(dense, |sum, body| sum.and(of_cube(body)));
-    let known = dense.seconds > multigrid.seconds || direct.seconds <= multigrid.seconds;
-    if !known {
-        // without METIS there is no better answer
-        direct = bodies.iter().fold(dense, |sum, body| sum.and(analysed(body).unwrap_or(of_cube(body))));
+    /// Compares both ways to solve for these bodies, with as many operations for a factorisation as a cube of as many dofs needs: no
+    /// body needs more.
+    pub fn of_cubes(bodies: &[Candidate], step: Step) -> Self {
+        let multigrid = bodies.iter().fold(Cost::default(), |sum, body| sum.and(body.multigrid(step)));
+        let retained = bodies.iter().map(|body| body.retained.map_or(0, |retained| retained.dofs.len()));
+        let retained = if step == Step::Joined { retained.sum() } else { retained.max().unwrap_or(0) } as f64;
+        let dense = Cost { seconds: STEPS * retained.powi(3) / 3.0 / RATE, bytes: 36.0 * retained * retained };
+        let direct = bodies.iter().fold(dense, |sum, body| sum.and(of_cube(body)));
+        Self { direct, multigrid, dense }
     }
-    Comparison { direct, multigrid }
+
+    /// Whether no order of elimination changes which is better: cubes are factored sooner, the dense algebra on the contact alone takes
+    /// longer, or a factor without any entry that K does not have exceeds `memory` bytes.
+    pub fn is_known(&self, bodies: &[Candidate], memory: usize) -> bool {
+        let least: f64 = bodies.iter().map(|body| 8.0 * FRONTS * 0.5 * 9.0 * body.couplings as f64).sum();
+        self.direct.seconds <= self.multigrid.seconds
+            || self.dense.seconds > self.multigrid.seconds
+            || least > memory as f64
+    }
+
+    /// The same by the symbolic factorisation of each body's nodes, of which K couples i with `col[ptr[i]..ptr[i + 1]]`, i itself included:
+    /// (ptr, col).
+    pub fn analysed(&self, bodies: &[Candidate], graphs: &[(&[u32], &[u32])]) -> Self {
+        // without METIS there is no better answer
+        let of = |(body, graph): (&Candidate, &(&[u32], &[u32]))| analysed(body, *graph).unwrap_or(of_cube(body));
+        let direct = bodies.iter().zip(graphs).map(of).fold(self.dense, Cost::and);
+        Self { direct, ..*self }
+    }
 }
 
 impl Cost {
@@ -135,7 +146,7 @@ impl Cost {
 impl Candidate<'_> {
     /// By multigrid.
     fn multigrid(&self, step: Step) -> Cost {
-        let entries = 9.0 * self.col.len() as f64;
+        let entries = 9.0 * self.couplings as f64;
         let [seconds, bytes] = match self.order {
             Order::P1 => [MULTIGRID, LEVELS],
             Order::P2 => [MULTIGRID_P2, LEVELS_P2],
@@ -156,8 +167,7 @@ fn of_cube(body: &Candidate) -> Cost {
 }
 
 /// By the symbolic factorisation of the nodes.
-fn analysed(body: &Candidate) -> Result<Cost> {
-    let &Candidate { ptr, col, .. } = body;
+fn analysed(body: &Candidate, (ptr, col): (&[u32], &[u32])) -> Result<Cost> {
     let nodes = ptr.len() - 1;
     let mut neighbours = vec![0];
     let mut others = Vec::with_capacity(col.len() - nodes);
@@ -198,14 +208,36 @@ mod tests {
 
     fn of(sizes: &[[usize; 3]], step: Step) -> Comparison {
         let bodies: Vec<_> = sizes.iter().map(|&size| body(size)).collect();
-        let candidates = bodies.iter().map(|(ptr, col, retained)| Candidate {
-            dofs: 3 * (ptr.len() - 1),
-            order: Order::P1,
-            retained: Some(retained),
-            ptr,
-            col,
-        });
-        compare(&candidates.collect::<Vec<_>>(), step)
+        let candidates = candidates(&bodies);
+        let graphs: Vec<_> = bodies.iter().map(|(ptr, col, _)| (&ptr[..], &col[..])).collect();
+        let comparison = Comparison::of_cubes(&candidates, step);
+        if comparison.is_known(&candidates, usize::MAX) {
+            comparison
+        } else {
+            comparison.analysed(&candidates, &graphs)
+        }
+    }
+
+    fn candidates(bodies: &[(Vec<u32>, Vec<u32>, Retained)]) -> Vec<Candidate<'_>> {
+        let of = |(ptr, col, retained): &'_ (Vec<u32>, Vec<u32>, Retained)| (3 * (ptr.len() - 1), col.len(), retained);
+        let sizes = bodies.iter().map(of);
+        let candidate =
+            |(dofs, couplings, retained)| Candidate { dofs, order: Order::P1, retained: Some(retained), couplings };
+        sizes.map(candidate).collect()
+    }
+
+    /// Small cubes are factored, whatever order is found; wide contact is not; and no factor has fewer entries than K.
+    #[test]
+    fn graphs_are_analysed_only_where_the_answer_depends_on_them() {
+        let known = |sizes: &[[usize; 3]], memory: usize| {
+            let bodies: Vec<_> = sizes.iter().map(|&size| body(size)).collect();
+            let candidates = candidates(&bodies);
+            Comparison::of_cubes(&candidates, Step::Joined).is_known(&candidates, memory)
+        };
+        assert!(known(&[[10, 10, 10]], usize::MAX) && known(&[[100, 100, 3]], usize::MAX));
+        // 9 x 8 x 0.6 bytes for each of 7 couplings of a node, less those at the surface
+        let bar = [[6, 6, 1296]];
+        assert!(!known(&bar, usize::MAX) && !known(&bar, 13_000_000) && known(&bar, 12_000_000));
     }
 
     /// A cube is dear to factor and a long bar of as many nodes is not, which its dofs alone do not say.
