@@ -32,14 +32,11 @@ use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
 use crate::exchange::Exchange;
-use crate::fem::assemble::{NodalBlock, NodeGraph};
-use crate::fem::rigid::{FreeMotion, RigidMotion};
+use crate::fem::{FreeMotion, NodalBlock, NodeGraph, RigidMotion};
 use crate::linalg::{Csr, axpy, dot};
 use crate::mesh::Checked;
 use crate::model::{BodySlot, Loads, Mechanism, Model, Segment};
-use crate::problem::body::BodySpec;
-use crate::problem::contact::ContactSpec;
-use crate::problem::method::Start;
+use crate::problem::{BodySpec, ContactSpec, Start};
 use crate::scene::Scene;
 use balance::Forces;
 pub use balance::{Balance, Resultant};

@@ -3,13 +3,10 @@
 use super::shown;
 use crate::discretize::BodyInfo;
 use crate::error::Result;
-use crate::output::BodyField;
 use crate::output::collection::{Entry, write_pvd};
 use crate::output::gmsh::Tags;
-use crate::output::{Folder, safe_name};
-use crate::run::report;
-use crate::run::results::{All, Recovered};
-use crate::run::stages::Done;
+use crate::output::{BodyField, Folder, safe_name};
+use crate::run::{All, Done, Recovered, report};
 use std::io::Write;
 
 /// Folder of the files of steps but the last.

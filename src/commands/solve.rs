@@ -13,12 +13,8 @@ use crate::output::progress::Line;
 use crate::output::{Folder, HistoryWriter, IterationTable, StepTable, Verbosity, say};
 use crate::parallel::agree;
 use crate::petsc::Session;
-use crate::run::asking::{Asking, is_snapshot, signal};
-use crate::run::clock::Clock;
-use crate::run::keep::Keep;
-use crate::run::results::All;
-use crate::run::stages::{Built, Done, Ready};
-use crate::run::{self, measure, report};
+use crate::run::asking::{is_snapshot, signal};
+use crate::run::{self, All, Asking, Built, Clock, Done, Keep, Ready, measure, report};
 use std::path::{Path, PathBuf};
 
 /// What the user typed.

@@ -6,13 +6,9 @@ use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::output::{Folder, LISTED, PairRow, Plot, Report, StepReport, busiest, contacts};
 use crate::petsc::Session;
-use crate::problem::elasticity::Plane;
-use crate::problem::units::force_labels;
-use crate::run::clock::Clock;
-use crate::run::results;
-use crate::run::stages::Done;
+use crate::problem::{Plane, force_labels};
 use crate::run::words::numbered;
-use crate::run::{measure, report};
+use crate::run::{Clock, Done, measure, report, results};
 use serde::Serialize;
 use std::path::Path;
 

@@ -9,11 +9,11 @@ use crate::contact;
 use crate::error::{Error, Result};
 use crate::exchange::Exchange;
 use crate::expression::Field;
-use crate::fem::assemble::{self, NodalBlock};
-use crate::fem::interpolation::{Interpolation, coarse_nodes, from_vertices};
-use crate::fem::quadrature::Parts;
-use crate::fem::rigid::{self, RigidMotion};
-use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, support, surface};
+use crate::fem::interpolation::{coarse_nodes, from_vertices};
+use crate::fem::{
+    ElasticBody, Elasticity, Interpolation, NodalBlock, NodeGraph, Parts, RigidMotion, Space, assemble, rigid, support,
+    surface,
+};
 use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};

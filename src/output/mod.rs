@@ -52,10 +52,10 @@ pub use history::HistoryWriter;
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
-    PairReport, Report, RoundReport, busiest,
+    PairReport, Report, RoundReport, busiest, warning_lines,
 };
 pub use rows::RowFile;
 pub use steps::{Extent, ReactionReport, StepPairReport, StepReport, StepTable};
 #[cfg(feature = "cli")]
 pub use table::{IterationTable, Verbosity};
-pub use vtu::{BodyField, CellKind, Grid};
+pub use vtu::{BodyField, CellKind, Encoding, Grid};

@@ -19,4 +19,9 @@ pub mod steps;
 pub mod verdict;
 pub mod words;
 
+pub use asking::Asking;
+pub use clock::Clock;
+pub use keep::Keep;
 pub use phases::{build, build_with, estimate, in_parts, iterate, set_up, targets};
+pub use results::{All, Recovered};
+pub use stages::{Begin, Built, Done, Ready};

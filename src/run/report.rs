@@ -15,10 +15,9 @@ use crate::error::{Kind, few};
 use crate::estimate::Estimate;
 use crate::exchange::share;
 use crate::model::BodyCounts;
-use crate::output::sci;
-use crate::output::vtu::Grid;
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, Extent, InnerTimes, IntervalReport, LISTED, PairReport, PairRow, Report,
+    BodyReport, ContactTable, EstimateReport, Extent, Grid, InnerTimes, IntervalReport, LISTED, PairReport, PairRow,
+    Report, sci,
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};

@@ -4,8 +4,7 @@ use super::stages::Done;
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Result, few};
 use crate::exchange::share;
-use crate::output::BodyReport;
-use crate::output::vtu::BodyField;
+use crate::output::{BodyField, BodyReport};
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 

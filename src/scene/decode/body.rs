@@ -3,8 +3,7 @@
 use super::{Decoder, elasticity, pattern};
 use crate::error::{Error, Result};
 use crate::expression::Field;
-use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Support};
-use crate::problem::order::Order;
+use crate::problem::{BodySpec, Load, LoadKind, Order, SpringKind, SpringSpec, Support};
 use crate::scene::read::{Keys, Node, Value};
 use crate::scene::shape::{Form, Table};
 

@@ -3,9 +3,7 @@
 use super::{Decoder, choose, history};
 use crate::error::Result;
 use crate::expression::Field;
-use crate::problem::method::{Gamma, Linear, MethodName, MethodSpec, Start};
-use crate::problem::robin::{RobinRule, Zone};
-use crate::problem::stop::StopRule;
+use crate::problem::{Gamma, Linear, MethodName, MethodSpec, RobinRule, Start, StopRule, Zone};
 use crate::scene::read::{Keys, Node, Value};
 use crate::scene::shape::{Form, Table, word};
 
