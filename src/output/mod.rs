@@ -1,6 +1,7 @@
 //! Everything the program writes: the table on the terminal, and the files of a run.
 //!
-//! Nothing here knows the space dimension: points and vectors have three components, z = 0 in the plane.
+//! Nothing here knows the space dimension: points and vectors have three components, z = 0 in the plane. What is
+//! written to an `out` has the errors of that.
 
 #[cfg(feature = "cli")]
 mod chart;

@@ -59,9 +59,6 @@ pub struct Inner<'a> {
 impl<'a> Inner<'a> {
     /// Starts from the memory that is free now and the options that the user wrote for these `bodies`; collective. `kept` are bodies of an
     /// earlier scene that serve this one, too.
-    ///
-    /// # Errors
-    /// When PETSc is out of memory.
     pub fn new(session: &'a Session, scene: &Scene, bodies: &[&str], kept: Vec<BodySlot>) -> Result<Self> {
         let mine = memory::available() as u64;
         let mut least = mine;

@@ -42,9 +42,6 @@ pub fn build(
 }
 
 /// The same, with the bodies `kept` from an earlier scene.
-///
-/// # Errors
-/// Those of [`build`].
 pub fn build_with(
     session: &Session,
     scene: Rc<Scene>,
@@ -318,9 +315,6 @@ pub fn iterate(ready: Ready, interrupt: &Interrupt, keep: &mut dyn Keep, clock: 
 }
 
 /// Estimates the error of what a run found, if the scene asks for it.
-///
-/// # Errors
-/// Failures of PETSc.
 pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> {
     let Outcome { status, iterate, layer, .. } = &done.outcome;
     let good = status.is_solved() || *status == Status::IterationLimit;

@@ -19,7 +19,7 @@ pub(super) fn table() -> Table {
         let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
         table.key(form.name, self::form(form).form(), format!("write {} = {{ {} }}", form.name, values.join(", ")))
     };
-    let forms = FORMS.iter().fold(Table::new("the layer"), add);
+    let forms = FORMS.into_iter().fold(Table::new("the layer"), add);
     forms
         .key("table", Form::Number.list().list(), POINTS)
         .key("pressure", Form::Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
@@ -66,7 +66,7 @@ impl Decoder<'_> {
             let up_to = keys.get("up_to").map(Node::number).transpose()?;
             return Ok(LayerSpec::Pressure { law, up_to });
         }
-        match FORMS.iter().find_map(|form| Some((form, keys.get(form.name)?))) {
+        match FORMS.into_iter().find_map(|form| Some((form, keys.get(form.name)?))) {
             Some((form, node)) => self.form(form, node),
             None => Err(keys.node().refuse("the layer has no law").help(EXAMPLE)),
         }

@@ -57,9 +57,6 @@ const LATE: &str = "ksp_converged_reason";
 /// ]);
 /// # Ok::<(), winkler::error::Error>(())
 /// ```
-///
-/// # Errors
-/// When PETSc is out of memory.
 pub fn unread(session: &Session, bodies: &[&str], all_reduce: &dyn Fn(&mut [u8])) -> Result<Vec<Unread>> {
     let options = session.options();
     let (prefixes, typed) = (Prefixes::new(bodies), Typed::read(session, bodies)?);
