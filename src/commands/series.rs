@@ -153,5 +153,5 @@ fn collection(done: &Done, folder: &Folder, ended: bool) -> Result<()> {
             }
         }
     }
-    folder.write("bodies.pvd", |out| write_pvd(&entries, out)).map(|_| ())
+    folder.write("bodies.pvd", |out| write_pvd(&entries, out))
 }

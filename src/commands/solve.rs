@@ -104,8 +104,8 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         let estimate = run::estimate(&mut done, &mut clock)?;
         drop(stage);
         watchers.table.finish();
-        let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
-        let failed = failed.and(watchers.steps.map_or(Ok(()), |steps| steps.finish().map(|_| ())));
+        let failed = watchers.history.map_or(Ok(()), |history| history.finish());
+        let failed = failed.and(watchers.steps.map_or(Ok(()), |steps| steps.finish()));
         let more = plan.goes_on(session, &done, estimate.as_ref(), &mut clock)?;
         if !more {
             break (done, estimate, failed);

@@ -85,15 +85,15 @@ impl Writing<'_> {
         plots.plotted.iter().for_each(|(i, file)| rows[*i].plot.clone_from(file));
         let save = |&i: &usize| {
             let table = report::contact_table(self.done, self.estimate, i);
-            folder.write(&rows[i].table, |out| table.write(out)).map(|_| ())
+            folder.write(&rows[i].table, |out| table.write(out))
         };
-        shown.iter().map(save).fold(contacts::save(folder, &report.pairs, &rows).map(|_| ()), Result::and)
+        shown.iter().map(save).fold(contacts::save(folder, &report.pairs, &rows), Result::and)
     }
 
     fn report(&self, folder: &Folder, report: &mut Report, fields: bool) -> Result<()> {
         report.files = self.names(folder, fields);
         let json = to_json(report)?;
-        folder.write("report.json", |out| out.write_all(json.as_bytes())).map(|_| ())
+        folder.write("report.json", |out| out.write_all(json.as_bytes()))
     }
 
     /// Names of the files of a run, those of other ranks included.

@@ -9,7 +9,7 @@ use super::part::Part;
 use crate::contact::ContactPair;
 use crate::error::few;
 use crate::fem::{RigidMotion, Space, rigid};
-use crate::linalg::{Blocks, PART, TOLERANCE, axpy, dot, fit};
+use crate::linalg::{Blocks, PART, TOLERANCE, axpy, bounds, dot, fit};
 use crate::mesh::Joined;
 use crate::model::{Mechanism, Motion, Motions, Segment};
 use nalgebra::{DMatrix, DVector};
@@ -313,10 +313,6 @@ fn slices(vectors: &[Vec<f64>]) -> Vec<&[f64]> {
 
 /// Largest dimension of a body along an axis.
 fn extent<const D: usize>(space: &Space<D>) -> f64 {
-    let along = |c: usize| {
-        let (low, high) =
-            space.nodes.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x[c]), high.max(x[c])));
-        high - low
-    };
-    (0..D).map(along).fold(0.0, f64::max)
+    let [low, high] = bounds(space.nodes.iter().copied());
+    (0..D).map(|c| high[c] - low[c]).fold(0.0, f64::max)
 }

@@ -115,15 +115,15 @@ impl<const D: usize> Source<D> {
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
         let gains = D == 3 && verified.portion.mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
         session.set_blas_threads(if gains { cores / session.size() } else { 1 });
-        clock.estimate = inner.seconds();
+        clock.estimate = inner.seconds;
         clock.phase("discretize");
         drop(stage);
         let mut warnings = warnings(session, &discrete);
         warnings.extend(in_parts(verified.portion.mesh.split));
         warnings.extend(inner.applied_once());
-        let (linear, whole) = (inner.linear(), inner.whole().clone());
+        let (linear, whole) = (inner.linear, inner.whole.clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());
-        let interpolation = inner.interpolation();
+        let interpolation = inner.interpolation.take();
         let scene = scene.clone();
         let (options, again) = (inner.into_options(), None);
         Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, options, warnings, again })

@@ -329,7 +329,7 @@ impl<'a> Table<'a> {
             }
             file.flush()
         };
-        self.folder.write(FILE, fill).map(|_| ())
+        self.folder.write(FILE, fill)
     }
 
     /// Folder of the results of all runs.
