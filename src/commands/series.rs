@@ -1,11 +1,11 @@
-//! Fields of a history: files of each load step, and the collection that gives them their times.
+//! Fields of bodies and pairs: names of their files, those of each load step, and the collection that gives them their times.
 
-use super::shown;
 use crate::discretize::BodyInfo;
 use crate::error::Result;
 use crate::output::collection::{Entry, write_pvd};
 use crate::output::gmsh::Tags;
 use crate::output::{BodyField, Folder, safe_name};
+use crate::run::measure::pair_names;
 use crate::run::{All, Done, Recovered, report};
 use std::io::Write;
 
@@ -16,6 +16,11 @@ const FOLDER: &str = "steps";
 fn stem_of(name: &str, step: usize, steps: usize) -> String {
     let digits = steps.to_string().len();
     format!("{FOLDER}/{}-{step:0digits$}", safe_name(name))
+}
+
+/// `contact-<a>-<b>` of each pair, safe as a file name, with a number from the second pair of the same bodies on.
+pub fn stems(done: &Done) -> Vec<String> {
+    pair_names(&done.built).into_iter().map(|name| format!("contact-{}", safe_name(&name))).collect()
 }
 
 /// The file of a rank's part of a body.
@@ -48,7 +53,7 @@ pub fn of_bodies(done: &Done) -> Vec<String> {
 /// Bodies, then contact surfaces.
 fn names(done: &Done) -> Vec<String> {
     let bodies = done.built.discrete.bodies.iter().map(|body| body.name.clone());
-    bodies.chain(shown::stems(done)).collect()
+    bodies.chain(stems(done)).collect()
 }
 
 /// Writes the fields of the step that has ended: each rank its parts of bodies, one rank the contact surfaces and what joins all.
@@ -96,7 +101,7 @@ fn views(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
             tags = Tags { entity: tags.entity + 1, points: tags.points + info.nodes, cells: tags.cells + info.cells };
         }
     }
-    for (i, name) in shown::stems(done).into_iter().enumerate().filter(|_| first) {
+    for (i, name) in stems(done).into_iter().enumerate().filter(|_| first) {
         let grid = report::contact_surface(&name, done, i);
         folder.write(&format!("{name}.msh"), |out| grid.write_msh(tags, out))?;
         let (points, cells) = (grid.points.len(), grid.connectivity.len() / grid.cell.stride());
@@ -121,7 +126,7 @@ fn fields(done: &Done, recovered: &All, folder: &Folder, stem: &dyn Fn(&str) -> 
             folder.write(&format!("{stem}.pvtu"), |out| BodyField::join(&parts, encoding, out))?;
         }
     }
-    for (i, name) in shown::stems(done).into_iter().enumerate().filter(|_| first) {
+    for (i, name) in stems(done).into_iter().enumerate().filter(|_| first) {
         let file = format!("{}.vtu", stem(&name));
         folder.write(&file, |out| report::contact_surface(&name, done, i).write(encoding, out))?;
     }

@@ -1,10 +1,10 @@
 //! All files of a run: what is small comes first, so that a full disk takes fields and not results.
 
 use super::adapt::Plan;
-use super::{curves, series, shown};
+use super::{curves, series};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
-use crate::output::{Folder, LISTED, PairRow, Plot, Report, StepReport, busiest, contacts};
+use crate::output::{Folder, LISTED, PairReport, PairRow, Plot, Report, StepReport, busiest, contacts};
 use crate::petsc::Session;
 use crate::problem::{Plane, force_labels};
 use crate::run::words::numbered;
@@ -54,7 +54,7 @@ impl Writing<'_> {
         if first {
             let output = &done.built.scene.output;
             let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
-            report.left_out = shown::left_out(&report.pairs, &shown);
+            report.left_out = left_out(&report.pairs, &shown);
             let plots = Plots::of(done, &shown);
             written = self.small(&folder, &report, &shown, &plots);
             if output.plots || fields {
@@ -80,7 +80,7 @@ impl Writing<'_> {
     /// Tables: one of all pairs, and those of the pairs shown.
     fn small(&self, folder: &Folder, report: &Report, shown: &[usize], plots: &Plots) -> Result<()> {
         let mut rows: Vec<PairRow> = (0..report.pairs.len()).map(|i| report::pair_row(self.done, i)).collect();
-        let stems = shown::stems(self.done);
+        let stems = series::stems(self.done);
         shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));
         plots.plotted.iter().for_each(|(i, file)| rows[*i].plot.clone_from(file));
         let save = |&i: &usize| {
@@ -126,6 +126,17 @@ pub fn to_json(report: &impl Serialize) -> Result<String> {
     serde_json::to_string_pretty(report)
         .map(|text| text + "\n")
         .map_err(|cause| Error::new(Kind::File, "the report cannot be written as JSON").because(cause.to_string()))
+}
+
+/// What the pairs lack that are not `shown` and how to get it, in words; none if all are.
+fn left_out(pairs: &[PairReport], shown: &[usize]) -> Option<String> {
+    let (all, left) = (pairs.len(), pairs.len() - shown.len());
+    (left > 0).then(|| {
+        format!(
+            "{left} of {all} pairs, those with the smallest forces, have no table and plot of their own; contacts.csv has a row of \
+             each, and --set output.pairs=all writes all"
+        )
+    })
 }
 
 /// Approach and force of pair `i` in each step.

@@ -1,10 +1,9 @@
 //! One body of the scene on its mesh: space, supports, loads, stiffness.
 
-use super::elastic;
 use super::find::{Values, find_group, not_on_body, point, without_area};
 use super::known::Known;
-use super::springs;
 use super::supports::Held;
+use super::{elastic, springs};
 use crate::contact;
 use crate::error::{Error, Result};
 use crate::exchange::Exchange;

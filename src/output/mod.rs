@@ -47,7 +47,7 @@ use std::path::Path;
 pub use contact::ContactTable;
 pub use contacts::PairRow;
 pub use folder::{Folder, safe_name, write_whole};
-pub use format::{sci, seconds};
+pub use format::{sci, seconds, trimmed};
 pub use history::HistoryWriter;
 #[cfg(feature = "cli")]
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};

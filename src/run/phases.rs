@@ -3,10 +3,9 @@
 use super::clock::Clock;
 use super::inner::{Inner, WHOLE};
 use super::keep::{self, Keep};
-use super::method;
 use super::stages::{Begin, Built, Done, Ready};
-use super::steps;
 use super::words::in_words;
+use super::{method, steps};
 use crate::contact::pieces::{self, Cut};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{self, Outcome, Start, Status};

@@ -1,13 +1,9 @@
 //! Outcome -> report and contact tables.
 
-use super::asking;
-use super::balance;
 use super::clock::Clock;
-use super::measure;
-use super::preflight;
-use super::results;
 use super::stages::{Built, Done};
 use super::verdict::{self, forecast, message, status_name};
+use super::{asking, balance, measure, preflight, results};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::Status;
 use crate::discretize::Discrete;

@@ -1,12 +1,10 @@
 //! `layer` of a contact: a form with parameters, a table, or an expression.
 
-use super::Decoder;
+use super::{Decoder, Form, Keys, Node, Table};
 use crate::data::{Grid, Summits};
 use crate::error::{Error, Result};
 use crate::expression::{Expression, Scope};
 use crate::problem::layer::{AsperitySpec, Depths, FORMS, LawForm, LayerSpec, Parameter};
-use crate::scene::read::{Keys, Node};
-use crate::scene::shape::{Form, Table};
 
 /// What a layer may be.
 pub(super) const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
