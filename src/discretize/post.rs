@@ -13,7 +13,7 @@ use crate::problem::BodySpec;
 
 /// A part of a body, asked with states of all dofs of the body, whatever the dimension.
 pub trait Post {
-    /// Displacements and stresses of the cells that this rank [shows](super::local::Local::told). `bent` is the same state without the rigid
+    /// Displacements and stresses of the cells that this rank shows. `bent` is the same state without the rigid
     /// motion that supports leave: beside a large one the digits of the deformation are few.
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField;
 

@@ -19,8 +19,8 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// Least and largest coordinates of points, the corners of the box around them; without points the least ones are infinite.
-pub fn bounds<const D: usize>(points: impl IntoIterator<Item = [f64; D]>) -> [[f64; D]; 2] {
-    points.into_iter().fold([[f64::INFINITY; D], [f64::NEG_INFINITY; D]], |[low, high], x| {
+pub fn bounds<const K: usize>(points: impl IntoIterator<Item = [f64; K]>) -> [[f64; K]; 2] {
+    points.into_iter().fold([[f64::INFINITY; K], [f64::NEG_INFINITY; K]], |[low, high], x| {
         [std::array::from_fn(|c| low[c].min(x[c])), std::array::from_fn(|c| high[c].max(x[c]))]
     })
 }

@@ -65,8 +65,8 @@ pub(super) struct Row {
     numbers: BTreeMap<&'static str, f64>,
     /// What the error is measured in and against; empty without an error.
     pub error_of: String,
-    /// Error of the displacements that the run itself told.
-    displacement_error: Option<f64>,
+    /// Relative error of the displacements that the run itself told, where the scene has their closed form.
+    pub displacement_error: Option<f64>,
 }
 
 /// All rows and their file.
@@ -213,11 +213,6 @@ impl Row {
     pub fn set_error(&mut self, error: f64, what: &str) {
         self.numbers.insert("error", error);
         self.error_of = what.to_owned();
-    }
-
-    /// Relative error of the displacements, where the scene has their closed form.
-    pub fn displacement_error(&self) -> Option<f64> {
-        self.displacement_error
     }
 
     /// The row as a line for the terminal.

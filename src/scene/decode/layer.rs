@@ -66,7 +66,7 @@ impl Decoder<'_> {
         }
         match FORMS.into_iter().find_map(|form| Some((form, keys.get(form.name)?))) {
             Some((form, node)) => self.form(form, node),
-            None => Err(keys.node().refuse("the layer has no law").help(EXAMPLE)),
+            None => Err(keys.node.refuse("the layer has no law").help(EXAMPLE)),
         }
     }
 
