@@ -43,27 +43,18 @@ pub use crate::expression::Field;
 pub use crate::model::line::Unbounded;
 pub use crate::output::{BodyField, ContactTable, PairReport, Report};
 pub use crate::petsc::Session;
-pub use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Support};
-pub use crate::problem::contact::{AutoContact, ContactSpec, Overlap};
-pub use crate::problem::elasticity::{Constants, ElasticitySpec, Plane};
-pub use crate::problem::history::History;
-pub use crate::problem::layer::LayerSpec;
-pub use crate::problem::mesh::{GroupArrays, MeshArrays, MeshSource};
-pub use crate::problem::method::{Gamma, Linear, MethodName, MethodSpec, Start};
-pub use crate::problem::order::Order;
-pub use crate::problem::robin::{RobinRule, Zone};
-pub use crate::problem::solver::{Preset, SolverSpec};
-pub use crate::problem::stop::StopRule;
+pub use crate::problem::{
+    AutoContact, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, GroupArrays, History, LayerSpec, Linear,
+    Load, LoadKind, MeshArrays, MeshSource, MethodName, MethodSpec, Order, Overlap, Plane, Preset, RobinRule,
+    SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support, Zone,
+};
 pub use crate::robin::Ritz;
 pub use crate::run::keep::Keep;
 pub use crate::scene::Scene;
 
 use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;
-use crate::run::clock::Clock;
-use crate::run::results::{self, All};
-use crate::run::stages::{Begin, Done};
-use crate::run::{self, report};
+use crate::run::{self, All, Begin, Clock, Done, report, results};
 
 /// What a run found.
 pub struct Solution {

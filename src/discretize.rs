@@ -10,7 +10,6 @@ mod distribute;
 mod draft;
 mod elastic;
 mod factory;
-mod fields;
 mod find;
 mod gauge;
 mod known;
@@ -32,14 +31,11 @@ use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
 use crate::exchange::Exchange;
-use crate::fem::assemble::{NodalBlock, NodeGraph};
-use crate::fem::rigid::{FreeMotion, RigidMotion};
+use crate::fem::{FreeMotion, NodalBlock, NodeGraph, RigidMotion};
 use crate::linalg::{Csr, axpy, dot};
 use crate::mesh::Checked;
 use crate::model::{BodySlot, Loads, Mechanism, Model, Segment};
-use crate::problem::body::BodySpec;
-use crate::problem::contact::ContactSpec;
-use crate::problem::method::Start;
+use crate::problem::{BodySpec, ContactSpec, Start};
 use crate::scene::Scene;
 use balance::Forces;
 pub use balance::{Balance, Resultant};
@@ -53,6 +49,7 @@ use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use parts::parts;
+use post::OnPart;
 pub use post::Post;
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -98,7 +95,7 @@ pub struct BodyInfo {
     pub springs: Vec<String>,
     /// Names of its rigid surfaces.
     pub rigid: Vec<String>,
-    post: Option<Post>,
+    post: Option<Box<dyn Post>>,
 }
 
 impl BodyInfo {
@@ -106,8 +103,8 @@ impl BodyInfo {
     ///
     /// # Panics
     /// On ranks that have no part of the body.
-    pub fn post(&self) -> &Post {
-        self.post.as_ref().unwrap_or_else(|| unreachable!("only ranks that have a part of a body recover it"))
+    pub fn post(&self) -> &dyn Post {
+        self.post.as_deref().unwrap_or_else(|| unreachable!("only ranks that have a part of a body recover it"))
     }
 }
 
@@ -335,7 +332,7 @@ pub fn discretize<const D: usize>(
                 elasticity: elasticity.clone(),
                 part: local,
             };
-            post = Some(Post::new(part.spec, part.known.outer, forces)?);
+            post = Some(Box::new(OnPart::new(part.spec, part.known.outer, forces)?) as Box<dyn Post>);
         }
         infos.push(BodyInfo {
             name: name.clone(),

@@ -9,9 +9,6 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
 /// All bytes of a regular file.
-///
-/// # Errors
-/// Those of [`open`].
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     let (mut file, mut bytes) = (open(path)?, Vec::new());
     file.read_to_end(&mut bytes).map_err(|cause| Error::file(path, "read", &cause)).map(|_| bytes)
@@ -35,6 +32,16 @@ pub fn open(path: &Path) -> Result<File> {
         .help("name a regular file; what a pipe gives can be saved as one"))
 }
 
+/// Bytes on a line of a file in which Linux tells of itself, such as `MemAvailable` of /proc/meminfo; none where it does not.
+pub fn bytes_in_proc(file: &str, line: &str) -> Option<u64> {
+    bytes_on_line(&std::fs::read_to_string(file).ok()?, line)
+}
+
+fn bytes_on_line(text: &str, line: &str) -> Option<u64> {
+    let rest = text.lines().find_map(|other| other.strip_prefix(line)?.strip_prefix(':'))?;
+    rest.split_whitespace().next()?.parse::<u64>().ok().map(|kibibytes| kibibytes * 1024)
+}
+
 /// SHA-256 of numbers, texts, lists and tuples of such, in hexadecimal digits. Lengths are part of it, so that pieces do not run together.
 pub fn digest(data: &impl Serialize) -> String {
     // nothing of these kinds fails
@@ -56,6 +63,14 @@ mod tests {
         assert_ne!(digest(&("ab", "c")), digest(&("a", "bc")));
         assert_ne!(digest(&[2.0, 1.0]), digest(&[2.0, 1.0 + f64::EPSILON]));
         assert!(digest(&()).starts_with("e3b0c442"), "that of no byte");
+    }
+
+    #[test]
+    fn the_line_of_linux_is_read() {
+        let text = "MemTotal:       24000000 kB\nMemFree:  5 kB\nMemAvailable:   20000 kB\n";
+        assert_eq!(bytes_on_line(text, "MemAvailable"), Some(20_480_000));
+        assert_eq!(bytes_on_line("MemFree: 1 kB", "MemAvailable"), None);
+        assert!(bytes_in_proc("/proc/meminfo", "MemAvailable").is_some_and(|bytes| bytes > 1_000_000));
     }
 
     #[test]

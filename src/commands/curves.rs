@@ -3,9 +3,9 @@
 use crate::contact::ContactPair;
 use crate::ddm::Outcome;
 use crate::discretize::Discrete;
+use crate::linalg::bounds;
 use crate::output::{Color, ConvergenceSeries, Plot, Series, Style};
 use crate::problem::units::label;
-use crate::report::body::bounds;
 use crate::run::stages::Done;
 use crate::scene::Scene;
 
@@ -41,7 +41,7 @@ pub fn pressure_plot(title: &str, scene: &Scene, pair: &ContactPair, curves: Vec
 
 /// The coordinate along which a pair's points spread most, and its name.
 fn main_axis(pair: &ContactPair) -> (usize, &'static str) {
-    let [low, high] = bounds(pair.position.iter());
+    let [low, high] = bounds(pair.position.iter().copied());
     let spread = |k: usize| high[k] - low[k];
     let axis = (0..3).max_by(|&i, &j| spread(i).total_cmp(&spread(j)).then(j.cmp(&i))).unwrap_or(0);
     (axis, ["x", "y", "z"][axis])

@@ -5,11 +5,11 @@ use crate::error::{Error, Kind, Result};
 use crate::exchange::Serial;
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
-use crate::mesh::{Group, Loaded, Mesh, Origin, Portion};
+use crate::linalg::bounds;
+use crate::mesh::{Loaded, Origin, Portion};
 use crate::output::progress::Line;
 use crate::output::report::readable;
-use crate::output::vtu::Encoding;
-use crate::output::{CellKind, Grid, say, write_whole};
+use crate::output::{CellKind, Encoding, Grid, say, write_whole};
 use crate::problem::order::Order;
 use crate::run::in_parts;
 use crate::scene::Scene;
@@ -100,7 +100,8 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
         .groups
         .iter()
         .map(|group| {
-            let [low, high] = corners(mesh, group).map(Vec::from);
+            let points = group.connectivity.iter().map(|&point| mesh.points[point as usize]);
+            let [low, high] = bounds(points).map(Vec::from);
             json!({ "name": group.name, "dimension": group.dimension, "simplices": group.len(), "low": low, "high": high })
         })
         .collect();
@@ -120,15 +121,6 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
         "bodies": bodies,
         "groups": groups,
     }))
-}
-
-/// Least and largest coordinates of a group.
-fn corners<const D: usize>(mesh: &Mesh<D>, group: &Group) -> [[f64; D]; 2] {
-    let grow = |[low, high]: [[f64; D]; 2], &point: &u32| {
-        let x = mesh.points[point as usize];
-        [std::array::from_fn(|c| low[c].min(x[c])), std::array::from_fn(|c| high[c].max(x[c]))]
-    };
-    group.connectivity.iter().fold([[f64::INFINITY; D], [f64::NEG_INFINITY; D]], grow)
 }
 
 fn print(facts: &Value) -> Result<()> {

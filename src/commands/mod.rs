@@ -12,7 +12,6 @@ pub mod new;
 mod reuse;
 mod said;
 mod series;
-mod shown;
 pub mod solve;
 pub mod surfaces;
 pub mod sweep;

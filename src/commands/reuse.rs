@@ -6,18 +6,13 @@ use crate::interrupt::Interrupt;
 use crate::parallel::Ranks;
 use crate::petsc::Session;
 use crate::problem::method::{MethodName, MethodSpec};
-use crate::run;
-use crate::run::clock::Clock;
-use crate::run::stages::{Built, Done};
+use crate::run::{self, Built, Clock, Done};
 use crate::scene::Scene;
 use crate::solver::options;
 use serde_json::{Map, Value};
 use std::rc::Rc;
 
 /// Builds `scene` after another scene of the sweep was solved, with what that one has left.
-///
-/// # Errors
-/// Those of [`run::build`].
 pub fn build(
     session: &Session,
     scene: Rc<Scene>,

@@ -2,15 +2,11 @@
 
 use crate::error::Result;
 use crate::output::progress::Line;
-use crate::output::report::warning_lines;
-use crate::output::{LISTED, Report};
+use crate::output::{LISTED, Report, warning_lines};
 use crate::petsc::Session;
-use crate::problem::method::MethodName;
-use crate::problem::name_of;
-use crate::run;
-use crate::run::clock::Clock;
+use crate::problem::{MethodName, name_of};
 use crate::run::report::{Shared, solvers_in_words};
-use crate::run::stages::Ready;
+use crate::run::{self, Clock, Ready};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -33,9 +29,6 @@ pub fn watched(loud: bool) -> Clock {
 }
 
 /// What was decided and why, and the PETSc options of each body. Collective.
-///
-/// # Errors
-/// When PETSc is out of memory.
 pub fn decisions(session: &Session, ready: &Ready) -> Result<Vec<String>> {
     let built = &ready.built;
     let (scene, discrete) = (&built.scene, &built.discrete);

@@ -1,15 +1,12 @@
-//! Fields of a history: files of each load step, and the collection that gives them their times.
+//! Fields of bodies and pairs: names of their files, those of each load step, and the collection that gives them their times.
 
-use super::shown;
 use crate::discretize::BodyInfo;
 use crate::error::Result;
-use crate::output::BodyField;
 use crate::output::collection::{Entry, write_pvd};
 use crate::output::gmsh::Tags;
-use crate::output::{Folder, safe_name};
-use crate::run::report;
-use crate::run::results::{All, Recovered};
-use crate::run::stages::Done;
+use crate::output::{BodyField, Folder, safe_name};
+use crate::run::measure::pair_names;
+use crate::run::{All, Done, Recovered, report};
 use std::io::Write;
 
 /// Folder of the files of steps but the last.
@@ -19,6 +16,11 @@ const FOLDER: &str = "steps";
 fn stem_of(name: &str, step: usize, steps: usize) -> String {
     let digits = steps.to_string().len();
     format!("{FOLDER}/{}-{step:0digits$}", safe_name(name))
+}
+
+/// `contact-<a>-<b>` of each pair, safe as a file name, with a number from the second pair of the same bodies on.
+pub fn stems(done: &Done) -> Vec<String> {
+    pair_names(&done.built).into_iter().map(|name| format!("contact-{}", safe_name(&name))).collect()
 }
 
 /// The file of a rank's part of a body.
@@ -51,7 +53,7 @@ pub fn of_bodies(done: &Done) -> Vec<String> {
 /// Bodies, then contact surfaces.
 fn names(done: &Done) -> Vec<String> {
     let bodies = done.built.discrete.bodies.iter().map(|body| body.name.clone());
-    bodies.chain(shown::stems(done)).collect()
+    bodies.chain(stems(done)).collect()
 }
 
 /// Writes the fields of the step that has ended: each rank its parts of bodies, one rank the contact surfaces and what joins all.
@@ -66,9 +68,6 @@ pub fn write(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
 }
 
 /// Writes the fields of the end of a run, likewise.
-///
-/// # Errors
-/// Those of [`write`].
 pub fn write_last(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
     if done.built.scene.output.msh {
         views(done, recovered, folder)?;
@@ -102,7 +101,7 @@ fn views(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
             tags = Tags { entity: tags.entity + 1, points: tags.points + info.nodes, cells: tags.cells + info.cells };
         }
     }
-    for (i, name) in shown::stems(done).into_iter().enumerate().filter(|_| first) {
+    for (i, name) in stems(done).into_iter().enumerate().filter(|_| first) {
         let grid = report::contact_surface(&name, done, i);
         folder.write(&format!("{name}.msh"), |out| grid.write_msh(tags, out))?;
         let (points, cells) = (grid.points.len(), grid.connectivity.len() / grid.cell.stride());
@@ -127,7 +126,7 @@ fn fields(done: &Done, recovered: &All, folder: &Folder, stem: &dyn Fn(&str) -> 
             folder.write(&format!("{stem}.pvtu"), |out| BodyField::join(&parts, encoding, out))?;
         }
     }
-    for (i, name) in shown::stems(done).into_iter().enumerate().filter(|_| first) {
+    for (i, name) in stems(done).into_iter().enumerate().filter(|_| first) {
         let file = format!("{}.vtu", stem(&name));
         folder.write(&file, |out| report::contact_surface(&name, done, i).write(encoding, out))?;
     }
@@ -159,5 +158,5 @@ fn collection(done: &Done, folder: &Folder, ended: bool) -> Result<()> {
             }
         }
     }
-    folder.write("bodies.pvd", |out| write_pvd(&entries, out)).map(|_| ())
+    folder.write("bodies.pvd", |out| write_pvd(&entries, out))
 }

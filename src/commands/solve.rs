@@ -13,12 +13,8 @@ use crate::output::progress::Line;
 use crate::output::{Folder, HistoryWriter, IterationTable, StepTable, Verbosity, say};
 use crate::parallel::agree;
 use crate::petsc::Session;
-use crate::run::asking::{Asking, is_snapshot, signal};
-use crate::run::clock::Clock;
-use crate::run::keep::Keep;
-use crate::run::results::All;
-use crate::run::stages::{Built, Done, Ready};
-use crate::run::{self, measure, report};
+use crate::run::asking::{is_snapshot, signal};
+use crate::run::{self, All, Asking, Built, Clock, Done, Keep, Ready, measure, report};
 use std::path::{Path, PathBuf};
 
 /// What the user typed.
@@ -108,8 +104,8 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         let estimate = run::estimate(&mut done, &mut clock)?;
         drop(stage);
         watchers.table.finish();
-        let failed = watchers.history.map_or(Ok(()), |history| history.finish().map(|_| ()));
-        let failed = failed.and(watchers.steps.map_or(Ok(()), |steps| steps.finish().map(|_| ())));
+        let failed = watchers.history.map_or(Ok(()), |history| history.finish());
+        let failed = failed.and(watchers.steps.map_or(Ok(()), |steps| steps.finish()));
         let more = plan.goes_on(session, &done, estimate.as_ref(), &mut clock)?;
         if !more {
             break (done, estimate, failed);

@@ -12,13 +12,8 @@ use crate::output::{
 };
 use crate::parallel::agree;
 use crate::petsc::Session;
-use crate::run;
-use crate::run::asking::Asking;
-use crate::run::clock::Clock;
-use crate::run::keep::Keep;
-use crate::run::stages::{Begin, Built};
 use crate::run::words::numbered;
-use crate::run::{measure, report, results};
+use crate::run::{self, Asking, Begin, Built, Clock, Keep, measure, report, results};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::rc::Rc;

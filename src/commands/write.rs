@@ -1,18 +1,14 @@
 //! All files of a run: what is small comes first, so that a full disk takes fields and not results.
 
 use super::adapt::Plan;
-use super::{curves, series, shown};
+use super::{curves, series};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
-use crate::output::{Folder, LISTED, PairRow, Plot, Report, StepReport, busiest, contacts};
+use crate::output::{Folder, LISTED, PairReport, PairRow, Plot, Report, StepReport, busiest, contacts};
 use crate::petsc::Session;
-use crate::problem::elasticity::Plane;
-use crate::problem::units::force_labels;
-use crate::run::clock::Clock;
-use crate::run::results;
-use crate::run::stages::Done;
+use crate::problem::{Plane, force_labels};
 use crate::run::words::numbered;
-use crate::run::{measure, report};
+use crate::run::{Clock, Done, measure, report, results};
 use serde::Serialize;
 use std::path::Path;
 
@@ -58,7 +54,7 @@ impl Writing<'_> {
         if first {
             let output = &done.built.scene.output;
             let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
-            report.left_out = shown::left_out(&report.pairs, &shown);
+            report.left_out = left_out(&report.pairs, &shown);
             let plots = Plots::of(done, &shown);
             written = self.small(&folder, &report, &shown, &plots);
             if output.plots || fields {
@@ -84,20 +80,20 @@ impl Writing<'_> {
     /// Tables: one of all pairs, and those of the pairs shown.
     fn small(&self, folder: &Folder, report: &Report, shown: &[usize], plots: &Plots) -> Result<()> {
         let mut rows: Vec<PairRow> = (0..report.pairs.len()).map(|i| report::pair_row(self.done, i)).collect();
-        let stems = shown::stems(self.done);
+        let stems = series::stems(self.done);
         shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));
         plots.plotted.iter().for_each(|(i, file)| rows[*i].plot.clone_from(file));
         let save = |&i: &usize| {
             let table = report::contact_table(self.done, self.estimate, i);
-            folder.write(&rows[i].table, |out| table.write(out)).map(|_| ())
+            folder.write(&rows[i].table, |out| table.write(out))
         };
-        shown.iter().map(save).fold(contacts::save(folder, &report.pairs, &rows).map(|_| ()), Result::and)
+        shown.iter().map(save).fold(contacts::save(folder, &report.pairs, &rows), Result::and)
     }
 
     fn report(&self, folder: &Folder, report: &mut Report, fields: bool) -> Result<()> {
         report.files = self.names(folder, fields);
         let json = to_json(report)?;
-        folder.write("report.json", |out| out.write_all(json.as_bytes())).map(|_| ())
+        folder.write("report.json", |out| out.write_all(json.as_bytes()))
     }
 
     /// Names of the files of a run, those of other ranks included.
@@ -130,6 +126,17 @@ pub fn to_json(report: &impl Serialize) -> Result<String> {
     serde_json::to_string_pretty(report)
         .map(|text| text + "\n")
         .map_err(|cause| Error::new(Kind::File, "the report cannot be written as JSON").because(cause.to_string()))
+}
+
+/// What the pairs lack that are not `shown` and how to get it, in words; none if all are.
+fn left_out(pairs: &[PairReport], shown: &[usize]) -> Option<String> {
+    let (all, left) = (pairs.len(), pairs.len() - shown.len());
+    (left > 0).then(|| {
+        format!(
+            "{left} of {all} pairs, those with the smallest forces, have no table and plot of their own; contacts.csv has a row of \
+             each, and --set output.pairs=all writes all"
+        )
+    })
 }
 
 /// Approach and force of pair `i` in each step.

@@ -3,8 +3,7 @@
 use super::basis::Carriers;
 use super::pieces::Common;
 use super::side::{Side, length};
-use crate::fem::space::area_vector;
-use crate::fem::{assemble, element, quadrature};
+use crate::fem::{area_vector, assemble, element, quadrature};
 use crate::problem::order::Order;
 
 /// What a pair takes of a facet of side a.

@@ -19,4 +19,4 @@ pub use cover::{Cover, Left};
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
 pub use pair::{ContactPair, Fault, add, assemble};
-pub use side::Side;
+pub use side::{Side, length, unit};

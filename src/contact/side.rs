@@ -1,7 +1,6 @@
 //! One surface of a pair: facets of a body with averaged nodal normals.
 
-use crate::fem::space::area_vector;
-use crate::fem::{Facets, Frame, Space, element};
+use crate::fem::{Facets, Frame, Space, area_vector, element};
 use std::collections::HashMap;
 
 /// One contact surface of a body.

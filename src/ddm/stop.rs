@@ -22,7 +22,7 @@ pub enum Status {
     },
     /// The iterates repeat.
     Cycle {
-        /// Updates after which they come back.
+        /// Updates after which they come back; 1 where the contact stays and nothing falls.
         period: usize,
     },
     /// Neither supports nor the Robin term hold a body.
@@ -108,8 +108,8 @@ impl Cycle {
     const LONGEST: usize = 8;
 
     /// The period, if the last update moved `trace` by more than half of its digits and it is that of 2 to 8 updates ago to half of the
-    /// digits of this step, or if the contact sets `closed` of the last 64 iterates repeat with that period and neither the residual nor F1 has
-    /// fallen meanwhile.
+    /// digits of this step, or if the contact sets `closed` of the last 64 iterates repeat with that period, or are all the same (1), and neither the
+    /// residual nor F1 has fallen meanwhile.
     pub fn period(
         &mut self,
         trace: &[f64],
@@ -148,8 +148,7 @@ impl Cycle {
         let stuck = then.0 <= now.0 && then.1 <= now.1;
         let sets: Vec<u64> = self.sets.iter().map(|set| set.0).collect();
         let repeats = |period: &usize| sets.windows(period + 1).all(|window| window[0] == window[*period]);
-        let constant = repeats(&1);
-        (2..=Self::LONGEST).find(|period| stuck && !constant && repeats(period))
+        (1..=Self::LONGEST).find(|period| stuck && repeats(period))
     }
 }
 
@@ -180,8 +179,10 @@ mod tests {
             (0..200)
                 .all(|k| falling.period(&[fall(k).0 + fall(k).1], [k % 2 == 0].into_iter(), 1.0, fall(k).1).is_none())
         );
+        // nothing happens any more
         let mut still = Cycle::default();
-        assert!((0..20).all(|_| still.period(&[1.0], [true].into_iter(), 1.0, 0.0).is_none()));
+        let found = (0..99).find_map(|k| Some(k).zip(still.period(&[1.0], [true].into_iter(), 1.0, 0.0)));
+        assert_eq!(found, Some((64, 1)));
     }
 
     /// Traces that come back are seen at once, sets of points when all 64 repeat; periods above eight never.
@@ -204,16 +205,20 @@ mod tests {
             };
             assert_eq!(first(&mut each), None);
         }
+        let falls = |k: usize| 0.9f64.powi(k as i32);
         let mut traces = Cycle::default();
-        assert_eq!(first(&mut |k| traces.period(&[(k % 9) as f64, 2.0], std::iter::empty(), 1.0, 0.0)), None);
+        assert_eq!(first(&mut |k| traces.period(&[(k % 9) as f64, 2.0], std::iter::empty(), falls(k), 0.0)), None);
         let mut sets = Cycle::default();
         assert_eq!(first(&mut |k| sets.period(&[k as f64], [k.is_multiple_of(9), true].into_iter(), 1.0, 0.0)), None);
         // steps of 1e-8 are none, and traces that differ by 1e-7 are others
         let mut small = Cycle::default();
-        assert_eq!(first(&mut |k| small.period(&[1.0 + 1e-8 * (k % 2) as f64], std::iter::empty(), 1.0, 0.0)), None);
+        assert_eq!(
+            first(&mut |k| small.period(&[1.0 + 1e-8 * (k % 2) as f64], std::iter::empty(), falls(k), 0.0)),
+            None
+        );
         let mut drifting = Cycle::default();
         let mut each =
-            |k: usize| drifting.period(&[(k % 2) as f64 + 1e-7 * k as f64, 1.0], std::iter::empty(), 1.0, 0.0);
+            |k: usize| drifting.period(&[(k % 2) as f64 + 1e-7 * k as f64, 1.0], std::iter::empty(), falls(k), 0.0);
         assert_eq!(first(&mut each), None);
     }
 

@@ -3,9 +3,8 @@
 use super::part::Part;
 use super::roster::{pattern, tie};
 use super::surface::Surface;
-use crate::contact::Side;
 use crate::contact::pieces::{Cut, Reach, Search};
-use crate::contact::side::unit;
+use crate::contact::{Side, unit};
 use crate::error::{Error, Place, Result, few};
 use crate::fem::Facets;
 use crate::problem::contact::AutoContact;

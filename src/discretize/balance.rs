@@ -3,8 +3,7 @@
 use super::local::Local;
 use super::supports::Held;
 use crate::contact::{add, pad};
-use crate::fem::assemble::{self, NodalBlock, NodeGraph};
-use crate::fem::{Elasticity, Frame, Space};
+use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, Space, assemble};
 use crate::linalg::Csr;
 use std::rc::Rc;
 

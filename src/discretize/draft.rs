@@ -3,8 +3,7 @@
 use super::part::Part;
 use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::fem::quadrature::Parts;
-use crate::fem::rigid::{self, RigidMotion};
+use crate::fem::{Parts, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, rigid as joint};

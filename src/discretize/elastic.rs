@@ -7,9 +7,7 @@ use crate::exchange::{Exchange, first};
 use crate::fem::Space;
 use crate::fem::elasticity::{Elasticity, Flaw};
 use crate::mesh::{Key, Mesh};
-use crate::problem::body::BodySpec;
-use crate::problem::elasticity::{Constants, ElasticitySpec, Plane};
-use crate::problem::order::Order;
+use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
 
 /// The elasticity of the cells of a body that are here; `key` puts those of all ranks into an order. Collective.
 ///

@@ -1,9 +1,7 @@
 //! What bodies need to become solvers, and who makes them.
 
 use crate::error::Result;
-use crate::fem::assemble::NodeGraph;
-use crate::fem::rigid::FreeMotion;
-use crate::fem::{ElasticBody, Interpolation};
+use crate::fem::{ElasticBody, FreeMotion, Interpolation, NodeGraph};
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot, Distribution};
 use crate::problem::order::Order;

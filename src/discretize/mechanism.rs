@@ -8,9 +8,9 @@ use super::gauge;
 use super::part::Part;
 use crate::contact::ContactPair;
 use crate::error::few;
-use crate::fem::Space;
-use crate::fem::rigid::{self, RigidMotion};
-use crate::linalg::{Blocks, PART, TOLERANCE, axpy, dot, fit};
+use crate::fem::{RigidMotion, Space, rigid};
+use crate::linalg::{Blocks, PART, TOLERANCE, axpy, bounds, dot, fit};
+use crate::mesh::Joined;
 use crate::model::{Mechanism, Motion, Motions, Segment};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
@@ -52,21 +52,11 @@ pub fn fix<const D: usize>(parts: &mut [Part<D>], drafts: &[Draft<D>], pairs: &[
 
 /// Bodies that pairs connect, two at least, in the order of the first of them.
 fn groups(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<usize>> {
-    // each body points to one before it, or to itself: the first of its group in the end
-    let mut before: Vec<usize> = (0..bodies).collect();
-    fn first(before: &mut [usize], mut body: usize) -> usize {
-        while before[body] != body {
-            before[body] = before[before[body]];
-            body = before[body];
-        }
-        body
-    }
-    for pair in pairs {
-        let [a, b] = pair.bodies.map(|body| first(&mut before, body));
-        before[a.max(b)] = a.min(b);
-    }
-    let mut members = vec![Vec::new(); bodies];
-    (0..bodies).for_each(|body| members[first(&mut before, body)].push(body));
+    let mut joined = Joined::new(bodies);
+    pairs.iter().map(|pair| pair.bodies.map(|body| body as u32)).for_each(|[a, b]| joined.join(a, b));
+    let (count, group) = joined.classes();
+    let mut members = vec![Vec::new(); count];
+    (0..bodies).for_each(|body| members[group[body] as usize].push(body));
     members.retain(|bodies| bodies.len() > 1);
     members
 }
@@ -323,10 +313,6 @@ fn slices(vectors: &[Vec<f64>]) -> Vec<&[f64]> {
 
 /// Largest dimension of a body along an axis.
 fn extent<const D: usize>(space: &Space<D>) -> f64 {
-    let along = |c: usize| {
-        let (low, high) =
-            space.nodes.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x[c]), high.max(x[c])));
-        high - low
-    };
-    (0..D).map(along).fold(0.0, f64::max)
+    let [low, high] = bounds(space.nodes.iter().copied());
+    (0..D).map(|c| high[c] - low[c]).fold(0.0, f64::max)
 }

@@ -1,11 +1,8 @@
 //! What an estimate of the error asks of meshes, without their dimension.
 
 use super::supports::Held;
-use crate::contact::Fine;
-use crate::contact::side::length;
-use crate::fem::element::EDGES;
-use crate::fem::recovery::Recovery;
-use crate::fem::{Elasticity, Space, element, pad};
+use crate::contact::{Fine, length};
+use crate::fem::{EDGES, Elasticity, Recovery, Space, element, pad};
 use crate::linalg::Csr;
 use crate::problem::order::Order;
 use std::rc::Rc;

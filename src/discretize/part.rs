@@ -1,19 +1,18 @@
 //! One body of the scene on its mesh: space, supports, loads, stiffness.
 
-use super::elastic;
 use super::find::{Values, find_group, not_on_body, point, without_area};
 use super::known::Known;
-use super::springs;
 use super::supports::Held;
+use super::{elastic, springs};
 use crate::contact;
 use crate::error::{Error, Result};
 use crate::exchange::Exchange;
 use crate::expression::Field;
-use crate::fem::assemble::{self, NodalBlock};
-use crate::fem::interpolation::{Interpolation, coarse_nodes, from_vertices};
-use crate::fem::quadrature::Parts;
-use crate::fem::rigid::{self, RigidMotion};
-use crate::fem::{ElasticBody, Elasticity, NodeGraph, Space, support, surface};
+use crate::fem::interpolation::{coarse_nodes, from_vertices};
+use crate::fem::{
+    ElasticBody, Elasticity, Interpolation, NodalBlock, NodeGraph, Parts, RigidMotion, Space, assemble, rigid, support,
+    surface,
+};
 use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};
@@ -111,9 +110,6 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 
     /// What the quadrature of the nodal forces `load` misses; empty where all loads are constant.
-    ///
-    /// # Errors
-    /// Those of [`Part::load`].
     pub fn unloaded(&self, mesh: &Mesh<D>, load: &[f64]) -> Result<Vec<f64>> {
         let is_constant = |load: &Load| match &load.kind {
             LoadKind::Pressure(pressure) => pressure.is_constant(),
@@ -166,9 +162,6 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 
     /// Sum of the nodal forces of a load of the scene at its full value, unless its surface is rigid.
-    ///
-    /// # Errors
-    /// Those of [`Part::load`].
     pub fn resultant(&self, spec: &Load, mesh: &Mesh<D>) -> Result<[f64; 3]> {
         let mut load = vec![0.0; self.space.dofs()];
         self.add_load(spec, 1.0, mesh, Parts::Whole, &mut load)?;

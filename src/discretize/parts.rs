@@ -9,12 +9,9 @@ use super::verify::{self, Verified};
 use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::exchange::{Exchange, first, gather, share};
-use crate::fem::quadrature::Parts;
-use crate::fem::{Elasticity, Space, interpolation};
+use crate::fem::{Elasticity, Parts, Space, interpolation};
 use crate::mesh::{Key, Mesh, Portion};
-use crate::problem::body::BodySpec;
-use crate::problem::elasticity::Plane;
-use crate::problem::order::Order;
+use crate::problem::{BodySpec, Order, Plane};
 use crate::scene::Scene;
 use std::sync::Arc;
 

@@ -1,67 +1,101 @@
-//! What a body says of its displacements once they are found: each rank of its part.
+//! What a body says of its displacements once they are found: fields for output, forces, errors against a known answer; each rank of its
+//! part.
 
 use super::approach::Outer;
 use super::balance::{Balance, Forces};
-use super::fields::{self, ErrorMaker, FieldMaker};
-use crate::error::Result;
-use crate::output::vtu::BodyField;
-use crate::problem::body::BodySpec;
+use super::find::point;
+use crate::contact::pad;
+use crate::error::{Error, Result};
+use crate::expression::Expression;
+use crate::fem::{norms, stress};
+use crate::output::{BodyField, CellKind};
+use crate::problem::BodySpec;
 
-/// Displacements of a body -> fields, forces, errors of a part of it.
-pub struct Post {
-    field: FieldMaker,
-    nodal: NodalMaker,
-    balance: BalanceMaker,
-    errors: Option<ErrorMaker>,
-    outer: OuterMaker,
+/// A part of a body, asked with states of all dofs of the body, whatever the dimension.
+pub trait Post {
+    /// Displacements and stresses of the cells that this rank shows. `bent` is the same state without the rigid
+    /// motion that supports leave: beside a large one the digits of the deformation are few.
+    fn field(&self, v: &[f64], bent: &[f64]) -> BodyField;
+
+    /// Forces on the own nodes, under the forces omega p of the contact rows of the body.
+    fn balance(&self, v: &[f64], force: &[f64]) -> Balance;
+
+    /// Mean displacement of where the body is loaded along a direction, else of where it is held along it, else of all of it.
+    fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3];
+
+    /// Norms of the error against the scene's known displacements, and of these, on the cells that this rank shows, if the scene has them: L2
+    /// norm, H1 seminorm, energy norm ([`norms::error`]).
+    fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]>;
 }
 
-/// State of all dofs -> displacements of the nodes of the part.
-type NodalMaker = Box<dyn Fn(&[f64]) -> Vec<f64>>;
+/// [`Post`] in `D` dimensions.
+pub struct OnPart<const D: usize> {
+    name: String,
+    /// Known displacements, if the scene has them.
+    exact: Option<Vec<Expression>>,
+    outer: Outer,
+    forces: Forces<D>,
+}
 
-/// Displacements of the nodes of the part, forces omega p at the contact rows -> forces on its own nodes.
-type BalanceMaker = Box<dyn Fn(&[f64], &[f64]) -> Balance>;
-
-/// State of all dofs, a direction -> mean displacement of the body.
-type OuterMaker = Box<dyn Fn(&[f64], [f64; 3]) -> [f64; 3]>;
-
-impl Post {
+impl<const D: usize> OnPart<D> {
     /// Of a part of a body.
     ///
     /// # Errors
     /// A known displacement that is not finite at a node.
-    pub fn new<const D: usize>(spec: &BodySpec, outer: Outer, forces: Forces<D>) -> Result<Self> {
-        let Forces { part, elasticity, held, .. } = &forces;
-        let (part, elasticity, held, frame) = (part.clone(), elasticity.clone(), held.clone(), held.clone());
-        Ok(Self {
-            errors: fields::error_maker(spec, &part, &elasticity)?,
-            outer: Box::new(move |v, direction| outer.mean::<D>(&frame.frame.displacements(v), direction)),
-            field: fields::field_maker(spec.name.value.clone(), part.clone(), elasticity),
-            nodal: Box::new(move |v| part.values(&held.frame.displacements(v))),
-            balance: Box::new(move |u, force| forces.balance(u, force)),
-        })
+    pub fn new(spec: &BodySpec, outer: Outer, forces: Forces<D>) -> Result<Self> {
+        let nodes = &forces.part.space.nodes;
+        for (component, &x) in spec.exact.iter().flatten().flat_map(|u| nodes.iter().map(move |x| (u, x))) {
+            let value = component.eval(&x);
+            if !value.is_finite() {
+                let message = format!("the known displacement is {value} at {}", point(pad(x)));
+                return Err(Error::scene(component.place(), message)
+                    .help("look for roots of negative numbers and divisions by zero in the expression"));
+            }
+        }
+        Ok(Self { name: spec.name.value.clone(), exact: spec.exact.clone(), outer, forces })
     }
 
-    /// Displacements and stresses of the cells that this rank shows, from a state of all dofs. `bent` is the same without the rigid motion
-    /// that supports leave: beside a large one the digits of the deformation are few.
-    pub fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
-        (self.field)(&(self.nodal)(v), &(self.nodal)(bent))
+    /// Displacements of the nodes of the part.
+    fn nodal(&self, v: &[f64]) -> Vec<f64> {
+        self.forces.part.values(&self.forces.held.frame.displacements(v))
+    }
+}
+
+impl<const D: usize> Post for OnPart<D> {
+    fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
+        let Forces { part, elasticity, .. } = &self.forces;
+        let (u, space) = (self.nodal(v), &part.space);
+        let (told, shown) = space.part(part.told());
+        let stress = stress::nodal(space, elasticity, &self.nodal(bent));
+        let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
+        let displacement = |&node: &u32| pad(std::array::from_fn::<f64, D, _>(|c| u[D * node as usize + c]));
+        BodyField {
+            name: self.name.clone(),
+            points: told.nodes.iter().map(|&x| pad(x)).collect(),
+            cell: CellKind::simplex(D, space.order.degree()),
+            connectivity: told.cells,
+            displacement: shown.iter().map(displacement).collect(),
+            von_mises: stress.iter().map(stress::von_mises).collect(),
+            principal: stress.iter().map(stress::principal).collect(),
+            stress,
+        }
     }
 
-    /// Forces on the own nodes in a state of all dofs, under the forces omega p of the contact rows of the body.
-    pub fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
-        (self.balance)(&(self.nodal)(v), force)
+    fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
+        self.forces.balance(&self.nodal(v), force)
     }
 
-    /// Mean displacement of where the body is loaded along a direction, else of where it is held along it, else of all of it; from a
-    /// state of all dofs.
-    pub fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3] {
-        (self.outer)(v, direction)
+    fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3] {
+        self.outer.mean::<D>(&self.forces.held.frame.displacements(v), direction)
     }
 
-    /// Norms of the error against the scene's known displacements, and of these, on the cells that this rank shows, if the scene has them: L2
-    /// norm, H1 seminorm, energy norm ([`norms::error`](crate::fem::norms::error)); from a state of all dofs.
-    pub fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]> {
-        self.errors.as_ref().map(|errors| errors(&(self.nodal)(v)))
+    fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]> {
+        let (exact, Forces { part, elasticity, .. }) = (self.exact.as_ref()?, &self.forces);
+        let at = |x: [f64; D]| norms::Known {
+            value: std::array::from_fn(|i| exact[i].eval(&x)),
+            gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, &x).1)),
+        };
+        let norms = norms::error(&part.space, part.told(), elasticity, &self.nodal(v), &at);
+        Some(norms.map(|norms| [norms.l2, norms.h1, norms.energy]))
     }
 }

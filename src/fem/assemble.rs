@@ -4,11 +4,10 @@
 //! follow from the graph by arithmetic, so that assembly writes each value straight to its place.
 
 use super::elasticity::{Elasticity, Flaw};
-use super::element;
 use super::frame::Frame;
-use super::pad;
 use super::quadrature::{self, Parts};
 use super::space::Space;
+use super::{element, pad};
 use crate::linalg::Csr;
 use crate::problem::order::Order;
 

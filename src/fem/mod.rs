@@ -23,13 +23,17 @@ pub mod stress;
 mod support;
 pub mod surface;
 
-pub use assemble::NodeGraph;
+pub use assemble::{NodalBlock, NodeGraph};
 pub use elasticity::Elasticity;
+pub use element::EDGES;
 pub use frame::Frame;
 pub use interpolation::Interpolation;
 pub use material::Material;
+pub use quadrature::Parts;
+pub use recovery::Recovery;
+pub use rigid::{FreeMotion, RigidMotion};
 pub use slope::Slope;
-pub use space::{Facets, Space};
+pub use space::{Facets, Space, area_vector};
 pub use support::{Couplings, ElasticBody, support};
 
 /// A vector of 2 or 3 components as 3.

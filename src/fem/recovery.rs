@@ -11,11 +11,9 @@ mod strip;
 #[cfg(test)]
 mod tests;
 
-use super::Slope;
 use super::assemble::interpolate;
-use super::element;
-use super::quadrature;
 use super::space::Space;
+use super::{Slope, element, quadrature};
 use crate::problem::order::Order;
 use bubble::Bubble;
 use patch::{Monomials, Patch};

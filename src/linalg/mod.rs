@@ -18,6 +18,13 @@ use crate::error::{Error, Kind, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
+/// Least and largest coordinates of points, the corners of the box around them; without points the least ones are infinite.
+pub fn bounds<const K: usize>(points: impl IntoIterator<Item = [f64; K]>) -> [[f64; K]; 2] {
+    points.into_iter().fold([[f64::INFINITY; K], [f64::NEG_INFINITY; K]], |[low, high], x| {
+        [std::array::from_fn(|c| low[c].min(x[c])), std::array::from_fn(|c| high[c].max(x[c]))]
+    })
+}
+
 /// A sparse matrix in compressed rows: row `i` holds columns `col[ptr[i]..ptr[i+1]]`, sorted.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Csr {

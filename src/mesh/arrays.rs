@@ -2,8 +2,7 @@
 
 use super::{Group, Mesh, simplex};
 use crate::error::{Error, Result};
-use crate::problem::mesh::{GroupArrays, MeshArrays};
-use crate::problem::order::Order;
+use crate::problem::{GroupArrays, MeshArrays, Order};
 use std::collections::HashSet;
 use std::path::Path;
 

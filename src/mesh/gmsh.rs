@@ -3,8 +3,7 @@
 use super::guard::{self, End};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::{self, Interrupt};
-use crate::problem::mesh::Guard;
-use crate::problem::order::Order;
+use crate::problem::{Guard, Order};
 use signal_hook::consts::SIGXFSZ;
 use std::fs::File;
 use std::os::unix::process::ExitStatusExt;

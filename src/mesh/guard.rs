@@ -1,5 +1,6 @@
 //! Runs a program with limits of time and memory, which ends with this one.
 
+use crate::file::bytes_in_proc;
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::Guard;
 use std::io;
@@ -29,14 +30,9 @@ pub fn find(name: &str) -> Option<PathBuf> {
 pub fn bytes(guard: &Guard) -> Option<u64> {
     match guard.gigabytes {
         Some(gigabytes) => Some((gigabytes * 1e9) as u64),
-        None => available(&std::fs::read_to_string("/proc/meminfo").unwrap_or_default()),
+        // what programs can take without swapping
+        None => bytes_in_proc("/proc/meminfo", "MemAvailable"),
     }
-}
-
-/// Bytes that Linux says programs can take without swapping.
-fn available(meminfo: &str) -> Option<u64> {
-    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    line.split_whitespace().next()?.parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
 }
 
 /// A command for a program that the system ends with the thread that starts it, and that may take so many bytes. Both are left to
@@ -107,7 +103,6 @@ mod tests {
         // no program can be loaded into a hundred kilobytes
         assert!(matches!(ended(&mut sleep(Some(100_000)), 9.0), Ok(End::Itself(status)) if !status.success()));
         assert!(began.elapsed() < Duration::from_secs(4));
-        assert_eq!(available("MemTotal: 9 kB\nMemAvailable:   20 kB\n"), Some(20_480));
     }
 
     #[test]

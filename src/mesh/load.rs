@@ -9,8 +9,7 @@ use crate::error::{Error, Located, Place, Result};
 use crate::exchange::Serial;
 use crate::file::digest_of_bytes;
 use crate::interrupt::Interrupt;
-use crate::problem::mesh::{Guard, MeshSource};
-use crate::problem::order::Order;
+use crate::problem::{Guard, MeshSource, Order};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -50,9 +49,6 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
 }
 
 /// The same; where there are several ranks, cells of `.msh` files that are of this order are dealt out while they are read, and the mesh lacks them.
-///
-/// # Errors
-/// Those of [`load`].
 pub fn deal<const D: usize>(
     source: &MeshSource,
     order: Order,

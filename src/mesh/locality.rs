@@ -12,18 +12,14 @@ impl<const D: usize> Mesh<D> {
     /// Sorts the cells of each group along Morton's curve. Structured meshes in the plane come in a good order already. Gives the
     /// keys of cells of which `index` has the places in the file, group by group.
     pub(super) fn sort_cells(&mut self, index: &[Vec<u32>]) -> Vec<Vec<Key>> {
-        let mut corner = [[f64::INFINITY; D], [f64::NEG_INFINITY; D]];
-        for (x, c) in self.points.iter().flat_map(|x| (0..D).map(move |c| (x, c))) {
-            corner[0][c] = corner[0][c].min(x[c]);
-            corner[1][c] = corner[1][c].max(x[c]);
-        }
-        let size = (0..D).map(|c| corner[1][c] - corner[0][c]).fold(f64::MIN_POSITIVE, f64::max);
+        let [low, high] = crate::linalg::bounds(self.points.iter().copied());
+        let size = (0..D).map(|c| high[c] - low[c]).fold(f64::MIN_POSITIVE, f64::max);
         let scale = f64::from((1u32 << BITS) - 1) / size;
         let points = &self.points;
         let sorted = |(number, group): (usize, &mut Group)| {
             let place = |cell: &[u32]| {
                 let centre = |c: usize| cell[..=D].iter().map(|&p| points[p as usize][c]).sum::<f64>() / (D + 1) as f64;
-                (0..D).fold(0, |place, c| place | spread(((centre(c) - corner[0][c]) * scale) as u64) << c)
+                (0..D).fold(0, |place, c| place | spread(((centre(c) - low[c]) * scale) as u64) << c)
             };
             let order = if group.dimension == D { sort(group, place) } else { Vec::new() };
             index.get(number).map_or(Vec::new(), |index| order.iter().map(|&(at, i)| (at, index[i as usize])).collect())

@@ -34,7 +34,7 @@ mod trust;
 mod unv;
 
 pub use bisect::parts as bisect;
-pub use check::{Asked, Checked, Duty, Parts};
+pub use check::{Asked, Checked, Duty, Joined, Parts};
 pub use dealer::Dealer;
 pub use foreign::is_shape;
 pub use groups::{Group, Groups};

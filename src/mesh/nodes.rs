@@ -140,14 +140,7 @@ impl Numbers {
 
 /// Longest side of the box around the points.
 fn size(points: &[[f64; 3]]) -> f64 {
-    let mut low = [f64::INFINITY; 3];
-    let mut high = [f64::NEG_INFINITY; 3];
-    for point in points {
-        for k in 0..3 {
-            low[k] = low[k].min(point[k]);
-            high[k] = high[k].max(point[k]);
-        }
-    }
+    let [low, high] = crate::linalg::bounds(points.iter().copied());
     (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max)
 }
 

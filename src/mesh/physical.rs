@@ -1,9 +1,8 @@
 //! Physical groups: their names, and which entities of the geometry belong to them.
 
-use super::Dealer;
-use super::Group;
 use super::cursor::Cursor;
 use super::simplex::THINGS;
+use super::{Dealer, Group};
 use crate::error::Result;
 use crate::problem::body::is_in_name;
 use crate::problem::order::Order;

@@ -4,11 +4,12 @@ mod cases;
 mod damage;
 mod loading;
 
-use super::{Dealer, Group, Maker, Mesh, Portion, msh, simplex};
-use crate::error::{Located, Place, Source};
+use super::load::from_script;
+use super::{Dealer, Group, Loaded, Maker, Mesh, Portion, msh, simplex};
+use crate::error::{Located, Place, Result, Source};
 use crate::exchange::crowd;
-use crate::problem::mesh::Guard;
-use crate::problem::order::Order;
+use crate::interrupt::Interrupt;
+use crate::problem::{Guard, Order};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -50,6 +51,12 @@ fn located(path: PathBuf) -> Located<PathBuf> {
     Located::new(path, Place { source: source.into(), span: 0..4 })
 }
 
+/// The mesh of a script with these numbers, kept in a cache.
+fn meshed<const D: usize>(geo: &Path, set: &[(String, f64)], order: Order, cache: &[PathBuf]) -> Result<Loaded<D>> {
+    let limits = (&Guard::default(), &Interrupt::default());
+    from_script(&located(geo.to_owned()), (set, &[]), None, order, limits, cache)
+}
+
 /// Bytes of the mesh of a script in another form than the program asks for.
 fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
@@ -66,7 +73,7 @@ fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
     std::fs::read(out).unwrap()
 }
 
-fn parse<const D: usize>(bytes: &[u8]) -> crate::error::Result<Mesh<D>> {
+fn parse<const D: usize>(bytes: &[u8]) -> Result<Mesh<D>> {
     msh::parse(Path::new("a.msh"), bytes, msh::Maker::User)
 }
 

@@ -1,6 +1,6 @@
 //! Drawing of a [`Plot`] as SVG by plotters: axes, ticks, curves, and a legend beside the axes, where it covers nothing.
 
-use super::format::superscript;
+use super::format::{superscript, trimmed};
 use super::plot::{Axis, Color, Plot, Series, Style};
 use plotters::chart::{ChartBuilder, SeriesLabelPosition};
 use plotters::coord::Shift;
@@ -51,9 +51,6 @@ type At = (i32, i32);
 
 impl Plot {
     /// Writes the plot as SVG, 900 by 560 pixels, on white.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         out.write_all(self.svg()?.as_bytes())
     }
@@ -247,8 +244,7 @@ impl ValueFormatter<f64> for Scale {
                 // key points carry errors of rounding
                 let digits = (9.0 - width.log10()).clamp(0.0, 15.0) as usize;
                 let text = format!("{:.digits$}", value / 10f64.powi(*power));
-                let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-                if text == "-0" { "0".to_owned() } else { text.replace('-', "−") }
+                if trimmed(&text) == "-0" { "0".to_owned() } else { trimmed(&text).replace('-', "−") }
             }
             Self::Log(_) => {
                 let power = (value.log10() + 1e-6).floor();

@@ -5,7 +5,6 @@ use super::format::field;
 use super::report::PairReport;
 use crate::error::Result;
 use std::io::{self, Write};
-use std::path::PathBuf;
 
 /// What `contacts.csv` says of a pair besides what its report says.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -40,11 +39,11 @@ impl PairRow {
     }
 }
 
-/// Writes the pairs in the order of the scene; returns the path.
+/// Writes the pairs in the order of the scene.
 ///
 /// # Errors
 /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
-pub fn save(folder: &Folder, pairs: &[PairReport], rows: &[PairRow]) -> Result<PathBuf> {
+pub fn save(folder: &Folder, pairs: &[PairReport], rows: &[PairRow]) -> Result<()> {
     folder.write("contacts.csv", |out| write(out, pairs, rows))
 }
 

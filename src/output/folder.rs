@@ -43,17 +43,17 @@ impl Folder {
         self.files.borrow().iter().cloned().collect()
     }
 
-    /// Writes a whole file `name`, replacing one of this name; returns its path.
+    /// Writes a whole file `name`, replacing one of this name.
     ///
     /// The text goes to a temporary file in the same folder, which takes the name only when it is complete.
     ///
     /// # Errors
     /// [`Kind::File`](crate::error::Kind::File) with the path and the cause; then nothing was changed.
-    pub fn write(&self, name: &str, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<PathBuf> {
+    pub fn write(&self, name: &str, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
         let path = self.path.join(name);
         write_whole(&path, fill)?;
-        self.files.borrow_mut().insert(path.clone());
-        Ok(path)
+        self.files.borrow_mut().insert(path);
+        Ok(())
     }
 
     /// Opens a file `name` that grows while the program works, replacing one of this name.

@@ -33,6 +33,11 @@ pub(super) fn field(value: f64) -> String {
     if value.is_nan() { String::new() } else { format!("{value:?}") }
 }
 
+/// A number without zeros at the end of its fraction.
+pub fn trimmed(text: &str) -> &str {
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
+}
+
 /// An integer in superscript digits, for powers of ten.
 #[cfg(feature = "cli")]
 pub(super) fn superscript(value: i32) -> String {

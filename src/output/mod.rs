@@ -1,6 +1,7 @@
 //! Everything the program writes: the table on the terminal, and the files of a run.
 //!
-//! Nothing here knows the space dimension: points and vectors have three components, z = 0 in the plane.
+//! Nothing here knows the space dimension: points and vectors have three components, z = 0 in the plane. What is
+//! written to an `out` has the errors of that.
 
 #[cfg(feature = "cli")]
 mod chart;
@@ -46,16 +47,16 @@ use std::path::Path;
 pub use contact::ContactTable;
 pub use contacts::PairRow;
 pub use folder::{Folder, safe_name, write_whole};
-pub use format::{sci, seconds};
+pub use format::{sci, seconds, trimmed};
 pub use history::HistoryWriter;
 #[cfg(feature = "cli")]
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
-    PairReport, Report, RoundReport, busiest,
+    PairReport, Report, RoundReport, busiest, warning_lines,
 };
 pub use rows::RowFile;
 pub use steps::{Extent, ReactionReport, StepPairReport, StepReport, StepTable};
 #[cfg(feature = "cli")]
 pub use table::{IterationTable, Verbosity};
-pub use vtu::{BodyField, CellKind, Grid};
+pub use vtu::{BodyField, CellKind, Encoding, Grid};

@@ -41,12 +41,12 @@ impl RowFile {
         self.failure = written.err().map(|cause| failed(&self.path, &cause));
     }
 
-    /// Ends the file and returns its path.
+    /// Ends the file.
     ///
     /// # Errors
     /// The first failure to write a row: later rows were dropped then.
-    pub fn finish(self) -> Result<PathBuf> {
-        self.failure.map_or(Ok(self.path), Err)
+    pub fn finish(self) -> Result<()> {
+        self.failure.map_or(Ok(()), Err)
     }
 }
 

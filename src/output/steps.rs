@@ -6,7 +6,6 @@ use super::rows::RowFile;
 use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 /// A load step.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -162,11 +161,11 @@ impl StepTable {
         self.rows.push(&line);
     }
 
-    /// Ends the file and returns its path.
+    /// Ends the file.
     ///
     /// # Errors
     /// The first failure to write a row: later rows were dropped then.
-    pub fn finish(self) -> Result<PathBuf> {
+    pub fn finish(self) -> Result<()> {
         self.rows.finish()
     }
 }

@@ -1,7 +1,6 @@
 //! Schur complements by MUMPS itself: PETSc forces a poor ordering on it and hands the complement on in part only.
 
-use super::metis;
-use super::{Int, Session, ffi};
+use super::{Int, Session, ffi, metis};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::{MPI_Comm_c2f, RSMPI_COMM_SELF};
 use std::ptr::null_mut;

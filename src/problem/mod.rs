@@ -18,6 +18,20 @@ pub mod solver;
 pub mod stop;
 pub mod units;
 
+pub use body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Support};
+pub use contact::{AutoContact, ContactSpec, Overlap};
+pub use elasticity::{AxesSpec, Constants, ElasticitySpec, Plane, RegionSpec};
+pub use history::History;
+pub use layer::{AsperitySpec, Depths, LawForm, LawKind, LayerSpec};
+pub use mesh::{GroupArrays, Guard, MeshArrays, MeshSource};
+pub use method::{Gamma, Linear, MethodName, MethodSpec, Start};
+pub use order::Order;
+pub use own::Own;
+pub use robin::{RobinRule, Zone};
+pub use solver::{Preset, SolverSpec};
+pub use stop::StopRule;
+pub use units::{Units, force_labels, label};
+
 /// The name of a choice in a list of all; empty if it has none.
 pub fn name_of<T: PartialEq>(choices: &[(&'static str, T)], choice: &T) -> &'static str {
     choices.iter().find(|(_, known)| known == choice).map_or("", |(name, _)| name)

@@ -1,6 +1,7 @@
 //! Bands of equal value on deformed bodies of the plane, as SVG.
 
-use super::body::{Part, bounds};
+use super::body::Part;
+use crate::linalg::bounds;
 use minijinja::context;
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 use serde::Serialize;
@@ -80,9 +81,6 @@ impl Canvas {
     }
 
     /// The picture of bodies: of each its name, its pieces from back to front and its outline.
-    ///
-    /// # Errors
-    /// Those of the template.
     pub fn draw(
         &self,
         bodies: Vec<(String, Vec<Piece>, String)>,
@@ -105,9 +103,6 @@ impl Canvas {
 /// The picture of one value, given at the points of all parts; `title` says what it is, with its unit. With `squares` the
 /// levels grow as squares: a stress peaks at contacts, and with equal steps most of a body would have the first colour.
 /// A picture that stands alone has a white ground.
-///
-/// # Errors
-/// Those of the template.
 pub fn svg(
     parts: &[Part],
     values: &[Vec<f64>],
@@ -117,7 +112,7 @@ pub fn svg(
     alone: bool,
 ) -> Result<String, minijinja::Error> {
     let places: Vec<Vec<[f64; 3]>> = parts.iter().map(|part| part.moved(scale)).collect();
-    let canvas = Canvas::new(bounds(places.iter().flatten()), range(values.iter().flatten()), squares);
+    let canvas = Canvas::new(bounds(places.iter().flatten().copied()), range(values.iter().flatten()), squares);
     let colors = colors();
     let body = |((part, places), values): ((&Part, &Vec<[f64; 3]>), &Vec<f64>)| {
         let places: Vec<[f64; 2]> = places.iter().map(|x| canvas.place(x)).collect();
@@ -134,14 +129,11 @@ pub fn svg(
 }
 
 /// The picture of the pressure on a contact surface in space, seen along its shortest direction; grey where there is none.
-///
-/// # Errors
-/// Those of the template.
 pub fn pressure(surface: &Part, axes: [usize; 2], title: &str, alone: bool) -> Result<String, minijinja::Error> {
     let flat: Vec<[f64; 3]> = surface.points.iter().map(|x| [x[axes[0]], x[axes[1]], 0.0]).collect();
     let pressures: Vec<f64> = surface.value.iter().map(|p| p.max(0.0)).collect();
     let [_, most] = range(pressures.iter());
-    let canvas = Canvas::new(bounds(flat.iter()), [0.0, most], false);
+    let canvas = Canvas::new(bounds(flat.iter().copied()), [0.0, most], false);
     let places: Vec<[f64; 2]> = flat.iter().map(|x| canvas.place(x)).collect();
     let region = |level: f64| path(&surface.triangles, &places, &pressures, level);
     let outline = region(f64::NEG_INFINITY);

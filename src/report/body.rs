@@ -1,6 +1,7 @@
 //! Triangles of bodies and contact surfaces from `.vtu` files: all cells in the plane, the surface in space.
 
 use crate::error::{Error, Kind, Result};
+use crate::linalg::bounds;
 use std::collections::HashMap;
 use std::path::Path;
 use vtkio::model::{Attribute, CellType, DataSet, Piece, UnstructuredGridPiece, Vtk};
@@ -184,17 +185,10 @@ impl Points {
     }
 }
 
-/// Low and high corner of a box around points.
-pub fn bounds<'a>(points: impl Iterator<Item = &'a [f64; 3]>) -> [[f64; 3]; 2] {
-    points.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], x| {
-        [std::array::from_fn(|k| low[k].min(x[k])), std::array::from_fn(|k| high[k].max(x[k]))]
-    })
-}
-
 /// The largest of 1, 2, 5 times a power of ten by which displacements can be multiplied so that none is longer than a
 /// twentieth of the diagonal of all bodies: what is seen to move, and still looks like the bodies. At least 1.
 pub fn magnification(parts: &[Part]) -> f64 {
-    let [low, high] = bounds(parts.iter().flat_map(|part| &part.points));
+    let [low, high] = bounds(parts.iter().flat_map(|part| &part.points).copied());
     let size = (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt();
     let most = parts.iter().flat_map(Part::travel).fold(0.0, f64::max);
     let wish = 0.05 * size / most;

@@ -1,8 +1,9 @@
 //! Pressures of pairs of surfaces from their tables: curves in the plane, maps in space.
 
 use super::bands::{self, BANDS, colors, range};
-use super::body::{Part, bounds};
+use super::body::Part;
 use crate::error::{Error, Kind, Result};
+use crate::linalg::bounds;
 use crate::output::{Plot, Series, Style};
 use crate::problem::units::{Units, label};
 use minijinja::context;
@@ -43,9 +44,6 @@ pub fn value(row: &HashMap<String, String>, column: &str) -> f64 {
 }
 
 /// The pressures of all pairs that have a table and touch, by the rows of `contacts.csv`.
-///
-/// # Errors
-/// Those of [`rows`], and of the templates.
 pub fn pictures(folder: &Path, is_space: bool, units: Option<&Units>, alone: bool) -> Result<Vec<Picture>> {
     let pairs = rows(&folder.join("contacts.csv"))?;
     let touching = |pair: &&HashMap<String, String>| value(pair, "peak_pressure") > 0.0;
@@ -57,7 +55,7 @@ pub fn pictures(folder: &Path, is_space: bool, units: Option<&Units>, alone: boo
         let pressures: Vec<f64> = points.iter().map(|row| value(row, "pressure")).collect();
         let name = |column: &str| pair.get(column).map_or("", String::as_str);
         let title = format!("{} – {}", name("a"), name("b"));
-        let [low, high] = bounds(places.iter());
+        let [low, high] = bounds(places.iter().copied());
         let mut axes = [0, 1, 2];
         axes.sort_by(|&i, &j| (high[j] - low[j]).total_cmp(&(high[i] - low[i])).then(i.cmp(&j)));
         let pressure = label("contact pressure", units.map(|units| units.stress));

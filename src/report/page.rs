@@ -81,9 +81,6 @@ impl Results {
     }
 
     /// The bodies, if the run wrote their fields.
-    ///
-    /// # Errors
-    /// Those of [`Part::read`].
     pub fn bodies(&self) -> Result<Vec<Part>> {
         let names = self.names("bodies", |body| body["name"].as_str().map(str::to_owned));
         let parts = names.iter().filter_map(|name| Some((name, self.file(&[&safe_name(name), name])?)));
@@ -91,9 +88,6 @@ impl Results {
     }
 
     /// The contact surfaces, if the run wrote them.
-    ///
-    /// # Errors
-    /// Those of [`Part::read`].
     pub fn surfaces(&self) -> Result<Vec<Part>> {
         let files = self.names("files", |file| Some(file.as_str()?.strip_suffix(".vtu")?.to_owned()));
         let surfaces = files.iter().filter(|name| name.starts_with("contact-"));
@@ -122,9 +116,6 @@ impl Results {
     }
 
     /// Residual, error and increment of each iteration; none without iterations.
-    ///
-    /// # Errors
-    /// Those of `rows`.
     pub fn convergence(&self) -> Result<Option<Plot>> {
         let rows = rows(&self.folder.join("history.csv"))?;
         // load steps begin to count anew
@@ -184,17 +175,11 @@ impl Results {
     }
 
     /// A picture of the pressure of each pair that touches and has a table.
-    ///
-    /// # Errors
-    /// Those of the tables.
     pub fn pressures(&self, alone: bool) -> Result<Vec<Picture>> {
         pictures(&self.folder, self.is_space(), self.units.as_ref(), alone)
     }
 
     /// A picture of the stress, or else the displacement, on deformed bodies: of those in space their surfaces.
-    ///
-    /// # Errors
-    /// Those of the template.
     pub fn bands(&self, bodies: &[Part], stress: bool, alone: bool) -> Result<String> {
         let values: Vec<Vec<f64>> =
             bodies.iter().map(|part| if stress { part.value.clone() } else { part.travel() }).collect();

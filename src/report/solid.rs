@@ -1,7 +1,8 @@
 //! Bodies in space as one picture: the triangles of their surfaces that face the viewer, from back to front, coloured by a value.
 
 use super::bands::{BANDS, Canvas, Piece, band, range};
-use super::body::{Part, bounds};
+use super::body::Part;
+use crate::linalg::bounds;
 use nalgebra::Vector3;
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 use std::fmt::Write;
@@ -17,9 +18,6 @@ const SHADES: usize = 6;
 const RIM: f64 = 0.6;
 
 /// The picture of one value, given at the points of all parts: see [`super::bands::svg`].
-///
-/// # Errors
-/// Those of the template.
 pub fn svg(
     parts: &[Part],
     values: &[Vec<f64>],
@@ -33,7 +31,7 @@ pub fn svg(
     let axes = [right, towards.cross(&right), towards];
     let turned = |&x: &[f64; 3]| axes.map(|axis| axis.dot(&Vector3::from(x)));
     let seen: Vec<Vec<[f64; 3]>> = parts.iter().map(|part| part.moved(scale).iter().map(turned).collect()).collect();
-    let canvas = Canvas::new(bounds(seen.iter().flatten()), range(values.iter().flatten()), squares);
+    let canvas = Canvas::new(bounds(seen.iter().flatten().copied()), range(values.iter().flatten()), squares);
     let mut triangles: Vec<(f64, usize, [[i64; 2]; 3])> = Vec::new();
     for ((part, seen), values) in parts.iter().zip(&seen).zip(values) {
         for corners in &part.triangles {

@@ -1,6 +1,7 @@
 //! Surfaces in space for the view that turns.
 
-use super::body::{Part, bounds};
+use super::body::Part;
+use crate::linalg::bounds;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
@@ -11,7 +12,7 @@ const NONE: u16 = u16::MAX;
 /// Numbers of a view: of each part points and displacements (float32), triangles (uint32), and its value (uint16 between
 /// `low` and `high`, 65535 for none), little endian in base64.
 pub fn view(bodies: &[Part], surfaces: &[Part], scale: f64) -> Value {
-    let [low, high] = bounds(bodies.iter().chain(surfaces).flat_map(|part| &part.points));
+    let [low, high] = bounds(bodies.iter().chain(surfaces).flat_map(|part| &part.points).copied());
     json!({
         "bodies": parts(bodies),
         "surfaces": parts(surfaces),

@@ -1,5 +1,6 @@
 //! Values of a report as words and numbers for people, and the templates that have them as filters.
 
+use crate::output::trimmed;
 use minijinja::value::{Rest, ValueKind};
 use minijinja::{Environment, Value};
 
@@ -27,11 +28,6 @@ fn number(value: &Value) -> String {
             trimmed(&format!("{value:.digits$}")).replace('-', "−")
         }
     }
-}
-
-/// Without zeros at the end of a fraction.
-fn trimmed(text: &str) -> &str {
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
 /// A table as `key = value, ...`, a list as `(a, b)`; numbers as [`number`] has them.

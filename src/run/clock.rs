@@ -1,5 +1,6 @@
 //! Where the time of a run goes.
 
+use crate::file::bytes_in_proc;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Instant;
@@ -41,7 +42,8 @@ impl Clock {
         let now = Instant::now();
         *self.times.entry(name.to_owned()).or_default() += (now - self.last).as_secs_f64();
         self.last = now;
-        self.memory.extend(peak_memory().map(|memory| (name.to_owned(), memory)));
+        let peak = bytes_in_proc("/proc/self/status", "VmHWM");
+        self.memory.extend(peak.map(|bytes| (name.to_owned(), bytes as f64 / 1e6)));
         self.watch.iter().for_each(|watch| watch(name, self.estimate));
     }
 
@@ -51,12 +53,4 @@ impl Clock {
         self.times.insert("total".to_owned(), total);
         total
     }
-}
-
-/// Largest resident memory of this process so far, 10^6 bytes.
-fn peak_memory() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kibibytes * 1024.0 / 1e6)
 }

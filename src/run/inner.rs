@@ -14,9 +14,7 @@ use crate::linalg::Csr;
 use crate::model::{Body, BodySlot};
 use crate::parallel::Ranks;
 use crate::petsc::{Rows, Session};
-use crate::problem::method::{Linear, MethodName};
-use crate::problem::order::Order;
-use crate::problem::solver::Preset;
+use crate::problem::{Linear, MethodName, Order, Preset};
 use crate::scene::Scene;
 use crate::solver::cost::{Candidate, Comparison, Step};
 use crate::solver::options::{Chosen, Typed};
@@ -40,15 +38,15 @@ pub struct Inner<'a> {
     /// How the scene wants linear steps to be solved.
     wanted: Option<Linear>,
     /// How linear steps are solved, from the plan on.
-    linear: Linear,
+    pub linear: Linear,
     /// What the user wrote for the solvers.
     typed: Typed,
     /// Options of the matrix of all bodies.
-    whole: Chosen,
+    pub whole: Chosen,
     /// Its interpolation from linear displacements, where bodies have quadratic ones and multigrid.
-    interpolation: Option<Interpolation>,
-    /// Seconds of set-up and iteration by the estimates that chose the solvers of bodies in space.
-    seconds: Option<f64>,
+    pub interpolation: Option<Interpolation>,
+    /// Seconds of set-up and iteration by the estimates that chose the solvers of bodies in space; none where there was nothing to estimate.
+    pub seconds: Option<f64>,
     plans: Vec<Plan>,
     /// Whether each body is dealt out over the ranks, where sweeps solve linear steps.
     dealt: Vec<bool>,
@@ -61,9 +59,6 @@ pub struct Inner<'a> {
 impl<'a> Inner<'a> {
     /// Starts from the memory that is free now and the options that the user wrote for these `bodies`; collective. `kept` are bodies of an
     /// earlier scene that serve this one, too.
-    ///
-    /// # Errors
-    /// When PETSc is out of memory.
     pub fn new(session: &'a Session, scene: &Scene, bodies: &[&str], kept: Vec<BodySlot>) -> Result<Self> {
         let mine = memory::available() as u64;
         let mut least = mine;
@@ -110,11 +105,6 @@ impl<'a> Inner<'a> {
         kinds.into_iter().filter_map(of_kind).collect::<Vec<_>>().join("; ")
     }
 
-    /// Seconds of set-up and iteration by the estimates that chose the solvers; none where there was nothing to estimate.
-    pub fn seconds(&self) -> Option<f64> {
-        self.seconds
-    }
-
     /// The options of all solvers of PETSc that a run has: of each body that sweeps solve by one, or of the matrix of all bodies.
     pub fn into_options(self) -> Vec<Chosen> {
         match self.linear {
@@ -125,16 +115,6 @@ impl<'a> Inner<'a> {
                 solved.map(|plan| plan.chosen).collect()
             }
         }
-    }
-
-    /// Options of the matrix of all bodies.
-    pub fn whole(&self) -> &Chosen {
-        &self.whole
-    }
-
-    /// Interpolation of all bodies from linear displacements, if the matrix of all bodies wants it.
-    pub fn interpolation(&mut self) -> Option<Interpolation> {
-        self.interpolation.take()
     }
 
     /// Whether a body has quadratic elements.
@@ -167,11 +147,6 @@ impl<'a> Inner<'a> {
     pub fn condensed(&self) -> Vec<String> {
         let condensed = self.plans.iter().filter(|plan| plan.preset == Preset::Condensed);
         condensed.map(|plan| plan.name.clone()).collect()
-    }
-
-    /// How linear steps are solved.
-    pub fn linear(&self) -> Linear {
-        self.linear
     }
 
     /// Whether a matrix is factored on the way, by the program's choice.

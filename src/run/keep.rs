@@ -23,9 +23,6 @@ impl Keep for Silent {}
 
 /// Solves through all pauses until a rule or a signal ends the run. At the full load it may end at the error of the discretisation,
 /// and the interval of gamma is found if the scene asks for it.
-///
-/// # Errors
-/// Failures of the solver library.
 pub fn solve(mut ready: Ready, full: bool, keep: &mut dyn Keep) -> Result<Done> {
     if let Start::Continue(state) = &ready.start {
         state.rows.iter().for_each(|row| keep.row(row));

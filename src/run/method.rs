@@ -16,9 +16,6 @@ use crate::solver::{Dense, Krylov, Monolithic, Union};
 
 /// Makes the method of a scene and the solvers it needs, set up; refusals come before the first sweep. An automatic start that the set-up
 /// finds is left in `start`.
-///
-/// # Errors
-/// Failures of PETSc.
 pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<Method> {
     let Built { scene, discrete, linear, whole, interpolation, .. } = built;
     let model = &mut discrete.model;

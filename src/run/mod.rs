@@ -1,5 +1,7 @@
 //! A run: from a scene to what was found, for the library and for the command line. Its types are the [`stages`], each made from
 //! the one before by [`build`], [`set_up`], [`iterate`] and [`estimate`].
+//!
+//! Errors are failures of the solver library, but for what functions say of their own.
 
 pub mod asking;
 mod balance;
@@ -19,4 +21,9 @@ pub mod steps;
 pub mod verdict;
 pub mod words;
 
+pub use asking::Asking;
+pub use clock::Clock;
+pub use keep::Keep;
 pub use phases::{build, build_with, estimate, in_parts, iterate, set_up, targets};
+pub use results::{All, Recovered};
+pub use stages::{Begin, Built, Done, Ready};

@@ -3,10 +3,9 @@
 use super::clock::Clock;
 use super::inner::{Inner, WHOLE};
 use super::keep::{self, Keep};
-use super::method;
 use super::stages::{Begin, Built, Done, Ready};
-use super::steps;
 use super::words::in_words;
+use super::{method, steps};
 use crate::contact::pieces::{self, Cut};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{self, Outcome, Start, Status};
@@ -18,8 +17,7 @@ use crate::mesh::{self, Dealer, Portion};
 use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::{Session, give_back};
-use crate::problem::method::Linear;
-use crate::problem::order::Order;
+use crate::problem::{Linear, Order};
 use crate::scene::Scene;
 use crate::solver::options;
 use mpi::collective::SystemOperation;
@@ -43,9 +41,6 @@ pub fn build(
 }
 
 /// The same, with the bodies `kept` from an earlier scene.
-///
-/// # Errors
-/// Those of [`build`].
 pub fn build_with(
     session: &Session,
     scene: Rc<Scene>,
@@ -119,15 +114,15 @@ impl<const D: usize> Source<D> {
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
         let gains = D == 3 && verified.portion.mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
         session.set_blas_threads(if gains { cores / session.size() } else { 1 });
-        clock.estimate = inner.seconds();
+        clock.estimate = inner.seconds;
         clock.phase("discretize");
         drop(stage);
         let mut warnings = warnings(session, &discrete);
         warnings.extend(in_parts(verified.portion.mesh.split));
         warnings.extend(inner.applied_once());
-        let (linear, whole) = (inner.linear(), inner.whole().clone());
+        let (linear, whole) = (inner.linear, inner.whole.clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());
-        let interpolation = inner.interpolation();
+        let interpolation = inner.interpolation.take();
         let scene = scene.clone();
         let (options, again) = (inner.into_options(), None);
         Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, options, warnings, again })
@@ -319,9 +314,6 @@ pub fn iterate(ready: Ready, interrupt: &Interrupt, keep: &mut dyn Keep, clock: 
 }
 
 /// Estimates the error of what a run found, if the scene asks for it.
-///
-/// # Errors
-/// Failures of PETSc.
 pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> {
     let Outcome { status, iterate, layer, .. } = &done.outcome;
     let good = status.is_solved() || *status == Status::IterationLimit;

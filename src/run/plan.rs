@@ -1,7 +1,6 @@
 //! The choice of an inner solver for each body, and what bodies have to agree on.
 
-use crate::problem::order::Order;
-use crate::problem::solver::Preset;
+use crate::problem::{Order, Preset};
 use crate::solver::Retained;
 use crate::solver::options::Chosen;
 

@@ -1,13 +1,9 @@
 //! Outcome -> report and contact tables.
 
-use super::asking;
-use super::balance;
 use super::clock::Clock;
-use super::measure;
-use super::preflight;
-use super::results;
 use super::stages::{Built, Done};
 use super::verdict::{self, forecast, message, status_name};
+use super::{asking, balance, measure, preflight, results};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::Status;
 use crate::discretize::Discrete;
@@ -15,10 +11,9 @@ use crate::error::{Kind, few};
 use crate::estimate::Estimate;
 use crate::exchange::share;
 use crate::model::BodyCounts;
-use crate::output::sci;
-use crate::output::vtu::Grid;
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, Extent, InnerTimes, IntervalReport, LISTED, PairReport, PairRow, Report,
+    BodyReport, ContactTable, EstimateReport, Extent, Grid, InnerTimes, IntervalReport, LISTED, PairReport, PairRow,
+    Report, sci,
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};

@@ -4,8 +4,8 @@ use super::stages::Done;
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Result, few};
 use crate::exchange::share;
-use crate::output::BodyReport;
-use crate::output::vtu::BodyField;
+use crate::linalg::bounds;
+use crate::output::{BodyField, BodyReport};
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 
@@ -78,7 +78,7 @@ impl Found {
             at: [0.0; 3],
             principal: [f64::INFINITY, f64::NEG_INFINITY],
             displacement: 0.0,
-            extent: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
+            extent: bounds([]),
             norms: None,
         };
         let Ok(recovered) = recovered else { return Self { von_mises: f64::NAN, ..found } };
@@ -93,9 +93,7 @@ impl Found {
         }
         let length = |u: &[f64; 3]| u.iter().map(|x| x * x).sum::<f64>().sqrt();
         found.displacement = field.displacement.iter().map(length).fold(0.0, f64::max);
-        for x in &field.points {
-            found.extent = box_of(found.extent, [*x, *x]);
-        }
+        found.extent = bounds(field.points.iter().copied());
         found.norms = info.post().errors(&recovered.state);
         found
     }
@@ -108,16 +106,11 @@ impl Found {
             .zip(other.norms)
             .map(|(a, b)| std::array::from_fn(|of| std::array::from_fn(|norm| f64::hypot(a[of][norm], b[of][norm]))));
         let displacement = self.displacement.max(other.displacement);
-        let extent = box_of(self.extent, other.extent);
+        let extent = bounds([self.extent, other.extent].concat());
         // NaN is above all numbers
         let larger = if other.von_mises.total_cmp(&self.von_mises).is_gt() { other } else { self };
         Self { principal: [low.min(least), high.max(largest)], displacement, extent, norms, ..larger }
     }
-}
-
-/// The box around two boxes.
-fn box_of(a: [[f64; 3]; 2], b: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
-    [std::array::from_fn(|c| a[0][c].min(b[0][c])), std::array::from_fn(|c| a[1][c].max(b[1][c]))]
 }
 
 /// Displacements up to this share of a body are small: a turn by it changes lengths along and across by half a per cent.

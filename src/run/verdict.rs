@@ -56,6 +56,11 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
             "body `{}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}",
             name(body)
         ),
+        Status::Cycle { period: 1 } => {
+            format!(
+                "the contact stays as it is, and neither residual nor F1 falls (seen in iteration {k}): try {other}"
+            )
+        }
         Status::Cycle { period } => {
             format!("the iterates repeat every {period} iterations (seen in iteration {k}): try {other}")
         }

@@ -5,13 +5,7 @@ use crate::contact::law::LayerLaw;
 use crate::data::Library;
 use crate::ddm::gamma::GammaRule;
 use crate::error::{Located, Place};
-use crate::problem::body::BodySpec;
-use crate::problem::contact::ContactSpec;
-use crate::problem::elasticity::Plane;
-use crate::problem::mesh::MeshSource;
-use crate::problem::method::MethodSpec;
-use crate::problem::own::Own;
-use crate::problem::solver::SolverSpec;
+use crate::problem::{BodySpec, ContactSpec, MeshSource, MethodSpec, Own, Plane, SolverSpec};
 use std::rc::Rc;
 
 impl Scene {

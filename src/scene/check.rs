@@ -4,14 +4,12 @@
 use super::Scene;
 use crate::error::{Error, Place, Result, shown};
 use crate::expression::Field;
-use crate::problem::body::{BodySpec, LoadKind, SPELLING, SpringKind, Support, fault, is_in_name};
-use crate::problem::contact::{AutoContact, ContactSpec};
-use crate::problem::elasticity::{Constants, ElasticitySpec, Plane};
-use crate::problem::layer::{Depths, LayerSpec};
-use crate::problem::mesh::MeshSource;
-use crate::problem::method::{Gamma, MethodName, MethodSpec, Start};
+use crate::problem::body::{SPELLING, fault, is_in_name};
 use crate::problem::pattern::is_pattern;
-use crate::problem::robin::RobinRule;
+use crate::problem::{
+    AutoContact, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, LayerSpec, LoadKind, MeshSource,
+    MethodName, MethodSpec, Plane, RobinRule, SpringKind, Start, Support,
+};
 use std::collections::HashSet;
 
 /// A refusal and the key that it is about.

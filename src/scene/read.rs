@@ -266,7 +266,8 @@ const TOP: [&str; 8] = ["title", "dimension", "plane", "units", "mesh", "solver"
 
 /// A table whose keys are all known, with values of the right kind.
 pub(super) struct Keys<'a> {
-    node: &'a Node,
+    /// The table itself.
+    pub node: &'a Node,
     entries: &'a [Entry],
     what: String,
 }
@@ -304,11 +305,6 @@ impl<'a> Keys<'a> {
             keys.require(key.name).map_err(|error| error.help(format!("{}: {}", key.name, key.about)))?;
         }
         Ok(keys)
-    }
-
-    /// The table itself.
-    pub fn node(&self) -> &'a Node {
-        self.node
     }
 
     pub fn entry(&self, key: &str) -> Option<&'a Entry> {

@@ -2,16 +2,11 @@
 
 use crate::data::{DataSpec, Interpolation, Outside};
 use crate::expression::Field;
-use crate::problem::body::{BodySpec, LoadKind, SpringKind};
-use crate::problem::contact::{ContactSpec, Overlap};
-use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, Plane};
-use crate::problem::history::History;
-use crate::problem::layer::{AsperitySpec, Depths, LayerSpec};
-use crate::problem::mesh::MeshSource;
-use crate::problem::method::{Gamma, MethodName, MethodSpec, Start};
-use crate::problem::name_of;
-use crate::problem::robin::{RobinRule, Zone};
-use crate::problem::stop::StopRule;
+use crate::problem::{
+    AsperitySpec, AxesSpec, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, History, LayerSpec,
+    LoadKind, MeshSource, MethodName, MethodSpec, Overlap, Plane, RobinRule, SpringKind, Start, StopRule, Zone,
+    name_of,
+};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 

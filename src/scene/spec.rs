@@ -5,13 +5,7 @@ use crate::data::Library;
 use crate::ddm::gamma::OwnRules;
 use crate::error::{Located, Place};
 use crate::output::vtu::Encoding;
-use crate::problem::body::BodySpec;
-use crate::problem::contact::{AutoContact, ContactSpec};
-use crate::problem::elasticity::Plane;
-use crate::problem::mesh::MeshSource;
-use crate::problem::method::MethodSpec;
-use crate::problem::solver::SolverSpec;
-use crate::problem::units::Units;
+use crate::problem::{AutoContact, BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
 use std::path::PathBuf;
 
 /// A checked scene.

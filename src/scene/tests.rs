@@ -1,14 +1,9 @@
 use super::*;
 use crate::expression::Field;
-use crate::problem::body::{BodySpec, LoadKind};
-use crate::problem::elasticity::{Constants, Plane};
-use crate::problem::layer::{LawKind, LayerSpec};
-use crate::problem::mesh::MeshSource;
-use crate::problem::method::{Gamma, MethodName, Start};
-use crate::problem::order::Order;
-use crate::problem::robin::{RobinRule, Zone};
-use crate::problem::solver::{Preset, SolverSpec};
-use crate::problem::stop::StopRule;
+use crate::problem::{
+    BodySpec, Constants, Gamma, LawKind, LayerSpec, LoadKind, MeshSource, MethodName, Order, Plane, Preset, RobinRule,
+    SolverSpec, Start, StopRule, Zone,
+};
 
 /// The scene of docs/scene-file.md, and its mesh file beside it.
 const GROOVE: &str = r#"title = "Groove with a nonlinear Winkler layer"

@@ -6,7 +6,6 @@
 //! energies and all that is printed are the same numbers.
 
 use super::options::Chosen;
-use super::sparse::Loaded;
 use super::{Dense, Retained, SparseBody, memory};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{ElasticBody, rigid::FreeMotion};
@@ -67,8 +66,8 @@ impl CondensedBody {
         }
     }
 
-    /// The loads on the retained dofs.
-    fn loaded(&self, schur: &mut Schur) -> Result<Loaded> {
+    /// The loads on the retained dofs, of which none is prescribed; without K.
+    fn loaded(&self, schur: &mut Schur) -> Result<ElasticBody> {
         let (mut whole_lifting, mut lifting) = (Vec::new(), Vec::new());
         if !self.whole.lifting.is_empty() {
             whole_lifting = self.retained.turn(&self.whole.lifting);
@@ -78,11 +77,12 @@ impl CondensedBody {
         // the interior under the loads alone, with the retained dofs at rest
         let rest = schur.expand_condensed(&self.load, &vec![0.0; self.retained.dofs.len()])?;
         let work = dot(&self.load, &rest);
-        Ok(Loaded {
+        Ok(ElasticBody {
             load,
             lifting,
             energy_constant: self.whole.energy_constant - 0.5 * work,
             strain_constant: self.whole.strain_constant + work + 2.0 * dot(&whole_lifting, &rest),
+            ..ElasticBody::default()
         })
     }
 
@@ -102,10 +102,9 @@ impl CondensedBody {
         schur.factor()?;
         let loaded = self.loaded(&mut schur)?;
         let stiffness = Csr::full(retained, schur.take_complement());
-        let body = ElasticBody { stiffness, ..ElasticBody::default() };
+        let body = ElasticBody { stiffness, ..loaded };
         let dense = |stiffness: Rows| Ok(Dense::new(stiffness));
-        let mut body = SparseBody::new(body, self.retained.rows.clone(), &[], dense, String::new());
-        body.reload(loaded, &self.free);
+        let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, dense, String::new());
         Ok(Condensed { kept: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
     }
 }

@@ -219,11 +219,12 @@ mod tests {
     }
 
     fn candidates(bodies: &[(Vec<u32>, Vec<u32>, Retained)]) -> Vec<Candidate<'_>> {
-        let of = |(ptr, col, retained): &'_ (Vec<u32>, Vec<u32>, Retained)| (3 * (ptr.len() - 1), col.len(), retained);
-        let sizes = bodies.iter().map(of);
-        let candidate =
-            |(dofs, couplings, retained)| Candidate { dofs, order: Order::P1, retained: Some(retained), couplings };
-        sizes.map(candidate).collect()
+        let mut candidates = Vec::new();
+        for (ptr, col, retained) in bodies {
+            let (dofs, couplings) = (3 * (ptr.len() - 1), col.len());
+            candidates.push(Candidate { dofs, order: Order::P1, retained: Some(retained), couplings });
+        }
+        candidates
     }
 
     /// Small cubes are factored, whatever order is found; wide contact is not; and no factor has fewer entries than K.

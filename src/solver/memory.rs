@@ -2,14 +2,7 @@
 
 /// Bytes that programs can still take without swapping, as Linux tells; no limit where it does not.
 pub fn available() -> usize {
-    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    available_in(&text).unwrap_or(usize::MAX)
-}
-
-fn available_in(meminfo: &str) -> Option<usize> {
-    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kilobytes: usize = line.split_whitespace().next()?.parse().ok()?;
-    Some(kilobytes * 1024)
+    crate::file::bytes_in_proc("/proc/meminfo", "MemAvailable").map_or(usize::MAX, |bytes| bytes as usize)
 }
 
 /// Estimated bytes of a sparse Cholesky factor of a body in the plane by nested dissection: the growth n log n with factors
@@ -32,14 +25,6 @@ pub fn work_in_plane(dofs: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_line_of_linux_is_read() {
-        let text = "MemTotal:       24000000 kB\nMemFree:  5 kB\nMemAvailable:   20000 kB\n";
-        assert_eq!(available_in(text), Some(20_480_000));
-        assert_eq!(available_in("MemFree: 1 kB"), None);
-        assert!(available() > 1_000_000);
-    }
 
     /// Measured by MUMPS with METIS: 502 000 dofs took 538 MB and 2.0e10 operations.
     #[test]

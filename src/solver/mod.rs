@@ -2,6 +2,8 @@
 //!
 //! [`SparseBody`] owns K, f and B and answers the verbs of [`Body`](crate::model::Body); a [`RobinMatrix`] is G, by an
 //! [`InnerSolver`]. A new way to solve is a new file with that trait. [`CondensedBody`] is such a body whose dofs are those of its contact.
+//!
+//! Errors are failures of the solver library, and PETSc being out of memory, but for what functions say of their own.
 
 mod coarse;
 mod condensed;
@@ -81,15 +83,9 @@ pub trait InnerSolver {
     }
 
     /// Changes values of G; the next solve uses the new matrix.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn update(&mut self, change: Change) -> Result<Seen>;
 
     /// Factors G, or sets its preconditioner up, if it changed since.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn set_up(&mut self) -> Result<()>;
 
     /// Solves G z = r with zero guess.
@@ -100,17 +96,11 @@ pub trait InnerSolver {
 
     /// The same, until `enough` is true of z and the share of r that it leaves, for solvers that come nearer step by step. If the user
     /// set a tolerance, that ends the solve.
-    ///
-    /// # Errors
-    /// Those of [`solve`](Self::solve).
     fn solve_until(&mut self, r: &[f64], z: &mut [f64], _enough: &mut Enough) -> Result<Solved> {
         self.solve(r, z)
     }
 
     /// How far solves have to reduce r, unless the user says; false if solves are what they are.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn precision(&mut self, _rtol: f64) -> Result<bool> {
         Ok(false)
     }
@@ -122,9 +112,6 @@ pub trait InnerSolver {
 
     /// z = M^-1 r with a fixed symmetric M near G: one application of the preconditioner of an iterative solver, a whole solve
     /// of a direct one.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         self.solve(r, z)
     }

@@ -222,9 +222,6 @@ impl Joint for Joined<Krylov> {
 
 impl<S: InnerSolver> Monolithic<S> {
     /// The joined bodies, with the solver that `make` makes of their K.
-    ///
-    /// # Errors
-    /// Those of `make`.
     pub fn new(union: Union, make: impl FnOnce(Rows) -> Result<S>) -> Result<Self> {
         let Union { stiffness, rows, offset, start, row_stiffness, coarse, is_redundant } = union;
         let matrix = RobinMatrix::new(super::rows(stiffness, start)?, &rows, row_stiffness, make)?.with_coarse(coarse);

@@ -32,9 +32,6 @@ pub struct RobinMatrix<S> {
 impl<S: InnerSolver> RobinMatrix<S> {
     /// Starts from G = K, on a pattern that holds B'B; `make` turns K into its solver. `row_stiffness` is b diag(K) b' of each row b,
     /// also of those on other ranks.
-    ///
-    /// # Errors
-    /// Those of `make`.
     pub fn new(
         stiffness: Rows,
         rows: &Csr,
@@ -62,9 +59,6 @@ impl<S: InnerSolver> RobinMatrix<S> {
     }
 
     /// Sets the springs d.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub fn update(&mut self, rows: &Csr, weight: &[f64]) -> Result<()> {
         if weight == self.weight {
             self.counts.robin_skipped += 1;
@@ -99,9 +93,6 @@ impl<S: InnerSolver> RobinMatrix<S> {
     }
 
     /// Factors G, or makes its preconditioner, if it changed since.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub fn set_up(&mut self) -> Result<()> {
         let began = Instant::now();
         let done = self.solver.set_up();
@@ -110,9 +101,6 @@ impl<S: InnerSolver> RobinMatrix<S> {
     }
 
     /// One solve, or one application of the preconditioner, counted and timed apart from the set-up it may need.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub fn apply(&mut self, solve: impl FnOnce(&mut S) -> Result<Solved>) -> Result<Solved> {
         self.set_up()?;
         self.counts.solves += 1;

@@ -23,18 +23,6 @@ pub struct SparseBody<S> {
     sizes: Vec<[f64; 2]>,
 }
 
-/// What loads make of a body without prescribed dofs: see [`ElasticBody`].
-pub struct Loaded {
-    /// f.
-    pub load: Vec<f64>,
-    /// Forces of prescribed values on the dofs.
-    pub lifting: Vec<f64>,
-    /// What energies lack.
-    pub energy_constant: f64,
-    /// What u'Ku lacks.
-    pub strain_constant: f64,
-}
-
 /// G, made when something is first to be solved: a body that is only measured, or joined with others, needs none.
 enum Lazy<S> {
     Later {
@@ -73,17 +61,9 @@ impl<S: InnerSolver> SparseBody<S> {
         Self { rows: distribution.of_rows(&self.rows), split, distribution: Some(distribution), ..self }
     }
 
-    /// Takes other loads on the same K; their work on the motions that its supports leave is in `free`.
-    pub fn reload(&mut self, loaded: Loaded, free: &[FreeMotion]) {
-        let Loaded { load, lifting, energy_constant, strain_constant } = loaded;
-        self.body = ElasticBody {
-            load,
-            lifting,
-            energy_constant,
-            strain_constant,
-            stiffness: std::mem::take(&mut self.body.stiffness),
-            ..ElasticBody::default()
-        };
+    /// Takes the loads of a body without K on the K that is here; their work on the motions that its supports leave is in `free`.
+    pub fn reload(&mut self, loaded: ElasticBody, free: &[FreeMotion]) {
+        self.body = ElasticBody { stiffness: std::mem::take(&mut self.body.stiffness), ..loaded };
         self.split = Split::new(free, &self.rows);
     }
 

@@ -121,7 +121,7 @@ fn known_error(
     if let Some(error) = reference.error(scene, &tables) {
         return Some((error, "pressure, --against"));
     }
-    if let Some(error) = row.displacement_error() {
+    if let Some(error) = row.displacement_error {
         return Some((error, "displacement, exact"));
     }
     Some((compare::closed_form(scene, &tables)?, "pressure, reference"))

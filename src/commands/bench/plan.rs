@@ -4,10 +4,7 @@ use super::request::{Request, usage};
 use crate::commands::case_of;
 use crate::commands::sweep::{axis, combinations};
 use crate::error::Result;
-use crate::problem::method::MethodName;
-use crate::problem::name_of;
-use crate::problem::order::Order;
-use crate::problem::solver::Preset;
+use crate::problem::{MethodName, Order, Preset, name_of};
 use crate::scene::Scene;
 use std::path::PathBuf;
 

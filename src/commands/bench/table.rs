@@ -65,8 +65,8 @@ pub(super) struct Row {
     numbers: BTreeMap<&'static str, f64>,
     /// What the error is measured in and against; empty without an error.
     pub error_of: String,
-    /// Error of the displacements that the run itself told.
-    displacement_error: Option<f64>,
+    /// Relative error of the displacements that the run itself told, where the scene has their closed form.
+    pub displacement_error: Option<f64>,
 }
 
 /// All rows and their file.
@@ -215,11 +215,6 @@ impl Row {
         self.error_of = what.to_owned();
     }
 
-    /// Relative error of the displacements, where the scene has their closed form.
-    pub fn displacement_error(&self) -> Option<f64> {
-        self.displacement_error
-    }
-
     /// The row as a line for the terminal.
     pub fn line(&self, label: &str, is_new: bool) -> String {
         let number = |name: &str| self.number(name);
@@ -329,7 +324,7 @@ impl<'a> Table<'a> {
             }
             file.flush()
         };
-        self.folder.write(FILE, fill).map(|_| ())
+        self.folder.write(FILE, fill)
     }
 
     /// Folder of the results of all runs.

@@ -8,8 +8,7 @@
 use super::polygon::{self, Polygon};
 use super::{Common, Reach, Refused, SNAP, Search, Shared};
 use crate::contact::side::{Side, length, unit};
-use crate::fem::space::area_vector;
-use crate::fem::{assemble, cross, element, quadrature};
+use crate::fem::{area_vector, assemble, cross, element, quadrature};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 

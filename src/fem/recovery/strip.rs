@@ -4,9 +4,7 @@
 //! the facet that is nearest to those of the facets around it. Facets that meet at a corner do not know each other.
 
 use super::{Law, Recovery};
-use crate::fem::element::{self, EDGES};
-use crate::fem::space::{Space, area_vector};
-use crate::fem::{Facets, assemble, quadrature};
+use crate::fem::{EDGES, Facets, Space, area_vector, assemble, element, quadrature};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 use nalgebra::{Matrix3, Vector3};

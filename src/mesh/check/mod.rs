@@ -40,7 +40,7 @@ mod surface;
 mod tests;
 
 pub use groups::Duty;
-pub use parts::Parts;
+pub use parts::{Joined, Parts};
 
 use super::Portion;
 use crate::error::{Error, Result};

@@ -4,6 +4,7 @@ use super::cells::{Cells, NONE};
 use super::distance::{self, Point};
 use super::faces::Face;
 use crate::error::Result;
+use crate::linalg;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
@@ -39,7 +40,7 @@ impl<'a, const D: usize> Surface<'a, D> {
         let nodes: Vec<u32> = faces.iter().flat_map(|face| face.nodes(cells)).collect();
         let stride = if cells.is_quadratic() { D * (D + 1) / 2 } else { D };
         let boxed = |(facet, i)| {
-            let (low, high) = bounds(facet, cells);
+            let [low, high] = bounds(facet, cells);
             GeomWithData::new(Rectangle::from_corners(low, high), i)
         };
         let tree = RTree::bulk_load(nodes.chunks_exact(stride).zip(0..).map(boxed).collect());
@@ -100,7 +101,7 @@ impl<'a, const D: usize> Surface<'a, D> {
     /// No two facets meet but in the corners and edges that they share.
     pub fn check(&self) -> Result<()> {
         for i in 0..self.faces.len() {
-            let (low, high) = bounds(self.facet(i), self.cells);
+            let [low, high] = bounds(self.facet(i), self.cells);
             let slack = TOUCH * distance::apart(low, high);
             for j in self.near(low.map(|x| x - slack), high.map(|x| x + slack)).filter(|&j| j > i) {
                 if self.meet(i, j) {
@@ -131,7 +132,7 @@ impl<'a, const D: usize> Surface<'a, D> {
         let cells = [i, j].map(|i| self.faces[i].cell());
         let pair = || [(i, j), (j, i)].into_iter();
         let size = |i: usize| {
-            let (low, high) = bounds(self.facet(i), self.cells);
+            let [low, high] = bounds(self.facet(i), self.cells);
             TOUCH * distance::apart(low, high)
         };
         let slack = size(i).max(size(j));
@@ -163,13 +164,8 @@ impl<'a, const D: usize> Surface<'a, D> {
 }
 
 /// The box around nodes.
-fn bounds<const D: usize>(nodes: &[u32], cells: &Cells<D>) -> (Point, Point) {
-    let mut corners = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for x in nodes.iter().map(|&node| cells.at(node)) {
-        (0..3).for_each(|c| corners.0[c] = corners.0[c].min(x[c]));
-        (0..3).for_each(|c| corners.1[c] = corners.1[c].max(x[c]));
-    }
-    corners
+fn bounds<const D: usize>(nodes: &[u32], cells: &Cells<D>) -> [Point; 2] {
+    linalg::bounds(nodes.iter().map(|&node| cells.at(node)))
 }
 
 /// Whether two pieces meet but in the corners that they share.

@@ -1,24 +1,12 @@
 //! The geometries in `meshes/`.
 
 use super::*;
-use crate::interrupt::Interrupt;
-use crate::mesh::Loaded;
-use crate::mesh::load::from_script;
 
 fn case(script: &str, set: &[(&str, f64)]) -> Mesh<2> {
     let folder = tempfile::tempdir().unwrap();
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes").join(script);
     let set: Vec<(String, f64)> = set.iter().map(|(name, value)| (name.to_string(), *value)).collect();
-    let loaded: Loaded<2> = from_script(
-        &located(file),
-        (&set, &[]),
-        None,
-        Order::P1,
-        (&Guard::default(), &Interrupt::default()),
-        &[folder.path().to_owned()],
-    )
-    .unwrap();
-    loaded.mesh
+    meshed(&file, &set, Order::P1, &[folder.path().to_owned()]).unwrap().mesh
 }
 
 /// Gmsh places the nodes of a transfinite line to about this.

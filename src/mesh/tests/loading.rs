@@ -1,8 +1,6 @@
 //! From scripts and files to meshes, with the cache.
 
 use super::*;
-use crate::interrupt::Interrupt;
-use crate::mesh::load::from_script;
 use crate::mesh::{Origin, load, view};
 use crate::problem::mesh::MeshSource;
 
@@ -14,17 +12,7 @@ fn scripts_are_meshed_once_for_each_key() {
     let part = folder.path().join("part.geo");
     std::fs::write(&geo, "Include \"part.geo\";\n").unwrap();
     std::fs::write(&part, SQUARE).unwrap();
-    let run = |n: f64, order| {
-        from_script::<2>(
-            &located(geo.clone()),
-            (&[("n".into(), n)], &[]),
-            None,
-            order,
-            (&Guard::default(), &Interrupt::default()),
-            &cache,
-        )
-        .unwrap()
-    };
+    let run = |n: f64, order| meshed::<2>(&geo, &[("n".into(), n)], order, &cache).unwrap();
 
     let first = run(4.0, Order::P1);
     assert_eq!(first.origin, Origin::Gmsh);
@@ -79,9 +67,7 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
     let refuse = |script: &str, set: &[(String, f64)], order| {
         let geo = folder.path().join("a.geo");
         std::fs::write(&geo, script).unwrap();
-        from_script::<2>(&located(geo), (set, &[]), None, order, (&Guard::default(), &Interrupt::default()), &cache)
-            .unwrap_err()
-            .to_string()
+        meshed::<2>(&geo, set, order, &cache).unwrap_err().to_string()
     };
     let message = refuse("Line(1) = {1, 7};", &[], Order::P1);
     assert!(message.contains("a.geo: Gmsh cannot mesh this script"), "{message}");
@@ -122,17 +108,7 @@ fn loads_at_the_same_time_do_not_meet() {
     let cache = [folder.path().join("cache")];
     let geo = folder.path().join("a.geo");
     std::fs::write(&geo, SQUARE).unwrap();
-    let load = || {
-        from_script::<2>(
-            &located(geo.clone()),
-            (&[], &[]),
-            None,
-            Order::P1,
-            (&Guard::default(), &Interrupt::default()),
-            &cache,
-        )
-        .unwrap()
-    };
+    let load = || meshed::<2>(&geo, &[], Order::P1, &cache).unwrap();
     std::thread::scope(|scope| {
         let threads = [(); 4].map(|()| scope.spawn(load));
         for thread in threads {

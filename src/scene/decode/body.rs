@@ -1,12 +1,9 @@
 //! `[[body]]`: supports, loads.
 
-use super::{Decoder, elasticity, pattern};
+use super::{Decoder, Form, Keys, Node, Table, Value, elasticity, pattern};
 use crate::error::{Error, Result};
 use crate::expression::Field;
-use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Support};
-use crate::problem::order::Order;
-use crate::scene::read::{Keys, Node, Value};
-use crate::scene::shape::{Form, Table};
+use crate::problem::{BodySpec, Load, LoadKind, Order, SpringKind, SpringSpec, Support};
 
 /// Names of components, for supports.
 const AXES: [&str; 3] = ["x", "y", "z"];

@@ -1,11 +1,9 @@
 //! `[[contact]]`: two surfaces, or a rule that finds such, the gap and the layer between them.
 
-use super::{Decoder, choose, layer, pattern};
+use super::{Decoder, Form, Keys, Node, Table, Value, choose, layer, pattern, word};
 use crate::error::{Error, Located, Result};
 use crate::expression::Field;
 use crate::problem::contact::{ANGLE, AutoContact, ContactSpec, Overlap};
-use crate::scene::read::{Keys, Node, Value};
-use crate::scene::shape::{Form, Table, word};
 
 /// The shape of `[[contact]]`.
 pub(super) fn table() -> Table {

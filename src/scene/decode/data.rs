@@ -1,11 +1,10 @@
 //! `[data.NAME]`: files whose numbers are functions for expressions.
 
-use super::{Decoder, choose, file};
+use super::{Decoder, Form, Keys, Node, Table, Value, choose, file, word};
 use crate::data::{Data, DataSpec, Interpolation, Library, Outside};
 use crate::error::{Error, Result};
 use crate::expression::names;
-use crate::scene::read::{Entry, Keys, Node, Value};
-use crate::scene::shape::{Form, Table, word};
+use crate::scene::read::Entry;
 use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;

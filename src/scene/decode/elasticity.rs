@@ -1,11 +1,9 @@
 //! Elastic constants of bodies and regions.
 
-use super::Decoder;
+use super::{Decoder, Form, Keys, Node, Table, Value};
 use crate::error::Result;
 use crate::expression::Field;
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, RegionSpec};
-use crate::scene::read::{Keys, Node, Value};
-use crate::scene::shape::{Form, Table};
 
 /// Adds the keys that say what a body or a region is made of.
 pub(super) fn keys(table: Table) -> Table {

@@ -1,11 +1,9 @@
 //! `steps` of the method: shares of all loads, or a table of factors.
 
-use super::{Decoder, file};
+use super::{Decoder, Form, Keys, Node, Table, Value, file};
 use crate::error::{Error, Kind, Located, Place, Result, Source, joined};
 use crate::problem::body::BodySpec;
 use crate::problem::history::{COMMON, History, Step, has_common, paths};
-use crate::scene::read::{Keys, Node, Value};
-use crate::scene::shape::{Form, Table};
 use std::path::PathBuf;
 use std::sync::Arc;
 

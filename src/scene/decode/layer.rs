@@ -1,12 +1,10 @@
 //! `layer` of a contact: a form with parameters, a table, or an expression.
 
-use super::Decoder;
+use super::{Decoder, Form, Keys, Node, Table};
 use crate::data::{Grid, Summits};
 use crate::error::{Error, Result};
 use crate::expression::{Expression, Scope};
 use crate::problem::layer::{AsperitySpec, Depths, FORMS, LawForm, LayerSpec, Parameter};
-use crate::scene::read::{Keys, Node};
-use crate::scene::shape::{Form, Table};
 
 /// What a layer may be.
 pub(super) const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
@@ -19,7 +17,7 @@ pub(super) fn table() -> Table {
         let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
         table.key(form.name, self::form(form).form(), format!("write {} = {{ {} }}", form.name, values.join(", ")))
     };
-    let forms = FORMS.iter().fold(Table::new("the layer"), add);
+    let forms = FORMS.into_iter().fold(Table::new("the layer"), add);
     forms
         .key("table", Form::Number.list().list(), POINTS)
         .key("pressure", Form::Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
@@ -66,9 +64,9 @@ impl Decoder<'_> {
             let up_to = keys.get("up_to").map(Node::number).transpose()?;
             return Ok(LayerSpec::Pressure { law, up_to });
         }
-        match FORMS.iter().find_map(|form| Some((form, keys.get(form.name)?))) {
+        match FORMS.into_iter().find_map(|form| Some((form, keys.get(form.name)?))) {
             Some((form, node)) => self.form(form, node),
-            None => Err(keys.node().refuse("the layer has no law").help(EXAMPLE)),
+            None => Err(keys.node.refuse("the layer has no law").help(EXAMPLE)),
         }
     }
 

@@ -1,13 +1,9 @@
 //! `[method]`: the outer iteration.
 
-use super::{Decoder, choose, history};
+use super::{Decoder, Form, Keys, Node, Table, Value, choose, history, word};
 use crate::error::Result;
 use crate::expression::Field;
-use crate::problem::method::{Gamma, Linear, MethodName, MethodSpec, Start};
-use crate::problem::robin::{RobinRule, Zone};
-use crate::problem::stop::StopRule;
-use crate::scene::read::{Keys, Node, Value};
-use crate::scene::shape::{Form, Table, word};
+use crate::problem::{Gamma, Linear, MethodName, MethodSpec, RobinRule, Start, StopRule, Zone};
 
 /// The shape of `[method]`.
 pub(super) fn table() -> Table {

@@ -117,9 +117,6 @@ fn ask(session: &Session, matrix: &Matrix, types: &[Entry]) -> Result<BTreeSet<S
 }
 
 /// Prints the options of a solver as `-help` does, where a run makes none.
-///
-/// # Errors
-/// When PETSc is out of memory.
 pub fn show_help(session: &Session) -> Result<()> {
     let mut ksp = Ksp::new(session, "")?;
     ksp.set_operator(&tiny(session)?)?;

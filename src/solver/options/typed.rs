@@ -55,9 +55,6 @@ pub fn set_of_scene(session: &Session, bodies: &[&str], name: &str, value: Optio
 }
 
 /// Takes what stood in the scene out of the table, so that another scene of the process starts from the typed options.
-///
-/// # Errors
-/// When PETSc refuses, which it does not for options it has taken before.
 pub fn withdraw(session: &Session) -> Result<()> {
     OF_SCENE.take().iter().try_for_each(|name| session.options().clear(name))
 }
@@ -73,9 +70,6 @@ pub struct Typed {
 
 impl Typed {
     /// Reads PETSc's table. `prefixes` are those of all solvers of the run, on every rank.
-    ///
-    /// # Errors
-    /// When PETSc is out of memory.
     pub fn read(session: &Session, prefixes: &[&str]) -> Result<Self> {
         let known = Prefixes::new(prefixes);
         let (mut plain, mut own) = (Vec::new(), BTreeMap::<String, Vec<Entry>>::new());
@@ -114,9 +108,6 @@ impl Typed {
 }
 
 /// The options that the user typed and that look at a solver, with their dash.
-///
-/// # Errors
-/// When PETSc refuses, which it does not for options it has taken before.
 pub fn watching(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
     let prefixes = Prefixes::new(bodies);
     let watches = |name: &String| looks(prefixes.bare(name)) && is_of_family(prefixes.bare(name));

@@ -11,8 +11,6 @@ use std::collections::BTreeSet;
 pub struct Unread {
     /// Its name as typed, with the dash.
     pub name: String,
-    /// Its value, if it has one.
-    pub value: Option<String>,
     /// What it is.
     pub kind: UnreadKind,
     /// The most similar name that PETSc knows, with the dash, for an unknown one.
@@ -57,9 +55,6 @@ const LATE: &str = "ksp_converged_reason";
 /// ]);
 /// # Ok::<(), winkler::error::Error>(())
 /// ```
-///
-/// # Errors
-/// When PETSc is out of memory.
 pub fn unread(session: &Session, bodies: &[&str], all_reduce: &dyn Fn(&mut [u8])) -> Result<Vec<Unread>> {
     let options = session.options();
     let (prefixes, typed) = (Prefixes::new(bodies), Typed::read(session, bodies)?);
@@ -84,11 +79,10 @@ pub fn unread(session: &Session, bodies: &[&str], all_reduce: &dyn Fn(&mut [u8])
     }
 
     let names = Names::collect(session, &typed.combinations())?;
-    let found = left.into_iter().map(|(name, value)| {
+    let found = left.into_iter().map(|(name, _)| {
         let valid = names.contains(prefixes.bare(name));
         Unread {
             name: name.clone(),
-            value: value.clone(),
             kind: if valid { UnreadKind::NotInUse } else { UnreadKind::Unknown },
             nearest: if valid { None } else { near(name, bodies, &names) },
         }
