@@ -31,7 +31,7 @@ use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
 use crate::exchange::Exchange;
-use crate::fem::{FreeMotion, NodalBlock, NodeGraph, RigidMotion};
+use crate::fem::{FreeMotion, NodalBlock, RigidMotion};
 use crate::linalg::{Csr, axpy, dot};
 use crate::mesh::Checked;
 use crate::model::{BodySlot, Loads, Mechanism, Model, Segment};
@@ -41,6 +41,7 @@ use balance::Forces;
 pub use balance::{Balance, Resultant};
 use carried::{Supported, supported};
 use cells::Needs;
+use couplings::Coupled;
 use distribute::Deal;
 use draft::{Draft, Loose};
 pub use factory::{Assembled, Factory, Outline};
@@ -51,7 +52,6 @@ use part::Part;
 use parts::parts;
 use post::OnPart;
 pub use post::Post;
-use std::cell::OnceCell;
 use std::rc::Rc;
 pub use surface::ContactSurface;
 pub use verify::{Verified, verify};
@@ -174,31 +174,14 @@ pub fn discretize<const D: usize>(
     let Fixed { gauged, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs);
     let supported: Vec<Supported> =
         parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
-    let graphs: Vec<OnceCell<NodeGraph>> = parts.iter().map(|_| OnceCell::new()).collect();
-    let lazy = parts.iter().zip(&drafts).zip(&stocks).zip(&graphs);
     let others = &*verified.exchange;
-    let lazy = lazy.map(|(((part, draft), stock), graph)| {
-        move || graph.get_or_init(|| cells::graph(part, stock, &draft.rows, others))
-    });
-    let lazy: Vec<_> = lazy.collect();
-    let coupled: Vec<OnceCell<Vec<u32>>> = parts.iter().map(|_| OnceCell::new()).collect();
-    let inside = |body: usize| {
-        let (part, stock, rows) = (&parts[body], &stocks[body], &drafts[body].rows);
-        &coupled[body].get_or_init(|| couplings::inside(part, stock, rows, others))[..]
-    };
-    let counts: Vec<_> = (0..parts.len())
-        .zip(&lazy)
-        .map(|(body, graph)| {
-            move || match alone {
-                true => graph().col.len(),
-                false => inside(body).iter().map(|&count| count as usize).sum(),
-            }
-        })
-        .collect();
+    let lazy = Coupled::new((&parts, &stocks, &drafts), others);
+    let coupled = &lazy;
+    let asked: Vec<_> = (0..parts.len()).map(|i| (move || coupled.graph(i), move || coupled.count(i))).collect();
     let motions = parts.iter().zip(&drafts);
     let motions: Vec<_> =
         motions.map(|(part, draft)| move |k: usize, dof: usize| part.dof_of(&draft.free[k], dof)).collect();
-    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(lazy.iter().zip(&counts).zip(&motions));
+    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(asked.iter().zip(&motions));
     let outlines = outlines.map(|(((part, draft), supported), ((graph, couplings), motion))| Outline {
         name: &part.spec.name.value,
         dimension: D,
@@ -213,11 +196,12 @@ pub fn discretize<const D: usize>(
     factory.plan(&outlines.collect::<Vec<_>>())?;
     let deal = |bodies: Vec<usize>| {
         let nodes: Vec<[f64; D]> = bodies.iter().flat_map(|&body| &parts[body].space.nodes).copied().collect();
-        let couplings = couplings::of::<D>(&bodies, &inside, &pairs);
+        let couplings = coupled.of(&bodies, &pairs);
         let weight = |node: u32| u64::from(couplings[node as usize]);
         Deal { bodies, owner: crate::mesh::bisect::<D, D>(&nodes, &weight, exchange.ranks()) }
     };
     let deals: Vec<Deal> = factory.dealt_out().into_iter().map(deal).collect();
+    let graphs = lazy.into_graphs();
     let coarse = |body: usize| match factory.wants_interpolation(&parts[body].spec.name.value) {
         true => parts[body].coarse_nodes(),
         false => Vec::new(),
@@ -279,7 +263,7 @@ pub fn discretize<const D: usize>(
             assemblies_avoided += 1;
         } else if is_owner || dealt.is_some() {
             let left = free(&part, &left, &prescribed, &load);
-            let mut graph = graph.into_inner().filter(|_| alone).unwrap_or_else(|| part.graph(&part.space, &rows));
+            let mut graph = graph.filter(|_| alone).unwrap_or_else(|| part.graph(&part.space, &rows));
             if let Some(dealt) = &dealt {
                 graph = graph.of(|node| dealt.is_own::<D>(node));
             }
