@@ -46,6 +46,9 @@ const SAFETY: f64 = 1.25;
 const ROUGH: f64 = 0.1;
 
 /// Estimates the error of an iterate; `step` solves for the response of the bodies. Collective.
+///
+/// # Errors
+/// Failures of the solver library.
 pub fn estimate(
     meshes: &dyn Meshes,
     model: &mut Model,

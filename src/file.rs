@@ -9,6 +9,9 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
 /// All bytes of a regular file.
+///
+/// # Errors
+/// Those of [`open`].
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     let (mut file, mut bytes) = (open(path)?, Vec::new());
     file.read_to_end(&mut bytes).map_err(|cause| Error::file(path, "read", &cause)).map(|_| bytes)

@@ -21,6 +21,20 @@ const SCENES: [(&str, &[&str]); 10] = [
     ("blocks", &["mesh.set.k=2", "output.pairs=100"]),
 ];
 
+/// The program chooses solvers by the couplings of all nodes, which ranks count where the cells are.
+#[test]
+fn the_choice_of_solvers_is_that_of_one_rank() {
+    for scene in ["flange", "hertz-sphere"] {
+        let choice = |run: Run| {
+            let run = run.converged();
+            let line = run.stdout.lines().find(|line| line.contains("estimates: ")).map(str::to_owned);
+            line.unwrap_or_else(|| panic!("no estimates in\n{}", run.stdout))
+        };
+        let words = ["--set", "method={}", "--set", "output.plots=false"];
+        assert_eq!(choice(solve_on(3, case(scene), &words)), choice(solve(case(scene), &words)), "{scene}");
+    }
+}
+
 /// Ranks other than the first have no use for the mesh: here one has the scene in a folder without it. A support that holds all cells of a body is
 /// known there, too.
 #[test]

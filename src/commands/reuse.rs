@@ -13,6 +13,9 @@ use serde_json::{Map, Value};
 use std::rc::Rc;
 
 /// Builds `scene` after another scene of the sweep was solved, with what that one has left.
+///
+/// # Errors
+/// Those of [`run::build`].
 pub fn build(
     session: &Session,
     scene: Rc<Scene>,

@@ -29,6 +29,9 @@ pub fn watched(loud: bool) -> Clock {
 }
 
 /// What was decided and why, and the PETSc options of each body. Collective.
+///
+/// # Errors
+/// When PETSc is out of memory.
 pub fn decisions(session: &Session, ready: &Ready) -> Result<Vec<String>> {
     let built = &ready.built;
     let (scene, discrete) = (&built.scene, &built.discrete);

@@ -68,6 +68,9 @@ pub fn write(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
 }
 
 /// Writes the fields of the end of a run, likewise.
+///
+/// # Errors
+/// Those of [`write`].
 pub fn write_last(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
     if done.built.scene.output.msh {
         views(done, recovered, folder)?;

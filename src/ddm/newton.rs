@@ -33,6 +33,8 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
     let mut rho = run.memory.progress.slopes(&slopes);
     // watches what corrections gain, if rounding left too much of the last step
     let mut left: Option<Floor> = None;
+    // a correction takes half of what is left at least; of rounding the size is wanted
+    let halves = |trial: &Trial| trial.is_within(0.5);
     loop {
         let springs = resisting(run.model, places.springs(run.model));
         let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
@@ -42,7 +44,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             Forcing::new(&places, before.clone(), &rho, (run.stop.residual, &run.scale), linear.roughest());
         let mut enough = |model: &Model, trial: &Trial| match left {
             None => forcing.is_enough(model, trial),
-            Some(_) => trial.is_within(0.5),
+            Some(_) => halves(trial),
         };
         let system = System { model: run.model, places: &places, springs: &springs, residual: &r, enough: &mut enough };
         let mut x = match linear.solve(system)? {
@@ -71,7 +73,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let (mut is_floor, corrected) = (false, left.take());
         if run.is_enough(&reached) {
             // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
-            let mut enough = |_: &Model, trial: &Trial| trial.is_within(0.5);
+            let mut enough = |_: &Model, trial: &Trial| halves(trial);
             let (residual, enough) = (&rest[..], &mut enough);
             let system = System { model: run.model, places: &places, springs: &springs, residual, enough };
             let before = linear.counts();

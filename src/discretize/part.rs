@@ -110,6 +110,9 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 
     /// What the quadrature of the nodal forces `load` misses; empty where all loads are constant.
+    ///
+    /// # Errors
+    /// Those of [`Part::load`].
     pub fn unloaded(&self, mesh: &Mesh<D>, load: &[f64]) -> Result<Vec<f64>> {
         let is_constant = |load: &Load| match &load.kind {
             LoadKind::Pressure(pressure) => pressure.is_constant(),
@@ -162,6 +165,9 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 
     /// Sum of the nodal forces of a load of the scene at its full value, unless its surface is rigid.
+    ///
+    /// # Errors
+    /// Those of [`Part::load`].
     pub fn resultant(&self, spec: &Load, mesh: &Mesh<D>) -> Result<[f64; 3]> {
         let mut load = vec![0.0; self.space.dofs()];
         self.add_load(spec, 1.0, mesh, Parts::Whole, &mut load)?;

@@ -95,6 +95,9 @@ impl Elasticity {
     }
 
     /// Moduli along x, y, z ([`Tensor::moduli`]) in a cell at a point.
+    ///
+    /// # Errors
+    /// As [`Elasticity::at`].
     pub fn moduli(&self, cell: usize, x: [f64; 3]) -> Result<[f64; 3], Flaw> {
         let law = &self.laws[self.region(cell)];
         match &law.constant {

@@ -49,6 +49,9 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
 }
 
 /// The same; where there are several ranks, cells of `.msh` files that are of this order are dealt out while they are read, and the mesh lacks them.
+///
+/// # Errors
+/// Those of [`load`].
 pub fn deal<const D: usize>(
     source: &MeshSource,
     order: Order,

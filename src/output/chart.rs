@@ -51,6 +51,9 @@ type At = (i32, i32);
 
 impl Plot {
     /// Writes the plot as SVG, 900 by 560 pixels, on white.
+    ///
+    /// # Errors
+    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         out.write_all(self.svg()?.as_bytes())
     }

@@ -15,6 +15,9 @@ pub struct Entry<'a> {
 }
 
 /// Writes the collection that opens the `.vtu` files of all bodies and contact surfaces at once, over time.
+///
+/// # Errors
+/// Those of `out`.
 pub fn write_pvd(entries: &[Entry], out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(out, r#"<VTKFile type="Collection" version="1.0">"#)?;

@@ -26,6 +26,9 @@ pub struct ContactTable {
 
 impl ContactTable {
     /// Writes the table as CSV, points in their order, numbers to full precision.
+    ///
+    /// # Errors
+    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let [of_a, of_b] = &self.displacement;
         let mut columns = vec![&self.weight, &self.gap, &self.compression, &self.pressure, of_a, of_b];

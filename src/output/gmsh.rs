@@ -31,6 +31,9 @@ impl CellKind {
 impl Grid {
     /// Writes the grid as `.msh`, its cells a physical group called like its title, with a view `title: name` of each array at its
     /// points; symmetric tensors become full ones. Nodes where a value is no number have none.
+    ///
+    /// # Errors
+    /// Those of `out`.
     pub fn write_msh(&self, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
         let (dimension, kind) = self.cell.gmsh();
         let (points, stride) = (self.points.len(), self.cell.stride());

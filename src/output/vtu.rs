@@ -106,6 +106,9 @@ impl BodyField {
 
     /// Writes VTK's XML format with binary (base64) data: point arrays `displacement` (3 components), `stress` (6),
     /// `von_mises` (1) and `principal` (3).
+    ///
+    /// # Errors
+    /// Those of `out`.
     pub fn write(self, encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         self.into_grid().write(encoding, out)
     }
@@ -126,6 +129,9 @@ impl BodyField {
     }
 
     /// Writes the file that joins the fields of the parts of a body in these files of the same folder.
+    ///
+    /// # Errors
+    /// Those of `out`.
     pub fn join(files: &[String], encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         let kind = if encoding.single { "Float32" } else { "Float64" };
         let mut out = Whole::new(out);
@@ -163,6 +169,9 @@ pub struct Grid {
 
 impl Grid {
     /// Writes VTK's XML format with binary (base64) data. Arrays must fit the points and cells.
+    ///
+    /// # Errors
+    /// Those of `out`.
     pub fn write(self, encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         let numbers = |data: Vec<f64>| -> IOBuffer {
             if encoding.single { data.into_iter().map(|x| x as f32).collect::<Vec<_>>().into() } else { data.into() }
