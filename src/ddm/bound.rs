@@ -68,16 +68,16 @@ impl Reached {
                 is_bound &= p >= 0.0;
             }
         }
-        let linear = step.error;
+        let (linear, energy) = (step.error, strain + places.work);
         let absolute = (2.0 * gap).sqrt() + linear;
         let contact = if linear > 0.0 { contact_energy(model, places) } else { 0.0 };
         let missed = if linear > 0.0 { scale.relative(linear * linear, contact) } else { 0.0 };
-        let mismatch = if mismatch == 0.0 { 0.0 } else { mismatch / scale.peak(&places.pressure) };
+        let mismatch = if mismatch == 0.0 { 0.0 } else { mismatch / scale.peak(&places.pressure, energy) };
         Self {
-            error: scale.relative(absolute * absolute, strain + places.work),
+            error: scale.relative(absolute * absolute, energy),
             is_bound,
             pressure: mismatch.max(missed),
-            imbalance: scale.imbalance(model, &model.forces(pressure)),
+            imbalance: scale.imbalance(model, &model.forces(pressure), energy),
         }
     }
 
@@ -91,11 +91,11 @@ impl Reached {
         before: &Layer,
         places: &Layer,
     ) -> f64 {
-        let exact = self.worst();
-        self.error += scale.relative(more.energy + more.error * more.error, strain + places.work);
+        let (exact, energy) = (self.worst(), strain + places.work);
+        self.error += scale.relative(more.energy + more.error * more.error, energy);
         let closing = more.field.closing();
         let off = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
-        self.pressure += if off == 0.0 { 0.0 } else { off / scale.peak(&places.pressure) };
+        self.pressure += if off == 0.0 { 0.0 } else { off / scale.peak(&places.pressure, energy) };
         self.worst() - exact
     }
 

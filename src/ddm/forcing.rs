@@ -36,10 +36,9 @@ impl<'a> Forcing<'a> {
         places: &'a Layer,
         before: Vec<f64>,
         rho: &'a [f64],
-        stop: (Option<f64>, &'a Scale),
+        (tolerance, scale): (f64, &'a Scale),
         roughest: f64,
     ) -> Self {
-        let (tolerance, scale) = (stop.0.unwrap_or(f64::EPSILON.sqrt()), stop.1);
         Self { places, rho, tolerance, scale, roughest, pressures: VecDeque::from([places.linear(&before)]), before }
     }
 
@@ -58,9 +57,10 @@ impl<'a> Forcing<'a> {
         }
         // an error that is small beside the energy of the bodies may be large for the pressures of stiff layers
         let ends = || {
+            let energy = contact_energy(model, &met);
             most <= self.tolerance * peak
-                && trial.error <= 0.5 * self.tolerance * contact_energy(model, &met).sqrt()
-                && self.scale.imbalance(model, &model.forces(&p)) <= self.tolerance
+                && trial.error <= 0.5 * self.tolerance * energy.sqrt()
+                && self.scale.imbalance(model, &model.forces(&p), energy) <= self.tolerance
         };
         let settled = moved < apart || ends();
         let enough = trial.is_within(if settled { self.roughest } else { f64::EPSILON });
@@ -83,25 +83,25 @@ mod tests {
         let model = two_pairs();
         let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
         let (rho, scale) = ([2.0, 0.5, 0.25, 3.0], Scale::default());
-        let asked = |closings: &[[f64; 4]], tolerance: Option<f64>, error: f64| -> Vec<bool> {
+        let asked = |closings: &[[f64; 4]], tolerance: f64, error: f64| -> Vec<bool> {
             let mut forcing = Forcing::new(&places, places.compression.clone(), &rho, (tolerance, &scale), 0.5);
             let trial = |closing| Trial { closing, energy: 1.0, error };
             closings.iter().map(|closing| forcing.is_enough(&model, &trial(closing))).collect()
         };
         // the second pair goes to c = 3, where the line of slope 4 has p = 8 and the law 9: they meet between
         let far = [0.0, 0.0, 1.0, 0.0];
-        assert_eq!(asked(&[far; 5], None, 0.1), [false, false, false, true, true]);
-        assert_eq!(asked(&[far; 5], None, 0.6), [false; 5], "more than half of the step is missing");
+        assert_eq!(asked(&[far; 5], f64::EPSILON.sqrt(), 0.1), [false, false, false, true, true]);
+        assert_eq!(asked(&[far; 5], f64::EPSILON.sqrt(), 0.6), [false; 5], "more than half of the step is missing");
         // pressures that move by more than they are off
         let moving = [[0.0, 0.0, 0.2, 0.0], [0.0, 0.0, 0.4, 0.0], [0.0, 0.0, 0.6, 0.0], [0.0, 0.0, 0.8, 0.0]];
-        assert_eq!(asked(&moving, None, 0.1), [false; 4]);
+        assert_eq!(asked(&moving, f64::EPSILON.sqrt(), 0.1), [false; 4]);
         // the first pair is linear: nothing is off, and only the tolerance of the run ends the step
         let linear = [0.1, 0.0, 0.0, 0.0];
-        assert_eq!(asked(&[linear; 5], None, 0.1), [false; 5]);
+        assert_eq!(asked(&[linear; 5], f64::EPSILON.sqrt(), 0.1), [false; 5]);
         let contact = contact_energy(&model, &Layer::new(&model, vec![0.6, 1.0, 2.0, 1.0])).sqrt();
-        assert_eq!(asked(&[linear; 5], Some(0.01), 0.0049 * contact), [false, false, false, true, true]);
-        assert_eq!(asked(&[linear; 5], Some(0.01), 0.0051 * contact), [false; 5]);
+        assert_eq!(asked(&[linear; 5], 0.01, 0.0049 * contact), [false, false, false, true, true]);
+        assert_eq!(asked(&[linear; 5], 0.01, 0.0051 * contact), [false; 5]);
         // rounding
-        assert_eq!(asked(&[linear; 1], None, 1e-16), [true]);
+        assert_eq!(asked(&[linear; 1], f64::EPSILON.sqrt(), 1e-16), [true]);
     }
 }

@@ -29,7 +29,7 @@ use crate::model::linear::{LinearStep, System, Trial};
 /// # Errors
 /// Failures of the solver library. Not converging is a status.
 pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
-    let slopes = meeting_slopes(run.model);
+    let (slopes, tolerance) = (meeting_slopes(run.model), run.stop.tolerance());
     let mut rho = run.memory.progress.slopes(&slopes);
     // watches what corrections gain, if rounding left too much of the last step
     let mut left: Option<Floor> = None;
@@ -40,8 +40,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
         let (r, _) = residual(run.model, &u, &force);
         let before = run.model.compression(&u.trace);
-        let mut forcing =
-            Forcing::new(&places, before.clone(), &rho, (run.stop.residual, &run.scale), linear.roughest());
+        let mut forcing = Forcing::new(&places, before.clone(), &rho, (tolerance, &run.scale), linear.roughest());
         let mut enough = |model: &Model, trial: &Trial| match left {
             None => forcing.is_enough(model, trial),
             Some(_) => halves(trial),
@@ -64,7 +63,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
 
         let c = run.model.compression(&u.trace);
         let p = run.memory.progress.go(share, if share < 1.0 { pressure } else { places.linear(&c) });
-        let met = start::meet(run.model, &c, &p, &rho);
+        let met = Layer::meet(run.model, &c, &p, &rho);
 
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
         let mut measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
@@ -102,7 +101,11 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             run.memory.progress.forget();
         }
         if left.is_none() {
-            places = if blind { Layer::at(run.model, &u.trace) } else { met.clone() };
+            places = if blind {
+                Layer::at(run.model, &u.trace)
+            } else {
+                start::with_resistance(run.model, &met, &rho, tolerance)
+            };
         }
         if measured.asked != 0 {
             run.memory.places = Some(places);

@@ -210,10 +210,11 @@ impl Run<'_> {
         let missed = sweep.decrement.iter().sum();
         let (factorizations, inner_iterations, asked) = (sweep.factorizations, sweep.inner_iterations, sweep.asked);
         let f1 = potential + layer.energy.iter().sum::<f64>();
-        let residual = self.scale.relative(missed, strain + layer.work);
+        let all = strain + layer.work;
+        let residual = self.scale.relative(missed, all);
         // a small residual of a slow mode is no small error: the pressures stand still, too
-        let is_balanced = |tolerance: f64| self.scale.imbalance(self.model, &layer.force) <= tolerance;
-        let peak = self.scale.peak(&layer.pressure);
+        let is_balanced = |tolerance: f64| self.scale.imbalance(self.model, &layer.force, all) <= tolerance;
+        let peak = self.scale.peak(&layer.pressure, all);
         let missing = self.memory.steady.missing(residual, &layer.pressure, peak);
         let is_still = |tolerance| missing <= tolerance * peak && is_balanced(tolerance);
         let is_still = self.stop.residual.is_none_or(is_still) && self.stop.increment.is_none_or(is_balanced);

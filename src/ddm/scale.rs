@@ -1,18 +1,18 @@
-//! What counts as nothing: energies, pressures and forces of rest and of the start, by which a solution that vanishes is measured.
+//! What counts as nothing: energies, pressures and forces of rest, of the automatic start and of the bodies, by which a contact that vanishes is
+//! measured.
 //!
 //! Bodies that nothing presses together but an initial overlap, and that nothing holds, move apart until no pressure is left: all
 //! that a relative tolerance could refer to vanishes with the error. What remains then is rest, or the start. Its layers may answer
-//! an overlap with any pressure, so the surfaces give way first ([`start::at`]). A solution below [`PART`] of these is measured by that share.
+//! an overlap with any pressure, so the surfaces give way first ([`start::at`]). A contact may vanish while bodies are loaded otherwise. Then what remains
+//! is their energy: that of a pressure on all surfaces. A solution below [`PART`] of these is measured by that share: with a tolerance of
+//! 1e-8 that is 1e-14 of what the bodies carry, which rounding of their forces leaves unknown.
+//!
+//! A start that the scene gives is no measure: it may be any.
 
-use super::start;
+use super::start::{self, surface_slopes};
 use crate::linalg::dot;
 use crate::model::Model;
 use crate::model::rigid::PART;
-
-/// Forces on a body that do less than this share of what work they could on a motion are measured by that share: they may go through
-/// the point about which it turns, and their work be rounding. A tolerance of 1e-8 then asks for 1e-11 of what the forces could do, which is
-/// above the rounding of their sum.
-const LEAST_WORK: f64 = 1e-3;
 
 /// Least scales of a run.
 #[derive(Debug, Default)]
@@ -23,12 +23,17 @@ pub struct Scale {
     pressure: f64,
     /// Sum of contact forces.
     force: f64,
+    /// All contact surfaces, sum omega, and what they give way under a unit of pressure times its force, sum omega/rho0.
+    area: f64,
+    compliance: f64,
 }
 
 impl Scale {
     /// From traces that a run may begin with.
     pub fn new(model: &Model, traces: &[&[f64]]) -> Self {
-        let mut scale = Self::default();
+        let slopes = surface_slopes(model);
+        let compliance = slopes.iter().zip(&model.weight).map(|(slope, weight)| weight / slope).sum();
+        let mut scale = Self { area: model.weight.iter().sum(), compliance, ..Self::default() };
         for trace in traces {
             let layer = start::at(model, trace);
             let approach = model.compression(trace);
@@ -54,26 +59,31 @@ impl Scale {
         if numerator <= 0.0 { 0.0 } else { (numerator / self.energy(reference)).sqrt() }
     }
 
-    /// The largest pressure, by which errors of pressures are measured.
-    pub fn peak(&self, pressure: &[f64]) -> f64 {
-        pressure.iter().copied().fold(self.pressure, f64::max)
+    /// [`PART`] of the pressure that gives all contact surfaces the energy u'Ku + sum omega p c of bodies and layers.
+    fn stress(&self, energy: f64) -> f64 {
+        if self.compliance > 0.0 { PART * (energy / self.compliance).sqrt() } else { 0.0 }
     }
 
-    /// What the forces on a body lack in balance under the contact forces `force` (n), as a share of them, the most over all rigid
-    /// motions that supports leave free. For such a motion m, K m = 0: only loads and contact forces work on it.
+    /// The largest pressure, by which errors of pressures are measured, of bodies and layers with this energy.
+    pub fn peak(&self, pressure: &[f64], energy: f64) -> f64 {
+        pressure.iter().copied().fold(self.pressure.max(self.stress(energy)), f64::max)
+    }
+
+    /// What the forces on a body lack in balance under the contact forces `force` (n) in bodies and layers with this energy, as a share of them, the
+    /// most over all rigid motions that supports leave free. For such a motion m, K m = 0: only loads and contact forces work on it.
     ///
     /// The residual sees too little of this where a Robin term much stiffer than the layer holds the body.
-    pub fn imbalance(&self, model: &Model, force: &[f64]) -> f64 {
+    pub fn imbalance(&self, model: &Model, force: &[f64], energy: f64) -> f64 {
         let mut most = 0.0f64;
+        let least = self.force.max(self.area * self.stress(energy));
         for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()) {
             let force = model.at_rows(body, force);
-            let total: f64 = force.iter().map(|force| force.abs()).sum();
+            let total = least.max(force.iter().map(|force| force.abs()).sum());
             for motion in &slot.motions {
                 let arm = motion.trace.iter().fold(0.0f64, |max, m| max.max(m.abs()));
-                let acting: f64 = force.iter().zip(&motion.trace).map(|(force, m)| (force * m).abs()).sum();
                 let lacking = (motion.work - dot(&force, &motion.trace)).abs();
                 if lacking > 0.0 {
-                    most = most.max(lacking / acting.max(arm * self.force.max(LEAST_WORK * total)));
+                    most = most.max(lacking / (arm * total));
                 }
             }
         }

@@ -189,7 +189,7 @@ impl Run<'_> {
             Start::Trace(given) => given.clone(),
             _ => rigid.trace.clone(),
         };
-        self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &trace]);
+        self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &rigid.trace]);
         let places = places(self.model, &begin, &rigid);
         let floats = self.model.bodies.iter().any(|slot| !slot.motions.is_empty());
         // an estimate of the discretisation's error needs the iterates whole

@@ -55,7 +55,16 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
         gap = model.compression(given).into_iter().map(|c| -c).collect();
     }
     let (slope, bare) = (surface_slopes(model), vec![false; gap.len()]);
-    let mut rigid = Rigid { model, motions: &motions, work: DVector::from_vec(work), slope, gap, bare, grounded: true };
+    let mut rigid = Rigid {
+        model,
+        motions: &motions,
+        work: DVector::from_vec(work),
+        slope,
+        gap,
+        bare,
+        grounded: true,
+        balanced: PART,
+    };
     let mut amounts = DVector::zeros(motions.count());
     // bodies that neither loads nor contacts push stay where they are: all else would be rounding
     let at_rest = motions.count() == 0 || rigid.work == amounts && rigid.approach(&amounts).iter().all(|&s| s <= 0.0);
@@ -89,20 +98,20 @@ pub fn at(model: &Model, trace: &[f64]) -> Layer {
     met(model, &model.compression(trace), &surface_slopes(model))
 }
 
-/// The places of [`Layer::meet`], with the bodies moved rigidly until the pressures there balance the loads, if a motion of the bodies
-/// would else meet no resistance: a linear step from there would know nothing of the contact that stops it.
-pub fn meet(model: &Model, compression: &[f64], pressure: &[f64], rho: &[f64]) -> Layer {
-    let places = Layer::meet(model, compression, pressure, rho);
+/// Places that lines of slope `rho`, n, led to, with the bodies moved rigidly until the pressures there balance the loads to `tolerance` of the run, if a
+/// motion of the bodies would else meet no resistance: a linear step from there would know nothing of the contact that stops it. They are where
+/// the next step begins; the iterate that they came from has errors of its own.
+pub fn with_resistance(model: &Model, places: &Layer, rho: &[f64], tolerance: f64) -> Layer {
     let motions = Motions::of(model);
     if motions.count() == 0 || motions.springs(&places.springs(model)).factor(TOLERANCE).kernel().is_empty() {
-        return places;
+        return places.clone();
     }
     let work: Vec<f64> = motions.bodies().iter().copied().flatten().map(|motion| motion.work).collect();
-    let gap: Vec<f64> = (0..rho.len()).map(|q| -compression[q] - pressure[q] / rho[q]).collect();
+    let gap: Vec<f64> = (0..rho.len()).map(|q| -places.compression[q] - places.pressure[q] / rho[q]).collect();
     let (work, slope, bare) = (DVector::from_vec(work), rho.to_vec(), vec![false; gap.len()]);
-    let rigid = Rigid { model, motions: &motions, work, slope, gap, bare, grounded: false };
+    let rigid = Rigid { model, motions: &motions, work, slope, gap, bare, grounded: false, balanced: tolerance };
     // where nothing stops the motion, the linear step says so
-    rigid.descend(DVector::zeros(motions.count())).map_or(places, |amounts| rigid.places(&amounts))
+    rigid.descend(DVector::zeros(motions.count())).map_or_else(|_| places.clone(), |amounts| rigid.places(&amounts))
 }
 
 fn met(model: &Model, approach: &[f64], slope: &[f64]) -> Layer {
@@ -168,6 +177,8 @@ struct Rigid<'a> {
     bare: Vec<bool>,
     /// Whether the motions are also those that springs to the ground resist.
     grounded: bool,
+    /// Forces out of balance that count as zero, as a share of those at work.
+    balanced: f64,
 }
 
 impl Rigid<'_> {
@@ -255,7 +266,7 @@ impl Rigid<'_> {
             let push = self.motions.work(&places.force);
             let acting = self.motions.sizes(&places.force);
             let lacking = &self.work - &push - self.pull(&amounts);
-            let small = |i: usize| PART * (acting[i].max(self.work[i].abs()).max(PART * largest));
+            let small = |i: usize| self.balanced * (acting[i].max(self.work[i].abs()).max(PART * largest));
             if (0..lacking.len()).all(|i| lacking[i].abs() <= small(i)) {
                 break;
             }

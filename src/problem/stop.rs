@@ -21,6 +21,11 @@ impl Default for StopRule {
 }
 
 impl StopRule {
+    /// What relative errors inside a run refer to: the tolerance of its residual; half of all digits where the increment alone ends it.
+    pub fn tolerance(&self) -> f64 {
+        self.residual.unwrap_or(f64::EPSILON.sqrt())
+    }
+
     /// Whether an iterate with this number, reached by this increment (NaN before the first update), is good enough.
     pub fn is_met(&self, residual: f64, increment: f64) -> bool {
         self.residual.is_some_and(|tolerance| residual <= tolerance)
