@@ -237,3 +237,99 @@ load = [{ on = "b2_top", pressure = "5.7e3 * (1 + 0.77 * (2 * x - 1))" }]"#;
     let history = run.history();
     assert!(history["gamma"].iter().any(|&gamma| gamma < 1.0), "no step was shortened");
 }
+
+/// A round block that stands on one point of another, on soft springs: nothing resists that it rolls. The bodies are moved rigidly between steps, and
+/// what a run reports is in balance all the same.
+#[test]
+fn a_block_on_one_point_carries_its_load() {
+    let geo = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/stress/meshes/round.geo");
+    let text = format!(
+        r#"
+dimension = 2
+mesh = {{ geo = "{geo}", set = {{ R = 1.3, whole = 1, lens = 1, n1 = 1, n2 = 3, n3 = 10 }} }}
+method = {{ start = {{ normal = "4.735738402097211e-6*(1 + 0.5*x)" }} }}
+
+[[body]]
+name = "b1"
+young = 2.28491456937253e1
+poisson = 0.4999
+order = 1
+fix = [{{ on = "b1_left", x = 0 }}]
+spring = [{{ on = "b1_bottom", normal = 5.729283700314327e-5 }}]
+
+[[body]]
+name = "b2"
+young = 1.6612367978401252e-1
+poisson = 0.01680048210738843
+order = 1
+fix = [{{ on = "b2_pin", x = 0 }}]
+
+[[body]]
+name = "b3"
+young = 1.315698246293336e-1
+poisson = 0.3
+order = 1
+fix = [{{ on = "b3_pin", x = 0 }}]
+load = [{{ on = "b3_top", pressure = 1.252978329800831e-7 }}]
+
+[[contact]]
+between = ["b1_top", "b2_bottom"]
+gap = "-6.706107496514607e-5"
+layer = {{ pressure = "2.2942066860799147e-3*c^2/(c + 7.281984588417249e-5)" }}
+
+[[contact]]
+between = ["b2_top", "b3_bottom"]
+layer = {{ power = {{ B = 3.795984661450542e-5, a = 0.1 }} }}
+"#
+    );
+    let run = solve(Scene::new(text), &[]).converged();
+    let load = -run.number("bodies/2/balance/loads/force/1");
+    for pair in 0..2 {
+        let force = run.number(&format!("pairs/{pair}/force/1/1"));
+        assert!((force / load - 1.0).abs() < 1e-8, "pair {pair}: {force:e} instead of {load:e}");
+    }
+}
+
+/// A start a thousand times as far as the blocks are long has pressures of its own, by which no error is measured: c^2 = p.
+#[test]
+fn a_given_start_is_no_measure() {
+    let upper = r#"fix = [{ on = "b2_left", x = 0 }]
+load = [{ on = "b2_top", pressure = 1e-8 }]"#;
+    let scene = blocks([1.0; 2], [3, 2], upper, "1e-3", "power = { B = 1, a = 0.5 }");
+    let run = solve(scene, &["--set", "method.start={normal=1e3}"]).converged();
+    assert_pressure(&run, 1e-8, 1e-8);
+}
+
+/// Weight alone bulges a block against one that is free to move away: the contact vanishes, and is measured by what the blocks carry.
+#[test]
+fn a_contact_that_vanishes_beside_loads() {
+    let geo = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/stack/stack.geo");
+    let body = |name: &str, more: &str| {
+        format!("[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0.4\nforce = [0, -1e-6]\n{more}\n")
+    };
+    let text = format!(
+        "dimension = 2\nmesh = {{ geo = \"{geo}\", set = {{ rows = 1, columns = 2, n1 = 5, n2 = 5 }} }}\n{}{}{}",
+        body("b1", r#"fix = [{ on = "b1_bottom", y = 0 }, { on = "b1_left", x = 0 }]"#),
+        body("b2", r#"fix = [{ on = "b2_bottom", y = 0 }]"#),
+        "[[contact]]\nbetween = [\"b1_right\", \"b2_left\"]\nlayer = { pressure = \"1e6*c^2/(c + 1e-10)\" }\n"
+    );
+    let run = solve(Scene::new(text), &[]).converged();
+    // 1e-6 of what the blocks carry, to 1e-8, where each step leaves a quarter of a pressure that nothing balances
+    assert!(run.count("iterations") <= 30, "{}", run.said());
+    let largest = run.contact()["pressure"].iter().copied().fold(0.0, f64::max);
+    assert!(largest < 1e-6 * 1e-6, "{largest:e}");
+}
+
+/// Further steps at the rounding floor wander: the run ends at the best of its iterates.
+#[test]
+fn a_run_that_rounding_ends_is_at_its_best_iterate() {
+    let run = solve(
+        concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/groove-held/scene.toml"),
+        &["--set", "method={stop={residual=1e-16}}"],
+    );
+    assert_eq!(run.text("status"), "roundoff-limited", "{}", run.said());
+    let history = run.history();
+    let least = history["residual"].iter().copied().fold(f64::INFINITY, f64::min);
+    assert_eq!(history["residual"].last(), Some(&least));
+    assert_eq!(run.number("residual"), least);
+}

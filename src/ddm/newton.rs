@@ -13,6 +13,7 @@
 use super::bound::Reached;
 use super::digits::of_compressions;
 use super::forcing::Forcing;
+use super::history::Row;
 use super::linear::resisting;
 use super::run::{End, Run};
 use super::start;
@@ -31,6 +32,8 @@ use crate::model::linear::{LinearStep, System, Trial};
 pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
     let (slopes, tolerance) = (meeting_slopes(run.model), run.stop.tolerance());
     let mut rho = run.memory.progress.slopes(&slopes);
+    // where rounding ends the run, what it has spoilt meanwhile is taken back
+    let mut best: Option<(Row, Field, Layer)> = None;
     // watches what corrections gain, if rounding left too much of the last step
     let mut left: Option<Floor> = None;
     // a correction takes half of what is left at least; of rounding the size is wanted
@@ -91,8 +94,18 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         }
         let at = run.after_step((&u, &x.field, share), measured, &reached, &met, linear);
         let ended = run.end_at(&at, linear)?;
-        if let Some(status) = ended.or(is_floor.then_some(Status::RoundoffLimited)) {
-            return Ok(run.end(status, u, met, linear));
+        let row = run.rows.last().expect("a row of this iterate");
+        if best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual) {
+            best = Some((row.clone(), u.clone(), met.clone()));
+        }
+        match ended.or(is_floor.then_some(Status::RoundoffLimited)) {
+            Some(Status::RoundoffLimited) => {
+                let (row, u, layer) = best.expect("at least this iterate");
+                run.go_back(row);
+                return Ok(run.end(Status::RoundoffLimited, u, layer, linear));
+            }
+            Some(status) => return Ok(run.end(status, u, met, linear)),
+            None => (),
         }
         // a step that knew of no contact runs through the other body
         let blind = places.closed == 0 && met.closed > 0;
