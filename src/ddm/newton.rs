@@ -114,11 +114,8 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             run.memory.progress.forget();
         }
         if left.is_none() {
-            places = if blind {
-                Layer::at(run.model, &u.trace)
-            } else {
-                start::with_resistance(run.model, &met, &rho, tolerance)
-            };
+            places =
+                if blind { Layer::at(run.model, &u.trace) } else { start::balanced(run.model, &met, &rho, tolerance) };
         }
         if measured.asked != 0 {
             run.memory.places = Some(places);

@@ -101,7 +101,7 @@ pub fn at(model: &Model, trace: &[f64]) -> Layer {
 /// Places that lines of slope `rho`, n, led to, with the bodies moved rigidly until the pressures there balance the loads to `tolerance` of the run, if a
 /// motion of the bodies would else meet no resistance: a linear step from there would know nothing of the contact that stops it. They are where
 /// the next step begins; the iterate that they came from has errors of its own.
-pub fn with_resistance(model: &Model, places: &Layer, rho: &[f64], tolerance: f64) -> Layer {
+pub fn balanced(model: &Model, places: &Layer, rho: &[f64], tolerance: f64) -> Layer {
     let motions = Motions::of(model);
     if motions.count() == 0 || motions.springs(&places.springs(model)).factor(TOLERANCE).kernel().is_empty() {
         return places.clone();
