@@ -238,10 +238,23 @@ load = [{ on = "b2_top", pressure = "5.7e3 * (1 + 0.77 * (2 * x - 1))" }]"#;
     assert!(history["gamma"].iter().any(|&gamma| gamma < 1.0), "no step was shortened");
 }
 
-/// A mesh of the random scenes with bodies and contacts.
-fn on_mesh(name: &str, set: &str, rest: &str) -> Scene {
-    let geo = format!("{}/tests/stress/meshes/{name}.geo", env!("CARGO_MANIFEST_DIR"));
-    Scene::new(format!("dimension = 2\nmesh = {{ geo = \"{geo}\", set = {{ {set} }} }}\n\n{rest}"))
+/// Three bodies on each other on a mesh of the random scenes: modulus, Poisson's ratio and order of each, the support that keeps the third from
+/// sliding, the pressure on it, and what the two contacts have beside their surfaces.
+fn three(geo: &str, of: [(&str, &str, u8); 3], held: &str, pressure: &str, contacts: [&str; 2]) -> Scene {
+    let supports = [
+        r#"fix = [{ on = "b1_bottom", y = 0 }, { on = "b1_left", x = 0 }]"#.to_owned(),
+        r#"fix = [{ on = "b2_pin", x = 0 }]"#.to_owned(),
+        format!("fix = [{{ on = \"{held}\", x = 0 }}]\nload = [{{ on = \"b3_top\", pressure = {pressure} }}]"),
+    ];
+    let mut text =
+        format!("dimension = 2\nmesh = {{ geo = \"{}/tests/stress/meshes/{geo} }}\n", env!("CARGO_MANIFEST_DIR"));
+    for (i, ((young, poisson, order), more)) in (1..).zip(of.into_iter().zip(supports)) {
+        text += &format!("[[body]]\nname = \"b{i}\"\nyoung = {young}\npoisson = {poisson}\norder = {order}\n{more}\n");
+    }
+    for (i, more) in (1..).zip(contacts) {
+        text += &format!("[[contact]]\nbetween = [\"b{i}_top\", \"b{}_bottom\"]\n{more}\n", i + 1);
+    }
+    Scene::new(text)
 }
 
 /// The load on the third body goes through both contacts, to a share of 1e-8.
@@ -257,79 +270,36 @@ fn assert_carried(run: &Run) {
 /// run reports is in balance.
 #[test]
 fn blocks_on_one_point_carry_their_load() {
-    let rest = r#"
-[[body]]
-name = "b1"
-young = 2.3242291180960872e5
-poisson = 0.3
-order = 2
-fix = [{ on = "b1_bottom", y = 0 }, { on = "b1_left", x = 0 }]
-
-[[body]]
-name = "b2"
-young = 2.3242291180960872e5
-poisson = 0.4749161204155611
-order = 1
-fix = [{ on = "b2_pin", x = 0 }]
-
-[[body]]
-name = "b3"
-young = 2.3242291180960872e5
-poisson = 0
-order = 1
-fix = [{ on = "b3_pin", x = 0 }]
-load = [{ on = "b3_top", pressure = 2.406644667837266e0 }]
-
-[[contact]]
-between = ["b1_top", "b2_bottom"]
-layer = { power = { B = 4.13978317480803e-11, a = 0.3 } }
-
-[[contact]]
-between = ["b2_top", "b3_bottom"]
-gap = "1.3149934836616322e-2"
-layer = { power = { B = 1.8018927164479965e-6, a = 0.5 } }
-"#;
-    assert_carried(
-        &solve(on_mesh("round", "R = 1.05, whole = 1, lens = 1, n1 = 6, n2 = 5, n3 = 9", rest), &[]).converged(),
+    let scene = three(
+        r#"round.geo", set = { R = 1.05, whole = 1, lens = 1, n1 = 6, n2 = 5, n3 = 9 }"#,
+        [
+            ("2.3242291180960872e5", "0.3", 2),
+            ("2.3242291180960872e5", "0.4749161204155611", 1),
+            ("2.3242291180960872e5", "0", 1),
+        ],
+        "b3_pin",
+        "2.406644667837266",
+        [
+            "layer = { power = { B = 4.13978317480803e-11, a = 0.3 } }",
+            "gap = \"1.3149934836616322e-2\"\nlayer = { power = { B = 1.8018927164479965e-6, a = 0.5 } }",
+        ],
     );
+    assert_carried(&solve(scene, &[]).converged());
 }
 
 /// A start ten times as far as the blocks are long has pressures of its own, by which no error is measured.
 #[test]
 fn a_given_start_is_no_measure() {
-    let rest = r#"
-[[body]]
-name = "b1"
-young = 870
-poisson = 0.17
-order = 1
-fix = [{ on = "b1_bottom", y = 0 }, { on = "b1_left", x = 0 }]
-
-[[body]]
-name = "b2"
-young = 870
-poisson = 0.3
-order = 1
-fix = [{ on = "b2_pin", x = 0 }]
-
-[[body]]
-name = "b3"
-young = 2.8
-poisson = 0.27
-order = 1
-fix = [{ on = "b3_left", x = 0 }]
-load = [{ on = "b3_top", pressure = 7.6e-11 }]
-
-[[contact]]
-between = ["b1_top", "b2_bottom"]
-layer = { power = { B = 1.1e-11, a = 0.88 } }
-
-[[contact]]
-between = ["b2_top", "b3_bottom"]
-gap = "1.36e-11"
-layer = { power = { B = 2.3e-8, a = 0.5 } }
-"#;
-    let scene = on_mesh("small", "size = 1e-4, three = 1, n = 1", rest);
+    let scene = three(
+        r#"small.geo", set = { size = 1e-4, three = 1, n = 1 }"#,
+        [("870", "0.17", 1), ("870", "0.3", 1), ("2.8", "0.27", 1)],
+        "b3_left",
+        "7.6e-11",
+        [
+            "layer = { power = { B = 1.1e-11, a = 0.88 } }",
+            "gap = \"1.36e-11\"\nlayer = { power = { B = 2.3e-8, a = 0.5 } }",
+        ],
+    );
     assert_carried(&solve(scene, &["--set", "method.start={normal=1e-3}"]).converged());
 }
 
@@ -365,4 +335,10 @@ fn a_run_that_rounding_ends_is_at_its_best_iterate() {
     let least = history["residual"].iter().copied().fold(f64::INFINITY, f64::min);
     assert_eq!(history["residual"].last(), Some(&least));
     assert_eq!(run.number("residual"), least);
+    // going back is no step
+    assert_eq!(
+        (history["gamma"].last(), history["iteration"].last()),
+        (Some(&0.0), Some(&(run.count("iterations") as f64)))
+    );
+    assert_eq!(run.count("iterations") + 1, history["iteration"].len());
 }

@@ -82,7 +82,7 @@ mod tests {
     fn a_step_ends_when_pressures_have_settled() {
         let model = two_pairs();
         let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
-        let (rho, scale) = ([2.0, 0.5, 0.25, 3.0], Scale::default());
+        let (rho, scale, half) = ([2.0, 0.5, 0.25, 3.0], Scale::default(), f64::EPSILON.sqrt());
         let asked = |closings: &[[f64; 4]], tolerance: f64, error: f64| -> Vec<bool> {
             let mut forcing = Forcing::new(&places, places.compression.clone(), &rho, (tolerance, &scale), 0.5);
             let trial = |closing| Trial { closing, energy: 1.0, error };
@@ -90,18 +90,18 @@ mod tests {
         };
         // the second pair goes to c = 3, where the line of slope 4 has p = 8 and the law 9: they meet between
         let far = [0.0, 0.0, 1.0, 0.0];
-        assert_eq!(asked(&[far; 5], f64::EPSILON.sqrt(), 0.1), [false, false, false, true, true]);
-        assert_eq!(asked(&[far; 5], f64::EPSILON.sqrt(), 0.6), [false; 5], "more than half of the step is missing");
+        assert_eq!(asked(&[far; 5], half, 0.1), [false, false, false, true, true]);
+        assert_eq!(asked(&[far; 5], half, 0.6), [false; 5], "more than half of the step is missing");
         // pressures that move by more than they are off
         let moving = [[0.0, 0.0, 0.2, 0.0], [0.0, 0.0, 0.4, 0.0], [0.0, 0.0, 0.6, 0.0], [0.0, 0.0, 0.8, 0.0]];
-        assert_eq!(asked(&moving, f64::EPSILON.sqrt(), 0.1), [false; 4]);
+        assert_eq!(asked(&moving, half, 0.1), [false; 4]);
         // the first pair is linear: nothing is off, and only the tolerance of the run ends the step
         let linear = [0.1, 0.0, 0.0, 0.0];
-        assert_eq!(asked(&[linear; 5], f64::EPSILON.sqrt(), 0.1), [false; 5]);
+        assert_eq!(asked(&[linear; 5], half, 0.1), [false; 5]);
         let contact = contact_energy(&model, &Layer::new(&model, vec![0.6, 1.0, 2.0, 1.0])).sqrt();
         assert_eq!(asked(&[linear; 5], 0.01, 0.0049 * contact), [false, false, false, true, true]);
         assert_eq!(asked(&[linear; 5], 0.01, 0.0051 * contact), [false; 5]);
         // rounding
-        assert_eq!(asked(&[linear; 1], f64::EPSILON.sqrt(), 1e-16), [true]);
+        assert_eq!(asked(&[linear; 1], half, 1e-16), [true]);
     }
 }

@@ -66,7 +66,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
 
         let c = run.model.compression(&u.trace);
         let p = run.memory.progress.go(share, if share < 1.0 { pressure } else { places.linear(&c) });
-        let met = Layer::meet(run.model, &c, &p, &rho);
+        let mut met = Layer::meet(run.model, &c, &p, &rho);
 
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
         let mut measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
@@ -94,18 +94,16 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         }
         let at = run.after_step((&u, &x.field, share), measured, &reached, &met, linear);
         let ended = run.end_at(&at, linear)?;
-        let row = run.rows.last().expect("a row of this iterate");
-        if best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual) {
+        if let Some(row) =
+            run.rows.last().filter(|row| best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual))
+        {
             best = Some((row.clone(), u.clone(), met.clone()));
         }
-        match ended.or(is_floor.then_some(Status::RoundoffLimited)) {
-            Some(Status::RoundoffLimited) => {
-                let (row, u, layer) = best.expect("at least this iterate");
-                run.go_back(row);
-                return Ok(run.end(Status::RoundoffLimited, u, layer, linear));
+        if let Some(status) = ended.or(is_floor.then_some(Status::RoundoffLimited)) {
+            if let (Status::RoundoffLimited, Some(best)) = (&status, best) {
+                (u, met) = run.go_back(best);
             }
-            Some(status) => return Ok(run.end(status, u, met, linear)),
-            None => (),
+            return Ok(run.end(status, u, met, linear));
         }
         // a step that knew of no contact runs through the other body
         let blind = places.closed == 0 && met.closed > 0;

@@ -134,14 +134,15 @@ impl Run<'_> {
         Ok((at.k >= self.stop.iterations).then_some(Status::IterationLimit))
     }
 
-    /// Ends at an earlier iterate of this row: one more row, with a step of no length, unless it is the last one.
-    pub fn go_back(&mut self, row: Row) {
-        let Some(last) = self.rows.last().filter(|last| last.iteration != row.iteration) else { return };
-        let Row { iteration, factorizations, inner_iterations, sweeps, seconds, .. } = *last;
-        let row =
-            Row { iteration: iteration + 1, gamma: 0.0, factorizations, inner_iterations, sweeps, seconds, ..row };
-        self.observer.row(&row);
-        self.rows.push(row);
+    /// Goes back to an iterate, unless it is the last one: one more row, of no update.
+    pub fn go_back(&mut self, (row, u, layer): (Row, Field, Layer)) -> (Field, Layer) {
+        if let Some(last) = self.rows.last().filter(|last| last.iteration != row.iteration) {
+            let Row { iteration, factorizations, inner_iterations, sweeps, seconds, .. } = *last;
+            let row = Row { iteration, gamma: 0.0, factorizations, inner_iterations, sweeps, seconds, ..row };
+            self.observer.row(&row);
+            self.rows.push(row);
+        }
+        (u, layer)
     }
 
     fn row(&self, at: &Iterate) -> Row {

@@ -314,7 +314,7 @@ impl Run<'_> {
         let End { status, mut iterate, layer, weight, sweeps, skipped } = end;
         let mut found = None;
         let (spectrum, factor, updates) = match method {
-            Method::Newton(linear) => (linear.spectrum(), None, rows.len()),
+            Method::Newton(linear) => (linear.spectrum(), None, rows.last().map_or(0, |row| row.iteration)),
             Method::Sweeps { acceleration, .. } => {
                 acceleration.conclude(model, &layer, &weight);
                 if let ([first, .., last], true) = (&rows[..], wants_interval && status.is_solved()) {
