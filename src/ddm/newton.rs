@@ -42,7 +42,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let springs = resisting(run.model, places.springs(run.model));
         let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
         let (r, _) = residual(run.model, &u, &force);
-        let before = run.model.compression(&u.trace);
+        let (before, digits) = (run.model.compression(&u.trace), of_compressions(run.model, &u.trace));
         let mut forcing = Forcing::new(&places, before.clone(), &rho, (tolerance, &run.scale), linear.roughest());
         let mut enough = |model: &Model, trial: &Trial| match left {
             None => forcing.is_enough(model, trial),
@@ -56,7 +56,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let end: Vec<f64> = before.iter().zip(x.field.closing()).map(|(c, closing)| c + closing).collect();
         let pressure = places.linear(&end);
         let share = match left {
-            None => run.memory.progress.share(run.model, &rho, &before, (&end, &pressure)),
+            None => run.memory.progress.share(run.model, &rho, [&before, &digits], [&end, &pressure]),
             Some(_) => 1.0,
         };
         rho = run.memory.progress.slopes(&slopes);

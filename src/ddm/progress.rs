@@ -37,16 +37,19 @@ impl Progress {
         rho.iter().map(|rho| SLOPES[self.failures % SLOPES.len()] * rho).collect()
     }
 
-    /// The share of the way from compressions `from` to the state (c, p), n each, that a step goes. Where no slope brought it nearer to the laws,
-    /// which rounding and motions without resistance do, it goes all the way.
-    pub fn share(&mut self, model: &Model, rho: &[f64], from: &[f64], (c, p): (&[f64], &[f64])) -> f64 {
+    /// The share of the way from compressions `from`, known to their `digits`, to the state (c, p), n each, that a step goes. Distances from the
+    /// laws count beyond these digits and those of the pressures: steps between states that differ by rounding are not shortened. Where no
+    /// slope brought it nearer to the laws, which motions without resistance do, it goes all the way.
+    pub fn share(&mut self, model: &Model, rho: &[f64], [from, digits]: [&[f64]; 2], [c, p]: [&[f64]; 2]) -> f64 {
         if self.pressure.is_empty() {
             return 1.0;
         }
         let off = |t: f64| {
             let (c, p) = (between(from, c, t), between(&self.pressure, p, t));
             let met = Layer::meet(model, &c, &p, rho);
-            (0..c.len()).map(|q| model.weight[q] * (p[q] - met.pressure[q]).powi(2) / rho[q]).sum::<f64>()
+            let known = |q: usize| rho[q] * digits[q] + f64::EPSILON * (p[q].abs() + met.pressure[q]);
+            let apart = |q: usize| ((p[q] - met.pressure[q]).abs() - known(q)).max(0.0);
+            (0..c.len()).map(|q| model.weight[q] * apart(q).powi(2) / rho[q]).sum::<f64>()
         };
         let here = off(0.0);
         let mut shares = (0..=HALVINGS as i32).map(|halvings| 0.5f64.powi(halvings));
@@ -87,23 +90,21 @@ mod tests {
         let model = two_pairs();
         let rho = [2.0, 0.5, 0.25, 3.0];
         let mut progress = Progress::default();
-        let (from, start) = ([0.5, 0.5, 1.0, 1.0], vec![2.0, 4.0, 1.0, 1.0]);
-        assert_eq!(
-            progress.share(&model, &rho, &from, (&[9.0; 4], &[0.0; 4])),
-            1.0,
-            "the first step has no pressures to begin with"
-        );
+        let (from, start, exact) = ([0.5, 0.5, 1.0, 1.0], vec![2.0, 4.0, 1.0, 1.0], [0.0; 4]);
+        // the first step has no pressures to begin with
+        assert_eq!(progress.share(&model, &rho, [&from, &exact], [&[9.0; 4], &[0.0; 4]]), 1.0);
         assert_eq!(progress.go(1.0, start.clone()), start);
         // the second point is on p = 4 c then
-        assert_eq!(progress.share(&model, &rho, &from, (&[0.5, 0.75, 1.0, 1.0], &[2.0, 3.0, 1.0, 1.0])), 1.0);
+        assert_eq!(progress.share(&model, &rho, [&from, &exact], [&[0.5, 0.75, 1.0, 1.0], &[2.0, 3.0, 1.0, 1.0]]), 1.0);
         // from p = 4 to p = -4 where the law has 6
         let (to, pressure) = ([0.5, 1.5, 1.0, 1.0], [2.0, -4.0, 1.0, 1.0]);
-        assert_eq!(progress.share(&model, &rho, &from, (&to, &pressure)), 0.25);
+        assert_eq!(progress.share(&model, &rho, [&from, &exact], [&to, &pressure]), 0.25);
+        // no distance is left beyond compressions known to -+ 100
+        assert_eq!(progress.clone().share(&model, &rho, [&from, &[1e2; 4]], [&to, &pressure]), 1.0);
         assert_eq!(progress.go(0.25, pressure.to_vec()), [2.0, 2.0, 1.0, 1.0]);
         assert_eq!(progress.slopes(&rho), rho);
-        let away = |progress: &mut Progress| {
-            progress.share(&model, &rho, &[0.5, 1.0, 1.0, 1.0], (&[0.5, 2.0, 1.0, 1.0], &[2.0, -9.0, 1.0, 1.0]))
-        };
+        let (bent, away) = ([0.5, 1.0, 1.0, 1.0], [[0.5, 2.0, 1.0, 1.0], [2.0, -9.0, 1.0, 1.0]]);
+        let away = |progress: &mut Progress| progress.share(&model, &rho, [&bent, &exact], [&away[0], &away[1]]);
         assert_eq!([away(&mut progress), away(&mut progress)], [0.5f64.powi(7); 2]);
         assert_eq!(progress.slopes(&rho), rho.map(|rho| 0.1 * rho));
         assert_eq!(away(&mut progress), 1.0);
