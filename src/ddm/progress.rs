@@ -48,7 +48,8 @@ impl Progress {
             let (c, p) = (between(from, c, t), between(&self.pressure, p, t));
             let met = Layer::meet(model, &c, &p, rho);
             let known = |q: usize| rho[q] * digits[q] + f64::EPSILON * (p[q].abs() + met.pressure[q]);
-            let apart = |q: usize| ((p[q] - met.pressure[q]).abs() - known(q)).max(0.0);
+            // a distance that is no number stays none: it is not nearer
+            let apart = |q: usize| ((p[q] - met.pressure[q]).abs() - known(q)).clamp(0.0, f64::INFINITY);
             (0..c.len()).map(|q| model.weight[q] * apart(q).powi(2) / rho[q]).sum::<f64>()
         };
         let here = off(0.0);
