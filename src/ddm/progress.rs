@@ -50,7 +50,9 @@ impl Progress {
             let known = |q: usize| rho[q] * digits[q] + f64::EPSILON * (p[q].abs() + met.pressure[q]);
             // a distance that is no number stays none: it is not nearer
             let apart = |q: usize| ((p[q] - met.pressure[q]).abs() - known(q)).clamp(0.0, f64::INFINITY);
-            (0..c.len()).map(|q| model.weight[q] * apart(q).powi(2) / rho[q]).sum::<f64>()
+            // lines of infinite slope lead to places at c itself
+            let sloped = (0..c.len()).filter(|&q| rho[q] < f64::INFINITY);
+            sloped.map(|q| model.weight[q] * apart(q).powi(2) / rho[q]).sum::<f64>()
         };
         let here = off(0.0);
         let mut shares = (0..=HALVINGS as i32).map(|halvings| 0.5f64.powi(halvings));
@@ -100,6 +102,9 @@ mod tests {
         // from p = 4 to p = -4 where the law has 6
         let (to, pressure) = ([0.5, 1.5, 1.0, 1.0], [2.0, -4.0, 1.0, 1.0]);
         assert_eq!(progress.share(&model, &rho, [&from, &exact], [&to, &pressure]), 0.25);
+        // points without stiffness on either side, whose compression may be exact, have none
+        let hard = [f64::INFINITY, 0.5, 0.25, 3.0];
+        assert_eq!(progress.clone().share(&model, &hard, [&from, &exact], [&to, &pressure]), 0.25);
         // no distance is left beyond compressions known to -+ 100
         assert_eq!(progress.clone().share(&model, &rho, [&from, &[1e2; 4]], [&to, &pressure]), 1.0);
         assert_eq!(progress.go(0.25, pressure.to_vec()), [2.0, 2.0, 1.0, 1.0]);
