@@ -228,11 +228,11 @@ fn lost_digits_have_their_status() {
 #[test]
 fn shortened_steps_stay_in_equilibrium() {
     let upper = r#"order = 1
-load = [{ on = "b2_top", pressure = "5.7e3 * (1 + 0.77 * (2 * x - 1))" }]"#;
+load = [{ on = "b2_top", pressure = "5.7e3 * (1 + 0.9 * (2 * x - 1))" }]"#;
     let gap = "8.6e-4 * max(0, 1 - ((x - 1) / 0.3)^2)^1.5";
     let scene = blocks([9e6, 9e7], [1, 8], upper, gap, "power = { B = 3.6e-13, a = 1 }");
     let run = solve(scene, &["--set", "body.0.order=1"]).converged();
-    // 6; 20 with the pressures of the whole way
+    // 5
     assert!(run.count("iterations") <= 10, "{} steps", run.count("iterations"));
     let history = run.history();
     assert!(history["gamma"].iter().any(|&gamma| gamma < 1.0), "no step was shortened");
@@ -317,8 +317,8 @@ fn a_contact_that_vanishes_beside_loads() {
         "[[contact]]\nbetween = [\"b1_right\", \"b2_left\"]\nlayer = { pressure = \"1e6*c^2/(c + 1e-10)\" }\n"
     );
     let run = solve(Scene::new(text), &[]).converged();
-    // 1e-6 of what the blocks carry, to 1e-8, where each step leaves a quarter of a pressure that nothing balances
-    assert!(run.count("iterations") <= 30, "{}", run.said());
+    // 6; 20 if the free block is not moved to where nothing is pressed
+    assert!(run.count("iterations") <= 10, "{}", run.said());
     let largest = run.contact()["pressure"].iter().copied().fold(0.0, f64::max);
     assert!(largest < 1e-6 * 1e-6, "{largest:e}");
 }
@@ -328,7 +328,7 @@ fn a_contact_that_vanishes_beside_loads() {
 fn a_run_that_rounding_ends_is_at_its_best_iterate() {
     let run = solve(
         concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/groove-held/scene.toml"),
-        &["--set", "method={stop={residual=1e-16}}"],
+        &["--set", "method={stop={residual=1e-16}}", "--set", "mesh.set.n=16"],
     );
     assert_eq!(run.text("status"), "roundoff-limited", "{}", run.said());
     let history = run.history();

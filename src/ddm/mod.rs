@@ -8,6 +8,7 @@ pub mod acceleration;
 mod balance;
 mod bound;
 mod digits;
+mod fit;
 mod forcing;
 pub mod forecast;
 pub mod gamma;

@@ -12,6 +12,7 @@
 
 use super::bound::Reached;
 use super::digits::of_compressions;
+use super::fit;
 use super::forcing::Forcing;
 use super::history::Row;
 use super::linear::resisting;
@@ -31,7 +32,7 @@ use crate::model::linear::{LinearStep, System, Trial};
 /// Failures of the solver library. Not converging is a status.
 pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
     let (slopes, tolerance) = (meeting_slopes(run.model), run.stop.tolerance());
-    let mut rho = run.memory.progress.slopes(&slopes);
+    let mut rho = run.memory.progress.slopes(run.model, &slopes);
     // where rounding ends the run, what it has spoilt meanwhile is taken back
     let mut best: Option<(Row, Field, Layer)> = None;
     // watches what corrections gain, if rounding left too much of the last step
@@ -56,16 +57,23 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let end: Vec<f64> = before.iter().zip(x.field.closing()).map(|(c, closing)| c + closing).collect();
         let pressure = places.linear(&end);
         let share = match left {
-            None => run.memory.progress.share(run.model, &rho, [&before, &digits], [&end, &pressure]),
+            None => run.memory.progress.share(run.model, &slopes, [&before, &digits], [&end, &pressure]),
             Some(_) => 1.0,
         };
-        rho = run.memory.progress.slopes(&slopes);
+        rho = run.memory.progress.slopes(run.model, &slopes);
         x.field.scale(share);
         u.add(1.0, &x.field);
         u.retrace(run.model);
 
+        let p = match share < 1.0 {
+            true => pressure,
+            false => places.linear(&run.model.compression(&u.trace)),
+        };
+        let p = run.memory.progress.go(share, p);
+        if places.closed > 0 {
+            fit::fit(run.model, [&mut u, &mut x.field], &p, &rho, tolerance);
+        }
         let c = run.model.compression(&u.trace);
-        let p = run.memory.progress.go(share, if share < 1.0 { pressure } else { places.linear(&c) });
         let mut met = Layer::meet(run.model, &c, &p, &rho);
 
         let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));

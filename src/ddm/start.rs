@@ -106,12 +106,26 @@ pub fn balanced(model: &Model, places: &Layer, rho: &[f64], tolerance: f64) -> L
     if motions.count() == 0 || motions.springs(&places.springs(model)).factor(TOLERANCE).kernel().is_empty() {
         return places.clone();
     }
+    // where nothing stops the motion, the linear step says so
+    balance(model, &motions, places, rho, tolerance).map_or_else(|| places.clone(), |(_, places)| places)
+}
+
+/// Amounts of these motions by which places that lines of slope `rho`, n, led to come to balance the loads to a tolerance, and the places then;
+/// none if nothing stops a motion.
+pub fn balance(
+    model: &Model,
+    motions: &Motions,
+    places: &Layer,
+    rho: &[f64],
+    tolerance: f64,
+) -> Option<(DVector<f64>, Layer)> {
     let work: Vec<f64> = motions.bodies().iter().copied().flatten().map(|motion| motion.work).collect();
     let gap: Vec<f64> = (0..rho.len()).map(|q| -places.compression[q] - places.pressure[q] / rho[q]).collect();
     let (work, slope, bare) = (DVector::from_vec(work), rho.to_vec(), vec![false; gap.len()]);
-    let rigid = Rigid { model, motions: &motions, work, slope, gap, bare, grounded: false, balanced: tolerance };
-    // where nothing stops the motion, the linear step says so
-    rigid.descend(DVector::zeros(motions.count())).map_or_else(|_| places.clone(), |amounts| rigid.places(&amounts))
+    let rigid = Rigid { model, motions, work, slope, gap, bare, grounded: false, balanced: tolerance };
+    let amounts = rigid.descend(DVector::zeros(motions.count())).ok()?;
+    let places = rigid.places(&amounts);
+    Some((amounts, places))
 }
 
 fn met(model: &Model, approach: &[f64], slope: &[f64]) -> Layer {

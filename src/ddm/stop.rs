@@ -70,10 +70,10 @@ impl Floor {
     /// Share of the best error that an iterate must reach to be progress.
     const FALLS: f64 = 0.9;
 
-    /// Of Newton's method, whose iterates are in equilibrium: two without progress may be there. An error of all of the solution or more leaves
+    /// Of Newton's method, whose iterates are in equilibrium: one without progress may be there. An error of all of the solution or more leaves
     /// nothing of it that is known.
     pub fn of_steps() -> Self {
-        Self { best: f64::INFINITY, since: 0, patience: 2, believable: 1.0 }
+        Self { best: f64::INFINITY, since: 0, patience: 1, believable: 1.0 }
     }
 
     /// Of sweeps: twenty without progress, as each may gain half a per cent, and an error of 1e-4 at most. Those far from any solution can have large
@@ -243,7 +243,7 @@ mod tests {
         let mut far = Floor::of_sweeps();
         assert!((0..99).all(|_| !far.is_reached(1.1e-4)));
         let mut steps = Floor::of_steps();
-        assert_eq!([0.9; 5].map(|error| steps.is_reached(error)), [false, false, true, false, true]);
+        assert_eq!([0.9; 5].map(|error| steps.is_reached(error)), [false, true, true, true, true]);
         assert!((0..9).all(|_| !steps.is_reached(1.0)));
     }
 }

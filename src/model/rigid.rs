@@ -3,8 +3,8 @@
 //! Motions are numbered through body by body. As K E = 0, what is asked of them here are sums over contact points. Which of their
 //! combinations nothing holds is the kernel of [`Motions::springs`]; [`TOLERANCE`] says what is nothing.
 
-use super::{BodySlot, Model, Motion, Segment};
-use crate::linalg::{Blocks, axpy, dot};
+use super::{BodySlot, Field, Model, Motion, Segment};
+use crate::linalg::{Blocks, axpy, dot, fit};
 pub use crate::linalg::{PART, TOLERANCE};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -145,6 +145,21 @@ impl<'a> Motions<'a> {
             model.put(body, &rows, &mut trace);
         }
         trace
+    }
+
+    /// E `amounts` of the bodies that live here, for the model whose motions these are; traces of all.
+    pub fn field(&self, model: &Model, amounts: &DVector<f64>) -> Field {
+        let mut field = Field::zero(model);
+        field.trace = self.trace(model, amounts);
+        for (body, slot) in model.bodies.iter().enumerate() {
+            let Some(matrices) = slot.local.as_ref().and_then(|body| body.matrices()) else { continue };
+            // a state ends with its rigid motions
+            let own = fit(matrices.traces, &model.of_body(body, &field.trace));
+            let state = &mut field.states[body];
+            let deformation = state.len() - own.len();
+            state[deformation..].copy_from_slice(&own);
+        }
+        field
     }
 
     /// (B E)' `force`: work of forces at the points on each motion.
