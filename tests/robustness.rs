@@ -232,7 +232,7 @@ load = [{ on = "b2_top", pressure = "5.7e3 * (1 + 0.9 * (2 * x - 1))" }]"#;
     let gap = "8.6e-4 * max(0, 1 - ((x - 1) / 0.3)^2)^1.5";
     let scene = blocks([9e6, 9e7], [1, 8], upper, gap, "power = { B = 3.6e-13, a = 1 }");
     let run = solve(scene, &["--set", "body.0.order=1"]).converged();
-    // 5
+    // 5; a cycle with the pressures of the whole way
     assert!(run.count("iterations") <= 10, "{} steps", run.count("iterations"));
     let history = run.history();
     assert!(history["gamma"].iter().any(|&gamma| gamma < 1.0), "no step was shortened");
