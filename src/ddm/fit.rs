@@ -1,7 +1,7 @@
 //! Bodies that nothing holds, moved to where a state in equilibrium fits the laws best.
 //!
 //! Free rigid motions E strain nothing: with (u, p) also (u + E a, p) is in equilibrium, for any a. Where no pressure is negative, the laws
-//! can have these pressures, and the least sum of [`duality gaps`](super::bound) on lines of slope rho is where the places balance the loads. So pressures that
+//! can have these pressures, and the Moreau envelope of the layers, met on lines of slope rho, is least where the places balance the loads. So pressures that
 //! statics alone give need no steps by which compressions follow them.
 
 use super::digits::of_compressions;
