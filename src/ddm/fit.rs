@@ -12,8 +12,8 @@ use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::rigid::Motions;
 
-/// The part of their distance from the laws that a motion must take from a state to be worth it, of its square: from all of it to a
-/// hundredth random scenes took the same number of steps; without it, rounding moves bodies on stiff layers.
+/// What a motion may leave of the squared distance from the laws, at most (docs/methods.md): below one, as rounding moves bodies on
+/// stiff layers; how far below hardly matters.
 const PART: f64 = 0.25;
 
 /// Moves u, which a step x led to with pressures p, n, and both with it, if that brings it much nearer to the laws; places are met on lines of slope rho,
@@ -24,10 +24,12 @@ pub(super) fn fit(model: &Model, [u, x]: [&mut Field; 2], p: &[f64], rho: &[f64]
         return;
     }
     let off = |u: &Field| distance(model, rho, [&model.compression(&u.trace), &of_compressions(model, &u.trace)], p);
-    let (here, places) = (off(u), Layer::meet(model, &model.compression(&u.trace), p, rho));
-    if here > 0.0
-        && let Some((amounts, _)) = start::balance(model, &motions, &places, rho, tolerance)
-    {
+    let here = off(u);
+    if here == 0.0 {
+        return;
+    }
+    let places = Layer::meet(model, &model.compression(&u.trace), p, rho);
+    if let Some((amounts, _)) = start::balance(model, &motions, &places, rho, tolerance) {
         let (motion, mut there) = (motions.field(model, &amounts), u.clone());
         there.add(1.0, &motion);
         if off(&there) <= PART * here {
