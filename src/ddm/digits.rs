@@ -10,14 +10,14 @@ pub(super) fn of_compressions(model: &Model, trace: &[f64]) -> Vec<f64> {
     (0..points).map(|q| f64::EPSILON * terms(q)).collect()
 }
 
-/// What rounding of the gap and of both displacements, a trace vector, can make of a pressure, as a share of the largest pressure: the
-/// most over all contact points.
+/// What rounding of the gap and of both displacements, a trace vector, can make of a pressure, as a share of the `peak` by which pressures
+/// are measured: the most over all contact points.
 ///
 /// Origins of bodies that fall far keep the digits of every iterate, but the gap is data, with the digits that it has. Layer and surfaces answer an error of it like springs in a row,
 /// 1/(1/kappa + 1/rho0).
-pub(super) fn lost(model: &Model, trace: &[f64], layer: &Layer) -> f64 {
+pub(super) fn lost(model: &Model, trace: &[f64], layer: &Layer, peak: f64) -> f64 {
     let (digits, slopes) = (of_compressions(model, trace), surface_slopes(model));
     let error = |q: usize| in_series(layer.tangent[q], slopes[q]) * digits[q];
     let most = (0..digits.len()).filter(|&q| layer.pressure[q] > 0.0).map(error).fold(0.0, f64::max);
-    if most > 0.0 { most / layer.peak() } else { 0.0 }
+    if most > 0.0 { most / peak } else { 0.0 }
 }

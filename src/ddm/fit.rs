@@ -9,7 +9,6 @@ use super::progress::distance;
 use super::start;
 use crate::model::Model;
 use crate::model::field::Field;
-use crate::model::layer::Layer;
 use crate::model::rigid::Motions;
 
 /// What a motion may leave of the squared distance from the laws, at most (docs/methods.md): below one, as rounding moves bodies on
@@ -23,16 +22,14 @@ pub(super) fn fit(model: &Model, [u, x]: [&mut Field; 2], p: &[f64], rho: &[f64]
     if motions.count() == 0 || p.iter().any(|&p| p < 0.0) {
         return;
     }
-    let off = |u: &Field| distance(model, rho, [&model.compression(&u.trace), &of_compressions(model, &u.trace)], p);
-    let here = off(u);
-    if here == 0.0 {
-        return;
-    }
-    let places = Layer::meet(model, &model.compression(&u.trace), p, rho);
-    if let Some((amounts, _)) = start::balance(model, &motions, &places, rho, tolerance) {
-        let (motion, mut there) = (motions.field(model, &amounts), u.clone());
+    let c = model.compression(&u.trace);
+    let off = |u: &Field, c: &[f64]| distance(model, rho, [c, &of_compressions(model, &u.trace)], p);
+    let here = off(u, &c);
+    let motion = || Some(motions.field(model, &start::balance(model, &motions, [&c, p], rho, tolerance)?));
+    if let Some(motion) = (here > 0.0).then(motion).flatten() {
+        let mut there = u.clone();
         there.add(1.0, &motion);
-        if off(&there) <= PART * here {
+        if off(&there, &model.compression(&there.trace)) <= PART * here {
             *u = there;
             x.add(1.0, &motion);
         }

@@ -44,23 +44,26 @@ pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
     if motions.count() == 0 {
         return springs;
     }
-    let mut free = motions.springs(&springs).factor(TOLERANCE).kernel();
-    if free.is_empty() {
-        return springs;
-    }
     let surfaces: Vec<f64> =
         surface_slopes(model).iter().zip(&model.weight).map(|(slope, weight)| slope * weight).collect();
-    while let Some(motion) = free.pop() {
-        let closing = motions.closing(&motion);
-        let Some(most) = (0..closing.len()).max_by(|&p, &q| closing[p].abs().total_cmp(&closing[q].abs())) else {
+    // beside new springs, softer ones may be nothing but rounding
+    for _ in 0..motions.count() {
+        let mut free = motions.springs(&springs).factor(TOLERANCE).kernel();
+        if free.is_empty() {
             break;
-        };
-        let shares = closing.iter().map(|s| (s / closing[most]).powi(2));
-        springs[most] += PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
-        // what the others close at that point is this one's
-        for other in &mut free {
-            let share = motions.closing(other)[most] / closing[most];
-            other.axpy(-share, &motion, 1.0);
+        }
+        while let Some(motion) = free.pop() {
+            let closing = motions.closing(&motion);
+            let Some(most) = (0..closing.len()).max_by(|&p, &q| closing[p].abs().total_cmp(&closing[q].abs())) else {
+                break;
+            };
+            let shares = closing.iter().map(|s| (s / closing[most]).powi(2));
+            springs[most] += PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
+            // what the others close at that point is this one's
+            for other in &mut free {
+                let share = motions.closing(other)[most] / closing[most];
+                other.axpy(-share, &motion, 1.0);
+            }
         }
     }
     springs

@@ -17,7 +17,6 @@ use super::forcing::Forcing;
 use super::history::Row;
 use super::linear::resisting;
 use super::run::{End, Run};
-use super::start;
 use super::stop::{Floor, Status};
 use crate::error::Result;
 use crate::model::Model;
@@ -65,11 +64,11 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         u.add(1.0, &x.field);
         u.retrace(run.model);
 
-        let p = match share < 1.0 {
+        let whole = match share < 1.0 {
             true => pressure,
             false => places.linear(&run.model.compression(&u.trace)),
         };
-        let p = run.memory.progress.go(share, p);
+        let p = run.memory.progress.go(share, &whole);
         if places.closed > 0 {
             fit::fit(run.model, [&mut u, &mut x.field], &p, &rho, tolerance);
         }
@@ -120,8 +119,12 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             run.memory.progress.forget();
         }
         if left.is_none() {
-            places =
-                if blind { Layer::at(run.model, &u.trace) } else { start::balanced(run.model, &met, &rho, tolerance) };
+            places = match share < 1.0 {
+                _ if blind => Layer::at(run.model, &u.trace),
+                // on which side of a corner a law is next, the pressures tell that the whole step led to
+                true => Layer::meet(run.model, &c, &whole, &rho),
+                false => met.clone(),
+            };
         }
         if measured.asked != 0 {
             run.memory.places = Some(places);

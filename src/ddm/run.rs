@@ -30,6 +30,8 @@ pub(super) struct Run<'a> {
     pub earlier: f64,
     pub origin: Option<Origin>,
     pub scale: Scale,
+    /// That of bodies and layers at the last iterate, u'Ku + sum omega p c.
+    pub energy: f64,
     pub memory: Memory,
     /// From its first iterate on, also where it goes on.
     pub rows: Vec<Row>,
@@ -184,6 +186,7 @@ impl Run<'_> {
         linear: &dyn LinearStep,
     ) -> Iterate<'a> {
         let residual = reached.worst();
+        self.energy = measured.strain + places.work;
         let closed = places.compression.iter().map(|&c| c > 0.0);
         Iterate {
             k: self.rows.len() + 1,
@@ -196,7 +199,7 @@ impl Run<'_> {
             residual,
             error: reached.error,
             is_bound: reached.is_bound,
-            missed: reached.error.powi(2) * self.scale.energy(measured.strain + places.work),
+            missed: reached.error.powi(2) * self.scale.energy(self.energy),
             sweeps: self.sweeps(linear),
             // pressures of compressions that are far away may be beyond the range of numbers: the places are not
             is_finite: !residual.is_nan(),
@@ -222,6 +225,7 @@ impl Run<'_> {
         let (factorizations, inner_iterations, asked) = (sweep.factorizations, sweep.inner_iterations, sweep.asked);
         let f1 = potential + layer.energy.iter().sum::<f64>();
         let all = strain + layer.work;
+        self.energy = all;
         let residual = self.scale.relative(missed, all);
         // a small residual of a slow mode is no small error: the pressures stand still, too
         let is_balanced = |tolerance: f64| self.scale.imbalance(self.model, &layer.force, all) <= tolerance;

@@ -133,7 +133,7 @@ pub struct Outcome {
     pub linear_step: String,
     /// Estimated bounds of the spectrum of G^-1 F1'', if the method saw enough.
     pub spectrum: Option<(f64, f64)>,
-    /// What rounding of gaps and displacements can make of a pressure, as a share of the largest.
+    /// What rounding of gaps and displacements can make of a pressure, as a share of what errors of pressures are measured by.
     pub rounding: f64,
     /// What it would still need to the residual that is asked for, where that can be told.
     pub forecast: Option<Forecast>,
@@ -168,6 +168,7 @@ pub fn solve(
         earlier: 0.0,
         origin: None,
         scale: Scale::default(),
+        energy: 0.0,
         memory: Memory::new(floor, foreign),
         rows: Vec::new(),
     };
@@ -310,7 +311,7 @@ impl Outcome {
 impl Run<'_> {
     /// The result of a loop's end.
     fn conclude(self, end: End, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
-        let Run { model, stop, rows, origin, memory, .. } = self;
+        let Run { model, stop, rows, origin, memory, scale, energy, .. } = self;
         let End { status, mut iterate, layer, weight, sweeps, skipped } = end;
         let mut found = None;
         let (spectrum, factor, updates) = match method {
@@ -326,7 +327,7 @@ impl Run<'_> {
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
-        let rounding = digits::lost(model, &iterate.trace, &layer);
+        let rounding = digits::lost(model, &iterate.trace, &layer, scale.peak(&layer.pressure, energy));
         Ok(Outcome {
             status,
             iterations: updates,

@@ -49,22 +49,12 @@ const STEPS: usize = 200;
 /// Which bodies move how, if loads push them away for ever.
 pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Moved>> {
     let motions = Motions::with_springs(model);
-    let work: Vec<f64> = motions.bodies().iter().copied().flatten().map(|motion| motion.work).collect();
     let mut gap = model.gap.clone();
     if let Some(given) = given {
         gap = model.compression(given).into_iter().map(|c| -c).collect();
     }
-    let (slope, bare) = (surface_slopes(model), vec![false; gap.len()]);
-    let mut rigid = Rigid {
-        model,
-        motions: &motions,
-        work: DVector::from_vec(work),
-        slope,
-        gap,
-        bare,
-        grounded: true,
-        balanced: PART,
-    };
+    let (work, slope) = (motions.loads(), surface_slopes(model));
+    let mut rigid = Rigid { model, motions: &motions, work, slope, gap, grounded: true, balanced: PART };
     let mut amounts = DVector::zeros(motions.count());
     // bodies that neither loads nor contacts push stay where they are: all else would be rounding
     let at_rest = motions.count() == 0 || rigid.work == amounts && rigid.approach(&amounts).iter().all(|&s| s <= 0.0);
@@ -77,7 +67,6 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
             // a contact that opens as a whole keeps its slope
             found.filter(|(new, _)| new.is_finite()).for_each(|(new, old)| *old = new);
         }
-        rigid.open_idle(&mut amounts);
     }
     let layer = rigid.places(&amounts);
     let mut trace = motions.trace(model, &amounts);
@@ -98,34 +87,20 @@ pub fn at(model: &Model, trace: &[f64]) -> Layer {
     met(model, &model.compression(trace), &surface_slopes(model))
 }
 
-/// Places that lines of slope `rho`, n, led to, with the bodies moved rigidly until the pressures there balance the loads to `tolerance` of the run, if a
-/// motion of the bodies would else meet no resistance: a linear step from there would know nothing of the contact that stops it. They are where
-/// the next step begins; the iterate that they came from has errors of its own.
-pub fn balanced(model: &Model, places: &Layer, rho: &[f64], tolerance: f64) -> Layer {
-    let motions = Motions::of(model);
-    if motions.count() == 0 || motions.springs(&places.springs(model)).factor(TOLERANCE).kernel().is_empty() {
-        return places.clone();
-    }
-    // where nothing stops the motion, the linear step says so
-    balance(model, &motions, places, rho, tolerance).map_or_else(|| places.clone(), |(_, places)| places)
-}
-
-/// Amounts of these motions by which places that lines of slope `rho`, n, led to come to balance the loads to a tolerance, and the places then;
-/// none if nothing stops a motion.
+/// Amounts of these motions by which states (c, p), n each, come to have places, on lines of slope `rho`, whose pressures balance the loads to a
+/// tolerance; none if nothing stops a motion.
 pub fn balance(
     model: &Model,
     motions: &Motions,
-    places: &Layer,
+    [compression, pressure]: [&[f64]; 2],
     rho: &[f64],
     tolerance: f64,
-) -> Option<(DVector<f64>, Layer)> {
-    let work: Vec<f64> = motions.bodies().iter().copied().flatten().map(|motion| motion.work).collect();
-    let gap: Vec<f64> = (0..rho.len()).map(|q| -places.compression[q] - places.pressure[q] / rho[q]).collect();
-    let (work, slope, bare) = (DVector::from_vec(work), rho.to_vec(), vec![false; gap.len()]);
-    let rigid = Rigid { model, motions, work, slope, gap, bare, grounded: false, balanced: tolerance };
-    let amounts = rigid.descend(DVector::zeros(motions.count())).ok()?;
-    let places = rigid.places(&amounts);
-    Some((amounts, places))
+) -> Option<DVector<f64>> {
+    let gap = compression.iter().zip(pressure).zip(rho).map(|((c, p), rho)| -c - p / rho).collect();
+    let (work, slope) = (motions.loads(), rho.to_vec());
+    Rigid { model, motions, work, slope, gap, grounded: false, balanced: tolerance }
+        .descend(DVector::zeros(motions.count()))
+        .ok()
 }
 
 fn met(model: &Model, approach: &[f64], slope: &[f64]) -> Layer {
@@ -177,7 +152,6 @@ pub fn in_series(a: f64, b: f64) -> f64 {
     (a.recip() + b.recip()).recip()
 }
 
-#[derive(Clone)]
 struct Rigid<'a> {
     model: &'a Model,
     motions: &'a Motions<'a>,
@@ -187,8 +161,6 @@ struct Rigid<'a> {
     slope: Vec<f64>,
     /// d, less what a given start closes of it.
     gap: Vec<f64>,
-    /// Points where surfaces meet without a layer, n.
-    bare: Vec<bool>,
     /// Whether the motions are also those that springs to the ground resist.
     grounded: bool,
     /// Forces out of balance that count as zero, as a share of those at work.
@@ -203,17 +175,7 @@ impl Rigid<'_> {
     }
 
     fn places(&self, amounts: &DVector<f64>) -> Layer {
-        self.places_at(&self.approach(amounts))
-    }
-
-    fn places_at(&self, approach: &[f64]) -> Layer {
-        let mut layer = met(self.model, approach, &self.slope);
-        for q in (0..approach.len()).filter(|&q| self.bare[q]) {
-            layer.pressure[q] = self.slope[q] * approach[q].max(0.0);
-            layer.force[q] = self.model.weight[q] * layer.pressure[q];
-            layer.tangent[q] = if approach[q] > 0.0 { f64::INFINITY } else { 0.0 };
-        }
-        layer
+        met(self.model, &self.approach(amounts), &self.slope)
     }
 
     /// omega Pi'': springs of law and surfaces in series.
@@ -257,19 +219,18 @@ impl Rigid<'_> {
         closing.iter().all(|&s| s <= PART * most)
     }
 
-    /// The minimum, by Newton's method with line search.
+    /// The minimum, from where all contacts are drawn together as far as surfaces let them: contact is found from the closed side.
     ///
     /// # Errors
     /// A motion along which the energy falls for ever.
     fn minimize(&self) -> Result<DVector<f64>, DVector<f64>> {
-        // drawn together as far as the surfaces let them, contact is found from the closed side
-        let everywhere: Vec<f64> =
+        let springs: Vec<f64> =
             self.slope.iter().zip(&self.model.weight).map(|(slope, weight)| slope * weight).collect();
-        let drawn: Vec<f64> = everywhere.iter().zip(&self.gap).map(|(spring, gap)| spring * gap).collect();
-        self.descend(self.solve(&everywhere, &(&self.work + self.motions.work(&drawn))))
+        let drawn: Vec<f64> = springs.iter().zip(&self.gap).map(|(spring, gap)| spring * gap).collect();
+        self.descend(self.solve(&springs, &(&self.work + self.motions.work(&drawn))))
     }
 
-    /// The minimum from `amounts` on.
+    /// The minimum from `amounts` on, by Newton's method with line search.
     ///
     /// # Errors
     /// A motion along which the energy falls for ever.
@@ -295,8 +256,7 @@ impl Rigid<'_> {
             let start = places.force;
             let held = step.dot(&self.pull(&amounts)) - gain;
             let slope = |t: f64| {
-                let approach = self.approach(&(&amounts + t * &step));
-                let force = self.places_at(&approach).force;
+                let force = self.places(&(&amounts + t * &step)).force;
                 dot(&force, &closing) + held + t * resisted
             };
             let first = dot(&start, &closing) + held;
@@ -308,37 +268,5 @@ impl Rigid<'_> {
             }
         }
         Ok(amounts)
-    }
-
-    /// Opens the contacts that an overlap alone presses together, and loads do not, if bodies can move so that no such contact is left.
-    /// Any part of the overlap that is left would be a pressure that vanishes slowly.
-    fn open_idle(&self, amounts: &mut DVector<f64>) {
-        let places = self.places(amounts);
-        let force = |pair: usize| places.force[self.model.range(pair)].iter().sum::<f64>();
-        let most = (0..self.model.pairs.len()).map(force).fold(0.0, f64::max);
-        let unloaded = self.work.iter().all(|&work| work == 0.0);
-        let idle = |pair: &usize| unloaded || force(*pair) <= PART.sqrt() * most;
-        let idle: Vec<usize> =
-            (0..self.model.pairs.len()).filter(idle).flat_map(|pair| self.model.range(pair)).collect();
-        // bodies give way by about what they are compressed elsewhere, and by what an origin's digits leave of their way
-        let deepest = places.compression.iter().copied().fold(0.0, f64::max);
-        let approach = self.approach(amounts);
-        let terms = |q: usize| self.gap[q].abs().max((approach[q] + self.gap[q]).abs());
-        let way = idle.iter().map(|&q| terms(q)).fold(0.0, f64::max);
-        let room = 2.0 * (deepest + 4.0 * super::origin::ROUNDING * way);
-        if idle.iter().all(|&q| approach[q] <= -0.5 * room) {
-            return;
-        }
-        let mut gap = self.gap.clone();
-        let mut bare = vec![false; gap.len()];
-        idle.iter().for_each(|&q| (gap[q], bare[q]) = (gap[q] - room, true));
-        let wider = Rigid { gap, bare, ..self.clone() };
-        // layers that are soft at first would open slowly
-        if let Ok(moved) = wider.descend(amounts.clone()) {
-            let approach = self.approach(&moved);
-            if idle.iter().all(|&q| approach[q] <= -0.5 * room) {
-                *amounts = moved;
-            }
-        }
     }
 }

@@ -162,6 +162,11 @@ impl<'a> Motions<'a> {
         field
     }
 
+    /// Work of the loads on each motion.
+    pub fn loads(&self) -> DVector<f64> {
+        DVector::from_iterator(self.count(), self.bodies.iter().copied().flatten().map(|motion| motion.work))
+    }
+
     /// (B E)' `force`: work of forces at the points on each motion.
     pub fn work(&self, force: &[f64]) -> DVector<f64> {
         let mut work = DVector::zeros(self.count());
