@@ -11,7 +11,7 @@ use crate::ddm::{Discretisation, linear};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
 use crate::model::field::residual;
-use crate::model::layer::meeting_slopes;
+use crate::model::surface::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
 use layer::LayerError;
 use std::rc::Rc;

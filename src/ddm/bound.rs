@@ -10,11 +10,11 @@
 //! each term of which is zero on the graph of the law and positive beside it. No spectrum, no history, no constants.
 
 use super::scale::Scale;
-use super::start::surface_slopes;
 use crate::contact::LayerLaw;
 use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::linear::Solution;
+use crate::model::surface::surface_slopes;
 
 /// The relative errors by which a run of Newton's method ends.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

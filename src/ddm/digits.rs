@@ -1,6 +1,6 @@
 //! Digits that pressures lose where displacements are far larger than compressions.
 
-use super::start::{in_series, surface_slopes};
+use crate::model::surface::{in_series, surface_slopes};
 use crate::model::{Layer, Model};
 
 /// What rounding of the gap and of both displacements, a trace vector, leaves unknown of every compression c = u_a + u_b - d, n.

@@ -1,9 +1,9 @@
 //! Linear steps of the method: their springs, and the response to small loads.
 
-use super::start::surface_slopes;
 use crate::error::Result;
 use crate::model::linear::{Failure, LinearStep, System, Trial};
 use crate::model::rigid::{Motions, TOLERANCE};
+use crate::model::surface::surface_slopes;
 use crate::model::{Field, Layer, Model};
 
 /// The response w of the bodies and their layers to small loads: (K + B' diag(omega kappa) B) w = r, with its squared energy norm,

@@ -21,9 +21,10 @@ use super::stop::{Floor, Status};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
-use crate::model::layer::{Layer, meeting_slopes};
+use crate::model::layer::Layer;
 use crate::model::line::Line;
 use crate::model::linear::{LinearStep, System, Trial};
+use crate::model::surface::meeting_slopes;
 
 /// Iterates from displacements and places until a rule ends it.
 ///

@@ -25,7 +25,7 @@ pub(super) struct Progress {
     /// Steps in a row that came no nearer to the laws, and all of them.
     row: usize,
     failures: usize,
-    /// Slopes for each pair after the last step, as multiples of [`meeting_slopes`](crate::model::layer::meeting_slopes); empty before the second.
+    /// Slopes for each pair after the last step, as multiples of [`meeting_slopes`](crate::model::surface::meeting_slopes); empty before the second.
     answer: Vec<f64>,
 }
 

@@ -9,10 +9,11 @@
 //!
 //! A start that the scene gives is no measure: it may be any.
 
-use super::start::{self, surface_slopes};
+use super::start;
 use crate::linalg::dot;
 use crate::model::Model;
 use crate::model::rigid::PART;
+use crate::model::surface::surface_slopes;
 
 /// Least scales of a run.
 #[derive(Debug, Default)]

@@ -17,11 +17,12 @@
 //! elastic bodies leave of it; and what a motion closes, by rounding and proximal springs. One that is felt at a meshed circle of
 //! 1000 edges closes 1e-5 of itself.
 
-use crate::linalg::{axpy, dot};
+use crate::linalg::{Blocks, axpy, dot};
+use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::line::{self, Unbounded};
 use crate::model::rigid::{Motions, Moved, PART, TOLERANCE};
-use crate::model::{Model, Sprung};
+use crate::model::surface::{contact_slopes, in_series, surface_slopes};
 use nalgebra::DVector;
 
 /// Where a run begins.
@@ -54,7 +55,10 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
         gap = model.compression(given).into_iter().map(|c| -c).collect();
     }
     let (work, slope) = (motions.loads(), surface_slopes(model));
-    let mut rigid = Rigid { model, motions: &motions, work, slope, gap, grounded: true, balanced: PART };
+    let mut ground = motions.blocks();
+    let sprung = model.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)));
+    sprung.for_each(|(body, sprung)| ground.add(body, body, &sprung.stiffness));
+    let mut rigid = Rigid { model, motions: &motions, work, slope, gap, ground, balanced: PART };
     let mut amounts = DVector::zeros(motions.count());
     // bodies that neither loads nor contacts push stay where they are: all else would be rounding
     let at_rest = motions.count() == 0 || rigid.work == amounts && rigid.approach(&amounts).iter().all(|&s| s <= 0.0);
@@ -63,7 +67,7 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
         for _ in 0..2 {
             amounts = rigid.minimize().map_err(|motion| motions.names(&motion))?;
             let approach = rigid.approach(&amounts);
-            let found = slopes(model, |q| approach[q] > 0.0).into_iter().zip(&mut rigid.slope);
+            let found = contact_slopes(model, |q| approach[q] > 0.0).into_iter().zip(&mut rigid.slope);
             // a contact that opens as a whole keeps its slope
             found.filter(|(new, _)| new.is_finite()).for_each(|(new, old)| *old = new);
         }
@@ -98,58 +102,13 @@ pub fn balance(
 ) -> Option<DVector<f64>> {
     let gap = compression.iter().zip(pressure).zip(rho).map(|((c, p), rho)| -c - p / rho).collect();
     let (work, slope) = (motions.loads(), rho.to_vec());
-    Rigid { model, motions, work, slope, gap, grounded: false, balanced: tolerance }
+    Rigid { model, motions, work, slope, gap, ground: motions.blocks(), balanced: tolerance }
         .descend(DVector::zeros(motions.count()))
         .ok()
 }
 
 fn met(model: &Model, approach: &[f64], slope: &[f64]) -> Layer {
     Layer::meet(model, approach, &vec![0.0; approach.len()], slope)
-}
-
-/// Stiffness of an elastic foundation over E*/a, with the half width or radius a of the contact, in the plane and in space: it then has
-/// the contact of Hertz (Johnson, Contact Mechanics, 1985, section 4.3).
-const FOUNDATION: [f64; 2] = [1.18, 1.70];
-
-/// Share of that stiffness, for a contact of spheres that is an eighth wider than Hertz's: steps that let points open are better than
-/// those that close them. Spheres and cylinders took the fewest steps at this share, of 0.3 to 1.2 (docs/methods.md).
-const LARGER: f64 = 0.7;
-
-/// rho0: stiffness per area of the two bodies of each point in series, for contact all over their surfaces.
-pub fn surface_slopes(model: &Model) -> Vec<f64> {
-    slopes(model, |_| true)
-}
-
-/// The same for contact at the points that are `closed`: each body gives way as over its depth, or as over its contact if that is
-/// smaller.
-fn slopes(model: &Model, closed: impl Fn(usize) -> bool) -> Vec<f64> {
-    let (points, rows) = (model.points(), model.row_stiffness());
-    let stiffness = |body: usize, per_modulus: f64| {
-        let slot = &model.bodies[body];
-        slot.modulus * per_modulus.max(slot.depth.recip())
-    };
-    let largest = (0..model.bodies.len()).map(|body| stiffness(body, 0.0)).fold(f64::MIN_POSITIVE, f64::max);
-    let mut slopes = Vec::with_capacity(points);
-    for (i, pair) in model.pairs.iter().enumerate() {
-        let area: f64 = model.range(i).filter(|&q| closed(q)).map(|q| model.weight[q]).sum();
-        let half = if pair.measure == "length" { 0.5 * area } else { (area / std::f64::consts::PI).sqrt() };
-        let per_modulus = LARGER * FOUNDATION[usize::from(pair.measure != "length")] / half;
-        slopes.extend(model.range(i).map(|q| {
-            // a row without stiffness cannot move
-            let compliance = |side: usize| match rows[side * points + q] {
-                0.0 => 0.0,
-                _ => stiffness(pair.bodies[side], per_modulus).recip(),
-            };
-            let sum = compliance(0) + compliance(1);
-            if sum > 0.0 { sum.recip() } else { largest }
-        }));
-    }
-    slopes
-}
-
-/// Stiffness of two springs in a row, either of which may be zero or infinite.
-pub fn in_series(a: f64, b: f64) -> f64 {
-    (a.recip() + b.recip()).recip()
 }
 
 struct Rigid<'a> {
@@ -161,8 +120,8 @@ struct Rigid<'a> {
     slope: Vec<f64>,
     /// d, less what a given start closes of it.
     gap: Vec<f64>,
-    /// Whether the motions are also those that springs to the ground resist.
-    grounded: bool,
+    /// Springs to the ground that resist the motions, a block a body.
+    ground: Blocks,
     /// Forces out of balance that count as zero, as a share of those at work.
     balanced: f64,
 }
@@ -193,30 +152,8 @@ impl Rigid<'_> {
         };
         let all: Vec<f64> = all.map(resisted).collect();
         let mut stiffness = self.motions.springs(&all);
-        self.grounded().for_each(|(body, sprung)| stiffness.add(body, body, &sprung.stiffness));
+        self.ground.stored().for_each(|(i, j, block)| stiffness.add(i, j, block));
         stiffness.factor(TOLERANCE).solve(load)
-    }
-
-    /// Bodies on springs.
-    fn grounded(&self) -> impl Iterator<Item = (usize, &Sprung)> {
-        let bodies = self.model.bodies.iter().enumerate().filter(|_| self.grounded);
-        bodies.filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)))
-    }
-
-    /// Forces of the springs to the ground on each motion.
-    fn pull(&self, amounts: &DVector<f64>) -> DVector<f64> {
-        let mut pull = DVector::zeros(amounts.len());
-        for (body, sprung) in self.grounded() {
-            let own = self.motions.of_body(body);
-            pull.rows_mut(own.start, own.len()).copy_from(&(&sprung.stiffness * amounts.rows(own.start, own.len())));
-        }
-        pull
-    }
-
-    /// Whether a motion opens contacts only.
-    fn opens(&self, closing: &[f64]) -> bool {
-        let most = closing.iter().fold(0.0f64, |most, s| most.max(s.abs()));
-        closing.iter().all(|&s| s <= PART * most)
     }
 
     /// The minimum, from where all contacts are drawn together as far as surfaces let them: contact is found from the closed side.
@@ -240,21 +177,24 @@ impl Rigid<'_> {
             let places = self.places(&amounts);
             let push = self.motions.work(&places.force);
             let acting = self.motions.sizes(&places.force);
-            let lacking = &self.work - &push - self.pull(&amounts);
+            let pull = self.ground.multiply(&amounts);
+            let lacking = &self.work - &push - &pull;
             let small = |i: usize| self.balanced * (acting[i].max(self.work[i].abs()).max(PART * largest));
             if (0..lacking.len()).all(|i| lacking[i].abs() <= small(i)) {
                 break;
             }
             let step = self.solve(&self.springs(&places), &lacking);
             let closing = self.motions.closing(&step);
-            let (gain, resisted) = (step.dot(&self.work), step.dot(&self.pull(&step)));
+            let (gain, resisted) = (step.dot(&self.work), step.dot(&self.ground.multiply(&step)));
             let gains = gain > PART * step.amax() * largest;
+            let most = closing.iter().fold(0.0f64, |most, s| most.max(s.abs()));
+            let opens = closing.iter().all(|&s| s <= PART * most);
             // near rest the step and what resists it are small
-            if gains && resisted <= PART * step.dot(&lacking) && self.opens(&closing) {
+            if gains && resisted <= PART * step.dot(&lacking) && opens {
                 return Err(step);
             }
             let start = places.force;
-            let held = step.dot(&self.pull(&amounts)) - gain;
+            let held = step.dot(&pull) - gain;
             let slope = |t: f64| {
                 let force = self.places(&(&amounts + t * &step)).force;
                 dot(&force, &closing) + held + t * resisted

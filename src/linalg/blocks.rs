@@ -1,8 +1,6 @@
 //! Symmetric positive semidefinite matrices of small dense blocks, one row of blocks a body.
 
-use nalgebra::DMatrix;
-#[cfg(test)]
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -68,7 +66,6 @@ impl Blocks {
     }
 
     /// A x.
-    #[cfg(test)]
     pub fn multiply(&self, x: &DVector<f64>) -> DVector<f64> {
         let mut y = DVector::zeros(self.unknowns());
         for (i, j, block) in self.stored() {

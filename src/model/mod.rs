@@ -13,6 +13,7 @@ pub mod line;
 pub mod linear;
 pub mod origin;
 pub mod rigid;
+pub mod surface;
 
 pub use body::{Body, BodyCounts, Energy, Loads, Matrices, Solved};
 pub use distribution::Distribution;

@@ -97,10 +97,14 @@ impl<'a> Motions<'a> {
         self.first.partition_point(|&first| first <= motion) - 1
     }
 
+    /// Zero, with a row of blocks a body.
+    pub fn blocks(&self) -> Blocks {
+        Blocks::new(&self.first.windows(2).map(|ends| ends[1] - ends[0]).collect::<Vec<usize>>())
+    }
+
     /// (B E)' diag(`weight`) (B E), for springs at the points, one entry a point: a block a body.
     pub fn springs(&self, weight: &[f64]) -> Blocks {
-        let sizes: Vec<usize> = self.first.windows(2).map(|ends| ends[1] - ends[0]).collect();
-        let mut springs = Blocks::new(&sizes);
+        let mut springs = self.blocks();
         for (range, ends) in &self.pairs {
             let weight = &weight[range.clone()];
             let pulled = |trace: &[f64]| trace.iter().zip(weight).map(|(t, w)| t * w).collect::<Vec<f64>>();
