@@ -65,11 +65,11 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         u.add(1.0, &x.field);
         u.retrace(run.model);
 
-        let whole = match share < 1.0 {
+        let p = match share < 1.0 {
             true => pressure,
             false => places.linear(&run.model.compression(&u.trace)),
         };
-        let p = run.memory.progress.go(share, &whole);
+        let p = run.memory.progress.go(share, &p);
         if places.closed > 0 {
             fit::fit(run.model, [&mut u, &mut x.field], &p, &rho, tolerance);
         }
@@ -120,12 +120,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             run.memory.progress.forget();
         }
         if left.is_none() {
-            places = match share < 1.0 {
-                _ if blind => Layer::at(run.model, &u.trace),
-                // on which side of a corner a law is next, the pressures tell that the whole step led to
-                true => Layer::meet(run.model, &c, &whole, &rho),
-                false => met.clone(),
-            };
+            places = if blind { Layer::at(run.model, &u.trace) } else { met.clone() };
         }
         if measured.asked != 0 {
             run.memory.places = Some(places);
