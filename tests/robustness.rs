@@ -226,7 +226,7 @@ fn lost_digits_have_their_status() {
 /// A block that leans on one edge, over a gap as wide as a contact point: whole steps go back and forth between two contacts.
 #[test]
 fn shortened_steps_come_to_an_end() {
-    for (lean, most) in [(0.8, 10), (0.85, 15), (0.9, 25), (0.93, 10)] {
+    for (lean, most) in [(0.8, 6), (0.85, 11), (0.9, 20), (0.93, 5)] {
         let upper =
             format!("order = 1\nload = [{{ on = \"b2_top\", pressure = \"5.7e3 * (1 + {lean} * (2*x - 1))\" }}]");
         let gap = "8.6e-4 * max(0, 1 - ((x - 1) / 0.3)^2)^1.5";

@@ -41,17 +41,14 @@ const PROXIMAL: f64 = 1e-3;
 /// and could turn about the points that are closed, a single spring carries nothing, and the step is exact; several would.
 pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
     let motions = Motions::of(model);
-    if motions.count() == 0 {
-        return springs;
-    }
-    let surfaces: Vec<f64> =
-        surface_slopes(model).iter().zip(&model.weight).map(|(slope, weight)| slope * weight).collect();
     // beside new springs, softer ones may be nothing but rounding
     for _ in 0..motions.count() {
         let mut free = motions.springs(&springs).factor(TOLERANCE).kernel();
         if free.is_empty() {
             break;
         }
+        let surfaces: Vec<f64> =
+            surface_slopes(model).iter().zip(&model.weight).map(|(slope, weight)| slope * weight).collect();
         while let Some(motion) = free.pop() {
             let closing = motions.closing(&motion);
             let Some(most) = (0..closing.len()).max_by(|&p, &q| closing[p].abs().total_cmp(&closing[q].abs())) else {

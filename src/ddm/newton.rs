@@ -65,11 +65,8 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         u.add(1.0, &x.field);
         u.retrace(run.model);
 
-        let p = match share < 1.0 {
-            true => pressure,
-            false => places.linear(&run.model.compression(&u.trace)),
-        };
-        let p = run.memory.progress.go(share, &p);
+        let whole = if share < 1.0 { pressure } else { places.linear(&run.model.compression(&u.trace)) };
+        let p = run.memory.progress.go(share, whole);
         if places.closed > 0 {
             fit::fit(run.model, [&mut u, &mut x.field], &p, &rho, tolerance);
         }

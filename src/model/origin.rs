@@ -5,8 +5,8 @@
 //! start, once, and the iteration works on what is left. They come from the scene alone, not from a method or its start, and have few
 //! digits: every method sees the same gaps.
 
-use super::{Field, Model};
-use crate::linalg::{dot, fit};
+use super::{Field, Model, Motions};
+use crate::linalg::dot;
 use nalgebra::DVector;
 
 /// Binary digits that an origin's amounts have: products with coordinates of 29 digits are then exact.
@@ -31,28 +31,21 @@ impl Origin {
         if amounts.iter().all(|&amount| amount == 0.0) {
             return None;
         }
-        let (mut motion, mut rest) = (Field::rest(model), Field::rest(model));
+        let mut motion = Motions::with_springs(model).field(model, amounts);
+        let mut rest = Field::rest(model);
         let mut energy = [0.0];
-        let mut first = 0;
         for (index, slot) in model.bodies.iter_mut().enumerate() {
-            let count = slot.sprung.as_ref().map_or(slot.motions.len(), |sprung| sprung.motions.len());
-            let own = first..first + count;
-            first = own.end;
+            let state = &mut motion.states[index];
             // what springs hold is no free motion: it stays part of the displacements
             if slot.sprung.is_some() {
-                motion.states[index].fill(0.0);
+                state.fill(0.0);
                 continue;
             }
             let Some(body) = slot.local.as_mut() else { continue };
-            let state = &mut motion.states[index];
-            state.fill(0.0);
-            let Some(matrices) = body.matrices() else { continue };
-            let mut trace = vec![0.0; slot.row_stiffness.len()];
-            slot.motions.iter().zip(own).for_each(|(m, i)| crate::linalg::axpy(amounts[i], &m.trace, &mut trace));
-            let own = fit(matrices.traces, &trace);
-            let deformation = state.len() - own.len();
-            let beyond = &mut rest.states[index][deformation..];
-            for ((origin, beyond), amount) in state[deformation..].iter_mut().zip(beyond).zip(own) {
+            let Some(count) = body.matrices().map(|matrices| matrices.traces.len()) else { continue };
+            let deformation = state.len() - count;
+            for (origin, beyond) in state[deformation..].iter_mut().zip(&mut rest.states[index][deformation..]) {
+                let amount = *origin;
                 *origin = short(amount);
                 *beyond += amount - *origin;
             }
