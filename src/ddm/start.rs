@@ -65,7 +65,7 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
     if !at_rest {
         // with rho0 of whole surfaces, then with that of the contact found
         for _ in 0..2 {
-            amounts = rigid.minimize().map_err(|motion| motions.names(&motion))?;
+            amounts = rigid.descend(amounts).map_err(|motion| motions.names(&motion))?;
             let approach = rigid.approach(&amounts);
             let found = contact_slopes(model, |q| approach[q] > 0.0).into_iter().zip(&mut rigid.slope);
             // a contact that opens as a whole keeps its slope
@@ -156,17 +156,6 @@ impl Rigid<'_> {
         stiffness.factor(TOLERANCE).solve(load)
     }
 
-    /// The minimum, from where all contacts are drawn together as far as surfaces let them: contact is found from the closed side.
-    ///
-    /// # Errors
-    /// A motion along which the energy falls for ever.
-    fn minimize(&self) -> Result<DVector<f64>, DVector<f64>> {
-        let springs: Vec<f64> =
-            self.slope.iter().zip(&self.model.weight).map(|(slope, weight)| slope * weight).collect();
-        let drawn: Vec<f64> = springs.iter().zip(&self.gap).map(|(spring, gap)| spring * gap).collect();
-        self.descend(self.solve(&springs, &(&self.work + self.motions.work(&drawn))))
-    }
-
     /// The minimum from `amounts` on, by Newton's method with line search.
     ///
     /// # Errors
@@ -189,12 +178,12 @@ impl Rigid<'_> {
             let gains = gain > PART * step.amax() * largest;
             let most = closing.iter().fold(0.0f64, |most, s| most.max(s.abs()));
             let opens = closing.iter().all(|&s| s <= PART * most);
-            // near rest the step and what resists it are small
-            if gains && resisted <= PART * step.dot(&lacking) && opens {
+            // where no contact is closed on the way, the energy is below that of loads and ground alone: -slope t + resisted t^2 / 2
+            let held = step.dot(&pull) - gain;
+            if gains && resisted <= -PART * held && opens {
                 return Err(step);
             }
             let start = places.force;
-            let held = step.dot(&pull) - gain;
             let slope = |t: f64| {
                 let force = self.places(&(&amounts + t * &step)).force;
                 dot(&force, &closing) + held + t * resisted
