@@ -178,7 +178,7 @@ impl Rigid<'_> {
             let gains = gain > PART * step.amax() * largest;
             let most = closing.iter().fold(0.0f64, |most, s| most.max(s.abs()));
             let opens = closing.iter().all(|&s| s <= PART * most);
-            // where no contact is closed on the way, the energy is below that of loads and ground alone: -slope t + resisted t^2 / 2
+            // where no contact closes, the energy falls at least as long as that of loads and ground: held t + resisted t^2 / 2
             let held = step.dot(&pull) - gain;
             if gains && resisted <= -PART * held && opens {
                 return Err(step);
