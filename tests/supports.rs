@@ -59,6 +59,21 @@ fn a_foundation_under_the_patch() {
     }
 }
 
+/// A stiff contact that overlaps pushes the upper block off, which is pulled as well: nothing but a soft spring ends that.
+#[test]
+fn a_soft_spring_holds_what_contact_lets_go() {
+    let sets = [
+        "method={}",
+        "body.1.load=[{on=\"upper_face\",pressure=-1e-3}]",
+        "body.1.spring=[{on=\"upper_face\",normal=0.01}]",
+        "contact.0.gap=-1e-3",
+    ];
+    let run = solve(case("patch"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged();
+    assert!(run.contact()["pressure"].iter().all(|&pressure| pressure == 0.0));
+    let pull = force(&run, 1, "springs", 0)[1];
+    assert!((pull / -1e-3 - 1.0).abs() < 1e-7, "{pull}");
+}
+
 #[test]
 fn a_spring_at_a_point_holds_like_a_support() {
     let run = patch(&["body.0.fix=[{on=\"lower_face\",y=0}]", "body.0.spring=[{on=\"lower_pin\",stiffness=[1e3,0]}]"]);

@@ -60,17 +60,12 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
     sprung.for_each(|(body, sprung)| ground.add(body, body, &sprung.stiffness));
     let mut rigid = Rigid { model, motions: &motions, work, slope, gap, ground, balanced: PART };
     let mut amounts = DVector::zeros(motions.count());
-    // bodies that neither loads nor contacts push stay where they are: all else would be rounding
-    let at_rest = motions.count() == 0 || rigid.work == amounts && rigid.approach(&amounts).iter().all(|&s| s <= 0.0);
-    if !at_rest {
+    if !amounts.is_empty() {
         // with rho0 of whole surfaces, then with that of the contact found
-        for _ in 0..2 {
-            amounts = rigid.descend(amounts).map_err(|motion| motions.names(&motion))?;
-            let approach = rigid.approach(&amounts);
-            let found = contact_slopes(model, |q| approach[q] > 0.0).into_iter().zip(&mut rigid.slope);
-            // a contact that opens as a whole keeps its slope
-            found.filter(|(new, _)| new.is_finite()).for_each(|(new, old)| *old = new);
-        }
+        amounts = rigid.descend(amounts).map_err(|motion| motions.names(&motion))?;
+        let approach = rigid.approach(&amounts);
+        rigid.slope = contact_slopes(model, |q| approach[q] > 0.0);
+        amounts = rigid.descend(amounts).map_err(|motion| motions.names(&motion))?;
     }
     let layer = rigid.places(&amounts);
     let mut trace = motions.trace(model, &amounts);

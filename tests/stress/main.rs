@@ -119,10 +119,6 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     assert!(answer.status == "converged" && answer.iterations <= 8, "{} {}", answer.iterations, answer.message);
     // springs of 1e-169 are rounding beside the one that keeps the next body: both motions get one
     assert_eq!(bench.run(132111, 727, &["auto"]).0[0].1.status, "converged");
-    // a body on weak springs to the ground is pulled off a stiff layer: springs hold it, and no contact does
-    let case = wide::scene(2170544, 267, Path::new(env!("CARGO_MANIFEST_DIR")));
-    let answer = &bench.solve(case, &["auto"]).0[0].1;
-    assert_eq!(answer.status, "converged", "{}", answer.message);
     // a layer of 1e14 answers the rounding of compressions with 1e-7 of the largest pressure, and further steps with as much again
     let case = wide::scene(132118, 113, Path::new(env!("CARGO_MANIFEST_DIR")));
     let answer = &bench.solve(case, &["auto"]).0[0].1;
