@@ -31,7 +31,7 @@ use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
 use crate::exchange::Exchange;
-use crate::fem::{FreeMotion, NodalBlock, RigidMotion};
+use crate::fem::{FreeMotion, place};
 use crate::linalg::{Csr, axpy, dot};
 use crate::mesh::Checked;
 use crate::model::{BodySlot, Loads, Mechanism, Model, Segment};
@@ -48,7 +48,6 @@ pub use factory::{Assembled, Factory, Outline};
 use local::Local;
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
-use part::Part;
 use parts::parts;
 use post::OnPart;
 pub use post::Post;
@@ -219,16 +218,12 @@ pub fn discretize<const D: usize>(
     drop(deals);
     let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt);
     let known = gauged.into_iter().zip(loose).zip(elasticities);
-    for (index, ((part, (((draft, supported), graph), dealt)), ((gauged, loose), elasticity))) in
+    for (index, ((mut part, (((draft, supported), graph), mut dealt)), ((gauged, loose), elasticity))) in
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
         let is_owner = owner[index] == rank;
-        let ranks = dealt.as_ref().map_or_else(|| vec![owner[index]], |dealt| dealt.ranks.clone());
-        let owns = dealt
-            .as_ref()
-            .map(|dealt| (0..part.space.nodes.len()).map(|node| dealt.is_own::<D>(node)).collect::<Vec<_>>());
-        let Draft { segments, rows, nodal_load, load, .. } = draft;
-        let Supported { carried, prescribed } = supported;
+        let Draft { segments, mut rows, nodal_load, load, .. } = draft;
+        let Supported { mut carried, mut prescribed } = supported;
         let mut offset = vec![0.0; rows.rows()];
         if !carried.is_empty() {
             rows.multiply(&carried, &mut offset);
@@ -236,109 +231,130 @@ pub fn discretize<const D: usize>(
         offsets.push(offset);
         let Loose { left, motions, sprung, unfelt } = loose;
         let name = part.spec.name.value.clone();
-        let mut resultant =
-            contact::pad(std::array::from_fn::<f64, D, _>(|c| nodal_load.iter().skip(c).step_by(D).sum()));
+        let mut resultant = nodal_load.sum();
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
         let surface: f64 = segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
         let modulus = dot(&part.known.moduli, &share(&segments, &pairs));
         let held = motions.len() == unfelt.len();
         let depth = part.known.volume / surface;
-        let stiffness = if held && surface > 0.0 { modulus / depth } else { 0.0 };
+        let mut info = BodyInfo {
+            name: name.clone(),
+            nodes: part.space.nodes.len(),
+            points: Vec::new(),
+            cells: part.known.cells,
+            facets: checked[index].clone(),
+            dofs: part.space.dofs(),
+            supported: part.held.supported(),
+            left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),
+            left_by_all: unfelt.into_iter().map(|(name, _)| name).collect(),
+            gauged,
+            warning: elastic::warning(part.spec, &part.space, scene.plane),
+            stiffness: if held && surface > 0.0 { modulus / depth } else { 0.0 },
+            load: resultant,
+            rank: owner[index],
+            ranks: dealt.as_ref().map_or_else(|| vec![owner[index]], |dealt| dealt.ranks.clone()),
+            supports: part.spec.fix.iter().map(|support| support.on.value.clone()).collect(),
+            springs: part.spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
+            rigid: part.held.rigid.iter().map(|(load, _)| part.spec.load[*load].on.value.clone()).collect(),
+            post: None,
+        };
+        let unloaded = if keep { part.unloaded(mesh, &nodal_load.all())? } else { Vec::new() };
         // what only the owner knows, until all ranks share it
         let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
-        let mut kept = factory.kept(&name).filter(|_| is_owner);
-        let loads = kept.is_some().then(|| Loads {
-            work: free(&part, &left, &prescribed, &load).iter().map(|motion| motion.work).collect(),
-            force: load.clone(),
-            prescribed: prescribed.clone(),
-            carried: carried.clone(),
-        });
-        let body = kept.as_mut().and_then(|slot| slot.local.as_mut());
-        let serves = match (body, loads) {
-            (Some(body), Some(loads)) => body.reload(&loads)?,
-            _ => false,
-        };
-        if let Some(before) = kept.filter(|_| serves) {
-            (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
-            assemblies_avoided += 1;
-        } else if is_owner || dealt.is_some() {
-            let left = free(&part, &left, &prescribed, &load);
-            let mut graph = graph.filter(|_| alone).unwrap_or_else(|| part.graph(&part.space, &rows));
-            if let Some(dealt) = &dealt {
-                graph = graph.of(|node| dealt.is_own::<D>(node));
-            }
-            let mut body = part.assemble(mesh, &graph, &elasticity, load, prescribed, carried)?;
-            drop(graph);
-            if is_owner {
-                assemblies += 1;
-                scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-            }
-            row_stiffness = rows.quadratic_diagonal(&body.stiffness);
-            if let Some(dealt) = &dealt {
-                body = dealt.own::<D>(body);
-            }
-            let interpolation = factory.wants_interpolation(&name).then(|| match &dealt {
-                Some(dealt) => dealt.interpolation::<D>(|coarse| part.interpolation(coarse)),
-                None => part.interpolation(&part.coarse_nodes()),
-            });
-            local = Some(factory.make(Assembled {
-                name: name.clone(),
-                dimension: D,
-                body,
-                distribution: dealt.map(|dealt| dealt.distribution),
-                rows,
-                motions: &|| part.smooth(),
-                left,
-                interpolation,
-            })?);
-        }
-        let unloaded = if keep { part.unloaded(mesh, &nodal_load)? } else { Vec::new() };
-        let warning = elastic::warning(part.spec, &part.space, scene.plane);
-        let (nodes, cells) = (part.space.nodes.len(), part.known.cells);
-        let (space, held, elasticity) = (Rc::new(part.space), Rc::new(part.held), Rc::new(elasticity));
-        let (mut points, mut post) = (Vec::new(), None);
-        if owns.is_some() || is_owner {
-            let is_own = |node| owns.as_ref().is_none_or(|owns| owns[held.frame.node(node) as usize]);
-            let local = Rc::new(Local::new(space.clone(), cells, is_own));
-            points = match &owns {
-                None => part.known.points.to_vec(),
-                Some(_) => {
-                    let (_, shown) = local.space.part(local.told());
-                    shown.iter().map(|&node| part.known.points[local.nodes[node as usize] as usize]).collect()
+        let elasticity = Rc::new(elasticity);
+        let (space, held) = if is_owner || dealt.is_some() {
+            let (smooth, mut nodal_rows) = (part.smooth(), nodal_rows(&segments, &pairs, part.space.dofs()));
+            let (mut force, mut nodal_force) = (load.all(), nodal_load.all());
+            let mut free: Vec<FreeMotion> = Vec::new();
+            let mut own = vec![true; part.space.nodes.len()];
+            match &mut dealt {
+                None => free.extend(
+                    left.iter().map(|motion| FreeMotion::new(part.dofs_of(motion), &prescribed, |u| dot(u, &force))),
+                ),
+                Some(dealt) => {
+                    let (products, work) = part.products(&left, &prescribed, &force);
+                    let nodes = part.space.among(dealt.nodes_here::<D>(&part, [&rows, &nodal_rows]));
+                    dealt.choose::<D>(&nodes, products);
+                    (part, force, nodal_force) = (part.on(&nodes), load.on(&nodes), nodal_load.on(&nodes));
+                    own = (0..nodes.len() as u32)
+                        .map(|node| dealt.is_own::<D>(part.held.frame.node(node) as usize))
+                        .collect();
+                    let here = |dof: usize| Some(D * place(&nodes, (dof / D) as u32)? as usize + dof % D);
+                    for rows in [&mut rows, &mut nodal_rows] {
+                        *rows = rows.of_columns(D * nodes.len(), here);
+                    }
+                    prescribed = prescribed.into_iter().filter_map(|(dof, u)| Some((here(dof)?, u))).collect();
+                    if !carried.is_empty() {
+                        carried = nodes.iter().flat_map(|&node| &carried[D * node as usize..][..D]).copied().collect();
+                    }
+                    let motions = left.iter().zip(work);
+                    free.extend(
+                        motions.map(|(motion, work)| FreeMotion::new(part.dofs_of(motion), &prescribed, |_| work)),
+                    );
                 }
+            }
+            let mut kept = factory.kept(&name).filter(|_| dealt.is_none());
+            let mut serves = false;
+            if let Some(body) = kept.as_mut().and_then(|slot| slot.local.as_mut()) {
+                let work = free.iter().map(|motion| motion.work).collect();
+                let (force, prescribed, carried) = (force.clone(), prescribed.clone(), carried.clone());
+                serves = body.reload(&Loads { work, force, prescribed, carried })?;
+            }
+            if let Some(before) = kept.filter(|_| serves) {
+                (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
+                assemblies_avoided += 1;
+            } else {
+                let mut graph = graph.filter(|_| alone).unwrap_or_else(|| part.graph(&part.space, &rows));
+                if let Some(dealt) = &dealt {
+                    graph = graph.of(|node| dealt.is_own::<D>(node));
+                }
+                let mut body = part.assemble(mesh, &graph, &elasticity, force, prescribed, carried)?;
+                drop(graph);
+                if is_owner {
+                    assemblies += 1;
+                    scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
+                }
+                row_stiffness = rows.quadratic_diagonal(&body.stiffness);
+                if let Some(dealt) = &dealt {
+                    body = dealt.own::<D>(body);
+                }
+                let interpolation = factory.wants_interpolation(&name).then(|| match &dealt {
+                    Some(dealt) => dealt.interpolation::<D>(|coarse| part.interpolation(coarse)),
+                    None => part.interpolation(&part.coarse_nodes()),
+                });
+                local = Some(factory.make(Assembled {
+                    name: name.clone(),
+                    dimension: D,
+                    body,
+                    distribution: dealt.map(|dealt| dealt.distribution),
+                    rows,
+                    motions: &|| smooth.iter().map(|motion| part.dofs_of(motion)).collect(),
+                    left: free,
+                    interpolation,
+                })?);
+            }
+            let (space, held) = (Rc::new(part.space), Rc::new(part.held));
+            let is_whole = info.ranks.len() == 1 && !own.contains(&false);
+            let local = Local { space: space.clone(), own };
+            info.points = match is_whole {
+                true => part.known.points.to_vec(),
+                false => space.part(local.told()).1.iter().map(|&node| part.known.points[node as usize]).collect(),
             };
             let forces = Forces {
-                rows: nodal_rows(&segments, &pairs, &local),
-                springs: part.springs.iter().map(|blocks| here(blocks, &local)).collect(),
+                rows: nodal_rows,
+                springs: part.springs,
                 supports: part.spec.fix.len(),
-                load: local.values(&nodal_load),
+                load: nodal_force,
                 held: held.clone(),
                 elasticity: elasticity.clone(),
                 part: local,
             };
-            post = Some(Box::new(OnPart::new(part.spec, part.known.outer, forces)?) as Box<dyn Post>);
-        }
-        infos.push(BodyInfo {
-            name: name.clone(),
-            nodes,
-            points,
-            cells,
-            facets: checked[index].clone(),
-            dofs: D * nodes,
-            supported: held.supported(),
-            left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),
-            left_by_all: unfelt.into_iter().map(|(name, _)| name).collect(),
-            gauged,
-            warning,
-            stiffness,
-            load: resultant,
-            rank: owner[index],
-            ranks,
-            supports: part.spec.fix.iter().map(|support| support.on.value.clone()).collect(),
-            springs: part.spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
-            rigid: held.rigid.iter().map(|(load, _)| part.spec.load[*load].on.value.clone()).collect(),
-            post,
-        });
+            info.post = Some(Box::new(OnPart::new(part.spec, part.known.outer, forces)?) as Box<dyn Post>);
+            (space, held)
+        } else {
+            (Rc::new(part.space), Rc::new(part.held))
+        };
+        infos.push(info);
         if keep {
             shapes.push(Shape { space, elasticity, modulus, held, unloaded });
         }
@@ -403,32 +419,13 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
     Ok(Some(trace))
 }
 
-/// The motions that supports and springs leave to a body, with the work that `load` does on them.
-fn free<const D: usize>(
-    part: &Part<D>,
-    left: &[RigidMotion<D>],
-    prescribed: &[(usize, f64)],
-    load: &[f64],
-) -> Vec<FreeMotion> {
-    left.iter().map(|motion| FreeMotion::new(part.dofs_of(motion), prescribed, load)).collect()
-}
-
-/// The rows of these segments for displacements of the nodes of a part.
-fn nodal_rows<const D: usize>(segments: &[Segment], pairs: &[ContactPair], part: &Local<D>) -> Csr {
-    let mut rows = Csr::new(part.space.dofs());
-    let here = |(dof, value): (usize, f64)| Some((D * part.node((dof / D) as u32)? as usize + dof % D, value));
+/// The rows of these segments for displacements of the nodes of a body, of so many dofs.
+fn nodal_rows(segments: &[Segment], pairs: &[ContactPair], dofs: usize) -> Csr {
+    let mut rows = Csr::new(dofs);
     for &Segment { pair, side } in segments {
-        (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].nodal[side].row(q).filter_map(here)));
+        (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].nodal[side].row(q)));
     }
     rows
-}
-
-/// Springs of a body between nodes of a part.
-fn here<const D: usize>(blocks: &[NodalBlock<D>], part: &Local<D>) -> Vec<NodalBlock<D>> {
-    let here = |NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
-        Some(NodalBlock { nodes: [part.node(*a)?, part.node(*b)?], block: *block })
-    };
-    blocks.iter().filter_map(here).collect()
 }
 
 /// Mean squared components of the normals on the contact surfaces of a body.

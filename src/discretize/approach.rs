@@ -4,7 +4,7 @@ use super::find::{find_group, nodes_on};
 use crate::contact::{add, pad};
 use crate::error::Result;
 use crate::exchange::Exchange;
-use crate::fem::{Facets, Parts, Space, assemble, surface};
+use crate::fem::{Facets, Parts, Space, assemble, place, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
@@ -13,13 +13,35 @@ use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
 /// which facets are pairs without the key `angle`.
 const ALONG: f64 = 0.5;
 
+/// What nodes count in a mean.
+#[derive(Debug, Clone, Default)]
+struct Weights {
+    /// Those of some nodes.
+    of_nodes: Vec<(u32, f64)>,
+    /// The sum of those of all.
+    total: f64,
+}
+
+impl Weights {
+    /// Of nodes that all are known.
+    fn new(of_nodes: Vec<(u32, f64)>) -> Self {
+        Self { total: of_nodes.iter().map(|entry| entry.1).sum(), of_nodes }
+    }
+
+    /// The same of some nodes, sorted, by their places among these.
+    fn on(&self, nodes: &[u32]) -> Self {
+        let here = |(node, weight): &(u32, f64)| Some((place(nodes, *node)?, *weight));
+        Self { of_nodes: self.of_nodes.iter().filter_map(here).collect(), total: self.total }
+    }
+}
+
 /// A surface or a set of nodes on which the body is loaded or held.
 #[derive(Debug, Clone)]
 struct Place {
     /// Unit vectors: the force, or the directions that are held.
     directions: Vec<[f64; 3]>,
-    /// Nodes with the integrals of their shape functions over the surface; 1 each where there is no surface.
-    weights: Vec<(u32, f64)>,
+    /// Integrals of the shape functions of nodes over the surface; 1 each where there is no surface.
+    weights: Weights,
     /// Whether it is a surface.
     has_area: bool,
 }
@@ -36,7 +58,11 @@ impl Place {
         let areas = facets.map_or(Vec::new(), |facets| areas(space, &facets));
         let has_area = !areas.is_empty();
         let nodes = || nodes_on(space, group, exchange).into_iter().map(|node| (node, 1.0)).collect();
-        Self { directions, weights: if has_area { areas } else { nodes() }, has_area }
+        Self { directions, weights: Weights::new(if has_area { areas } else { nodes() }), has_area }
+    }
+
+    fn on(&self, nodes: &[u32]) -> Self {
+        Self { directions: self.directions.clone(), weights: self.weights.on(nodes), ..*self }
     }
 
     fn acts_along(&self, n: [f64; 3]) -> bool {
@@ -50,7 +76,9 @@ pub struct Outer {
     loaded: Vec<Place>,
     held: Vec<Place>,
     /// Integrals of the shape functions over a body that nothing loads or holds.
-    whole: Vec<(u32, f64)>,
+    whole: Weights,
+    /// Number of nodes of the body.
+    nodes: usize,
 }
 
 impl Outer {
@@ -67,7 +95,7 @@ impl Outer {
         volumes: Vec<f64>,
         exchange: &dyn Exchange,
     ) -> Result<Self> {
-        let mut outer = Self::default();
+        let mut outer = Self { nodes: space.nodes.len(), ..Self::default() };
         for load in &spec.load {
             let group = find_group(mesh, &load.on, &[D - 1], "load")?;
             let force = match load.kind {
@@ -92,32 +120,46 @@ impl Outer {
             outer.held.push(Place::new(space, group, directions, exchange));
         }
         if outer.loaded.is_empty() && outer.held.is_empty() {
-            outer.whole = first_components::<D>(&volumes);
+            outer.whole = Weights::new(first_components::<D>(&volumes));
         }
         Ok(outer)
     }
 
-    /// Mean displacement, from those of all nodes: over all surfaces with loads that push along a direction; without them over supports and
-    /// springs that hold it; without these over the whole body.
-    pub fn mean<const D: usize>(&self, u: &[f64], direction: [f64; 3]) -> [f64; 3] {
+    /// The same of some nodes, sorted, by their places among these.
+    pub fn on(&self, nodes: &[u32]) -> Self {
+        let on = |places: &[Place]| places.iter().map(|place| place.on(nodes)).collect();
+        Self { loaded: on(&self.loaded), held: on(&self.held), whole: self.whole.on(nodes), nodes: self.nodes }
+    }
+
+    /// What own nodes add to the mean displacement, from those of the nodes here: over all surfaces with loads that push along a direction; without
+    /// them over supports and springs that hold it; without these over the whole body.
+    pub fn mean<const D: usize>(&self, u: &[f64], own: &[bool], direction: [f64; 3]) -> [f64; 3] {
         let chosen = |places: &[Place]| {
             let along = || places.iter().filter(|place| place.acts_along(direction));
             let surfaces = along().any(|place| place.has_area);
             let chosen = along().filter(|place| place.has_area || !surfaces);
-            mean::<D>(u, chosen.flat_map(|place| place.weights.iter().copied()))
+            mean::<D>(u, own, chosen.map(|place| &place.weights))
         };
-        let nodes = || (0..(u.len() / D) as u32).map(|node| (node, 1.0));
-        let whole = || mean::<D>(u, self.whole.iter().copied()).or_else(|| mean::<D>(u, nodes()));
+        let of_nodes = || {
+            let own = (0..).zip(own).filter(|(_, own)| **own).map(|(node, _)| (node, 1.0));
+            Weights { of_nodes: own.collect(), total: self.nodes as f64 }
+        };
+        let whole = || {
+            let whole = Some(self.whole.clone()).filter(|whole| whole.total > 0.0);
+            mean::<D>(u, own, [&whole.unwrap_or_else(of_nodes)].into_iter())
+        };
         chosen(&self.loaded).or_else(|| chosen(&self.held)).or_else(whole).unwrap_or_default()
     }
 }
 
-/// A mean of nodal displacements; none without nodes.
-fn mean<const D: usize>(u: &[f64], weights: impl Iterator<Item = (u32, f64)>) -> Option<[f64; 3]> {
+/// What own nodes add to a mean of nodal displacements; none without nodes.
+fn mean<'a, const D: usize>(u: &[f64], own: &[bool], all: impl Iterator<Item = &'a Weights>) -> Option<[f64; 3]> {
     let (mut sum, mut total) = ([0.0; 3], 0.0);
-    for (node, weight) in weights {
-        add(&mut sum, pad(std::array::from_fn::<f64, D, _>(|c| weight * u[D * node as usize + c])));
-        total += weight;
+    for Weights { of_nodes, total: of_all } in all {
+        for &(node, weight) in of_nodes.iter().filter(|(node, _)| own[*node as usize]) {
+            add(&mut sum, pad(std::array::from_fn::<f64, D, _>(|c| weight * u[D * node as usize + c])));
+        }
+        total += of_all;
     }
     (total > 0.0).then(|| sum.map(|sum| sum / total))
 }

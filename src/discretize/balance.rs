@@ -37,18 +37,18 @@ pub struct Balance {
 /// What it takes to find the forces on the own nodes of a part of a body.
 pub struct Forces<const D: usize> {
     /// The part.
-    pub part: Rc<Local<D>>,
+    pub part: Local<D>,
     /// Its elasticity.
     pub elasticity: Rc<Elasticity>,
     /// Its supports and rigid surfaces.
     pub held: Rc<Held<D>>,
-    /// Its springs, between nodes of the part.
+    /// Its springs.
     pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Number of supports in the scene.
     pub supports: usize,
-    /// Nodal forces of its loads, node by node of the part.
+    /// Nodal forces of its loads.
     pub load: Vec<f64>,
-    /// Its contact rows for displacements of these nodes.
+    /// Its contact rows for displacements of its nodes.
     pub rows: Csr,
 }
 
@@ -79,11 +79,10 @@ impl<const D: usize> Forces<D> {
         let mut rigid = vec![Resultant::default(); self.held.rigid.len()];
         for (node, reaction) in self.reactions(u, &known) {
             sum.grow(node, reaction);
-            let of_body = self.part.nodes[node as usize];
-            match self.held.rigid.iter().position(|(_, nodes)| nodes.binary_search(&of_body).is_ok()) {
+            match self.held.rigid.iter().position(|(_, nodes)| nodes.binary_search(&node).is_ok()) {
                 Some(surface) => rigid[surface].add(space, node, reaction),
                 None => {
-                    for (support, part) in self.held.split(of_body, reaction) {
+                    for (support, part) in self.held.split(node, reaction) {
                         supports[support].add(space, node, part);
                     }
                 }
@@ -94,9 +93,9 @@ impl<const D: usize> Forces<D> {
 
     /// What holds the own nodes of supports and rigid surfaces, in their order.
     fn reactions(&self, u: &[f64], known: &[f64]) -> Vec<(u32, [f64; D])> {
-        let Local { space, own, .. } = &*self.part;
+        let Local { space, own, .. } = &self.part;
         let mut held = vec![false; own.len()];
-        let nodes = self.held.nodes().filter_map(|node| self.part.node(node)).filter(|&node| own[node as usize]);
+        let nodes = self.held.nodes().filter(|&node| own[node as usize]);
         nodes.for_each(|node| held[node as usize] = true);
         let touched = |cell: &[u32]| cell.iter().any(|&node| held[node as usize]);
         let cells = space.cells.chunks_exact(space.stride).enumerate().filter(|(_, cell)| touched(cell));

@@ -1,10 +1,12 @@
 //! The dofs of all bodies over the ranks: a partition of their nodes, and what each rank knows of it.
 
 use super::draft::Draft;
+use super::part::Part;
 use crate::exchange::Exchange;
-use crate::fem::{Couplings, ElasticBody, Interpolation};
+use crate::fem::{Couplings, ElasticBody, Interpolation, place};
 use crate::linalg::Csr;
 use crate::model::Distribution;
+use nalgebra::DMatrix;
 use std::rc::Rc;
 
 /// Bodies whose rows of K are in one matrix of all ranks.
@@ -23,8 +25,10 @@ pub struct Dealt {
     pub leader: usize,
     /// The ranks that have nodes of it.
     pub ranks: Vec<usize>,
-    /// Number of each node in the matrix that has its rows.
+    /// Number of each node in the matrix that has its rows: of the nodes that are known here, once these are chosen.
     number: Vec<u32>,
+    /// First number of the nodes of each rank, and the end.
+    starts: Vec<u32>,
     /// Its coarse nodes; none where no interpolation is wanted.
     coarse: Coarse,
 }
@@ -80,13 +84,17 @@ fn of_deal<'a, const D: usize>(
             first: own.first().map_or(start, |&node| D * number[node] as usize),
             start,
             own: own.into_iter().flat_map(|node| (D * node..D * (node + 1)).map(|dof| dof as u32)).collect(),
+            places: Vec::new(),
+            known: 0,
+            near: Vec::new(),
+            products: DMatrix::zeros(0, 0),
             total,
             rows,
             leads: leader == rank,
             exchange: exchange.clone(),
         };
         let ranks = (0..ranks).filter(|&rank| counts[rank] > 0).collect();
-        Dealt { distribution, leader, ranks, number, coarse }
+        Dealt { distribution, leader, ranks, number, starts: starts.clone(), coarse }
     };
     drafts.map(of_body).collect()
 }
@@ -140,12 +148,45 @@ fn distribute_coarse(
 }
 
 impl Dealt {
+    /// The nodes that a rank must know of its part of a body: own ones, those of its cells and of contact rows, and masters of tied ones.
+    pub fn nodes_here<'a, const D: usize>(
+        &'a self,
+        part: &'a Part<D>,
+        rows: [&'a Csr; 2],
+    ) -> impl Iterator<Item = u32> + 'a {
+        let own = self.distribution.own.iter().step_by(D).map(|dof| dof / D as u32);
+        let of_rows = rows.into_iter().flat_map(|rows| rows.col.iter().map(|&dof| dof as u32 / D as u32));
+        let masters = part.held.frame.master.values().copied();
+        own.chain(part.space.cells.iter().copied()).chain(of_rows).chain(masters)
+    }
+
+    /// Turns to the nodes that are known here, sorted, and forgets the others; `products` are those of the motions that supports leave the body.
+    pub fn choose<const D: usize>(&mut self, nodes: &[u32], products: DMatrix<f64>) {
+        let known: Vec<u32> = nodes.iter().map(|&node| self.number[node as usize]).collect();
+        self.number = known;
+        let own = (0..nodes.len()).filter(|&node| self.is_own::<D>(node));
+        let places = own.flat_map(|node| D * node..D * (node + 1)).map(|dof| dof as u32).collect();
+        let mut near = vec![(Vec::new(), Vec::new()); self.starts.len() - 1];
+        for (node, &number) in self.number.iter().enumerate().filter(|(node, _)| !self.is_own::<D>(*node)) {
+            let (at, numbers) = &mut near[self.starts.partition_point(|&start| start <= number) - 1];
+            at.extend((D * node..D * (node + 1)).map(|dof| dof as u32));
+            numbers.extend(D as u32 * number..D as u32 * (number + 1));
+        }
+        let known = D * nodes.len();
+        let of = &mut self.distribution;
+        (of.places, of.known, of.near, of.products) = (places, known, near, products);
+        let Coarse { nodes: coarse, number, counts } = &self.coarse;
+        let here = coarse.iter().zip(number).filter_map(|(&node, &number)| Some((place(nodes, node)?, number)));
+        let (coarse, number) = here.unzip();
+        self.coarse = Coarse { nodes: coarse, number, counts: *counts };
+    }
+
     /// The rows of own dofs of the interpolation that `whole` makes from coarse nodes; columns are counted through the bodies in one matrix.
     pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Interpolation) -> Interpolation {
         let Coarse { nodes, number, counts: [all, own] } = &self.coarse;
         let whole = whole(nodes);
         let mut rows = Csr::new(D * all);
-        for &dof in &self.distribution.own {
+        for &dof in &self.distribution.places {
             let number = |j: usize| D * number[j / D] as usize + j % D;
             rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
         }
@@ -160,7 +201,7 @@ impl Dealt {
 
     /// A body that was assembled for own nodes alone, in its own dofs; columns of K are those of the matrix that has its rows.
     pub fn own<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
-        let own = &self.distribution.own;
+        let own = &self.distribution.places;
         let Csr { ptr, mut col, mut values, .. } = body.stiffness;
         let mut starts = vec![0];
         let mut row = Vec::new();
@@ -178,10 +219,10 @@ impl Dealt {
         let place = |&(dof, value): &(usize, f64)| Some((own.binary_search(&(dof as u32)).ok()?, value));
         ElasticBody {
             stiffness: Csr { columns: self.distribution.total, ptr: starts, col, values },
-            load: self.distribution.scatter(&body.load),
+            load: self.distribution.of_known(&body.load),
             prescribed: body.prescribed.iter().filter_map(place).collect(),
             held: Couplings::default(),
-            lifting: if body.lifting.is_empty() { Vec::new() } else { self.distribution.scatter(&body.lifting) },
+            lifting: if body.lifting.is_empty() { Vec::new() } else { self.distribution.of_known(&body.lifting) },
             ..body
         }
     }

@@ -1,7 +1,7 @@
 //! A body before it is assembled: its contact rows, its loads, and the rigid motions that supports leave it.
 
 use super::part::Part;
-use crate::contact::ContactPair;
+use crate::contact::{ContactPair, add, pad};
 use crate::error::Result;
 use crate::fem::{Parts, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
@@ -21,9 +21,49 @@ pub struct Draft<const D: usize> {
     /// Rigid motions of the free body.
     pub free: Vec<RigidMotion<D>>,
     /// Loads on its nodes.
-    pub nodal_load: Vec<f64>,
+    pub nodal_load: NodalForces<D>,
     /// Loads on its dofs.
-    pub load: Vec<f64>,
+    pub load: NodalForces<D>,
+}
+
+/// Forces at the nodes of a body, without those that are zero: most loads are on surfaces.
+pub struct NodalForces<const D: usize> {
+    /// Number of nodes of the body.
+    count: usize,
+    nodes: Vec<u32>,
+    forces: Vec<[f64; D]>,
+}
+
+impl<const D: usize> NodalForces<D> {
+    /// From forces at all nodes.
+    pub fn of(all: &[f64]) -> Self {
+        let at = all.chunks_exact(D).map(|force| std::array::from_fn(|c| force[c]));
+        let (nodes, forces) =
+            (0..).zip(at).filter(|(_, force): &(u32, [f64; D])| force.iter().any(|f| *f != 0.0)).unzip();
+        Self { count: all.len() / D, nodes, forces }
+    }
+
+    /// Their sum.
+    pub fn sum(&self) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        self.forces.iter().for_each(|&force| add(&mut sum, pad(force)));
+        sum
+    }
+
+    /// Forces at all nodes.
+    pub fn all(&self) -> Vec<f64> {
+        let mut all = vec![0.0; D * self.count];
+        for (node, force) in self.nodes.iter().zip(&self.forces) {
+            all[D * *node as usize..][..D].copy_from_slice(force);
+        }
+        all
+    }
+
+    /// Forces at some nodes, which are sorted.
+    pub fn on(&self, nodes: &[u32]) -> Vec<f64> {
+        let at = |node| self.nodes.binary_search(node).map_or([0.0; D], |place| self.forces[place]);
+        nodes.iter().flat_map(at).collect()
+    }
 }
 
 /// The rigid motions that supports and springs leave to a body.
@@ -55,16 +95,17 @@ impl<const D: usize> Draft<D> {
             (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].rows[side].row(q)));
         }
         let nodal_load = part.load(mesh, Parts::Whole)?;
-        let load = part.load_on_dofs(nodal_load.clone());
-        Ok(Self { segments, rows, free: rigid::of(&part.space), nodal_load, load })
+        let load = NodalForces::of(&part.load_on_dofs(nodal_load.clone()));
+        Ok(Self { segments, rows, free: rigid::of(&part.space), nodal_load: NodalForces::of(&nodal_load), load })
     }
 
     /// Motions as contact and loads see them.
     pub fn motions(&self, part: &Part<D>, all: &[RigidMotion<D>]) -> Vec<Motion> {
+        let load = if all.is_empty() { Vec::new() } else { self.load.all() };
         let of = |motion: &RigidMotion<D>| {
             let (displacement, mut trace) = (part.dofs_of(motion), vec![0.0; self.rows.rows()]);
             self.rows.multiply(&displacement, &mut trace);
-            Motion { name: motion.name.clone(), trace, work: work::<D>(&displacement, &self.load) }
+            Motion { name: motion.name.clone(), trace, work: work::<D>(&displacement, &load) }
         };
         all.iter().map(of).collect()
     }

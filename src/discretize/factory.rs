@@ -64,12 +64,12 @@ pub struct Assembled<'a> {
     pub body: ElasticBody,
     /// How the dofs are dealt out, if they are.
     pub distribution: Option<Distribution>,
-    /// All contact rows of the body, pair by pair.
+    /// All contact rows of the body, pair by pair. Columns: its dofs, or those of the nodes that this rank knows.
     pub rows: Csr,
     /// Motions with hardly any strain in a few cells, for multigrid's near-null space: the rigid ones of the free body, in one of
-    /// revolution those of its meridian. One vector of all dofs each.
+    /// revolution those of its meridian. One vector of these dofs each.
     pub motions: &'a dyn Fn() -> Vec<Vec<f64>>,
-    /// Those that its supports leave.
+    /// Those that its supports leave, of these dofs.
     pub left: Vec<FreeMotion>,
     /// Interpolation of its displacements from linear ones, if it was wanted. Rows: the dofs of `body`; columns: of this body alone, or of
     /// all where dofs are dealt out.

@@ -10,11 +10,15 @@ use crate::fem::rigid;
 /// Fixes the motions of a body that nothing feels and no load works on, and names them; `loose` becomes what is left.
 pub fn fix<const D: usize>(part: &mut Part<D>, draft: &Draft<D>, loose: &mut Loose<D>) -> Vec<String> {
     let mut fixed = Vec::new();
+    if loose.unfelt.is_empty() {
+        return fixed;
+    }
+    let load = draft.load.all();
     loop {
         let idle = loose.unfelt.iter().find_map(|(_, weights)| {
             let motion = rigid::combine(&loose.left, weights);
             let displacement = part.dofs_of(&motion);
-            (work::<D>(&displacement, &draft.load) == 0.0).then_some((motion, displacement))
+            (work::<D>(&displacement, &load) == 0.0).then_some((motion, displacement))
         });
         let Some((motion, displacement)) = idle else { return fixed };
         let Some(dof) = draft.candidate(part, &displacement) else { return fixed };

@@ -4,7 +4,7 @@
 //! numbers; cells go, once dofs are dealt out, to the ranks that assemble their nodes ([`cells`](super::cells)).
 
 use super::approach::Outer;
-use crate::fem::{Facets, Space};
+use crate::fem::{Facets, Space, place};
 use std::sync::Arc;
 
 /// What all ranks know of a body.
@@ -31,6 +31,18 @@ pub struct Known {
 }
 
 impl Known {
+    /// The same of some nodes, sorted, by their places among these; boundaries and loads are no longer asked for.
+    pub fn on(&self, nodes: &[u32]) -> Self {
+        Self {
+            points: Arc::new(nodes.iter().map(|&node| self.points[node as usize]).collect()),
+            corners: self.corners.iter().filter_map(|&node| place(nodes, node)).collect(),
+            outer: self.outer.on(nodes),
+            force: Vec::new(),
+            boundary: Vec::new(),
+            ..*self
+        }
+    }
+
     /// All facets of the boundary, if they were wanted.
     pub fn boundary<const D: usize>(&self, space: &Space<D>) -> Facets<D> {
         Facets::new(space.order, self.boundary.clone())

@@ -272,7 +272,7 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// Work of the loads on a motion, as a share of the largest possible; zero if it is rounding or an error of the mesh.
     fn work(&self, moving: &Moving) -> f64 {
-        let of = |(&body, u): (&usize, &Vec<f64>)| works::<D>(u, &self.drafts[body].load);
+        let of = |(&body, u): (&usize, &Vec<f64>)| works::<D>(u, &self.drafts[body].load.all());
         let each = moving.bodies.iter().zip(&moving.displacement).map(of);
         let [work, largest] = each.fold([0.0; 2], |[sum, most], [work, size]| [sum + work, most + size]);
         if work.abs() <= largest * moving.error.max(NO_WORK) { 0.0 } else { work / largest }

@@ -10,10 +10,10 @@ use crate::exchange::Exchange;
 use crate::expression::Field;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{
-    ElasticBody, Elasticity, Interpolation, NodalBlock, NodeGraph, Parts, RigidMotion, Space, assemble, rigid, support,
-    surface,
+    ElasticBody, Elasticity, Interpolation, NodalBlock, NodeGraph, Parts, RigidMotion, Space, assemble, place, rigid,
+    support, surface,
 };
-use crate::linalg::{Csr, countable};
+use crate::linalg::{Csr, countable, dot};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};
 use nalgebra::{DMatrix, DVector};
@@ -50,6 +50,23 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(Self { spec, space, held, springs, known })
     }
 
+    /// The part of the body that its cells are, on some of its nodes, sorted: those of the cells at least.
+    pub fn on(&self, nodes: &[u32]) -> Self {
+        let here = |blocks: &Vec<NodalBlock<D>>| {
+            let here = |NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
+                Some(NodalBlock { nodes: [place(nodes, *a)?, place(nodes, *b)?], block: *block })
+            };
+            blocks.iter().filter_map(here).collect()
+        };
+        Self {
+            spec: self.spec,
+            space: self.space.on(&self.space.cells, nodes),
+            held: self.held.on(nodes),
+            springs: self.springs.iter().map(here).collect(),
+            known: self.known.on(nodes),
+        }
+    }
+
     /// Displacements of all dofs in a rigid motion.
     pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
         self.held.frame.dofs(&motion.nodal(&self.space.nodes))
@@ -60,10 +77,39 @@ impl<'a, const D: usize> Part<'a, D> {
         self.held.frame.dof(dof, |node| motion.at(&self.space.nodes[node as usize]))
     }
 
-    /// Displacements of all dofs in motions with hardly any strain, which multigrid must know: the rigid ones of the body. Far from the axis a
+    /// Motions with hardly any strain, which multigrid must know: the rigid ones of the body. Far from the axis a
     /// ring is nearly as soft against radial displacements and turns of its section as a plane body.
-    pub fn smooth(&self) -> Vec<Vec<f64>> {
-        rigid::modes(|| self.space.nodes.iter()).iter().map(|motion| self.dofs_of(motion)).collect()
+    pub fn smooth(&self) -> Vec<RigidMotion<D>> {
+        rigid::modes(|| self.space.nodes.iter())
+    }
+
+    /// Products of rigid motions over all dofs but the `prescribed` ones, and the work that `load` does on each.
+    pub fn products(
+        &self,
+        motions: &[RigidMotion<D>],
+        prescribed: &[(usize, f64)],
+        load: &[f64],
+    ) -> (DMatrix<f64>, Vec<f64>) {
+        let (count, mut held) = (motions.len(), prescribed.iter().map(|entry| entry.0).peekable());
+        let (mut products, mut work) = (DMatrix::zeros(count, count), vec![0.0; count]);
+        for node in 0..self.space.nodes.len() {
+            let mut at: Vec<[f64; D]> =
+                motions.iter().map(|motion| self.held.frame.at(node as u32, |node| self.at(motion, node))).collect();
+            while let Some(dof) = held.next_if(|dof| dof / D == node) {
+                at.iter_mut().for_each(|u| u[dof % D] = 0.0);
+            }
+            for (i, u) in at.iter().enumerate() {
+                at[..=i].iter().enumerate().for_each(|(j, v)| products[(i, j)] += dot(u, v));
+                work[i] += dot(u, &load[D * node..][..D]);
+            }
+        }
+        products.fill_upper_triangle_with_lower_triangle();
+        (products, work)
+    }
+
+    /// What a rigid motion does at a node.
+    fn at(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
+        motion.at(&self.space.nodes[node as usize])
     }
 
     /// Prescribed (dof, value), sorted by dof.

@@ -11,7 +11,7 @@ use crate::fem::{norms, stress};
 use crate::output::{BodyField, CellKind};
 use crate::problem::BodySpec;
 
-/// A part of a body, asked with states of all dofs of the body, whatever the dimension.
+/// A part of a body, asked with states of the dofs of its nodes, whatever the dimension.
 pub trait Post {
     /// Displacements and stresses of the cells that this rank shows. `bent` is the same state without the rigid
     /// motion that supports leave: beside a large one the digits of the deformation are few.
@@ -20,7 +20,8 @@ pub trait Post {
     /// Forces on the own nodes, under the forces omega p of the contact rows of the body.
     fn balance(&self, v: &[f64], force: &[f64]) -> Balance;
 
-    /// Mean displacement of where the body is loaded along a direction, else of where it is held along it, else of all of it.
+    /// What own nodes add to the mean displacement of where the body is loaded along a direction, else of where it is held along it, else of all
+    /// of it.
     fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3];
 
     /// Norms of the error against the scene's known displacements, and of these, on the cells that this rank shows, if the scene has them: L2
@@ -57,7 +58,7 @@ impl<const D: usize> OnPart<D> {
 
     /// Displacements of the nodes of the part.
     fn nodal(&self, v: &[f64]) -> Vec<f64> {
-        self.forces.part.values(&self.forces.held.frame.displacements(v))
+        self.forces.held.frame.displacements(v)
     }
 }
 
@@ -86,7 +87,7 @@ impl<const D: usize> Post for OnPart<D> {
     }
 
     fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3] {
-        self.outer.mean::<D>(&self.forces.held.frame.displacements(v), direction)
+        self.outer.mean::<D>(&self.nodal(v), &self.forces.part.own, direction)
     }
 
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]> {

@@ -4,7 +4,7 @@ use super::find::{earlier, find_group, nodes_on, not_on_body, of_body, point};
 use crate::contact::pad;
 use crate::error::{Error, Place, Result};
 use crate::exchange::Exchange;
-use crate::fem::{Facets, Frame, Space};
+use crate::fem::{Facets, Frame, Space, place};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, LoadKind};
@@ -77,6 +77,20 @@ impl<const D: usize> Held<D> {
         }
         held.refuse_pushed_supports(spec)?;
         Ok(held)
+    }
+
+    /// The same of some nodes, sorted, by their places among these.
+    pub fn on(&self, nodes: &[u32]) -> Self {
+        let here = |node: u32| place(nodes, node);
+        let prescribed = |(dof, value): (&usize, &f64)| Some((D * here((dof / D) as u32)? as usize + dof % D, *value));
+        let directions = self.directions.iter().filter_map(|(node, at)| Some((here(*node)?, at.clone())));
+        let rigid = self.rigid.iter().map(|(load, tied)| (*load, tied.iter().filter_map(|&node| here(node)).collect()));
+        Self {
+            frame: self.frame.on(nodes),
+            prescribed: self.prescribed.iter().filter_map(prescribed).collect(),
+            directions: directions.collect(),
+            rigid: rigid.collect(),
+        }
     }
 
     /// In a body of revolution nodes on the axis and rigid surfaces have no radial displacement.

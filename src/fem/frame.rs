@@ -17,10 +17,23 @@ pub struct Frame<const D: usize> {
     pub master: BTreeMap<u32, u32>,
 }
 
+/// The place of a node among sorted ones.
+pub fn place(nodes: &[u32], node: u32) -> Option<u32> {
+    nodes.binary_search(&node).ok().map(|place| place as u32)
+}
+
 impl<const D: usize> Frame<D> {
     /// The node whose dofs move a node.
     pub fn node(&self, node: u32) -> u32 {
         self.master.get(&node).copied().unwrap_or(node)
+    }
+
+    /// The same of some nodes, sorted, by their places among these.
+    pub fn on(&self, nodes: &[u32]) -> Self {
+        let here = |node: &u32| place(nodes, *node);
+        let axes = self.axes.iter().filter_map(|(node, axes)| Some((here(node)?, *axes)));
+        let master = self.master.iter().filter_map(|(node, master)| Some((here(node)?, here(master)?)));
+        Self { axes: axes.collect(), master: master.collect() }
     }
 
     /// A force at a node as a force at dofs: their node, and its components. The same for a row of B.
@@ -61,13 +74,17 @@ impl<const D: usize> Frame<D> {
 
     /// What a displacement field is at a dof.
     pub fn dof(&self, dof: usize, u: impl Fn(u32) -> [f64; D]) -> f64 {
-        let node = (dof / D) as u32;
+        self.at((dof / D) as u32, u)[dof % D]
+    }
+
+    /// What it is at the dofs of a node.
+    pub fn at(&self, node: u32, u: impl Fn(u32) -> [f64; D]) -> [f64; D] {
         let mut own = u(node);
         if let Some(&master) = self.master.get(&node) {
             let of_master = u(master);
             own = std::array::from_fn(|c| own[c] - of_master[c]);
         }
-        self.turned(node, own)[dof % D]
+        self.turned(node, own)
     }
 
     /// Nodal displacements of dofs, u = T v.

@@ -26,7 +26,7 @@ pub mod surface;
 pub use assemble::{NodalBlock, NodeGraph};
 pub use elasticity::Elasticity;
 pub use element::EDGES;
-pub use frame::Frame;
+pub use frame::{Frame, place};
 pub use interpolation::Interpolation;
 pub use material::Material;
 pub use quadrature::Parts;

@@ -41,17 +41,17 @@ impl<const D: usize> RigidMotion<D> {
 /// A rigid motion that supports leave free.
 #[derive(Debug, Clone)]
 pub struct FreeMotion {
-    /// Displacement, one entry a dof, zero at supports.
+    /// Displacement, one entry a dof of the nodes that are known here, zero at supports.
     pub displacement: Vec<f64>,
-    /// Work of the loads on it.
+    /// Work of all loads on it.
     pub work: f64,
 }
 
 impl FreeMotion {
-    /// The motion with these displacements of dofs, of which supports hold some, and the work that `load` does on it.
-    pub fn new(mut displacement: Vec<f64>, prescribed: &[(usize, f64)], load: &[f64]) -> Self {
+    /// The motion with these displacements of dofs, of which supports hold some, and the work of the loads on it.
+    pub fn new(mut displacement: Vec<f64>, prescribed: &[(usize, f64)], work: impl Fn(&[f64]) -> f64) -> Self {
         prescribed.iter().for_each(|entry| displacement[entry.0] = 0.0);
-        Self { work: dot(&displacement, load), displacement }
+        Self { work: work(&displacement), displacement }
     }
 }
 

@@ -94,20 +94,30 @@ impl<const D: usize> Space<D> {
     /// Some of the cells, in this order, with their nodes alone in the order that they have here; and which nodes these are, sorted. Surfaces
     /// of the mesh are not known there.
     pub fn part(&self, cells: impl Iterator<Item = usize>) -> (Self, Vec<u32>) {
-        let cells: Vec<u32> =
-            cells.flat_map(|cell| &self.cells[cell * self.stride..(cell + 1) * self.stride]).copied().collect();
+        let cells = cells.flat_map(|cell| &self.cells[cell * self.stride..(cell + 1) * self.stride]);
+        let cells: Vec<u32> = cells.copied().collect();
+        let nodes = self.among(cells.iter().copied());
+        (self.on(&cells, &nodes), nodes)
+    }
+
+    /// These nodes, sorted, each once.
+    pub fn among(&self, nodes: impl Iterator<Item = u32>) -> Vec<u32> {
+        let mut is_one = vec![false; self.nodes.len()];
+        nodes.for_each(|node| is_one[node as usize] = true);
+        (0..).zip(is_one).filter(|(_, is_one)| *is_one).map(|(node, _)| node).collect()
+    }
+
+    /// Cells with nodes among these, which are sorted and get the numbers of their places. Surfaces of the mesh are not known there.
+    pub fn on(&self, cells: &[u32], nodes: &[u32]) -> Self {
         let mut number = vec![u32::MAX; self.nodes.len()];
-        cells.iter().for_each(|&node| number[node as usize] = 0);
-        let nodes: Vec<u32> = (0..).zip(&number).filter(|(_, number)| **number == 0).map(|(node, _)| node).collect();
-        (0..).zip(&nodes).for_each(|(place, &node)| number[node as usize] = place);
-        let space = Space {
+        (0..).zip(nodes).for_each(|(place, &node)| number[node as usize] = place);
+        Space {
             nodes: nodes.iter().map(|&node| self.nodes[node as usize]).collect(),
-            cells: cells.into_iter().map(|node| number[node as usize]).collect(),
+            cells: cells.iter().map(|&node| number[node as usize]).collect(),
             from_mesh: Numbering::default(),
             measure: OnceCell::new(),
             ..*self
-        };
-        (space, nodes)
+        }
     }
 
     /// The meridian of a body of revolution. Nodes whose radius is rounding of the largest one get the radius zero.

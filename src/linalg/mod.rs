@@ -109,6 +109,15 @@ impl Csr {
         Some(range.start + offset)
     }
 
+    /// The same rows over other columns, of so many; those without a number there are left out.
+    pub fn of_columns(&self, columns: usize, number: impl Fn(usize) -> Option<usize>) -> Self {
+        let mut rows = Self::new(columns);
+        for i in 0..self.rows() {
+            rows.push_row(self.row(i).filter_map(|(j, value)| Some((number(j)?, value))));
+        }
+        rows
+    }
+
     /// b diag(K) b' of each row b, for a square K.
     pub fn quadratic_diagonal(&self, k: &Csr) -> Vec<f64> {
         (0..self.rows()).map(|q| self.row(q).map(|(i, b)| b * b * k.diagonal(i)).sum()).collect()

@@ -229,7 +229,8 @@ pub trait Body {
     /// Gives a state that was made from [`Body::matrices`] the body's own shares of deformation and rigid motion.
     fn separate(&self, _state: &mut [f64]) {}
 
-    /// The rigid motion by which supports carry the body, one entry a dof; empty for none. It is no part of states.
+    /// The rigid motion by which supports carry the body, one entry a dof of the nodes that this rank knows; empty for none. It is no part of
+    /// states.
     fn carried(&self) -> &[f64] {
         &[]
     }
@@ -245,7 +246,7 @@ pub trait Body {
         self.distribution().is_none_or(|distribution| distribution.leads)
     }
 
-    /// Displacements of all nodes for a state, without the motion of [`Body::carried`], on every rank that has a part of the body.
+    /// Displacements of the nodes that this rank knows for a state, without the motion of [`Body::carried`]: of all, or of those of its part.
     ///
     /// # Errors
     /// Failures of the solver library.

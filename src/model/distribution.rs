@@ -3,8 +3,9 @@
 //! A state is (v, a): v has the dofs of this rank alone, the rigid motion a is the same on all. Of forces every rank has a part, also
 //! of those on the rigid motion, so that work is a sum over ranks.
 
-use crate::exchange::Exchange;
+use crate::exchange::{Exchange, trade};
 use crate::linalg::Csr;
+use nalgebra::DMatrix;
 use std::rc::Rc;
 
 /// The dofs of a body that one rank owns, and where they are in the matrix of all ranks that has their rows of K: that of all bodies, or
@@ -14,6 +15,14 @@ pub struct Distribution {
     pub dofs: usize,
     /// Those of this rank, sorted.
     pub own: Vec<u32>,
+    /// Their places among the dofs of the nodes that this rank knows, sorted.
+    pub places: Vec<u32>,
+    /// Number of dofs of these nodes.
+    pub known: usize,
+    /// For each rank those of its dofs that are known here: their places, and their numbers in the matrix.
+    pub near: Vec<(Vec<u32>, Vec<u32>)>,
+    /// Products of the rigid motions that supports leave the body, over all its dofs.
+    pub products: DMatrix<f64>,
     /// Number of the first of them in that matrix; the others follow.
     pub first: usize,
     /// First row of that matrix on this rank.
@@ -38,18 +47,36 @@ impl Distribution {
         all
     }
 
+    /// Values at the dofs of the nodes that this rank knows, from those of own dofs on every rank. Collective.
+    pub fn near(&self, own: &[f64]) -> Vec<f64> {
+        let asked = trade(&*self.exchange, self.near.iter().map(|(_, numbers)| numbers.clone()).collect());
+        let value = |number: u32| own[number as usize - self.first];
+        let answers = asked.into_iter().map(|numbers| numbers.into_iter().map(value).collect::<Vec<f64>>());
+        let mut known = vec![0.0; self.known];
+        self.places.iter().zip(own).for_each(|(&place, &value)| known[place as usize] = value);
+        for ((places, _), values) in self.near.iter().zip(trade(&*self.exchange, answers.collect())) {
+            places.iter().zip(values).for_each(|(&place, value)| known[place as usize] = value);
+        }
+        known
+    }
+
+    /// The values of own dofs among those of the nodes that this rank knows.
+    pub fn of_known(&self, known: &[f64]) -> Vec<f64> {
+        self.places.iter().map(|&place| known[place as usize]).collect()
+    }
+
     /// The values of own dofs among those of all, with what stands behind them.
     pub fn scatter(&self, all: &[f64]) -> Vec<f64> {
         let own = self.own.iter().map(|&dof| all[dof as usize]);
         own.chain(all[self.dofs..].iter().copied()).collect()
     }
 
-    /// Rows over all dofs of the body as rows over own ones.
+    /// Rows over the dofs of the nodes that this rank knows as rows over own ones.
     pub fn of_rows(&self, rows: &Csr) -> Csr {
         let mut here = Csr::new(self.own.len());
         for q in 0..rows.rows() {
             here.push_row(
-                rows.row(q).filter_map(|(dof, value)| Some((self.own.binary_search(&(dof as u32)).ok()?, value))),
+                rows.row(q).filter_map(|(dof, value)| Some((self.places.binary_search(&(dof as u32)).ok()?, value))),
             );
         }
         here

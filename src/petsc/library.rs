@@ -4,7 +4,7 @@
 //! all condensed makes no object of PETSc and never opens it.
 
 use super::error::{check_in, record};
-use super::{ffi, table, waiting};
+use super::{ffi, keep_apart, table, waiting};
 use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
 use std::ffi::{CString, c_char, c_int};
@@ -28,7 +28,12 @@ pub(super) fn open() -> Result<&'static ffi::Library> {
     static LIBRARY: OnceLock<std::result::Result<ffi::Library, String>> = OnceLock::new();
     // SAFETY: the file is that of the headers the declarations were made from, or one with the same name; its
     // initialisers are those of any program that links it.
-    let opened = LIBRARY.get_or_init(|| unsafe { ffi::Library::new(FILE) }.map_err(|cause| cause.to_string()));
+    let open = || unsafe { ffi::Library::new(FILE) }.map_err(|cause| cause.to_string());
+    let opened = LIBRARY.get_or_init(|| {
+        let opened = open();
+        keep_apart();
+        opened
+    });
     opened.as_ref().map_err(|cause| {
         Error::new(Kind::Solver, format!("PETSc cannot be loaded from {FILE}"))
             .because(cause.clone())

@@ -387,14 +387,10 @@ impl Factory for Inner<'_> {
             _ => Vec::new(),
         };
         if let Some(distribution) = &distribution {
-            modes.iter_mut().for_each(|mode| *mode = distribution.scatter(mode));
+            modes.iter_mut().for_each(|mode| *mode = distribution.of_known(mode));
         }
         let make = move |stiffness: Rows| Krylov::new(&session, chosen, dimension, stiffness, &modes, levels);
-        let body = SparseBody::new(body, rows, &left, make, words);
-        Ok(Box::new(match distribution {
-            Some(distribution) => body.dealt_out(distribution),
-            None => body,
-        }))
+        Ok(Box::new(SparseBody::new(body, rows, &left, distribution, make, words)))
     }
 
     fn kept(&mut self, name: &str) -> Option<BodySlot> {

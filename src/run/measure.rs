@@ -107,8 +107,7 @@ pub fn approaches(done: &Done, recovered: &All) -> Vec<Option<f64>> {
         let Some(n) = n else { continue };
         for (side, sign) in [(0, 1.0), (1, -1.0)] {
             let body = model.pairs[i].bodies[side];
-            let leads = discrete.bodies[body].rank == model.exchange.rank();
-            message[i] += match recovered[body].as_ref().filter(|_| leads) {
+            message[i] += match &recovered[body] {
                 None => 0.0,
                 Some(Err(_)) => f64::NAN,
                 Some(Ok(Recovered { state, .. })) => {

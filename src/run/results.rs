@@ -11,7 +11,7 @@ use std::cell::OnceCell;
 
 /// The end of a run in one body that this rank has a part of.
 pub struct Recovered {
-    /// Displacements of all nodes.
+    /// Displacements of the nodes that this rank knows.
     pub state: Vec<f64>,
     /// The same without the rigid motions that supports leave or carry the body by, which strain nothing.
     pub bent: Vec<f64>,

@@ -104,7 +104,7 @@ impl CondensedBody {
         let stiffness = Csr::full(retained, schur.take_complement());
         let body = ElasticBody { stiffness, ..loaded };
         let dense = |stiffness: Rows| Ok(Dense::new(stiffness));
-        let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, dense, String::new());
+        let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, None, dense, String::new());
         Ok(Condensed { kept: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
     }
 }

@@ -39,32 +39,29 @@ type Maker<S> = Box<dyn FnOnce(Rows) -> Result<S>>;
 
 impl<S: InnerSolver> SparseBody<S> {
     /// Joins a body, its contact rows (columns: its dofs, none of them prescribed) and a solver that `make` makes of K, on a
-    /// pattern that holds B'B, when something is first to be solved. `free` are the rigid motions that its supports leave.
+    /// pattern that holds B'B, when something is first to be solved. `free` are the rigid motions that its supports leave. Where the body is
+    /// dealt out, it has its own dofs, and rows and motions those of the nodes that this rank knows; the matrix, if it gets one of its own,
+    /// is one of all ranks.
     pub fn new(
         mut body: ElasticBody,
         rows: Csr,
         free: &[FreeMotion],
+        distribution: Option<Distribution>,
         make: impl FnOnce(Rows) -> Result<S> + 'static,
         words: String,
     ) -> Self {
         let robin = Lazy::Later { make: Some(Box::new(make)), words };
-        let split = Split::new(free, &rows);
+        let distribution = distribution.map(Rc::new);
+        let split = Split::new(free, &rows, distribution.clone());
         body.held = Couplings::default();
-        Self { body, rows, split, distribution: None, robin, sizes: Vec::new() }
-    }
-
-    /// The part of this rank, of a body made of its own dofs and of contact rows and motions of all dofs. Its matrix, if it gets one of its
-    /// own, is one of all ranks.
-    pub fn dealt_out(self, distribution: Distribution) -> Self {
-        let distribution = Rc::new(distribution);
-        let split = self.split.dealt_out(distribution.clone());
-        Self { rows: distribution.of_rows(&self.rows), split, distribution: Some(distribution), ..self }
+        let rows = distribution.as_ref().map(|distribution| distribution.of_rows(&rows)).unwrap_or(rows);
+        Self { body, rows, split, distribution, robin, sizes: Vec::new() }
     }
 
     /// Takes the loads of a body without K on the K that is here; their work on the motions that its supports leave is in `free`.
     pub fn reload(&mut self, loaded: ElasticBody, free: &[FreeMotion]) {
         self.body = ElasticBody { stiffness: std::mem::take(&mut self.body.stiffness), ..loaded };
-        self.split = Split::new(free, &self.rows);
+        self.split = Split::new(free, &self.rows, None);
     }
 
     /// Displacements of all dofs for a state.
@@ -282,7 +279,7 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         let own = self.join(u);
         Ok(match &self.distribution {
             None => own,
-            Some(distribution) => distribution.gather(&own, &[]),
+            Some(distribution) => distribution.near(&own),
         })
     }
 

@@ -8,6 +8,7 @@
 use crate::fem::rigid::FreeMotion;
 use crate::linalg::{Csr, axpy, dot};
 use crate::model::Distribution;
+use nalgebra::DVector;
 use std::rc::Rc;
 
 /// Orthogonal rigid motions that a body's supports leave free, with what they do at its contact rows.
@@ -27,39 +28,47 @@ pub struct Split {
 }
 
 impl Split {
-    /// From motions that a body's supports leave free, independent ones; `rows` are its contact rows.
-    pub fn new(free: &[FreeMotion], rows: &Csr) -> Self {
-        let mut split = Self::default();
-        for FreeMotion { displacement, work } in free {
+    /// From motions that a body's supports leave free, independent ones; `rows` are its contact rows. Of a body that is dealt out both are
+    /// those of the dofs that this rank knows; forces on rigid motions belong to the rank that speaks for it.
+    pub fn new(free: &[FreeMotion], rows: &Csr, distribution: Option<Rc<Distribution>>) -> Self {
+        let mut split = Self { distribution, ..Self::default() };
+        let mut weights: Vec<DVector<f64>> = Vec::new();
+        let products = split.distribution.clone();
+        // of two sums of motions: over the dofs, or by their weights where the dofs are those of many ranks
+        let product = |x: (&[f64], &DVector<f64>), y: (&[f64], &DVector<f64>)| match &products {
+            None => dot(x.0, y.0),
+            Some(distribution) => x.1.dot(&(&distribution.products * y.1)),
+        };
+        for (number, FreeMotion { displacement, work }) in free.iter().enumerate() {
             let (mut motion, mut work) = (displacement.clone(), *work);
+            let mut weight = DVector::from_fn(free.len(), |k, _| f64::from(u8::from(k == number)));
             // twice is enough
             for _ in 0..2 {
-                for ((other, square), its_work) in split.motions.iter().zip(&split.squares).zip(&split.work) {
-                    let part = dot(other, &motion) / square;
+                for (k, (other, square)) in split.motions.iter().zip(&split.squares).enumerate() {
+                    let part = product((other, &weights[k]), (&motion, &weight)) / square;
                     axpy(-part, other, &mut motion);
-                    work -= part * its_work;
+                    weight.axpy(-part, &weights[k], 1.0);
+                    work -= part * split.work[k];
                 }
             }
-            let scale = dot(&motion, &motion).sqrt().log2().floor().exp2();
+            let scale = product((&motion, &weight), (&motion, &weight)).sqrt().log2().floor().exp2();
             motion.iter_mut().for_each(|u| *u /= scale);
-            split.squares.push(dot(&motion, &motion));
+            weight /= scale;
+            split.squares.push(product((&motion, &weight), (&motion, &weight)));
             let mut trace = vec![0.0; rows.rows()];
             rows.multiply(&motion, &mut trace);
             split.traces.push(trace);
             split.work.push(work / scale);
             split.motions.push(motion.into());
+            weights.push(weight);
+        }
+        if let Some(distribution) = &split.distribution {
+            split.motions.iter_mut().for_each(|motion| *motion = distribution.of_known(motion).into());
+            if !distribution.leads {
+                split.work.fill(0.0);
+            }
         }
         split
-    }
-
-    /// The part of the rank that has these dofs. Forces on rigid motions belong to the rank that speaks for the body.
-    pub fn dealt_out(mut self, distribution: Rc<Distribution>) -> Self {
-        self.motions.iter_mut().for_each(|motion| *motion = distribution.scatter(motion).into());
-        if !distribution.leads {
-            self.work.fill(0.0);
-        }
-        self.distribution = Some(distribution);
-        self
     }
 
     /// Sums over dofs, one a motion, from those over the dofs here; one message.
@@ -156,7 +165,8 @@ mod tests {
         let free = |displacement: [f64; 6]| FreeMotion { displacement: displacement.to_vec(), work: 3.0 };
         let mut rows = Csr::new(6);
         (0..3).for_each(|node| rows.push_row([(2 * node, 1.0)]));
-        let split = Split::new(&[free([1.0, 0.0, 1.0, 0.0, 1.0, 0.0]), free([0.5, 0.5, 0.5, 0.0, 0.5, -0.5])], &rows);
+        let free = [free([1.0, 0.0, 1.0, 0.0, 1.0, 0.0]), free([0.5, 0.5, 0.5, 0.0, 0.5, -0.5])];
+        let split = Split::new(&free, &rows, None);
         assert_eq!(split.traces()[0], [1.0; 3]);
         assert!(dot(&split.motions()[0], &split.motions()[1]).abs() < 1e-15);
         // of the second motion half the first is taken away, with its work
