@@ -159,7 +159,7 @@ pub fn discretize<const D: usize>(
     let (mut parts, stocks) = parts(scene, verified, bodies)?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
     let (mut fine, mut shapes) = (Vec::new(), Vec::new());
-    for found in pairs::all(scene, mesh, cut, &parts, keep)? {
+    for found in pairs::all(scene, mesh, cut, &parts, keep, &*verified.exchange)? {
         let pairs::Contact { spec, pair, fine: points, swapped, surface } = found;
         pairs.push(pair);
         fine.extend(points);

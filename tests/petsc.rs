@@ -85,6 +85,24 @@ fn residual(matrix: &Matrix, b: &[f64], x: &[f64]) -> Result<f64> {
     Ok(ax.iter().zip(b).map(|(ax, b)| (b - ax).abs()).fold(0.0, f64::max))
 }
 
+/// SuperLU_DIST, which comes with PETSc, has the C library take all arrays from the heap, which keeps what is freed below what is not. Large
+/// ones lie apart all the same.
+#[test]
+fn large_arrays_lie_apart_from_the_heap() {
+    let output = alone("large_arrays_lie_apart_from_the_heap", 0, &[], || {
+        let session = Session::start(&[])?;
+        chain(&session, 2)?;
+        let array = std::hint::black_box(vec![1_u8; 128 << 20]);
+        let maps = std::fs::read_to_string("/proc/self/maps").expect("where memory lies");
+        let heap = maps.lines().find(|line| line.ends_with("[heap]")).and_then(|line| line.split(' ').next());
+        let ends = heap.and_then(|heap| heap.split_once('-')).expect("a heap");
+        let [from, to] = [ends.0, ends.1].map(|end| usize::from_str_radix(end, 16).expect("an address"));
+        assert!(!(from..to).contains(&(array.as_ptr() as usize)), "{from:x} to {to:x}");
+        Ok(())
+    });
+    expect_success(output);
+}
+
 #[test]
 fn a_failed_factorisation_is_a_reason_and_not_the_end() {
     for (test, line) in [

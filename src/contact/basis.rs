@@ -4,10 +4,11 @@ use super::pieces::Shared;
 use crate::fem::element::{self, EDGES};
 use crate::problem::order::Order;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// The nodes of a facet that carry a pressure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Carriers {
     /// All of them.
     Nodes,

@@ -5,9 +5,10 @@ use super::pieces::Common;
 use super::side::{Side, length};
 use crate::fem::{area_vector, assemble, element, quadrature};
 use crate::problem::order::Order;
+use serde::{Deserialize, Serialize};
 
 /// What a pair takes of a facet of side a.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Cover {
     /// Share of its length (area) that is paired.
     pub share: f64,
@@ -18,7 +19,7 @@ pub struct Cover {
 }
 
 /// Why a facet is not paired as a whole; of several reasons the first that holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Left {
     /// It is.
     Nothing,
@@ -35,8 +36,13 @@ pub enum Left {
 const WHOLE: f64 = 1.0 - 1e-3;
 
 impl Cover {
-    /// The cover of each facet, from the common pieces and the nodes that carry points on them.
-    pub(super) fn of<const D: usize>(a: &Side<D>, common: &Common<D>, carriers: &[Option<Carriers>]) -> Vec<Self> {
+    /// The cover of those facets that are `asked` for, from the common pieces and the nodes that carry points on them; with their numbers.
+    pub(super) fn of<const D: usize>(
+        a: &Side<D>,
+        common: &Common<D>,
+        carriers: &[Option<Carriers>],
+        asked: impl Fn(usize) -> bool,
+    ) -> Vec<(u32, Self)> {
         let mut covered = vec![0.0; a.facets.count()];
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
         let rule = quadrature::simplex(D, if a.facets.order == Order::P2 { 5 } else { 2 });
@@ -62,6 +68,6 @@ impl Cover {
             };
             Self { share, left, carriers: carriers[i] }
         };
-        (0..covered.len()).map(of_facet).collect()
+        (0..covered.len()).filter(|&i| asked(i)).map(|i| (i as u32, of_facet(i))).collect()
     }
 }

@@ -18,5 +18,5 @@ pub use basis::{Carriers, STEADY};
 pub use cover::{Cover, Left};
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
-pub use pair::{ContactPair, Fault, add, assemble};
+pub use pair::{ContactPair, Fault, Integrals, add, assemble, integrate};
 pub use side::{Side, length, unit};

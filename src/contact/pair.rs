@@ -8,7 +8,8 @@ use super::side::Side;
 use crate::error::{Error, Result};
 use crate::fem::{element, pad};
 use crate::linalg::Csr;
-use std::collections::{BTreeMap, HashMap};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// A pair of surfaces, discretised: n points with one pressure each.
@@ -68,24 +69,34 @@ pub enum Fault {
 /// From the contact points of a pair to its law.
 pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 
-/// Makes the arrays of a pair from the common pieces of its surfaces.
+/// Integrals over the common pieces of two surfaces: of some nodes of side a, and the cover of the facets of which these are the first.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct Integrals {
+    /// Those of each node that carries a point.
+    points: BTreeMap<u32, Accumulator>,
+    cover: Vec<(u32, Cover)>,
+}
+
+impl Integrals {
+    /// Takes those of other nodes.
+    pub fn add(&mut self, mut others: Self) {
+        self.points.append(&mut others.points);
+        self.cover.append(&mut others.cover);
+    }
+}
+
+/// Integrates over common pieces, which hold all facets at the nodes of side a that are `asked` for.
 ///
-/// `bodies` are the numbers of the bodies of side a and b, `gap(x)` the scene's own gap, added to the geometric one, `law` the layer at the contact points.
 /// Points: the nodes of side a with the dual basis diag(int phi) M^-1 phi of each facet's covered part, of quadratic triangles
 /// the mid-edges with that of the whole triangle; a facet on which that gives means that are not steady (partly covered) takes
 /// the hats of its vertices.
-///
-/// # Errors
-/// [`Fault`] if nothing is covered, the gap is not finite, or the law is none.
-pub fn assemble<const D: usize>(
+pub fn integrate<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
-    bodies: [usize; 2],
     common: &Common<D>,
-    gap: &dyn Fn([f64; 3]) -> f64,
-    law: &LawMaker,
-) -> Result<ContactPair, Fault> {
-    let mut points: HashMap<u32, Accumulator> = HashMap::new();
+    asked: &dyn Fn(&u32) -> bool,
+) -> Integrals {
+    let mut points: BTreeMap<u32, Accumulator> = BTreeMap::new();
     let mut carriers = vec![None; a.facets.count()];
     let group = common.points.chunk_by(|p, q| p.facet_a == q.facet_a);
     for chunk in group {
@@ -93,11 +104,12 @@ pub fn assemble<const D: usize>(
         let nodes = a.facets.facet(facet);
         let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk);
         carriers[facet] = Some(basis.carriers());
+        let asked: Vec<bool> = nodes.iter().map(asked).collect();
         for point in chunk {
             let phi = element::values(a.facets.order, &point.at_a);
             let psi = element::values(b.facets.order, &point.at_b);
             let others = b.facets.facet(point.facet_b);
-            for (i, &node) in nodes.iter().enumerate() {
+            for (i, &node) in nodes.iter().enumerate().filter(|(i, _)| asked[*i]) {
                 let mu = point.weight * basis.value(i, &phi, &point.at_a);
                 if mu == 0.0 {
                     continue;
@@ -110,6 +122,25 @@ pub fn assemble<const D: usize>(
             }
         }
     }
+    Integrals { points, cover: Cover::of(a, common, &carriers, |facet| asked(&a.facets.facet(facet)[0])) }
+}
+
+/// Makes the arrays of a pair from the integrals over the common pieces of its surfaces.
+///
+/// `bodies` are the numbers of the bodies of side a and b, `gap(x)` the scene's own gap, added to the geometric one, `law` the layer at the contact points.
+///
+/// # Errors
+/// [`Fault`] if nothing is covered, the gap is not finite, or the law is none.
+pub fn assemble<const D: usize>(
+    a: &Side<D>,
+    b: &Side<D>,
+    bodies: [usize; 2],
+    integrals: Integrals,
+    gap: &dyn Fn([f64; 3]) -> f64,
+    law: &LawMaker,
+) -> Result<ContactPair, Fault> {
+    let Integrals { points, mut cover } = integrals;
+    cover.sort_unstable_by_key(|entry| entry.0);
     let tiny = 1e-12 * points.values().map(|point| point.weight).fold(0.0, f64::max);
     let order = super::order::along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&n, _)| n));
     if order.is_empty() {
@@ -138,7 +169,7 @@ pub fn assemble<const D: usize>(
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
         law,
-        cover: Cover::of(a, common, &carriers),
+        cover: cover.into_iter().map(|(_, cover)| cover).collect(),
     };
     for q in 0..pair.nodes.len() {
         let node = pair.nodes[q];
@@ -202,7 +233,8 @@ fn shares(values: &BTreeMap<u32, f64>, weight: f64) -> Vec<(u32, f64)> {
 /// Share of a node in a point below which it is noise.
 const NOISE: f64 = 1e-9;
 
-#[derive(Default)]
+/// Integrals of mu_q and its products with the gap and the shape functions of either side.
+#[derive(Debug, Default, Serialize, Deserialize)]
 struct Accumulator {
     weight: f64,
     gap: f64,

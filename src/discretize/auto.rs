@@ -1,11 +1,13 @@
 //! Pairs that rules of the scene leave to be found: boundary facets of different bodies that face each other within a distance.
 
+use super::pairs::shares;
 use super::part::Part;
 use super::roster::{pattern, tie};
 use super::surface::Surface;
 use crate::contact::pieces::{Cut, Reach, Search};
 use crate::contact::{Side, unit};
 use crate::error::{Error, Place, Result, few};
+use crate::exchange::{Exchange, share};
 use crate::fem::Facets;
 use crate::problem::contact::AutoContact;
 use crate::problem::pattern::Rank;
@@ -18,7 +20,7 @@ pub type Found<'a, const D: usize> = (usize, [Surface<'a, D>; 2]);
 /// rule for two bodies decides alone whether they are a pair.
 ///
 /// First all facets that could have a partner are gathered, so that the nodal normals are those of smooth surfaces;
-/// of these the ones stay that share a piece.
+/// of these the ones stay that share a piece, for which every rank looks at an equal share of the facets. Collective.
 ///
 /// # Errors
 /// A rule that finds nothing, patterns that match no body, and two rules equally near to a pair.
@@ -27,6 +29,7 @@ pub fn find<'a, const D: usize>(
     cut: Cut<D>,
     parts: &'a [Part<D>],
     named: &HashSet<[usize; 2]>,
+    exchange: &dyn Exchange,
 ) -> Result<Vec<Found<'a, D>>> {
     if rules.is_empty() {
         return Ok(Vec::new());
@@ -47,7 +50,7 @@ pub fn find<'a, const D: usize>(
         .collect();
     let searches: Vec<Search<D>> = whole.iter().map(Search::new).collect();
     let bodies = Search::of_boxes(whole.iter().map(Side::extent));
-    let mut found = Vec::new();
+    let mut possible = Vec::new();
     for a in 0..parts.len() {
         let mut others: Vec<usize> = bodies.near_box(whole[a].extent(), farthest).collect();
         others.retain(|&b| b > a && !named.contains(&[a, b]));
@@ -57,39 +60,48 @@ pub fn find<'a, const D: usize>(
             let rule = &rules[number];
             let reach = within(&whole[a], &whole[b], rule.distance, rule.contact.angle);
             let near = candidates(&whole[a], &whole[b], &searches[b], &reach);
-            if near.iter().any(|facets| facets.count() == 0) {
-                continue;
-            }
-            let side = |body: usize, facets: &Facets<D>| {
-                Side::new(
-                    whole[body].name,
-                    whole[body].space,
-                    facets.clone(),
-                    whole[body].prescribed,
-                    whole[body].frame,
-                )
-            };
-            let (side_a, side_b) = (side(a, &near[0]), side(b, &near[1]));
-            let mut used = [vec![false; near[0].count()], vec![false; near[1].count()]];
-            let reach = within(&side_a, &side_b, rule.distance, rule.contact.angle);
-            for point in cut(&side_a, &side_b, &reach).points {
-                used[0][point.facet_a] = true;
-                used[1][point.facet_b] = true;
-            }
-            if used[0].contains(&true) {
-                if let Some(other) = other {
-                    let pair = format!("{} - {}", parts[a].spec.name.value, parts[b].spec.name.value);
-                    let [(own, _), (other, place)] = [number, other].map(|number| title(&rules[number]));
-                    return Err(tie(&pair, [&own, &other], place));
-                }
-                let surface = |side: usize, body: usize| Surface {
-                    body,
-                    name: parts[body].spec.name.value.as_str(),
-                    facets: near[side].only(&used[side]),
-                };
-                found.push((number, [surface(0, a), surface(1, b)]));
+            if near.iter().all(|facets| facets.count() > 0) {
+                possible.push(([a, b], near, number, other));
             }
         }
+    }
+    // facets of either side that share a piece, of each two bodies
+    let mut meeting: Vec<Vec<[u32; 2]>> = Vec::new();
+    let shares = shares(possible.iter().map(|(_, near, ..)| near[0].count()), exchange);
+    for (([a, b], near, number, _), mine) in possible.iter().zip(shares) {
+        let side = |body: usize, facets: &Facets<D>| {
+            let Side { name, space, prescribed, frame, .. } = whole[body];
+            Side::new(name, space, facets.clone(), prescribed, frame)
+        };
+        let (rule, side_a, side_b) = (&rules[*number], side(*a, &near[0]), side(*b, &near[1]));
+        let reach = within(&side_a, &side_b, rule.distance, rule.contact.angle);
+        let pieces = cut(&side_a, &side_b, &reach, &|facet| mine.contains(&facet)).points;
+        let mut facets: Vec<_> = pieces.iter().map(|point| [point.facet_a as u32, point.facet_b as u32]).collect();
+        facets.sort_unstable();
+        facets.dedup();
+        meeting.push(facets);
+    }
+    let of_ranks = if exchange.ranks() == 1 { vec![meeting] } else { share(exchange, &meeting) };
+    let mut found = Vec::new();
+    for (index, (bodies, near, number, other)) in possible.into_iter().enumerate() {
+        let mut used = near.each_ref().map(|facets| vec![false; facets.count()]);
+        for &facets in of_ranks.iter().flat_map(|of_rank| &of_rank[index]) {
+            used.iter_mut().zip(facets).for_each(|(used, facet)| used[facet as usize] = true);
+        }
+        if !used[0].contains(&true) {
+            continue;
+        }
+        if let Some(other) = other {
+            let [a, b] = bodies.map(|body| &parts[body].spec.name.value);
+            let [(own, _), (other, place)] = [number, other].map(|number| title(&rules[number]));
+            return Err(tie(&format!("{a} - {b}"), [&own, &other], place));
+        }
+        let surface = |side: usize| Surface {
+            body: bodies[side],
+            name: parts[bodies[side]].spec.name.value.as_str(),
+            facets: near[side].only(&used[side]),
+        };
+        found.push((number, [surface(0), surface(1)]));
     }
     let mut fruitless = vec![true; rules.len()];
     found.iter().for_each(|(number, _)| fruitless[*number] = false);

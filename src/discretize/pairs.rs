@@ -5,14 +5,16 @@ use super::find::{find_group, point};
 use super::part::Part;
 use super::surface::{ContactSurface, Surface};
 use crate::contact::law::{self, OwnLaws};
-use crate::contact::pieces::{Cut, Reach};
-use crate::contact::{self, ContactPair, Fault, Fine, Side};
+use crate::contact::pieces::{Common, Cut, Reach};
+use crate::contact::{self, ContactPair, Fault, Fine, Integrals, Side};
 use crate::error::{Error, Located, Result};
+use crate::exchange::{Exchange, Serial, share};
 use crate::fem::Facets;
 use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{ContactSpec, Overlap};
 use crate::scene::Scene;
 use std::collections::{BTreeSet, HashSet};
+use std::ops::Range;
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {
@@ -29,15 +31,16 @@ pub struct Contact<const D: usize> {
 }
 
 /// All pairs of the scene: those with names in the order of the file, then those that are found. `fine` asks for integration
-/// points.
+/// points. Every rank looks for the pieces at an equal share of the nodes, and all get all integrals. Collective.
 pub fn all<const D: usize>(
     scene: &Scene,
     mesh: &Mesh<D>,
     cut: Cut<D>,
     parts: &[Part<D>],
     fine: bool,
+    exchange: &dyn Exchange,
 ) -> Result<Vec<Contact<D>>> {
-    let mut contacts = Vec::new();
+    let mut opposite = Vec::new();
     let mut named = HashSet::new();
     let owners = if scene.contacts.is_empty() { Owners::default() } else { Owners::new(parts) };
     for spec in &scene.contacts {
@@ -57,62 +60,116 @@ pub fn all<const D: usize>(
             .help("contact of a body with itself is out of scope; make two bodies of it"));
         }
         named.insert([a.min(b), a.max(b)]);
-        contacts.push(make_pair(spec.clone(), &scene.laws, None, cut, parts, surfaces, fine)?);
+        opposite.push(Opposite::new(spec.clone(), None, parts, surfaces));
     }
-    for (rule, surfaces) in auto::find(&scene.auto, cut, parts, &named)? {
+    for (rule, surfaces) in auto::find(&scene.auto, cut, parts, &named, exchange)? {
         let rule = &scene.auto[rule];
         let mut spec = rule.contact.clone();
         for (name, surface) in spec.between.iter_mut().zip(&surfaces) {
             surface.name.clone_into(&mut name.value);
         }
-        contacts.push(make_pair(spec, &scene.laws, Some(rule.distance), cut, parts, surfaces, fine)?);
+        opposite.push(Opposite::new(spec, Some(rule.distance), parts, surfaces));
     }
-    Ok(contacts)
+    let nodes: Vec<Vec<u32>> = opposite.iter().map(|pair| pair.a.facets.distinct_nodes()).collect();
+    // integration points need all pieces
+    let shares = shares(nodes.iter().map(Vec::len), if fine { &Serial } else { exchange });
+    let (mut own, mut pieces) = (Vec::new(), Vec::new());
+    for ((pair, nodes), share) in opposite.iter().zip(&nodes).zip(shares) {
+        let (is_all, nodes) = (share.len() == nodes.len(), &nodes[share]);
+        let asked = |node: &u32| is_all || nodes.binary_search(node).is_ok();
+        let common = pair.common(cut, &|facet| pair.a.facets.facet(facet).iter().any(asked));
+        own.push(contact::integrate(&pair.a, &pair.b, &common, &asked));
+        pieces.push(Some(common).filter(|_| fine));
+    }
+    let integrals = if fine { own } else { joined(own, exchange) };
+    let pairs = opposite.into_iter().zip(integrals).zip(pieces);
+    pairs.map(|((pair, integrals), common)| pair.assemble(&scene.laws, integrals, common)).collect()
 }
 
-/// The pair of two surfaces; with a `distance` they may be no farther apart.
-fn make_pair<const D: usize>(
+/// The integrals of all ranks. Collective.
+fn joined(own: Vec<Integrals>, exchange: &dyn Exchange) -> Vec<Integrals> {
+    if exchange.ranks() == 1 {
+        return own;
+    }
+    let mut of_ranks = share(exchange, &own).into_iter();
+    let mut all = of_ranks.next().unwrap_or_default();
+    for of_rank in of_ranks {
+        all.iter_mut().zip(of_rank).for_each(|(all, more)| all.add(more));
+    }
+    all
+}
+
+/// What this rank has of lists of these lengths, if all of them one after the other are cut into equal parts for the ranks.
+pub fn shares(lengths: impl Iterator<Item = usize> + Clone, exchange: &dyn Exchange) -> Vec<Range<usize>> {
+    let (all, ranks): (usize, _) = (lengths.clone().sum(), exchange.ranks());
+    let [begin, end] = [0, 1].map(|next| all * (exchange.rank() + next) / ranks);
+    let mut first = 0;
+    let of_list = |length| {
+        let mine = [begin, end].map(|at| at.clamp(first, first + length) - first);
+        first += length;
+        mine[0]..mine[1]
+    };
+    lengths.map(of_list).collect()
+}
+
+/// Two surfaces that are to be a pair.
+struct Opposite<'a, const D: usize> {
     spec: ContactSpec,
-    laws: &OwnLaws,
-    distance: Option<f64>,
-    cut: Cut<D>,
-    parts: &[Part<D>],
-    surfaces: [Surface<D>; 2],
-    fine: bool,
-) -> Result<Contact<D>> {
-    let [first, second] = surfaces.map(|Surface { body, name, facets }| {
-        let held = &parts[body].held;
-        (body, Side::new(name, &parts[body].space, facets, &held.prescribed, &held.frame))
-    });
-    // the finer side carries the points, whatever the order in the scene
-    let (fine_a, fine_b) = (first.1.mean_measure(), second.1.mean_measure());
-    let equal = (fine_a - fine_b).abs() <= 1e-6 * fine_a;
-    let swapped = if equal { first.1.name >= second.1.name } else { fine_a >= fine_b };
-    let ((body_a, a), (body_b, b)) = if swapped { (second, first) } else { (first, second) };
-    let reach = distance
-        .map_or_else(|| Reach::between(&a, &b, spec.angle), |distance| auto::within(&a, &b, distance, spec.angle));
-    let mut common = cut(&a, &b, &reach);
-    if spec.touching {
-        common.points.iter_mut().for_each(|point| point.gap = 0.0);
+    bodies: [usize; 2],
+    a: Side<'a, D>,
+    b: Side<'a, D>,
+    /// Whether side a is the second of `spec.between`.
+    swapped: bool,
+    reach: Reach,
+}
+
+impl<'a, const D: usize> Opposite<'a, D> {
+    /// Of two surfaces; with a `distance` they may be no farther apart.
+    fn new(spec: ContactSpec, distance: Option<f64>, parts: &'a [Part<D>], surfaces: [Surface<'a, D>; 2]) -> Self {
+        let [first, second] = surfaces.map(|Surface { body, name, facets }| {
+            let held = &parts[body].held;
+            (body, Side::new(name, &parts[body].space, facets, &held.prescribed, &held.frame))
+        });
+        // the finer side carries the points, whatever the order in the scene
+        let (fine_a, fine_b) = (first.1.mean_measure(), second.1.mean_measure());
+        let equal = (fine_a - fine_b).abs() <= 1e-6 * fine_a;
+        let swapped = if equal { first.1.name >= second.1.name } else { fine_a >= fine_b };
+        let ((body_a, a), (body_b, b)) = if swapped { (second, first) } else { (first, second) };
+        let reach = distance
+            .map_or_else(|| Reach::between(&a, &b, spec.angle), |distance| auto::within(&a, &b, distance, spec.angle));
+        Self { spec, bodies: [body_a, body_b], a, b, swapped, reach }
     }
-    let gap = |x| spec.gap.eval(x);
-    let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
-    let pair =
-        contact::assemble(&a, &b, [body_a, body_b], &common, &gap, &law).map_err(|fault| refuse(&spec, fault))?;
-    let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
-    if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
-        let (depth, at) = (-pair.gap[deepest], point(pair.position[deepest]));
-        let message = format!("`{}` and `{}` overlap by {depth:.3e} at {at}", a.name, b.name);
-        return Err(Error::scene(&spec.between[0].place, message)
-            .help("move a body, give a larger gap, or let the layer take it: overlap = \"compress\""));
+
+    /// The common pieces on those facets of side a that are asked for.
+    fn common(&self, cut: Cut<D>, asked: &dyn Fn(usize) -> bool) -> Common<D> {
+        let mut common = cut(&self.a, &self.b, &self.reach, asked);
+        if self.spec.touching {
+            common.points.iter_mut().for_each(|point| point.gap = 0.0);
+        }
+        common
     }
-    if let Some(field) = &spec.reference {
-        let value = |&x: &[f64; 3]| field.eval_finite("the reference", x).map(drop);
-        pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(&spec)))?;
+
+    /// The pair, from the integrals over all pieces; with these also its integration points.
+    fn assemble(self, laws: &OwnLaws, integrals: Integrals, common: Option<Common<D>>) -> Result<Contact<D>> {
+        let Self { spec, bodies, a, b, swapped, .. } = self;
+        let gap = |x| spec.gap.eval(x);
+        let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
+        let pair = contact::assemble(&a, &b, bodies, integrals, &gap, &law).map_err(|fault| refuse(&spec, fault))?;
+        let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
+        if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
+            let (depth, at) = (-pair.gap[deepest], point(pair.position[deepest]));
+            let message = format!("`{}` and `{}` overlap by {depth:.3e} at {at}", a.name, b.name);
+            return Err(Error::scene(&spec.between[0].place, message)
+                .help("move a body, give a larger gap, or let the layer take it: overlap = \"compress\""));
+        }
+        if let Some(field) = &spec.reference {
+            let value = |&x: &[f64; 3]| field.eval_finite("the reference", x).map(drop);
+            pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(&spec)))?;
+        }
+        let surface = ContactSurface::new(&a, &pair);
+        let fine = common.map(|common| Fine::new(&a, &b, &common, &pair, &gap, spec.touching));
+        Ok(Contact { spec, pair, fine, swapped, surface })
     }
-    let surface = ContactSurface::new(&a, &pair);
-    let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching));
-    Ok(Contact { spec, pair, fine, swapped, surface })
 }
 
 /// Whose expression has no value somewhere: tables of contacts may be for many pairs.
@@ -198,5 +255,57 @@ impl Owners {
                     .help("the bodies share mesh nodes there: give each its own curve or surface in the geometry"))
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::{LayerLaw, pieces};
+    use crate::exchange::crowd;
+    use crate::fem::{Frame, sample::block};
+    use crate::problem::order::Order;
+    use std::collections::HashMap;
+    use std::rc::Rc;
+
+    /// Ranks that look at a part of the nodes each, and at the facets there alone, come to the pair of one rank, to the last digit.
+    #[test]
+    fn ranks_share_the_search_for_pieces() {
+        let pair = |exchange: &dyn Exchange| {
+            let (below, mut above) = (block::<3>(3, Order::P1), block::<3>(4, Order::P1));
+            above.nodes.iter_mut().for_each(|x| x[2] += 1.1 + 0.01 * x[0]);
+            let (free, frame) = (HashMap::new(), Frame::default());
+            let side = |space, name, faces: &dyn Fn([f64; 3]) -> bool| {
+                let all: Facets<3> = crate::fem::Space::boundary(space);
+                let keep: Vec<bool> = all.normals(space).chunks(3).map(|normals| faces(normals[0])).collect();
+                Side::new(name, space, all.only(&keep), &free, &frame)
+            };
+            let (a, b) = (side(&below, "a", &|n| n[2] > 0.9), side(&above, "b", &|n| n[2] < -0.9));
+            let nodes = a.facets.distinct_nodes();
+            let mine = &nodes[shares([nodes.len()].into_iter(), exchange).swap_remove(0)];
+            let asked = |node: &u32| mine.contains(node);
+            let is_near = |facet: usize| a.facets.facet(facet).iter().any(asked);
+            let common = pieces::space(&a, &b, &Reach::between(&a, &b, 60.0), &is_near);
+            let looked_at = (0..a.facets.count()).filter(|&facet| is_near(facet)).count();
+            assert!(common.points.iter().all(|point| is_near(point.facet_a)));
+            let own = vec![contact::integrate(&a, &b, &common, &asked)];
+            let integrals = joined(own, exchange).swap_remove(0);
+            let law = |_: &[[f64; 3]]| Ok(Rc::new(law::Linear { stiffness: 1.0 }) as Rc<dyn LayerLaw>);
+            let pair = contact::assemble(&a, &b, [0, 1], integrals, &|_| 0.0, &law).expect("a pair");
+            let rows = pair.rows.map(|rows| (rows.col, rows.values));
+            (looked_at, (pair.nodes, pair.weight, pair.gap, rows, pair.cover))
+        };
+        let [(all, one)] = &crowd::on(1, &pair)[..] else { panic!("one rank") };
+        assert_eq!((*all, one.0.len()), (18, 16));
+        let many = crowd::on(5, &pair);
+        assert!(many.iter().all(|(_, of_rank)| of_rank == one));
+        assert!(many.iter().all(|(looked_at, _)| (1..12).contains(looked_at)), "{many:?}");
+    }
+
+    /// Lists are cut into parts of equal length, one after the other.
+    #[test]
+    fn lists_are_cut_into_equal_parts() {
+        let parts = crowd::on(3, |exchange| shares([4, 0, 2, 3].into_iter(), exchange));
+        assert_eq!(parts, [[0..3, 0..0, 0..0, 0..0], [3..4, 0..0, 0..2, 0..0], [4..4, 0..0, 2..2, 0..3]]);
     }
 }

@@ -385,6 +385,14 @@ impl<const D: usize> Facets<D> {
         &self.nodes[i * self.stride..(i + 1) * self.stride]
     }
 
+    /// Their nodes, sorted, each once.
+    pub fn distinct_nodes(&self) -> Vec<u32> {
+        let mut nodes = self.nodes.clone();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
     /// Outer unit normals at the corners of all facets.
     pub fn normals(&self, space: &Space<D>) -> Vec<[f64; D]> {
         let normals = |i: usize| {

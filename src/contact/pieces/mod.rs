@@ -44,8 +44,8 @@ pub struct Common<const D: usize> {
     pub refused: Vec<Refused>,
 }
 
-/// Finds the common pieces of two surfaces.
-pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach) -> Common<D>;
+/// Finds the common pieces of two surfaces on those facets of side a that are asked for.
+pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach, &dyn Fn(usize) -> bool) -> Common<D>;
 
 /// Parameters closer than this to a facet's end are its end: surfaces that match do match.
 const SNAP: f64 = 1e-9;

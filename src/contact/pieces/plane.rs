@@ -6,13 +6,13 @@ use crate::fem::{element, quadrature};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
-/// The common pieces of two plane curves.
-pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
+/// The common pieces of two plane curves on those facets of side a that are `asked` for.
+pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach, asked: &dyn Fn(usize) -> bool) -> Common<2> {
     let search = Search::new(b);
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = quadrature::gauss(if quadratic { 4 } else { 3 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
-    for i in 0..a.facets.count() {
+    for i in (0..a.facets.count()).filter(|&i| asked(i)) {
         let facet = Curve::of(a, i);
         let refused = &mut common.refused[i];
         let mut found: Vec<Piece> = search

@@ -23,14 +23,14 @@ const ON_FACET: f64 = 0.1;
 const WHOLE: [[usize; 3]; 1] = [[0, 1, 2]];
 const QUARTERS: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
 
-/// The common pieces of two surfaces in space.
-pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
+/// The common pieces of two surfaces in space on those facets of side a that are `asked` for.
+pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach, asked: &dyn Fn(usize) -> bool) -> Common<3> {
     let search = Search::new(b);
     let facets_b: Vec<Facet> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = quadrature::simplex(3, if quadratic { 5 } else { 2 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
-    for i in 0..a.facets.count() {
+    for i in (0..a.facets.count()).filter(|&i| asked(i)) {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
         let mut found: Vec<Piece> = Vec::new();
