@@ -194,10 +194,11 @@ pub fn discretize<const D: usize>(
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
     let deal = |bodies: Vec<usize>| {
-        let nodes: Vec<[f64; D]> = bodies.iter().flat_map(|&body| &parts[body].space.nodes).copied().collect();
+        let points: Vec<u32> = bodies.iter().flat_map(|&body| parts[body].known.points.iter()).copied().collect();
         let couplings = coupled.of(&bodies, &pairs);
         let weight = |node: u32| u64::from(couplings[node as usize]);
-        Deal { bodies, owner: crate::mesh::bisect::<D, D>(&nodes, &weight, exchange.ranks()) }
+        let at = |node: u32| mesh.points[points[node as usize] as usize];
+        Deal { owner: crate::mesh::bisect(points.len(), at, &weight, exchange.ranks()), bodies }
     };
     let deals: Vec<Deal> = factory.dealt_out().into_iter().map(deal).collect();
     let graphs = lazy.into_graphs();

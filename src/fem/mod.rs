@@ -16,7 +16,7 @@ pub mod quadrature;
 pub mod recovery;
 pub mod rigid;
 #[cfg(test)]
-mod sample;
+pub mod sample;
 pub mod slope;
 pub mod space;
 pub mod stress;

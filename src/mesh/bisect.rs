@@ -8,24 +8,23 @@
 
 use std::ops::Range;
 
-/// The part of each point, of `parts` of equal weight to that of one point: across the longest side of the box around them, then likewise on
-/// either side.
-///
-/// Points may have more coordinates than the `D` that count.
-pub fn parts<const D: usize, const K: usize>(
-    points: &[[f64; K]],
+/// The part of each of `count` points, of `parts` of equal weight to that of one point: across the longest side of the box around them, then
+/// likewise on either side. `at` says where a point is.
+pub fn parts<const D: usize>(
+    count: usize,
+    at: impl Fn(u32) -> [f64; D],
     weight: &dyn Fn(u32) -> u64,
     parts: usize,
 ) -> Vec<u32> {
-    let mut part = vec![0; points.len()];
-    let mut order: Vec<u32> = (0..points.len() as u32).collect();
-    split::<D, K>((points, weight), &mut order, 0..parts, &mut part);
+    let mut part = vec![0; count];
+    let mut order: Vec<u32> = (0..count as u32).collect();
+    split((&at, weight), &mut order, 0..parts, &mut part);
     part
 }
 
 /// Deals the points of these numbers out to some parts.
-fn split<const D: usize, const K: usize>(
-    all: (&[[f64; K]], &dyn Fn(u32) -> u64),
+fn split<const D: usize>(
+    all: (&impl Fn(u32) -> [f64; D], &dyn Fn(u32) -> u64),
     these: &mut [u32],
     parts: Range<usize>,
     part: &mut [u32],
@@ -34,8 +33,7 @@ fn split<const D: usize, const K: usize>(
         these.iter().for_each(|&point| part[point as usize] = parts.start as u32);
         return;
     }
-    let (points, weight) = all;
-    let at = |point: u32| points[point as usize];
+    let (at, weight) = all;
     let size = |axis: usize| {
         let along = || these.iter().map(|&point| at(point)[axis]);
         along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
@@ -61,8 +59,8 @@ fn split<const D: usize, const K: usize>(
         }
     }
     let (below, above) = these.split_at_mut(low);
-    split::<D, K>(all, below, parts.start..middle, part);
-    split::<D, K>(all, above, middle..parts.end, part);
+    split(all, below, parts.start..middle, part);
+    split(all, above, middle..parts.end, part);
 }
 
 #[cfg(test)]
@@ -70,7 +68,7 @@ mod tests {
     use super::parts as of;
 
     fn parts<const D: usize>(points: &[[f64; D]], count: usize) -> Vec<u32> {
-        of::<D, D>(points, &|_| 1, count)
+        of(points.len(), |point| points[point as usize], &|_| 1, count)
     }
 
     /// A long box is cut across; points of a plane, of which a whole number of parts has not room, along the next axis; parts differ by one
@@ -86,7 +84,7 @@ mod tests {
         assert_eq!(counts, [96; 5]);
         // planes of the lower half weigh twice as much: two thirds of the weight, below the ninth of 24 planes
         let weights = |node: u32| if points[node as usize][2] < 12.0 { 2 } else { 1 };
-        let halves = of::<3, 3>(&points, &weights, 2);
+        let halves = of(points.len(), |point| points[point as usize], &weights, 2);
         assert!(points.iter().zip(&halves).all(|(x, &half)| (x[2] < 9.0) == (half == 0)));
         let back: Vec<[f64; 3]> = points.iter().rev().copied().collect();
         assert!(parts(&back, 5).iter().rev().eq(&fifths));

@@ -96,10 +96,11 @@ impl<'a> Dealer<'a> {
         self.reset();
         self.all(&Message::Begin);
         for slice in points.chunks(SLICE) {
-            self.exchange.tell(pack(&slice.iter().flat_map(|x| &x[..D]).copied().collect::<Vec<f64>>()));
+            self.exchange.tell(pack(&slice.iter().flat_map(first::<D, K>).collect::<Vec<f64>>()));
         }
         self.exchange.tell(pack(&Vec::<f64>::new()));
-        self.owner = bisect::parts::<D, K>(points, &|_| 1, self.next.len());
+        self.owner =
+            bisect::parts(points.len(), |point| first::<D, K>(&points[point as usize]), &|_| 1, self.next.len());
         self.used = vec![false; points.len()];
     }
 
@@ -149,6 +150,11 @@ impl<'a> Dealer<'a> {
         self.all(&Message::End);
         (self.own, self.owner, self.used)
     }
+}
+
+/// The coordinates that count.
+fn first<const D: usize, const K: usize>(x: &[f64; K]) -> [f64; D] {
+    std::array::from_fn(|c| x[c])
 }
 
 fn append(own: &mut Vec<Cells>, group: u32, mut cells: Cells) {

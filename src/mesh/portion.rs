@@ -40,7 +40,7 @@ impl<const D: usize> Portion<D> {
         if rank > 0 {
             let (points, cells) = dealer::take(exchange)?;
             let head: Head = tell(exchange, || unreachable!("the first rank tells"))?;
-            let owner = bisect::parts::<D, D>(&points, &|_| 1, ranks);
+            let owner = bisect::parts(points.len(), |point| points[point as usize], &|_| 1, ranks);
             return Ok(Self::of(head, cells, (points, owner), rank));
         }
         let mut dealer = Dealer::new(exchange, order);
