@@ -24,6 +24,17 @@ pub fn keep_apart() {
     }
 }
 
+/// Has the C library hold what is freed, however large, for the next array: Newton's steps take and give back the same ones, and a page that
+/// the system gives anew takes 4 us. Until [`keep_apart`].
+pub fn keep_at_hand() {
+    #[cfg(target_env = "gnu")]
+    // SAFETY: as above.
+    unsafe {
+        libc::mallopt(libc::M_MMAP_MAX, 0);
+        libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
+    }
+}
+
 /// Gives memory that is free back to the system, before solvers are set up.
 pub fn give_back() {
     #[cfg(target_env = "gnu")]

@@ -57,7 +57,7 @@ mod wrap;
 pub use around::Subspace;
 pub use blas::{cholesky, cholesky_solve};
 pub use ffi::Int;
-pub use heap::{Heap, give_back, keep_apart, leave};
+pub use heap::{Heap, give_back, keep_apart, keep_at_hand, leave};
 pub use ksp::{Ksp, Solved};
 pub use matrix::Matrix;
 pub use metis::nested_dissection;
