@@ -295,9 +295,9 @@ mod tests {
             let rows = pair.rows.map(|rows| (rows.col, rows.values));
             (looked_at, (pair.nodes, pair.weight, pair.gap, rows, pair.cover))
         };
-        let [(all, one)] = &crowd::on(1, &pair)[..] else { panic!("one rank") };
+        let [(all, one)] = &crowd::on(1, pair)[..] else { panic!("one rank") };
         assert_eq!((*all, one.0.len()), (18, 16));
-        let many = crowd::on(5, &pair);
+        let many = crowd::on(5, pair);
         assert!(many.iter().all(|(_, of_rank)| of_rank == one));
         assert!(many.iter().all(|(looked_at, _)| (1..12).contains(looked_at)), "{many:?}");
     }
