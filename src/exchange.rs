@@ -3,6 +3,7 @@
 use crate::error::{Error, Kind, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::ops::Range;
 
 /// What the ranks of a parallel run tell each other; calls are collective unless they say otherwise.
 pub trait Exchange {
@@ -38,6 +39,19 @@ pub fn gather<T: Serialize + DeserializeOwned + Ord>(exchange: &dyn Exchange, mi
     exchange.share(pack(&mine)).into_iter().for_each(|bytes| all.append(&mut own(bytes)));
     all.sort_unstable();
     all
+}
+
+/// What this rank has of lists of these lengths, if all of them one after the other are cut into equal parts for the ranks.
+pub fn shares(lengths: impl Iterator<Item = usize> + Clone, exchange: &dyn Exchange) -> Vec<Range<usize>> {
+    let (all, ranks): (usize, _) = (lengths.clone().sum(), exchange.ranks());
+    let [begin, end] = [0, 1].map(|next| all * (exchange.rank() + next) / ranks);
+    let mut first = 0;
+    let of_list = |length| {
+        let mine = [begin, end].map(|at| at.clamp(first, first + length) - first);
+        first += length;
+        mine[0]..mine[1]
+    };
+    lengths.map(of_list).collect()
 }
 
 /// What each rank has for this one, in their order, where `mine` is that for each rank; collective.
@@ -228,5 +242,17 @@ pub mod crowd {
         fn messages(&self) -> usize {
             0
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{crowd, shares};
+
+    /// Lists are cut into parts of equal length, one after the other.
+    #[test]
+    fn lists_are_cut_into_equal_parts() {
+        let parts = crowd::on(3, |exchange| shares([4, 0, 2, 3].into_iter(), exchange));
+        assert_eq!(parts, [[0..3, 0..0, 0..0, 0..0], [3..4, 0..0, 0..2, 0..0], [4..4, 0..0, 2..2, 0..3]]);
     }
 }

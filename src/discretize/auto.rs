@@ -1,13 +1,12 @@
 //! Pairs that rules of the scene leave to be found: boundary facets of different bodies that face each other within a distance.
 
-use super::pairs::shares;
 use super::part::Part;
 use super::roster::{pattern, tie};
 use super::surface::Surface;
 use crate::contact::pieces::{Cut, Reach, Search};
 use crate::contact::{Side, unit};
 use crate::error::{Error, Place, Result, few};
-use crate::exchange::{Exchange, share};
+use crate::exchange::{Exchange, share, shares};
 use crate::fem::Facets;
 use crate::problem::contact::AutoContact;
 use crate::problem::pattern::Rank;

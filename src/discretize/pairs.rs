@@ -8,13 +8,12 @@ use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Common, Cut, Reach};
 use crate::contact::{self, ContactPair, Fault, Fine, Integrals, Side};
 use crate::error::{Error, Located, Result};
-use crate::exchange::{Exchange, Serial, share};
+use crate::exchange::{Exchange, Serial, share, shares};
 use crate::fem::Facets;
 use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{ContactSpec, Overlap};
 use crate::scene::Scene;
 use std::collections::{BTreeSet, HashSet};
-use std::ops::Range;
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {
@@ -97,19 +96,6 @@ fn joined(own: Vec<Integrals>, exchange: &dyn Exchange) -> Vec<Integrals> {
         all.iter_mut().zip(of_rank).for_each(|(all, more)| all.add(more));
     }
     all
-}
-
-/// What this rank has of lists of these lengths, if all of them one after the other are cut into equal parts for the ranks.
-pub fn shares(lengths: impl Iterator<Item = usize> + Clone, exchange: &dyn Exchange) -> Vec<Range<usize>> {
-    let (all, ranks): (usize, _) = (lengths.clone().sum(), exchange.ranks());
-    let [begin, end] = [0, 1].map(|next| all * (exchange.rank() + next) / ranks);
-    let mut first = 0;
-    let of_list = |length| {
-        let mine = [begin, end].map(|at| at.clamp(first, first + length) - first);
-        first += length;
-        mine[0]..mine[1]
-    };
-    lengths.map(of_list).collect()
 }
 
 /// Two surfaces that are to be a pair.
@@ -300,12 +286,5 @@ mod tests {
         let many = crowd::on(5, pair);
         assert!(many.iter().all(|(_, of_rank)| of_rank == one));
         assert!(many.iter().all(|(looked_at, _)| (1..12).contains(looked_at)), "{many:?}");
-    }
-
-    /// Lists are cut into parts of equal length, one after the other.
-    #[test]
-    fn lists_are_cut_into_equal_parts() {
-        let parts = crowd::on(3, |exchange| shares([4, 0, 2, 3].into_iter(), exchange));
-        assert_eq!(parts, [[0..3, 0..0, 0..0, 0..0], [3..4, 0..0, 0..2, 0..0], [4..4, 0..0, 2..2, 0..3]]);
     }
 }
