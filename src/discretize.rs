@@ -265,15 +265,15 @@ pub fn discretize<const D: usize>(
         let elasticity = Rc::new(elasticity);
         let (space, held) = if is_owner || dealt.is_some() {
             let (smooth, mut nodal_rows) = (part.smooth(), nodal_rows(&segments, &pairs, part.space.dofs()));
-            let (mut force, mut nodal_force) = (load.all(), nodal_load.all());
-            let mut free: Vec<FreeMotion> = Vec::new();
-            let mut own = vec![true; part.space.nodes.len()];
+            let (force, nodal_force, own, free): (_, _, Vec<bool>, Vec<FreeMotion>);
             match &mut dealt {
-                None => free.extend(
-                    left.iter().map(|motion| FreeMotion::new(part.dofs_of(motion), &prescribed, |u| dot(u, &force))),
-                ),
+                None => {
+                    (force, nodal_force, own) = (load.all(), nodal_load.all(), vec![true; part.space.nodes.len()]);
+                    let motion = |motion| FreeMotion::new(part.dofs_of(motion), &prescribed, |u| dot(u, &force));
+                    free = left.iter().map(motion).collect();
+                }
                 Some(dealt) => {
-                    let (products, work) = part.products(&left, &prescribed, &force);
+                    let (products, work) = part.products(&left, &prescribed, &load.all());
                     let nodes = part.space.among(dealt.nodes_here::<D>(&part, [&rows, &nodal_rows]));
                     dealt.choose::<D>(&nodes, products);
                     (part, force, nodal_force) = (part.on(&nodes), load.on(&nodes), nodal_load.on(&nodes));
@@ -288,10 +288,8 @@ pub fn discretize<const D: usize>(
                     if !carried.is_empty() {
                         carried = nodes.iter().flat_map(|&node| &carried[D * node as usize..][..D]).copied().collect();
                     }
-                    let motions = left.iter().zip(work);
-                    free.extend(
-                        motions.map(|(motion, work)| FreeMotion::new(part.dofs_of(motion), &prescribed, |_| work)),
-                    );
+                    let motion = |(motion, work)| FreeMotion::new(part.dofs_of(motion), &prescribed, |_| work);
+                    free = left.iter().zip(work).map(motion).collect();
                 }
             }
             let mut kept = factory.kept(&name).filter(|_| dealt.is_none());

@@ -29,8 +29,11 @@ pub trait Exchange {
 }
 
 /// What each rank knows, in their order; collective.
-pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: &T) -> Vec<T> {
-    exchange.share(pack(mine)).into_iter().map(own).collect()
+pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
+    if exchange.ranks() == 1 {
+        return vec![mine];
+    }
+    exchange.share(pack(&mine)).into_iter().map(own).collect()
 }
 
 /// One list of what all ranks have, sorted; collective.

@@ -139,7 +139,7 @@ fn gather(model: &Model, field: &Field) -> Vec<Vec<f64>> {
         all.iter_mut().zip(other).filter(|(own, _)| own.is_empty()).for_each(|(own, other)| *own = other);
         all
     };
-    share(&*model.exchange, &states).into_iter().reduce(fill).unwrap_or_default()
+    share(&*model.exchange, states).into_iter().reduce(fill).unwrap_or_default()
 }
 
 fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {

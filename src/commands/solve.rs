@@ -162,7 +162,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
 
 /// Writes the page of the results when all ranks have written their fields. Collective.
 fn page(done: &Done, path: &Path, first: bool) -> Result<()> {
-    share(&*done.model().exchange, &());
+    share(&*done.model().exchange, ());
     if first { crate::report::save(path, None).map(|_| ()) } else { Ok(()) }
 }
 

@@ -80,7 +80,7 @@ pub fn find<'a, const D: usize>(
         facets.dedup();
         meeting.push(facets);
     }
-    let of_ranks = if exchange.ranks() == 1 { vec![meeting] } else { share(exchange, &meeting) };
+    let of_ranks = share(exchange, meeting);
     let mut found = Vec::new();
     for (index, (bodies, near, number, other)) in possible.into_iter().enumerate() {
         let mut used = near.each_ref().map(|facets| vec![false; facets.count()]);

@@ -75,17 +75,13 @@ fn of_deal<'a, const D: usize>(
         of_node.iter().for_each(|&owner| counts[owner as usize] += 1);
         // of equal ones the first
         let leader = (0..ranks).rev().max_by_key(|&rank| counts[rank]).unwrap_or(0);
-        let mut rows = Csr::new(total);
-        for q in 0..draft.rows.rows() {
-            rows.push_row(draft.rows.row(q).map(|(dof, value)| (D * number[dof / D] as usize + dof % D, value)));
-        }
+        let rows = draft.rows.of_columns(total, |dof| Some(D * number[dof / D] as usize + dof % D));
         let distribution = Distribution {
             dofs: D * nodes,
             first: own.first().map_or(start, |&node| D * number[node] as usize),
             start,
             own: own.into_iter().flat_map(|node| (D * node..D * (node + 1)).map(|dof| dof as u32)).collect(),
             places: Vec::new(),
-            known: 0,
             near: Vec::new(),
             products: DMatrix::zeros(0, 0),
             total,
@@ -162,8 +158,7 @@ impl Dealt {
 
     /// Turns to the nodes that are known here, sorted, and forgets the others; `products` are those of the motions that supports leave the body.
     pub fn choose<const D: usize>(&mut self, nodes: &[u32], products: DMatrix<f64>) {
-        let known: Vec<u32> = nodes.iter().map(|&node| self.number[node as usize]).collect();
-        self.number = known;
+        self.number = nodes.iter().map(|&node| self.number[node as usize]).collect();
         let own = (0..nodes.len()).filter(|&node| self.is_own::<D>(node));
         let places = own.flat_map(|node| D * node..D * (node + 1)).map(|dof| dof as u32).collect();
         let mut near = vec![(Vec::new(), Vec::new()); self.starts.len() - 1];
@@ -172,9 +167,8 @@ impl Dealt {
             at.extend((D * node..D * (node + 1)).map(|dof| dof as u32));
             numbers.extend(D as u32 * number..D as u32 * (number + 1));
         }
-        let known = D * nodes.len();
         let of = &mut self.distribution;
-        (of.places, of.known, of.near, of.products) = (places, known, near, products);
+        (of.places, of.near, of.products) = (places, near, products);
         let Coarse { nodes: coarse, number, counts } = &self.coarse;
         let here = coarse.iter().zip(number).filter_map(|(&node, &number)| Some((place(nodes, node)?, number)));
         let (coarse, number) = here.unzip();

@@ -87,10 +87,7 @@ pub fn all<const D: usize>(
 
 /// The integrals of all ranks. Collective.
 fn joined(own: Vec<Integrals>, exchange: &dyn Exchange) -> Vec<Integrals> {
-    if exchange.ranks() == 1 {
-        return own;
-    }
-    let mut of_ranks = share(exchange, &own).into_iter();
+    let mut of_ranks = share(exchange, own).into_iter();
     let mut all = of_ranks.next().unwrap_or_default();
     for of_rank in of_ranks {
         all.iter_mut().zip(of_rank).for_each(|(all, more)| all.add(more));

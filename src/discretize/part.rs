@@ -74,7 +74,7 @@ impl<'a, const D: usize> Part<'a, D> {
 
     /// What a rigid motion does at a dof.
     pub fn dof_of(&self, motion: &RigidMotion<D>, dof: usize) -> f64 {
-        self.held.frame.dof(dof, |node| motion.at(&self.space.nodes[node as usize]))
+        self.held.frame.dof(dof, |node| self.at(motion, node))
     }
 
     /// Motions with hardly any strain, which multigrid must know: the rigid ones of the body. Far from the axis a

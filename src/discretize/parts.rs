@@ -162,7 +162,7 @@ fn total(terms: impl Iterator<Item = f64>) -> [f64; 2] {
 
 /// Totals over all ranks. Collective.
 fn totals(mine: [[f64; 2]; 2], exchange: &dyn Exchange) -> [f64; 2] {
-    let all = share(exchange, &mine);
+    let all = share(exchange, mine);
     [0, 1].map(|which| {
         let [sum, lost] = total(all.iter().flat_map(|of| of[which]));
         sum + lost

@@ -151,7 +151,7 @@ pub fn lying<const D: usize>(scene: &Scene, portion: &Portion<D>, exchange: &dyn
         let asked = mesh.groups.iter().filter(|group| group.dimension < D).flat_map(|group| &group.connectivity);
         asked.for_each(|&point| is_asked[point as usize] = true);
         let mine: Vec<_> = owners.iter().filter(|(point, _)| is_asked[*point as usize]).copied().collect();
-        owners = owners.into_iter().chain(share(exchange, &mine).concat()).collect();
+        owners = owners.into_iter().chain(share(exchange, mine).concat()).collect();
     }
     owners.sort_unstable();
     owners.dedup();
@@ -174,7 +174,7 @@ pub fn lying<const D: usize>(scene: &Scene, portion: &Portion<D>, exchange: &dyn
         bodies.into_iter().for_each(|body| lying[body].push(place));
     }
     // groups of cells lie where some rank has seen them
-    let all = share(exchange, &lying);
+    let all = share(exchange, lying);
     let of_body = |body: usize| all.iter().flat_map(|lying| &lying[body]).copied().collect::<BTreeSet<u32>>();
     Ok((0..names.len()).map(|body| of_body(body).into_iter().collect()).collect())
 }

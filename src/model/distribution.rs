@@ -17,8 +17,6 @@ pub struct Distribution {
     pub own: Vec<u32>,
     /// Their places among the dofs of the nodes that this rank knows, sorted.
     pub places: Vec<u32>,
-    /// Number of dofs of these nodes.
-    pub known: usize,
     /// For each rank those of its dofs that are known here: their places, and their numbers in the matrix.
     pub near: Vec<(Vec<u32>, Vec<u32>)>,
     /// Products of the rigid motions that supports leave the body, over all its dofs.
@@ -52,7 +50,8 @@ impl Distribution {
         let asked = trade(&*self.exchange, self.near.iter().map(|(_, numbers)| numbers.clone()).collect());
         let value = |number: u32| own[number as usize - self.first];
         let answers = asked.into_iter().map(|numbers| numbers.into_iter().map(value).collect::<Vec<f64>>());
-        let mut known = vec![0.0; self.known];
+        let others: usize = self.near.iter().map(|(places, _)| places.len()).sum();
+        let mut known = vec![0.0; self.places.len() + others];
         self.places.iter().zip(own).for_each(|(&place, &value)| known[place as usize] = value);
         for ((places, _), values) in self.near.iter().zip(trade(&*self.exchange, answers.collect())) {
             places.iter().zip(values).for_each(|(&place, value)| known[place as usize] = value);
@@ -69,16 +68,5 @@ impl Distribution {
     pub fn scatter(&self, all: &[f64]) -> Vec<f64> {
         let own = self.own.iter().map(|&dof| all[dof as usize]);
         own.chain(all[self.dofs..].iter().copied()).collect()
-    }
-
-    /// Rows over the dofs of the nodes that this rank knows as rows over own ones.
-    pub fn of_rows(&self, rows: &Csr) -> Csr {
-        let mut here = Csr::new(self.own.len());
-        for q in 0..rows.rows() {
-            here.push_row(
-                rows.row(q).filter_map(|(dof, value)| Some((self.places.binary_search(&(dof as u32)).ok()?, value))),
-            );
-        }
-        here
     }
 }

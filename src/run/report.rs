@@ -71,7 +71,7 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
         factorizations_avoided: counts.factorizations_avoided,
         body_solves_skipped: outcome.solves_skipped,
         messages: model.exchange.messages(),
-        memory_of_ranks: share(&*model.exchange, &clock.memory),
+        memory_of_ranks: share(&*model.exchange, clock.memory.clone()),
         steps: done.steps.clone(),
         residual: finite(last.map(|row| row.residual)),
         increment: finite(last.map(|row| row.increment)),
@@ -200,7 +200,7 @@ impl Shared {
             mine.solvers.push(leader.map_or(String::new(), |body| body.describe()));
             mine.counts += leader.map_or(BodyCounts::default(), |body| body.counts());
         }
-        share(&*discrete.model.exchange, &mine).into_iter().reduce(Self::with).unwrap_or_default()
+        share(&*discrete.model.exchange, mine).into_iter().reduce(Self::with).unwrap_or_default()
     }
 
     /// With what another rank knows.

@@ -123,7 +123,7 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) ->
     let mine: Vec<(usize, Found)> =
         bodies.filter_map(|(index, (info, recovered))| Some((index, Found::new(info, recovered.as_ref()?)))).collect();
     let mut all: Vec<Option<Found>> = reports.iter().map(|_| None).collect();
-    for (body, found) in share(&*discrete.model.exchange, &mine).into_iter().flatten() {
+    for (body, found) in share(&*discrete.model.exchange, mine).into_iter().flatten() {
         let found = match all[body].take() {
             Some(before) => before.with(found),
             None => found,

@@ -338,7 +338,7 @@ fn gather(model: &Model) -> Option<Vec<Gathered>> {
         let (motions, traces) = (motions.to_vec(), traces.to_vec());
         Some(Gathered { stiffness: stiffness.clone(), rows: rows.clone(), motions, traces })
     });
-    let mut all = share(&*model.exchange, &here.collect::<Vec<_>>());
+    let mut all = share(&*model.exchange, here.collect::<Vec<_>>());
     let of = |body: usize| all.iter_mut().find_map(|of_rank| of_rank.get_mut(body)?.take());
     (0..model.bodies.len()).map(of).collect()
 }

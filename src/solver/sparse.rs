@@ -54,7 +54,8 @@ impl<S: InnerSolver> SparseBody<S> {
         let distribution = distribution.map(Rc::new);
         let split = Split::new(free, &rows, distribution.clone());
         body.held = Couplings::default();
-        let rows = distribution.as_ref().map(|distribution| distribution.of_rows(&rows)).unwrap_or(rows);
+        let own = |places: &Vec<u32>| rows.of_columns(places.len(), |dof| places.binary_search(&(dof as u32)).ok());
+        let rows = distribution.as_ref().map(|distribution| own(&distribution.places)).unwrap_or(rows);
         Self { body, rows, split, distribution, robin, sizes: Vec::new() }
     }
 

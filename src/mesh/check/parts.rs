@@ -84,7 +84,7 @@ fn of_all<const D: usize>(cells: &Cells<D>, count: usize, of_cell: &mut [u32], e
         let here = theirs.into_iter().filter_map(|(key, part)| Some((from, part, of_cell[cells.find(key)?])));
         links.extend(here);
     }
-    let all = share(exchange, &(firsts, links));
+    let all = share(exchange, (firsts, links));
     let mut starts = vec![0];
     all.iter().for_each(|(firsts, _)| starts.push(starts[starts.len() - 1] + firsts.len() as u32));
     let mut joined = Joined::new(starts[ranks] as usize);
