@@ -46,8 +46,11 @@ const FUNCTIONS: &[&str] = &[
     "MatCreate",
     "MatCreateMPIAIJWithSplitArrays",
     "MatCreateSeqAIJWithArrays",
+    "MatCreateSubMatrices",
     "MatCreateSubMatrix",
     "MatDestroy",
+    "MatDestroySubMatrices",
+    "MatGetRow",
     "MatIncreaseOverlap",
     "MatMPIAIJGetSeqAIJ",
     "MatMPIAIJSetPreallocationCSR",
@@ -57,6 +60,7 @@ const FUNCTIONS: &[&str] = &[
     "MatMumpsSetIcntl",
     "MatNullSpaceCreate",
     "MatNullSpaceDestroy",
+    "MatRestoreRow",
     "MatSeqAIJGetArray",
     "MatSeqAIJRestoreArray",
     "MatSeqAIJSetPreallocationCSR",
@@ -130,6 +134,10 @@ const FUNCTIONS: &[&str] = &[
     "VecResetArray",
     "VecRestoreArray",
     "VecRestoreArrayRead",
+    "VecScatterBegin",
+    "VecScatterCreate",
+    "VecScatterDestroy",
+    "VecScatterEnd",
     "VecSetBlockSize",
 ];
 
@@ -249,7 +257,7 @@ fn declare(petsc: &[PathBuf]) {
         // One type for communicators in the whole crate: that of the `mpi` crate.
         .blocklist_type("(MPI_Comm|ompi_communicator_t)")
         .raw_line("use mpi::ffi::MPI_Comm;")
-        .allowlist_type("(KSPConvergedReason|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool)")
+        .allowlist_type("(InsertMode|KSPConvergedReason|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool|ScatterMode)")
         .dynamic_library_name("Library")
         .dynamic_link_require_all(true);
     for function in FUNCTIONS {

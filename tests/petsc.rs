@@ -455,3 +455,75 @@ fn a_matrix_of_several_ranks() {
     };
     expect_success(alone("a_matrix_of_several_ranks", 3, &[], inside));
 }
+
+/// Rows of a sheet of `side` by `side` nodes with two dofs each, held at its rim: springs between neighbours, a thousand times as stiff where
+/// both are in rows 8 to 13, and between the two dofs of a node.
+fn sheet(side: usize, dofs: std::ops::Range<usize>) -> (Vec<Int>, Vec<Int>, Vec<f64>) {
+    let (mut row_ptr, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
+    for dof in dofs {
+        let (node, part) = (dof / 2, dof % 2);
+        let (x, y) = (node % side, node / side);
+        let stiffness = |other: usize| if [y, other].iter().all(|y| (8..14).contains(y)) { 1e3 } else { 1.0 };
+        // beyond the rim there is the ground
+        let springs = [(x, y.wrapping_sub(1)), (x.wrapping_sub(1), y), (x + 1, y), (x, y + 1)];
+        let sum: f64 = springs.iter().map(|place| stiffness(place.1)).sum();
+        let others = springs.into_iter().filter(|(x, y)| *x < side && *y < side);
+        let mut row: Vec<_> = others.map(|(x, y)| (2 * (x + side * y) + part, -stiffness(y))).collect();
+        row.extend([(dof, sum + 0.5), (dof ^ 1, -0.5)]);
+        row.sort_unstable_by_key(|entry| entry.0);
+        columns.extend(row.iter().map(|entry| entry.0 as Int));
+        values.extend(row.iter().map(|entry| entry.1));
+        row_ptr.push(columns.len() as Int);
+    }
+    (row_ptr, columns, values)
+}
+
+/// Dofs are solved exactly with the same iterations, however many processes have their rows: in two halves, and by MUMPS on all where halves
+/// would be more than a process has. The second of three has no rows.
+#[test]
+fn processes_share_an_exact_solve() {
+    let inside = || -> Result<()> {
+        let session = Session::start(&words("-ksp_type cg -pc_type jacobi -ksp_rtol 1e-10"))?;
+        let (side, ranks, rank) = (24, session.size(), session.rank());
+        let n = 2 * side * side;
+        let first = |rank: usize| if ranks == 3 { [0, n / 2, n / 2, n][rank] } else { 2 * (n / 2 * rank / ranks) };
+        let own = first(rank)..first(rank + 1);
+        let (row_ptr, columns, values) = sheet(side, 0..n);
+        let alone = Rows::all(row_ptr, columns, values)?;
+        let (row_ptr, columns, values) = sheet(side, own.clone());
+        let shared = Rows::of_process(own.start, n, row_ptr, columns, values)?;
+        let mut iterations = [[0; 3]; 2];
+        for (rows, iterations) in [alone, shared].into_iter().zip(&mut iterations) {
+            let own = rows.own();
+            let mut matrix = Matrix::new(&session, 2, rows)?;
+            matrix.set_spd()?;
+            let mut ksp = Ksp::of(&session, matrix.scope(), "")?;
+            ksp.set_operator(&matrix)?;
+            ksp.set_from_options()?;
+            ksp.set_up()?;
+            ksp.set_reuse_preconditioner(true)?;
+            // none, one dof of each stiff node, all
+            let dofs: Vec<usize> = (16 * side..28 * side).step_by(2).collect();
+            for (k, dofs) in [Vec::new(), dofs, (0..n).collect()].into_iter().enumerate() {
+                let b: Vec<f64> = own.clone().map(|dof| (dof * dof % 11) as f64 - 4.0).collect();
+                let (mut x, mut y) = (vec![0.0; own.len()], vec![0.0; own.len()]);
+                assert!(dofs.is_empty() || ksp.patch(&matrix, &dofs, 1)?);
+                let solved = ksp.solve(&b, &mut x)?;
+                ksp.unwrap()?;
+                assert!(solved.reason.converged());
+                matrix.multiply(&x, &mut y)?;
+                let error = y.iter().zip(&b).map(|(y, b)| (y - b).abs()).fold(0.0, f64::max);
+                assert!(error < 1e-6, "{error:e}");
+                iterations[k] = solved.iterations;
+            }
+        }
+        let [none, some, all] = iterations[0];
+        assert!(4 * some < 3 * none && all == 1, "{iterations:?}");
+        assert!(iterations[1][1].abs_diff(some) <= 1 && iterations[1][2] == 1, "{iterations:?}");
+        Ok(())
+    };
+    for ranks in [2, 3, 5] {
+        let Some(output) = alone("processes_share_an_exact_solve", ranks, &[], inside) else { return };
+        expect_success(Some(output));
+    }
+}

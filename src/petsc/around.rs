@@ -1,7 +1,7 @@
 //! A preconditioner in Rust around one of PETSc (PCSHELL).
 
 use super::library::petsc;
-use super::vector::Vector;
+use super::vector::{Vector, slice, slice_mut};
 use super::{Matrix, ffi};
 use crate::error::{Error, Result};
 use std::cell::{Cell, RefCell};
@@ -166,8 +166,7 @@ unsafe extern "C" fn applied(pc: ffi::PC, r: ffi::Vec, z: ffi::Vec) -> ffi::Pets
         petsc!(VecGetLocalSize(r, &mut rows))?;
         petsc!(VecGetArrayRead(r, &mut from))?;
         petsc!(VecGetArray(z, &mut to))?;
-        let (r_here, z_here) =
-            (std::slice::from_raw_parts(from, rows as usize), std::slice::from_raw_parts_mut(to, rows as usize));
+        let (r_here, z_here) = (slice(from, rows as usize), slice_mut(to, rows as usize));
         let applied = context.apply(r_here, z_here);
         petsc!(VecRestoreArrayRead(r, &mut from))?;
         petsc!(VecRestoreArray(z, &mut to))?;

@@ -1,11 +1,11 @@
-//! Nested dissection by METIS: Debian's MUMPS is built without it.
+//! Nested dissection and partition of graphs by METIS: Debian's MUMPS is built without it.
 //!
 //! The library is loaded when it is first needed: its header belongs to another package, and libraries of SCOTCH, which
 //! PETSc loads, have functions of the same names with other arguments.
 
 use crate::error::{Error, Kind, Result};
 use libloading::Library;
-use std::ffi::c_int;
+use std::ffi::{CStr, c_int};
 use std::ptr::null_mut;
 use std::sync::OnceLock;
 
@@ -14,16 +14,37 @@ const LIBRARY: &str = "libmetis.so.5";
 
 type NodeNd = unsafe extern "C" fn(*mut i32, *mut i32, *mut i32, *mut i32, *mut i32, *mut i32, *mut i32) -> c_int;
 
-/// The function of METIS.
-fn node_nd() -> Result<NodeNd> {
+type PartGraph = unsafe extern "C" fn(
+    *mut i32,
+    *mut i32,
+    *mut i32,
+    *mut i32,
+    *mut i32,
+    *mut i32,
+    *mut i32,
+    *mut i32,
+    *mut f32,
+    *mut f32,
+    *mut i32,
+    *mut i32,
+    *mut i32,
+) -> c_int;
+
+/// A function of METIS.
+///
+/// # Safety
+/// `T` is the type of the function of this name.
+unsafe fn function<T: Copy>(name: &CStr) -> Result<T> {
     static METIS: OnceLock<Option<Library>> = OnceLock::new();
     // SAFETY: the initialisers are those of any program that links it; it stays loaded.
     let library = METIS.get_or_init(|| unsafe { Library::new(LIBRARY) }.ok());
-    // SAFETY: METIS 5 has these arguments.
-    let function = library.as_ref().and_then(|library| unsafe { library.get::<NodeNd>(b"METIS_NodeND") }.ok());
-    function
-        .map(|function| *function)
-        .ok_or_else(|| Error::new(Kind::Solver, format!("METIS ({LIBRARY}) was not found")))
+    // SAFETY: the caller's promise.
+    let function = library.as_ref().and_then(|library| unsafe { library.get::<T>(name.to_bytes_with_nul()) }.ok());
+    function.map(|function| *function).ok_or_else(|| {
+        Error::new(Kind::Solver, format!("METIS ({LIBRARY}) was not found"))
+            .because("large bodies are eliminated, and parts near the contact are cut, by what it says")
+            .help("`apt-get install libmetis5`, or for a condensed body MUMPS' own order: -mat_mumps_icntl_7 0")
+    })
 }
 
 /// Elimination order of a graph's nodes by nested dissection: position of each node, from 0.
@@ -38,11 +59,8 @@ pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
         // METIS refuses graphs without edges
         return Ok((0..nodes as i32).collect());
     }
-    let node_nd = node_nd().map_err(|error| {
-        error
-            .because("the condensed solver takes the elimination order of large bodies from it")
-            .help("`apt-get install libmetis5`, or take MUMPS' own order: -mat_mumps_icntl_7 0")
-    })?;
+    // SAFETY: METIS 5 has these arguments.
+    let node_nd = unsafe { function::<NodeNd>(c"METIS_NodeND") }?;
     let (mut count, mut order, mut position) = (nodes as i32, vec![-1; nodes], vec![-1; nodes]);
     // SAFETY: it reads the graph and writes one number a node to each of the last two.
     let code = unsafe {
@@ -70,9 +88,49 @@ pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
     Ok(position)
 }
 
+/// The part of each of a graph's nodes, of `parts` with about as many nodes each and few edges between them; the graph as in
+/// [`nested_dissection`].
+///
+/// # Errors
+/// When METIS is not installed, or does not return parts.
+pub fn partition(ptr: &mut [i32], col: &mut [i32], parts: usize) -> Result<Vec<i32>> {
+    let nodes = ptr.len() - 1;
+    if parts < 2 || col.is_empty() {
+        return Ok((0..nodes).map(|node| (node * parts / nodes) as i32).collect());
+    }
+    // SAFETY: METIS 5 has these arguments.
+    let part_graph = unsafe { function::<PartGraph>(c"METIS_PartGraphRecursive") }?;
+    let (mut count, mut constraints, mut asked, mut cut) = (nodes as i32, 1, parts as i32, 0);
+    let mut part = vec![-1; nodes];
+    // SAFETY: it reads the graph, writes one number a node to the last and one to the last but one; null stands for what is usual.
+    let code = unsafe {
+        part_graph(
+            &mut count,
+            &mut constraints,
+            ptr.as_mut_ptr(),
+            col.as_mut_ptr(),
+            null_mut(),
+            null_mut(),
+            null_mut(),
+            &mut asked,
+            null_mut(),
+            null_mut(),
+            null_mut(),
+            &mut cut,
+            part.as_mut_ptr(),
+        )
+    };
+    if code != 1 || part.iter().any(|part| !(0..asked).contains(part)) {
+        return Err(Error::new(Kind::Solver, "METIS returned no parts")
+            .because(format!("METIS_PartGraphRecursive returned {code}"))
+            .help("take another solver: --set solver=mumps"));
+    }
+    Ok(part)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::nested_dissection;
+    use super::{nested_dissection, partition};
 
     /// A chain of nodes: the separator in its middle comes last.
     #[test]
@@ -86,5 +144,11 @@ mod tests {
         let last = position.iter().position(|&at| at == 400).expect("a permutation");
         assert!((100..300).contains(&last), "{last}");
         assert_eq!(nested_dissection(&mut [0, 0, 0], &mut []).expect("no edges"), [0, 1]);
+        // two ends and a middle, all as long
+        let thirds = partition(&mut ptr, &mut col, 3).expect("METIS");
+        let changes = thirds.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        let most = (0..3).map(|part| thirds.iter().filter(|of| **of == part).count()).max();
+        assert!(changes == 2 && most < Some(140), "{changes} {most:?}");
+        assert_eq!(partition(&mut [0, 0, 0], &mut [], 2).expect("no edges"), [0, 1]);
     }
 }

@@ -26,9 +26,12 @@
 mod around;
 mod blas;
 mod error;
+mod factor;
 mod failure;
 mod ffi;
+mod halves;
 mod heap;
+mod indices;
 mod interpolation;
 mod kernels;
 mod ksp;
@@ -44,9 +47,11 @@ mod reason;
 #[cfg(test)]
 mod requirements;
 mod rows;
+mod scatter;
 mod scope;
 mod session;
 mod stage;
+mod substructures;
 mod table;
 mod until;
 mod vector;

@@ -60,7 +60,7 @@ pub struct Schur {
 }
 
 impl Schur {
-    /// Plans to eliminate all but the `retained` dofs. `lower` holds (row, column, value) of the lower triangle, row by row, each place once;
+    /// Plans to eliminate all but the `retained` dofs, if there are any. `lower` holds (row, column, value) of the lower triangle, row by row, each place once;
     /// `block_size` dofs belong to one node. Options `-<body>_mat_mumps_icntl_<i>` and `_cntl_<i>` are honoured.
     ///
     /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1), in small bodies of the plane MUMPS' own approximate
@@ -78,8 +78,8 @@ impl Schur {
     ) -> Result<Schur> {
         let one = |i: usize| i as Int + 1;
         let inside = lower.iter().all(|&(i, j, _)| i < rows && j <= i) && retained.iter().all(|&i| i < rows);
-        if !inside || retained.is_empty() || retained.len() >= rows || !rows.is_multiple_of(block_size) {
-            return Err(Error::new(Kind::Solver, "not a lower triangle with retained and interior rows"));
+        if !inside || retained.len() >= rows || !rows.is_multiple_of(block_size) {
+            return Err(Error::new(Kind::Solver, "not a lower triangle with interior rows"));
         }
         let mut schur = Schur {
             // SAFETY: MUMPS' struct is plain C data; zeros are null pointers and empty sizes.
@@ -120,6 +120,11 @@ impl Schur {
     /// Memory in megabytes that the factorisation will take, S not counted.
     pub fn expected_megabytes(&self) -> usize {
         self.mumps.infog[15].max(0) as usize
+    }
+
+    /// Whether the last factorisation met a pivot of zero.
+    pub(super) fn is_singular(&self) -> bool {
+        self.mumps.infog[0] == -10
     }
 
     /// Eliminates; what follows needs it.
@@ -163,6 +168,9 @@ impl Schur {
     /// Failures of MUMPS.
     pub fn condense(&mut self, b: &[f64]) -> Result<Vec<f64>> {
         let mut reduced = vec![0.0; self.retained.len()];
+        if reduced.is_empty() {
+            return Ok(reduced);
+        }
         self.solve(1, &mut b.to_vec(), &mut reduced)?;
         Ok(reduced)
     }
@@ -197,7 +205,7 @@ impl Schur {
         }
         (mumps.rhs, mumps.nrhs, mumps.lrhs) = (b.as_mut_ptr(), 1, mumps.n);
         (mumps.redrhs, mumps.lredrhs) = (reduced.as_mut_ptr(), reduced.len() as Int);
-        mumps.icntl[25] = phase;
+        mumps.icntl[25] = if reduced.is_empty() { 0 } else { phase };
         let called = self.call(3);
         (self.mumps.rhs, self.mumps.redrhs) = (null_mut(), null_mut());
         called
@@ -212,8 +220,7 @@ impl Schur {
         self.call(-1)?;
         let icntl = &mut self.mumps.icntl;
         icntl[..4].copy_from_slice(&[-1, -1, -1, 0]);
-        // complement asked for
-        icntl[18] = 1;
+        icntl[18] = Int::from(!self.retained.is_empty());
         Ok(())
     }
 

@@ -7,15 +7,15 @@
 //! y = S r_P,   z = P y + M (r - A P y),   z += P S (r - A z)_P       S = (P'AP)^-1
 //! ```
 //!
-//! Both products are with columns P alone. Of several processes each has its rows of them, and its part of P'AP, which MUMPS factors on all.
+//! Both products are with columns P alone. Each process has its rows of them.
 
 use super::around::Subspace;
+use super::factor::Factor;
+use super::indices::Indices;
 use super::library::petsc;
 use super::vector::Vector;
-use super::{Int, Ksp, Matrix, ffi};
+use super::{Ksp, Matrix, ffi};
 use crate::error::Result;
-use mpi::ffi::{MPI_Comm, RSMPI_COMM_SELF};
-use std::ptr::{null, null_mut};
 
 /// What the preconditioner around another needs.
 struct Patch {
@@ -27,7 +27,7 @@ struct Patch {
     columns: ffi::Mat,
     /// Vectors over the rows, and over P.
     parts: [Vector; 2],
-    solver: Ksp,
+    factor: Factor,
 }
 
 impl Ksp {
@@ -83,36 +83,31 @@ impl Patch {
     fn new(matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
         let (session, scope, own) = (matrix.session(), matrix.scope(), matrix.own());
         let new = |rows: &[usize]| Vector::new(session, scope, rows.len(), 1);
-        let mut inside = Indices::around(matrix, dofs, layers)?;
+        let mut inside = whole(Indices::around(matrix, dofs, layers)?, matrix.block_size());
         let mut touched = Indices::around(matrix, &inside, 1)?;
+        let Some(factor) = Factor::new(matrix, &inside)? else { return Ok(None) };
         inside.retain(|i| own.contains(i));
         touched.retain(|i| own.contains(i));
         let parts = [new(&touched)?, new(&inside)?];
         let patch = Indices::new(scope.comm(session), &inside)?;
-        let mut block = patch.submatrix(matrix, &patch)?;
-        // SAFETY: a matrix of rows and columns of one that is positive definite.
-        unsafe {
-            petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, ffi::PetscBool_PETSC_TRUE))?;
-            petsc!(MatSetOption(block, ffi::MatOption_MAT_SPD, ffi::PetscBool_PETSC_TRUE))?;
-        }
-        let solver = Ksp::factored(session, scope, block, inside.len());
-        // SAFETY: our reference; the solver has its own.
-        unsafe { petsc!(MatDestroy(&mut block)) }?;
-        let solver = solver?;
-        if solver.failure().is_some() {
-            return Ok(None);
-        }
         let columns = Indices::new(scope.comm(session), &touched)?.submatrix(matrix, &patch)?;
         inside.iter_mut().chain(&mut touched).for_each(|i| *i -= own.start);
-        Ok(Some(Self { inside, touched, columns, parts, solver }))
+        Ok(Some(Self { inside, touched, columns, parts, factor }))
     }
+}
+
+/// All dofs of the nodes that some of them belong to.
+fn whole(mut dofs: Vec<usize>, block_size: usize) -> Vec<usize> {
+    dofs.iter_mut().for_each(|dof| *dof /= block_size);
+    dofs.dedup();
+    dofs.into_iter().flat_map(|node| node * block_size..(node + 1) * block_size).collect()
 }
 
 impl Subspace for Patch {
     fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
         let residual: Vec<f64> = self.inside.iter().map(|&i| r[i]).collect();
         let (mut y, mut ay) = (vec![0.0; residual.len()], vec![0.0; self.touched.len()]);
-        self.solver.solve(&residual, &mut y)?;
+        self.factor.solve(&residual, &mut y)?;
         // SAFETY: the product reads one and writes to the other.
         let product = |y, ay| unsafe { petsc!(MatMult(self.columns, y, ay)) };
         self.parts[1].map(("y", &y), &self.parts[0], ("A y", &mut ay), product)?;
@@ -127,7 +122,7 @@ impl Subspace for Patch {
         // SAFETY: as above.
         let product = |part, az| unsafe { petsc!(MatMultTranspose(self.columns, part, az)) };
         self.parts[0].map(("z", &part), &self.parts[1], ("A z", &mut az), product)?;
-        self.solver.solve(&az, &mut y)?;
+        self.factor.solve(&az, &mut y)?;
         self.inside.iter().zip(&y).for_each(|(&i, y)| z[i] -= y);
         Ok(())
     }
@@ -137,54 +132,5 @@ impl Drop for Patch {
     fn drop(&mut self) {
         // SAFETY: the one reference of this type.
         let _ = unsafe { petsc!(MatDestroy(&mut self.columns)) };
-    }
-}
-
-/// Numbers of rows, in increasing order.
-struct Indices(ffi::IS);
-
-impl Indices {
-    /// What each process of a communicator has of them.
-    fn new(comm: MPI_Comm, numbers: &[usize]) -> Result<Self> {
-        let numbers: Vec<Int> = numbers.iter().map(|&i| i as Int).collect();
-        let (count, copy, mut is) = (numbers.len() as Int, ffi::PetscCopyMode_PETSC_COPY_VALUES, null_mut());
-        // SAFETY: PETSc copies the numbers.
-        unsafe { petsc!(ISCreateGeneral(comm, count, numbers.as_ptr(), copy, &mut is)) }?;
-        Ok(Self(is))
-    }
-
-    /// These `rows` of a matrix and those within `layers` of its graph around them. Collective.
-    fn around(matrix: &Matrix, rows: &[usize], layers: usize) -> Result<Vec<usize>> {
-        let mut rows = rows.to_vec();
-        rows.sort_unstable();
-        rows.dedup();
-        // SAFETY: the constant of MPI itself.
-        let mut indices = Self::new(unsafe { RSMPI_COMM_SELF }, &rows)?;
-        let (mut count, mut numbers) = (0, null());
-        // SAFETY: one set, in the place of which PETSc puts a new one, and its array, read before it is given back.
-        unsafe {
-            petsc!(MatIncreaseOverlap(matrix.raw(), 1, &mut indices.0, layers as Int))?;
-            petsc!(ISSort(indices.0))?;
-            petsc!(ISGetLocalSize(indices.0, &mut count))?;
-            petsc!(ISGetIndices(indices.0, &mut numbers))?;
-            let copy = (0..count as usize).map(|k| *numbers.add(k) as usize).collect();
-            petsc!(ISRestoreIndices(indices.0, &mut numbers))?;
-            Ok(copy)
-        }
-    }
-
-    /// These rows and those columns of a matrix, of its processes.
-    fn submatrix(&self, matrix: &Matrix, columns: &Indices) -> Result<ffi::Mat> {
-        let (scall, mut part) = (ffi::MatReuse_MAT_INITIAL_MATRIX, null_mut());
-        // SAFETY: sets of the matrix's processes.
-        unsafe { petsc!(MatCreateSubMatrix(matrix.raw(), self.0, columns.0, scall, &mut part)) }?;
-        Ok(part)
-    }
-}
-
-impl Drop for Indices {
-    fn drop(&mut self) {
-        // SAFETY: the one reference of this type.
-        let _ = unsafe { petsc!(ISDestroy(&mut self.0)) };
     }
 }

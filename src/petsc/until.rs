@@ -3,6 +3,7 @@
 use super::around::ERROR;
 use super::ksp::Solved;
 use super::library::petsc;
+use super::vector::slice;
 use super::{Ksp, ffi};
 use crate::error::Result;
 use std::ffi::c_void;
@@ -129,7 +130,7 @@ unsafe extern "C" fn is_enough(
     })();
     let Ok(()) = read else { return ERROR };
     // SAFETY: PETSc's array has that many entries here, and nobody writes to it before it is given back.
-    let x = unsafe { std::slice::from_raw_parts(array, rows as usize) };
+    let x = unsafe { slice(array, rows as usize) };
     let least = extreme(ksp).map(|extreme| extreme[0]).filter(|least| *least > 0.0);
     if (until.enough)(&Iterate { x, residual: norm, first: until.first, least }) {
         *reason = ffi::KSPConvergedReason_KSP_CONVERGED_RTOL;

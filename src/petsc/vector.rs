@@ -47,7 +47,7 @@ impl Vector {
         unsafe {
             petsc!(VecSetBlockSize(vec, block_size as Int))?;
             petsc!(VecGetArray(vec, &mut array))?;
-            std::slice::from_raw_parts_mut(array, values.len()).copy_from_slice(values);
+            slice_mut(array, values.len()).copy_from_slice(values);
             petsc!(VecRestoreArray(vec, &mut array))?;
         }
         Ok(vector)
@@ -100,6 +100,24 @@ impl Drop for Placed<'_> {
         // SAFETY: an array was placed, or there were no guard.
         let _ = unsafe { petsc!(VecResetArray(self.0.vec)) };
     }
+}
+
+/// An array of PETSc, which has no place where it has no entries.
+///
+/// # Safety
+/// That many entries, which nobody writes to while the slice lives.
+pub(super) unsafe fn slice<'a, T>(first: *const T, len: usize) -> &'a [T] {
+    // SAFETY: the caller's promise.
+    if len == 0 { &[] } else { unsafe { std::slice::from_raw_parts(first, len) } }
+}
+
+/// The same to write to.
+///
+/// # Safety
+/// That many entries, which belong to nobody else while the slice lives.
+pub(super) unsafe fn slice_mut<'a, T>(first: *mut T, len: usize) -> &'a mut [T] {
+    // SAFETY: the caller's promise.
+    if len == 0 { &mut [] } else { unsafe { std::slice::from_raw_parts_mut(first, len) } }
 }
 
 /// Checks the length of a slice.
