@@ -42,7 +42,7 @@ unsafe fn function<T: Copy>(name: &CStr) -> Result<T> {
     let function = library.as_ref().and_then(|library| unsafe { library.get::<T>(name.to_bytes_with_nul()) }.ok());
     function.map(|function| *function).ok_or_else(|| {
         Error::new(Kind::Solver, format!("METIS ({LIBRARY}) was not found"))
-            .because("large bodies are eliminated, and parts near the contact are cut, by what it says")
+            .because("large bodies, and dofs near stiff contact, are eliminated in its order")
             .help("`apt-get install libmetis5`, or for a condensed body MUMPS' own order: -mat_mumps_icntl_7 0")
     })
 }
