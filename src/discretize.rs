@@ -12,6 +12,7 @@ mod elastic;
 mod factory;
 mod find;
 mod gauge;
+mod here;
 mod known;
 mod local;
 mod mechanism;
@@ -31,7 +32,7 @@ use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
 use crate::exchange::Exchange;
-use crate::fem::{FreeMotion, place};
+use crate::fem::FreeMotion;
 use crate::linalg::{Csr, axpy, dot};
 use crate::mesh::Checked;
 use crate::model::{BodySlot, Loads, Mechanism, Model, Segment};
@@ -45,6 +46,7 @@ use couplings::Coupled;
 use distribute::Deal;
 use draft::{Draft, Loose};
 pub use factory::{Assembled, Factory, Outline};
+use here::Here;
 use local::Local;
 use mechanism::Fixed;
 use meshes::{Kept, Meshes, Shape};
@@ -219,15 +221,14 @@ pub fn discretize<const D: usize>(
     drop(deals);
     let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt);
     let known = gauged.into_iter().zip(loose).zip(elasticities);
-    for (index, ((mut part, (((draft, supported), graph), mut dealt)), ((gauged, loose), elasticity))) in
+    for (index, ((part, (((draft, supported), graph), mut dealt)), ((gauged, loose), elasticity))) in
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
         let is_owner = owner[index] == rank;
-        let Draft { segments, mut rows, nodal_load, load, .. } = draft;
-        let Supported { mut carried, mut prescribed } = supported;
+        let Draft { segments, rows, nodal_load, load, .. } = draft;
         let mut offset = vec![0.0; rows.rows()];
-        if !carried.is_empty() {
-            rows.multiply(&carried, &mut offset);
+        if !supported.carried.is_empty() {
+            rows.multiply(&supported.carried, &mut offset);
         }
         offsets.push(offset);
         let Loose { left, motions, sprung, unfelt } = loose;
@@ -264,34 +265,24 @@ pub fn discretize<const D: usize>(
         let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
         let elasticity = Rc::new(elasticity);
         let (space, held) = if is_owner || dealt.is_some() {
-            let (smooth, mut nodal_rows) = (part.smooth(), nodal_rows(&segments, &pairs, part.space.dofs()));
-            let (force, nodal_force, own, free): (_, _, Vec<bool>, Vec<FreeMotion>);
-            match &mut dealt {
-                None => {
-                    (force, nodal_force, own) = (load.all(), nodal_load.all(), vec![true; part.space.nodes.len()]);
-                    let motion = |motion| FreeMotion::new(part.dofs_of(motion), &prescribed, |u| dot(u, &force));
-                    free = left.iter().map(motion).collect();
-                }
-                Some(dealt) => {
-                    let (products, work) = part.products(&left, &prescribed, &load.all());
-                    let nodes = part.space.among(dealt.nodes_here::<D>(&part, [&rows, &nodal_rows]));
-                    dealt.choose::<D>(&nodes, products);
-                    (part, force, nodal_force) = (part.on(&nodes), load.on(&nodes), nodal_load.on(&nodes));
-                    own = (0..nodes.len() as u32)
-                        .map(|node| dealt.is_own::<D>(part.held.frame.node(node) as usize))
-                        .collect();
-                    let here = |dof: usize| Some(D * place(&nodes, (dof / D) as u32)? as usize + dof % D);
-                    for rows in [&mut rows, &mut nodal_rows] {
-                        *rows = rows.of_columns(D * nodes.len(), here);
-                    }
-                    prescribed = prescribed.into_iter().filter_map(|(dof, u)| Some((here(dof)?, u))).collect();
-                    if !carried.is_empty() {
-                        carried = nodes.iter().flat_map(|&node| &carried[D * node as usize..][..D]).copied().collect();
-                    }
-                    let motion = |(motion, work)| FreeMotion::new(part.dofs_of(motion), &prescribed, |_| work);
-                    free = left.iter().zip(work).map(motion).collect();
-                }
+            let rows = [rows, nodal_rows(&segments, &pairs, part.space.dofs())];
+            let (smooth, loads) = (part.smooth(), [load, nodal_load]);
+            let (mut here, mut works) = (Here { part, rows, loads, supported }, None);
+            if let Some(dealt) = &mut dealt {
+                let work;
+                (here, work) = here.of(dealt, &left);
+                works = Some(work);
             }
+            let Here { part, rows: [rows, nodal_rows], loads, supported: Supported { carried, prescribed } } = here;
+            let [force, nodal_force] = loads.map(|loads| loads.all());
+            let free = left.iter().enumerate().map(|(k, motion)| {
+                let work = |u: &[f64]| works.as_ref().map_or_else(|| dot(u, &force), |works| works[k]);
+                FreeMotion::new(part.dofs_of(motion), &prescribed, work)
+            });
+            let free: Vec<_> = free.collect();
+            let is_own =
+                |node| dealt.as_ref().is_none_or(|dealt| dealt.is_own::<D>(part.held.frame.node(node) as usize));
+            let own: Vec<bool> = (0..part.space.nodes.len() as u32).map(is_own).collect();
             let mut kept = factory.kept(&name).filter(|_| dealt.is_none());
             let mut serves = false;
             if let Some(body) = kept.as_mut().and_then(|slot| slot.local.as_mut()) {

@@ -3,7 +3,7 @@
 use super::part::Part;
 use crate::contact::{ContactPair, add, pad};
 use crate::error::Result;
-use crate::fem::{Parts, RigidMotion, rigid};
+use crate::fem::{Parts, RigidMotion, place, rigid};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, rigid as joint};
@@ -59,10 +59,11 @@ impl<const D: usize> NodalForces<D> {
         all
     }
 
-    /// Forces at some nodes, which are sorted.
-    pub fn on(&self, nodes: &[u32]) -> Vec<f64> {
-        let at = |node| self.nodes.binary_search(node).map_or([0.0; D], |place| self.forces[place]);
-        nodes.iter().flat_map(at).collect()
+    /// Those at some nodes, which are sorted, of a body that has these alone.
+    pub fn on(&self, nodes: &[u32]) -> Self {
+        let forces = self.nodes.iter().zip(&self.forces);
+        let (at, forces) = forces.filter_map(|(&node, force)| Some((place(nodes, node)?, *force))).unzip();
+        Self { count: nodes.len(), nodes: at, forces }
     }
 }
 
