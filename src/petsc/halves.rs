@@ -1,8 +1,11 @@
 //! Some nodes of a matrix, cut into two halves that are not coupled.
 
 use super::indices::row;
-use super::{Int, Matrix, metis};
+use super::{Int, Matrix, Session, metis};
 use crate::error::Result;
+use mpi::Count;
+use mpi::datatype::PartitionMut;
+use mpi::traits::{Communicator, CommunicatorCollectives, Root};
 
 /// A node between the halves.
 pub(super) const BETWEEN: Int = -1;
@@ -35,8 +38,8 @@ pub(super) fn halves(matrix: &Matrix, dofs: &[usize]) -> Result<Vec<Int>> {
         graph.extend(others.filter(|other| *other != number).map(|other| other as Int));
         graph[at] = (graph.len() - at - 1) as Int;
     }
-    let graph = scope.collect(session, &graph);
-    if scope.is_first(session) {
+    let graph = collect(session, &graph);
+    if session.rank() == 0 {
         let (mut ptr, mut col, mut rest) = (vec![0], Vec::with_capacity(graph.len()), &graph[..]);
         while let [count, others @ ..] = rest {
             let (these, next) = others.split_at(*count as usize);
@@ -47,8 +50,24 @@ pub(super) fn halves(matrix: &Matrix, dofs: &[usize]) -> Result<Vec<Int>> {
         half = metis::partition(&mut ptr, &mut col, 2)?;
         separate(&ptr, &col, &mut half);
     }
-    scope.tell(session, &mut half);
+    session.world().process_at_rank(0).broadcast_into(&mut half[..]);
     Ok(half)
+}
+
+/// What all processes have, one after the other, on the first; nothing on others.
+fn collect(session: &Session, mine: &[Int]) -> Vec<Int> {
+    let mut lengths: Vec<Count> = vec![0; session.size()];
+    session.world().all_gather_into(&(mine.len() as Count), &mut lengths[..]);
+    let first = session.world().process_at_rank(0);
+    if session.rank() > 0 {
+        first.gather_varcount_into(mine);
+        return Vec::new();
+    }
+    let starts: Vec<Count> =
+        lengths.iter().scan(0, |next, length| Some(std::mem::replace(next, *next + length))).collect();
+    let mut all = vec![0; lengths.iter().sum::<Count>() as usize];
+    first.gather_varcount_into_root(mine, &mut PartitionMut::new(&mut all[..], lengths, starts));
+    all
 }
 
 /// Takes nodes out of the halves until no edge joins these: nodes with the most such edges first, so that they are few and of both halves.
