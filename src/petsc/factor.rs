@@ -15,25 +15,24 @@ pub(super) enum Factor {
 }
 
 impl Factor {
-    /// Of dofs in increasing order, whole nodes, the same on all processes; collective. `None` if it is not positive definite to rounding.
+    /// Of dofs in increasing order, whole nodes, the same on all processes, and of which `here` has so many of this process; collective. `None` if
+    /// it is not positive definite to rounding.
     ///
     /// # Errors
     /// Memory, and what else stops MUMPS.
-    pub fn new(matrix: &Matrix, dofs: &[usize]) -> Result<Option<Self>> {
-        let (session, scope, own) = (matrix.session(), matrix.scope(), matrix.own());
+    pub fn new(matrix: &Matrix, dofs: &[usize], (here, count): (&Indices, usize)) -> Result<Option<Self>> {
+        let (session, scope) = (matrix.session(), matrix.scope());
         // a half is to be no larger than what a process has of the matrix anyway
         if dofs.len() * scope.processes(session) <= 2 * matrix.total() {
             return Ok(Substructures::new(matrix, dofs)?.map(Self::Halves));
         }
-        let here: Vec<usize> = dofs.iter().copied().filter(|dof| own.contains(dof)).collect();
-        let rows = Indices::new(scope.comm(session), &here)?;
-        let mut block = rows.submatrix(matrix, &rows)?;
+        let mut block = here.submatrix(matrix, here)?;
         // SAFETY: a matrix of rows and columns of one that is positive definite.
         unsafe {
             petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, ffi::PetscBool_PETSC_TRUE))?;
             petsc!(MatSetOption(block, ffi::MatOption_MAT_SPD, ffi::PetscBool_PETSC_TRUE))?;
         }
-        let solver = Ksp::factored(session, scope, block, here.len());
+        let solver = Ksp::factored(session, scope, block, count);
         // SAFETY: our reference; the solver has its own.
         unsafe { petsc!(MatDestroy(&mut block)) }?;
         let solver = solver?;

@@ -47,8 +47,7 @@ pub(super) fn halves(matrix: &Matrix, dofs: &[usize]) -> Result<Vec<Int>> {
             ptr.push(col.len() as Int);
             rest = next;
         }
-        half = metis::partition(&mut ptr, &mut col, 2)?;
-        separate(&ptr, &col, &mut half);
+        half = of_graph(&mut ptr, &mut col)?;
     }
     session.world().process_at_rank(0).broadcast_into(&mut half[..]);
     Ok(half)
@@ -70,6 +69,13 @@ fn collect(session: &Session, mine: &[Int]) -> Vec<Int> {
     all
 }
 
+/// The halves of a graph: the neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`.
+fn of_graph(ptr: &mut [Int], col: &mut [Int]) -> Result<Vec<Int>> {
+    let mut half = metis::partition(ptr, col, 2)?;
+    separate(ptr, col, &mut half);
+    Ok(half)
+}
+
 /// Takes nodes out of the halves until no edge joins these: nodes with the most such edges first, so that they are few and of both halves.
 fn separate(ptr: &[Int], col: &[Int], half: &mut [Int]) {
     let around = |node: usize| col[ptr[node] as usize..ptr[node + 1] as usize].iter().map(|other| *other as usize);
@@ -86,7 +92,23 @@ fn separate(ptr: &[Int], col: &[Int], half: &mut [Int]) {
 
 #[cfg(test)]
 mod tests {
-    use super::{BETWEEN, separate};
+    use super::{BETWEEN, of_graph, separate};
+
+    /// A strip of 60 by 10 nodes: about one row of ten lies between halves of the same size, none of whose nodes is next to one of the other.
+    #[test]
+    fn a_strip_is_cut_across() {
+        let (mut ptr, mut col) = (vec![0], Vec::new());
+        for i in 0..600i32 {
+            let beside = [i - 1, i + 1].into_iter().filter(|j| j.div_euclid(10) == i / 10);
+            col.extend(beside.chain([i - 10, i + 10].into_iter().filter(|j| (0..600).contains(j))));
+            ptr.push(col.len() as i32);
+        }
+        let half = of_graph(&mut ptr, &mut col).expect("METIS");
+        let count = |of| half.iter().filter(|half| **half == of).count();
+        assert!(count(BETWEEN) <= 12 && count(0).abs_diff(count(1)) <= 24, "{} {}", count(0), count(1));
+        let apart = |i: usize, j: i32| half[i] == BETWEEN || half[j as usize] != 1 - half[i];
+        assert!((0..600).all(|i| col[ptr[i] as usize..ptr[i + 1] as usize].iter().all(|&j| apart(i, j))));
+    }
 
     /// Two stars whose centres are coupled: one centre is enough between them. A leaf in the half of the other star needs its own centre.
     #[test]

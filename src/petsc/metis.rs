@@ -95,7 +95,7 @@ pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
 /// When METIS is not installed, or does not return parts.
 pub fn partition(ptr: &mut [i32], col: &mut [i32], parts: usize) -> Result<Vec<i32>> {
     let nodes = ptr.len() - 1;
-    if parts < 2 || col.is_empty() {
+    if col.is_empty() {
         return Ok((0..nodes).map(|node| (node * parts / nodes) as i32).collect());
     }
     // SAFETY: METIS 5 has these arguments.

@@ -83,13 +83,13 @@ impl Patch {
     fn new(matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
         let (session, scope, own) = (matrix.session(), matrix.scope(), matrix.own());
         let new = |rows: &[usize]| Vector::new(session, scope, rows.len(), 1);
-        let mut inside = whole(Indices::around(matrix, dofs, layers)?, matrix.block_size());
-        let mut touched = Indices::around(matrix, &inside, 1)?;
-        let Some(factor) = Factor::new(matrix, &inside)? else { return Ok(None) };
-        inside.retain(|i| own.contains(i));
+        let dofs = whole(Indices::around(matrix, dofs, layers)?, matrix.block_size());
+        let mut touched = Indices::around(matrix, &dofs, 1)?;
         touched.retain(|i| own.contains(i));
-        let parts = [new(&touched)?, new(&inside)?];
+        let mut inside: Vec<usize> = dofs.iter().copied().filter(|i| own.contains(i)).collect();
         let patch = Indices::new(scope.comm(session), &inside)?;
+        let Some(factor) = Factor::new(matrix, &dofs, (&patch, inside.len()))? else { return Ok(None) };
+        let parts = [new(&touched)?, new(&inside)?];
         let columns = Indices::new(scope.comm(session), &touched)?.submatrix(matrix, &patch)?;
         inside.iter_mut().chain(&mut touched).for_each(|i| *i -= own.start);
         Ok(Some(Self { inside, touched, columns, parts, factor }))

@@ -171,13 +171,8 @@ impl<'a> Layout<'a> {
         let mut near: Vec<usize> = coupled.iter().map(|entry| entry.0 / size).collect();
         near.dedup();
         let near: Vec<usize> = near.into_iter().flat_map(|node| node * size..(node + 1) * size).collect();
-        let mut behind = 0;
-        for (place, i, value) in coupled {
-            while near[behind] < place {
-                behind += 1;
-            }
-            lower.push((inside + behind, i, value));
-        }
+        let behind = |place| inside + near.partition_point(|&near| near < place);
+        lower.extend(coupled.into_iter().map(|(place, i, value)| (behind(place), i, value)));
         if inside == 0 {
             return Ok((near, None));
         }
