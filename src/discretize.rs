@@ -196,11 +196,9 @@ pub fn discretize<const D: usize>(
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
     let deal = |bodies: Vec<usize>| {
-        let points: Vec<u32> = bodies.iter().flat_map(|&body| parts[body].known.points.iter()).copied().collect();
         let couplings = coupled.of(&bodies, &pairs);
-        let weight = |node: u32| u64::from(couplings[node as usize]);
-        let at = |node: u32| mesh.points[points[node as usize] as usize];
-        Deal { owner: crate::mesh::bisect(points.len(), at, &weight, exchange.ranks()), bodies }
+        let places: Vec<&[[f64; D]]> = bodies.iter().map(|&body| &parts[body].space.nodes[..]).collect();
+        Deal::new(bodies, &places, &couplings, exchange.ranks())
     };
     let deals: Vec<Deal> = factory.dealt_out().into_iter().map(deal).collect();
     let graphs = lazy.into_graphs();
@@ -327,8 +325,8 @@ pub fn discretize<const D: usize>(
             let is_whole = info.ranks.len() == 1 && !own.contains(&false);
             let local = Local { space: space.clone(), own };
             info.points = match is_whole {
-                true => part.known.points.to_vec(),
-                false => space.part(local.told()).1.iter().map(|&node| part.known.points[node as usize]).collect(),
+                true => part.known.points.iter().map(|&(_, point)| point).collect(),
+                false => space.part(local.told()).1.iter().filter_map(|&node| part.known.point(node)).collect(),
             };
             let forces = Forces {
                 rows: nodal_rows,

@@ -44,6 +44,32 @@ pub fn gather<T: Serialize + DeserializeOwned + Ord>(exchange: &dyn Exchange, mi
     all
 }
 
+/// The place of each of `mine`, which are sorted, among those of all ranks, of which no two are the same: each rank sorts those between two values, which
+/// are found by samples. Collective.
+pub fn places<T: Serialize + DeserializeOwned + Ord + Clone>(exchange: &dyn Exchange, mine: &[T]) -> Vec<u32> {
+    let ranks = exchange.ranks();
+    let every = |all: &[T]| (1..ranks).filter_map(|k| all.get(k * all.len() / ranks).cloned()).collect::<Vec<T>>();
+    let between = every(&gather(exchange, &every(mine)));
+    let mut rest = mine;
+    let mut parts = Vec::with_capacity(ranks);
+    for value in &between {
+        let part;
+        (part, rest) = rest.split_at(rest.partition_point(|other| other < value));
+        parts.push(part.to_vec());
+    }
+    parts.push(rest.to_vec());
+    parts.resize(ranks, Vec::new());
+    let theirs: Vec<Vec<T>> = trade(exchange, parts);
+    let lengths = share(exchange, theirs.iter().map(Vec::len).sum::<usize>());
+    let first = lengths[..exchange.rank()].iter().sum::<usize>() as u32;
+    let mut places: Vec<Vec<u32>> = theirs.iter().map(|theirs| vec![0; theirs.len()]).collect();
+    let of_rank = |(rank, theirs): (usize, Vec<T>)| theirs.into_iter().zip(0..).map(move |(value, k)| (value, rank, k));
+    let mut all: Vec<(T, usize, usize)> = theirs.into_iter().enumerate().flat_map(of_rank).collect();
+    all.sort_unstable();
+    all.iter().zip(first..).for_each(|(&(_, rank, k), place)| places[rank][k] = place);
+    trade(exchange, places).concat()
+}
+
 /// What this rank has of lists of these lengths, if all of them one after the other are cut into equal parts for the ranks.
 pub fn shares(lengths: impl Iterator<Item = usize> + Clone, exchange: &dyn Exchange) -> Vec<Range<usize>> {
     let (all, ranks): (usize, _) = (lengths.clone().sum(), exchange.ranks());
@@ -250,7 +276,27 @@ pub mod crowd {
 
 #[cfg(test)]
 mod tests {
-    use super::{crowd, shares};
+    use super::{crowd, places, shares};
+
+    /// Values have the places that one rank would give them, wherever they are.
+    #[test]
+    fn ranks_sort_together() {
+        for ranks in [1, 2, 5] {
+            let lists = crowd::on(ranks, |exchange| {
+                let rank = exchange.rank() as u64;
+                // some rank has nothing, and values of ranks lie among each other
+                let mut mine: Vec<u64> = (0..40 * (rank % 3)).map(|k| 7919 * (k + 1000 * rank) % 10_007).collect();
+                mine.sort_unstable();
+                (places(exchange, &mine), mine)
+            });
+            let mut all: Vec<u64> = lists.iter().flat_map(|(_, mine)| mine).copied().collect();
+            all.sort_unstable();
+            for (places, mine) in lists {
+                assert_eq!(places.len(), mine.len());
+                assert!(mine.iter().zip(places).all(|(value, place)| all[place as usize] == *value));
+            }
+        }
+    }
 
     /// Lists are cut into parts of equal length, one after the other.
     #[test]

@@ -50,6 +50,8 @@ struct Cells {
     keys: Vec<Key>,
     /// Their nodes.
     nodes: Vec<u32>,
+    /// The numbers of these among the points of the mesh.
+    points: Vec<u32>,
     /// Number of the constants of each; empty if the body has no regions.
     regions: Vec<usize>,
 }
@@ -90,6 +92,11 @@ pub fn deal<const D: usize>(
         }
         order.sort_unstable();
         order.dedup_by_key(|(key, ..)| *key);
+        let mut points: Vec<(u32, u32)> =
+            dealt.iter().flat_map(|cells| cells.nodes.iter().copied().zip(cells.points.iter().copied())).collect();
+        points.sort_unstable();
+        points.dedup();
+        part.known.points = points;
         let stride = part.space.stride;
         let nodes = order.iter().flat_map(|&(_, from, number)| &dealt[from].nodes[number * stride..][..stride]);
         part.space.cells = nodes.copied().collect();
@@ -118,24 +125,24 @@ fn near<const D: usize>(part: &Part<D>, stock: &Stock<D>, needs: &Needs, ranks: 
     // tied nodes are assembled where their master is
     let owner = |&node: &u32| of_node[part.held.frame.node(node) as usize];
     // all cells at an own point are here
-    let is_own = |node: &u32| stock.is_own(part.known.points[*node as usize]);
-    let cells = || stock.nodes.chunks_exact(part.space.stride);
+    let cells = || (0..).zip(stock.nodes.chunks_exact(part.space.stride));
     // ranks that have a node next to one of another rank
-    let next = |cell: &'_ [u32]| {
+    let next = |(number, cell): (u32, &'_ [u32])| {
         let mut next = Vec::new();
         for rank in cell.iter().map(owner) {
-            next.extend(cell.iter().filter(|node| owner(node) != rank && is_own(node)).map(|&node| (node, rank)));
+            let others = stock.own_of(number, cell).filter(|node| owner(node) != rank);
+            next.extend(others.map(|node| (node, rank)));
         }
         next
     };
     let mut others: Vec<(u32, u32)> = cells().flat_map(next).collect();
     others.sort_unstable();
     others.dedup();
-    for (number, cell) in (0..).zip(cells()) {
-        for node in cell.iter().filter(|node| is_own(node)) {
-            let first = others.partition_point(|(other, _)| other < node);
-            let others = others[first..].iter().take_while(|(other, _)| other == node).map(|(_, rank)| *rank);
-            for rank in std::iter::once(owner(node)).chain(others) {
+    for (number, cell) in cells() {
+        for node in stock.own_of(number, cell) {
+            let first = others.partition_point(|(other, _)| *other < node);
+            let others = others[first..].iter().take_while(|(other, _)| *other == node).map(|(_, rank)| *rank);
+            for rank in std::iter::once(owner(&node)).chain(others) {
                 let near = &mut near[rank as usize];
                 if near.last() != Some(&number) {
                     near.push(number);
@@ -154,6 +161,7 @@ fn some<const D: usize>(part: &Part<D>, stock: &Stock<D>, cells: impl Iterator<I
     Cells {
         keys: cells.clone().map(|cell| stock.keys()[cell as usize]).collect(),
         regions: regions.map(|cell| stock.elasticity.region(cell as usize)).collect(),
+        points: cells.clone().flat_map(|cell| stock.numbers(cell, stride)).collect(),
         nodes: cells.flat_map(of_cell).collect(),
     }
 }

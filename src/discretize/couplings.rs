@@ -67,11 +67,10 @@ impl<'a, const D: usize> Coupled<'a, D> {
         self.numbers[body].get_or_init(|| {
             let (space, _) = part.space.clone().of_cells(stock.nodes.clone(), 0.0);
             let NodeGraph { ptr, .. } = part.graph(&space, rows);
-            let own = ptr.windows(2).zip(part.known.points.iter()).map(|(row, &point)| match stock.is_own(point) {
-                true => f64::from(row[1] - row[0]),
-                false => 0.0,
-            });
-            let mut couplings: Vec<f64> = own.collect();
+            let mut couplings = vec![0.0; part.space.nodes.len()];
+            for node in stock.own().map(|node| node as usize) {
+                couplings[node] = f64::from(ptr[node + 1] - ptr[node]);
+            }
             self.exchange.sum(&mut couplings);
             couplings.into_iter().map(|count| count as u32).collect()
         })

@@ -5,6 +5,7 @@ use super::part::Part;
 use crate::exchange::Exchange;
 use crate::fem::{Couplings, ElasticBody, Interpolation, place};
 use crate::linalg::Csr;
+use crate::mesh::Cuts;
 use crate::model::Distribution;
 use nalgebra::DMatrix;
 use std::rc::Rc;
@@ -15,6 +16,21 @@ pub struct Deal {
     pub bodies: Vec<usize>,
     /// The rank of each of their nodes, body by body.
     pub owner: Vec<u32>,
+}
+
+impl Deal {
+    /// Of bodies with nodes at these places, each of which is coupled with so many, counted through all bodies.
+    pub fn new<const D: usize>(bodies: Vec<usize>, places: &[&[[f64; D]]], couplings: &[u32], ranks: usize) -> Self {
+        let mut starts = vec![0];
+        places.iter().for_each(|nodes| starts.push(starts[starts.len() - 1] + nodes.len()));
+        let at = |node: u32| {
+            let body = starts.partition_point(|&start| start <= node as usize) - 1;
+            places[body][node as usize - starts[body]]
+        };
+        let weight = |node: u32| u64::from(couplings[node as usize]);
+        let cuts = Cuts::new(couplings.len(), at, &weight, ranks);
+        Self { bodies, owner: (0..couplings.len() as u32).map(|node| cuts.part(&at(node), node) as u32).collect() }
+    }
 }
 
 /// A body that is dealt out, as one rank sees it.

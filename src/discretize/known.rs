@@ -5,13 +5,12 @@
 
 use super::approach::Outer;
 use crate::fem::{Facets, Space, place};
-use std::sync::Arc;
 
 /// What all ranks know of a body.
 #[derive(Debug, Clone, Default)]
 pub struct Known {
-    /// Point of the mesh of each node.
-    pub points: Arc<Vec<u32>>,
+    /// Nodes of the cells that are here, sorted, and the number of each among the points of the mesh.
+    pub points: Vec<(u32, u32)>,
     /// Number of cells.
     pub cells: usize,
     /// Area (volume) of the body; of one of revolution that of the rings.
@@ -34,13 +33,18 @@ impl Known {
     /// The same of some nodes, sorted, by their places among these; boundaries and loads are no longer asked for.
     pub fn on(&self, nodes: &[u32]) -> Self {
         Self {
-            points: Arc::new(nodes.iter().map(|&node| self.points[node as usize]).collect()),
+            points: self.points.iter().filter_map(|&(node, point)| Some((place(nodes, node)?, point))).collect(),
             corners: self.corners.iter().filter_map(|&node| place(nodes, node)).collect(),
             outer: self.outer.on(nodes),
             force: Vec::new(),
             boundary: Vec::new(),
             ..*self
         }
+    }
+
+    /// The number of a node of the cells that are here among the points of the mesh.
+    pub fn point(&self, node: u32) -> Option<u32> {
+        self.points.binary_search_by_key(&node, |entry| entry.0).ok().map(|place| self.points[place].1)
     }
 
     /// All facets of the boundary, if they were wanted.

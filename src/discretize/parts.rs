@@ -10,7 +10,7 @@ use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::exchange::{Exchange, first, gather, share};
 use crate::fem::{Elasticity, Parts, Space, interpolation};
-use crate::mesh::{Key, Mesh, Portion};
+use crate::mesh::{Group, Key, Mesh, Nodes, Portion};
 use crate::problem::{BodySpec, Order, Plane};
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -24,6 +24,8 @@ pub struct Stock<'a, const D: usize> {
     pub nodes: Vec<u32>,
     /// Elasticity of each.
     pub elasticity: Elasticity,
+    /// The nodes of the body that this rank has.
+    known: Arc<Nodes>,
 }
 
 impl<const D: usize> Stock<'_, D> {
@@ -32,9 +34,26 @@ impl<const D: usize> Stock<'_, D> {
         self.portion.keys(self.group)
     }
 
-    /// Whether a point of the mesh is one of this rank.
-    pub fn is_own(&self, point: u32) -> bool {
-        self.portion.is_own(point)
+    /// Points of a cell.
+    fn points(&self, cell: u32) -> &[u32] {
+        let Group { connectivity, stride, .. } = &self.portion.mesh.groups[self.group];
+        &connectivity[cell as usize * stride..][..*stride]
+    }
+
+    /// Nodes of a cell that are points of this rank.
+    pub fn own_of<'s>(&'s self, cell: u32, nodes: &'s [u32]) -> impl Iterator<Item = u32> + 's {
+        let own = nodes.iter().zip(self.points(cell)).filter(|(_, point)| self.portion.is_own(**point));
+        own.map(|(&node, _)| node)
+    }
+
+    /// Numbers of the points of a cell among those of the mesh, as many as it has nodes.
+    pub fn numbers(&self, cell: u32, stride: usize) -> impl Iterator<Item = u32> {
+        self.points(cell)[..stride].iter().map(|&point| self.portion.number(point))
+    }
+
+    /// Nodes that are points of this rank.
+    pub fn own(&self) -> impl Iterator<Item = u32> {
+        own(&self.known, self.portion)
     }
 
     /// Numbers of the cells that this rank speaks for: each is one of one rank.
@@ -46,6 +65,12 @@ impl<const D: usize> Stock<'_, D> {
 fn home<const D: usize>(portion: &Portion<D>, group: usize, rank: usize) -> impl Iterator<Item = usize> + Clone {
     let cells = portion.mesh.groups[group].simplices().enumerate();
     cells.filter(move |(_, cell)| portion.home(cell[0]) == rank).map(|(number, _)| number)
+}
+
+/// Nodes that are points of this rank.
+fn own<const D: usize>(known: &Nodes, portion: &Portion<D>) -> impl Iterator<Item = u32> {
+    let nodes = known.numbers.iter().zip(&known.points);
+    nodes.filter(|(_, point)| portion.is_own(**point)).map(|(&node, _)| node)
 }
 
 /// The bodies with their spaces, supports and springs, and the cells that this rank has of them. Where there are several ranks, the spaces have the
@@ -67,15 +92,15 @@ pub fn parts<'a, const D: usize>(
     for (index, spec) in bodies.iter().enumerate() {
         find_group(mesh, &spec.name, &[D], "body")?;
         let group = mesh.groups.place(&spec.name.value).unwrap_or_default();
-        let points = &checked[index].points;
-        let (mut space, elasticity, known) = read(spec, (portion, group), points, wanted, exchange)?;
+        let nodes_here = &checked[index].nodes;
+        let (mut space, elasticity, known) = read(spec, (portion, group), nodes_here, wanted, exchange)?;
         let mut volumes = Vec::new();
         if spec.load.is_empty() && spec.fix.is_empty() && spec.spring.is_empty() {
-            volumes = summed(approach::volumes(&space), points, portion, exchange);
+            volumes = summed(approach::volumes(&space), nodes_here, portion, exchange);
         }
         let mut nodes = Vec::new();
         if exchange.ranks() > 1 {
-            let behind = behind(&space, points, (portion, group), &on_surface, exchange);
+            let behind = behind(&space, (portion, group), &on_surface, exchange);
             (space, nodes) = space.of_cells(behind, known.measure);
         }
         let mut part = Part::new(spec, mesh, space, known, exchange)?;
@@ -83,7 +108,7 @@ pub fn parts<'a, const D: usize>(
         part.known.outer = Outer::new(spec, &part.space, mesh, &resultant, volumes, exchange)?;
         verify::held(&part, &checked[index].parts, mesh)?;
         parts.push(part);
-        stocks.push(Stock { portion, group, nodes, elasticity });
+        stocks.push(Stock { portion, group, nodes, elasticity, known: nodes_here.clone() });
     }
     Ok((parts, stocks))
 }
@@ -104,14 +129,14 @@ struct Wanted {
 fn read<const D: usize>(
     spec: &BodySpec,
     (portion, group): (&Portion<D>, usize),
-    points: &Arc<Vec<u32>>,
+    nodes: &Nodes,
     Wanted { plane, boundaries }: Wanted,
     exchange: &dyn Exchange,
 ) -> Result<(Space<D>, Elasticity, Known)> {
     let (mesh, keys, cells) = (&portion.mesh, portion.keys(group), &portion.mesh.groups[group]);
     let mut space = match exchange.ranks() {
         1 => Space::new(mesh, cells, spec.order),
-        _ => Space::of_points(mesh, points, cells, spec.order),
+        _ => Space::of_nodes(everywhere(nodes, portion, exchange), nodes, cells, spec.order),
     };
     if plane == Plane::Axisymmetric {
         space = space.revolved();
@@ -137,16 +162,17 @@ fn read<const D: usize>(
         moduli = moduli.map(|sum| sum / volume);
     }
     let force = part::body_force(spec, &space, Parts::Whole).map_err(|error| (exchange.rank(), error));
-    let force = summed(first(exchange, force)?, points, portion, exchange);
+    let force = summed(first(exchange, force)?, nodes, portion, exchange);
     let (mut corners, mut boundary) = (interpolation::corners(&space), Vec::new());
     if boundaries {
-        boundary = outside(&space, points, portion, &key, exchange);
+        boundary = outside(&space, (portion, group), &key, exchange);
     }
     if exchange.ranks() > 1 && space.order == Order::P2 {
         corners = gather(exchange, &corners);
         corners.dedup();
     }
-    let (points, outer) = (points.clone(), Outer::default());
+    let points = nodes.numbers.iter().zip(&nodes.points).map(|(&node, &point)| (node, point)).collect();
+    let outer = Outer::default();
     let known = Known { cells: count[0] as usize, volume, moduli, force, corners, boundary, measure, points, outer };
     Ok((space, elasticity, known))
 }
@@ -170,18 +196,31 @@ fn totals(mine: [[f64; 2]; 2], exchange: &dyn Exchange) -> [f64; 2] {
 }
 
 /// Sums at the dofs of nodes, of which ranks have found those at their own points. Collective.
-fn summed<const D: usize>(mut at: Vec<f64>, points: &[u32], portion: &Portion<D>, exchange: &dyn Exchange) -> Vec<f64> {
-    let nodes = at.chunks_exact_mut(D).zip(points);
-    nodes.filter(|(_, point)| !portion.is_own(**point)).for_each(|(at, _)| at.fill(0.0));
-    exchange.sum(&mut at);
-    at
+fn summed<const D: usize>(at: Vec<f64>, nodes: &Nodes, portion: &Portion<D>, exchange: &dyn Exchange) -> Vec<f64> {
+    if at.is_empty() || exchange.ranks() == 1 {
+        return at;
+    }
+    let mut all = vec![0.0; at.len()];
+    for dofs in own(nodes, portion).map(|node| D * node as usize..D * (node as usize + 1)) {
+        all[dofs.clone()].copy_from_slice(&at[dofs]);
+    }
+    exchange.sum(&mut all);
+    all
+}
+
+/// Places of all nodes of a body. Collective.
+fn everywhere<const D: usize>(nodes: &Nodes, portion: &Portion<D>, exchange: &dyn Exchange) -> Vec<[f64; D]> {
+    let mut all = vec![[0.0; D]; nodes.count];
+    let known = nodes.numbers.iter().zip(&nodes.points).filter(|(_, point)| portion.is_own(**point));
+    known.for_each(|(&node, &point)| all[node as usize] = portion.mesh.points[point as usize]);
+    exchange.sum(all.as_flattened_mut());
+    all
 }
 
 /// Nodes of the facets of the boundary. Whoever has the least corner of a facet has its cells. Collective.
 fn outside<const D: usize>(
     space: &Space<D>,
-    points: &[u32],
-    portion: &Portion<D>,
+    (portion, group): (&Portion<D>, usize),
     key: &dyn Fn(usize) -> Key,
     exchange: &dyn Exchange,
 ) -> Vec<u32> {
@@ -190,9 +229,10 @@ fn outside<const D: usize>(
         return space.facets_of(places.into_iter()).nodes;
     }
     places.retain(|&(cell, opposite)| {
-        let corners = space.cells[cell * space.stride..][..=D].iter().enumerate();
-        let least = corners.filter(|(corner, _)| *corner != opposite).map(|(_, &node)| node).min();
-        least.is_some_and(|node| portion.is_own(points[node as usize]))
+        let Group { connectivity, stride, .. } = &portion.mesh.groups[group];
+        let corners = space.cells[cell * space.stride..][..=D].iter().zip(&connectivity[cell * stride..]).enumerate();
+        let least = corners.filter(|(corner, _)| *corner != opposite).map(|(_, of_corner)| of_corner).min();
+        least.is_some_and(|(_, &point)| portion.is_own(point))
     });
     let facets = space.facets_of(places.iter().copied());
     let facets = places.iter().zip(facets.nodes.chunks_exact(facets.stride));
@@ -204,14 +244,14 @@ fn outside<const D: usize>(
 /// Nodes of the cells behind surfaces, which have all corners but one there. Collective.
 fn behind<const D: usize>(
     space: &Space<D>,
-    points: &[u32],
     (portion, group): (&Portion<D>, usize),
     on_surface: &[bool],
     exchange: &dyn Exchange,
 ) -> Vec<u32> {
     let cell = |number: usize| &space.cells[number * space.stride..][..space.stride];
-    let on_surface = |node: &&u32| on_surface[points[**node as usize] as usize];
-    let is_behind = |number: &usize| cell(*number)[..=D].iter().filter(on_surface).count() >= D;
+    let Group { connectivity, stride, .. } = &portion.mesh.groups[group];
+    let on_surface = |point: &&u32| on_surface[**point as usize];
+    let is_behind = |number: &usize| connectivity[number * stride..][..=D].iter().filter(on_surface).count() >= D;
     let mine = home(portion, group, exchange.rank()).filter(is_behind);
     let mine: Vec<(Key, Vec<u32>)> = mine.map(|number| (portion.keys(group)[number], cell(number).to_vec())).collect();
     gather(exchange, &mine).into_iter().flat_map(|(_, nodes)| nodes).collect()

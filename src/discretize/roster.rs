@@ -150,8 +150,10 @@ pub fn lying<const D: usize>(scene: &Scene, portion: &Portion<D>, exchange: &dyn
         let mut is_asked = vec![false; mesh.points.len()];
         let asked = mesh.groups.iter().filter(|group| group.dimension < D).flat_map(|group| &group.connectivity);
         asked.for_each(|&point| is_asked[point as usize] = true);
-        let mine: Vec<_> = owners.iter().filter(|(point, _)| is_asked[*point as usize]).copied().collect();
-        owners = owners.into_iter().chain(share(exchange, mine).concat()).collect();
+        let mine = owners.iter().filter(|(point, _)| is_asked[*point as usize]);
+        let mine: Vec<_> = mine.map(|&(point, body)| (portion.number(point), body)).collect();
+        let all = share(exchange, mine).into_iter().flatten();
+        owners.extend(all.filter_map(|(point, body)| Some((portion.find(point)?, body))));
     }
     owners.sort_unstable();
     owners.dedup();

@@ -11,7 +11,6 @@ pub mod frame;
 pub mod interpolation;
 pub mod material;
 pub mod norms;
-mod numbering;
 pub mod quadrature;
 pub mod recovery;
 pub mod rigid;

@@ -1,8 +1,7 @@
 //! The finite element space of one body: its nodes, cells and boundary facets, numbered within the body.
 
-use super::numbering::Numbering;
 use super::{Slope, cross, element, pad};
-use crate::mesh::{Group, Mesh};
+use crate::mesh::{Group, Mesh, Nodes, Numbering};
 use crate::problem::order::Order;
 use std::cell::OnceCell;
 use std::collections::{HashMap, HashSet};
@@ -65,18 +64,18 @@ impl<const D: usize> Space<D> {
         space
     }
 
-    /// The space on the points of a mesh, node by node, of a body of which only some cells, in `group`, are here. The measure of all of them is
-    /// known [later](Self::of_cells).
-    pub fn of_points(mesh: &Mesh<D>, points: &[u32], group: &Group, order: Order) -> Self {
-        let mut from_mesh = Numbering::new(points.iter().copied());
-        for (node, &point) in (0..).zip(points) {
+    /// The space on all `nodes` of a body, some of which are points of the mesh that are `known` here, and some of the cells, in `group`. The measure
+    /// of all of them is known [later](Self::of_cells).
+    pub fn of_nodes(nodes: Vec<[f64; D]>, known: &Nodes, group: &Group, order: Order) -> Self {
+        let mut from_mesh = Numbering::new(known.points.iter().copied());
+        for (&node, &point) in known.numbers.iter().zip(&known.points) {
             from_mesh.number(point, node);
         }
         let stride = element::node_count(D + 1, order);
         let corners = group.simplices().flat_map(|cell| &cell[..stride]);
         Space {
             order,
-            nodes: points.iter().map(|&point| mesh.points[point as usize]).collect(),
+            nodes,
             stride,
             cells: corners.filter_map(|&point| from_mesh.get(point)).collect(),
             axisymmetric: false,

@@ -1,6 +1,6 @@
-//! A mesh from the rank that has read it to all: points and surfaces as they are, cells in slices to the ranks of their points.
+//! A mesh from the rank that reads it to all: cells in slices to the ranks of their points, then surfaces and points.
 
-use super::{Group, bisect};
+use super::{Cuts, Group};
 use crate::error::Result;
 use crate::exchange::{Exchange, pack, unpack};
 use crate::problem::order::Order;
@@ -18,8 +18,10 @@ pub struct Head {
     pub groups: Vec<Group>,
     /// Elements that were split.
     pub split: usize,
-    /// Whether each point is used; empty where all are.
-    pub used: Vec<bool>,
+    /// Corners of the box around all points that are used, z = 0 in the plane.
+    pub bounds: [[f64; 3]; 2],
+    /// How many there are.
+    pub points: usize,
 }
 
 /// Cells of a group on one rank.
@@ -33,26 +35,27 @@ pub struct Cells {
     pub nodes: Vec<u32>,
 }
 
-/// Points, or cells, of one message, and elements that are read before they go on: of 24 to 52 bytes each. Two cubes of 48^3 are read by one rank in
+/// Cells of one message, and elements that are read before they go on: of 24 to 52 bytes each. Two cubes of 48^3 are read by one rank in
 /// 1.41 to 1.45 s with slices from 2^4 to 2^24; four ranks on two cores check them in 2.8 s with messages of 2^10 to 2^22 cells, in 3.0 s with 2^6.
 pub const SLICE: usize = 1 << 10;
 
 /// What the first rank sends each of the others.
 #[derive(Serialize, Deserialize)]
 enum Message {
-    /// Points come next, of a mesh that is read from its start.
-    Begin,
+    /// A mesh is read from its start, whose points are cut into parts like this.
+    Begin(Cuts),
     /// Cells of a group.
     Cells(u32, Cells),
     /// There are no more.
     End,
 }
 
-/// Sends a mesh to all ranks while the first one reads it: points, then cells to the ranks that have their points, in messages for many.
+/// Sends the cells of a mesh, while the first rank reads it, to the ranks that have their points, in messages for many.
 pub struct Dealer<'a> {
     exchange: &'a dyn Exchange,
     /// The order that a mesh must have to be dealt out while it is read.
     order: Order,
+    cuts: Cuts,
     /// The rank of each point; empty before there are points.
     owner: Vec<u32>,
     /// Whether each point is one of a cell.
@@ -69,7 +72,16 @@ impl<'a> Dealer<'a> {
     /// On the first rank.
     pub fn new(exchange: &'a dyn Exchange, order: Order) -> Self {
         let next = vec![(0, Cells::default()); exchange.ranks()];
-        Self { exchange, order, owner: Vec::new(), used: Vec::new(), next, own: Vec::new(), counts: Vec::new() }
+        Self {
+            exchange,
+            order,
+            cuts: Cuts::default(),
+            owner: Vec::new(),
+            used: Vec::new(),
+            next,
+            own: Vec::new(),
+            counts: Vec::new(),
+        }
     }
 
     /// Whether cells of an order go to several ranks while they are read.
@@ -91,16 +103,13 @@ impl<'a> Dealer<'a> {
         !self.owner.is_empty()
     }
 
-    /// Sends the points, of whose coordinates `D` count.
+    /// Cuts the points, of whose coordinates `D` count, into parts for the ranks.
     pub fn begin<const D: usize, const K: usize>(&mut self, points: &[[f64; K]]) {
         self.reset();
-        self.all(&Message::Begin);
-        for slice in points.chunks(SLICE) {
-            self.exchange.tell(pack(&slice.iter().flat_map(first::<D, K>).collect::<Vec<f64>>()));
-        }
-        self.exchange.tell(pack(&Vec::<f64>::new()));
-        self.owner =
-            bisect::parts(points.len(), |point| first::<D, K>(&points[point as usize]), &|_| 1, self.next.len());
+        let at = |point: u32| first::<D, K>(&points[point as usize]);
+        self.cuts = Cuts::new(points.len(), at, &|_| 1, self.next.len());
+        self.all(&Message::Begin(self.cuts.clone()));
+        self.owner = (0..points.len() as u32).map(|point| self.cuts.part(&at(point), point) as u32).collect();
         self.used = vec![false; points.len()];
     }
 
@@ -144,11 +153,11 @@ impl<'a> Dealer<'a> {
         (1..self.next.len()).for_each(|rank| self.exchange.send(rank, &pack(message)));
     }
 
-    /// Sends what is left; gives the own cells of each group, the rank of each point, and whether each point is one of a cell.
-    pub fn finish(mut self) -> (Vec<Cells>, Vec<u32>, Vec<bool>) {
+    /// Sends what is left; gives the cuts between the points of ranks, the own cells of each group, and whether each point is one of a cell.
+    pub fn finish(mut self) -> (Cuts, Vec<Cells>, Vec<bool>) {
         (0..self.next.len()).for_each(|rank| self.send(rank));
         self.all(&Message::End);
-        (self.own, self.owner, self.used)
+        (self.cuts, self.own, self.used)
     }
 }
 
@@ -165,26 +174,17 @@ fn append(own: &mut Vec<Cells>, group: u32, mut cells: Cells) {
     own.nodes.append(&mut cells.nodes);
 }
 
-/// Takes the points and the cells of each group that the first rank sends.
+/// Takes the cuts and the cells of each group that the first rank sends.
 ///
 /// # Errors
 /// A message that cannot be read.
-pub fn take<const D: usize>(exchange: &dyn Exchange) -> Result<(Vec<[f64; D]>, Vec<Cells>)> {
-    let (mut points, mut own) = (Vec::new(), Vec::new());
+pub fn take(exchange: &dyn Exchange) -> Result<(Cuts, Vec<Cells>)> {
+    let (mut cuts, mut own) = (Cuts::default(), Vec::new());
     loop {
         match unpack(&exchange.receive(0))? {
-            Message::Begin => {
-                (points, own) = (Vec::new(), Vec::new());
-                loop {
-                    let slice: Vec<f64> = unpack(&exchange.tell(Vec::new()))?;
-                    if slice.is_empty() {
-                        break;
-                    }
-                    points.extend(slice.chunks_exact(D).map(|x| std::array::from_fn::<f64, D, _>(|c| x[c])));
-                }
-            }
+            Message::Begin(begun) => (cuts, own) = (begun, Vec::new()),
             Message::Cells(group, cells) => append(&mut own, group, cells),
-            Message::End => return Ok((points, own)),
+            Message::End => return Ok((cuts, own)),
         }
     }
 }

@@ -88,14 +88,19 @@ pub fn used(groups: &[Group], count: usize) -> Vec<bool> {
     used
 }
 
-/// Renumbers the points that are used, in their old order, and gives the old number of each new one.
-pub fn compact(groups: &mut [Group], used: Vec<bool>) -> impl Iterator<Item = usize> + use<> {
+/// The number of each point among those that are used.
+pub fn compact(used: &[bool]) -> Vec<u32> {
     let mut next = 0;
     let number = |used: &bool| {
         next += u32::from(*used);
         next.wrapping_sub(1)
     };
-    let number: Vec<u32> = used.iter().map(number).collect();
+    used.iter().map(number).collect()
+}
+
+/// Renumbers the points that are used, in their old order, and gives the old number of each new one.
+pub fn renumber(groups: &mut [Group], used: Vec<bool>) -> impl Iterator<Item = usize> + use<> {
+    let number = compact(&used);
     for point in groups.iter_mut().flat_map(|group| &mut group.connectivity) {
         *point = number[*point as usize];
     }

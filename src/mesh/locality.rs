@@ -10,9 +10,8 @@ const BITS: u32 = 21;
 
 impl<const D: usize> Mesh<D> {
     /// Sorts the cells of each group along Morton's curve. Structured meshes in the plane come in a good order already. Gives the
-    /// keys of cells of which `index` has the places in the file, group by group.
-    pub(super) fn sort_cells(&mut self, index: &[Vec<u32>]) -> Vec<Vec<Key>> {
-        let [low, high] = crate::linalg::bounds(self.points.iter().copied());
+    /// keys of cells of which `index` has the places in the file, group by group. The corners are those of the box around the points of all ranks.
+    pub(super) fn sort_cells(&mut self, [low, high]: [[f64; 3]; 2], index: &[Vec<u32>]) -> Vec<Vec<Key>> {
         let size = (0..D).map(|c| high[c] - low[c]).fold(f64::MIN_POSITIVE, f64::max);
         let scale = f64::from((1u32 << BITS) - 1) / size;
         let points = &self.points;
@@ -78,7 +77,7 @@ mod tests {
             .into(),
             split: 0,
         };
-        mesh.sort_cells(&[]);
+        mesh.sort_cells([[0.0; 3], [4.0, 1.0, 1.0]], &[]);
         let first: Vec<f64> = mesh.groups[0].simplices().map(|cell| mesh.points[cell[0] as usize][0]).collect();
         assert_eq!(first, [0.0, 1.0, 2.0, 3.0]);
         assert_eq!(mesh.groups[0].tags, [8, 10, 9, 7]);

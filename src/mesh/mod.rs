@@ -20,6 +20,7 @@ mod load;
 mod locality;
 mod msh;
 mod nodes;
+mod numbering;
 mod physical;
 mod portion;
 mod quality;
@@ -33,13 +34,14 @@ mod tokens;
 mod trust;
 mod unv;
 
-pub use bisect::parts as bisect;
-pub use check::{Asked, Checked, Duty, Joined, Parts};
+pub use bisect::Cuts;
+pub use check::{Asked, Checked, Duty, Joined, Nodes, Parts};
 pub use dealer::Dealer;
 pub use foreign::is_shape;
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, deal, keep_final, load, recall_final};
 pub use msh::{Maker, parse};
+pub use numbering::Numbering;
 pub use portion::{Key, Portion};
 pub use quality::Quality;
 pub use sizes::{unstructured, view};
@@ -95,7 +97,7 @@ impl<const D: usize> Mesh<D> {
             group.stride = vertices;
         }
         let used = groups::used(&groups, self.points.len());
-        let points = groups::compact(&mut groups, used).map(|old| self.points[old]).collect();
+        let points = groups::renumber(&mut groups, used).map(|old| self.points[old]).collect();
         Mesh { path: self.path.clone(), points, order: Order::P1, groups, split: self.split }
     }
 }

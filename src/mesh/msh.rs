@@ -179,7 +179,7 @@ fn finish<const D: usize>(
         true => nodes.points.into_iter().map(point).collect(),
         false => {
             let used = groups::used(&groups, nodes.points.len());
-            groups::compact(&mut groups, used).map(|old| point(nodes.points[old])).collect()
+            groups::renumber(&mut groups, used).map(|old| point(nodes.points[old])).collect()
         }
     };
     Ok(Mesh { path: path.to_owned(), points, order, groups: groups.into(), split })

@@ -194,21 +194,30 @@ fn cells_are_dealt_out_while_they_are_read() {
         let bytes = gmsh(&script, arguments);
         let whole: Mesh<3> = parse(&bytes).unwrap();
         for ranks in [2, 5] {
-            let portions = crowd::on(ranks, |exchange| {
+            let portions: Vec<(Vec<u32>, _, usize)> = crowd::on(ranks, |exchange| {
                 let read = |dealer: &mut Dealer| {
                     let mesh = msh::read(Path::new("a.msh"), Box::new(Cursor::new(&bytes)), Maker::User, Some(dealer))?;
                     assert!(mesh.groups.iter().all(|group: &Group| group.dimension < 3 || group.is_empty()));
                     Ok(mesh)
                 };
                 let portion = Portion::<3>::read(exchange, whole.order, read).unwrap();
-                assert_eq!(portion.mesh.points, whole.points);
-                let own = (0..whole.points.len() as u32).filter(|&point| portion.is_own(point)).collect::<Vec<_>>();
-                (own, portion.mesh.groups)
+                let points = 0..portion.mesh.points.len() as u32;
+                let at = |point: u32| portion.mesh.points[point as usize];
+                assert!(points.clone().all(|point| at(point) == whole.points[portion.number(point) as usize]));
+                assert!(points.clone().all(|point| portion.find(portion.number(point)) == Some(point)));
+                assert_eq!((portion.points, portion.find(u32::MAX)), (whole.points.len(), None));
+                let own = points.filter(|&point| portion.is_own(point)).map(|point| portion.number(point)).collect();
+                let mut groups = portion.mesh.groups.clone();
+                for point in groups.iter_mut().flat_map(|group| &mut group.connectivity) {
+                    *point = portion.number(*point);
+                }
+                (own, groups, portion.mesh.points.len())
             });
-            assert_eq!(portions.iter().map(|(own, _)| own.len()).sum::<usize>(), whole.points.len());
+            assert_eq!(portions.iter().map(|(own, ..)| own.len()).sum::<usize>(), whole.points.len());
             let count =
                 |groups: &[Group]| groups.iter().filter(|group| group.dimension == 3).map(Group::len).sum::<usize>();
-            for (rank, (own, groups)) in portions.iter().enumerate() {
+            for (rank, (own, groups, points)) in portions.iter().enumerate() {
+                assert!(*points < whole.points.len(), "rank {rank} of {ranks} has all points");
                 assert!(count(groups) < count(&whole.groups), "rank {rank} of {ranks} has all");
                 for (group, all) in groups.iter().zip(whole.groups.iter()) {
                     let cells = |group: &Group| -> BTreeMap<u64, Vec<u32>> {

@@ -112,7 +112,7 @@ impl<const D: usize> Source<D> {
         discrete.share();
         // small fronts and several ranks lose by BLAS threads, and the short vectors of a Krylov method do; large factorisations gain
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-        let gains = D == 3 && verified.portion.mesh.points.len() * D >= LARGE_FRONTS && inner.factors();
+        let gains = D == 3 && verified.portion.points * D >= LARGE_FRONTS && inner.factors();
         session.set_blas_threads(if gains { cores / session.size() } else { 1 });
         clock.estimate = inner.seconds;
         clock.phase("discretize");

@@ -1,10 +1,11 @@
 //! The cells of one body, their nodes numbered within it.
 
+use super::nodes::Nodes;
 use crate::error::Error;
-use crate::exchange::{Exchange, gather};
 use crate::mesh::{Key, Portion};
-use crate::problem::order::Order;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Mid-edge nodes of a simplex stand behind its corners in the order of these edges.
@@ -24,8 +25,10 @@ pub struct Cells<'a, const D: usize> {
     name: &'a str,
     /// Nodes per cell: corners, then mid-edge nodes if its elements are quadratic.
     pub stride: usize,
-    /// Point of the mesh of each node of the body, as the cells of all ranks meet them.
-    pub points: Arc<Vec<u32>>,
+    /// The nodes that are known here.
+    pub known: Arc<Nodes>,
+    /// Their places, if they are those of other ranks.
+    far: Vec<[f64; 3]>,
     /// Nodes of all cells.
     nodes: Vec<u32>,
     /// Numbers of the cells in the file; none if they have none.
@@ -34,53 +37,72 @@ pub struct Cells<'a, const D: usize> {
     keys: Cow<'a, [Key]>,
 }
 
-/// Cells of a body for another rank: nodes, numbers in the file, keys.
-pub type Sent = (Vec<u32>, Vec<u64>, Vec<Key>);
+/// Cells of a body for another rank.
+#[derive(Clone, Default, Serialize, Deserialize)]
+pub struct Sent {
+    /// Numbers of their nodes among those of all ranks, and their places.
+    nodes: Vec<(u32, [f64; 3])>,
+    /// Numbers of the nodes of each.
+    cells: Vec<u32>,
+    /// Numbers in the file.
+    tags: Vec<u64>,
+    /// Their keys.
+    pub keys: Vec<Key>,
+}
 
 impl<'a, const D: usize> Cells<'a, D> {
-    /// Numbers the nodes of the body of this group with elements of an order, the same on all ranks. `node` is [`NONE`] for every point of the mesh
-    /// before, and has the nodes of the body after. Collective.
-    pub fn new(portion: &'a Portion<D>, group: usize, order: Order, node: &mut [u32], exchange: &dyn Exchange) -> Self {
+    /// Of the body of this group with elements of an order, and these nodes. `node` has the node of each point after.
+    pub fn new(portion: &'a Portion<D>, group: usize, stride: usize, known: Arc<Nodes>, node: &mut [u32]) -> Self {
         let (keys, group) = (portion.keys(group), &portion.mesh.groups[group]);
-        let stride = if order == Order::P1 { D + 1 } else { group.stride };
-        let mut points = Vec::new();
-        let mut met = Vec::new();
-        for (cell, corners) in group.simplices().enumerate() {
-            for (corner, &point) in (0_u8..).zip(&corners[..stride]).filter(|(_, point)| portion.is_own(**point)) {
-                let node = &mut node[point as usize];
-                if *node == NONE {
-                    *node = points.len() as u32;
-                    points.push(point);
-                    // its first cell is here, as all are in which it is
-                    met.extend(keys.get(cell).map(|&key| (key, corner, point)));
-                }
-            }
-        }
-        if exchange.ranks() > 1 {
-            points = gather::<(Key, u8, u32)>(exchange, &met).into_iter().map(|(.., point)| point).collect();
-            points.iter().zip(0..).for_each(|(&point, number)| node[point as usize] = number);
-        }
+        known.points.iter().zip(0..).for_each(|(&point, number)| node[point as usize] = number);
         let nodes = group.simplices().flat_map(|cell| &cell[..stride]).map(|&point| node[point as usize]).collect();
         let (tags, keys) = (Cow::Borrowed(&group.tags[..]), Cow::Borrowed(keys));
-        Self { portion, name: &group.name, stride, points: Arc::new(points), nodes, tags, keys }
+        Self { portion, name: &group.name, stride, known, far: Vec::new(), nodes, tags, keys }
     }
 
     /// Some cells for another rank.
     pub fn some(&self, cells: impl Iterator<Item = usize> + Clone) -> Sent {
-        let tags = cells.clone().filter_map(|cell| self.tags.get(cell)).copied().collect();
-        let keys = cells.clone().map(|cell| self.key(cell)).collect();
-        (cells.flat_map(|cell| self.cell(cell)).copied().collect(), tags, keys)
+        let mut nodes: Vec<u32> = cells.clone().flat_map(|cell| self.cell(cell)).copied().collect();
+        let cells_of = nodes.iter().map(|&node| self.number(node)).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        Sent {
+            nodes: nodes.iter().map(|&node| (self.number(node), self.at(node))).collect(),
+            cells: cells_of,
+            tags: cells.clone().filter_map(|cell| self.tags.get(cell)).copied().collect(),
+            keys: cells.map(|cell| self.key(cell)).collect(),
+        }
     }
 
-    /// Cells of other ranks in place of own ones.
+    /// Cells of other ranks, with their nodes, in place of own ones.
     pub fn of(&self, sent: impl Iterator<Item = Sent>) -> Self {
-        let (mut nodes, mut tags, mut keys) = Sent::default();
+        let (mut places, mut cells, mut tags, mut keys) = (BTreeMap::new(), Vec::new(), Vec::new(), Vec::new());
         for mut sent in sent {
-            nodes.append(&mut sent.0);
-            tags.append(&mut sent.1);
-            keys.append(&mut sent.2);
+            places.extend(sent.nodes);
+            cells.append(&mut sent.cells);
+            tags.append(&mut sent.tags);
+            keys.append(&mut sent.keys);
         }
-        Self { nodes, tags: tags.into(), keys: keys.into(), ..self.clone() }
+        let (numbers, far): (Vec<u32>, Vec<_>) = places.into_iter().unzip();
+        let place = |number: u32| numbers.binary_search(&number).map_or(NONE, |place| place as u32);
+        let nodes = cells.into_iter().map(place).collect();
+        let known = Arc::new(Nodes { count: self.known.count, numbers, points: Vec::new() });
+        Self { known, far, nodes, tags: tags.into(), keys: keys.into(), ..*self }
+    }
+
+    /// Number of nodes that this rank has.
+    pub fn node_count(&self) -> usize {
+        self.known.numbers.len()
+    }
+
+    /// The number of a node among those of all ranks.
+    pub fn number(&self, node: u32) -> u32 {
+        self.known.numbers[node as usize]
+    }
+
+    /// The node with this number among those of all ranks, which this rank has.
+    pub fn place(&self, number: u32) -> u32 {
+        self.known.numbers.binary_search(&number).map_or(NONE, |node| node as u32)
     }
 
     /// Number of cells.
@@ -90,12 +112,12 @@ impl<'a, const D: usize> Cells<'a, D> {
 
     /// Whether a node is one of this rank, which has all cells around it.
     pub fn is_own(&self, node: u32) -> bool {
-        self.portion.is_own(self.points[node as usize])
+        self.portion.is_own(self.known.points[node as usize])
     }
 
     /// The one rank of those with this cell that speaks for it.
     pub fn home(&self, cell: usize) -> usize {
-        self.portion.home(self.points[self.cell(cell)[0] as usize])
+        self.portion.home(self.known.points[self.cell(cell)[0] as usize])
     }
 
     /// What puts cells of all ranks into an order.
@@ -120,7 +142,10 @@ impl<'a, const D: usize> Cells<'a, D> {
 
     /// Coordinates of a node, z = 0 in the plane.
     pub fn at(&self, node: u32) -> [f64; 3] {
-        let x = &self.portion.mesh.points[self.points[node as usize] as usize];
+        if !self.far.is_empty() {
+            return self.far[node as usize];
+        }
+        let x = &self.portion.mesh.points[self.known.points[node as usize] as usize];
         std::array::from_fn(|c| x.get(c).copied().unwrap_or(0.0))
     }
 

@@ -17,7 +17,7 @@ pub fn check<const D: usize>(cells: &Cells<D>) -> Found {
     if !cells.is_quadratic() {
         return Ok(());
     }
-    let mut ends = vec![None; cells.points.len()];
+    let mut ends = vec![None; cells.node_count()];
     for cell in 0..cells.count() {
         let nodes = cells.cell(cell);
         let at = |place: u32| (1, cells.key(cell).0, cells.key(cell).1, place);

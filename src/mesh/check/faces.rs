@@ -21,6 +21,13 @@ impl<const D: usize> Face<D> {
         Self { place: (4 * cell) as u32 + self.place % 4, ..self }
     }
 
+    /// The same face where its nodes have other numbers, in the same order.
+    pub fn of_nodes(self, number: impl Fn(u32) -> u32) -> Self {
+        let mut rest = self.rest;
+        rest[..D - 1].iter_mut().for_each(|node| *node = number(*node));
+        Self { rest, ..self }
+    }
+
     /// The cell.
     pub fn cell(&self) -> usize {
         (self.place / 4) as usize
@@ -86,10 +93,10 @@ impl<const D: usize> Faces<D> {
         let of_cell =
             |cell| (0..=D).filter(move |&opposite| is_own(cell, opposite)).map(move |opposite| face(cell, opposite));
         let all = || (0..cells.count()).flat_map(of_cell);
-        let mut first = vec![0; cells.points.len() + 1];
+        let mut first = vec![0; cells.node_count() + 1];
         all().for_each(|(least, _)| first[least + 1] += 1);
         (1..first.len()).for_each(|i| first[i] += first[i - 1]);
-        let (mut list, mut next) = (vec![Face::default(); first[cells.points.len()] as usize], first.clone());
+        let (mut list, mut next) = (vec![Face::default(); first[cells.node_count()] as usize], first.clone());
         for (least, face) in all() {
             let next = &mut next[least];
             list[*next as usize] = face;
@@ -144,6 +151,7 @@ impl<const D: usize> Faces<D> {
             let refuse = |what: &str| {
                 let cells_of = alike.iter().map(Face::cell).collect::<Vec<_>>();
                 let [middle, last] = alike[0].rest;
+                let [least, middle, last] = [least, middle, last].map(|node| cells.number(node));
                 ((2, u64::from(least), middle, last), cells.refuse(what, &cells_of, alike[0].centre(cells)).help(AGAIN))
             };
             let [a, b] = alike else {

@@ -80,7 +80,7 @@ impl<'a> InUse<'a> {
 
     /// Those edges of the body between nodes of the group, for groups of edges in space.
     fn edges<const D: usize>(&self, cells: &Cells<D>, node: &[u32]) -> HashSet<[u32; 2]> {
-        let mut on_group = vec![false; cells.points.len()];
+        let mut on_group = vec![false; cells.node_count()];
         let nodes = self.group.connectivity.iter().map(|&point| node[point as usize]);
         nodes.filter(|&node| node != NONE).for_each(|node| on_group[node as usize] = true);
         let mut edges = HashSet::new();

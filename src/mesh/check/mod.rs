@@ -23,8 +23,8 @@
 //! boundary.
 //!
 //! On several ranks each looks at what it has ([`Portion`]) and is complete there, without others: 1 at its cells; 2 at facets whose least corner
-//! is its own; 6 at facets with an own corner, and whether bodies share an own node. Of others it needs: the numbers of nodes, in the order in which
-//! the cells of all ranks meet them (18 bytes a node, sent to all); for 3 and 4 on the first rank the facets of the whole boundary, with the cells behind
+//! is its own; 6 at facets with an own corner, and whether bodies share an own node. Of others it needs: the numbers of nodes, which all sort by the
+//! cells in which they are met first ([`nodes`]); for 3 and 4 on the first rank the facets of the whole boundary, with the cells behind
 //! them; for 5 which of its parts hang together by cells of other ranks. Errors have the place at which one rank would meet them, and the first
 //! one counts.
 
@@ -34,12 +34,14 @@ mod distance;
 mod faces;
 mod groups;
 mod nesting;
+mod nodes;
 mod parts;
 mod surface;
 #[cfg(test)]
 mod tests;
 
 pub use groups::Duty;
+pub use nodes::Nodes;
 pub use parts::{Joined, Parts};
 
 use super::Portion;
@@ -73,8 +75,8 @@ pub struct Checked {
     pub outer: usize,
     /// What hangs together.
     pub parts: Parts,
-    /// Point of the mesh of each node, as the cells of all ranks meet them.
-    pub points: Arc<Vec<u32>>,
+    /// Its nodes, as the cells of all ranks meet them.
+    pub nodes: Arc<Nodes>,
 }
 
 impl<const D: usize> Portion<D> {
@@ -100,14 +102,20 @@ impl<const D: usize> Portion<D> {
         }
         let mut node = vec![NONE; mesh.points.len()];
         let mut owner = vec![NONE; if shared { 0 } else { mesh.points.len() }];
+        let place = |body: &Asked| mesh.groups.place(body.name).filter(|&place| mesh.groups[place].dimension == D);
+        let stride =
+            |body: &Asked, place: usize| if body.order == Order::P1 { D + 1 } else { mesh.groups[place].stride };
+        let found = bodies.iter().filter_map(|body| place(body).map(|place| (place, stride(body, place))));
+        let mut nodes = nodes::number(self, &found.collect::<Vec<_>>(), exchange).into_iter();
         let mut checked = Vec::new();
         for (index, body) in bodies.iter().enumerate() {
-            let place = mesh.groups.place(body.name).filter(|&place| mesh.groups[place].dimension == D);
-            let Some(place) = place else { continue };
-            let cells = Cells::new(self, place, body.order, &mut node, exchange);
+            let Some((place, known)) = place(body).and_then(|place| Some((place, Arc::new(nodes.next()?)))) else {
+                continue;
+            };
+            let cells = Cells::new(self, place, stride(body, place), known, &mut node);
             let mut twice = None;
             if !shared {
-                for (number, &point) in (0..).zip(&*cells.points) {
+                for (number, &point) in (0..).zip(&cells.known.points) {
                     let other = std::mem::replace(&mut owner[point as usize], index as u32);
                     if other != NONE && twice.is_none() {
                         twice = Some((number, bodies[other as usize].name));
@@ -133,8 +141,8 @@ impl<const D: usize> Portion<D> {
                 group.compare(&cells, &faces, &node, !served);
             }
             let [inner, outer] = counts.map(|count| count as usize);
-            cells.points.iter().for_each(|&point| node[point as usize] = NONE);
-            checked.push(Checked { inner, outer, parts, points: cells.points });
+            cells.known.points.iter().for_each(|&point| node[point as usize] = NONE);
+            checked.push(Checked { inner, outer, parts, nodes: cells.known });
         }
         in_use.values_mut().for_each(|group| group.agree(exchange));
         let judged = in_use.values().try_for_each(|group| group.judge(mesh));
@@ -152,7 +160,7 @@ fn two<const D: usize>(cells: &Cells<D>, node: u32, other: &str) -> ((u8, u64, u
         "shared nodes join nothing: give each body its own points, curves and surfaces, \
          or let contacts be found: between = \"auto\"",
     );
-    ((0, u64::from(node), 0, 0), error)
+    ((0, u64::from(cells.number(node)), 0, 0), error)
 }
 
 /// Checks the boundary, of which each rank has some facets with their least corners: the first rank gets all, with the cells behind them. Collective.
@@ -168,19 +176,23 @@ fn boundary<const D: usize>(cells: &Cells<D>, outer: Vec<(u32, Face<D>)>, exchan
     let mut behind: Vec<usize> = outer.iter().map(|(_, face)| face.cell()).collect();
     behind.sort_unstable();
     behind.dedup();
+    let number = |node: u32| cells.number(node);
     let here = |face: Face<D>| behind.binary_search(&face.cell()).map_or(face, |place| face.of_cell(place));
-    let faces: Vec<_> = outer.into_iter().map(|(least, face)| (least, here(face))).collect();
+    let faces: Vec<_> = outer.into_iter().map(|(least, face)| (number(least), here(face).of_nodes(number))).collect();
     let mut mine = vec![Default::default(); exchange.ranks()];
     mine[0] = (cells.some(behind.iter().copied()), faces);
     let (mut all, mut rim, mut before) = (Vec::new(), Vec::new(), 0);
     for (sent, faces) in trade::<(Sent, Vec<(u32, Face<D>)>)>(exchange, mine) {
         all.extend(faces.into_iter().map(|(least, face)| (least, face.of_cell(before + face.cell()))));
-        before += sent.2.len();
+        before += sent.keys.len();
         rim.push(sent);
     }
     if exchange.rank() > 0 {
         return Ok(());
     }
     all.sort_unstable();
-    look(&cells.of(rim.into_iter()), all)
+    let cells = cells.of(rim.into_iter());
+    let place = |node: u32| cells.place(node);
+    let all = all.into_iter().map(|(least, face)| (place(least), face.of_nodes(place))).collect();
+    look(&cells, all)
 }

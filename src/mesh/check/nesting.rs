@@ -18,7 +18,7 @@ const INSIDE: [[f64; 4]; 5] = [
 /// Every closed surface of the boundary has the body on one side and nothing on the other: behind one facet of each there is
 /// one cell, not two, as there would be were a part meshed again inside another one.
 pub fn check<const D: usize>(cells: &Cells<D>, surface: &Surface<D>) -> Result<()> {
-    let mut joined = Joined::new(cells.points.len());
+    let mut joined = Joined::new(cells.node_count());
     for i in 0..surface.faces.len() {
         let facet = surface.facet(i);
         (1..D).for_each(|k| joined.join(facet[0], facet[k]));

@@ -3,7 +3,7 @@
 use super::cells::{Cells, Found, NONE};
 use super::faces::Faces;
 use crate::error::Result;
-use crate::exchange::{Exchange, first, share, trade};
+use crate::exchange::{Exchange, first, gather, share, trade};
 use crate::mesh::Key;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -36,21 +36,21 @@ pub fn parts<const D: usize>(
     if count == 1 {
         return first(exchange, before).map(|()| Parts { count, of_node: Vec::new() });
     }
-    let mut of_node = vec![0.0; cells.points.len()];
-    first(exchange, before.and_then(|()| apart(cells, &of_cell, &mut of_node)))?;
-    exchange.sum(&mut of_node);
-    Ok(Parts { count, of_node: of_node.into_iter().map(|part| part as u32).collect() })
+    let of_own = first(exchange, before.and_then(|()| apart(cells, &of_cell)))?;
+    let of_node = gather(exchange, &of_own).into_iter().map(|(_, part)| part).collect();
+    Ok(Parts { count, of_node })
 }
 
-/// Gives own nodes the parts of their cells, which are the same.
-fn apart<const D: usize>(cells: &Cells<D>, of_cell: &[u32], of_node: &mut [f64]) -> Found {
-    let mut first = vec![NONE; cells.points.len()];
+/// Numbers of own nodes, and the parts of their cells, which are the same.
+fn apart<const D: usize>(cells: &Cells<D>, of_cell: &[u32]) -> Found<Vec<(u32, u32)>> {
+    let mut first = vec![NONE; cells.node_count()];
+    let mut of_own = Vec::new();
     for cell in 0..cells.count() {
         for (corner, &node) in (0..).zip(cells.cell(cell)).filter(|(_, node)| cells.is_own(**node)) {
             let first = &mut first[node as usize];
             if *first == NONE {
                 *first = cell as u32;
-                of_node[node as usize] = f64::from(of_cell[cell]);
+                of_own.push((cells.number(node), of_cell[cell]));
             }
             let other = *first as usize;
             if of_cell[cell] != of_cell[other] {
@@ -62,7 +62,7 @@ fn apart<const D: usize>(cells: &Cells<D>, of_cell: &[u32], of_node: &mut [f64])
             }
         }
     }
-    Ok(())
+    Ok(of_own)
 }
 
 /// From what hangs together on this rank, so many parts, to what does on all: a cell of several ranks joins their parts. Collective.

@@ -1,4 +1,4 @@
-//! From points of a mesh to nodes of a body: its size is that of the body, as a mesh may have thousands.
+//! From numbers of points to others, of a body or of a rank: its size is that of these, as a mesh may have thousands.
 
 /// No node has this number.
 const ABSENT: u32 = u32::MAX;
@@ -32,6 +32,16 @@ impl Numbering {
         points.sort_unstable();
         points.dedup();
         Self { node: vec![ABSENT; points.len()], points, first }
+    }
+
+    /// The points that are named, each as often as it likes, numbered in increasing order.
+    pub fn in_order(named: impl Iterator<Item = u32> + Clone) -> Self {
+        let mut numbering = Self::new(named.clone());
+        named.for_each(|point| {
+            numbering.number(point, 0);
+        });
+        (0..).zip(numbering.node.iter_mut().filter(|node| **node != ABSENT)).for_each(|(next, node)| *node = next);
+        numbering
     }
 
     fn place(&self, point: u32) -> Option<usize> {
@@ -81,6 +91,9 @@ mod tests {
                 numbering.points().collect::<Vec<_>>(),
                 [8, 9, named[0]].into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect::<Vec<_>>()
             );
+            let ordered = Numbering::in_order(named.iter().copied());
+            assert!(ordered.points().zip(0..).all(|(point, number)| ordered.get(point) == Some(number)));
+            assert_eq!(ordered.points().count(), 3);
         }
         assert!(Numbering::new([].into_iter()).points().next().is_none());
     }
