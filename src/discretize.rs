@@ -13,6 +13,7 @@ mod factory;
 mod find;
 mod gauge;
 mod here;
+mod info;
 mod known;
 mod local;
 mod mechanism;
@@ -21,6 +22,7 @@ mod pairs;
 mod part;
 mod parts;
 mod post;
+mod ready;
 pub mod resolution;
 mod roster;
 mod springs;
@@ -32,92 +34,29 @@ use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
 use crate::exchange::Exchange;
-use crate::fem::FreeMotion;
 use crate::linalg::{Csr, axpy, dot};
 use crate::mesh::Checked;
-use crate::model::{BodySlot, Loads, Mechanism, Model, Segment};
-use crate::problem::{BodySpec, ContactSpec, Start};
+use crate::model::{Mechanism, Model, Segment};
+use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
-use balance::Forces;
 pub use balance::{Balance, Resultant};
 use carried::{Supported, supported};
 use cells::Needs;
 use couplings::Coupled;
 use distribute::Deal;
-use draft::{Draft, Loose};
+use draft::Draft;
 pub use factory::{Assembled, Factory, Outline};
 use here::Here;
-use local::Local;
+pub use info::{BodyInfo, ContactInfo};
 use mechanism::Fixed;
-use meshes::{Kept, Meshes, Shape};
+use meshes::{Kept, Meshes};
 use parts::parts;
-use post::OnPart;
 pub use post::Post;
+use ready::{Counts, Ready};
 use std::rc::Rc;
+use std::sync::Arc;
 pub use surface::ContactSurface;
 pub use verify::{Verified, verify};
-
-/// What is known of a body besides its matrices.
-pub struct BodyInfo {
-    /// Name in the scene.
-    pub name: String,
-    /// Nodes.
-    pub nodes: usize,
-    /// Number among the points of the mesh of each node of the cells that this rank shows.
-    pub points: Vec<u32>,
-    /// Cells.
-    pub cells: usize,
-    /// What the check of its mesh counted.
-    pub facets: Checked,
-    /// Degrees of freedom, supported ones included.
-    pub dofs: usize,
-    /// Supported degrees of freedom.
-    pub supported: usize,
-    /// Names of the rigid motions that the supports leave.
-    pub left_by_supports: Vec<String>,
-    /// Names of those that no contact row can hold either.
-    pub left_by_all: Vec<String>,
-    /// Names of the rigid motions without work that a gauge fixes at one node each.
-    pub gauged: Vec<String>,
-    /// What the user should know of its elasticity.
-    pub warning: Option<String>,
-    /// Stiffness of the body against a uniform contact pressure, per area: modulus over depth (area or volume over the length
-    /// or area of its contact surfaces); zero if supports leave it a motion that contact feels.
-    pub stiffness: f64,
-    /// Sum of its loads; in a body of revolution radial ones add up as if they had one direction.
-    pub load: [f64; 3],
-    /// Rank that owns the body, or most of it.
-    pub rank: usize,
-    /// Ranks that have a part of it.
-    pub ranks: Vec<usize>,
-    /// Names of the groups of its supports.
-    pub supports: Vec<String>,
-    /// Names of the groups of its springs.
-    pub springs: Vec<String>,
-    /// Names of its rigid surfaces.
-    pub rigid: Vec<String>,
-    post: Option<Box<dyn Post>>,
-}
-
-impl BodyInfo {
-    /// What the body says of its displacements.
-    ///
-    /// # Panics
-    /// On ranks that have no part of the body.
-    pub fn post(&self) -> &dyn Post {
-        self.post.as_deref().unwrap_or_else(|| unreachable!("only ranks that have a part of a body recover it"))
-    }
-}
-
-/// What is known of a pair besides its arrays.
-pub struct ContactInfo {
-    /// What the scene says; `between` names the bodies if the pair was found.
-    pub spec: ContactSpec,
-    /// Whether side a (which carries the points) is the second of `spec.between`.
-    pub swapped: bool,
-    /// Mesh of side a, for output.
-    pub surface: ContactSurface,
-}
 
 /// The discrete problem and what reports need to know of its origin.
 pub struct Discrete {
@@ -160,15 +99,13 @@ pub fn discretize<const D: usize>(
     let (mesh, rank, alone) = (&portion.mesh, exchange.rank(), exchange.ranks() == 1);
     let (mut parts, stocks) = parts(scene, verified, bodies)?;
     let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
-    let (mut fine, mut shapes) = (Vec::new(), Vec::new());
+    let mut fine = Vec::new();
     for found in pairs::all(scene, mesh, cut, &parts, keep, &*verified.exchange)? {
         let pairs::Contact { spec, pair, fine: points, swapped, surface } = found;
         pairs.push(pair);
         fine.extend(points);
         contacts.push(ContactInfo { spec, swapped, surface });
     }
-    let (mut slots, mut infos, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut assemblies, mut assemblies_avoided) = (0, 0);
     let drafts = parts.iter().zip(draft::segments(parts.len(), &pairs));
     let drafts = drafts.map(|(part, segments)| Draft::new(part, segments, &pairs, mesh));
     let drafts = drafts.collect::<Result<Vec<_>>>()?;
@@ -219,34 +156,32 @@ pub fn discretize<const D: usize>(
     drop(deals);
     let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt);
     let known = gauged.into_iter().zip(loose).zip(elasticities);
+    let (mut infos, mut offsets, mut ready) = (Vec::new(), Vec::new(), Vec::new());
     for (index, ((part, (((draft, supported), graph), mut dealt)), ((gauged, loose), elasticity))) in
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
-        let is_owner = owner[index] == rank;
         let Draft { segments, rows, nodal_load, load, .. } = draft;
         let mut offset = vec![0.0; rows.rows()];
         if !supported.carried.is_empty() {
             rows.multiply(&supported.carried, &mut offset);
         }
         offsets.push(offset);
-        let Loose { left, motions, sprung, unfelt } = loose;
-        let name = part.spec.name.value.clone();
-        let mut resultant = nodal_load.sum();
-        part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
         let surface: f64 = segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
         let modulus = dot(&part.known.moduli, &share(&segments, &pairs));
-        let held = motions.len() == unfelt.len();
+        let held = loose.motions.len() == loose.unfelt.len();
         let depth = part.known.volume / surface;
-        let mut info = BodyInfo {
-            name: name.clone(),
+        let mut resultant = nodal_load.sum();
+        part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
+        infos.push(BodyInfo {
+            name: part.spec.name.value.clone(),
             nodes: part.space.nodes.len(),
             points: Vec::new(),
             cells: part.known.cells,
-            facets: checked[index].clone(),
+            facets: Checked { nodes: Arc::default(), ..checked[index].clone() },
             dofs: part.space.dofs(),
             supported: part.held.supported(),
-            left_by_supports: left.iter().map(|motion| motion.name.clone()).collect(),
-            left_by_all: unfelt.into_iter().map(|(name, _)| name).collect(),
+            left_by_supports: loose.left.iter().map(|motion| motion.name.clone()).collect(),
+            left_by_all: loose.unfelt.iter().map(|(name, _)| name.clone()).collect(),
             gauged,
             warning: elastic::warning(part.spec, &part.space, scene.plane),
             stiffness: if held && surface > 0.0 { modulus / depth } else { 0.0 },
@@ -257,96 +192,42 @@ pub fn discretize<const D: usize>(
             springs: part.spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
             rigid: part.held.rigid.iter().map(|(load, _)| part.spec.load[*load].on.value.clone()).collect(),
             post: None,
-        };
+        });
         let unloaded = if keep { part.unloaded(mesh, &nodal_load.all())? } else { Vec::new() };
-        // what only the owner knows, until all ranks share it
-        let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
-        let elasticity = Rc::new(elasticity);
-        let (space, held) = if is_owner || dealt.is_some() {
+        let (mut here, mut works, mut smooth, mut elsewhere) = (None, None, Vec::new(), None);
+        if owner[index] == rank || dealt.is_some() {
+            smooth = part.smooth();
             let rows = [rows, nodal_rows(&segments, &pairs, part.space.dofs())];
-            let (smooth, loads) = (part.smooth(), [load, nodal_load]);
-            let (mut here, mut works) = (Here { part, rows, loads, supported }, None);
+            let mut all = Here { part, rows, loads: [load, nodal_load], supported };
             if let Some(dealt) = &mut dealt {
                 let work;
-                (here, work) = here.of(dealt, &left);
+                (all, work) = all.of(dealt, &loose.left);
                 works = Some(work);
             }
-            let Here { part, rows: [rows, nodal_rows], loads, supported: Supported { carried, prescribed } } = here;
-            let [force, nodal_force] = loads.map(|loads| loads.all());
-            let free = left.iter().enumerate().map(|(k, motion)| {
-                let work = |u: &[f64]| works.as_ref().map_or_else(|| dot(u, &force), |works| works[k]);
-                FreeMotion::new(part.dofs_of(motion), &prescribed, work)
-            });
-            let free: Vec<_> = free.collect();
-            let is_own =
-                |node| dealt.as_ref().is_none_or(|dealt| dealt.is_own::<D>(part.held.frame.node(node) as usize));
-            let own: Vec<bool> = (0..part.space.nodes.len() as u32).map(is_own).collect();
-            let mut kept = factory.kept(&name).filter(|_| dealt.is_none());
-            let mut serves = false;
-            if let Some(body) = kept.as_mut().and_then(|slot| slot.local.as_mut()) {
-                let work = free.iter().map(|motion| motion.work).collect();
-                let (force, prescribed, carried) = (force.clone(), prescribed.clone(), carried.clone());
-                serves = body.reload(&Loads { work, force, prescribed, carried })?;
-            }
-            if let Some(before) = kept.filter(|_| serves) {
-                (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
-                assemblies_avoided += 1;
-            } else {
-                let mut graph = graph.filter(|_| alone).unwrap_or_else(|| part.graph(&part.space, &rows));
-                if let Some(dealt) = &dealt {
-                    graph = graph.of(|node| dealt.is_own::<D>(node));
-                }
-                let mut body = part.assemble(mesh, &graph, &elasticity, force, prescribed, carried)?;
-                drop(graph);
-                if is_owner {
-                    assemblies += 1;
-                    scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-                }
-                row_stiffness = rows.quadratic_diagonal(&body.stiffness);
-                if let Some(dealt) = &dealt {
-                    body = dealt.own::<D>(body);
-                }
-                let interpolation = factory.wants_interpolation(&name).then(|| match &dealt {
-                    Some(dealt) => dealt.interpolation::<D>(|coarse| part.interpolation(coarse)),
-                    None => part.interpolation(&part.coarse_nodes()),
-                });
-                local = Some(factory.make(Assembled {
-                    name: name.clone(),
-                    dimension: D,
-                    body,
-                    distribution: dealt.map(|dealt| dealt.distribution),
-                    rows,
-                    motions: &|| smooth.iter().map(|motion| part.dofs_of(motion)).collect(),
-                    left: free,
-                    interpolation,
-                })?);
-            }
-            let (space, held) = (Rc::new(part.space), Rc::new(part.held));
-            let is_whole = info.ranks.len() == 1 && !own.contains(&false);
-            let local = Local { space: space.clone(), own };
-            info.points = match is_whole {
-                true => part.known.points.iter().map(|&(_, point)| point).collect(),
-                false => space.part(local.told()).1.iter().filter_map(|&node| part.known.point(node)).collect(),
-            };
-            let forces = Forces {
-                rows: nodal_rows,
-                springs: part.springs,
-                supports: part.spec.fix.len(),
-                load: nodal_force,
-                held: held.clone(),
-                elasticity: elasticity.clone(),
-                part: local,
-            };
-            info.post = Some(Box::new(OnPart::new(part.spec, part.known.outer, forces)?) as Box<dyn Post>);
-            (space, held)
-        } else {
-            (Rc::new(part.space), Rc::new(part.held))
-        };
-        infos.push(info);
-        if keep {
-            shapes.push(Shape { space, elasticity, modulus, held, unloaded });
+            here = Some(all);
+        } else if keep {
+            elsewhere = Some((part.space, part.held));
         }
-        slots.push(BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness });
+        let scales = [modulus, depth];
+        ready.push(Ready {
+            segments,
+            loose,
+            scales,
+            elasticity,
+            graph,
+            dealt,
+            here,
+            works,
+            smooth,
+            elsewhere,
+            unloaded,
+        });
+    }
+    let (mut slots, mut shapes, mut counts) = (Vec::new(), Vec::new(), Counts::default());
+    for ((ready, info), &owner) in ready.into_iter().zip(&mut infos).zip(&owner) {
+        let (slot, shape) = ready.make(info, mesh, alone, owner == rank, factory, &mut counts)?;
+        slots.push(slot);
+        shapes.extend(shape.filter(|_| keep));
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
@@ -354,6 +235,7 @@ pub fn discretize<const D: usize>(
     let mut carried = vec![0.0; 2 * model.points()];
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);
+    let Counts { assemblies, avoided: assemblies_avoided } = counts;
     Ok(Discrete { model, bodies: infos, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided })
 }
 

@@ -109,12 +109,12 @@ pub fn deal<const D: usize>(
 /// Which nodes of a body K couples; of several ranks the first has the graph, and all cells meanwhile. Collective.
 pub fn graph<const D: usize>(part: &Part<D>, stock: &Stock<D>, rows: &Csr, exchange: &dyn Exchange) -> NodeGraph {
     if exchange.ranks() == 1 {
-        return part.graph(&part.space, rows);
+        return NodeGraph::with_rows(&part.space, rows, &part.held.frame);
     }
     let mut mine = vec![Vec::new(); exchange.ranks()];
     mine[0] = some(part, stock, stock.home(exchange.rank()).map(|cell| cell as u32)).nodes;
     let (space, _) = part.space.clone().of_cells(trade(exchange, mine).concat(), 0.0);
-    part.graph(&space, rows)
+    NodeGraph::with_rows(&space, rows, &part.held.frame)
 }
 
 /// Numbers of the cells at own points that each rank needs of a body whose nodes are dealt out: those that touch a cell at one of its nodes, so that

@@ -6,7 +6,7 @@ use super::part::Part;
 use super::parts::Stock;
 use crate::contact::ContactPair;
 use crate::exchange::Exchange;
-use crate::fem::NodeGraph;
+use crate::fem::{NodeGraph, place};
 use std::cell::OnceCell;
 use std::collections::HashMap;
 
@@ -65,11 +65,18 @@ impl<'a, const D: usize> Coupled<'a, D> {
         let (parts, stocks, drafts) = self.of;
         let (part, stock, rows) = (&parts[body], &stocks[body], &drafts[body].rows);
         self.numbers[body].get_or_init(|| {
-            let (space, _) = part.space.clone().of_cells(stock.nodes.clone(), 0.0);
-            let NodeGraph { ptr, .. } = part.graph(&space, rows);
+            // of the nodes of these cells and of contact rows alone
+            let of_rows = rows.col.iter().map(|&dof| dof as u32 / D as u32);
+            let masters = part.held.frame.master.values().copied();
+            let nodes = part.space.among(stock.nodes.iter().copied().chain(of_rows).chain(masters));
+            let dof = |dof: usize| Some(D * place(&nodes, (dof / D) as u32)? as usize + dof % D);
+            let space = part.space.on(&stock.nodes, &nodes);
+            let rows = rows.of_columns(D * nodes.len(), dof);
+            let NodeGraph { ptr, .. } = NodeGraph::with_rows(&space, &rows, &part.held.frame.on(&nodes));
             let mut couplings = vec![0.0; part.space.nodes.len()];
-            for node in stock.own().map(|node| node as usize) {
-                couplings[node] = f64::from(ptr[node + 1] - ptr[node]);
+            for node in stock.own() {
+                let at = place(&nodes, node).map_or(0, |at| at as usize);
+                couplings[node as usize] = f64::from(ptr[at + 1] - ptr[at]);
             }
             self.exchange.sum(&mut couplings);
             couplings.into_iter().map(|count| count as u32).collect()

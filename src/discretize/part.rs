@@ -13,7 +13,7 @@ use crate::fem::{
     ElasticBody, Elasticity, Interpolation, NodalBlock, NodeGraph, Parts, RigidMotion, Space, assemble, place, rigid,
     support, surface,
 };
-use crate::linalg::{Csr, countable, dot};
+use crate::linalg::{countable, dot};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};
 use nalgebra::{DMatrix, DVector};
@@ -241,19 +241,6 @@ impl<'a, const D: usize> Part<'a, D> {
         }
         self.held.frame.forces(&mut load);
         load
-    }
-
-    /// Which nodes K couples: those of a cell of a space, and those of a contact row.
-    pub fn graph(&self, space: &Space<D>, rows: &Csr) -> NodeGraph {
-        let coupled: Vec<Vec<u32>> = (0..rows.rows())
-            .map(|q| {
-                let mut nodes: Vec<u32> = rows.row(q).map(|(dof, _)| (dof / D) as u32).collect();
-                nodes.dedup();
-                nodes
-            })
-            .filter(|nodes| nodes.len() > 1)
-            .collect();
-        NodeGraph::new(space, &coupled, &self.held.frame)
     }
 
     /// The nodes that linear displacements have, sorted.

@@ -23,6 +23,16 @@ pub struct NodeGraph {
 }
 
 impl NodeGraph {
+    /// Which nodes K couples: those of a cell of a space, and those of a contact row.
+    pub fn with_rows<const D: usize>(space: &Space<D>, rows: &Csr, frame: &Frame<D>) -> Self {
+        let coupled = (0..rows.rows()).map(|q| {
+            let mut nodes: Vec<u32> = rows.row(q).map(|(dof, _)| (dof / D) as u32).collect();
+            nodes.dedup();
+            nodes
+        });
+        Self::new(space, &coupled.filter(|nodes| nodes.len() > 1).collect::<Vec<_>>(), frame)
+    }
+
     /// The graph of a space's cells plus `extra` sets of nodes that are coupled among themselves (the nodes of
     /// each contact row: pattern of B'B). The nodes that `frame` ties are one node in it, their master; alone they only
     /// meet themselves.
