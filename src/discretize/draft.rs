@@ -50,6 +50,21 @@ impl<const D: usize> NodalForces<D> {
         sum
     }
 
+    /// Their work on a displacement; exactly zero if it is rounding.
+    pub fn work(&self, at: impl Fn(u32) -> [f64; D]) -> f64 {
+        let [work, largest] = self.works(at);
+        if work.abs() <= NO_WORK * largest { 0.0 } else { work }
+    }
+
+    /// Their work on a displacement, and the largest that forces and displacements of these sizes can do, node by node.
+    pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [f64; 2] {
+        let size = |v: &[f64]| dot(v, v).sqrt();
+        self.nodes.iter().zip(&self.forces).fold([0.0; 2], |[work, largest], (&node, force)| {
+            let u = at(node);
+            [u.iter().zip(force).fold(work, |work, (u, f)| work + u * f), largest + size(&u) * size(force)]
+        })
+    }
+
     /// Forces at all nodes.
     pub fn all(&self) -> Vec<f64> {
         let mut all = vec![0.0; D * self.count];
@@ -100,13 +115,12 @@ impl<const D: usize> Draft<D> {
         Ok(Self { segments, rows, free: rigid::of(&part.space), nodal_load: NodalForces::of(&nodal_load), load })
     }
 
-    /// Motions as contact and loads see them.
+    /// Motions as contact and loads see them: at the dofs of contact rows and at loaded ones.
     pub fn motions(&self, part: &Part<D>, all: &[RigidMotion<D>]) -> Vec<Motion> {
-        let load = if all.is_empty() { Vec::new() } else { self.load.all() };
         let of = |motion: &RigidMotion<D>| {
-            let (displacement, mut trace) = (part.dofs_of(motion), vec![0.0; self.rows.rows()]);
-            self.rows.multiply(&displacement, &mut trace);
-            Motion { name: motion.name.clone(), trace, work: work::<D>(&displacement, &load) }
+            let row = |q: usize| self.rows.row(q).map(|(dof, b)| b * part.dof_of(motion, dof)).sum();
+            let work = self.load.work(|node| part.at_dofs(motion, node));
+            Motion { name: motion.name.clone(), trace: (0..self.rows.rows()).map(row).collect(), work }
         };
         all.iter().map(of).collect()
     }
@@ -140,17 +154,4 @@ fn felt_by_none(motions: &[Motion]) -> Vec<(String, DVector<f64>)> {
     let names = || motions.iter().map(|motion| motion.name.as_str());
     let named = |weights: DVector<f64>| (joint::combined(names(), weights.iter().copied()), weights);
     Blocks::free(&felt, rows as f64, TOLERANCE).into_iter().map(named).collect()
-}
-
-/// Work of a load on a displacement; exactly zero if it is rounding.
-pub fn work<const D: usize>(displacement: &[f64], load: &[f64]) -> f64 {
-    let [work, largest] = works::<D>(displacement, load);
-    if work.abs() <= NO_WORK * largest { 0.0 } else { work }
-}
-
-/// Work of a load on a displacement, and the largest that forces and displacements of these sizes can do, node by node.
-pub fn works<const D: usize>(displacement: &[f64], load: &[f64]) -> [f64; 2] {
-    let size = |v: &[f64]| dot(v, v).sqrt();
-    let nodes = displacement.chunks_exact(D).zip(load.chunks_exact(D));
-    [dot(displacement, load), nodes.map(|(u, f)| size(u) * size(f)).sum()]
 }

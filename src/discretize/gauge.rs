@@ -3,7 +3,7 @@
 //! If the loads do no work on such a motion, the solution is free up to it: one node is fixed against it, without reaction. If
 //! they do, there is no solution, and the run says so.
 
-use super::draft::{Draft, Loose, work};
+use super::draft::{Draft, Loose};
 use super::part::Part;
 use crate::fem::rigid;
 
@@ -13,15 +13,13 @@ pub fn fix<const D: usize>(part: &mut Part<D>, draft: &Draft<D>, loose: &mut Loo
     if loose.unfelt.is_empty() {
         return fixed;
     }
-    let load = draft.load.all();
     loop {
         let idle = loose.unfelt.iter().find_map(|(_, weights)| {
             let motion = rigid::combine(&loose.left, weights);
-            let displacement = part.dofs_of(&motion);
-            (work::<D>(&displacement, &load) == 0.0).then_some((motion, displacement))
+            (draft.load.work(|node| part.at_dofs(&motion, node)) == 0.0).then_some(motion)
         });
-        let Some((motion, displacement)) = idle else { return fixed };
-        let Some(dof) = draft.candidate(part, &displacement) else { return fixed };
+        let Some(motion) = idle else { return fixed };
+        let Some(dof) = draft.candidate(part, &part.dofs_of(&motion)) else { return fixed };
         part.held.prescribed.insert(dof, 0.0);
         *loose = draft.loose(part);
         fixed.push(motion.name);

@@ -3,7 +3,7 @@
 //! Each body is held by its neighbours then, and all of them are not. As with the motions of one body ([`gauge`]) there is a
 //! solution if the loads do no work on such a motion: one node of one body is fixed against it, without reaction.
 
-use super::draft::{Draft, Loose, NO_WORK, works};
+use super::draft::{Draft, Loose, NO_WORK};
 use super::gauge;
 use super::part::Part;
 use crate::contact::ContactPair;
@@ -272,7 +272,9 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// Work of the loads on a motion, as a share of the largest possible; zero if it is rounding or an error of the mesh.
     fn work(&self, moving: &Moving) -> f64 {
-        let of = |(&body, u): (&usize, &Vec<f64>)| works::<D>(u, &self.drafts[body].load.all());
+        let of = |(&body, u): (&usize, &Vec<f64>)| {
+            self.drafts[body].load.works(|node| std::array::from_fn(|c| u[D * node as usize + c]))
+        };
         let each = moving.bodies.iter().zip(&moving.displacement).map(of);
         let [work, largest] = each.fold([0.0; 2], |[sum, most], [work, size]| [sum + work, most + size]);
         if work.abs() <= largest * moving.error.max(NO_WORK) { 0.0 } else { work / largest }

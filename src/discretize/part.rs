@@ -72,6 +72,11 @@ impl<'a, const D: usize> Part<'a, D> {
         self.held.frame.dofs(&motion.nodal(&self.space.nodes))
     }
 
+    /// What a rigid motion does at the dofs of a node.
+    pub fn at_dofs(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
+        self.held.frame.at(node, |node| self.at(motion, node))
+    }
+
     /// What a rigid motion does at a dof.
     pub fn dof_of(&self, motion: &RigidMotion<D>, dof: usize) -> f64 {
         self.held.frame.dof(dof, |node| self.at(motion, node))
@@ -93,8 +98,7 @@ impl<'a, const D: usize> Part<'a, D> {
         let (count, mut held) = (motions.len(), prescribed.iter().map(|entry| entry.0).peekable());
         let (mut products, mut work) = (DMatrix::zeros(count, count), vec![0.0; count]);
         for node in 0..self.space.nodes.len() {
-            let mut at: Vec<[f64; D]> =
-                motions.iter().map(|motion| self.held.frame.at(node as u32, |node| self.at(motion, node))).collect();
+            let mut at: Vec<[f64; D]> = motions.iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
             while let Some(dof) = held.next_if(|dof| dof / D == node) {
                 at.iter_mut().for_each(|u| u[dof % D] = 0.0);
             }

@@ -60,12 +60,8 @@ impl Retained {
         turned.col.iter().for_each(|&dof| kept[dof as usize] = true);
         retained.hold(&mut kept, &is_prescribed, motions, motion);
         retained.dofs = (0..kept.len()).filter(|&dof| kept[dof]).collect();
-        let mut place = vec![0; kept.len()];
-        retained.dofs.iter().enumerate().for_each(|(i, &dof)| place[dof] = i);
-        retained.rows = Csr::new(retained.dofs.len());
-        for q in 0..turned.rows() {
-            retained.rows.push_row(turned.row(q).map(|(dof, value)| (place[dof], value)));
-        }
+        let place = |dof: usize| retained.dofs.binary_search(&dof).ok();
+        retained.rows = turned.of_columns(retained.dofs.len(), place);
         retained
     }
 
