@@ -100,11 +100,6 @@ impl<'a, const D: usize> Cells<'a, D> {
         self.known.numbers[node as usize]
     }
 
-    /// The node with this number among those of all ranks, which this rank has.
-    pub fn place(&self, number: u32) -> u32 {
-        self.known.numbers.binary_search(&number).map_or(NONE, |node| node as u32)
-    }
-
     /// Number of cells.
     pub fn count(&self) -> usize {
         self.nodes.len() / self.stride

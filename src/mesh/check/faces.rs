@@ -21,13 +21,6 @@ impl<const D: usize> Face<D> {
         Self { place: (4 * cell) as u32 + self.place % 4, ..self }
     }
 
-    /// The same face where its nodes have other numbers, in the same order.
-    pub fn of_nodes(self, number: impl Fn(u32) -> u32) -> Self {
-        let mut rest = self.rest;
-        rest[..D - 1].iter_mut().for_each(|node| *node = number(*node));
-        Self { rest, ..self }
-    }
-
     /// The cell.
     pub fn cell(&self) -> usize {
         (self.place / 4) as usize

@@ -176,9 +176,9 @@ fn boundary<const D: usize>(cells: &Cells<D>, outer: Vec<(u32, Face<D>)>, exchan
     let mut behind: Vec<usize> = outer.iter().map(|(_, face)| face.cell()).collect();
     behind.sort_unstable();
     behind.dedup();
-    let number = |node: u32| cells.number(node);
     let here = |face: Face<D>| behind.binary_search(&face.cell()).map_or(face, |place| face.of_cell(place));
-    let faces: Vec<_> = outer.into_iter().map(|(least, face)| (number(least), here(face).of_nodes(number))).collect();
+    // those of one least corner are of one rank, in the order that all would have
+    let faces: Vec<_> = outer.into_iter().map(|(least, face)| (cells.number(least), here(face))).collect();
     let mut mine = vec![Default::default(); exchange.ranks()];
     mine[0] = (cells.some(behind.iter().copied()), faces);
     let (mut all, mut rim, mut before) = (Vec::new(), Vec::new(), 0);
@@ -191,8 +191,5 @@ fn boundary<const D: usize>(cells: &Cells<D>, outer: Vec<(u32, Face<D>)>, exchan
         return Ok(());
     }
     all.sort_unstable();
-    let cells = cells.of(rim.into_iter());
-    let place = |node: u32| cells.place(node);
-    let all = all.into_iter().map(|(least, face)| (place(least), face.of_nodes(place))).collect();
-    look(&cells, all)
+    look(&cells.of(rim.into_iter()), all)
 }

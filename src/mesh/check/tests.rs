@@ -48,6 +48,11 @@ fn all<const D: usize>(mesh: &Mesh<D>, asked: &[Asked], shared: bool) -> Result<
             let of_ranks = nodes.iter().flat_map(|of_rank| &of_rank[body]);
             assert!(of_ranks.clone().all(|(node, point)| all.get(node) == Some(point)), "{ranks} ranks");
             assert_eq!(of_ranks.map(|(node, _)| node).collect::<BTreeSet<_>>().len(), all.len(), "{ranks} ranks");
+            // those on surfaces are known everywhere
+            let low = mesh.groups.iter().filter(|group| group.dimension < D).flat_map(|group| &group.connectivity);
+            let on_surface: BTreeSet<u32> = low.copied().collect();
+            let mut on_surface = all.iter().filter(|(_, point)| on_surface.contains(point));
+            assert!(on_surface.all(|(node, _)| nodes.iter().all(|of_rank| of_rank[body].contains_key(node))));
         }
         // one rank has the words
         others.sort_by_key(|other| other.as_ref().map_or_else(|words| usize::MAX - words.len(), |_| 0));
@@ -122,6 +127,33 @@ fn good_meshes_are_counted() {
         let found = found.unwrap();
         assert_eq!([found.inner, found.outer, found.parts.count], counts);
     }
+}
+
+/// Of a bar of many cubes each rank has a part of the nodes: the surface at its end is known to all, and its boundary is looked at as a whole.
+#[test]
+fn ranks_have_parts_of_a_bar() {
+    let count = 20;
+    let corners = |i: u32| (0..4).map(move |k| [i, k & 1, k >> 1].map(f64::from));
+    let mut points: Vec<[f64; 3]> = (0..=count).flat_map(corners).collect();
+    let of_bar = |i: u32| cube([0.0; 3], 0).1.into_iter().map(move |k| 4 * (i + (k & 1)) + (k >> 1));
+    let mut cells: Vec<u32> = (0..count).flat_map(of_bar).collect();
+    let end =
+        Group { name: "end".into(), dimension: 2, stride: 3, connectivity: vec![0, 1, 3, 0, 3, 2], tags: Vec::new() };
+    let with_end = |points: Vec<[f64; 3]>, cells: &[u32]| {
+        let mut bar = mesh(points, cells);
+        bar.groups = [bar.groups.to_vec(), vec![end.clone()]].concat().into();
+        bar
+    };
+    let bar = with_end(points.clone(), &cells);
+    for bar in [bar.clone(), quadratic(&bar)] {
+        let found = check(&bar, &[("end", Duty::Acts)]).unwrap();
+        assert_eq!([found.inner, found.outer, found.parts.count, found.nodes.count], [158, 164, 1, bar.points.len()]);
+    }
+    // a cube of its own through a side in the middle
+    let (more, others) = cube([10.3, 0.4, 0.5], points.len() as u32);
+    points.extend(more);
+    cells.extend(others);
+    refused(&with_end(points, &cells), &["crosses itself", "elements "]);
 }
 
 #[test]
