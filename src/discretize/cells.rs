@@ -92,11 +92,11 @@ pub fn deal<const D: usize>(
         }
         order.sort_unstable();
         order.dedup_by_key(|(key, ..)| *key);
-        let mut points: Vec<(u32, u32)> =
-            dealt.iter().flat_map(|cells| cells.nodes.iter().copied().zip(cells.points.iter().copied())).collect();
-        points.sort_unstable();
-        points.dedup();
-        part.known.points = points;
+        let mut points = vec![None; part.space.nodes.len()];
+        for cells in &dealt {
+            cells.nodes.iter().zip(&cells.points).for_each(|(&node, &point)| points[node as usize] = Some(point));
+        }
+        part.known.points = (0..).zip(points).filter_map(|(node, point)| Some((node, point?))).collect();
         let stride = part.space.stride;
         let nodes = order.iter().flat_map(|&(_, from, number)| &dealt[from].nodes[number * stride..][..stride]);
         part.space.cells = nodes.copied().collect();
