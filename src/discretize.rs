@@ -214,7 +214,7 @@ pub fn discretize<const D: usize>(
             loose,
             scales,
             elasticity,
-            graph,
+            graph: graph.filter(|_| alone),
             dealt,
             here,
             works,
@@ -225,7 +225,7 @@ pub fn discretize<const D: usize>(
     }
     let (mut slots, mut shapes, mut counts) = (Vec::new(), Vec::new(), Counts::default());
     for ((ready, info), &owner) in ready.into_iter().zip(&mut infos).zip(&owner) {
-        let (slot, shape) = ready.make(info, mesh, alone, owner == rank, factory, &mut counts)?;
+        let (slot, shape) = ready.make(info, mesh, owner == rank, factory, &mut counts)?;
         slots.push(slot);
         shapes.extend(shape.filter(|_| keep));
     }

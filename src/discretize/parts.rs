@@ -53,7 +53,7 @@ impl<const D: usize> Stock<'_, D> {
 
     /// Nodes that are points of this rank.
     pub fn own(&self) -> impl Iterator<Item = u32> {
-        own(&self.known, self.portion)
+        own(&self.known, self.portion).map(|(node, _)| node)
     }
 
     /// Numbers of the cells that this rank speaks for: each is one of one rank.
@@ -67,10 +67,10 @@ fn home<const D: usize>(portion: &Portion<D>, group: usize, rank: usize) -> impl
     cells.filter(move |(_, cell)| portion.home(cell[0]) == rank).map(|(number, _)| number)
 }
 
-/// Nodes that are points of this rank.
-fn own<const D: usize>(known: &Nodes, portion: &Portion<D>) -> impl Iterator<Item = u32> {
-    let nodes = known.numbers.iter().zip(&known.points);
-    nodes.filter(|(_, point)| portion.is_own(**point)).map(|(&node, _)| node)
+/// Nodes that are points of this rank, with these.
+fn own<const D: usize>(known: &Nodes, portion: &Portion<D>) -> impl Iterator<Item = (u32, u32)> {
+    let nodes = known.numbers.iter().copied().zip(known.points.iter().copied());
+    nodes.filter(|(_, point)| portion.is_own(*point))
 }
 
 /// The bodies with their spaces, supports and springs, and the cells that this rank has of them. Where there are several ranks, the spaces have the
@@ -201,7 +201,7 @@ fn summed<const D: usize>(at: Vec<f64>, nodes: &Nodes, portion: &Portion<D>, exc
         return at;
     }
     let mut all = vec![0.0; at.len()];
-    for dofs in own(nodes, portion).map(|node| D * node as usize..D * (node as usize + 1)) {
+    for dofs in own(nodes, portion).map(|(node, _)| D * node as usize..D * (node as usize + 1)) {
         all[dofs.clone()].copy_from_slice(&at[dofs]);
     }
     exchange.sum(&mut all);
@@ -211,8 +211,7 @@ fn summed<const D: usize>(at: Vec<f64>, nodes: &Nodes, portion: &Portion<D>, exc
 /// Places of all nodes of a body. Collective.
 fn everywhere<const D: usize>(nodes: &Nodes, portion: &Portion<D>, exchange: &dyn Exchange) -> Vec<[f64; D]> {
     let mut all = vec![[0.0; D]; nodes.count];
-    let known = nodes.numbers.iter().zip(&nodes.points).filter(|(_, point)| portion.is_own(**point));
-    known.for_each(|(&node, &point)| all[node as usize] = portion.mesh.points[point as usize]);
+    own(nodes, portion).for_each(|(node, point)| all[node as usize] = portion.mesh.points[point as usize]);
     exchange.sum(all.as_flattened_mut());
     all
 }

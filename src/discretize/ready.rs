@@ -28,7 +28,7 @@ pub struct Ready<'a, const D: usize> {
     pub scales: [f64; 2],
     /// Elasticity of the cells that are here.
     pub elasticity: Elasticity,
-    /// Which nodes K couples, if that was asked for.
+    /// Which nodes K couples, if that is known here.
     pub graph: Option<NodeGraph>,
     /// How its nodes are dealt out, if they are.
     pub dealt: Option<Dealt>,
@@ -62,7 +62,6 @@ impl<const D: usize> Ready<'_, D> {
         self,
         info: &mut BodyInfo,
         mesh: &Mesh<D>,
-        is_alone: bool,
         is_owner: bool,
         factory: &mut dyn Factory,
         counts: &mut Counts,
@@ -103,10 +102,8 @@ impl<const D: usize> Ready<'_, D> {
             (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
             counts.avoided += 1;
         } else {
-            let mut graph = self
-                .graph
-                .filter(|_| is_alone)
-                .unwrap_or_else(|| NodeGraph::with_rows(&part.space, &rows, &part.held.frame));
+            let whole = || NodeGraph::with_rows(&part.space, &rows, &part.held.frame);
+            let mut graph = self.graph.unwrap_or_else(whole);
             if let Some(dealt) = &dealt {
                 graph = graph.of(|node| dealt.is_own::<D>(node));
             }

@@ -22,6 +22,7 @@ pub mod stress;
 mod support;
 pub mod surface;
 
+pub use crate::linalg::pad;
 pub use assemble::{NodalBlock, NodeGraph};
 pub use elasticity::Elasticity;
 pub use element::EDGES;
@@ -34,11 +35,6 @@ pub use rigid::{FreeMotion, RigidMotion};
 pub use slope::Slope;
 pub use space::{Facets, Space, area_vector};
 pub use support::{Couplings, ElasticBody, support};
-
-/// A vector of 2 or 3 components as 3.
-pub fn pad<const D: usize>(v: [f64; D]) -> [f64; 3] {
-    std::array::from_fn(|c| if c < D { v[c] } else { 0.0 })
-}
 
 /// Vector product.
 pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

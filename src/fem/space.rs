@@ -178,15 +178,6 @@ impl<const D: usize> Space<D> {
         self.from_mesh.points()
     }
 
-    /// The point of the mesh of each node.
-    pub fn points(&self) -> Vec<u32> {
-        let mut points = vec![0; self.nodes.len()];
-        for point in self.mesh_points() {
-            self.from_mesh.get(point).into_iter().for_each(|node| points[node as usize] = point);
-        }
-        points
-    }
-
     /// What a cell adds to the measure of the body, by its corners: in a body of revolution the volume of a ring.
     pub fn share(&self, i: usize) -> f64 {
         self.cell_measure(i) * self.circle(&self.centroid(i))

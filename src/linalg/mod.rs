@@ -25,6 +25,11 @@ pub fn bounds<const K: usize>(points: impl IntoIterator<Item = [f64; K]>) -> [[f
     })
 }
 
+/// A vector of 2 or 3 components as 3.
+pub fn pad<const K: usize>(v: [f64; K]) -> [f64; 3] {
+    std::array::from_fn(|c| if c < K { v[c] } else { 0.0 })
+}
+
 /// A sparse matrix in compressed rows: row `i` holds columns `col[ptr[i]..ptr[i+1]]`, sorted.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Csr {

@@ -6,6 +6,7 @@
 //! Iterations of all linear steps with hypre on 1, 2, 3, 5, 8 ranks: groove3d n = 24 50, 53, 54, 54, 54; hertz-sphere n = 26, edge = 1, P1 53, 58,
 //! 57, 52, 55; flange 110, 109, 109, 113, 107. Parts that METIS made of the graph of the nodes took as many to some per cent.
 
+use crate::linalg::pad;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -92,10 +93,8 @@ impl Cuts {
             }
         }
         let (below, above) = these.split_at_mut(low);
-        self.cuts[place] = above.iter().min_by(|a, b| order(a, b)).map(|&number| {
-            let x = at(number);
-            Cut { axis, at: std::array::from_fn(|c| x.get(c).copied().unwrap_or_default()), number }
-        });
+        let first = above.iter().copied().min_by(order);
+        self.cuts[place] = first.map(|number| Cut { axis, at: pad(at(number)), number });
         self.split(all, below, parts.start..middle, place + 1);
         self.split(all, above, middle..parts.end, place + middle - parts.start);
     }

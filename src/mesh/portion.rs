@@ -8,7 +8,7 @@ use super::dealer::{self, Cells, Dealer, Head};
 use super::{Cuts, Group, Mesh, Numbering, groups};
 use crate::error::Result;
 use crate::exchange::{Exchange, pack, tell, unpack};
-use crate::linalg::bounds;
+use crate::linalg::{bounds, pad};
 use crate::problem::order::Order;
 
 /// The place of a cell among those of its group: on Morton's curve, and of equal ones in the file.
@@ -81,7 +81,7 @@ impl<const D: usize> Portion<D> {
             (head, points) = read?;
             let mut used = groups::used(&head.groups, points.len());
             used.iter_mut().zip(of_cells).for_each(|(used, of_cell)| *used |= of_cell || !is_dealt);
-            head.bounds = bounds(points.iter().zip(&used).filter(|(_, used)| **used).map(|(x, _)| pad(x)));
+            head.bounds = bounds(points.iter().zip(&used).filter(|(_, used)| **used).map(|(x, _)| pad(*x)));
             number = groups::compact(&used);
             head.points = number.last().map_or(0, |last| *last as usize + 1);
             Ok(head)
@@ -103,7 +103,7 @@ impl<const D: usize> Portion<D> {
     /// All of a mesh.
     pub fn whole(mut mesh: Mesh<D>) -> Self {
         if D == 3 {
-            mesh.sort_cells(bounds(mesh.points.iter().map(pad)), &[]);
+            mesh.sort_cells(bounds(mesh.points.iter().copied().map(pad)), &[]);
         }
         let points = mesh.points.len();
         Self { mesh, points, owner: Vec::new(), numbers: Vec::new(), keys: Vec::new(), rank: 0 }
@@ -177,9 +177,4 @@ impl Wanted {
         let place = Numbering::in_order(cells.iter().flat_map(|cells| &cells.nodes).chain(of_groups).copied());
         Self { points: place.points().collect(), place }
     }
-}
-
-/// A place, z = 0 in the plane.
-fn pad<const D: usize>(x: &[f64; D]) -> [f64; 3] {
-    std::array::from_fn(|c| x.get(c).copied().unwrap_or_default())
 }

@@ -2,6 +2,7 @@
 
 use super::nodes::Nodes;
 use crate::error::Error;
+use crate::linalg::pad;
 use crate::mesh::{Key, Portion};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -137,11 +138,10 @@ impl<'a, const D: usize> Cells<'a, D> {
 
     /// Coordinates of a node, z = 0 in the plane.
     pub fn at(&self, node: u32) -> [f64; 3] {
-        if !self.far.is_empty() {
-            return self.far[node as usize];
+        match self.far.get(node as usize) {
+            Some(&x) => x,
+            None => pad(self.portion.mesh.points[self.known.points[node as usize] as usize]),
         }
-        let x = &self.portion.mesh.points[self.known.points[node as usize] as usize];
-        std::array::from_fn(|c| x.get(c).copied().unwrap_or(0.0))
     }
 
     /// The mid-edge node of a cell between two of its corners.
