@@ -11,6 +11,7 @@ mod draft;
 mod elastic;
 mod factory;
 mod find;
+mod free;
 mod gauge;
 mod here;
 mod info;
@@ -33,11 +34,12 @@ mod verify;
 use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
-use crate::exchange::Exchange;
-use crate::linalg::{Csr, axpy, dot};
+use crate::exchange::{Exchange, share as share_all};
+use crate::fem::rigid::AtDofs;
+use crate::linalg::{axpy, dot};
 use crate::mesh::Checked;
 use crate::model::{Mechanism, Model, Segment};
-use crate::problem::{BodySpec, Start};
+use crate::problem::{BodySpec, Plane, Start};
 use crate::scene::Scene;
 pub use balance::{Balance, Resultant};
 use carried::{Supported, supported};
@@ -46,10 +48,12 @@ use couplings::Coupled;
 use distribute::Deal;
 use draft::Draft;
 pub use factory::{Assembled, Factory, Outline};
+use free::Free;
 use here::Here;
 pub use info::{BodyInfo, ContactInfo};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes};
+use part::Part;
 use parts::parts;
 pub use post::Post;
 use ready::{Counts, Ready};
@@ -106,71 +110,69 @@ pub fn discretize<const D: usize>(
         fine.extend(points);
         contacts.push(ContactInfo { spec, swapped, surface });
     }
-    let drafts = parts.iter().zip(draft::segments(parts.len(), &pairs));
-    let drafts = drafts.map(|(part, segments)| Draft::new(part, segments, &pairs, mesh));
-    let drafts = drafts.collect::<Result<Vec<_>>>()?;
-    let Fixed { gauged, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs);
-    let supported: Vec<Supported> =
-        parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
     let others = &*verified.exchange;
+    let drafts = parts.iter().zip(draft::segments(parts.len(), &pairs));
+    let drafts = drafts.map(|(part, segments)| Draft::new(part, segments, &pairs, mesh, others));
+    let mut drafts = drafts.collect::<Result<Vec<_>>>()?;
+    let Fixed { gauged, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs, others);
+    let supported: Vec<Supported<D>> =
+        parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
     let lazy = Coupled::new((&parts, &stocks, &drafts), others);
     let coupled = &lazy;
     let asked: Vec<_> = (0..parts.len()).map(|i| (move || coupled.graph(i), move || coupled.count(i))).collect();
-    let motions = parts.iter().zip(&drafts);
-    let motions: Vec<_> =
-        motions.map(|(part, draft)| move |k: usize, dof: usize| part.dof_of(&draft.free[k], dof)).collect();
-    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(asked.iter().zip(&motions));
-    let outlines = outlines.map(|(((part, draft), supported), ((graph, couplings), motion))| Outline {
+    let motions: Vec<_> = parts.iter().zip(&drafts).map(|(part, draft)| Free::new(part, draft, others)).collect();
+    let at: Vec<_> = motions.iter().map(|free| |k: usize, dof: usize| free.at(k, dof)).collect();
+    let largest: Vec<_> = motions.iter().map(|free| |size: &dyn Fn(usize) -> Option<f64>| free.largest(size)).collect();
+    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(asked.iter().zip(at.iter().zip(&largest)));
+    let outlines = outlines.map(|(((part, draft), supported), ((graph, couplings), (at, largest)))| Outline {
         name: &part.spec.name.value,
         dimension: D,
         order: part.space.order,
         rows: &draft.rows,
         prescribed: &supported.prescribed,
-        motions: draft.free.len(),
-        motion,
+        motions: AtDofs { count: draft.free.len(), at, largest },
         couplings,
         graph,
     });
     factory.plan(&outlines.collect::<Vec<_>>())?;
     let deal = |bodies: Vec<usize>| {
         let couplings = coupled.of(&bodies, &pairs);
-        let places: Vec<&[[f64; D]]> = bodies.iter().map(|&body| &parts[body].space.nodes[..]).collect();
-        Deal::new(bodies, &places, &couplings, exchange.ranks())
+        Deal::new(bodies, &parts, &couplings, others)
     };
     let deals: Vec<Deal> = factory.dealt_out().into_iter().map(deal).collect();
     let graphs = lazy.into_graphs();
-    let coarse = |body: usize| match factory.wants_interpolation(&parts[body].spec.name.value) {
-        true => parts[body].coarse_nodes(),
-        false => Vec::new(),
-    };
-    let dealt = distribute::distribute::<D>(&drafts, &coarse, &deals, &exchange);
-    let loads = parts.iter().zip(&dealt).map(|(part, dealt)| if dealt.is_some() { 0 } else { part.space.dofs() });
+    let is_dealt = |body: usize| deals.iter().any(|deal| deal.bodies.contains(&body));
+    let loads = parts.iter().enumerate().map(|(body, part)| if is_dealt(body) { 0 } else { part.space.dofs() });
     let mut owner = crate::parallel::owners(&loads.collect::<Vec<_>>(), exchange.ranks());
+    let needs = if keep { vec![Needs::Everywhere; parts.len()] } else { Needs::of(&owner, &deals) };
+    let (totals, warnings) = together(&parts, &drafts, scene.plane, others);
+    let mut loads: Vec<_> = drafts.iter_mut().map(|draft| &mut draft.nodal_load).collect();
+    let elasticities = cells::deal(&mut parts, stocks, &mut loads, &needs, scene.plane, others)?;
+    drop(needs);
+    let wants_coarse = |body: usize| factory.wants_interpolation(&parts[body].spec.name.value);
+    let dealt = distribute::distribute(&parts, &drafts, &wants_coarse, &deals, others, &exchange);
+    drop(deals);
     dealt
         .iter()
         .zip(&mut owner)
         .for_each(|(dealt, owner)| *owner = dealt.as_ref().map_or(*owner, |dealt| dealt.leader));
-    let needs = if keep { Needs::everywhere(parts.len()) } else { Needs::of(&owner, &drafts, &deals) };
-    let elasticities = cells::deal(&mut parts, stocks, &needs, scene.plane, &*verified.exchange)?;
-    drop(needs);
-    drop(deals);
-    let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt);
+    let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt).zip(totals.into_iter().zip(warnings));
     let known = gauged.into_iter().zip(loose).zip(elasticities);
     let (mut infos, mut offsets, mut ready) = (Vec::new(), Vec::new(), Vec::new());
-    for (index, ((part, (((draft, supported), graph), mut dealt)), ((gauged, loose), elasticity))) in
+    for (index, ((part, ((((draft, supported), graph), mut dealt), of_all)), ((gauged, loose), elasticity))) in
         parts.into_iter().zip(drafts).zip(known).enumerate()
     {
-        let Draft { segments, rows, nodal_load, load, .. } = draft;
-        let mut offset = vec![0.0; rows.rows()];
-        if !supported.carried.is_empty() {
-            rows.multiply(&supported.carried, &mut offset);
-        }
-        offsets.push(offset);
+        let Draft { segments, rows, nodal_rows, nodal_load, .. } = draft;
+        let carried = |q: usize| {
+            let at = |motion| rows.row(q).map(|(dof, b)| b * part.dof_of(motion, dof)).sum();
+            supported.carried.as_ref().map_or(0.0, at)
+        };
+        offsets.push((0..rows.rows()).map(carried).collect::<Vec<f64>>());
         let surface: f64 = segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
         let modulus = dot(&part.known.moduli, &share(&segments, &pairs));
         let held = loose.motions.len() == loose.unfelt.len();
         let depth = part.known.volume / surface;
-        let mut resultant = nodal_load.sum();
+        let (mut resultant, warning) = of_all;
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
         infos.push(BodyInfo {
             name: part.spec.name.value.clone(),
@@ -183,7 +185,7 @@ pub fn discretize<const D: usize>(
             left_by_supports: loose.left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: loose.unfelt.iter().map(|(name, _)| name.clone()).collect(),
             gauged,
-            warning: elastic::warning(part.spec, &part.space, scene.plane),
+            warning,
             stiffness: if held && surface > 0.0 { modulus / depth } else { 0.0 },
             load: resultant,
             rank: owner[index],
@@ -193,15 +195,14 @@ pub fn discretize<const D: usize>(
             rigid: part.held.rigid.iter().map(|(load, _)| part.spec.load[*load].on.value.clone()).collect(),
             post: None,
         });
-        let unloaded = if keep { part.unloaded(mesh, &nodal_load.all())? } else { Vec::new() };
+        let unloaded = if keep { part.unloaded(mesh)? } else { Vec::new() };
         let (mut here, mut works, mut smooth, mut elsewhere) = (None, None, Vec::new(), None);
         if owner[index] == rank || dealt.is_some() {
             smooth = part.smooth();
-            let rows = [rows, nodal_rows(&segments, &pairs, part.space.dofs())];
-            let mut all = Here { part, rows, loads: [load, nodal_load], supported };
+            let mut all = Here { part, rows: [rows, nodal_rows], load: nodal_load, supported };
             if let Some(dealt) = &mut dealt {
                 let work;
-                (all, work) = all.of(dealt, &loose.left);
+                (all, work) = all.of(dealt, &loose.left, others);
                 works = Some(work);
             }
             here = Some(all);
@@ -289,13 +290,24 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
     Ok(Some(trace))
 }
 
-/// The rows of these segments for displacements of the nodes of a body, of so many dofs.
-fn nodal_rows(segments: &[Segment], pairs: &[ContactPair], dofs: usize) -> Csr {
-    let mut rows = Csr::new(dofs);
-    for &Segment { pair, side } in segments {
-        (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].nodal[side].row(q)));
-    }
-    rows
+/// What all nodes of each body come to: the sum of its loads, but for those on rigid surfaces, and what the user should know of its elasticity.
+/// Collective.
+fn together<const D: usize>(
+    parts: &[Part<D>],
+    drafts: &[Draft<D>],
+    plane: Plane,
+    exchange: &dyn Exchange,
+) -> (Vec<[f64; 3]>, Vec<Option<String>>) {
+    let mut sums: Vec<[f64; 3]> = drafts.iter().map(|draft| draft.nodal_load.sum()).collect();
+    exchange.sum(sums.as_flattened_mut());
+    let poisson = share_all(
+        exchange,
+        parts.iter().map(|part| elastic::poisson(part.spec, part.own(), plane)).collect::<Vec<_>>(),
+    );
+    let warning = |(body, part): (usize, &Part<D>)| {
+        elastic::warning(part.spec, poisson.iter().map(|of_rank| of_rank[body]).fold(0.0, f64::max))
+    };
+    (sums, parts.iter().enumerate().map(warning).collect())
 }
 
 /// Mean squared components of the normals on the contact surfaces of a body.

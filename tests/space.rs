@@ -254,11 +254,10 @@ fn volume_and_area_of_a_ball() {
             let scene = scene::load(&path, &[format!("mesh.set.h={h}")]).expect("a scene");
             let mesh = load::<3>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
             let space = Space::new(&mesh, mesh.group("ball").expect("a body"), degree);
-            let total = |load: &[f64]| load.iter().step_by(3).sum::<f64>();
-            let (mut volume, mut area) = (vec![0.0; space.dofs()], vec![0.0; space.dofs()]);
-            fem::body_force(&space, Parts::Whole, &|_| [1.0, 0.0, 0.0], &mut volume);
+            let volume = fem::body_force(&space, Parts::Whole, &|_| [1.0, 0.0, 0.0]).sum()[0];
             let facets = space.facets(mesh.group("skin").expect("a surface"));
-            winkler::fem::surface::surface_load(&space, &facets, Parts::Whole, &|_, _| [1.0, 0.0, 0.0], &mut area);
+            let unit = |_, _| [1.0, 0.0, 0.0];
+            let area = winkler::fem::surface::surface_load(&space, &facets, Parts::Whole, &unit).sum()[0];
             // the boundary found from the cells is the group, facet by facet
             let sorted = |facets: &winkler::fem::Facets<3>| {
                 let mut all: Vec<Vec<u32>> = (0..facets.count()).map(|i| facets.facet(i).to_vec()).collect();
@@ -267,7 +266,7 @@ fn volume_and_area_of_a_ball() {
                 all
             };
             assert_eq!(sorted(&space.boundary()), sorted(&facets));
-            [(total(&volume) / (4.0 / 3.0 * pi) - 1.0).abs(), (total(&area) / (4.0 * pi) - 1.0).abs()]
+            [(volume / (4.0 / 3.0 * pi) - 1.0).abs(), (area / (4.0 * pi) - 1.0).abs()]
         });
         for what in 0..2 {
             let found = order(&[errors[0][what], errors[1][what]]);

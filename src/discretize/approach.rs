@@ -4,7 +4,7 @@ use super::find::{find_group, nodes_on};
 use crate::contact::{add, pad};
 use crate::error::Result;
 use crate::exchange::Exchange;
-use crate::fem::{Facets, Parts, Space, assemble, place, surface};
+use crate::fem::{Facets, NodalForces, Parts, Space, assemble, place, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
@@ -75,15 +75,15 @@ impl Place {
 pub struct Outer {
     loaded: Vec<Place>,
     held: Vec<Place>,
-    /// Integrals of the shape functions over a body that nothing loads or holds.
+    /// Integrals of the shape functions over a body that nothing loads or holds: the sum at first, each once all cells at own nodes are here.
     whole: Weights,
     /// Number of nodes of the body.
     nodes: usize,
 }
 
 impl Outer {
-    /// Of a body whose cells behind surfaces are here; `resultant` sums a load, `volumes` are the [integrals](volumes) of the shape functions over all
-    /// cells where nothing loads or holds it. Collective.
+    /// Of a body whose cells behind surfaces are here; `resultant` sums a load, `volume` is the sum of all
+    /// [integrals](volumes) of the shape functions where nothing loads or holds it. Collective.
     ///
     /// # Errors
     /// Groups that are not there.
@@ -92,7 +92,7 @@ impl Outer {
         space: &Space<D>,
         mesh: &Mesh<D>,
         resultant: &dyn Fn(&Load) -> Result<[f64; 3]>,
-        volumes: Vec<f64>,
+        volume: f64,
         exchange: &dyn Exchange,
     ) -> Result<Self> {
         let mut outer = Self { nodes: space.nodes.len(), ..Self::default() };
@@ -119,10 +119,15 @@ impl Outer {
             };
             outer.held.push(Place::new(space, group, directions, exchange));
         }
-        if outer.loaded.is_empty() && outer.held.is_empty() {
-            outer.whole = Weights::new(first_components::<D>(&volumes));
-        }
+        outer.whole.total = volume;
         Ok(outer)
+    }
+
+    /// Integrates the shape functions where nothing loads or holds the body; all cells at own nodes are here.
+    pub fn weigh<const D: usize>(&mut self, space: &Space<D>) {
+        if self.whole.total > 0.0 {
+            self.whole.of_nodes = volumes(space);
+        }
     }
 
     /// The same of some nodes, sorted, by their places among these.
@@ -166,27 +171,20 @@ fn mean<'a, const D: usize>(u: &[f64], own: &[bool], all: impl Iterator<Item = &
 
 /// Integrals of the shape functions over a surface.
 fn areas<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> Vec<(u32, f64)> {
-    let mut all = vec![0.0; space.dofs()];
-    surface::surface_load(
-        space,
-        facets,
-        Parts::Whole,
-        &|_, _| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }),
-        &mut all,
-    );
-    first_components::<D>(&all)
+    first_components(&surface::surface_load(space, facets, Parts::Whole, &|_, _| along_first()))
 }
 
-/// Integrals of the shape functions over cells, at the first dof of each node.
-pub fn volumes<const D: usize>(space: &Space<D>) -> Vec<f64> {
-    let mut all = vec![0.0; space.dofs()];
-    assemble::body_force(space, Parts::Whole, &|_| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }), &mut all);
-    all
+/// Integrals of the shape functions over the cells that are here.
+pub fn volumes<const D: usize>(space: &Space<D>) -> Vec<(u32, f64)> {
+    first_components(&assemble::body_force(space, Parts::Whole, &|_| along_first()))
 }
 
-fn first_components<const D: usize>(all: &[f64]) -> Vec<(u32, f64)> {
-    let numbers = all.iter().step_by(D).enumerate().filter(|(_, weight)| **weight != 0.0);
-    numbers.map(|(node, &weight)| (node as u32, weight)).collect()
+fn along_first<const D: usize>() -> [f64; D] {
+    std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 })
+}
+
+fn first_components<const D: usize>(all: &NodalForces<D>) -> Vec<(u32, f64)> {
+    all.iter().map(|(node, weight)| (node, weight[0])).collect()
 }
 
 /// Mean normal of a surface.

@@ -1,31 +1,24 @@
 //! Supports that move a body as one: that motion is taken out before anything is rounded.
 
 use super::part::Part;
-use crate::fem::rigid::RigidMotion;
-use crate::linalg::axpy;
+use crate::fem::rigid::{self, RigidMotion};
 use nalgebra::{DMatrix, DVector};
 
 /// What supports prescribe.
-pub struct Supported {
-    /// Displacement by which they move the body as one, one entry a dof; empty for none.
-    pub carried: Vec<f64>,
+pub struct Supported<const D: usize> {
+    /// The rigid motion by which they move the body as one.
+    pub carried: Option<RigidMotion<D>>,
     /// (dof, value) besides it, sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
 }
 
 /// What the supports of a body prescribe; `free` are the rigid motions of the free body.
-pub fn supported<const D: usize>(part: &Part<D>, free: &[RigidMotion<D>]) -> Supported {
+pub fn supported<const D: usize>(part: &Part<D>, free: &[RigidMotion<D>]) -> Supported<D> {
     let prescribed = part.prescribed_sorted();
     let value = |k: usize, dof: usize| part.dof_of(&free[k], dof);
     match carried(free.len(), &value, &prescribed).filter(|_| part.springs.is_empty()) {
-        None => Supported { carried: Vec::new(), prescribed },
-        Some((weights, rest)) => {
-            let mut carried = vec![0.0; part.space.dofs()];
-            for (motion, &weight) in free.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0) {
-                axpy(weight, &part.dofs_of(motion), &mut carried);
-            }
-            Supported { carried, prescribed: rest }
-        }
+        None => Supported { carried: None, prescribed },
+        Some((weights, rest)) => Supported { carried: Some(rigid::sum(free, &weights)), prescribed: rest },
     }
 }
 
@@ -41,7 +34,7 @@ fn carried(
     count: usize,
     value: &dyn Fn(usize, usize) -> f64,
     prescribed: &[(usize, f64)],
-) -> Option<(Vec<f64>, Prescribed)> {
+) -> Option<(DVector<f64>, Prescribed)> {
     let largest = prescribed.iter().fold(0.0f64, |max, (_, u)| max.max(u.abs()));
     if largest == 0.0 {
         return None;
@@ -56,18 +49,19 @@ fn carried(
     weights.iter_mut().filter(|weight| weight.abs() < noise).for_each(|weight| *weight = 0.0);
     let moved = at * &weights;
     let rest: Prescribed = prescribed.iter().zip(&moved).map(|(&(dof, u), moved)| (dof, u - moved)).collect();
-    rest.iter().all(|(_, u)| u.abs() <= AGREES * largest).then(|| (weights.as_slice().to_vec(), rest))
+    rest.iter().all(|(_, u)| u.abs() <= AGREES * largest).then_some((weights, rest))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fem::Extent;
     use crate::fem::rigid::modes;
 
     #[test]
     fn supports_carry_a_body_or_deform_it() {
         let nodes = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
-        let all = modes(|| nodes.iter());
+        let all = modes(&Extent::of(nodes.into_iter()));
         let value = |k: usize, dof: usize| all[k].at(&nodes[dof / 2])[dof % 2];
         // the upper edge down by 0.3, x held at one node
         let (weights, rest) = carried(3, &value, &[(0, 0.0), (5, -0.3), (7, -0.3)]).expect("a translation");

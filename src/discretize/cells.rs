@@ -1,90 +1,104 @@
 //! The cells of bodies, from the ranks that have their points to those that assemble their nodes.
 
 use super::distribute::Deal;
-use super::draft::Draft;
 use super::elastic;
 use super::part::Part;
 use super::parts::Stock;
 use crate::error::Result;
 use crate::exchange::{Exchange, trade};
-use crate::fem::{Elasticity, NodeGraph};
+use crate::fem::{Elasticity, NodalForces, NodeGraph};
 use crate::linalg::Csr;
-use crate::mesh::Key;
+use crate::mesh::{Key, Numbering};
 use crate::problem::elasticity::Plane;
 use serde::{Deserialize, Serialize};
 
 /// Which ranks need cells of a body.
-pub enum Needs<'a> {
+#[derive(Clone, Copy)]
+pub enum Needs<'a, const D: usize> {
     /// Every rank needs all.
     Everywhere,
     /// This rank has the body.
     Whole(usize),
-    /// These ranks have its nodes: each needs the cells at its own ones, and those next to them.
-    Owners(&'a [u32]),
+    /// Ranks have its nodes, as a body of this number is dealt out: each needs the cells at its own ones, and those next to them.
+    Owners(&'a Deal, usize),
 }
 
-impl<'a> Needs<'a> {
-    /// Of so many bodies.
-    pub fn everywhere(bodies: usize) -> Vec<Self> {
-        (0..bodies).map(|_| Needs::Everywhere).collect()
-    }
-
+impl<'a, const D: usize> Needs<'a, D> {
     /// Of bodies of these `leaders`, some of which are dealt out.
-    pub fn of<const D: usize>(leaders: &[usize], drafts: &[Draft<D>], deals: &'a [Deal]) -> Vec<Self> {
+    pub fn of(leaders: &[usize], deals: &'a [Deal]) -> Vec<Self> {
         let mut needs: Vec<Self> = leaders.iter().map(|&leader| Needs::Whole(leader)).collect();
-        for Deal { bodies, owner } in deals {
-            let mut rest = &owner[..];
-            for &body in bodies {
-                let own;
-                (own, rest) = rest.split_at(drafts[body].rows.columns / D);
-                needs[body] = Needs::Owners(own);
-            }
+        for deal in deals {
+            deal.bodies.iter().enumerate().for_each(|(number, &body)| needs[body] = Needs::Owners(deal, number));
         }
         needs
     }
+
+    /// Whether a rank needs what is at a node. Tied nodes are assembled where their master is.
+    fn at(&self, part: &Part<D>, node: u32, rank: usize) -> bool {
+        match self {
+            Needs::Everywhere => true,
+            Needs::Whole(owner) => rank == *owner,
+            Needs::Owners(deal, number) => deal.owner(*number, part, part.held.frame.node(node)) == rank,
+        }
+    }
 }
 
-/// Cells of a body.
+/// Cells of a body, and loads at nodes of them.
 #[derive(Clone, Default, Serialize, Deserialize)]
 struct Cells {
     keys: Vec<Key>,
-    /// Their nodes.
+    /// Their nodes, sorted, each once.
     nodes: Vec<u32>,
     /// The numbers of these among the points of the mesh.
     points: Vec<u32>,
+    /// Where they are, `D` coordinates each.
+    places: Vec<f64>,
+    /// The nodes of each cell, by their places among these.
+    corners: Vec<u32>,
     /// Number of the constants of each; empty if the body has no regions.
     regions: Vec<usize>,
+    /// Nodes with loads.
+    loaded: Vec<u32>,
+    /// The nodal forces there, `D` components each.
+    forces: Vec<f64>,
 }
 
-/// Gives every rank the cells that it needs, which `parts` have afterwards, and their elasticity. Each rank has `stocks`. Collective.
+/// Gives every rank the cells that it needs, which `parts` have afterwards, their elasticity, and the nodal `loads` at its own nodes. Each rank has
+/// `stocks`. Collective.
 ///
 /// # Errors
 /// None that were not found before.
 pub fn deal<const D: usize>(
     parts: &mut [Part<D>],
     stocks: Vec<Stock<D>>,
-    needs: &[Needs],
+    loads: &mut [&mut NodalForces<D>],
+    needs: &[Needs<D>],
     plane: Plane,
     exchange: &dyn Exchange,
 ) -> Result<Vec<Elasticity>> {
     let (rank, ranks) = (exchange.rank(), exchange.ranks());
     let mut elasticities = Vec::new();
-    for ((part, stock), needs) in parts.iter_mut().zip(stocks).zip(needs) {
+    for (((part, stock), needs), load) in parts.iter_mut().zip(stocks).zip(needs).zip(loads) {
         if ranks == 1 {
             elasticities.push(stock.elasticity);
             continue;
         }
-        let home = |wanted: bool| stock.home(rank).filter(move |_| wanted).map(|cell| cell as u32);
-        let of_rank: Vec<Cells> = match needs {
-            Needs::Owners(_) => near(part, &stock, needs, ranks)
-                .into_iter()
-                .map(|cells| some(part, &stock, cells.into_iter()))
-                .collect(),
-            Needs::Whole(owner) => (0..ranks).map(|rank| some(part, &stock, home(rank == *owner))).collect(),
-            Needs::Everywhere => vec![some(part, &stock, home(true)); ranks],
+        let home = |wanted: bool| stock.home(rank).filter(|_| wanted).map(|cell| cell as u32).collect::<Vec<_>>();
+        let cells: Vec<Vec<u32>> = match needs {
+            Needs::Owners(deal, number) => near(part, &stock, deal, *number, ranks),
+            Needs::Whole(owner) => (0..ranks).map(|rank| home(rank == *owner)).collect(),
+            Needs::Everywhere => vec![home(true); ranks],
         };
+        let of_rank = |(rank, cells): (usize, Vec<u32>)| {
+            let mut cells = some(part, &stock, &cells);
+            let wanted = load.only(|node| needs.at(part, node, rank));
+            cells.loaded = wanted.iter().map(|(node, _)| node).collect();
+            cells.forces = wanted.iter().flat_map(|(_, force)| force).collect();
+            cells
+        };
+        let of_ranks: Vec<Cells> = cells.into_iter().enumerate().map(of_rank).collect();
         drop(stock);
-        let dealt = trade(exchange, of_rank);
+        let dealt = trade(exchange, of_ranks);
         // cells at points of several ranks come from each of these
         let mut order: Vec<(Key, usize, usize)> = Vec::new();
         for (from, cells) in dealt.iter().enumerate() {
@@ -92,14 +106,22 @@ pub fn deal<const D: usize>(
         }
         order.sort_unstable();
         order.dedup_by_key(|(key, ..)| *key);
-        let mut points = vec![None; part.space.nodes.len()];
-        for cells in &dealt {
-            cells.nodes.iter().zip(&cells.points).for_each(|(&node, &point)| points[node as usize] = Some(point));
-        }
-        part.known.points = (0..).zip(points).filter_map(|(node, point)| Some((node, point?))).collect();
+        let points = dealt.iter().flat_map(|cells| cells.nodes.iter().copied().zip(cells.points.iter().copied()));
+        let mut points: Vec<(u32, u32)> = points.collect();
+        points.sort_unstable();
+        points.dedup();
+        part.known.points = points;
+        let place = |x: &[f64]| std::array::from_fn(|c| x[c]);
+        let places = dealt.iter().flat_map(|cells| cells.nodes.iter().copied().zip(cells.places.chunks_exact(D)));
+        part.space.nodes.learn(places.map(|(node, x)| (node, place(x))));
+        let forces = dealt.iter().flat_map(|cells| cells.loaded.iter().copied().zip(cells.forces.chunks_exact(D)));
+        **load = forces.map(|(node, force)| (node, place(force))).collect();
         let stride = part.space.stride;
-        let nodes = order.iter().flat_map(|&(_, from, number)| &dealt[from].nodes[number * stride..][..stride]);
-        part.space.cells = nodes.copied().collect();
+        let nodes = order.iter().flat_map(|&(_, from, number)| {
+            let of_rank = &dealt[from];
+            of_rank.corners[number * stride..][..stride].iter().map(|&corner| of_rank.nodes[corner as usize])
+        });
+        part.space.cells = nodes.collect();
         let regions = order.iter().filter_map(|&(_, from, number)| dealt[from].regions.get(number)).copied();
         elasticities.push(elastic::of_regions(part.spec, regions.collect(), D, plane)?);
     }
@@ -112,18 +134,21 @@ pub fn graph<const D: usize>(part: &Part<D>, stock: &Stock<D>, rows: &Csr, excha
         return NodeGraph::with_rows(&part.space, rows, &part.held.frame);
     }
     let mut mine = vec![Vec::new(); exchange.ranks()];
-    mine[0] = some(part, stock, stock.home(exchange.rank()).map(|cell| cell as u32)).nodes;
+    let stride = part.space.stride;
+    mine[0] = stock.home(exchange.rank()).flat_map(|cell| stock.nodes[cell * stride..][..stride].to_vec()).collect();
     let (space, _) = part.space.clone().of_cells(trade(exchange, mine).concat(), 0.0);
     NodeGraph::with_rows(&space, rows, &part.held.frame)
 }
 
 /// Numbers of the cells at own points that each rank needs of a body whose nodes are dealt out: those that touch a cell at one of its nodes, so that
 /// it knows all that meets at the nodes of the latter.
-fn near<const D: usize>(part: &Part<D>, stock: &Stock<D>, needs: &Needs, ranks: usize) -> Vec<Vec<u32>> {
+fn near<const D: usize>(part: &Part<D>, stock: &Stock<D>, deal: &Deal, number: usize, ranks: usize) -> Vec<Vec<u32>> {
     let mut near = vec![Vec::new(); ranks];
-    let Needs::Owners(of_node) = needs else { return near };
     // tied nodes are assembled where their master is
-    let owner = |&node: &u32| of_node[part.held.frame.node(node) as usize];
+    let owner: Vec<usize> =
+        part.space.nodes.known().map(|node| deal.owner(number, part, part.held.frame.node(node))).collect();
+    let number_of = Numbering::in_order(part.space.nodes.known());
+    let owner = |&node: &u32| number_of.get(node).map_or(0, |place| owner[place as usize]) as u32;
     // all cells at an own point are here
     let cells = || (0..).zip(stock.nodes.chunks_exact(part.space.stride));
     // ranks that have a node next to one of another rank
@@ -154,14 +179,20 @@ fn near<const D: usize>(part: &Part<D>, stock: &Stock<D>, needs: &Needs, ranks: 
 }
 
 /// Some of the cells of a body that are here.
-fn some<const D: usize>(part: &Part<D>, stock: &Stock<D>, cells: impl Iterator<Item = u32> + Clone) -> Cells {
+fn some<const D: usize>(part: &Part<D>, stock: &Stock<D>, cells: &[u32]) -> Cells {
     let stride = part.space.stride;
     let of_cell = |cell: u32| stock.nodes[cell as usize * stride..][..stride].iter().copied();
-    let regions = cells.clone().filter(|_| !part.spec.regions.is_empty());
+    let corners = || cells.iter().flat_map(|&cell| of_cell(cell));
+    let number = Numbering::in_order(corners());
+    let nodes: Vec<u32> = number.points().collect();
+    let regions = cells.iter().filter(|_| !part.spec.regions.is_empty());
     Cells {
-        keys: cells.clone().map(|cell| stock.keys()[cell as usize]).collect(),
-        regions: regions.map(|cell| stock.elasticity.region(cell as usize)).collect(),
-        points: cells.clone().flat_map(|cell| stock.numbers(cell, stride)).collect(),
-        nodes: cells.flat_map(of_cell).collect(),
+        keys: cells.iter().map(|&cell| stock.keys()[cell as usize]).collect(),
+        points: nodes.iter().filter_map(|&node| stock.number(node)).collect(),
+        places: nodes.iter().flat_map(|&node| part.space.nodes[node as usize]).collect(),
+        corners: corners().filter_map(|node| number.get(node)).collect(),
+        regions: regions.map(|&cell| stock.elasticity.region(cell as usize)).collect(),
+        nodes,
+        ..Cells::default()
     }
 }

@@ -6,7 +6,7 @@ use super::part::Part;
 use super::parts::Stock;
 use crate::contact::ContactPair;
 use crate::exchange::Exchange;
-use crate::fem::{NodeGraph, place};
+use crate::fem::{NodeGraph, Space, place};
 use std::cell::OnceCell;
 use std::collections::HashMap;
 
@@ -33,34 +33,40 @@ impl<'a, const D: usize> Coupled<'a, D> {
 
     /// The couplings of all nodes of a body, each with itself included. Collective.
     pub fn count(&self, body: usize) -> usize {
-        match self.exchange.ranks() {
-            1 => self.graph(body).col.len(),
-            _ => self.inside(body).iter().map(|&count| count as usize).sum(),
+        if self.exchange.ranks() == 1 {
+            return self.graph(body).col.len();
         }
+        let mut count = [self.inside(body).iter().map(|&count| f64::from(count)).sum()];
+        self.exchange.sum(&mut count);
+        count[0] as usize
     }
 
-    /// With how many nodes each of these `bodies`, one body after the other, is coupled in a matrix of all of them: in cells around it, and in
-    /// contact rows. Collective.
+    /// With how many nodes each own node of these `bodies`, one body after the other, is coupled in a matrix of all of them: in cells around it, and
+    /// in contact rows.
     pub fn of(&self, bodies: &[usize], pairs: &[ContactPair]) -> Vec<u32> {
         let (mut first, mut all) = (HashMap::new(), Vec::new());
         for &body in bodies {
             first.insert(body, all.len());
             all.extend_from_slice(self.inside(body));
         }
-        for pair in pairs {
-            let [Some(a), Some(b)] = pair.bodies.map(|body| first.get(&body).copied()) else { continue };
-            let nodes = |side: usize, q: usize| pair.rows[side].row(q).map(|(dof, _)| dof / D);
-            let both =
-                |q: usize| nodes(0, q).flat_map(move |i| nodes(1, q).map(move |j| ((a + i) as u32, (b + j) as u32)));
-            let mut across: Vec<(u32, u32)> = (0..pair.len()).flat_map(both).collect();
+        // the place of a node among own ones
+        let place = |body: usize, node: u32| {
+            let known = &self.of.0[body].known;
+            Some(first.get(&body)? + place(&known.own, node)? as usize)
+        };
+        for pair in pairs.iter().filter(|pair| pair.bodies.iter().all(|body| first.contains_key(body))) {
+            let nodes = |side: usize, q: usize| pair.rows[side].row(q).map(|(dof, _)| (dof / D) as u32);
+            let both = |q: usize| nodes(0, q).flat_map(move |i| nodes(1, q).map(move |j| [i, j]));
+            let mut across: Vec<[u32; 2]> = (0..pair.len()).flat_map(both).collect();
             across.sort_unstable();
             across.dedup();
-            across.into_iter().flat_map(|(i, j)| [i, j]).for_each(|node| all[node as usize] += 1);
+            let own = across.into_iter().flat_map(|nodes| [0, 1].map(|side| place(pair.bodies[side], nodes[side])));
+            own.flatten().for_each(|node| all[node] += 1);
         }
         all
     }
 
-    /// The same within a body, by the ranks that have the cells around its nodes. Collective.
+    /// The same within a body.
     fn inside(&self, body: usize) -> &[u32] {
         let (parts, stocks, drafts) = self.of;
         let (part, stock, rows) = (&parts[body], &stocks[body], &drafts[body].rows);
@@ -68,18 +74,13 @@ impl<'a, const D: usize> Coupled<'a, D> {
             // of the nodes of these cells and of contact rows alone
             let of_rows = rows.col.iter().map(|&dof| dof as u32 / D as u32);
             let masters = part.held.frame.master.values().copied();
-            let nodes = part.space.among(stock.nodes.iter().copied().chain(of_rows).chain(masters));
+            let nodes = Space::<D>::among(stock.nodes.iter().copied().chain(of_rows).chain(masters));
             let dof = |dof: usize| Some(D * place(&nodes, (dof / D) as u32)? as usize + dof % D);
             let space = part.space.on(&stock.nodes, &nodes);
             let rows = rows.of_columns(D * nodes.len(), dof);
             let NodeGraph { ptr, .. } = NodeGraph::with_rows(&space, &rows, &part.held.frame.on(&nodes));
-            let mut couplings = vec![0.0; part.space.nodes.len()];
-            for node in stock.own() {
-                let at = place(&nodes, node).map_or(0, |at| at as usize);
-                couplings[node as usize] = f64::from(ptr[at + 1] - ptr[at]);
-            }
-            self.exchange.sum(&mut couplings);
-            couplings.into_iter().map(|count| count as u32).collect()
+            let at = |node: &u32| place(&nodes, *node).map_or(0, |at| at as usize);
+            part.known.own.iter().map(at).map(|at| ptr[at + 1] - ptr[at]).collect()
         })
     }
 

@@ -2,34 +2,47 @@
 
 use super::draft::Draft;
 use super::part::Part;
-use crate::exchange::Exchange;
-use crate::fem::{Couplings, ElasticBody, Interpolation, place};
+use crate::exchange::{Exchange, share, trade};
+use crate::fem::{Couplings, ElasticBody, Interpolation, Space, place};
 use crate::linalg::Csr;
 use crate::mesh::Cuts;
 use crate::model::Distribution;
 use nalgebra::DMatrix;
+use std::collections::HashMap;
 use std::rc::Rc;
 
 /// Bodies whose rows of K are in one matrix of all ranks.
 pub struct Deal {
     /// Their numbers in the scene, in increasing order.
     pub bodies: Vec<usize>,
-    /// The rank of each of their nodes, body by body.
-    pub owner: Vec<u32>,
+    /// The number of the first node of each among those of all, and the end.
+    starts: Vec<u32>,
+    /// What says which rank has a node.
+    cuts: Cuts,
 }
 
 impl Deal {
-    /// Of bodies with nodes at these places, each of which is coupled with so many, counted through all bodies.
-    pub fn new<const D: usize>(bodies: Vec<usize>, places: &[&[[f64; D]]], couplings: &[u32], ranks: usize) -> Self {
-        let mut starts = vec![0];
-        places.iter().for_each(|nodes| starts.push(starts[starts.len() - 1] + nodes.len()));
-        let at = |node: u32| {
-            let body = starts.partition_point(|&start| start <= node as usize) - 1;
-            places[body][node as usize - starts[body]]
-        };
-        let weight = |node: u32| u64::from(couplings[node as usize]);
-        let cuts = Cuts::new(couplings.len(), at, &weight, ranks);
-        Self { bodies, owner: (0..couplings.len() as u32).map(|node| cuts.part(&at(node), node) as u32).collect() }
+    /// Of `bodies`, each own node of which, one body after the other, is coupled with so many nodes of all. Collective.
+    pub fn new<const D: usize>(
+        bodies: Vec<usize>,
+        parts: &[Part<D>],
+        couplings: &[u32],
+        exchange: &dyn Exchange,
+    ) -> Self {
+        let (mut starts, mut own) = (vec![0], Vec::with_capacity(couplings.len()));
+        for &body in &bodies {
+            let (start, Part { space, known, .. }) = (starts[starts.len() - 1], &parts[body]);
+            own.extend(known.own.iter().map(|&node| (space.nodes[node as usize], start + node)));
+            starts.push(start + space.nodes.len() as u32);
+        }
+        let weight = |at: u32| u64::from(couplings[at as usize]);
+        let cuts = Cuts::new(own.len(), &|at| own[at as usize], &weight, exchange.ranks(), exchange);
+        Self { bodies, starts, cuts }
+    }
+
+    /// The rank of a node whose place is known, of the body with this number among those of the matrix.
+    pub fn owner<const D: usize>(&self, number: usize, part: &Part<D>, node: u32) -> usize {
+        self.cuts.part(&part.space.nodes[node as usize], self.starts[number] + node)
     }
 }
 
@@ -41,92 +54,18 @@ pub struct Dealt {
     pub leader: usize,
     /// The ranks that have nodes of it.
     pub ranks: Vec<usize>,
-    /// Number of each node in the matrix that has its rows: of the nodes that are known here, once these are chosen.
+    /// The nodes that this rank must know, sorted: own ones, those of its cells and of contact rows, and masters of tied ones.
+    pub nodes: Vec<u32>,
+    /// Number of each of these in the matrix that has its rows.
     number: Vec<u32>,
-    /// First number of the nodes of each rank, and the end.
-    starts: Vec<u32>,
     /// Its coarse nodes; none where no interpolation is wanted.
     coarse: Coarse,
 }
 
-/// What this rank knows of each body; none for those that are not dealt out. `coarse` tells the coarse nodes of a body.
-pub fn distribute<const D: usize>(
-    drafts: &[Draft<D>],
-    coarse: &dyn Fn(usize) -> Vec<u32>,
-    deals: &[Deal],
-    exchange: &Rc<dyn Exchange>,
-) -> Vec<Option<Dealt>> {
-    let ranks = (exchange.rank(), exchange.ranks());
-    let mut all: Vec<Option<Dealt>> = drafts.iter().map(|_| None).collect();
-    for Deal { bodies, owner } in deals {
-        let sizes = bodies.iter().map(|&body| drafts[body].rows.columns / D);
-        let coarse = distribute_coarse(bodies.iter().map(|&body| coarse(body)).collect(), sizes, owner, ranks);
-        let drafts = bodies.iter().map(|&body| &drafts[body]).zip(coarse);
-        bodies
-            .iter()
-            .zip(of_deal::<D>(drafts, owner, ranks, exchange))
-            .for_each(|(&body, dealt)| all[body] = Some(dealt));
-    }
-    all
-}
-
-/// The same of the bodies of one matrix, with the rank of every node, body by body.
-fn of_deal<'a, const D: usize>(
-    drafts: impl Iterator<Item = (&'a Draft<D>, Coarse)>,
-    owner: &[u32],
-    (rank, ranks): (usize, usize),
-    exchange: &Rc<dyn Exchange>,
-) -> Vec<Dealt> {
-    let (number, starts) = numbered(owner, ranks);
-    let (start, total) = (D * starts[rank] as usize, D * owner.len());
-    let (mut owner, mut number) = (owner, &number[..]);
-    let of_body = |(draft, coarse): (&Draft<D>, Coarse)| {
-        let nodes = draft.rows.columns / D;
-        let (of_node, numbers);
-        (of_node, owner) = owner.split_at(nodes);
-        (numbers, number) = number.split_at(nodes);
-        let number = numbers.to_vec();
-        let own: Vec<usize> = (0..nodes).filter(|&node| of_node[node] as usize == rank).collect();
-        let mut counts = vec![0; ranks];
-        of_node.iter().for_each(|&owner| counts[owner as usize] += 1);
-        // of equal ones the first
-        let leader = (0..ranks).rev().max_by_key(|&rank| counts[rank]).unwrap_or(0);
-        let rows = draft.rows.of_columns(total, |dof| Some(D * number[dof / D] as usize + dof % D));
-        let distribution = Distribution {
-            dofs: D * nodes,
-            first: own.first().map_or(start, |&node| D * number[node] as usize),
-            start,
-            own: own.into_iter().flat_map(|node| (D * node..D * (node + 1)).map(|dof| dof as u32)).collect(),
-            places: Vec::new(),
-            near: Vec::new(),
-            products: DMatrix::zeros(0, 0),
-            total,
-            rows,
-            leads: leader == rank,
-            exchange: exchange.clone(),
-        };
-        let ranks = (0..ranks).filter(|&rank| counts[rank] > 0).collect();
-        Dealt { distribution, leader, ranks, number, starts: starts.clone(), coarse }
-    };
-    drafts.map(of_body).collect()
-}
-
-/// Numbers of things that `owner` deals out: rank by rank, there in their order; and the first number of each rank.
-fn numbered(owner: &[u32], ranks: usize) -> (Vec<u32>, Vec<u32>) {
-    let mut starts = vec![0; ranks + 1];
-    owner.iter().for_each(|&owner| starts[owner as usize + 1] += 1);
-    (0..ranks).for_each(|rank| starts[rank + 1] += starts[rank]);
-    let mut next = starts.clone();
-    let number = owner.iter().map(|&owner| {
-        next[owner as usize] += 1;
-        next[owner as usize] - 1
-    });
-    (number.collect(), starts)
-}
-
 /// The coarse nodes of a body that is dealt out.
+#[derive(Default)]
 struct Coarse {
-    /// Which nodes these are.
+    /// Which of the nodes that are known here these are: their places.
     nodes: Vec<u32>,
     /// Their numbers among the coarse nodes of the bodies in one matrix.
     number: Vec<u32>,
@@ -134,63 +73,161 @@ struct Coarse {
     counts: [usize; 2],
 }
 
-/// The coarse `nodes` of each body when `owner` has the rank of every node, body by body; bodies have so many nodes.
-fn distribute_coarse(
-    nodes: Vec<Vec<u32>>,
-    sizes: impl Iterator<Item = usize>,
-    owner: &[u32],
-    (rank, ranks): (usize, usize),
-) -> Vec<Coarse> {
-    let mut first = 0;
-    let of_body = |(nodes, size): (&Vec<u32>, usize)| {
-        let owner = &owner[first..first + size];
-        first += size;
-        nodes.iter().map(|&node| owner[node as usize]).collect()
+/// What this rank knows of each body, once it has its cells; none for those that are not dealt out. `wants_coarse` tells whether the coarse nodes of a
+/// body are wanted. `told` numbers nodes; iterations go by `exchange`. Collective.
+pub fn distribute<const D: usize>(
+    parts: &[Part<D>],
+    drafts: &[Draft<D>],
+    wants_coarse: &dyn Fn(usize) -> bool,
+    deals: &[Deal],
+    told: &dyn Exchange,
+    exchange: &Rc<dyn Exchange>,
+) -> Vec<Option<Dealt>> {
+    let mut all: Vec<Option<Dealt>> = drafts.iter().map(|_| None).collect();
+    for deal in deals {
+        let near = |(number, &body): (usize, &usize)| {
+            Near::new(deal, number, &parts[body], &drafts[body], wants_coarse(body), told.rank())
+        };
+        let near: Vec<Near> = deal.bodies.iter().enumerate().map(near).collect();
+        let drafts = deal.bodies.iter().map(|&body| &drafts[body]);
+        deal.bodies.iter().zip(of_deal::<D>(drafts, near, told, exchange)).for_each(|(&body, of)| all[body] = Some(of));
+    }
+    all
+}
+
+/// What a rank knows of a body that is dealt out before nodes have numbers in the matrix.
+struct Near {
+    /// The nodes that it must know, sorted.
+    nodes: Vec<u32>,
+    /// The rank of each.
+    owner: Vec<u32>,
+    /// Whether each is a coarse one.
+    is_coarse: Vec<bool>,
+    /// Nodes of the body.
+    count: usize,
+}
+
+impl Near {
+    fn new<const D: usize>(
+        deal: &Deal,
+        number: usize,
+        part: &Part<D>,
+        draft: &Draft<D>,
+        wants_coarse: bool,
+        rank: usize,
+    ) -> Self {
+        let owner = |node: u32| deal.owner(number, part, node) as u32;
+        let own: Vec<u32> = part.space.nodes.known().filter(|&node| owner(node) as usize == rank).collect();
+        let of_rows = [&draft.rows, &draft.nodal_rows].into_iter().flat_map(|rows| &rows.col);
+        let of_rows = of_rows.map(|&dof| dof as u32 / D as u32);
+        let masters = part.held.frame.master.values().copied();
+        let all = own.iter().copied().chain(part.space.cells.iter().copied()).chain(of_rows).chain(masters);
+        let nodes = Space::<D>::among(all);
+        let coarse = if wants_coarse { part.coarse_nodes() } else { Vec::new() };
+        Self {
+            owner: nodes.iter().map(|&node| owner(node)).collect(),
+            is_coarse: nodes.iter().map(|node| coarse.binary_search(node).is_ok()).collect(),
+            nodes,
+            count: part.space.nodes.len(),
+        }
+    }
+
+    /// Places of the nodes of a rank.
+    fn of_rank(&self, rank: usize) -> impl Iterator<Item = usize> + Clone {
+        (0..self.nodes.len()).filter(move |&place| self.owner[place] as usize == rank)
+    }
+}
+
+/// Number in the matrix of a node, and among the coarse nodes.
+type Numbers = (u32, Option<u32>);
+
+/// The same of the bodies of one matrix. Collective.
+fn of_deal<'a, const D: usize>(
+    drafts: impl Iterator<Item = &'a Draft<D>>,
+    near: Vec<Near>,
+    told: &dyn Exchange,
+    exchange: &Rc<dyn Exchange>,
+) -> Vec<Dealt> {
+    let (rank, ranks) = (told.rank(), told.ranks());
+    // rank by rank, there body by body, there in the order of the nodes
+    let count = |near: &Near| {
+        let coarse = near.of_rank(rank).filter(|&place| near.is_coarse[place]).count();
+        [near.of_rank(rank).count(), coarse]
     };
-    let owners: Vec<Vec<u32>> = nodes.iter().zip(sizes).map(of_body).collect();
-    let (number, _) = numbered(&owners.concat(), ranks);
-    let mut rest = &number[..];
-    let of_body = |(nodes, owners): (Vec<u32>, Vec<u32>)| {
-        let own = owners.iter().filter(|&&owner| owner as usize == rank).count();
-        let (here, others) = rest.split_at(nodes.len());
-        rest = others;
-        Coarse { nodes, number: here.to_vec(), counts: [number.len(), own] }
+    let counts: Vec<Vec<[usize; 2]>> = share(told, near.iter().map(count).collect());
+    let sum = |of_ranks: &[Vec<[usize; 2]>], which: usize| {
+        of_ranks.iter().flatten().map(|counts| counts[which]).sum::<usize>()
     };
-    nodes.into_iter().zip(owners).map(of_body).collect()
+    let [start, first_coarse] = [0, 1].map(|which| sum(&counts[..rank], which) as u32);
+    let (mut next, mut next_coarse) = (start, first_coarse);
+    let mut own: Vec<HashMap<u32, Numbers>> = Vec::new();
+    for near in &near {
+        let number = |place: usize| {
+            let coarse = near.is_coarse[place].then_some(next_coarse);
+            next_coarse += u32::from(coarse.is_some());
+            next += 1;
+            (near.nodes[place], (next - 1, coarse))
+        };
+        own.push(near.of_rank(rank).map(number).collect());
+    }
+    // those of other ranks are asked for
+    let mut asked: Vec<Vec<(u32, u32)>> = vec![Vec::new(); ranks];
+    for (body, near) in (0..).zip(&near) {
+        let others = near.nodes.iter().zip(&near.owner).filter(|(_, owner)| **owner as usize != rank);
+        others.for_each(|(&node, &owner)| asked[owner as usize].push((body, node)));
+    }
+    let answer = |(body, node): (u32, u32)| own[body as usize].get(&node).copied().unwrap_or_default();
+    let answers = trade(told, asked).into_iter().map(|asked| asked.into_iter().map(answer).collect::<Vec<Numbers>>());
+    let mut answers: Vec<_> = trade(told, answers.collect()).into_iter().map(Vec::into_iter).collect();
+    let (total, all_coarse) = (D * sum(&counts, 0), sum(&counts, 1));
+    let of_body = |((body, draft), near): ((usize, &Draft<D>), Near)| {
+        let of_node = |place: usize| match near.owner[place] as usize {
+            owner if owner == rank => own[body].get(&near.nodes[place]).copied(),
+            owner => answers[owner].next(),
+        };
+        let numbers: Vec<Numbers> = (0..near.nodes.len()).map(of_node).map(Option::unwrap_or_default).collect();
+        let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
+        let mut others = vec![(Vec::new(), Vec::new()); ranks];
+        for place in (0..near.nodes.len()).filter(|&place| near.owner[place] as usize != rank) {
+            let (places, of_matrix) = &mut others[near.owner[place] as usize];
+            places.extend(dofs(place as u32));
+            of_matrix.extend(dofs(numbers[place].0));
+        }
+        let of_ranks = || counts.iter().map(|of_rank| of_rank[body][0]);
+        // of equal ones the first
+        let leader = (0..ranks).rev().max_by_key(|&rank| counts[rank][body][0]).unwrap_or(0);
+        let number = |dof: usize| {
+            let place = place(&near.nodes, (dof / D) as u32)? as usize;
+            Some(D * numbers[place].0 as usize + dof % D)
+        };
+        let distribution = Distribution {
+            dofs: D * near.count,
+            first: D * near.of_rank(rank).next().map_or(start, |place| numbers[place].0) as usize,
+            start: D * start as usize,
+            own: near.of_rank(rank).flat_map(|place| dofs(near.nodes[place])).collect(),
+            places: near.of_rank(rank).flat_map(|place| dofs(place as u32)).collect(),
+            near: others,
+            products: DMatrix::zeros(0, 0),
+            total,
+            rows: draft.rows.of_columns(total, number),
+            leads: leader == rank,
+            exchange: exchange.clone(),
+        };
+        let coarse = (0..).zip(&numbers).filter_map(|(place, (_, coarse))| Some((place, (*coarse)?)));
+        let (nodes, number) = coarse.unzip();
+        Dealt {
+            distribution,
+            leader,
+            ranks: (0..ranks).zip(of_ranks()).filter(|(_, count)| *count > 0).map(|(rank, _)| rank).collect(),
+            coarse: Coarse { nodes, number, counts: [all_coarse, counts[rank][body][1]] },
+            number: numbers.into_iter().map(|(number, _)| number).collect(),
+            nodes: near.nodes,
+        }
+    };
+    drafts.enumerate().zip(near).map(of_body).collect()
 }
 
 impl Dealt {
-    /// The nodes that a rank must know of its part of a body: own ones, those of its cells and of contact rows, and masters of tied ones.
-    pub fn nodes_here<'a, const D: usize>(
-        &'a self,
-        part: &'a Part<D>,
-        rows: [&'a Csr; 2],
-    ) -> impl Iterator<Item = u32> + 'a {
-        let own = self.distribution.own.iter().step_by(D).map(|dof| dof / D as u32);
-        let of_rows = rows.into_iter().flat_map(|rows| rows.col.iter().map(|&dof| dof as u32 / D as u32));
-        let masters = part.held.frame.master.values().copied();
-        own.chain(part.space.cells.iter().copied()).chain(of_rows).chain(masters)
-    }
-
-    /// Turns to the nodes that are known here, sorted, and forgets the others; `products` are those of the motions that supports leave the body.
-    pub fn choose<const D: usize>(&mut self, nodes: &[u32], products: DMatrix<f64>) {
-        self.number = nodes.iter().map(|&node| self.number[node as usize]).collect();
-        let own = (0..nodes.len()).filter(|&node| self.is_own::<D>(node));
-        let places = own.flat_map(|node| D * node..D * (node + 1)).map(|dof| dof as u32).collect();
-        let mut near = vec![(Vec::new(), Vec::new()); self.starts.len() - 1];
-        for (node, &number) in self.number.iter().enumerate().filter(|(node, _)| !self.is_own::<D>(*node)) {
-            let (at, numbers) = &mut near[self.starts.partition_point(|&start| start <= number) - 1];
-            at.extend((D * node..D * (node + 1)).map(|dof| dof as u32));
-            numbers.extend(D as u32 * number..D as u32 * (number + 1));
-        }
-        let of = &mut self.distribution;
-        (of.places, of.near, of.products) = (places, near, products);
-        let Coarse { nodes: coarse, number, counts } = &self.coarse;
-        let here = coarse.iter().zip(number).filter_map(|(&node, &number)| Some((place(nodes, node)?, number)));
-        let (coarse, number) = here.unzip();
-        self.coarse = Coarse { nodes: coarse, number, counts: *counts };
-    }
-
     /// The rows of own dofs of the interpolation that `whole` makes from coarse nodes; columns are counted through the bodies in one matrix.
     pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Interpolation) -> Interpolation {
         let Coarse { nodes, number, counts: [all, own] } = &self.coarse;

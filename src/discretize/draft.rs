@@ -1,13 +1,15 @@
 //! A body before it is assembled: its contact rows, its loads, and the rigid motions that supports leave it.
 
-use super::part::Part;
-use crate::contact::{ContactPair, add, pad};
+use super::part::{Candidate, Part};
+use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::fem::{Parts, RigidMotion, place, rigid};
+use crate::exchange::Exchange;
+use crate::fem::{NodalForces, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, rigid as joint};
 use nalgebra::{DMatrix, DVector};
+use std::collections::HashSet;
 
 /// Share of the largest possible work below which the work of the loads is rounding.
 pub const NO_WORK: f64 = 1e-9;
@@ -18,68 +20,14 @@ pub struct Draft<const D: usize> {
     pub segments: Vec<Segment>,
     /// These rows; columns: its dofs.
     pub rows: Csr,
+    /// The same for displacements of its nodes.
+    pub nodal_rows: Csr,
     /// Rigid motions of the free body.
     pub free: Vec<RigidMotion<D>>,
-    /// Loads on its nodes.
+    /// Loads at own nodes.
     pub nodal_load: NodalForces<D>,
-    /// Loads on its dofs.
+    /// What they add to forces at dofs.
     pub load: NodalForces<D>,
-}
-
-/// Forces at the nodes of a body, without those that are zero: most loads are on surfaces.
-pub struct NodalForces<const D: usize> {
-    /// Number of nodes of the body.
-    count: usize,
-    nodes: Vec<u32>,
-    forces: Vec<[f64; D]>,
-}
-
-impl<const D: usize> NodalForces<D> {
-    /// From forces at all nodes.
-    pub fn of(all: &[f64]) -> Self {
-        let at = all.chunks_exact(D).map(|force| std::array::from_fn(|c| force[c]));
-        let (nodes, forces) =
-            (0..).zip(at).filter(|(_, force): &(u32, [f64; D])| force.iter().any(|f| *f != 0.0)).unzip();
-        Self { count: all.len() / D, nodes, forces }
-    }
-
-    /// Their sum.
-    pub fn sum(&self) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        self.forces.iter().for_each(|&force| add(&mut sum, pad(force)));
-        sum
-    }
-
-    /// Their work on a displacement; exactly zero if it is rounding.
-    pub fn work(&self, at: impl Fn(u32) -> [f64; D]) -> f64 {
-        let [work, largest] = self.works(at);
-        if work.abs() <= NO_WORK * largest { 0.0 } else { work }
-    }
-
-    /// Their work on a displacement, and the largest that forces and displacements of these sizes can do, node by node.
-    pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [f64; 2] {
-        let size = |v: &[f64]| dot(v, v).sqrt();
-        self.nodes.iter().zip(&self.forces).fold([0.0; 2], |[work, largest], (&node, force)| {
-            let u = at(node);
-            [u.iter().zip(force).fold(work, |work, (u, f)| work + u * f), largest + size(&u) * size(force)]
-        })
-    }
-
-    /// Forces at all nodes.
-    pub fn all(&self) -> Vec<f64> {
-        let mut all = vec![0.0; D * self.count];
-        for (node, force) in self.nodes.iter().zip(&self.forces) {
-            all[D * *node as usize..][..D].copy_from_slice(force);
-        }
-        all
-    }
-
-    /// Those at some nodes, which are sorted, of a body that has these alone.
-    pub fn on(&self, nodes: &[u32]) -> Self {
-        let forces = self.nodes.iter().zip(&self.forces);
-        let (at, forces) = forces.filter_map(|(&node, force)| Some((place(nodes, node)?, *force))).unzip();
-        Self { count: nodes.len(), nodes: at, forces }
-    }
 }
 
 /// The rigid motions that supports and springs leave to a body.
@@ -104,46 +52,68 @@ pub fn segments(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<Segment>> {
 }
 
 impl<const D: usize> Draft<D> {
-    /// A body with its contact rows and loads.
-    pub fn new(part: &Part<D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
-        let mut rows = Csr::new(part.space.dofs());
-        for &Segment { pair, side } in &segments {
-            (0..pairs[pair].len()).for_each(|q| rows.push_row(pairs[pair].rows[side].row(q)));
-        }
-        let nodal_load = part.load(mesh, Parts::Whole)?;
-        let load = NodalForces::of(&part.load_on_dofs(nodal_load.clone()));
-        Ok(Self { segments, rows, free: rigid::of(&part.space), nodal_load: NodalForces::of(&nodal_load), load })
+    /// A body with its contact rows and loads. Collective.
+    ///
+    /// # Errors
+    /// Those of [`Part::load`].
+    pub fn new(
+        part: &Part<D>,
+        segments: Vec<Segment>,
+        pairs: &[ContactPair],
+        mesh: &Mesh<D>,
+        exchange: &dyn Exchange,
+    ) -> Result<Self> {
+        let all = |rows: fn(&ContactPair) -> &[Csr; 2]| {
+            let mut all = Csr::new(part.space.dofs());
+            for &Segment { pair, side } in &segments {
+                (0..pairs[pair].len()).for_each(|q| all.push_row(rows(&pairs[pair])[side].row(q)));
+            }
+            all
+        };
+        let (rows, nodal_rows) = (all(|pair| &pair.rows), all(|pair| &pair.nodal));
+        let nodal_load = part.load(mesh, exchange)?;
+        let load = part.load_on_dofs(&nodal_load);
+        Ok(Self { segments, rows, nodal_rows, free: part.free(), nodal_load, load })
     }
 
-    /// Motions as contact and loads see them: at the dofs of contact rows and at loaded ones.
-    pub fn motions(&self, part: &Part<D>, all: &[RigidMotion<D>]) -> Vec<Motion> {
-        let of = |motion: &RigidMotion<D>| {
+    /// Motions as contact and loads see them: at the dofs of contact rows and at loaded ones. Collective.
+    pub fn motions(&self, part: &Part<D>, all: &[RigidMotion<D>], exchange: &dyn Exchange) -> Vec<Motion> {
+        let of = |(motion, work): (&RigidMotion<D>, f64)| {
             let row = |q: usize| self.rows.row(q).map(|(dof, b)| b * part.dof_of(motion, dof)).sum();
-            let work = self.load.work(|node| part.at_dofs(motion, node));
             Motion { name: motion.name.clone(), trace: (0..self.rows.rows()).map(row).collect(), work }
         };
-        all.iter().map(of).collect()
+        all.iter().zip(self.works(part, all, exchange)).map(of).collect()
     }
 
-    /// What supports and springs leave to the body now.
-    pub fn loose(&self, part: &Part<D>) -> Loose<D> {
+    /// The work of the loads on motions; exactly zero if it is rounding. Collective.
+    pub fn works(&self, part: &Part<D>, all: &[RigidMotion<D>], exchange: &dyn Exchange) -> Vec<f64> {
+        let of = |motion: &RigidMotion<D>| self.load.works(|node| part.at_dofs(motion, node));
+        let mut works: Vec<[f64; 2]> = all.iter().map(of).collect();
+        exchange.sum(works.as_flattened_mut());
+        let work = |[work, largest]: [f64; 2]| if work.abs() <= NO_WORK * largest { 0.0 } else { work };
+        works.into_iter().map(work).collect()
+    }
+
+    /// What supports and springs leave to the body now. Collective.
+    pub fn loose(&self, part: &Part<D>, exchange: &dyn Exchange) -> Loose<D> {
         let at = |k: usize, node: u32| self.free[k].at(&part.space.nodes[node as usize]);
         let left = part.left(self.free.len(), &at);
         let left: Vec<_> = left.iter().map(|weights| rigid::combine(&self.free, weights)).collect();
-        let motions = self.motions(part, &left);
+        let motions = self.motions(part, &left, exchange);
         let unfelt = felt_by_none(&motions);
         let sprung = part.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
-        let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions(part, &all), stiffness });
+        let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions(part, &all, exchange), stiffness });
         Loose { left, motions, sprung, unfelt }
     }
 
-    /// The dof outside the contact rows, so that these stay as they are, that a motion moves most, unless that is little.
-    pub fn candidate(&self, part: &Part<D>, displacement: &[f64]) -> Option<usize> {
-        let mut in_rows = vec![false; displacement.len()];
-        self.rows.col.iter().for_each(|&dof| in_rows[dof as usize] = true);
-        let candidates = (0..in_rows.len()).filter(|dof| !in_rows[*dof] && !part.held.prescribed.contains_key(dof));
-        let size = |dof: &usize| displacement[*dof].abs();
-        candidates.max_by(|a, b| size(a).total_cmp(&size(b))).filter(|dof| size(dof) > 1e-3)
+    /// The dof outside the contact rows, so that these stay as they are, that a motion moves most, unless that is little. Collective.
+    pub fn candidate(&self, part: &Part<D>, motion: &RigidMotion<D>, exchange: &dyn Exchange) -> Option<Candidate<D>> {
+        let in_rows: HashSet<usize> = self.rows.col.iter().map(|&dof| dof as usize).collect();
+        let size = |dof: usize| {
+            let is_free = !in_rows.contains(&dof) && !part.held.prescribed.contains_key(&dof);
+            is_free.then(|| part.dof_of(motion, dof).abs())
+        };
+        part.largest(&size, exchange).filter(|found| found.size > 1e-3)
     }
 }
 

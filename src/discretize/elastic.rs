@@ -106,16 +106,20 @@ pub fn moduli<const D: usize>(
     sum
 }
 
-/// What the user should know: linear elements are too stiff where the volume can hardly change.
-pub fn warning<const D: usize>(spec: &BodySpec, space: &Space<D>, plane: Plane) -> Option<String> {
+/// The largest Poisson's ratio at these places of a body with linear elements; zero where these do not lock, or no element is linear.
+pub fn poisson<const D: usize>(spec: &BodySpec, own: impl Iterator<Item = [f64; D]> + Clone, plane: Plane) -> f64 {
     if spec.order == Order::P2 || (D == 2 && plane == Plane::Stress) {
-        return None;
+        return 0.0;
     }
     let largest = |spec: &ElasticitySpec| match &spec.constants {
-        Constants::Isotropic { poisson, .. } => space.nodes.iter().map(|&x| poisson.eval(pad(x))).fold(0.0, f64::max),
+        Constants::Isotropic { poisson, .. } => own.clone().map(|x| poisson.eval(pad(x))).fold(0.0, f64::max),
         _ => 0.0,
     };
-    let poisson = specs(spec).map(largest).fold(0.0, f64::max);
+    specs(spec).map(largest).fold(0.0, f64::max)
+}
+
+/// What the user should know: linear elements are too stiff where the volume can hardly change; by the largest Poisson's ratio.
+pub fn warning(spec: &BodySpec, poisson: f64) -> Option<String> {
     (poisson > LOCKING).then(|| {
         let name = &spec.name.value;
         format!("body {name}: Poisson's ratio is {poisson}: linear elements are far too stiff there; set order = 2")

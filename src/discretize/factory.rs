@@ -1,6 +1,7 @@
 //! What bodies need to become solvers, and who makes them.
 
 use crate::error::Result;
+use crate::fem::rigid::AtDofs;
 use crate::fem::{ElasticBody, FreeMotion, Interpolation, NodeGraph};
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot, Distribution};
@@ -18,10 +19,8 @@ pub struct Outline<'a> {
     pub rows: &'a Csr,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: &'a [(usize, f64)],
-    /// Number of rigid motions of the free body.
-    pub motions: usize,
-    /// What one of them does at a dof.
-    pub motion: &'a dyn Fn(usize, usize) -> f64,
+    /// Rigid motions of the free body.
+    pub motions: AtDofs<'a>,
     /// How many of its nodes each is coupled with, itself included, summed over them: entries of K by blocks. Collective.
     pub couplings: &'a dyn Fn() -> usize,
     /// Which of its nodes K couples, made when it is first asked for; of several ranks the first has the graph, and all cells meanwhile. Collective.

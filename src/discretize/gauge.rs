@@ -5,10 +5,16 @@
 
 use super::draft::{Draft, Loose};
 use super::part::Part;
+use crate::exchange::Exchange;
 use crate::fem::rigid;
 
-/// Fixes the motions of a body that nothing feels and no load works on, and names them; `loose` becomes what is left.
-pub fn fix<const D: usize>(part: &mut Part<D>, draft: &Draft<D>, loose: &mut Loose<D>) -> Vec<String> {
+/// Fixes the motions of a body that nothing feels and no load works on, and names them; `loose` becomes what is left. Collective.
+pub fn fix<const D: usize>(
+    part: &mut Part<D>,
+    draft: &Draft<D>,
+    loose: &mut Loose<D>,
+    exchange: &dyn Exchange,
+) -> Vec<String> {
     let mut fixed = Vec::new();
     if loose.unfelt.is_empty() {
         return fixed;
@@ -16,12 +22,12 @@ pub fn fix<const D: usize>(part: &mut Part<D>, draft: &Draft<D>, loose: &mut Loo
     loop {
         let idle = loose.unfelt.iter().find_map(|(_, weights)| {
             let motion = rigid::combine(&loose.left, weights);
-            (draft.load.work(|node| part.at_dofs(&motion, node)) == 0.0).then_some(motion)
+            (draft.works(part, std::slice::from_ref(&motion), exchange) == [0.0]).then_some(motion)
         });
         let Some(motion) = idle else { return fixed };
-        let Some(dof) = draft.candidate(part, &part.dofs_of(&motion)) else { return fixed };
-        part.held.prescribed.insert(dof, 0.0);
-        *loose = draft.loose(part);
+        let Some(found) = draft.candidate(part, &motion, exchange) else { return fixed };
+        part.fix(&found);
+        *loose = draft.loose(part, exchange);
         fixed.push(motion.name);
     }
 }

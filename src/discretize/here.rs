@@ -2,9 +2,9 @@
 
 use super::carried::Supported;
 use super::distribute::Dealt;
-use super::draft::NodalForces;
 use super::part::Part;
-use crate::fem::{RigidMotion, place};
+use crate::exchange::Exchange;
+use crate::fem::{NodalForces, RigidMotion, place};
 use crate::linalg::Csr;
 
 /// A body on the nodes that this rank knows of it.
@@ -13,31 +13,25 @@ pub struct Here<'a, const D: usize> {
     pub part: Part<'a, D>,
     /// Its contact rows, pair by pair: of its dofs, and of displacements of its nodes.
     pub rows: [Csr; 2],
-    /// Its loads: on its dofs, and on its nodes.
-    pub loads: [NodalForces<D>; 2],
+    /// The nodal forces of its loads: at own nodes, and at those that are tied to own ones.
+    pub load: NodalForces<D>,
     /// What its supports prescribe.
-    pub supported: Supported,
+    pub supported: Supported<D>,
 }
 
 impl<const D: usize> Here<'_, D> {
-    /// Of a body that is dealt out, of which this is all, the nodes that this rank is to know, which `dealt` chooses; and the work that all of the
-    /// loads do on each of the motions that supports leave it.
-    pub fn of(self, dealt: &mut Dealt, left: &[RigidMotion<D>]) -> (Self, Vec<f64>) {
-        let Self { part, rows, loads, supported: Supported { carried, prescribed } } = self;
-        let (products, work) = part.products(left, &prescribed, &loads[0].all());
-        let nodes = part.space.among(dealt.nodes_here::<D>(&part, rows.each_ref()));
-        dealt.choose::<D>(&nodes, products);
-        let dof = |dof: usize| Some(D * place(&nodes, (dof / D) as u32)? as usize + dof % D);
-        let on_nodes = |&node: &u32| &carried[D * node as usize..][..D];
-        let here = Self {
-            part: part.on(&nodes),
-            rows: rows.map(|rows| rows.of_columns(D * nodes.len(), dof)),
-            loads: loads.map(|loads| loads.on(&nodes)),
-            supported: Supported {
-                carried: if carried.is_empty() { carried } else { nodes.iter().flat_map(on_nodes).copied().collect() },
-                prescribed: prescribed.into_iter().filter_map(|(at, u)| Some((dof(at)?, u))).collect(),
-            },
-        };
-        (here, work)
+    /// Of a body that is dealt out, on the nodes that this rank is to know; and the work that all of the loads do on each of the motions that
+    /// supports leave it, whose products `dealt` gets. Collective.
+    pub fn of(self, dealt: &mut Dealt, left: &[RigidMotion<D>], exchange: &dyn Exchange) -> (Self, Vec<f64>) {
+        let Self { part, rows, load, supported: Supported { carried, prescribed } } = self;
+        let nodes = &dealt.nodes;
+        let dof = |dof: usize| Some(D * place(nodes, (dof / D) as u32)? as usize + dof % D);
+        let (part, load) = (part.on(nodes), load.on(nodes));
+        let prescribed: Vec<_> = prescribed.into_iter().filter_map(|(at, u)| Some((dof(at)?, u))).collect();
+        let rows = rows.map(|rows| rows.of_columns(D * nodes.len(), dof));
+        let own = |node: usize| dealt.is_own::<D>(node);
+        let (products, work) = part.products(left, &prescribed, (&part.load_vector(&load), &own), exchange);
+        dealt.distribution.products = products;
+        (Self { part, rows, load, supported: Supported { carried, prescribed } }, work)
     }
 }

@@ -4,23 +4,25 @@
 //! numbers; cells go, once dofs are dealt out, to the ranks that assemble their nodes ([`cells`](super::cells)).
 
 use super::approach::Outer;
-use crate::fem::{Facets, Space, place};
+use crate::fem::{Extent, Facets, NodalForces, Space, place};
 
 /// What all ranks know of a body.
 #[derive(Debug, Clone, Default)]
-pub struct Known {
+pub struct Known<const D: usize> {
     /// Nodes of the cells that are here, sorted, and the number of each among the points of the mesh.
     pub points: Vec<(u32, u32)>,
+    /// Nodes that are points of this rank, sorted: each is one of one rank.
+    pub own: Vec<u32>,
+    /// How many nodes it has, and where.
+    pub extent: Extent,
     /// Number of cells.
     pub cells: usize,
     /// Area (volume) of the body; of one of revolution that of the rings.
     pub volume: f64,
     /// Means of the moduli along x, y, z over it ([`moduli`](super::elastic::moduli)).
     pub moduli: [f64; 3],
-    /// Nodal forces of the body force; empty without one.
-    pub force: Vec<f64>,
-    /// The corners of cells, of a body whose elements are quadratic.
-    pub corners: Vec<u32>,
+    /// Forces of the body force at own nodes.
+    pub force: NodalForces<D>,
     /// Nodes of all facets of the boundary, oriented outwards, where contacts are to be found.
     pub boundary: Vec<u32>,
     /// Area (volume) of the cells by their corners.
@@ -29,17 +31,22 @@ pub struct Known {
     pub outer: Outer,
 }
 
-impl Known {
+impl<const D: usize> Known<D> {
     /// The same of some nodes, sorted, by their places among these; boundaries and loads are no longer asked for.
     pub fn on(&self, nodes: &[u32]) -> Self {
         Self {
             points: self.points.iter().filter_map(|&(node, point)| Some((place(nodes, node)?, point))).collect(),
-            corners: self.corners.iter().filter_map(|&node| place(nodes, node)).collect(),
             outer: self.outer.on(nodes),
-            force: Vec::new(),
+            own: Vec::new(),
+            force: NodalForces::default(),
             boundary: Vec::new(),
             ..*self
         }
+    }
+
+    /// Whether a node is a point of this rank.
+    pub fn is_own(&self, node: u32) -> bool {
+        self.own.binary_search(&node).is_ok()
     }
 
     /// The number of a node of the cells that are here among the points of the mesh.
@@ -48,7 +55,7 @@ impl Known {
     }
 
     /// All facets of the boundary, if they were wanted.
-    pub fn boundary<const D: usize>(&self, space: &Space<D>) -> Facets<D> {
+    pub fn boundary(&self, space: &Space<D>) -> Facets<D> {
         Facets::new(space.order, self.boundary.clone())
     }
 }

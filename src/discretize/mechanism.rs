@@ -5,11 +5,12 @@
 
 use super::draft::{Draft, Loose, NO_WORK};
 use super::gauge;
-use super::part::Part;
+use super::part::{Candidate, Part};
 use crate::contact::ContactPair;
 use crate::error::few;
-use crate::fem::{RigidMotion, Space, rigid};
-use crate::linalg::{Blocks, PART, TOLERANCE, axpy, bounds, dot, fit};
+use crate::exchange::Exchange;
+use crate::fem::{Extent, RigidMotion, rigid};
+use crate::linalg::{Blocks, PART, TOLERANCE, axpy, dot, fit};
 use crate::mesh::Joined;
 use crate::model::{Mechanism, Motion, Motions, Segment};
 use nalgebra::{DMatrix, DVector};
@@ -30,10 +31,15 @@ pub struct Fixed<const D: usize> {
     pub loose: Vec<Loose<D>>,
 }
 
-/// Fixes the motions that nothing feels and no load works on: of whole groups of bodies, of each body alone, then what is left.
-pub fn fix<const D: usize>(parts: &mut [Part<D>], drafts: &[Draft<D>], pairs: &[ContactPair]) -> Fixed<D> {
-    let loose = parts.iter().zip(drafts).map(|(part, draft)| draft.loose(part)).collect();
-    let mut search = Search { parts, drafts, pairs, loose, found: Vec::new() };
+/// Fixes the motions that nothing feels and no load works on: of whole groups of bodies, of each body alone, then what is left. Collective.
+pub fn fix<const D: usize>(
+    parts: &mut [Part<D>],
+    drafts: &[Draft<D>],
+    pairs: &[ContactPair],
+    exchange: &dyn Exchange,
+) -> Fixed<D> {
+    let loose = parts.iter().zip(drafts).map(|(part, draft)| draft.loose(part, exchange)).collect();
+    let mut search = Search { parts, drafts, pairs, exchange, loose, found: Vec::new() };
     for group in groups(drafts.len(), pairs) {
         if group.iter().all(|&body| !search.loose[body].left.is_empty()) {
             let all = search.of_group(&group);
@@ -43,7 +49,7 @@ pub fn fix<const D: usize>(parts: &mut [Part<D>], drafts: &[Draft<D>], pairs: &[
         }
     }
     let bodies = search.parts.iter_mut().zip(drafts).zip(&mut search.loose);
-    let gauged = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose)).collect();
+    let gauged = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose, exchange)).collect();
     if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
         search.fix_some();
     }
@@ -61,10 +67,10 @@ fn groups(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<usize>> {
     members
 }
 
-/// A motion of some bodies: the displacement of the dofs of each.
-struct Moving {
+/// A motion of some bodies, each of which is rigid.
+struct Moving<const D: usize> {
     bodies: Vec<usize>,
-    displacement: Vec<Vec<f64>>,
+    motions: Vec<RigidMotion<D>>,
     name: String,
     /// Root of the mean square of what it closes.
     error: f64,
@@ -110,6 +116,7 @@ struct Search<'p, 's, const D: usize> {
     parts: &'p mut [Part<'s, D>],
     drafts: &'p [Draft<D>],
     pairs: &'p [ContactPair],
+    exchange: &'p dyn Exchange,
     /// The motions that supports and springs leave to each body now.
     loose: Vec<Loose<D>>,
     found: Vec<Mechanism>,
@@ -123,35 +130,34 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// The rigid motions of some bodies as one.
     fn as_one(&self, bodies: &[usize]) -> Vec<RigidMotion<D>> {
-        rigid::of_all(&bodies.iter().map(|&body| &self.parts[body].space).collect::<Vec<_>>())
+        let parts = || bodies.iter().map(|&body| &self.parts[body]);
+        let extent = parts().fold(Extent::default(), |all, part| all.join(&part.known.extent));
+        rigid::of(&extent, parts().any(|part| part.space.axisymmetric))
     }
 
     /// The rigid motions of a group as one body that supports do not feel. Contact does not either, but for the error of meshed
     /// surfaces that are curved and apart.
-    fn of_group(&self, group: &[usize]) -> Vec<Moving> {
+    fn of_group(&self, group: &[usize]) -> Vec<Moving<D>> {
         let all = self.as_one(group);
         let count = all.len();
         let mut held = DMatrix::zeros(count, count);
-        let dofs = |motions: &[RigidMotion<D>], body: usize| {
-            motions.iter().map(|motion| self.parts[body].dofs_of(motion)).collect::<Vec<_>>()
-        };
         for &body in group {
-            let left = dofs(&self.loose[body].left, body);
-            let off: Vec<Vec<f64>> = dofs(&all, body).iter().map(|motion| rest(motion, &left)).collect();
+            let at_corners = |motion: &RigidMotion<D>| motion.nodal(self.parts[body].known.extent.corners());
+            let left: Vec<Vec<f64>> = self.loose[body].left.iter().map(at_corners).collect();
+            let off: Vec<Vec<f64>> = all.iter().map(|motion| rest(&at_corners(motion), &left)).collect();
             held += DMatrix::from_fn(count, count, |i, j| dot(&off[i], &off[j]) / off[i].len() as f64);
         }
-        let motions: Vec<Vec<Motion>> =
-            group.iter().map(|&body| self.drafts[body].motions(&self.parts[body], &all)).collect();
+        let traces: Vec<Vec<Motion>> =
+            group.iter().map(|&body| self.drafts[body].motions(&self.parts[body], &all, self.exchange)).collect();
         let rows = self.rows(group);
-        let felt = rows.feel(motions.iter().map(Vec::as_slice));
+        let felt = rows.feel(traces.iter().map(Vec::as_slice));
         let moving = |weights: DVector<f64>| {
             // all bodies move by the same motion
             let amounts = DVector::from_fn(felt.count(), |i, _| weights[i % count]);
             let square: f64 = felt.closing(&amounts).iter().zip(&rows.weight).map(|(c, weight)| weight * c * c).sum();
             let motion = rigid::combine(&all, &weights);
-            let displacement = group.iter().map(|&body| self.parts[body].dofs_of(&motion)).collect();
             let error = square.sqrt() / weights.amax();
-            Moving { bodies: group.to_vec(), displacement, name: motion.name, error }
+            Moving { bodies: group.to_vec(), name: motion.name.clone(), motions: vec![motion; group.len()], error }
         };
         let mut free = Blocks::free(&held, 1.0, TOLERANCE);
         // translations come first
@@ -162,7 +168,7 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// Motions of some of these bodies that contact does not feel, all others at rest; none if contact does not feel a motion of
     /// one of them alone.
-    fn of_some(&self, bodies: &[usize]) -> Vec<Moving> {
+    fn of_some(&self, bodies: &[usize]) -> Vec<Moving<D>> {
         if bodies.iter().any(|&body| !self.loose[body].unfelt.is_empty()) {
             return Vec::new();
         }
@@ -170,22 +176,18 @@ impl<const D: usize> Search<'_, '_, D> {
         let felt = rows.feel(bodies.iter().map(|&body| &self.loose[body].motions[..]));
         let factor = felt.springs(&rows.weight).factor(TOLERANCE);
         let moving = |entries: &Vec<(usize, f64)>| {
-            let mut moving = Moving { bodies: Vec::new(), displacement: Vec::new(), name: String::new(), error: 0.0 };
+            let mut moving = Moving { bodies: Vec::new(), motions: Vec::new(), name: String::new(), error: 0.0 };
             let mut each = Vec::new();
             let entries: Vec<(usize, f64)> = entries.iter().filter(|(_, a)| a.abs() > PART).copied().collect();
             for own in entries.chunk_by(|a, b| felt.body_of(a.0) == felt.body_of(b.0)) {
                 let (at, body) = (felt.body_of(own[0].0), bodies[felt.body_of(own[0].0)]);
                 let left = &self.loose[body].left;
                 let mut weights = DVector::zeros(left.len());
-                let mut displacement = vec![0.0; self.parts[body].space.dofs()];
-                for &(motion, amount) in own {
-                    let motion = motion - felt.of_body(at).start;
-                    weights[motion] = amount;
-                    axpy(amount, &self.parts[body].dofs_of(&left[motion]), &mut displacement);
-                }
+                own.iter().for_each(|&(motion, amount)| weights[motion - felt.of_body(at).start] = amount);
+                let motion = rigid::sum(left, &weights);
+                each.push(format!("{} of {}", motion.name, self.parts[body].spec.name.value));
                 moving.bodies.push(body);
-                moving.displacement.push(displacement);
-                each.push(format!("{} of {}", rigid::combine(left, &weights).name, self.parts[body].spec.name.value));
+                moving.motions.push(motion);
             }
             moving.name = self.name_as_one(&moving).unwrap_or_else(|| few(each).join(", "));
             moving
@@ -194,17 +196,18 @@ impl<const D: usize> Search<'_, '_, D> {
     }
 
     /// The name of a motion that moves its bodies like one.
-    fn name_as_one(&self, moving: &Moving) -> Option<String> {
-        let nodal = moving.bodies.iter().zip(&moving.displacement);
-        let nodal: Vec<f64> = nodal.flat_map(|(&body, v)| self.parts[body].held.frame.displacements(v)).collect();
+    fn name_as_one(&self, moving: &Moving<D>) -> Option<String> {
+        let corners = |body: usize| self.parts[body].known.extent.corners();
+        let each = moving.bodies.iter().zip(&moving.motions);
+        let each: Vec<f64> = each.flat_map(|(&body, motion)| motion.nodal(corners(body))).collect();
         let whole = self.as_one(&moving.bodies);
         let of_bodies = |motion: &RigidMotion<D>| -> Vec<f64> {
-            moving.bodies.iter().flat_map(|&body| motion.nodal(&self.parts[body].space.nodes)).collect()
+            moving.bodies.iter().flat_map(|&body| motion.nodal(corners(body))).collect()
         };
         let vectors: Vec<Vec<f64>> = whole.iter().map(of_bodies).collect();
-        let off = rest(&nodal, &vectors);
-        let is_one = dot(&off, &off) <= PART * PART * dot(&nodal, &nodal);
-        is_one.then(|| rigid::combine(&whole, &DVector::from_vec(fit(&slices(&vectors), &nodal))).name)
+        let off = rest(&each, &vectors);
+        let is_one = dot(&off, &off) <= PART * PART * dot(&each, &each);
+        is_one.then(|| rigid::combine(&whole, &DVector::from_vec(fit(&slices(&vectors), &each))).name)
     }
 
     /// Fixes what motions of some bodies are left, until there are none, loads work on one, or one cannot be fixed.
@@ -234,7 +237,7 @@ impl<const D: usize> Search<'_, '_, D> {
     }
 
     /// Notes the motion that loads work on most. Whether there is one.
-    fn works_on(&mut self, all: &[Moving]) -> bool {
+    fn works_on(&mut self, all: &[Moving<D>]) -> bool {
         let works: Vec<f64> = all.iter().map(|moving| self.work(moving).abs()).collect();
         let most = (0..works.len()).max_by(|&i, &j| works[i].total_cmp(&works[j])).filter(|&i| works[i] > 0.0);
         self.found.extend(most.map(|i| Mechanism {
@@ -247,7 +250,7 @@ impl<const D: usize> Search<'_, '_, D> {
     }
 
     /// Fixes motions of the same bodies; `again` finds those that are left. Whether the first was fixed.
-    fn fix(&mut self, all: Vec<Moving>, again: impl Fn(&Self) -> Vec<Moving>) -> bool {
+    fn fix(&mut self, all: Vec<Moving<D>>, again: impl Fn(&Self) -> Vec<Moving<D>>) -> bool {
         let Some(bodies) = all.first().map(|moving| moving.bodies.clone()) else { return false };
         let names: Vec<&str> = all.iter().map(|moving| moving.name.as_str()).collect();
         let mut mechanism = Mechanism { motion: names.join("; "), bodies, work: 0.0, fixed: None };
@@ -271,29 +274,30 @@ impl<const D: usize> Search<'_, '_, D> {
     }
 
     /// Work of the loads on a motion, as a share of the largest possible; zero if it is rounding or an error of the mesh.
-    fn work(&self, moving: &Moving) -> f64 {
-        let of = |(&body, u): (&usize, &Vec<f64>)| {
-            self.drafts[body].load.works(|node| std::array::from_fn(|c| u[D * node as usize + c]))
+    fn work(&self, moving: &Moving<D>) -> f64 {
+        let of = |(&body, motion): (&usize, &RigidMotion<D>)| {
+            self.drafts[body].load.works(|node| self.parts[body].at_dofs(motion, node))
         };
-        let each = moving.bodies.iter().zip(&moving.displacement).map(of);
-        let [work, largest] = each.fold([0.0; 2], |[sum, most], [work, size]| [sum + work, most + size]);
+        let each = moving.bodies.iter().zip(&moving.motions).map(of);
+        let mut works = each.fold([0.0; 2], |[sum, most], [work, size]| [sum + work, most + size]);
+        self.exchange.sum(&mut works);
+        let [work, largest] = works;
         if work.abs() <= largest * moving.error.max(NO_WORK) { 0.0 } else { work / largest }
     }
 
     /// Fixes a motion at one node of the largest body that has one where the motion is not small; returns the body.
-    fn pin(&mut self, moving: &Moving) -> Option<usize> {
-        let candidate = |(&body, u): (&usize, &Vec<f64>)| {
-            let dof = self.drafts[body].candidate(&self.parts[body], u)?;
-            Some((body, dof, u[dof].abs()))
+    fn pin(&mut self, moving: &Moving<D>) -> Option<usize> {
+        let candidate = |(&body, motion): (&usize, &RigidMotion<D>)| {
+            Some((body, self.drafts[body].candidate(&self.parts[body], motion, self.exchange)?))
         };
-        let mut all: Vec<(usize, usize, f64)> =
-            moving.bodies.iter().zip(&moving.displacement).filter_map(candidate).collect();
-        let most = all.iter().map(|found| found.2).fold(0.0, f64::max);
-        all.retain(|found| found.2 > NEAR * most);
-        let size = |found: &(usize, usize, f64)| extent(&self.parts[found.0].space);
-        let &(body, dof, _) = all.iter().rev().max_by(|a, b| size(a).total_cmp(&size(b)))?;
-        self.parts[body].held.prescribed.insert(dof, 0.0);
-        self.loose[body] = self.drafts[body].loose(&self.parts[body]);
+        let mut all: Vec<(usize, Candidate<D>)> =
+            moving.bodies.iter().zip(&moving.motions).filter_map(candidate).collect();
+        let most = all.iter().map(|(_, found)| found.size).fold(0.0, f64::max);
+        all.retain(|(_, found)| found.size > NEAR * most);
+        let size = |body: usize| self.parts[body].known.extent.size();
+        let (body, found) = all.into_iter().rev().max_by(|a, b| size(a.0).total_cmp(&size(b.0)))?;
+        self.parts[body].fix(&found);
+        self.loose[body] = self.drafts[body].loose(&self.parts[body], self.exchange);
         Some(body)
     }
 }
@@ -311,10 +315,4 @@ fn rest(displacement: &[f64], motions: &[Vec<f64>]) -> Vec<f64> {
 
 fn slices(vectors: &[Vec<f64>]) -> Vec<&[f64]> {
     vectors.iter().map(Vec::as_slice).collect()
-}
-
-/// Largest dimension of a body along an axis.
-fn extent<const D: usize>(space: &Space<D>) -> f64 {
-    let [low, high] = bounds(space.nodes.iter().copied());
-    (0..D).map(|c| high[c] - low[c]).fold(0.0, f64::max)
 }

@@ -6,14 +6,14 @@ use super::supports::Held;
 use super::{elastic, springs};
 use crate::contact;
 use crate::error::{Error, Result};
-use crate::exchange::Exchange;
+use crate::exchange::{Exchange, first, share};
 use crate::expression::Field;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{
-    ElasticBody, Elasticity, Interpolation, NodalBlock, NodeGraph, Parts, RigidMotion, Space, assemble, place, rigid,
-    support, surface,
+    ElasticBody, Elasticity, Interpolation, NodalBlock, NodalForces, NodeGraph, Parts, RigidMotion, Space, assemble,
+    place, rigid, support, surface,
 };
-use crate::linalg::{countable, dot};
+use crate::linalg::{axpy, countable, dot};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};
 use nalgebra::{DMatrix, DVector};
@@ -29,7 +29,17 @@ pub struct Part<'a, const D: usize> {
     /// Springs to the ground: for each of the scene, its stiffnesses between nodes.
     pub springs: Vec<Vec<NodalBlock<D>>>,
     /// What of its cells is known on all ranks.
-    pub known: Known,
+    pub known: Known<D>,
+}
+
+/// A dof that can be fixed against a motion.
+pub struct Candidate<const D: usize> {
+    /// Which one.
+    pub dof: usize,
+    /// The size of the motion there.
+    pub size: f64,
+    /// Where its node is.
+    pub at: [f64; D],
 }
 
 impl<'a, const D: usize> Part<'a, D> {
@@ -41,7 +51,7 @@ impl<'a, const D: usize> Part<'a, D> {
         spec: &'a BodySpec,
         mesh: &Mesh<D>,
         space: Space<D>,
-        known: Known,
+        known: Known<D>,
         exchange: &dyn Exchange,
     ) -> Result<Self> {
         let held = Held::new(spec, &space, mesh, exchange)?;
@@ -69,7 +79,12 @@ impl<'a, const D: usize> Part<'a, D> {
 
     /// Displacements of all dofs in a rigid motion.
     pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
-        self.held.frame.dofs(&motion.nodal(&self.space.nodes))
+        self.held.frame.dofs(&motion.nodal(self.space.nodes.iter().copied()))
+    }
+
+    /// The rigid motions of the free body.
+    pub fn free(&self) -> Vec<RigidMotion<D>> {
+        rigid::of(&self.known.extent, self.space.axisymmetric)
     }
 
     /// What a rigid motion does at the dofs of a node.
@@ -85,35 +100,62 @@ impl<'a, const D: usize> Part<'a, D> {
     /// Motions with hardly any strain, which multigrid must know: the rigid ones of the body. Far from the axis a
     /// ring is nearly as soft against radial displacements and turns of its section as a plane body.
     pub fn smooth(&self) -> Vec<RigidMotion<D>> {
-        rigid::modes(|| self.space.nodes.iter())
+        rigid::modes(&self.known.extent)
     }
 
-    /// Products of rigid motions over all dofs but the `prescribed` ones, and the work that `load` does on each.
+    /// Products of rigid motions over all dofs but the `prescribed` ones, and the work that the load vector does on each. Every rank has the
+    /// dofs of the nodes for which `is_own` holds. Collective.
     pub fn products(
         &self,
         motions: &[RigidMotion<D>],
         prescribed: &[(usize, f64)],
-        load: &[f64],
+        (load, is_own): (&[f64], &dyn Fn(usize) -> bool),
+        exchange: &dyn Exchange,
     ) -> (DMatrix<f64>, Vec<f64>) {
         let (count, mut held) = (motions.len(), prescribed.iter().map(|entry| entry.0).peekable());
-        let (mut products, mut work) = (DMatrix::zeros(count, count), vec![0.0; count]);
+        let mut sums = vec![0.0; count * (count + 1)];
+        let (products, work) = sums.split_at_mut(count * count);
         for node in 0..self.space.nodes.len() {
             let mut at: Vec<[f64; D]> = motions.iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
             while let Some(dof) = held.next_if(|dof| dof / D == node) {
                 at.iter_mut().for_each(|u| u[dof % D] = 0.0);
             }
-            for (i, u) in at.iter().enumerate() {
-                at[..=i].iter().enumerate().for_each(|(j, v)| products[(i, j)] += dot(u, v));
+            for (i, u) in at.iter().enumerate().filter(|_| is_own(node)) {
+                at.iter().enumerate().for_each(|(j, v)| products[count * i + j] += dot(u, v));
                 work[i] += dot(u, &load[D * node..][..D]);
             }
         }
-        products.fill_upper_triangle_with_lower_triangle();
-        (products, work)
+        exchange.sum(&mut sums);
+        let (products, work) = sums.split_at(count * count);
+        (DMatrix::from_row_slice(count, count, products), work.to_vec())
     }
 
     /// What a rigid motion does at a node.
     fn at(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
         motion.at(&self.space.nodes[node as usize])
+    }
+
+    /// Places of own nodes.
+    pub fn own(&self) -> impl Iterator<Item = [f64; D]> + Clone {
+        self.known.own.iter().map(|&node| self.space.nodes[node as usize])
+    }
+
+    /// The dof of the body at which a value is largest; `size` has none for dofs that do not count, and is asked for at own nodes. Collective.
+    pub fn largest(&self, size: &dyn Fn(usize) -> Option<f64>, exchange: &dyn Exchange) -> Option<Candidate<D>> {
+        // of equal ones the last
+        let later = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0));
+        let dofs = self.known.own.iter().flat_map(|&node| D * node as usize..D * (node as usize + 1));
+        let mine = dofs.filter_map(|dof| Some((dof, size(dof)?))).max_by(later);
+        let mine = mine.map(|found| (found, contact::pad(self.space.nodes[found.0 / D])));
+        let all = share(exchange, mine).into_iter().flatten();
+        let ((dof, size), x) = all.max_by(|a, b| later(&a.0, &b.0))?;
+        Some(Candidate { dof, size, at: std::array::from_fn(|c| x[c]) })
+    }
+
+    /// Fixes a dof.
+    pub fn fix(&mut self, found: &Candidate<D>) {
+        self.held.prescribed.insert(found.dof, 0.0);
+        self.space.nodes.learn([((found.dof / D) as u32, found.at)].into_iter());
     }
 
     /// Prescribed (dof, value), sorted by dof.
@@ -148,22 +190,22 @@ impl<'a, const D: usize> Part<'a, D> {
         Some((left, stiffness))
     }
 
-    /// Nodal forces of the loads, but for those on rigid surfaces. Supports are not regarded.
-    pub fn load(&self, mesh: &Mesh<D>, parts: Parts) -> Result<Vec<f64>> {
-        let whole = parts == Parts::Whole;
-        let force = if whole { self.known.force.clone() } else { body_force(self.spec, &self.space, parts)? };
-        let mut load = if force.is_empty() { vec![0.0; self.space.dofs()] } else { force };
-        for spec in &self.spec.load {
-            self.add_load(spec, spec.factor, mesh, parts, &mut load)?;
-        }
-        Ok(load)
+    /// Forces of the loads at own nodes, but for those on rigid surfaces. Supports are not regarded. Collective.
+    ///
+    /// # Errors
+    /// Loads that are not finite somewhere, and surfaces that are not of the body or have no area.
+    pub fn load(&self, mesh: &Mesh<D>, exchange: &dyn Exchange) -> Result<NodalForces<D>> {
+        let surfaces = self.on_surfaces(mesh, Parts::Whole)?.only(|node| self.known.is_own(node));
+        let load = self.known.force.clone().and(surfaces);
+        let found = if load.is_finite() { Ok(load) } else { Err((exchange.rank(), too_large(self.spec))) };
+        first(exchange, found)
     }
 
-    /// What the quadrature of the nodal forces `load` misses; empty where all loads are constant.
+    /// What the quadrature of the nodal forces of all loads misses, of a body of which all cells are here; empty where all loads are constant.
     ///
     /// # Errors
     /// Those of [`Part::load`].
-    pub fn unloaded(&self, mesh: &Mesh<D>, load: &[f64]) -> Result<Vec<f64>> {
+    pub fn unloaded(&self, mesh: &Mesh<D>) -> Result<Vec<f64>> {
         let is_constant = |load: &Load| match &load.kind {
             LoadKind::Pressure(pressure) => pressure.is_constant(),
             LoadKind::Traction(traction) => traction.iter().all(Field::is_constant),
@@ -173,13 +215,26 @@ impl<'a, const D: usize> Part<'a, D> {
         if self.spec.load.iter().all(is_constant) && force.into_iter().all(Field::is_constant) {
             return Ok(Vec::new());
         }
-        let mut missed = self.load(mesh, Parts::Halves)?;
-        missed.iter_mut().zip(load).for_each(|(missed, load)| *missed -= load);
+        let all = |parts: Parts| {
+            let load = body_force(self.spec, &self.space, parts)?.and(self.on_surfaces(mesh, parts)?);
+            Ok(load.all(self.space.nodes.len()))
+        };
+        let (mut missed, load) = (all(Parts::Halves)?, all(Parts::Whole)?);
+        axpy(-1.0, &load, &mut missed);
         Ok(missed)
     }
 
-    /// Adds `factor` times a load of the scene to nodal forces, unless its surface is rigid.
-    fn add_load(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, parts: Parts, load: &mut [f64]) -> Result<()> {
+    /// Nodal forces of all loads on surfaces that are not rigid.
+    fn on_surfaces(&self, mesh: &Mesh<D>, parts: Parts) -> Result<NodalForces<D>> {
+        let mut load = NodalForces::default();
+        for spec in &self.spec.load {
+            load = load.and(self.on_surface(spec, spec.factor, mesh, parts)?);
+        }
+        Ok(load)
+    }
+
+    /// Nodal forces of `factor` times a load of the scene, unless its surface is rigid.
+    fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, parts: Parts) -> Result<NodalForces<D>> {
         let name = &self.spec.name;
         let group = find_group(mesh, &spec.on, &[D - 1], "load")?;
         let facets = self.space.facets(group);
@@ -191,27 +246,21 @@ impl<'a, const D: usize> Part<'a, D> {
             return Err(without_area(&spec.on, self.spec));
         }
         let values = Values::of("this load", &name.value);
-        surface::surface_load(
-            &self.space,
-            &facets,
-            parts,
-            &|x, n| match &spec.kind {
-                LoadKind::Pressure(field) => {
-                    let pressure = factor * values.at(field, x);
-                    n.map(|n| -pressure * n)
-                }
-                LoadKind::Traction(fields) => std::array::from_fn(|c| factor * values.at(&fields[c], x)),
-                LoadKind::Force { rigid: true, .. } => [0.0; D],
-                LoadKind::Force { total, .. } => std::array::from_fn(|c| factor * total[c] / area),
-            },
-            load,
-        );
+        let load = surface::surface_load(&self.space, &facets, parts, &|x, n| match &spec.kind {
+            LoadKind::Pressure(field) => {
+                let pressure = factor * values.at(field, x);
+                n.map(|n| -pressure * n)
+            }
+            LoadKind::Traction(fields) => std::array::from_fn(|c| factor * values.at(&fields[c], x)),
+            LoadKind::Force { rigid: true, .. } => [0.0; D],
+            LoadKind::Force { total, .. } => std::array::from_fn(|c| factor * total[c] / area),
+        });
         values.refused()?;
-        if load.iter().any(|f| !f.is_finite()) {
+        if !load.is_finite() {
             return Err(Error::scene(&spec.on.place, format!("body `{}`: the load is too large", name.value))
                 .label("its forces are beyond the range of numbers"));
         }
-        Ok(())
+        Ok(load)
     }
 
     /// Sum of the nodal forces of a load of the scene at its full value, unless its surface is rigid.
@@ -219,11 +268,10 @@ impl<'a, const D: usize> Part<'a, D> {
     /// # Errors
     /// Those of [`Part::load`].
     pub fn resultant(&self, spec: &Load, mesh: &Mesh<D>) -> Result<[f64; 3]> {
-        let mut load = vec![0.0; self.space.dofs()];
-        self.add_load(spec, 1.0, mesh, Parts::Whole, &mut load)?;
         let mut sum = [0.0; 3];
-        let forces = load.chunks_exact(D).map(|f| self.space.net_force(std::array::from_fn(|c| f[c])));
-        forces.for_each(|force| contact::add(&mut sum, force));
+        for (_, force) in self.on_surface(spec, 1.0, mesh, Parts::Whole)?.iter() {
+            contact::add(&mut sum, self.space.net_force(force));
+        }
         Ok(sum)
     }
 
@@ -238,8 +286,17 @@ impl<'a, const D: usize> Part<'a, D> {
         })
     }
 
-    /// The load vector f at the body's dofs, from the nodal forces of [`Part::load`] and the forces on rigid surfaces.
-    pub fn load_on_dofs(&self, mut load: Vec<f64>) -> Vec<f64> {
+    /// Nodal forces of [`Part::load`] and those on rigid surfaces as forces at dofs: all of a body together, on each rank those that its own
+    /// nodes add.
+    pub fn load_on_dofs(&self, load: &NodalForces<D>) -> NodalForces<D> {
+        let rigid = self.rigid_forces().filter(|(node, _)| self.known.is_own(*node));
+        let rigid = rigid.map(|(node, total)| (node, std::array::from_fn(|c| total[c])));
+        load.iter().chain(rigid).map(|(node, force)| self.held.frame.force(node, force)).collect()
+    }
+
+    /// The load vector f at all dofs, from the nodal forces at all nodes.
+    pub fn load_vector(&self, load: &NodalForces<D>) -> Vec<f64> {
+        let mut load = load.all(self.space.nodes.len());
         for (node, total) in self.rigid_forces() {
             (0..D).for_each(|c| load[D * node as usize + c] += total[c]);
         }
@@ -249,7 +306,7 @@ impl<'a, const D: usize> Part<'a, D> {
 
     /// The nodes that linear displacements have, sorted.
     pub fn coarse_nodes(&self) -> Vec<u32> {
-        coarse_nodes(&self.space, &self.known.corners, &self.held.frame)
+        coarse_nodes(&self.space, &self.held.frame)
     }
 
     /// Interpolation of the dofs from those at these nodes.
@@ -290,20 +347,25 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 }
 
-/// Nodal forces of the body force of a body of which all cells are here; empty without one.
+/// Forces of the body force at the nodes of the cells that are here.
 ///
 /// # Errors
 /// A force that is not finite somewhere, or beyond the range of numbers.
-pub fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Parts) -> Result<Vec<f64>> {
-    let (name, Some(fields)) = (&spec.name, &spec.force) else { return Ok(Vec::new()) };
-    let mut load = vec![0.0; space.dofs()];
+pub fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Parts) -> Result<NodalForces<D>> {
+    let (name, Some(fields)) = (&spec.name, &spec.force) else { return Ok(NodalForces::default()) };
     let values = Values::of("this body force", &name.value);
     let density = |x: [f64; D]| std::array::from_fn(|c| spec.force_factor * values.at(&fields[c], x));
-    assemble::body_force(space, parts, &density, &mut load);
+    let load = assemble::body_force(space, parts, &density);
     values.refused()?;
-    if load.iter().any(|f| !f.is_finite()) {
+    if !load.is_finite() {
         return Err(Error::scene(&name.place, format!("body `{}`: the body force is too large", name.value))
             .label("its forces are beyond the range of numbers"));
     }
     Ok(load)
+}
+
+/// The refusal of loads that only together are beyond the range of numbers.
+fn too_large(spec: &BodySpec) -> Error {
+    Error::scene(&spec.name.place, format!("body `{}`: its loads together are too large", spec.name.value))
+        .label("their forces are beyond the range of numbers")
 }

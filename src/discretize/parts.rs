@@ -9,9 +9,9 @@ use super::verify::{self, Verified};
 use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::exchange::{Exchange, first, gather, share};
-use crate::fem::{Elasticity, Parts, Space, interpolation};
+use crate::fem::{Elasticity, Extent, Parts, Space, place};
 use crate::mesh::{Group, Key, Mesh, Nodes, Portion};
-use crate::problem::{BodySpec, Order, Plane};
+use crate::problem::{BodySpec, Plane};
 use crate::scene::Scene;
 use std::sync::Arc;
 
@@ -46,14 +46,9 @@ impl<const D: usize> Stock<'_, D> {
         own.map(|(&node, _)| node)
     }
 
-    /// Numbers of the points of a cell among those of the mesh, as many as it has nodes.
-    pub fn numbers(&self, cell: u32, stride: usize) -> impl Iterator<Item = u32> {
-        self.points(cell)[..stride].iter().map(|&point| self.portion.number(point))
-    }
-
-    /// Nodes that are points of this rank.
-    pub fn own(&self) -> impl Iterator<Item = u32> {
-        own(&self.known, self.portion).map(|(node, _)| node)
+    /// The number of a node of the cells among the points of the mesh.
+    pub fn number(&self, node: u32) -> Option<u32> {
+        Some(self.portion.number(self.known.points[place(&self.known.numbers, node)? as usize]))
     }
 
     /// Numbers of the cells that this rank speaks for: each is one of one rank.
@@ -67,10 +62,10 @@ fn home<const D: usize>(portion: &Portion<D>, group: usize, rank: usize) -> impl
     cells.filter(move |(_, cell)| portion.home(cell[0]) == rank).map(|(number, _)| number)
 }
 
-/// Nodes that are points of this rank, with these.
-fn own<const D: usize>(known: &Nodes, portion: &Portion<D>) -> impl Iterator<Item = (u32, u32)> {
+/// Nodes that are points of this rank, sorted.
+fn own<const D: usize>(known: &Nodes, portion: &Portion<D>) -> impl Iterator<Item = u32> {
     let nodes = known.numbers.iter().copied().zip(known.points.iter().copied());
-    nodes.filter(|(_, point)| portion.is_own(*point))
+    nodes.filter(|(_, point)| portion.is_own(*point)).map(|(node, _)| node)
 }
 
 /// The bodies with their spaces, supports and springs, and the cells that this rank has of them. Where there are several ranks, the spaces have the
@@ -94,19 +89,24 @@ pub fn parts<'a, const D: usize>(
         let group = mesh.groups.place(&spec.name.value).unwrap_or_default();
         let nodes_here = &checked[index].nodes;
         let (mut space, elasticity, known) = read(spec, (portion, group), nodes_here, wanted, exchange)?;
-        let mut volumes = Vec::new();
+        let mut volume = [0.0];
         if spec.load.is_empty() && spec.fix.is_empty() && spec.spring.is_empty() {
-            volumes = summed(approach::volumes(&space), nodes_here, portion, exchange);
+            let own = approach::volumes(&space).into_iter().filter(|(node, _)| known.is_own(*node));
+            volume[0] = own.map(|(_, volume)| volume).sum();
+            exchange.sum(&mut volume);
         }
         let mut nodes = Vec::new();
         if exchange.ranks() > 1 {
             let behind = behind(&space, (portion, group), &on_surface, exchange);
+            let held = held(spec, &space, mesh);
+            let wanted = known.boundary.iter().chain(&behind).chain(&held).copied();
+            tell(&mut space, &known, wanted, exchange);
             (space, nodes) = space.of_cells(behind, known.measure);
         }
         let mut part = Part::new(spec, mesh, space, known, exchange)?;
         let resultant = |load: &_| part.resultant(load, mesh);
-        part.known.outer = Outer::new(spec, &part.space, mesh, &resultant, volumes, exchange)?;
-        verify::held(&part, &checked[index].parts, mesh)?;
+        part.known.outer = Outer::new(spec, &part.space, mesh, &resultant, volume[0], exchange)?;
+        verify::held(&part, &checked[index].parts, mesh, exchange)?;
         parts.push(part);
         stocks.push(Stock { portion, group, nodes, elasticity, known: nodes_here.clone() });
     }
@@ -132,28 +132,37 @@ fn read<const D: usize>(
     nodes: &Nodes,
     Wanted { plane, boundaries }: Wanted,
     exchange: &dyn Exchange,
-) -> Result<(Space<D>, Elasticity, Known)> {
-    let (mesh, keys, cells) = (&portion.mesh, portion.keys(group), &portion.mesh.groups[group]);
+) -> Result<(Space<D>, Elasticity, Known<D>)> {
+    let (mesh, keys, cells_here) = (&portion.mesh, portion.keys(group), &portion.mesh.groups[group]);
     let mut space = match exchange.ranks() {
-        1 => Space::new(mesh, cells, spec.order),
-        _ => Space::of_nodes(everywhere(nodes, portion, exchange), nodes, cells, spec.order),
+        1 => Space::new(mesh, cells_here, spec.order),
+        _ => Space::of_nodes(mesh, nodes, cells_here, spec.order),
     };
+    let own: Vec<u32> = own(nodes, portion).collect();
     if plane == Plane::Axisymmetric {
-        space = space.revolved();
-        if let Some(x) = space.nodes.iter().find(|x| x[0] < 0.0) {
-            let message = format!("body `{}` has a negative radius at {}", spec.name.value, point(pad(*x)));
-            return Err(Error::mesh(&mesh.path, None, message).help(
-                "axisymmetric bodies are drawn as meridians, x >= 0 with the axis at x = 0: leave out one half",
-            ));
-        }
+        let largest = share(exchange, space.largest_radius()).into_iter().fold(0.0, f64::max);
+        space = space.revolved(largest);
+        let negative = |node: &&u32| space.nodes[**node as usize][0] < 0.0;
+        let refuse = |&node: &u32| {
+            let x = point(pad(space.nodes[node as usize]));
+            let message = format!("body `{}` has a negative radius at {x}", spec.name.value);
+            let help = "axisymmetric bodies are drawn as meridians, x >= 0 with the axis at x = 0: leave out one half";
+            Err((node, Error::mesh(&mesh.path, None, message).help(help)))
+        };
+        first(exchange, own.iter().find(negative).map_or(Ok(()), refuse))?;
     }
     let key = |cell: usize| keys.get(cell).copied().unwrap_or((0, cell as u32));
     let elasticity = elastic::of(spec, &space, mesh, plane, (&key, exchange))?;
     let home = || home(portion, group, exchange.rank());
     let shares = [total(home().map(|i| space.share(i))), total(home().map(|i| space.cell_measure(i)))];
-    let [volume, measure] = totals(shares, exchange);
-    let mut count = [home().count() as f64];
-    exchange.sum(&mut count);
+    let extent = Extent::of(own.iter().map(|&node| space.nodes[node as usize]));
+    let all = share(exchange, (home().count(), shares, extent));
+    let [volume, measure] = [0, 1].map(|which| {
+        let [sum, lost] = total(all.iter().flat_map(|(_, shares, _)| shares[which]));
+        sum + lost
+    });
+    let cells = all.iter().map(|(count, ..)| count).sum();
+    let extent = all.iter().fold(Extent::default(), |joined, (.., extent)| joined.join(extent));
     let mut moduli = elasticity.moduli(0, [0.0; 3]).unwrap_or_default();
     // a rank may have no cell of it, and so none of a region
     if !spec.regions.is_empty() || !elasticity.is_constant() {
@@ -162,18 +171,11 @@ fn read<const D: usize>(
         moduli = moduli.map(|sum| sum / volume);
     }
     let force = part::body_force(spec, &space, Parts::Whole).map_err(|error| (exchange.rank(), error));
-    let force = summed(first(exchange, force)?, nodes, portion, exchange);
-    let (mut corners, mut boundary) = (interpolation::corners(&space), Vec::new());
-    if boundaries {
-        boundary = outside(&space, (portion, group), &key, exchange);
-    }
-    if exchange.ranks() > 1 && space.order == Order::P2 {
-        corners = gather(exchange, &corners);
-        corners.dedup();
-    }
+    let force = first(exchange, force)?.only(|node| own.binary_search(&node).is_ok());
+    let boundary = if boundaries { outside(&space, (portion, group), &key, exchange) } else { Vec::new() };
     let points = nodes.numbers.iter().zip(&nodes.points).map(|(&node, &point)| (node, point)).collect();
     let outer = Outer::default();
-    let known = Known { cells: count[0] as usize, volume, moduli, force, corners, boundary, measure, points, outer };
+    let known = Known { own, extent, cells, volume, moduli, force, boundary, measure, points, outer };
     Ok((space, elasticity, known))
 }
 
@@ -186,34 +188,26 @@ fn total(terms: impl Iterator<Item = f64>) -> [f64; 2] {
     })
 }
 
-/// Totals over all ranks. Collective.
-fn totals(mine: [[f64; 2]; 2], exchange: &dyn Exchange) -> [f64; 2] {
-    let all = share(exchange, mine);
-    [0, 1].map(|which| {
-        let [sum, lost] = total(all.iter().flat_map(|of| of[which]));
-        sum + lost
-    })
+/// Nodes of this rank that supports on groups of cells hold, and those on the axis of a body of revolution.
+fn held<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Vec<u32> {
+    let groups = spec.fix.iter().filter_map(|fix| mesh.group(&fix.on.value)).filter(|group| group.dimension == D);
+    let on_axis = space.nodes.known().filter(|&node| space.on_axis(node));
+    groups.flat_map(|group| space.nodes_on(group)).chain(on_axis).collect()
 }
 
-/// Sums at the dofs of nodes, of which ranks have found those at their own points. Collective.
-fn summed<const D: usize>(at: Vec<f64>, nodes: &Nodes, portion: &Portion<D>, exchange: &dyn Exchange) -> Vec<f64> {
-    if at.is_empty() || exchange.ranks() == 1 {
-        return at;
-    }
-    let mut all = vec![0.0; at.len()];
-    for dofs in own(nodes, portion).map(|(node, _)| D * node as usize..D * (node as usize + 1)) {
-        all[dofs.clone()].copy_from_slice(&at[dofs]);
-    }
-    exchange.sum(&mut all);
-    all
-}
-
-/// Places of all nodes of a body. Collective.
-fn everywhere<const D: usize>(nodes: &Nodes, portion: &Portion<D>, exchange: &dyn Exchange) -> Vec<[f64; D]> {
-    let mut all = vec![[0.0; D]; nodes.count];
-    own(nodes, portion).for_each(|(node, point)| all[node as usize] = portion.mesh.points[point as usize]);
-    exchange.sum(all.as_flattened_mut());
-    all
+/// Tells all ranks the places of these nodes, each of which at least its own rank wants to tell. Collective.
+fn tell<const D: usize>(
+    space: &mut Space<D>,
+    known: &Known<D>,
+    wanted: impl Iterator<Item = u32>,
+    exchange: &dyn Exchange,
+) {
+    let mut own: Vec<u32> = wanted.filter(|&node| known.is_own(node)).collect();
+    own.sort_unstable();
+    own.dedup();
+    let mine: Vec<(u32, [f64; 3])> = own.into_iter().map(|node| (node, pad(space.nodes[node as usize]))).collect();
+    let all = share(exchange, mine).into_iter().flatten();
+    space.nodes.learn(all.map(|(node, x)| (node, std::array::from_fn(|c| x[c]))));
 }
 
 /// Nodes of the facets of the boundary. Whoever has the least corner of a facet has its cells. Collective.

@@ -81,9 +81,10 @@ impl<const D: usize> Ready<'_, D> {
                 shape,
             ));
         };
-        let Here { part, rows: [rows, nodal_rows], loads, supported: Supported { carried, prescribed } } = here;
+        let Here { part, rows: [rows, nodal_rows], load, supported: Supported { carried, prescribed } } = here;
         let (dealt, works, smooth) = (self.dealt, self.works, self.smooth);
-        let [force, nodal_force] = loads.map(|loads| loads.all());
+        let force = part.load_vector(&load);
+        let carried = carried.map_or_else(Vec::new, |motion| part.dofs_of(&motion));
         let free = left.iter().enumerate().map(|(k, motion)| {
             let work = |u: &[f64]| works.as_ref().map_or_else(|| dot(u, &force), |works| works[k]);
             FreeMotion::new(part.dofs_of(motion), &prescribed, work)
@@ -143,12 +144,14 @@ impl<const D: usize> Ready<'_, D> {
             rows: nodal_rows,
             springs: part.springs,
             supports: part.spec.fix.len(),
-            load: nodal_force,
+            load: load.all(space.nodes.len()),
             held: held.clone(),
             elasticity: elasticity.clone(),
             part: here,
         };
-        info.post = Some(Box::new(OnPart::new(part.spec, part.known.outer, forces)?) as Box<dyn Post>);
+        let mut outer = part.known.outer;
+        outer.weigh(&space);
+        info.post = Some(Box::new(OnPart::new(part.spec, outer, forces)?) as Box<dyn Post>);
         let slot = BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness };
         Ok((slot, Some(Shape { space, elasticity, modulus, held, unloaded })))
     }

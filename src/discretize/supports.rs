@@ -96,7 +96,7 @@ impl<const D: usize> Held<D> {
     /// In a body of revolution nodes on the axis and rigid surfaces have no radial displacement.
     fn symmetry(&self, space: &Space<D>) -> BTreeMap<u32, Vec<Condition<D>>> {
         let radial = Condition { direction: unit(0), value: 0.0, support: None };
-        let on_axis = (0..space.nodes.len() as u32).filter(|&node| space.on_axis(node));
+        let on_axis = space.nodes.known().filter(|&node| space.on_axis(node));
         let masters = self.rigid.iter().flat_map(|(_, nodes)| nodes.first().copied());
         let held = on_axis.chain(masters).filter(|_| space.axisymmetric);
         held.map(|node| (self.frame.node(node), vec![radial])).collect()

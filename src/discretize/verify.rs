@@ -5,8 +5,8 @@ use super::part::Part;
 use super::roster;
 use crate::contact::pad;
 use crate::error::{Error, Result};
-use crate::exchange::Exchange;
-use crate::fem::{RigidMotion, Space, rigid};
+use crate::exchange::{Exchange, share};
+use crate::fem::{Extent, RigidMotion, rigid};
 use crate::mesh::{Asked, Checked, Duty, Mesh, Parts, Portion};
 use crate::problem::body::BodySpec;
 use crate::scene::Scene;
@@ -46,19 +46,28 @@ fn asked(body: &BodySpec) -> Asked<'_> {
 }
 
 /// Refuses a body in parts of which supports and springs leave more free than of a body in one: contact and loads see its rigid
-/// motions as those of one body.
+/// motions as those of one body. Collective.
 ///
 /// # Errors
 /// Such a body, with the place of a part that is free.
-pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Result<()> {
+pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>, exchange: &dyn Exchange) -> Result<()> {
     if parts.count == 1 {
         return Ok(());
     }
     let space = &part.space;
     let part_of = &parts.of_node;
-    let mut nodes = vec![Vec::new(); parts.count];
-    (0..).zip(part_of).for_each(|(node, &of)| nodes[of as usize].push(node));
-    let motions: Vec<Vec<RigidMotion<D>>> = nodes.iter().map(|nodes| of_nodes(space, nodes)).collect();
+    // of each part: where its nodes are, and the first of them
+    let mut mine = vec![(Extent::default(), None); parts.count];
+    for &node in &part.known.own {
+        let (extent, first) = &mut mine[part_of[node as usize] as usize];
+        let x = space.nodes[node as usize];
+        *extent = extent.join(&Extent::of([x].into_iter()));
+        first.get_or_insert((node, pad(x)));
+    }
+    let of_ranks = share(exchange, mine);
+    let extent = |number: usize| of_ranks.iter().fold(Extent::default(), |all, of_rank| all.join(&of_rank[number].0));
+    let motions: Vec<Vec<RigidMotion<D>>> =
+        (0..parts.count).map(|number| rigid::of(&extent(number), space.axisymmetric)).collect();
     // a part moves, the others stay at rest
     let each: Vec<(usize, &RigidMotion<D>)> =
         motions.iter().enumerate().flat_map(|(number, own)| own.iter().map(move |motion| (number, motion))).collect();
@@ -69,7 +78,7 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Re
         };
         part.left(moving.len(), &at).len()
     };
-    let free = rigid::of(space);
+    let free = part.free();
     let whole = part.left(free.len(), &|k, node| free[k].at(&space.nodes[node as usize])).len();
     if left(&each) <= whole {
         return Ok(());
@@ -77,19 +86,11 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Re
     // contact may hold a part that supports leave free in part: the one most free is the one that is meant
     let alone = |number: usize| left(&each.iter().filter(|moving| moving.0 == number).copied().collect::<Vec<_>>());
     let most = (0..parts.count).min_by_key(|&number| std::cmp::Reverse(alone(number))).unwrap_or(0);
-    let at = pad(space.nodes[nodes[most][0] as usize]);
+    let first = of_ranks.iter().filter_map(|of_rank| of_rank[most].1).min_by_key(|(node, _)| *node);
+    let at = first.map_or([0.0; 3], |(_, x)| x);
     let (name, count) = (&part.spec.name.value, parts.count);
     let message =
         format!("body `{name}` is in {count} parts that share no facet, and the one at {} is not held", point(at));
     Err(Error::mesh(&mesh.path, None, message)
         .help("make a body of each part, support each of them, or let them share facets (in the script: `Coherence;`)"))
-}
-
-/// The rigid motions of some nodes of a body.
-fn of_nodes<const D: usize>(space: &Space<D>, nodes: &[u32]) -> Vec<RigidMotion<D>> {
-    let mut motions = rigid::modes(|| nodes.iter().map(|&node| &space.nodes[node as usize]));
-    if space.axisymmetric {
-        motions = vec![motions.swap_remove(1)];
-    }
-    motions
 }

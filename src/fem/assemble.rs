@@ -4,6 +4,7 @@
 //! follow from the graph by arithmetic, so that assembly writes each value straight to its place.
 
 use super::elasticity::{Elasticity, Flaw};
+use super::forces::NodalForces;
 use super::frame::Frame;
 use super::quadrature::{self, Parts};
 use super::space::Space;
@@ -256,13 +257,14 @@ pub fn is_straight<const D: usize>(x: &[[f64; D]], vertices: usize) -> bool {
     })
 }
 
-/// Adds a body force density (per volume) to `load`.
+/// Nodal forces of a body force density (per volume) on the cells that are here.
 pub fn body_force<const D: usize>(
     space: &Space<D>,
     parts: Parts,
     density: &dyn Fn([f64; D]) -> [f64; D],
-    load: &mut [f64],
-) {
+) -> NodalForces<D> {
+    let (space, nodes) = space.part(0..space.cell_count());
+    let mut load = vec![0.0; space.dofs()];
     let low = space.order == Order::P1 && !space.axisymmetric;
     let mut rule = quadrature::simplex(D + 1, if low { 2 } else { 5 });
     if parts == Parts::Halves {
@@ -284,6 +286,7 @@ pub fn body_force<const D: usize>(
             }
         }
     }
+    NodalForces::new(nodes.into_iter(), &load)
 }
 
 /// Point of an element with node coordinates `x` and shape function values `phi`.

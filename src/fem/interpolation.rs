@@ -26,23 +26,15 @@ impl Interpolation {
     }
 }
 
-/// The corners of cells, sorted, of a space with nodes between them; empty where all nodes are corners.
-pub fn corners<const D: usize>(space: &Space<D>) -> Vec<u32> {
-    let mut is_corner = vec![false; if space.order == Order::P1 { 0 } else { space.nodes.len() }];
-    let cells = space.cells.chunks_exact(space.stride).filter(|_| space.order == Order::P2);
-    cells.flat_map(|cell| &cell[..=D]).for_each(|&node| is_corner[node as usize] = true);
-    (0..is_corner.len() as u32).filter(|&node| is_corner[node as usize]).collect()
-}
-
-/// The nodes of linear displacements, sorted: the corners, and nodes that stand for others.
-pub fn coarse_nodes<const D: usize>(space: &Space<D>, corners: &[u32], frame: &Frame<D>) -> Vec<u32> {
-    if space.order == Order::P1 {
-        return (0..space.nodes.len() as u32).collect();
+/// The nodes of linear displacements, sorted: corners of the cells that are here, and nodes that stand for others.
+pub fn coarse_nodes<const D: usize>(space: &Space<D>, frame: &Frame<D>) -> Vec<u32> {
+    match space.order {
+        Order::P1 => space.nodes.known().collect(),
+        Order::P2 => {
+            let corners = space.cells.chunks_exact(space.stride).flat_map(|cell| &cell[..=D]);
+            Space::<D>::among(corners.chain(frame.master.values()).copied())
+        }
     }
-    let mut coarse: Vec<u32> = corners.iter().chain(frame.master.values()).copied().collect();
-    coarse.sort_unstable();
-    coarse.dedup();
-    coarse
 }
 
 /// Interpolation from the dofs at the nodes `coarse` ([`coarse_nodes`]) to all dofs of a body: a node in the middle of an edge moves as the
@@ -107,7 +99,7 @@ mod tests {
     /// Values at all dofs, and those of them at coarse nodes.
     fn both(space: &Space<3>, frame: &Frame<3>, u: impl Fn(&[f64; 3]) -> [f64; 3]) -> (Vec<f64>, Vec<f64>) {
         let all = frame.dofs(&space.nodes.iter().flat_map(u).collect::<Vec<_>>());
-        let coarse = coarse_nodes(space, &corners(space), frame);
+        let coarse = coarse_nodes(space, frame);
         let few = coarse.iter().flat_map(|&node| all[3 * node as usize..3 * node as usize + 3].to_vec()).collect();
         (all, few)
     }
@@ -120,7 +112,7 @@ mod tests {
     #[test]
     fn linear_displacements_are_interpolated_exactly() {
         let space = block::<3>(2, Order::P2);
-        let coarse = coarse_nodes(&space, &corners(&space), &Frame::default());
+        let coarse = coarse_nodes(&space, &Frame::default());
         assert_eq!((space.nodes.len(), coarse.len()), (125, 27));
         let turned = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
         let middle =
@@ -138,12 +130,12 @@ mod tests {
     #[test]
     fn supports_have_no_part() {
         let space = block::<3>(1, Order::P2);
-        let vertices = coarse_nodes(&space, &corners(&space), &Frame::default());
+        let vertices = coarse_nodes(&space, &Frame::default());
         let master =
             (0..27).find(|node| vertices.binary_search(node).is_err()).expect("a node in the middle of an edge");
         let tied = [vertices[0], vertices[1]];
         let frame = Frame { master: tied.map(|node| (node, master)).into(), ..Frame::default() };
-        let coarse = coarse_nodes(&space, &corners(&space), &frame);
+        let coarse = coarse_nodes(&space, &frame);
         assert_eq!(coarse.len(), 9);
         let is_tied = |dof: usize| tied.contains(&(dof as u32 / 3));
         let (all, few) = both(&space, &frame, |_| [1.0, -2.0, 3.0]);

@@ -1,7 +1,7 @@
 //! Rigid motions of a body and what its supports leave of them.
 
 use super::assemble::NodalBlock;
-use super::space::Space;
+use super::extent::Extent;
 use crate::linalg::{Blocks, PART, TOLERANCE, dot};
 use nalgebra::{DMatrix, DVector};
 
@@ -32,10 +32,30 @@ impl<const D: usize> RigidMotion<D> {
         u
     }
 
-    /// Displacements of nodes.
-    pub fn nodal(&self, nodes: &[[f64; D]]) -> Vec<f64> {
-        nodes.iter().flat_map(|x| self.at(x)).collect()
+    /// Displacements of points.
+    pub fn nodal(&self, points: impl Iterator<Item = [f64; D]>) -> Vec<f64> {
+        points.flat_map(|x| self.at(&x)).collect()
     }
+}
+
+/// What is largest of a value at the dofs of a body, a dof and its size, where `size` has none for dofs that do not count; what rigid motions are there
+/// is known on all ranks afterwards. Collective.
+pub type Largest<'a> = dyn Fn(&dyn Fn(usize) -> Option<f64>) -> Option<(usize, f64)> + 'a;
+
+/// Rigid motions of a free body at its dofs.
+#[derive(Clone, Copy)]
+pub struct AtDofs<'a> {
+    /// How many there are.
+    pub count: usize,
+    /// What one of them does at a dof of the contact, of supports, or one that was the largest before.
+    pub at: &'a dyn Fn(usize, usize) -> f64,
+    /// Looks at all dofs.
+    pub largest: &'a Largest<'a>,
+}
+
+impl AtDofs<'_> {
+    /// No motions.
+    pub const NONE: AtDofs<'static> = AtDofs { count: 0, at: &|_, _| 0.0, largest: &|_| None };
 }
 
 /// A rigid motion that supports leave free.
@@ -56,25 +76,18 @@ impl FreeMotion {
 }
 
 /// The rigid motions of a body; of one of revolution the translation along its axis alone.
-pub fn of<const D: usize>(space: &Space<D>) -> Vec<RigidMotion<D>> {
-    of_all(&[space])
-}
-
-/// The rigid motions of several bodies as one.
-pub fn of_all<const D: usize>(spaces: &[&Space<D>]) -> Vec<RigidMotion<D>> {
-    let mut all = modes(|| spaces.iter().flat_map(|space| &space.nodes));
-    if spaces.iter().any(|space| space.axisymmetric) {
+pub fn of<const D: usize>(extent: &Extent, axisymmetric: bool) -> Vec<RigidMotion<D>> {
+    let mut all = modes(extent);
+    if axisymmetric {
         all = vec![all.swap_remove(1)];
     }
     all
 }
 
-/// The 3 (2D) or 6 (3D) rigid motions about the centre of `nodes`: translations, then rotations, scaled to
+/// The 3 (2D) or 6 (3D) rigid motions about the mean of some points: translations, then rotations, scaled to
 /// displacements of about one. Gmsh and PETSc call them rigid body modes.
-pub fn modes<'x, const D: usize, I: Iterator<Item = &'x [f64; D]>>(nodes: impl Fn() -> I) -> Vec<RigidMotion<D>> {
-    let n = nodes().count().max(1) as f64;
-    let centre: [f64; D] = std::array::from_fn(|i| nodes().map(|x| x[i]).sum::<f64>() / n);
-    let size = nodes().flat_map(|x| (0..D).map(move |i| (x[i] - centre[i]).abs())).fold(f64::MIN_POSITIVE, f64::max);
+pub fn modes<const D: usize>(extent: &Extent) -> Vec<RigidMotion<D>> {
+    let (centre, size) = (extent.mean(), extent.farthest::<D>());
     let translations = (0..D).map(|c| (c, format!("translation along {}", ["x", "y", "z"][c])));
     let rotations = (0..3).filter(|&k| D == 3 || k == 2);
     let rotations = rotations.map(|k| (3 + k, if D == 2 { "rotation" } else { PLANES[k].2 }.to_owned()));
@@ -123,11 +136,16 @@ pub fn left_by_springs(left: Vec<DVector<f64>>, stiffness: &DMatrix<f64>) -> Vec
 
 /// Combination of motions about the same centre, its largest weight one; named after the parts that matter.
 pub fn combine<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64>) -> RigidMotion<D> {
+    sum(motions, &(weights / weights.amax()))
+}
+
+/// Sum of motions about the same centre, named after the parts that matter.
+pub fn sum<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64>) -> RigidMotion<D> {
     let largest = weights.amax();
     let matters = |(_, weight): &(&RigidMotion<D>, &f64)| weight.abs() > PART * largest;
     let name = motions.iter().zip(weights).filter(matters).map(|(motion, _)| motion.name.as_str());
     let name = crate::error::joined(name);
-    let sum = |k: usize| motions.iter().zip(weights).map(|(motion, weight)| weight / largest * motion.weights[k]).sum();
+    let sum = |k: usize| motions.iter().zip(weights).map(|(motion, weight)| weight * motion.weights[k]).sum();
     let (centre, size) = motions.first().map_or(([0.0; D], 1.0), |motion| (motion.centre, motion.size));
     RigidMotion { name, centre, size, weights: std::array::from_fn(sum) }
 }
@@ -139,7 +157,7 @@ mod tests {
     #[test]
     fn supports_leave_what_they_do_not_hold() {
         let nodes = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
-        let all = modes(|| nodes.iter());
+        let all = modes(&Extent::of(nodes.into_iter()));
         let value = |k: usize, dof: usize| all[k].at(&nodes[dof / 2])[dof % 2];
         let left = |dofs: &[usize]| {
             let prescribed: Vec<_> = dofs.iter().map(|&dof| (dof, 0.0)).collect();
@@ -154,7 +172,7 @@ mod tests {
         // one pinned node: a rotation about it
         let pinned = left(&[0, 1]);
         assert_eq!(pinned.len(), 1);
-        let u = pinned[0].nodal(&nodes);
+        let u = pinned[0].nodal(nodes.into_iter());
         assert!(u[0].abs() < 1e-14 && u[1].abs() < 1e-14 && u[5].abs() > 0.4);
     }
 
@@ -162,7 +180,7 @@ mod tests {
     #[test]
     fn rotations_turn_their_planes() {
         let nodes = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0]];
-        let all = modes(|| nodes.iter());
+        let all = modes(&Extent::of(nodes.into_iter()));
         let at = |name: &str| all.iter().find(|motion| motion.name == name).map(|motion| motion.at(&nodes[1]));
         assert_eq!(at("rotation about z"), Some([-1.0, 1.0, 0.0]));
         assert_eq!(at("rotation about x"), Some([0.0, -1.0, 1.0]));

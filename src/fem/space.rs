@@ -1,6 +1,6 @@
 //! The finite element space of one body: its nodes, cells and boundary facets, numbered within the body.
 
-use super::{Slope, cross, element, pad};
+use super::{Places, Slope, cross, element, pad};
 use crate::mesh::{Group, Mesh, Nodes, Numbering};
 use crate::problem::order::Order;
 use std::cell::OnceCell;
@@ -15,8 +15,8 @@ pub const ON_AXIS: f64 = 1e-10;
 pub struct Space<const D: usize> {
     /// Polynomial order.
     pub order: Order,
-    /// Coordinates of the nodes.
-    pub nodes: Vec<[f64; D]>,
+    /// Where the nodes are.
+    pub nodes: Places<D>,
     /// Nodes per cell.
     pub stride: usize,
     /// Body node numbers, `stride` per cell, in the local order of [`element`].
@@ -45,9 +45,10 @@ impl<const D: usize> Space<D> {
     pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
         let stride = element::node_count(D + 1, order);
         let corners = group.connectivity.chunks_exact(group.stride).flat_map(|cell| &cell[..stride]).copied();
+        let mut nodes = Vec::new();
         let mut space = Space {
             order,
-            nodes: Vec::new(),
+            nodes: Places::default(),
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
             axisymmetric: false,
@@ -55,18 +56,21 @@ impl<const D: usize> Space<D> {
             measure: OnceCell::new(),
         };
         for point in corners {
-            let (node, is_new) = space.from_mesh.number(point, space.nodes.len() as u32);
+            let (node, is_new) = space.from_mesh.number(point, nodes.len() as u32);
             if is_new {
-                space.nodes.push(mesh.points[point as usize]);
+                nodes.push(mesh.points[point as usize]);
             }
             space.cells.push(node);
         }
+        space.nodes = nodes.into();
         space
     }
 
-    /// The space on all `nodes` of a body, some of which are points of the mesh that are `known` here, and some of the cells, in `group`. The measure
+    /// The space on all nodes of a body, of which those that are points of the mesh here are `known`, and some of the cells, in `group`. The measure
     /// of all of them is known [later](Self::of_cells).
-    pub fn of_nodes(nodes: Vec<[f64; D]>, known: &Nodes, group: &Group, order: Order) -> Self {
+    pub fn of_nodes(mesh: &Mesh<D>, known: &Nodes, group: &Group, order: Order) -> Self {
+        let places = known.points.iter().map(|&point| mesh.points[point as usize]);
+        let nodes = Places::some(known.count, known.numbers.iter().copied().zip(places));
         let mut from_mesh = Numbering::new(known.points.iter().copied());
         for (&node, &point) in known.numbers.iter().zip(&known.points) {
             from_mesh.number(point, node);
@@ -95,33 +99,34 @@ impl<const D: usize> Space<D> {
     pub fn part(&self, cells: impl Iterator<Item = usize>) -> (Self, Vec<u32>) {
         let cells = cells.flat_map(|cell| &self.cells[cell * self.stride..(cell + 1) * self.stride]);
         let cells: Vec<u32> = cells.copied().collect();
-        let nodes = self.among(cells.iter().copied());
+        let nodes = Self::among(cells.iter().copied());
         (self.on(&cells, &nodes), nodes)
     }
 
     /// These nodes, sorted, each once.
-    pub fn among(&self, nodes: impl Iterator<Item = u32>) -> Vec<u32> {
-        let mut is_one = vec![false; self.nodes.len()];
-        nodes.for_each(|node| is_one[node as usize] = true);
-        (0..).zip(is_one).filter(|(_, is_one)| *is_one).map(|(node, _)| node).collect()
+    pub fn among(nodes: impl Iterator<Item = u32> + Clone) -> Vec<u32> {
+        Numbering::in_order(nodes).points().collect()
     }
 
     /// Cells with nodes among these, which are sorted and get the numbers of their places. Surfaces of the mesh are not known there.
     pub fn on(&self, cells: &[u32], nodes: &[u32]) -> Self {
-        let mut number = vec![u32::MAX; self.nodes.len()];
-        (0..).zip(nodes).for_each(|(place, &node)| number[node as usize] = place);
+        let number = Numbering::in_order(nodes.iter().copied());
         Space {
-            nodes: nodes.iter().map(|&node| self.nodes[node as usize]).collect(),
-            cells: cells.iter().map(|&node| number[node as usize]).collect(),
+            nodes: nodes.iter().map(|&node| self.nodes[node as usize]).collect::<Vec<_>>().into(),
+            cells: cells.iter().filter_map(|&node| number.get(node)).collect(),
             from_mesh: Numbering::default(),
             measure: OnceCell::new(),
             ..*self
         }
     }
 
-    /// The meridian of a body of revolution. Nodes whose radius is rounding of the largest one get the radius zero.
-    pub fn revolved(mut self) -> Self {
-        let largest = self.nodes.iter().fold(0.0, |max: f64, x| max.max(x[0].abs()));
+    /// The largest radius of the nodes that are known here.
+    pub fn largest_radius(&self) -> f64 {
+        self.nodes.iter().fold(0.0, |max: f64, x| max.max(x[0].abs()))
+    }
+
+    /// The meridian of a body of revolution. Nodes whose radius is rounding of the `largest` one get the radius zero.
+    pub fn revolved(mut self, largest: f64) -> Self {
         self.nodes.iter_mut().filter(|x| x[0].abs() <= ON_AXIS * largest).for_each(|x| x[0] = 0.0);
         self.axisymmetric = true;
         self
@@ -272,11 +277,13 @@ impl<const D: usize> Space<D> {
 
     /// The facets of a mesh group (of dimension `D - 1`) that bound a cell of this body, oriented outwards.
     pub fn facets(&self, group: &Group) -> Facets<D> {
-        let mut on_group = vec![false; self.nodes.len()];
+        // where cells are few, a place may stand for several nodes: `wanted` decides
+        let mut on_group = vec![false; self.cells.len().next_power_of_two()];
+        let at = |node: u32| node as usize & (self.cells.len().next_power_of_two() - 1);
         let mut wanted: HashMap<[u32; D], usize> = HashMap::new();
         for points in group.connectivity.chunks_exact(group.stride) {
             if let Some(nodes) = self.simplex(points, D - 1) {
-                nodes[..D].iter().for_each(|&node| on_group[node as usize] = true);
+                nodes[..D].iter().for_each(|&node| on_group[at(node)] = true);
                 let next = wanted.len();
                 wanted.entry(key(&nodes)).or_insert(next);
             }
@@ -284,7 +291,7 @@ impl<const D: usize> Space<D> {
         // the cell next to each facet decides which way is out
         let mut found = vec![None; wanted.len()];
         for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
-            let touching = cell[..=D].iter().filter(|&&node| on_group[node as usize]).count();
+            let touching = cell[..=D].iter().filter(|&&node| on_group[at(node)]).count();
             if touching < D {
                 continue;
             }

@@ -2,26 +2,30 @@
 
 use super::assemble::{NodalBlock, interpolate};
 use super::element;
+use super::forces::NodalForces;
+use super::frame::place;
 use super::quadrature::{self, Parts};
 use super::space::{Facets, Space, area_vector};
 use crate::problem::order::Order;
 
-/// Adds a surface load to `load`; `traction(x, n)` is force per area at a point with outer unit normal n.
+/// Nodal forces of a surface load; `traction(x, n)` is force per area at a point with outer unit normal n.
 pub fn surface_load<const D: usize>(
     space: &Space<D>,
     facets: &Facets<D>,
     parts: Parts,
     traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
-    load: &mut [f64],
-) {
+) -> NodalForces<D> {
+    let of_surface = facets.distinct_nodes();
+    let mut load = vec![0.0; D * of_surface.len()];
     on_facets(space, facets, parts, &mut |nodes, phi, weight, x, normal| {
         let force = traction(x, normal);
-        for (a, &node) in nodes.iter().enumerate() {
+        for (a, at) in nodes.iter().enumerate().filter_map(|(a, &node)| Some((a, place(&of_surface, node)?))) {
             for c in 0..D {
-                load[D * node as usize + c] += weight * phi[a] * force[c];
+                load[D * at as usize + c] += weight * phi[a] * force[c];
             }
         }
     });
+    NodalForces::new(of_surface.into_iter(), &load)
 }
 
 /// What is done at an integration point of a surface: nodes of the facet, their shape functions, weight, place, outer unit

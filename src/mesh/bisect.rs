@@ -6,7 +6,8 @@
 //! Iterations of all linear steps with hypre on 1, 2, 3, 5, 8 ranks: groove3d n = 24 50, 53, 54, 54, 54; hertz-sphere n = 26, edge = 1, P1 53, 58,
 //! 57, 52, 55; flange 110, 109, 109, 113, 107. Parts that METIS made of the graph of the nodes took as many to some per cent.
 
-use crate::linalg::pad;
+use crate::exchange::{Exchange, share};
+use crate::linalg::{bounds, pad};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -26,18 +27,61 @@ struct Cut {
     number: u32,
 }
 
+/// A point that is to be cut from others: where it is, and its number among all.
+pub type Point<const D: usize> = ([f64; D], u32);
+
+/// Points that are to be cut into some parts.
+struct Piece {
+    /// Those of this rank.
+    own: Vec<u32>,
+    parts: Range<usize>,
+    /// The place of the first of its cuts.
+    place: usize,
+}
+
+/// The search for the cut of a piece.
+struct Search {
+    axis: usize,
+    /// Points of this rank that may be the first above the cut.
+    candidates: Vec<u32>,
+    /// The first known to be above.
+    found: Option<Cut>,
+    /// Weight that points before the first one above may have, from the first candidate on.
+    share: f64,
+    /// Whether a rank has candidates.
+    is_open: bool,
+}
+
+/// How many of its candidates a rank proposes at once: each round leaves about one of them in so many.
+const PROPOSED: usize = 16;
+
 impl Cuts {
-    /// Of `count` points into `parts` of equal weight to that of one point: across the longest side of the box around them, then likewise on either
-    /// side. `at` says where a point is.
+    /// Of the points of all ranks, of which this one has `count`, into `parts` of equal weight to that of one point: across the longest side of the
+    /// box around them, then likewise on either side. Collective.
     pub fn new<const D: usize>(
         count: usize,
-        at: impl Fn(u32) -> [f64; D],
+        at: &dyn Fn(u32) -> Point<D>,
         weight: &dyn Fn(u32) -> u64,
         parts: usize,
+        exchange: &dyn Exchange,
     ) -> Self {
         let mut cuts = Self { parts, cuts: vec![None; parts.saturating_sub(1)] };
-        let mut order: Vec<u32> = if parts > 1 { (0..count as u32).collect() } else { Vec::new() };
-        cuts.split((&at, weight), &mut order, 0..parts, 0);
+        let mut pieces = vec![Piece { own: (0..count as u32).collect(), parts: 0..parts, place: 0 }];
+        pieces.retain(|piece| piece.parts.len() > 1);
+        while !pieces.is_empty() {
+            let found = search(&pieces, at, weight, exchange);
+            let mut next = Vec::new();
+            for (Piece { own, parts, place }, cut) in pieces.into_iter().zip(found) {
+                cuts.cuts[place] = cut;
+                let middle = parts.start + parts.len() / 2;
+                let is_above = |point: &u32| cut.is_some_and(|cut| cut.is_below(at(*point)));
+                let (above, below) = own.into_iter().partition(is_above);
+                next.push(Piece { own: below, parts: parts.start..middle, place: place + 1 });
+                next.push(Piece { own: above, parts: middle..parts.end, place: place + middle - parts.start });
+            }
+            pieces = next;
+            pieces.retain(|piece| piece.parts.len() > 1);
+        }
         cuts
     }
 
@@ -46,10 +90,7 @@ impl Cuts {
         let (mut parts, mut place) = (0..self.parts, 0);
         while parts.len() > 1 {
             let middle = parts.start + parts.len() / 2;
-            let is_above = |cut: &Cut| {
-                let of_cut = std::array::from_fn(|c| cut.at[c]);
-                compare(cut.axis, (x, number), (&of_cut, cut.number)).is_ge()
-            };
+            let is_above = |cut: &Cut| cut.is_below((*x, number));
             if self.cuts[place].as_ref().is_some_and(is_above) {
                 place += middle - parts.start;
                 parts.start = middle;
@@ -60,48 +101,117 @@ impl Cuts {
         }
         parts.start
     }
+}
 
-    /// Cuts the points of these numbers into some parts; the first of the cuts has this place.
-    fn split<const D: usize>(
-        &mut self,
-        all: (&impl Fn(u32) -> [f64; D], &dyn Fn(u32) -> u64),
-        these: &mut [u32],
-        parts: Range<usize>,
-        place: usize,
-    ) {
-        if parts.len() < 2 || these.is_empty() {
-            return;
+impl Cut {
+    /// Whether the cut is below a point.
+    fn is_below<const D: usize>(&self, point: Point<D>) -> bool {
+        compare(self.axis, point, self.point()).is_ge()
+    }
+
+    fn point<const D: usize>(&self) -> Point<D> {
+        (std::array::from_fn(|c| self.at[c]), self.number)
+    }
+}
+
+/// The first point above the cut of each of these pieces; none where there is none. Collective.
+fn search<const D: usize>(
+    pieces: &[Piece],
+    at: &dyn Fn(u32) -> Point<D>,
+    weight: &dyn Fn(u32) -> u64,
+    exchange: &dyn Exchange,
+) -> Vec<Option<Cut>> {
+    let weigh = |points: &[u32]| points.iter().map(|&point| weight(point)).sum::<u64>() as f64;
+    let around = |own: &[u32]| (!own.is_empty()).then(|| bounds(own.iter().map(|&point| pad(at(point).0))));
+    let mine: Vec<_> = pieces.iter().map(|Piece { own, .. }| (around(own), weigh(own))).collect();
+    let all = share(exchange, mine);
+    let of_piece = |(number, piece): (usize, &Piece)| {
+        let [low, high] = bounds(all.iter().filter_map(|of_rank| of_rank[number].0).flatten());
+        let axis = (0..D).rev().max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0);
+        let total = all.iter().map(|of_rank| of_rank[number].1).sum::<f64>() as u64;
+        let share = (total * (piece.parts.len() / 2) as u64 / piece.parts.len() as u64) as f64;
+        Search { axis, candidates: piece.own.clone(), found: None, share, is_open: true }
+    };
+    let mut searches: Vec<Search> = pieces.iter().enumerate().map(of_piece).collect();
+    while searches.iter().any(|search| search.is_open) {
+        let mine: Vec<Vec<Cut>> = searches.iter().map(|search| search.propose(at)).collect();
+        let mut proposed: Vec<Vec<Cut>> = searches.iter().map(|_| Vec::new()).collect();
+        for of_rank in share(exchange, mine) {
+            proposed.iter_mut().zip(of_rank).for_each(|(all, more)| all.extend(more));
         }
-        let (at, weight) = all;
-        let size = |axis: usize| {
-            let along = || these.iter().map(|&point| at(point)[axis]);
-            along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
-        };
-        let axis = (0..D).rev().max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
-        let order = |&a: &u32, &b: &u32| compare(axis, (&at(a), a), (&at(b), b));
-        let weigh = |these: &[u32]| these.iter().map(|&point| weight(point)).sum::<u64>();
-        let middle = parts.start + parts.len() / 2;
-        let mut share = weigh(these) * (middle - parts.start) as u64 / parts.len() as u64;
-        // those before `low` are below the cut, those from `high` on above it
-        let (mut low, mut high) = (0, these.len());
-        while low < high {
-            let half = (low + high) / 2;
-            these[low..high].select_nth_unstable_by(half - low, order);
-            match share.checked_sub(weigh(&these[low..=half])) {
-                Some(rest) => (low, share) = (half + 1, rest),
-                None => high = half,
+        proposed.iter_mut().for_each(|cuts| cuts.sort_unstable_by(|a, b| compare::<D>(a.axis, a.point(), b.point())));
+        // of candidates from each proposed point down to the one before: their weight, and how many they are
+        let mut sums: Vec<Vec<[f64; 2]>> = Vec::new();
+        let mut places: Vec<Vec<u32>> = Vec::new();
+        for (search, cuts) in searches.iter().zip(&proposed) {
+            let is_before = |cut: &Cut, x: Point<D>| compare(cut.axis, cut.point(), x).is_lt();
+            let place = |&point: &u32| cuts.partition_point(|cut| is_before(cut, at(point))) as u32;
+            places.push(search.candidates.iter().map(place).collect());
+            let mut of_search = vec![[0.0; 2]; cuts.len() + 1];
+            for (&point, &place) in search.candidates.iter().zip(&places[places.len() - 1]) {
+                of_search[place as usize][0] += weight(point) as f64;
+                of_search[place as usize][1] += 1.0;
             }
+            sums.push(of_search);
         }
-        let (below, above) = these.split_at_mut(low);
-        let first = above.iter().copied().min_by(order);
-        self.cuts[place] = first.map(|number| Cut { axis, at: pad(at(number)), number });
-        self.split(all, below, parts.start..middle, place + 1);
-        self.split(all, above, middle..parts.end, place + middle - parts.start);
+        let mut all = sums.concat();
+        exchange.sum(all.as_flattened_mut());
+        let mut rest = &all[..];
+        for ((search, cuts), places) in searches.iter_mut().zip(&proposed).zip(&places) {
+            let own;
+            (own, rest) = rest.split_at(cuts.len() + 1);
+            search.narrow(cuts, own, places, at);
+        }
+    }
+    searches.into_iter().map(|search| search.found).collect()
+}
+
+impl Search {
+    /// Some candidates of this rank, by steps that no regular order of them shares.
+    fn propose<const D: usize>(&self, at: &dyn Fn(u32) -> Point<D>) -> Vec<Cut> {
+        let count = self.candidates.len();
+        let golden = |k: usize| ((k as f64 * 0.618_033_988_749_895).fract() * count as f64) as usize;
+        let places: Vec<usize> =
+            if count <= PROPOSED { (0..count).collect() } else { (0..PROPOSED).map(golden).collect() };
+        let cut = |place: usize| {
+            let (x, number) = at(self.candidates[place]);
+            Cut { axis: self.axis, at: pad(x), number }
+        };
+        places.into_iter().map(cut).collect()
+    }
+
+    /// Chooses between proposed points, with the sums of weights and numbers of candidates up to each and above all; own candidates have these
+    /// `places` between them.
+    fn narrow<const D: usize>(
+        &mut self,
+        proposed: &[Cut],
+        sums: &[[f64; 2]],
+        places: &[u32],
+        at: &dyn Fn(u32) -> Point<D>,
+    ) {
+        let mut chosen = proposed.len();
+        for (place, [weight, _]) in sums[..proposed.len()].iter().enumerate() {
+            if *weight > self.share {
+                chosen = place;
+                break;
+            }
+            self.share -= weight;
+        }
+        let mut left = sums[chosen][1];
+        if let Some(&cut) = proposed.get(chosen) {
+            self.found = Some(cut);
+            left -= 1.0;
+        }
+        self.is_open = left > 0.0;
+        let is_left = |&(&point, &place): &(&u32, &u32)| {
+            place as usize == chosen && self.is_open && proposed.get(chosen).is_none_or(|cut| cut.number != at(point).1)
+        };
+        self.candidates = self.candidates.iter().zip(places).filter(is_left).map(|(&point, _)| point).collect();
     }
 }
 
 /// The order of two points along an axis; planes of equal coordinates are cut along the other axes.
-fn compare<const D: usize>(axis: usize, a: (&[f64; D], u32), b: (&[f64; D], u32)) -> Ordering {
+fn compare<const D: usize>(axis: usize, a: Point<D>, b: Point<D>) -> Ordering {
     let along = (0..D).map(|k| (axis + k) % D).map(|c| a.0[c].total_cmp(&b.0[c]));
     along.fold(Ordering::Equal, Ordering::then).then(a.1.cmp(&b.1))
 }
@@ -109,9 +219,10 @@ fn compare<const D: usize>(axis: usize, a: (&[f64; D], u32), b: (&[f64; D], u32)
 #[cfg(test)]
 mod tests {
     use super::Cuts;
+    use crate::exchange::{Serial, crowd};
 
     fn of<const D: usize>(points: &[[f64; D]], weight: &dyn Fn(u32) -> u64, parts: usize) -> Vec<usize> {
-        let cuts = Cuts::new(points.len(), |point| points[point as usize], weight, parts);
+        let cuts = Cuts::new(points.len(), &|point| (points[point as usize], point), weight, parts, &Serial);
         points.iter().zip(0..).map(|(x, number)| cuts.part(x, number)).collect()
     }
 
@@ -142,5 +253,28 @@ mod tests {
         assert!(few[0] < few[1] && few[1] < 5);
         assert!(parts::<2>(&[], 3).is_empty());
         assert_eq!(Cuts::default().part(&[1.0, 2.0], 3), 0);
+    }
+
+    /// Ranks with some of the points each find the cuts of one that has all, whatever the weights.
+    #[test]
+    fn ranks_cut_together() {
+        let points: Vec<[f64; 3]> =
+            (0..3000).map(|i| [f64::from(i % 10), f64::from(i / 10 % 15), 0.1 * f64::from(i / 150 % 7)]).collect();
+        let weight = |number: u32| u64::from(number % 5 + number / 1000);
+        for parts in [2, 3, 8, 13] {
+            let alone = of(&points, &weight, parts);
+            let mut sums = vec![0; parts];
+            alone.iter().zip(0..).for_each(|(&part, number)| sums[part] += weight(number));
+            let (least, most) = (sums.iter().min().expect("parts"), sums.iter().max().expect("parts"));
+            assert!(most - least < 30, "{sums:?}");
+            let together = crowd::on(4, |exchange| {
+                // the last rank has none
+                let own: Vec<u32> = (0..3000).filter(|number| number * 7 % 3 == exchange.rank() as u32).collect();
+                let at = |k: u32| (points[own[k as usize] as usize], own[k as usize]);
+                let cuts = Cuts::new(own.len(), &at, &|k| weight(own[k as usize]), parts, exchange);
+                points.iter().zip(0..).map(|(x, number)| cuts.part(x, number)).collect::<Vec<_>>()
+            });
+            assert!(together.iter().all(|of_rank| *of_rank == alone), "{parts}");
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Cuts, Group};
 use crate::error::Result;
-use crate::exchange::{Exchange, pack, unpack};
+use crate::exchange::{Exchange, Serial, pack, unpack};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -107,7 +107,7 @@ impl<'a> Dealer<'a> {
     pub fn begin<const D: usize, const K: usize>(&mut self, points: &[[f64; K]]) {
         self.reset();
         let at = |point: u32| first::<D, K>(&points[point as usize]);
-        self.cuts = Cuts::new(points.len(), at, &|_| 1, self.next.len());
+        self.cuts = Cuts::new(points.len(), &|point| (at(point), point), &|_| 1, self.next.len(), &Serial);
         self.all(&Message::Begin(self.cuts.clone()));
         self.owner = (0..points.len() as u32).map(|point| self.cuts.part(&at(point), point) as u32).collect();
         self.used = vec![false; points.len()];

@@ -289,10 +289,8 @@ impl Factory for Inner<'_> {
         let mut plans = Vec::new();
         // bodies for which the program is to choose
         let mut open = Vec::new();
-        for (index, &Outline { name, dimension, order, rows, prescribed, motions, motion, .. }) in
-            outlines.iter().enumerate()
-        {
-            let (dofs, retained) = (rows.columns, Retained::new(dimension, rows, prescribed, motions, motion));
+        for (index, &Outline { name, dimension, order, rows, prescribed, motions, .. }) in outlines.iter().enumerate() {
+            let (dofs, retained) = (rows.columns, Retained::new(dimension, rows, prescribed, motions));
             let chosen = self.typed.of(name);
             // a KSP of all bodies together wants them whole
             let typed = chosen.asks_for_ksp() || (self.may_join() && self.whole.asks_for_ksp());

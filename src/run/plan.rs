@@ -57,6 +57,7 @@ pub fn agree(plans: &mut [Plan]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fem::rigid::AtDofs;
     use crate::linalg::Csr;
     use crate::solver::options::Typed;
 
@@ -65,7 +66,7 @@ mod tests {
         let mut rows = Csr::new(30_000);
         (0..contact).for_each(|i| rows.push_row([(3 * i, 1.0)]));
         let prescribed: Vec<(usize, f64)> = (29_000..30_000).map(|dof| (dof, 0.0)).collect();
-        let retained = Some(Retained::new(3, &rows, &prescribed, 0, &|_, _| 0.0));
+        let retained = Some(Retained::new(3, &rows, &prescribed, AtDofs::NONE));
         let chosen = Typed::default().of(name);
         Plan {
             name: name.to_owned(),

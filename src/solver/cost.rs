@@ -187,6 +187,7 @@ fn analysed(body: &Candidate, (ptr, col): (&[u32], &[u32])) -> Result<Cost> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fem::rigid::AtDofs;
     use crate::linalg::Csr;
 
     /// Nodes of a box, each coupled to the next along its edges, and contact along z on those with z = 0.
@@ -203,7 +204,7 @@ mod tests {
                 rows.push_row([(3 * (i + x * (j + y * k)) + 2, 1.0)]);
             }
         }
-        (ptr, col, Retained::new(3, &rows, &[], 0, &|_, _| 0.0))
+        (ptr, col, Retained::new(3, &rows, &[], AtDofs::NONE))
     }
 
     fn of(sizes: &[[usize; 3]], step: Step) -> Comparison {

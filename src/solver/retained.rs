@@ -4,9 +4,10 @@
 //! that touch a node, the node is turned to axes (n, t, ...), and of its dofs one is left. Dofs of a few more nodes are
 //! retained where supports and contact do not hold the interior safely.
 
+use crate::fem::rigid::AtDofs;
 use crate::linalg::{Blocks, Csr, dot};
 use nalgebra::{DMatrix, DVector};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// Rows of a node count as parallel below this sine of their angle.
 const PARALLEL: f64 = 1e-12;
@@ -30,16 +31,9 @@ pub struct Retained {
 
 impl Retained {
     /// Chooses the dofs for contact `rows` (columns: all dofs, `dimension` of them a node), `prescribed` (dof, value) and the
-    /// `motions` of the free body, which are rigid: `motion` is what one of them does at a dof.
-    pub fn new(
-        dimension: usize,
-        rows: &Csr,
-        prescribed: &[(usize, f64)],
-        motions: usize,
-        motion: &dyn Fn(usize, usize) -> f64,
-    ) -> Self {
-        let mut is_prescribed = vec![false; rows.columns];
-        prescribed.iter().for_each(|entry| is_prescribed[entry.0] = true);
+    /// `motions` of the free body. Collective, if it has motions.
+    pub fn new(dimension: usize, rows: &Csr, prescribed: &[(usize, f64)], motions: AtDofs) -> Self {
+        let prescribed: HashSet<usize> = prescribed.iter().map(|entry| entry.0).collect();
         let mut vectors: BTreeMap<usize, Vec<Vec<f64>>> = BTreeMap::new();
         for q in 0..rows.rows() {
             let mut of_row: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
@@ -49,43 +43,42 @@ impl Retained {
             of_row.into_iter().for_each(|(node, vector)| vectors.entry(node).or_default().push(vector));
         }
         let axes = vectors.into_iter().filter_map(|(node, vectors)| {
-            let free = (node * dimension..(node + 1) * dimension).all(|dof| !is_prescribed[dof]);
+            let free = (node * dimension..(node + 1) * dimension).all(|dof| !prescribed.contains(&dof));
             let normal = common_direction(&vectors).filter(|_| free)?;
             // along an axis of the scene nothing is to be turned
             (normal.iter().filter(|n| **n != 0.0).count() > 1).then(|| (node, frame(normal)))
         });
         let mut retained = Self { dofs: Vec::new(), rows: Csr::new(0), axes: axes.collect(), dimension };
         let turned = retained.turn_rows(rows);
-        let mut kept = vec![false; rows.columns];
-        turned.col.iter().for_each(|&dof| kept[dof as usize] = true);
-        retained.hold(&mut kept, &is_prescribed, motions, motion);
-        retained.dofs = (0..kept.len()).filter(|&dof| kept[dof]).collect();
+        let mut kept: BTreeSet<usize> = turned.col.iter().map(|&dof| dof as usize).collect();
+        retained.hold(&mut kept, &prescribed, motions);
+        retained.dofs = kept.into_iter().collect();
         let place = |dof: usize| retained.dofs.binary_search(&dof).ok();
         retained.rows = turned.of_columns(retained.dofs.len(), place);
         retained
     }
 
     /// Adds dofs until supports and retained dofs together hold every rigid motion.
-    fn hold(&self, kept: &mut [bool], is_prescribed: &[bool], motions: usize, motion: &dyn Fn(usize, usize) -> f64) {
+    fn hold(&self, kept: &mut BTreeSet<usize>, prescribed: &HashSet<usize>, motions: AtDofs) {
+        let AtDofs { count: motions, at: motion, largest } = motions;
         loop {
-            let (mut gram, mut count) = (DMatrix::zeros(motions, motions), 0);
-            for dof in (0..kept.len()).filter(|&dof| kept[dof] || is_prescribed[dof]) {
+            let mut gram = DMatrix::zeros(motions, motions);
+            let held: BTreeSet<usize> = kept.iter().chain(prescribed).copied().collect();
+            for &dof in &held {
                 let at = DVector::from_fn(motions, |k, _| self.turned(dof, |dof| motion(k, dof)));
                 gram.syger(1.0, &at, &at, 1.0);
-                count += 1;
             }
             gram.fill_upper_triangle_with_lower_triangle();
-            let free = Blocks::free(&gram, count.max(1) as f64, SAFE);
+            let free = Blocks::free(&gram, held.len().max(1) as f64, SAFE);
             let Some(weights) = free.first() else { return };
             let size = |dof: usize| {
                 let sum = |dof: usize| (0..motions).map(|k| weights[k] * motion(k, dof)).sum();
-                self.turned(dof, sum).abs() / weights.amax()
+                (!held.contains(&dof)).then(|| self.turned(dof, sum).abs() / weights.amax())
             };
-            let candidates = (0..kept.len()).filter(|&dof| !kept[dof] && !is_prescribed[dof]);
-            match candidates.map(|dof| (dof, size(dof))).max_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some((dof, size)) if size > 1e-3 => kept[dof] = true,
+            match largest(&size) {
+                Some((dof, size)) if size > 1e-3 => kept.insert(dof),
                 _ => return,
-            }
+            };
         }
     }
 
@@ -227,14 +220,19 @@ fn frame(normal: Vec<f64>) -> Vec<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::rigid;
+    use crate::fem::{Extent, rigid};
 
     /// Nodes of a square with side 2; the dofs of node i are 2 i and 2 i + 1.
     const NODES: [[f64; 2]; 4] = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
 
     fn of(rows: &Csr, prescribed: &[(usize, f64)]) -> Retained {
-        let motions = rigid::modes(|| NODES.iter());
-        Retained::new(2, rows, prescribed, 3, &|k, dof| motions[k].at(&NODES[dof / 2])[dof % 2])
+        let motions = rigid::modes(&Extent::of(NODES.into_iter()));
+        let at = |k: usize, dof: usize| motions[k].at(&NODES[dof / 2])[dof % 2];
+        let largest = |size: &dyn Fn(usize) -> Option<f64>| {
+            let sizes = (0..8).filter_map(|dof| Some((dof, size(dof)?)));
+            sizes.max_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        Retained::new(2, rows, prescribed, AtDofs { count: 3, at: &at, largest: &largest })
     }
 
     fn rows(list: &[&[(usize, f64)]]) -> Csr {

@@ -1,0 +1,67 @@
+//! Points of which only this is known: how many there are, their mean, and the box around them.
+
+use crate::linalg::pad;
+use serde::{Deserialize, Serialize};
+
+/// How many points there are, and where: what their rigid motions depend on.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct Extent {
+    count: usize,
+    sum: [f64; 3],
+    /// The corners of the box around them.
+    bounds: [[f64; 3]; 2],
+}
+
+impl Default for Extent {
+    fn default() -> Self {
+        Self { count: 0, sum: [0.0; 3], bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]] }
+    }
+}
+
+impl Extent {
+    /// Of these points.
+    pub fn of<const D: usize>(points: impl Iterator<Item = [f64; D]>) -> Self {
+        points.fold(Self::default(), |all, x| {
+            let x = pad(x);
+            all.join(&Self { count: 1, sum: x, bounds: [x; 2] })
+        })
+    }
+
+    /// Of these points and others.
+    #[must_use]
+    pub fn join(&self, others: &Self) -> Self {
+        let ([low, high], [others_low, others_high]) = (self.bounds, others.bounds);
+        Self {
+            count: self.count + others.count,
+            sum: std::array::from_fn(|c| self.sum[c] + others.sum[c]),
+            bounds: [
+                std::array::from_fn(|c| low[c].min(others_low[c])),
+                std::array::from_fn(|c| high[c].max(others_high[c])),
+            ],
+        }
+    }
+
+    /// Their mean.
+    pub fn mean<const D: usize>(&self) -> [f64; D] {
+        std::array::from_fn(|c| self.sum[c] / self.count.max(1) as f64)
+    }
+
+    /// The largest distance of a point from the mean along an axis; positive.
+    pub fn farthest<const D: usize>(&self) -> f64 {
+        let mean: [f64; D] = self.mean();
+        let along = |c: usize| self.bounds.map(|x| (x[c] - mean[c]).abs());
+        (0..D).filter(|_| self.count > 0).flat_map(along).fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    /// The largest side of the box around the points.
+    pub fn size(&self) -> f64 {
+        let [low, high] = self.bounds;
+        (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max)
+    }
+
+    /// The corners of this box: a rigid motion that moves none of them moves no point.
+    pub fn corners<const D: usize>(&self) -> impl Iterator<Item = [f64; D]> {
+        let bounds = self.bounds;
+        (0..1 << D).map(move |corner: usize| std::array::from_fn(|c| bounds[corner >> c & 1][c]))
+    }
+}

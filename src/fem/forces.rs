@@ -1,0 +1,92 @@
+//! Forces at nodes of a body.
+
+use super::{pad, place};
+use crate::linalg::dot;
+
+/// Forces at nodes, without those that are zero: most loads are on surfaces.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct NodalForces<const D: usize> {
+    /// Their nodes, sorted, each once.
+    nodes: Vec<u32>,
+    forces: Vec<[f64; D]>,
+}
+
+impl<const D: usize> NodalForces<D> {
+    /// From the forces at `nodes`, which are sorted, `D` components each.
+    pub fn new(nodes: impl Iterator<Item = u32>, forces: &[f64]) -> Self {
+        let forces = forces.chunks_exact(D).map(|force| std::array::from_fn(|c| force[c]));
+        let (nodes, forces) = nodes.zip(forces).filter(|(_, force): &(u32, [f64; D])| *force != [0.0; D]).unzip();
+        Self { nodes, forces }
+    }
+
+    /// Nodes and their forces.
+    pub fn iter(&self) -> impl Iterator<Item = (u32, [f64; D])> {
+        self.nodes.iter().copied().zip(self.forces.iter().copied())
+    }
+
+    /// These and other forces together.
+    #[must_use]
+    pub fn and(self, others: Self) -> Self {
+        if self.nodes.is_empty() || others.nodes.is_empty() {
+            return if self.nodes.is_empty() { others } else { self };
+        }
+        // of a node the force of `self` comes first
+        self.iter().chain(others.iter()).collect()
+    }
+
+    /// Those at nodes for which `keep` holds.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(u32) -> bool) -> Self {
+        let (nodes, forces) = self.iter().filter(|(node, _)| keep(*node)).unzip();
+        Self { nodes, forces }
+    }
+
+    /// Their sum.
+    pub fn sum(&self) -> [f64; 3] {
+        self.forces.iter().fold([0.0; 3], |sum, &force| {
+            let force = pad(force);
+            std::array::from_fn(|c| sum[c] + force[c])
+        })
+    }
+
+    /// Their work on a displacement, and the largest that forces and displacements of these sizes can do, node by node.
+    pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [f64; 2] {
+        let size = |v: &[f64]| dot(v, v).sqrt();
+        self.iter().fold([0.0; 2], |[work, largest], (node, force)| {
+            let u = at(node);
+            [u.iter().zip(force).fold(work, |work, (u, f)| work + u * f), largest + size(&u) * size(&force)]
+        })
+    }
+
+    /// Forces at all dofs of a body with so many nodes.
+    pub fn all(&self, nodes: usize) -> Vec<f64> {
+        let mut all = vec![0.0; D * nodes];
+        self.iter().for_each(|(node, force)| all[D * node as usize..][..D].copy_from_slice(&force));
+        all
+    }
+
+    /// Those at some nodes, which are sorted, by their places among these.
+    #[must_use]
+    pub fn on(&self, nodes: &[u32]) -> Self {
+        let (nodes, forces) = self.iter().filter_map(|(node, force)| Some((place(nodes, node)?, force))).unzip();
+        Self { nodes, forces }
+    }
+
+    /// Whether all of them are numbers.
+    pub fn is_finite(&self) -> bool {
+        self.forces.as_flattened().iter().all(|f| f.is_finite())
+    }
+}
+
+impl<const D: usize> FromIterator<(u32, [f64; D])> for NodalForces<D> {
+    /// Of forces at nodes in any order: those of one node are added in their order.
+    fn from_iter<I: IntoIterator<Item = (u32, [f64; D])>>(forces: I) -> Self {
+        let mut all: Vec<(u32, [f64; D])> = forces.into_iter().collect();
+        all.sort_by_key(|entry| entry.0);
+        let sum = |at: &[(u32, [f64; D])]| {
+            (at[0].0, at[1..].iter().fold(at[0].1, |sum, (_, force)| std::array::from_fn(|c| sum[c] + force[c])))
+        };
+        let (nodes, forces) = all.chunk_by(|a, b| a.0 == b.0).map(sum).unzip();
+        Self { nodes, forces }
+    }
+}
