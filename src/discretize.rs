@@ -80,6 +80,8 @@ pub struct Discrete {
     pub assemblies: usize,
     /// Those that an earlier scene has left.
     pub assemblies_avoided: usize,
+    /// Nodes of all bodies whose places this rank knew when dofs were dealt out.
+    pub known_nodes: usize,
 }
 
 /// Turns a scene and its mesh into a model.
@@ -144,6 +146,7 @@ pub fn discretize<const D: usize>(
     let is_dealt = |body: usize| deals.iter().any(|deal| deal.bodies.contains(&body));
     let loads = parts.iter().enumerate().map(|(body, part)| if is_dealt(body) { 0 } else { part.space.dofs() });
     let mut owner = crate::parallel::owners(&loads.collect::<Vec<_>>(), exchange.ranks());
+    let known_nodes = parts.iter().map(|part| part.space.nodes.known().count()).sum();
     let needs = if keep { vec![Needs::Everywhere; parts.len()] } else { Needs::of(&owner, &deals) };
     let (totals, warnings) = together(&parts, &drafts, scene.plane, others);
     let mut loads: Vec<_> = drafts.iter_mut().map(|draft| &mut draft.nodal_load).collect();
@@ -237,7 +240,8 @@ pub fn discretize<const D: usize>(
     offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
     model.carry(&carried);
     let Counts { assemblies, avoided: assemblies_avoided } = counts;
-    Ok(Discrete { model, bodies: infos, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided })
+    let bodies = infos;
+    Ok(Discrete { model, bodies, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided, known_nodes })
 }
 
 impl Discrete {

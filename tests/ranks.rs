@@ -129,6 +129,35 @@ fn rows_are_dealt_out() {
     }
 }
 
+/// To deal out the dofs a rank knows the places of nodes near its own ones and of surfaces: on eight ranks
+/// less than two fifths of those of a cube of 24 cells a side.
+#[test]
+fn no_rank_knows_all_nodes() {
+    let sets = ["--set", "mesh.set={nl=24,nu=2}", "--set", "solver=hypre", "--set", "method={}"];
+    let known = |run: Run| run.converged().count("known_nodes");
+    let all = known(solve(case("patch-3d"), &sets));
+    assert_eq!(all, 25usize.pow(3) + 27);
+    let few = known(solve_on(8, case("patch-3d"), &sets));
+    assert!(few > all / 8 && few < 2 * all / 5, "{few} of {all}");
+}
+
+/// What the user should know is that of one rank, although most of five ranks have no cell of the body with linear elements at its least Poisson's
+/// ratio, none of another, and parts of bodies are smaller than these.
+#[test]
+fn warnings_are_those_of_one_rank() {
+    let near = "body.0.poisson=\"0.2 + 0.295*x\"";
+    let sets = ["--set", "solver=hypre", "--method", "newton", "--set", near, "--set", "body.0.order=1"];
+    let warnings = |run: Run| run.report["warnings"].clone();
+    let one = warnings(solve(case("manufactured"), &sets));
+    assert!(
+        ["a tenth of the body's size: lower, upper", "Poisson's ratio is 0.4"]
+            .iter()
+            .all(|words| one.to_string().contains(words)),
+        "{one}"
+    );
+    assert_eq!(warnings(solve_on(5, case("manufactured"), &sets)), one);
+}
+
 /// A product with the matrix takes each rank as many operations, although rows of quadratic elements are longer, and those at the contact: PETSc
 /// prints the ratio of the most to the least with one decimal.
 #[test]

@@ -1,6 +1,6 @@
 //! Points of which only this is known: how many there are, their mean, and the box around them.
 
-use crate::linalg::pad;
+use crate::linalg::{around, bounds, pad};
 use serde::{Deserialize, Serialize};
 
 /// How many points there are, and where: what their rigid motions depend on.
@@ -14,7 +14,7 @@ pub struct Extent {
 
 impl Default for Extent {
     fn default() -> Self {
-        Self { count: 0, sum: [0.0; 3], bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]] }
+        Self { count: 0, sum: [0.0; 3], bounds: bounds([]) }
     }
 }
 
@@ -30,14 +30,10 @@ impl Extent {
     /// Of these points and others.
     #[must_use]
     pub fn join(&self, others: &Self) -> Self {
-        let ([low, high], [others_low, others_high]) = (self.bounds, others.bounds);
         Self {
             count: self.count + others.count,
             sum: std::array::from_fn(|c| self.sum[c] + others.sum[c]),
-            bounds: [
-                std::array::from_fn(|c| low[c].min(others_low[c])),
-                std::array::from_fn(|c| high[c].max(others_high[c])),
-            ],
+            bounds: around(self.bounds, others.bounds),
         }
     }
 

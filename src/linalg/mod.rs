@@ -20,9 +20,12 @@ use serde::{Deserialize, Serialize};
 
 /// Least and largest coordinates of points, the corners of the box around them; without points the least ones are infinite.
 pub fn bounds<const K: usize>(points: impl IntoIterator<Item = [f64; K]>) -> [[f64; K]; 2] {
-    points.into_iter().fold([[f64::INFINITY; K], [f64::NEG_INFINITY; K]], |[low, high], x| {
-        [std::array::from_fn(|c| low[c].min(x[c])), std::array::from_fn(|c| high[c].max(x[c]))]
-    })
+    points.into_iter().fold([[f64::INFINITY; K], [f64::NEG_INFINITY; K]], |all, x| around(all, [x; 2]))
+}
+
+/// The box around two boxes, of which one may have no points.
+pub fn around<const K: usize>(a: [[f64; K]; 2], b: [[f64; K]; 2]) -> [[f64; K]; 2] {
+    [std::array::from_fn(|c| a[0][c].min(b[0][c])), std::array::from_fn(|c| a[1][c].max(b[1][c]))]
 }
 
 /// A vector of 2 or 3 components as 3.

@@ -7,7 +7,7 @@
 //! 57, 52, 55; flange 110, 109, 109, 113, 107. Parts that METIS made of the graph of the nodes took as many to some per cent.
 
 use crate::exchange::{Exchange, share};
-use crate::linalg::{bounds, pad};
+use crate::linalg::{around, bounds, pad};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -122,11 +122,11 @@ fn search<const D: usize>(
     exchange: &dyn Exchange,
 ) -> Vec<Option<Cut>> {
     let weigh = |points: &[u32]| points.iter().map(|&point| weight(point)).sum::<u64>() as f64;
-    let around = |own: &[u32]| (!own.is_empty()).then(|| bounds(own.iter().map(|&point| pad(at(point).0))));
-    let mine: Vec<_> = pieces.iter().map(|Piece { own, .. }| (around(own), weigh(own))).collect();
+    let of_own = |Piece { own, .. }: &Piece| (bounds(own.iter().map(|&point| pad(at(point).0))), weigh(own));
+    let mine: Vec<_> = pieces.iter().map(of_own).collect();
     let all = share(exchange, mine);
     let of_piece = |(number, piece): (usize, &Piece)| {
-        let [low, high] = bounds(all.iter().filter_map(|of_rank| of_rank[number].0).flatten());
+        let [low, high] = all.iter().map(|of_rank| of_rank[number].0).fold(bounds([]), around);
         let axis = (0..D).rev().max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0);
         let total = all.iter().map(|of_rank| of_rank[number].1).sum::<f64>() as u64;
         let share = (total * (piece.parts.len() / 2) as u64 / piece.parts.len() as u64) as f64;

@@ -4,7 +4,7 @@ use super::stages::Done;
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Result, few};
 use crate::exchange::share;
-use crate::linalg::bounds;
+use crate::linalg::{around, bounds};
 use crate::output::{BodyField, BodyReport};
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
@@ -106,7 +106,7 @@ impl Found {
             .zip(other.norms)
             .map(|(a, b)| std::array::from_fn(|of| std::array::from_fn(|norm| f64::hypot(a[of][norm], b[of][norm]))));
         let displacement = self.displacement.max(other.displacement);
-        let extent = bounds([self.extent, other.extent].concat());
+        let extent = around(self.extent, other.extent);
         // NaN is above all numbers
         let larger = if other.von_mises.total_cmp(&self.von_mises).is_gt() { other } else { self };
         Self { principal: [low.min(least), high.max(largest)], displacement, extent, norms, ..larger }

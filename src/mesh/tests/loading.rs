@@ -132,10 +132,12 @@ fn free_meshes_in_space_by_threads() {
         let guard = Guard { threads, ..Guard::default() };
         let limits = (&guard, &Interrupt::default());
         let loaded = from_script::<3>(&located(geo.clone()), (&[], &[]), None, Order::P1, limits, &cache).unwrap();
-        (loaded.origin, loaded.mesh.points.len())
+        (loaded.origin, loaded.mesh.points)
     };
     let ((_, usual), (origin, parallel)) = (run(None), run(Some(1)));
     assert_eq!(origin, Origin::Gmsh);
-    assert!(usual != parallel && usual.abs_diff(parallel) < usual / 4, "{usual} {parallel}");
+    // as many points, perhaps, but others
+    let counts = [&usual, &parallel].map(Vec::len);
+    assert!(usual != parallel && counts[0].abs_diff(counts[1]) < counts[0] / 4, "{counts:?}");
     assert_eq!((run(Some(2)), run(None)), ((Origin::Cache, parallel), (Origin::Cache, usual)));
 }
