@@ -39,7 +39,7 @@ fn the_choice_of_solvers_is_that_of_one_rank() {
 /// known there, too.
 #[test]
 fn one_rank_reads_the_mesh() {
-    let words = ["--method", "newton", "--set", "mesh.set.n=4", "--set", "solver=hypre", "--set", STOP];
+    let words = ["--method", "newton", "--set", "mesh.set.n=8", "--set", "solver=hypre", "--set", STOP];
     let rigid = ["--set", "body.0.fix=[{on=\"lower\",x=0,y=0,z=0}]", "--set", "body.0.load=[]"];
     let elsewhere = TempDir::new().expect("a temporary folder");
     let scene = elsewhere.path().join("scene.toml");
@@ -81,7 +81,7 @@ fn run(ranks: usize, (scene, sets): (&str, &[&str]), solver: &str) -> Run {
     .converged()
 }
 
-/// The pressures of one rank on several, to 1e-8 of the peak, and Newton's steps to one.
+/// The pressures of one rank on several, to 1e-8 of the peak, the approach of the first pair, and Newton's steps to one.
 fn same_on(ranks: &[usize], solver: &str) {
     for scene in SCENES {
         let serial = run(1, scene, solver);
@@ -93,6 +93,8 @@ fn same_on(ranks: &[usize], solver: &str) {
             assert_eq!(found.len(), expected.len(), "{} on {ranks}", scene.0);
             let apart = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(apart <= 1e-8 * peak, "{} on {ranks}: {:e} apart", scene.0, apart / peak);
+            let [far, near] = [&serial, &parallel].map(|run| run.number("pairs/0/approach"));
+            assert!((far - near).abs() <= 1e-7 * far.abs(), "{} on {ranks}: {far} {near}", scene.0);
             let steps = [&parallel, &serial].map(|run| run.count("iterations"));
             assert!(steps[0].abs_diff(steps[1]) <= 1, "{} on {ranks}: {steps:?}", scene.0);
             assert_eq!([&parallel, &serial].map(|run| run.text("method")), ["newton"; 2]);
@@ -145,7 +147,7 @@ fn no_rank_knows_all_nodes() {
 /// ratio, none of another, and parts of bodies are smaller than these.
 #[test]
 fn warnings_are_those_of_one_rank() {
-    let near = "body.0.poisson=\"0.2 + 0.295*x\"";
+    let near = "body.0.poisson=\"0.2 + 0.295*y\"";
     let sets = ["--set", "solver=hypre", "--method", "newton", "--set", near, "--set", "body.0.order=1"];
     let warnings = |run: Run| run.report["warnings"].clone();
     let one = warnings(solve(case("manufactured"), &sets));
@@ -191,10 +193,44 @@ fn ranks_without_nodes() {
     assert!(!parallel.warnings().contains("no body"), "{}", parallel.warnings());
 }
 
-/// The nodes of a rigid surface are assembled where their master is, and so are cells that touch one of them alone.
+/// Two discs around an axis that no group of the mesh names: no rank has to know of it but those of its nodes, and others learn of them. Pressed by 10
+/// they bear on each other with that everywhere.
+#[test]
+fn an_axis_without_a_name() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let disc = |body: &str, at: usize, first: usize| {
+        let [a, b, c, d] = [first, first + 1, first + 2, first + 3];
+        format!(
+            "Point({a}) = {{0, {at}, 0}}; Point({b}) = {{1, {at}, 0}}; Point({c}) = {{1, {at} + 1, 0}}; Point({d}) = {{0, {at} + 1, 0}};\n\
+             Line({a}) = {{{a}, {b}}}; Line({b}) = {{{b}, {c}}}; Line({c}) = {{{c}, {d}}}; Line({d}) = {{{d}, {a}}};\n\
+             Transfinite Curve {{{a}:{d}}} = 13;\nCurve Loop({a}) = {{{a}:{d}}}; Plane Surface({a}) = {{{a}}};\n\
+             Transfinite Surface {{{a}}};\nPhysical Surface(\"{body}\") = {{{a}}};\n\
+             Physical Curve(\"{body}_bottom\") = {{{a}}}; Physical Curve(\"{body}_top\") = {{{c}}};\n"
+        )
+    };
+    fs::write(folder.path().join("discs.geo"), disc("lower", 0, 1) + &disc("upper", 1, 11)).expect("written");
+    let text = "dimension = 2\nplane = \"axisymmetric\"\nmesh = { geo = \"discs.geo\" }\n\
+                [[body]]\nname = \"lower\"\nyoung = 100\npoisson = 0.3\nfix = [{ on = \"lower_bottom\", y = 0 }]\n\
+                [[body]]\nname = \"upper\"\nyoung = 200\npoisson = 0.2\nload = [{ on = \"upper_top\", pressure = 10 }]\n\
+                [[contact]]\nbetween = [\"lower_top\", \"upper_bottom\"]\nlayer = { linear = { stiffness = 50 } }\n";
+    let scene = folder.path().join("scene.toml");
+    fs::write(&scene, text).expect("written");
+    for ranks in [1, 4] {
+        for solver in ["solver=mumps", "solver=hypre"] {
+            let words = ["--method", "newton", "--set", STOP, "--set", solver];
+            let run = if ranks == 1 { solve(&scene, &words) } else { solve_on(ranks, &scene, &words) }.converged();
+            let off = pressures(&run).into_iter().map(|p| (p / 10.0 - 1.0).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-8, "{solver} on {ranks}: {off:e}");
+            let stress = run.number("bodies/0/max_von_mises");
+            assert!((stress - 10.0).abs() < 1e-6, "{solver} on {ranks}: {stress}");
+        }
+    }
+}
+
+/// The nodes of a rigid surface are assembled where their master is, and so are cells that touch one of them alone, with the weight at these nodes.
 #[test]
 fn tied_nodes_on_many_ranks() {
-    let scene = ("coating", &[][..]);
+    let scene = ("coating", &["body.1.force=[0, -100]"][..]);
     let (serial, parallel) = (run(1, scene, "mumps"), run(12, scene, "mumps"));
     let apart = pressures(&serial).into_iter().zip(pressures(&parallel)).map(|(a, b)| (a - b).abs());
     assert!(apart.fold(0.0, f64::max) <= 1e-8 * serial.number("pairs/0/peak_pressure"));

@@ -11,6 +11,7 @@ use crate::linalg::Csr;
 use crate::mesh::{Key, Numbering};
 use crate::problem::elasticity::Plane;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Which ranks need cells of a body.
 #[derive(Clone, Copy)]
@@ -33,12 +34,13 @@ impl<'a, const D: usize> Needs<'a, D> {
         needs
     }
 
-    /// Whether a rank needs what is at a node. Tied nodes are assembled where their master is.
-    fn at(&self, part: &Part<D>, node: u32, rank: usize) -> bool {
+    /// The ranks, of so many, that need the load at a node. Tied nodes are assembled where their master is.
+    fn at(&self, part: &Part<D>, node: u32, ranks: usize) -> Range<usize> {
+        let one = |rank: usize| rank..rank + 1;
         match self {
-            Needs::Everywhere => true,
-            Needs::Whole(owner) => rank == *owner,
-            Needs::Owners(deal, number) => deal.owner(*number, part, part.held.frame.node(node)) == rank,
+            Needs::Everywhere => 0..ranks,
+            Needs::Whole(owner) => one(*owner),
+            Needs::Owners(deal, number) => one(deal.owner(*number, part, part.held.frame.node(node))),
         }
     }
 }
@@ -89,14 +91,13 @@ pub fn deal<const D: usize>(
             Needs::Whole(owner) => (0..ranks).map(|rank| home(rank == *owner)).collect(),
             Needs::Everywhere => vec![home(true); ranks],
         };
-        let of_rank = |(rank, cells): (usize, Vec<u32>)| {
-            let mut cells = some(part, &stock, &cells);
-            let wanted = load.only(|node| needs.at(part, node, rank));
-            cells.loaded = wanted.iter().map(|(node, _)| node).collect();
-            cells.forces = wanted.iter().flat_map(|(_, force)| force).collect();
-            cells
-        };
-        let of_ranks: Vec<Cells> = cells.into_iter().enumerate().map(of_rank).collect();
+        let mut of_ranks: Vec<Cells> = cells.iter().map(|cells| some(part, &stock, cells)).collect();
+        for (node, force) in load.iter() {
+            for of_rank in &mut of_ranks[needs.at(part, node, ranks)] {
+                of_rank.loaded.push(node);
+                of_rank.forces.extend(force);
+            }
+        }
         drop(stock);
         let dealt = trade(exchange, of_ranks);
         // cells at points of several ranks come from each of these

@@ -16,7 +16,7 @@ pub enum Duty {
     Holds,
 }
 
-/// A group in use, and what is known of its simplices so far.
+/// A group of facets, edges or points in use, which all ranks have, and what is known of its simplices so far.
 pub struct InUse<'a> {
     group: &'a Group,
     duty: Duty,
@@ -43,7 +43,7 @@ impl<'a> InUse<'a> {
     /// group in part. `node` has the nodes of the body.
     pub fn compare<const D: usize>(&mut self, cells: &Cells<D>, faces: &Faces<D>, node: &[u32], other: bool) {
         let dimension = self.group.dimension;
-        if dimension == D || (other && self.duty == Duty::Acts) {
+        if other && self.duty == Duty::Acts {
             return;
         }
         let corners = dimension + 1;
@@ -97,9 +97,6 @@ impl<'a> InUse<'a> {
     /// Refuses a group that has a simplex twice, serves in part only, or whose simplices lie across its bodies. One that touches none is left to
     /// the line of the scene that names it.
     pub fn judge<const D: usize>(&self, mesh: &Mesh<D>) -> Result<()> {
-        if self.group.dimension == D {
-            return Ok(());
-        }
         if let Some(twice) = self.twice() {
             return Err(self.refuse(mesh, twice, "stands twice in it", "mesh the geometry again"));
         }

@@ -96,7 +96,8 @@ impl<const D: usize> Portion<D> {
         let mut in_use: BTreeMap<(&str, Duty), InUse> = BTreeMap::new();
         let contacts = || contacts.iter().map(|&name| (name, Duty::Acts));
         for (name, duty) in bodies.iter().flat_map(|body| body.groups.iter().copied()).chain(contacts()) {
-            if let Some(group) = mesh.group(name) {
+            // every cell of a group is one of a body, or of none; and ranks have different ones
+            if let Some(group) = mesh.group(name).filter(|group| group.dimension < D) {
                 in_use.entry((name, duty)).or_insert_with(|| InUse::new(group, duty));
             }
         }
