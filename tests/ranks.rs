@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Run, case, solve, solve_on, text_of};
+use common::{Run, case, solve, solve_on, text_of, winkler_on};
 use std::fs;
 use tempfile::TempDir;
 
@@ -39,17 +39,17 @@ fn the_choice_of_solvers_is_that_of_one_rank() {
 /// known there, too.
 #[test]
 fn one_rank_reads_the_mesh() {
-    let words = ["--method", "newton", "--set", "mesh.set.n=8", "--set", "solver=hypre", "--set", STOP];
-    let rigid = ["--set", "body.0.fix=[{on=\"lower\",x=0,y=0,z=0}]", "--set", "body.0.load=[]"];
+    let words = ["--method", "newton", "--set", "mesh.set={nl=10,nu=8}", "--set", "solver=hypre", "--set", STOP];
+    let rigid = ["--set", "body.0.fix=[{on=\"lower\",x=0,y=0,z=0}]", "--set", "contact.0.gap=\"1e-5*x\""];
     let elsewhere = TempDir::new().expect("a temporary folder");
     let scene = elsewhere.path().join("scene.toml");
-    fs::write(&scene, text_of("groove3d")).expect("written");
+    fs::write(&scene, text_of("patch-3d")).expect("written");
     let [scene, folder] = [scene, elsewhere.path().join("results")].map(|path| path.display().to_string());
     for more in [&rigid[..], &[]] {
         let words = [&words[..], more].concat();
-        let serial = solve(case("groove3d"), &words).converged();
+        let serial = solve(case("patch-3d"), &words).converged();
         let other = [":", "-n", "1", env!("CARGO_BIN_EXE_winkler"), "solve", &scene, "-o", &folder];
-        let parallel = solve_on(2, case("groove3d"), &[&words, &other[..], &words].concat()).converged();
+        let parallel = solve_on(2, case("patch-3d"), &[&words, &other[..], &words].concat()).converged();
         assert_eq!(parallel.count("ranks"), 3);
         assert_eq!(parallel.report["bodies"][0]["dofs"], serial.report["bodies"][0]["dofs"]);
         let apart = pressures(&serial).into_iter().zip(pressures(&parallel)).map(|(a, b)| (a - b).abs());
@@ -193,26 +193,31 @@ fn ranks_without_nodes() {
     assert!(!parallel.warnings().contains("no body"), "{}", parallel.warnings());
 }
 
-/// Two discs around an axis that no group of the mesh names: no rank has to know of it but those of its nodes, and others learn of them. Pressed by 10
-/// they bear on each other with that everywhere.
+/// Three discs around an axis that no group of the mesh names: ranks learn of its nodes from each other. The uppermost is pressed by p = 10, and the middle one has
+/// no load and no support of its own: the contacts bear p everywhere, and the lower one approaches by p (h/E + 1/k + h/2E'), with the mean over the middle one.
 #[test]
 fn an_axis_without_a_name() {
     let folder = TempDir::new().expect("a temporary folder");
-    let disc = |body: &str, at: usize, first: usize| {
+    let disc = |body: &str, at: usize| {
+        let first = 10 * at + 1;
         let [a, b, c, d] = [first, first + 1, first + 2, first + 3];
         format!(
-            "Point({a}) = {{0, {at}, 0}}; Point({b}) = {{1, {at}, 0}}; Point({c}) = {{1, {at} + 1, 0}}; Point({d}) = {{0, {at} + 1, 0}};\n\
+            "Point({a}) = {{0, {at}, 0}}; Point({b}) = {{1, {at}, 0}}; Point({c}) = {{1, {at} + 1, 0}};\n\
+             Point({d}) = {{0, {at} + 1, 0}};\n\
              Line({a}) = {{{a}, {b}}}; Line({b}) = {{{b}, {c}}}; Line({c}) = {{{c}, {d}}}; Line({d}) = {{{d}, {a}}};\n\
              Transfinite Curve {{{a}:{d}}} = 13;\nCurve Loop({a}) = {{{a}:{d}}}; Plane Surface({a}) = {{{a}}};\n\
              Transfinite Surface {{{a}}};\nPhysical Surface(\"{body}\") = {{{a}}};\n\
              Physical Curve(\"{body}_bottom\") = {{{a}}}; Physical Curve(\"{body}_top\") = {{{c}}};\n"
         )
     };
-    fs::write(folder.path().join("discs.geo"), disc("lower", 0, 1) + &disc("upper", 1, 11)).expect("written");
+    let discs = ["lower", "middle", "upper"].into_iter().zip(0..).map(|(body, at)| disc(body, at));
+    fs::write(folder.path().join("discs.geo"), discs.collect::<String>()).expect("written");
     let text = "dimension = 2\nplane = \"axisymmetric\"\nmesh = { geo = \"discs.geo\" }\n\
                 [[body]]\nname = \"lower\"\nyoung = 100\npoisson = 0.3\nfix = [{ on = \"lower_bottom\", y = 0 }]\n\
+                [[body]]\nname = \"middle\"\nyoung = 150\npoisson = 0.25\n\
                 [[body]]\nname = \"upper\"\nyoung = 200\npoisson = 0.2\nload = [{ on = \"upper_top\", pressure = 10 }]\n\
-                [[contact]]\nbetween = [\"lower_top\", \"upper_bottom\"]\nlayer = { linear = { stiffness = 50 } }\n";
+                [[contact]]\nbetween = [\"lower_top\", \"middle_bottom\"]\nlayer = { linear = { stiffness = 50 } }\n\
+                [[contact]]\nbetween = [\"middle_top\", \"upper_bottom\"]\nlayer = { linear = { stiffness = 50 } }\n";
     let scene = folder.path().join("scene.toml");
     fs::write(&scene, text).expect("written");
     for ranks in [1, 4] {
@@ -221,10 +226,25 @@ fn an_axis_without_a_name() {
             let run = if ranks == 1 { solve(&scene, &words) } else { solve_on(ranks, &scene, &words) }.converged();
             let off = pressures(&run).into_iter().map(|p| (p / 10.0 - 1.0).abs()).fold(0.0, f64::max);
             assert!(off < 1e-8, "{solver} on {ranks}: {off:e}");
-            let stress = run.number("bodies/0/max_von_mises");
-            assert!((stress - 10.0).abs() < 1e-6, "{solver} on {ranks}: {stress}");
+            let (approach, exact) = (run.number("pairs/0/approach"), 10.0 * (1.0 / 100.0 + 1.0 / 50.0 + 0.5 / 150.0));
+            assert!((approach / exact - 1.0).abs() < 1e-7, "{solver} on {ranks}: {approach} {exact}");
         }
     }
+    same_check(4, &scene.display().to_string());
+}
+
+/// What `check` says of a scene with hypre, on several ranks.
+fn same_check(ranks: usize, scene: &str) {
+    let words = ["check", scene, "--set", "solver=hypre"];
+    let [one, several] = [1, ranks].map(|ranks| winkler_on(ranks, &words));
+    assert!(one.code == 0 && one.stdout.contains("supported"), "{}", one.said());
+    assert_eq!(several.stdout, one.stdout);
+}
+
+/// Supports, loads and the coupling of pairs in words are those of one rank.
+#[test]
+fn check_says_what_one_rank_says() {
+    ["groove", "coating", "manufactured-3d"].iter().for_each(|name| same_check(3, &case(name).display().to_string()));
 }
 
 /// The nodes of a rigid surface are assembled where their master is, and so are cells that touch one of them alone, with the weight at these nodes.

@@ -146,9 +146,14 @@ pub fn solve_on(ranks: usize, scene: impl AsRef<Path>, args: &[&str]) -> Run {
 
 /// Runs the program with these words, in an empty folder.
 pub fn winkler(args: &[&str]) -> Run {
+    winkler_on(1, args)
+}
+
+/// The same on several ranks.
+pub fn winkler_on(ranks: usize, args: &[&str]) -> Run {
     let scratch = TempDir::new().expect("a temporary folder");
     let folder = scratch.path().to_owned();
-    let mut command = program(1);
+    let mut command = program(ranks);
     command.args(args);
     finish(command, scratch, folder)
 }
