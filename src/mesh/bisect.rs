@@ -9,6 +9,7 @@
 use crate::exchange::{Exchange, share};
 use crate::linalg::{around, bounds, pad};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::ops::Range;
 
@@ -40,10 +41,10 @@ struct Piece {
 }
 
 /// The search for the cut of a piece.
-struct Search {
+struct Search<'a> {
     axis: usize,
     /// Points of this rank that may be the first above the cut.
-    candidates: Vec<u32>,
+    candidates: Cow<'a, [u32]>,
     /// The first known to be above.
     found: Option<Cut>,
     /// Weight that points before the first one above may have, from the first candidate on.
@@ -125,14 +126,15 @@ fn search<const D: usize>(
     let of_own = |Piece { own, .. }: &Piece| (bounds(own.iter().map(|&point| pad(at(point).0))), weigh(own));
     let mine: Vec<_> = pieces.iter().map(of_own).collect();
     let all = share(exchange, mine);
-    let of_piece = |(number, piece): (usize, &Piece)| {
+    let searches = pieces.iter().enumerate().map(|(number, piece)| {
         let [low, high] = all.iter().map(|of_rank| of_rank[number].0).fold(bounds([]), around);
         let axis = (0..D).rev().max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0);
         let total = all.iter().map(|of_rank| of_rank[number].1).sum::<f64>() as u64;
-        let share = (total * (piece.parts.len() / 2) as u64 / piece.parts.len() as u64) as f64;
-        Search { axis, candidates: piece.own.clone(), found: None, share, is_open: true }
-    };
-    let mut searches: Vec<Search> = pieces.iter().enumerate().map(of_piece).collect();
+        let Piece { own, parts, .. } = piece;
+        let share = (total * (parts.len() / 2) as u64 / parts.len() as u64) as f64;
+        Search { axis, candidates: Cow::Borrowed(own), found: None, share, is_open: true }
+    });
+    let mut searches: Vec<Search> = searches.collect();
     while searches.iter().any(|search| search.is_open) {
         let mine: Vec<Vec<Cut>> = searches.iter().map(|search| search.propose(at)).collect();
         let mut proposed: Vec<Vec<Cut>> = searches.iter().map(|_| Vec::new()).collect();
@@ -166,7 +168,7 @@ fn search<const D: usize>(
     searches.into_iter().map(|search| search.found).collect()
 }
 
-impl Search {
+impl Search<'_> {
     /// Some candidates of this rank, by steps that no regular order of them shares.
     fn propose<const D: usize>(&self, at: &dyn Fn(u32) -> Point<D>) -> Vec<Cut> {
         let count = self.candidates.len();
