@@ -3,9 +3,9 @@
 use super::part::{Candidate, Part};
 use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::exchange::Exchange;
+use crate::exchange::{Exchange, totals};
 use crate::fem::{NodalForces, RigidMotion, rigid};
-use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
+use crate::linalg::{Blocks, Csr, TOLERANCE, Total, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, rigid as joint};
 use nalgebra::{DMatrix, DVector};
@@ -88,10 +88,9 @@ impl<const D: usize> Draft<D> {
     /// The work of the loads on motions; exactly zero if it is rounding. Collective.
     pub fn works(&self, part: &Part<D>, all: &[RigidMotion<D>], exchange: &dyn Exchange) -> Vec<f64> {
         let of = |motion: &RigidMotion<D>| self.load.works(|node| part.at_dofs(motion, node));
-        let mut works: Vec<[f64; 2]> = all.iter().map(of).collect();
-        exchange.sum(works.as_flattened_mut());
-        let work = |[work, largest]: [f64; 2]| if work.abs() <= NO_WORK * largest { 0.0 } else { work };
-        works.into_iter().map(work).collect()
+        let works: Vec<Total> = all.iter().flat_map(of).collect();
+        let work = |of: &[f64]| if of[0].abs() <= NO_WORK * of[1] { 0.0 } else { of[0] };
+        totals(exchange, &works).chunks_exact(2).map(work).collect()
     }
 
     /// What supports and springs leave to the body now. Collective.

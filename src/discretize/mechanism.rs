@@ -8,9 +8,9 @@ use super::gauge;
 use super::part::{Candidate, Part};
 use crate::contact::ContactPair;
 use crate::error::few;
-use crate::exchange::Exchange;
+use crate::exchange::{Exchange, totals};
 use crate::fem::{Extent, RigidMotion, rigid};
-use crate::linalg::{Blocks, PART, TOLERANCE, axpy, dot, fit};
+use crate::linalg::{Blocks, PART, TOLERANCE, Total, axpy, dot, fit};
 use crate::mesh::Joined;
 use crate::model::{Mechanism, Motion, Motions, Segment};
 use nalgebra::{DMatrix, DVector};
@@ -279,9 +279,12 @@ impl<const D: usize> Search<'_, '_, D> {
             self.drafts[body].load.works(|node| self.parts[body].at_dofs(motion, node))
         };
         let each = moving.bodies.iter().zip(&moving.motions).map(of);
-        let mut works = each.fold([0.0; 2], |[sum, most], [work, size]| [sum + work, most + size]);
-        self.exchange.sum(&mut works);
-        let [work, largest] = works;
+        let works = each.fold([Total::default(); 2], |mut sums, more| {
+            sums.iter_mut().zip(&more).for_each(|(sum, more)| sum.join(more));
+            sums
+        });
+        let works = totals(self.exchange, &works);
+        let (work, largest) = (works[0], works[1]);
         if work.abs() <= largest * moving.error.max(NO_WORK) { 0.0 } else { work / largest }
     }
 

@@ -8,8 +8,9 @@ use super::part::{self, Part};
 use super::verify::{self, Verified};
 use crate::contact::pad;
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, first, gather, share};
+use crate::exchange::{Exchange, first, gather, share, totals};
 use crate::fem::{Elasticity, Extent, Parts, Space, place};
+use crate::linalg::Total;
 use crate::mesh::{Group, Key, Mesh, Nodes, Portion};
 use crate::problem::{BodySpec, Plane};
 use crate::scene::Scene;
@@ -89,11 +90,10 @@ pub fn parts<'a, const D: usize>(
         let group = mesh.groups.place(&spec.name.value).unwrap_or_default();
         let nodes_here = &checked[index].nodes;
         let (mut space, elasticity, known) = read(spec, (portion, group), nodes_here, wanted, exchange)?;
-        let mut volume = [0.0];
+        let mut volume = Vec::new();
         if spec.load.is_empty() && spec.fix.is_empty() && spec.spring.is_empty() {
             let own = approach::volumes(&space).into_iter().filter(|(node, _)| known.is_own(*node));
-            volume[0] = own.map(|(_, volume)| volume).sum();
-            exchange.sum(&mut volume);
+            volume = totals(exchange, &[own.map(|(_, volume)| volume).collect()]);
         }
         let mut nodes = Vec::new();
         if exchange.ranks() > 1 {
@@ -105,7 +105,7 @@ pub fn parts<'a, const D: usize>(
         }
         let mut part = Part::new(spec, mesh, space, known, exchange)?;
         let resultant = |load: &_| part.resultant(load, mesh);
-        part.known.outer = Outer::new(spec, &part.space, mesh, &resultant, volume[0], exchange)?;
+        part.known.outer = Outer::new(spec, &part.space, mesh, &resultant, volume.into_iter().sum(), exchange)?;
         verify::held(&part, &checked[index].parts, mesh, exchange)?;
         parts.push(part);
         stocks.push(Stock { portion, group, nodes, elasticity, known: nodes_here.clone() });
@@ -154,15 +154,14 @@ fn read<const D: usize>(
     let key = |cell: usize| keys.get(cell).copied().unwrap_or((0, cell as u32));
     let elasticity = elastic::of(spec, &space, mesh, plane, (&key, exchange))?;
     let home = || home(portion, group, exchange.rank());
-    let shares = [total(home().map(|i| space.share(i))), total(home().map(|i| space.cell_measure(i)))];
+    let shares: [Total; 2] =
+        [home().map(|i| space.share(i)).collect(), home().map(|i| space.cell_measure(i)).collect()];
     let extent = Extent::of(own.iter().map(|&node| space.nodes[node as usize]));
-    let all = share(exchange, (home().count(), shares, extent));
-    let [volume, measure] = [0, 1].map(|which| {
-        let [sum, lost] = total(all.iter().flat_map(|(_, shares, _)| shares[which]));
-        sum + lost
-    });
-    let cells = all.iter().map(|(count, ..)| count).sum();
-    let extent = all.iter().fold(Extent::default(), |joined, (.., extent)| joined.join(extent));
+    let shares = totals(exchange, &shares);
+    let (volume, measure) = (shares[0], shares[1]);
+    let all = share(exchange, (home().count(), extent));
+    let cells = all.iter().map(|(count, _)| count).sum();
+    let extent = all.iter().fold(Extent::default(), |joined, (_, extent)| joined.join(extent));
     let mut moduli = elasticity.moduli(0, [0.0; 3]).unwrap_or_default();
     // a rank may have no cell of it, and so none of a region
     if !spec.regions.is_empty() || !elasticity.is_constant() {
@@ -177,15 +176,6 @@ fn read<const D: usize>(
     let outer = Outer::default();
     let known = Known { own, extent, cells, volume, moduli, force, boundary, measure, points, outer };
     Ok((space, elasticity, known))
-}
-
-/// A sum, and what its additions have lost: rounded together, the same in any order of the terms but for rare last digits.
-fn total(terms: impl Iterator<Item = f64>) -> [f64; 2] {
-    terms.fold([0.0; 2], |[sum, lost], term| {
-        let next = sum + term;
-        let added = next - sum;
-        [next, lost + (sum - (next - added)) + (term - added)]
-    })
 }
 
 /// Nodes of this rank that supports on groups of cells hold, and those on the axis of a body of revolution.

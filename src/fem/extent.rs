@@ -1,45 +1,45 @@
 //! Points of which only this is known: how many there are, their mean, and the box around them.
 
-use crate::linalg::{around, bounds, pad};
+use crate::linalg::{Total, around, bounds, pad};
 use serde::{Deserialize, Serialize};
 
 /// How many points there are, and where: what their rigid motions depend on.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Extent {
     count: usize,
-    sum: [f64; 3],
+    sum: [Total; 3],
     /// The corners of the box around them.
     bounds: [[f64; 3]; 2],
 }
 
 impl Default for Extent {
     fn default() -> Self {
-        Self { count: 0, sum: [0.0; 3], bounds: bounds([]) }
+        Self { count: 0, sum: [Total::default(); 3], bounds: bounds([]) }
     }
 }
 
 impl Extent {
     /// Of these points.
     pub fn of<const D: usize>(points: impl Iterator<Item = [f64; D]>) -> Self {
-        points.fold(Self::default(), |all, x| {
-            let x = pad(x);
-            all.join(&Self { count: 1, sum: x, bounds: [x; 2] })
+        points.map(pad).fold(Self::default(), |mut all, x| {
+            all.count += 1;
+            all.sum.iter_mut().zip(x).for_each(|(sum, x)| sum.add(x));
+            all.bounds = around(all.bounds, [x; 2]);
+            all
         })
     }
 
     /// Of these points and others.
     #[must_use]
     pub fn join(&self, others: &Self) -> Self {
-        Self {
-            count: self.count + others.count,
-            sum: std::array::from_fn(|c| self.sum[c] + others.sum[c]),
-            bounds: around(self.bounds, others.bounds),
-        }
+        let mut sum = self.sum;
+        sum.iter_mut().zip(&others.sum).for_each(|(sum, more)| sum.join(more));
+        Self { count: self.count + others.count, sum, bounds: around(self.bounds, others.bounds) }
     }
 
     /// Their mean.
     pub fn mean<const D: usize>(&self) -> [f64; D] {
-        std::array::from_fn(|c| self.sum[c] / self.count.max(1) as f64)
+        std::array::from_fn(|c| self.sum[c].value() / self.count.max(1) as f64)
     }
 
     /// The largest distance of a point from the mean along an axis; positive.

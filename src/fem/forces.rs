@@ -1,7 +1,7 @@
 //! Forces at nodes of a body.
 
 use super::{pad, place};
-use crate::linalg::dot;
+use crate::linalg::{Total, dot};
 
 /// Forces at nodes, without those that are zero: most loads are on surfaces.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -50,12 +50,15 @@ impl<const D: usize> NodalForces<D> {
     }
 
     /// Their work on a displacement, and the largest that forces and displacements of these sizes can do, node by node.
-    pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [f64; 2] {
+    pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [Total; 2] {
         let size = |v: &[f64]| dot(v, v).sqrt();
-        self.iter().fold([0.0; 2], |[work, largest], (node, force)| {
+        let [mut work, mut largest] = [Total::default(); 2];
+        for (node, force) in self.iter() {
             let u = at(node);
-            [u.iter().zip(force).fold(work, |work, (u, f)| work + u * f), largest + size(&u) * size(&force)]
-        })
+            work.add(dot(&u, &force));
+            largest.add(size(&u) * size(&force));
+        }
+        [work, largest]
     }
 
     /// Forces at all dofs of a body with so many nodes.

@@ -9,10 +9,12 @@ mod blocks_tests;
 mod degree;
 mod factor;
 mod symbolic;
+mod total;
 
 pub use blocks::Blocks;
 pub use factor::{Factor, PART, TOLERANCE};
 pub use symbolic::{Work, factorisation};
+pub use total::Total;
 
 use crate::error::{Error, Kind, Result};
 use nalgebra::{DMatrix, DVector};
