@@ -34,9 +34,9 @@ mod verify;
 use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
-use crate::exchange::{Exchange, share as share_all};
+use crate::exchange::{Exchange, share as share_all, totals};
 use crate::fem::rigid::AtDofs;
-use crate::linalg::{axpy, dot};
+use crate::linalg::{Total, axpy, dot};
 use crate::mesh::Checked;
 use crate::model::{Mechanism, Model, Segment};
 use crate::problem::{BodySpec, Plane, Start};
@@ -302,8 +302,9 @@ fn together<const D: usize>(
     plane: Plane,
     exchange: &dyn Exchange,
 ) -> (Vec<[f64; 3]>, Vec<Option<String>>) {
-    let mut sums: Vec<[f64; 3]> = drafts.iter().map(|draft| draft.nodal_load.sum()).collect();
-    exchange.sum(sums.as_flattened_mut());
+    let sums: Vec<Total> = drafts.iter().flat_map(|draft| draft.nodal_load.sum()).collect();
+    let sums = totals(exchange, &sums);
+    let sums = sums.chunks_exact(3).map(|sum| [sum[0], sum[1], sum[2]]).collect();
     let poisson = share_all(
         exchange,
         parts.iter().map(|part| elastic::poisson(part.spec, part.own(), plane)).collect::<Vec<_>>(),

@@ -42,11 +42,8 @@ impl<const D: usize> NodalForces<D> {
     }
 
     /// Their sum.
-    pub fn sum(&self) -> [f64; 3] {
-        self.forces.iter().fold([0.0; 3], |sum, &force| {
-            let force = pad(force);
-            std::array::from_fn(|c| sum[c] + force[c])
-        })
+    pub fn sum(&self) -> [Total; 3] {
+        std::array::from_fn(|c| self.forces.iter().map(|&force| pad(force)[c]).collect())
     }
 
     /// Their work on a displacement, and the largest that forces and displacements of these sizes can do, node by node.
