@@ -29,12 +29,13 @@ mod roster;
 mod springs;
 mod supports;
 mod surface;
+mod totals;
 mod verify;
 
 use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
-use crate::exchange::{Exchange, share as share_all, totals};
+use crate::exchange::{Exchange, share as share_all};
 use crate::fem::rigid::AtDofs;
 use crate::linalg::{Total, axpy, dot};
 use crate::mesh::Checked;
@@ -60,6 +61,7 @@ use ready::{Counts, Ready};
 use std::rc::Rc;
 use std::sync::Arc;
 pub use surface::ContactSurface;
+use totals::totals;
 pub use verify::{Verified, verify};
 
 /// The discrete problem and what reports need to know of its origin.

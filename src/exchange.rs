@@ -1,7 +1,6 @@
 //! What the ranks of a run tell each other: bytes, and plain data as bytes.
 
 use crate::error::{Error, Kind, Result};
-use crate::linalg::Total;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
@@ -35,14 +34,6 @@ pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: T) 
         return vec![mine];
     }
     exchange.share(pack(&mine)).into_iter().map(own).collect()
-}
-
-/// Sums over all ranks, the same in whatever parts these have the terms but for rare last digits; collective.
-pub fn totals(exchange: &dyn Exchange, mine: &[Total]) -> Vec<f64> {
-    let mut of_ranks = share(exchange, mine.to_vec()).into_iter();
-    let mut all = of_ranks.next().unwrap_or_default();
-    of_ranks.for_each(|of_rank| all.iter_mut().zip(&of_rank).for_each(|(all, more)| all.join(more)));
-    all.iter().map(Total::value).collect()
 }
 
 /// One list of what all ranks have, sorted; collective.

@@ -1,9 +1,10 @@
 //! A body before it is assembled: its contact rows, its loads, and the rigid motions that supports leave it.
 
 use super::part::{Candidate, Part};
+use super::totals::totals;
 use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::exchange::{Exchange, totals};
+use crate::exchange::Exchange;
 use crate::fem::{NodalForces, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, TOLERANCE, Total, dot};
 use crate::mesh::Mesh;

@@ -6,9 +6,10 @@
 use super::draft::{Draft, Loose, NO_WORK};
 use super::gauge;
 use super::part::{Candidate, Part};
+use super::totals::totals;
 use crate::contact::ContactPair;
 use crate::error::few;
-use crate::exchange::{Exchange, totals};
+use crate::exchange::Exchange;
 use crate::fem::{Extent, RigidMotion, rigid};
 use crate::linalg::{Blocks, PART, TOLERANCE, Total, axpy, dot, fit};
 use crate::mesh::Joined;
