@@ -35,7 +35,7 @@ mod verify;
 use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
-use crate::exchange::{Exchange, share as share_all};
+use crate::exchange::{Exchange, share};
 use crate::fem::rigid::AtDofs;
 use crate::linalg::{Total, axpy, dot};
 use crate::mesh::Checked;
@@ -174,7 +174,7 @@ pub fn discretize<const D: usize>(
         };
         offsets.push((0..rows.rows()).map(carried).collect::<Vec<f64>>());
         let surface: f64 = segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
-        let modulus = dot(&part.known.moduli, &share(&segments, &pairs));
+        let modulus = dot(&part.known.moduli, &along_axes(&segments, &pairs));
         let held = loose.motions.len() == loose.unfelt.len();
         let depth = part.known.volume / surface;
         let (mut resultant, warning) = of_all;
@@ -307,10 +307,8 @@ fn together<const D: usize>(
     let sums: Vec<Total> = drafts.iter().flat_map(|draft| draft.nodal_load.sum()).collect();
     let sums = totals(exchange, &sums);
     let sums = sums.chunks_exact(3).map(|sum| [sum[0], sum[1], sum[2]]).collect();
-    let poisson = share_all(
-        exchange,
-        parts.iter().map(|part| elastic::poisson(part.spec, part.own(), plane)).collect::<Vec<_>>(),
-    );
+    let poisson =
+        share(exchange, parts.iter().map(|part| elastic::poisson(part.spec, part.own(), plane)).collect::<Vec<_>>());
     let warning = |(body, part): (usize, &Part<D>)| {
         elastic::warning(part.spec, poisson.iter().map(|of_rank| of_rank[body]).fold(0.0, f64::max))
     };
@@ -318,7 +316,7 @@ fn together<const D: usize>(
 }
 
 /// Mean squared components of the normals on the contact surfaces of a body.
-fn share(segments: &[Segment], pairs: &[ContactPair]) -> [f64; 3] {
+fn along_axes(segments: &[Segment], pairs: &[ContactPair]) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for pair in segments.iter().map(|segment| &pairs[segment.pair]) {
         for (weight, normal) in pair.weight.iter().zip(&pair.normal) {

@@ -94,7 +94,7 @@ fn same_on(ranks: &[usize], solver: &str) {
             let apart = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(apart <= 1e-8 * peak, "{} on {ranks}: {:e} apart", scene.0, apart / peak);
             let [far, near] = [&serial, &parallel].map(|run| run.number("pairs/0/approach"));
-            assert!((far - near).abs() <= 1e-7 * far.abs(), "{} on {ranks}: {far} {near}", scene.0);
+            assert!((far - near).abs() <= 1e-8 * far.abs(), "{} on {ranks}: {far} {near}", scene.0);
             let steps = [&parallel, &serial].map(|run| run.count("iterations"));
             assert!(steps[0].abs_diff(steps[1]) <= 1, "{} on {ranks}: {steps:?}", scene.0);
             assert_eq!([&parallel, &serial].map(|run| run.text("method")), ["newton"; 2]);
@@ -227,7 +227,7 @@ fn an_axis_without_a_name() {
             let off = pressures(&run).into_iter().map(|p| (p / 10.0 - 1.0).abs()).fold(0.0, f64::max);
             assert!(off < 1e-8, "{solver} on {ranks}: {off:e}");
             let (approach, exact) = (run.number("pairs/0/approach"), 10.0 * (1.0 / 100.0 + 1.0 / 50.0 + 0.5 / 150.0));
-            assert!((approach / exact - 1.0).abs() < 1e-7, "{solver} on {ranks}: {approach} {exact}");
+            assert!((approach / exact - 1.0).abs() < 1e-9, "{solver} on {ranks}: {approach} {exact}");
         }
     }
     same_check(4, &scene.display().to_string());

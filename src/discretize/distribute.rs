@@ -170,22 +170,18 @@ fn of_deal<'a, const D: usize>(
         };
         own.push(near.of_rank(rank).map(number).collect());
     }
-    // those of other ranks are asked for
+    // each node is asked for at its rank, which may be this one
     let mut asked: Vec<Vec<(u32, u32)>> = vec![Vec::new(); ranks];
     for (body, near) in (0..).zip(&near) {
-        let others = near.nodes.iter().zip(&near.owner).filter(|(_, owner)| **owner as usize != rank);
-        others.for_each(|(&node, &owner)| asked[owner as usize].push((body, node)));
+        near.nodes.iter().zip(&near.owner).for_each(|(&node, &owner)| asked[owner as usize].push((body, node)));
     }
     let answer = |(body, node): (u32, u32)| own[body as usize].get(&node).copied().unwrap_or_default();
     let answers = trade(told, asked).into_iter().map(|asked| asked.into_iter().map(answer).collect::<Vec<Numbers>>());
     let mut answers: Vec<_> = trade(told, answers.collect()).into_iter().map(Vec::into_iter).collect();
     let (total, all_coarse) = (D * sum(&counts, 0), sum(&counts, 1));
     let of_body = |((body, draft), near): ((usize, &Draft<D>), Near)| {
-        let of_node = |place: usize| match near.owner[place] as usize {
-            owner if owner == rank => own[body].get(&near.nodes[place]).copied(),
-            owner => answers[owner].next(),
-        };
-        let numbers: Vec<Numbers> = (0..near.nodes.len()).map(of_node).map(Option::unwrap_or_default).collect();
+        let numbers: Vec<Numbers> =
+            near.owner.iter().map(|&owner| answers[owner as usize].next().unwrap_or_default()).collect();
         let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
         let mut others = vec![(Vec::new(), Vec::new()); ranks];
         for place in (0..near.nodes.len()).filter(|&place| near.owner[place] as usize != rank) {

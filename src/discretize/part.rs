@@ -115,12 +115,12 @@ impl<'a, const D: usize> Part<'a, D> {
         let (count, mut held) = (motions.len(), prescribed.iter().map(|entry| entry.0).peekable());
         let mut sums = vec![0.0; count * (count + 1)];
         let (products, work) = sums.split_at_mut(count * count);
-        for node in 0..self.space.nodes.len() {
+        for node in (0..self.space.nodes.len()).filter(|&node| is_own(node)) {
             let mut at: Vec<[f64; D]> = motions.iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
-            while let Some(dof) = held.next_if(|dof| dof / D == node) {
-                at.iter_mut().for_each(|u| u[dof % D] = 0.0);
+            while let Some(dof) = held.next_if(|dof| dof / D <= node) {
+                at.iter_mut().filter(|_| dof / D == node).for_each(|u| u[dof % D] = 0.0);
             }
-            for (i, u) in at.iter().enumerate().filter(|_| is_own(node)) {
+            for (i, u) in at.iter().enumerate() {
                 at.iter().enumerate().for_each(|(j, v)| products[count * i + j] += dot(u, v));
                 work[i] += dot(u, &load[D * node..][..D]);
             }

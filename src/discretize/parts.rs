@@ -91,10 +91,10 @@ pub fn parts<'a, const D: usize>(
         let group = mesh.groups.place(&spec.name.value).unwrap_or_default();
         let nodes_here = &checked[index].nodes;
         let (mut space, elasticity, known) = read(spec, (portion, group), nodes_here, wanted, exchange)?;
-        let mut volume = Vec::new();
+        let mut volume = 0.0;
         if spec.load.is_empty() && spec.fix.is_empty() && spec.spring.is_empty() {
             let own = approach::volumes(&space).into_iter().filter(|(node, _)| known.is_own(*node));
-            volume = totals(exchange, &[own.map(|(_, volume)| volume).collect()]);
+            volume = totals(exchange, &[own.map(|(_, volume)| volume).collect()])[0];
         }
         let mut nodes = Vec::new();
         if exchange.ranks() > 1 {
@@ -106,7 +106,7 @@ pub fn parts<'a, const D: usize>(
         }
         let mut part = Part::new(spec, mesh, space, known, exchange)?;
         let resultant = |load: &_| part.resultant(load, mesh);
-        part.known.outer = Outer::new(spec, &part.space, mesh, &resultant, volume.into_iter().sum(), exchange)?;
+        part.known.outer = Outer::new(spec, &part.space, mesh, &resultant, volume, exchange)?;
         verify::held(&part, &checked[index].parts, mesh, exchange)?;
         parts.push(part);
         stocks.push(Stock { portion, group, nodes, elasticity, known: nodes_here.clone() });
@@ -158,11 +158,13 @@ fn read<const D: usize>(
     let shares: [Total; 2] =
         [home().map(|i| space.share(i)).collect(), home().map(|i| space.cell_measure(i)).collect()];
     let extent = Extent::of(own.iter().map(|&node| space.nodes[node as usize]));
-    let shares = totals(exchange, &shares);
-    let (volume, measure) = (shares[0], shares[1]);
-    let all = share(exchange, (home().count(), extent));
-    let cells = all.iter().map(|(count, _)| count).sum();
-    let extent = all.iter().fold(Extent::default(), |joined, (_, extent)| joined.join(extent));
+    let (mut cells, mut all_shares, mut all_points) = (0, [Total::default(); 2], Extent::default());
+    for (count, shares, extent) in share(exchange, (home().count(), shares, extent)) {
+        cells += count;
+        all_shares.iter_mut().zip(&shares).for_each(|(all, more)| all.join(more));
+        all_points = all_points.join(&extent);
+    }
+    let ([volume, measure], extent) = (all_shares.map(|share| share.value()), all_points);
     let mut moduli = elasticity.moduli(0, [0.0; 3]).unwrap_or_default();
     // a rank may have no cell of it, and so none of a region
     if !spec.regions.is_empty() || !elasticity.is_constant() {

@@ -61,7 +61,7 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>, excha
     for &node in &part.known.own {
         let (extent, first) = &mut mine[part_of[node as usize] as usize];
         let x = space.nodes[node as usize];
-        *extent = extent.join(&Extent::of([x].into_iter()));
+        extent.add(x);
         first.get_or_insert((node, pad(x)));
     }
     let of_ranks = share(exchange, mine);

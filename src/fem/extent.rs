@@ -21,20 +21,24 @@ impl Default for Extent {
 impl Extent {
     /// Of these points.
     pub fn of<const D: usize>(points: impl Iterator<Item = [f64; D]>) -> Self {
-        points.map(pad).fold(Self::default(), |mut all, x| {
-            all.count += 1;
-            all.sum.iter_mut().zip(x).for_each(|(sum, x)| sum.add(x));
-            all.bounds = around(all.bounds, [x; 2]);
-            all
-        })
+        let mut all = Self::default();
+        points.for_each(|x| all.add(x));
+        all
+    }
+
+    /// Adds a point.
+    pub fn add<const D: usize>(&mut self, x: [f64; D]) {
+        let x = pad(x);
+        self.count += 1;
+        self.sum.iter_mut().zip(x).for_each(|(sum, x)| sum.add(x));
+        self.bounds = around(self.bounds, [x; 2]);
     }
 
     /// Of these points and others.
     #[must_use]
-    pub fn join(&self, others: &Self) -> Self {
-        let mut sum = self.sum;
-        sum.iter_mut().zip(&others.sum).for_each(|(sum, more)| sum.join(more));
-        Self { count: self.count + others.count, sum, bounds: around(self.bounds, others.bounds) }
+    pub fn join(mut self, others: &Self) -> Self {
+        self.sum.iter_mut().zip(&others.sum).for_each(|(sum, more)| sum.join(more));
+        Self { count: self.count + others.count, bounds: around(self.bounds, others.bounds), ..self }
     }
 
     /// Their mean.

@@ -1,6 +1,6 @@
 //! Where the nodes of a body are, as far as a rank knows it.
 
-use std::ops::{Index, IndexMut};
+use std::ops::Index;
 
 /// Places of the nodes of a body: of all, or of some.
 #[derive(Debug, Clone, Default)]
@@ -78,15 +78,6 @@ impl<const D: usize> Index<usize> for Places<D> {
         match self.place(node as u32) {
             Some(place) => &self.at[place],
             None => unreachable!("who asks for the place of a node has been told it"),
-        }
-    }
-}
-
-impl<const D: usize> IndexMut<usize> for Places<D> {
-    fn index_mut(&mut self, node: usize) -> &mut [f64; D] {
-        match self.place(node as u32) {
-            Some(place) => &mut self.at[place],
-            None => unreachable!("who moves a node knows its place"),
         }
     }
 }
