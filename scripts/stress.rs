@@ -10,6 +10,8 @@ mod random;
 mod runs;
 #[path = "../tests/stress/scenes.rs"]
 mod scenes;
+#[path = "../tests/stress/slender.rs"]
+mod slender;
 #[path = "../tests/stress/wide.rs"]
 mod wide;
 
@@ -26,7 +28,8 @@ use winkler::petsc::Session;
 ///
 /// Scenes are two or three blocks on each other or a ring of four, in the plane, with linear and power laws. With --wide they are up
 /// to seventeen bodies in the plane, of revolution or in space: blocks, cylinders, spheres, lenses, small bodies, walls of bricks; with
-/// laws of every form in one scene, springs to the ground, own weight, and given starts. A seed stands for other scenes then.
+/// laws of every form in one scene, springs to the ground, own weight, and given starts. With --slender they are leaves, discs, plates, frames and
+/// hoops from 1:5 to 1:200, in the plane, of revolution and in space. A seed stands for other scenes then.
 ///
 /// Exits with 1 if the default method fails on a scene that has a solution, or if any method is wrong.
 #[derive(Parser)]
@@ -39,8 +42,11 @@ struct Arguments {
     #[arg(long, default_value_t = 0)]
     first: usize,
     /// Draws from the wider box
-    #[arg(long)]
+    #[arg(long, conflicts_with = "slender")]
     wide: bool,
+    /// Draws slender bodies
+    #[arg(long)]
+    slender: bool,
     /// Seed of the series
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -106,7 +112,11 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let mut failures = Vec::new();
     let mut sound = true;
     for index in indices {
-        let draw = if arguments.wide { wide::scene } else { scenes::scene };
+        let draw = match (arguments.wide, arguments.slender) {
+            (true, _) => wide::scene,
+            (_, true) => slender::scene,
+            _ => scenes::scene,
+        };
         let case = draw(arguments.seed, index, root);
         let path = folder.join(format!("scene-{}-{index}.toml", arguments.seed));
         let text = format!("# {}\n{}", case.line, case.text);
@@ -228,8 +238,12 @@ fn print(arguments: &Arguments, tallies: &HashMap<&str, Tally>, failures: &[(usi
     let mut last = usize::MAX;
     for (index, _, line, scene) in failures {
         if *index != last {
-            let wide = if arguments.wide { " --wide" } else { "" };
-            println!("\n`scripts/stress{wide} --seed {} --only {index} --keep`: {scene}\n", arguments.seed);
+            let family = match (arguments.wide, arguments.slender) {
+                (true, _) => " --wide",
+                (_, true) => " --slender",
+                _ => "",
+            };
+            println!("\n`scripts/stress{family} --seed {} --only {index} --keep`: {scene}\n", arguments.seed);
             last = *index;
         }
         println!("- {line}");

@@ -172,7 +172,7 @@ fn share(model: &Model, layer: &Layer, beyond: &[f64]) -> f64 {
 /// Newton's method: bodies give way to what a point presses, however stiff its layer.
 fn pressure_errors(model: &Model, layer: &Layer, closing: &[f64]) -> Vec<f64> {
     let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
-    let met = Layer::meet(model, &compression, &layer.linear(&compression), &meeting_slopes(model));
+    let met = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
     met.pressure.iter().zip(&layer.pressure).map(|(exact, found)| exact - found).collect()
 }
 

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Run, Scene, case, distance, solve, solve_on, text_of};
+use common::{Run, Scene, case, distance, root, solve, solve_on, text_of};
 
 /// The relaxed iteration with each rule, and the other methods.
 const METHODS: [&str; 10] = [
@@ -296,4 +296,67 @@ fn a_tower_takes_as_long_as_a_wall() {
     };
     let sweeps = [tower(4), tower(12)];
     assert_eq!(sweeps, [17, 19]);
+}
+
+/// Two clamped leaves of a spring, the shorter one below, which touch at its tip alone; `n` elements along the upper.
+fn leaves(n: usize, layer: &str) -> Scene {
+    let mesh = root().join("tests/stress/meshes/leaves.geo");
+    let set = format!("l1 = 200, t1 = 4, n1 = {}, l2 = 300, t2 = 6, n2 = {n}, through = 2", 7 * n / 10);
+    let body = |name: &str, more: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\norder = 2\nyoung = 2.1e5\npoisson = 0\nfix = [{{ on = \"{name}_left\", x = 0, y = 0 }}]\n{more}\n"
+        )
+    };
+    Scene::new(format!(
+        "dimension = 2\nplane = \"stress\"\nmesh = {{ geo = \"{}\", set = {{ {set} }} }}\n{}{}[[contact]]\nbetween = [\"b2_bottom\", \"b1_top\"]\nlayer = {{ {layer} }}\n",
+        mesh.display(),
+        body("b2", "load = [{ on = \"b2_right\", force = [0, -5] }]"),
+        body("b1", ""),
+    ))
+}
+
+/// Slender bodies peel off each other in a few steps, as many on fine meshes as on coarse ones, by smoothed laws; to the answer of a start that
+/// needs none. Beams share the load of 5 so that 2 goes through the tip.
+#[test]
+fn leaves_peel_in_a_few_steps() {
+    for layer in ["linear = { stiffness = 1e7 }", "power = { B = 1e-5, a = 0.5 }"] {
+        let mut steps = Vec::new();
+        for n in [60, 120] {
+            let run = solve(&leaves(n, layer).path, &["--method", "newton"]).converged();
+            steps.push(run.count("iterations"));
+            let smoothed = run.history().counts("smoothed");
+            assert_eq!(smoothed.last(), Some(&run.count("smoothed_steps")));
+            assert!(run.count("smoothed_steps") > 0, "{}", run.said());
+            assert!((run.number("pairs/0/force/0/1") - 2.0).abs() < 2e-3, "{}", run.said());
+            let nested = ["--set", "method={name=\"newton\", start=\"nested\"}"];
+            let reference = solve(&leaves(n, layer).path, &nested).converged().contact();
+            let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
+            assert!(apart < 1e-7, "{layer} {n}: {apart:e}");
+        }
+        assert!(steps[0].abs_diff(steps[1]) <= 1 && steps[0].max(steps[1]) <= 15, "{layer}: {steps:?}");
+    }
+}
+
+/// Smoothed laws are the same with multigrid, by one factorisation, on two ranks, and where a run pauses at each iterate.
+#[test]
+fn leaves_peel_by_any_linear_step() {
+    let scene = leaves(60, "linear = { stiffness = 1e5 }");
+    let whole = solve(&scene.path, &["--method", "newton"]).converged();
+    let pressure = &whole.contact()["pressure"];
+    let others: [(usize, &[&str]); 4] = [
+        (1, &["--method", "newton", "--set", "solver=hypre"]),
+        (1, &["--method", "newton", "--set", "solver=mumps"]),
+        (2, &["--method", "newton"]),
+        (1, &["--method", "newton", "--checkpoint", "1e-9"]),
+    ];
+    for (ranks, args) in others {
+        let run = solve_on(ranks, &scene.path, args).converged();
+        assert!(run.count("smoothed_steps") > 0 && run.count("iterations") <= 15, "{args:?}: {}", run.said());
+        let apart = distance(&run.contact()["pressure"], pressure);
+        assert!(apart < 1e-6, "{args:?}: {apart:e}");
+        if args.contains(&"--checkpoint") {
+            assert_eq!(run.count("iterations"), whole.count("iterations"));
+            assert_eq!(run.contact()["pressure"], whole.contact()["pressure"]);
+        }
+    }
 }

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file in the folder of results.
 pub const FILE: &str = "checkpoint";
 
-const FORMAT: &str = "winkler checkpoint 3";
+const FORMAT: &str = "winkler checkpoint 4";
 
 /// Bytes of the digest at the end.
 const DIGEST: usize = 32;
@@ -64,7 +64,9 @@ impl Checkpoint {
         let head = Head { mesh: mesh_digest(&built.discrete), steps: steps.clone(), ..head };
         let failed = |cause: String| Error::new(Kind::File, "the checkpoint cannot be written").because(cause);
         let json = serde_json::to_string(&head).map_err(|cause| failed(cause.to_string()))?;
-        let numbers = (earlier, &outcome.rows, &outcome.layer.compression, &outcome.iterate.trace, states);
+        let next = outcome.next_states();
+        let layer = (&next.compression, &next.smoothing);
+        let numbers = (earlier, &outcome.rows, layer, &outcome.iterate.trace, states);
         let mut bytes = postcard::to_extend(&numbers, format!("{FORMAT}\n{json}\n").into_bytes())
             .map_err(|cause| failed(cause.to_string()))?;
         let sum = Sha256::digest(&bytes);
@@ -147,8 +149,8 @@ fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
     let mut lines = text.splitn(3, |&byte| byte == b'\n');
     let is_ours = lines.next()? == FORMAT.as_bytes() && Sha256::digest(text)[..] == *digest;
     let head: Head = serde_json::from_slice(lines.next()?).ok().filter(|_| is_ours)?;
-    let (earlier, rows, compression, trace, states) = postcard::from_bytes(lines.next()?).ok()?;
-    let state = State { field: Field { states, trace }, compression, rows, memory: None };
+    let (earlier, rows, (compression, smoothing), trace, states) = postcard::from_bytes(lines.next()?).ok()?;
+    let state = State { field: Field { states, trace }, compression, smoothing, rows, memory: None };
     Some(Checkpoint { path: path.to_owned(), head, earlier, state })
 }
 

@@ -5,7 +5,7 @@
 //! statics alone give need no steps by which compressions follow them.
 
 use super::digits::of_compressions;
-use super::progress::distance;
+use super::path::Equilibrium;
 use super::start;
 use crate::model::Model;
 use crate::model::field::Field;
@@ -23,7 +23,10 @@ pub(super) fn fit(model: &Model, [u, x]: [&mut Field; 2], p: &[f64], rho: &[f64]
         return;
     }
     let c = model.compression(&u.trace);
-    let off = |u: &Field, c: &[f64]| distance(model, rho, [c, &of_compressions(model, &u.trace)], p);
+    let off = |u: &Field, compression: &[f64]| {
+        let roundoff = &of_compressions(model, &u.trace)[..];
+        Equilibrium { compression, roundoff, pressure: p, rho }.distance(model, &[])
+    };
     let here = off(u, &c);
     let motion = || Some(motions.field(model, &start::balance(model, &motions, [&c, p], rho, tolerance)?));
     if let Some(motion) = (here > 0.0).then(motion).flatten() {

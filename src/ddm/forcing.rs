@@ -47,7 +47,7 @@ impl<'a> Forcing<'a> {
     pub fn is_enough(&mut self, model: &Model, trial: &Trial) -> bool {
         let c: Vec<f64> = self.before.iter().zip(trial.closing).map(|(c, closing)| c + closing).collect();
         let p = self.places.linear(&c);
-        let met = Layer::meet(model, &c, &p, self.rho);
+        let met = Layer::resolve(model, &c, &p, self.rho, &self.places.smoothing);
         let (mut moved, mut most, mut apart, mut peak) = (0.0, 0.0f64, 0.0, 0.0f64);
         for (q, old) in self.pressures[0].iter().enumerate() {
             let change = (p[q] - old).abs();

@@ -35,6 +35,8 @@ pub struct Row {
     pub factorizations: usize,
     /// Inner Krylov iterations so far, all bodies (0 with a direct solver).
     pub inner_iterations: usize,
+    /// Steps of Newton's method so far that were taken with smoothed laws.
+    pub smoothed: usize,
     /// Seconds since the iteration began.
     pub seconds: f64,
 }

@@ -29,8 +29,8 @@ pub struct Memory {
     pub(super) steady: Steady,
     /// Of Newton's method.
     pub(super) progress: Progress,
-    /// Places of the next step where a run paused.
-    pub(super) places: Option<Layer>,
+    /// Layer states of the next step where a run paused.
+    pub(super) states: Option<Layer>,
     /// Of sweeps: what was done, the last step, and the sweep at the iterate where a run paused.
     pub(super) sweeper: Sweeper,
     pub(super) last: Option<Last>,
@@ -48,7 +48,7 @@ impl Memory {
             floor,
             steady: Steady::default(),
             progress: Progress::default(),
-            places: None,
+            states: None,
             sweeper: Sweeper::default(),
             last: None,
             sweep: None,

@@ -16,6 +16,7 @@ pub mod history;
 pub mod linear;
 mod memory;
 mod newton;
+mod path;
 mod progress;
 mod robin;
 mod run;

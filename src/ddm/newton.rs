@@ -1,14 +1,15 @@
 //! Semismooth Newton (35) with a state of its own in every layer.
 //!
-//! Each contact point keeps a place (c_q, p_q) on its law, with the tangent kappa_q there:
+//! Each contact point keeps a state (c_q, p_q) on its law, with the tangent kappa_q there:
 //!
 //! ```text
 //! linear step    K u + B' omega (p_q + kappa_q (B u - d - c_q)) = f           all bodies together
-//! update         c = B u - d,   p = p_q + kappa_q (c - c_q)                   in equilibrium
-//!                the place where the law meets c_q + p_q/rho = c + p/rho      (Minty)
+//! step length    c = B u - d,   p = p_q + kappa_q (c - c_q)                   in equilibrium, also on the way to it
+//! layer states   where the law meets c_q + p_q/rho = c + p/rho                (Minty)
 //! ```
 //!
-//! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
+//! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u. Where steps have to be
+//! shortened, the laws are smoothed for a while ([`path`](super::path)).
 
 use super::bound::Reached;
 use super::digits::of_compressions;
@@ -16,124 +17,200 @@ use super::fit;
 use super::forcing::Forcing;
 use super::history::Row;
 use super::linear::resisting;
-use super::run::{End, Run};
+use super::path::Equilibrium;
+use super::run::{End, Measured, Run};
 use super::stop::{Floor, Status};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
 use crate::model::layer::Layer;
-use crate::model::line::Line;
-use crate::model::linear::{LinearStep, System, Trial};
+use crate::model::linear::{LinearStep, Solution, Solved, System, Trial};
 use crate::model::surface::meeting_slopes;
 
-/// Iterates from displacements and places until a rule ends it.
+/// Error of a correction as a share of it.
+const HALF: f64 = 0.5;
+
+/// Share of the tolerance below which an error in the energy norm changes nothing in the digits that are asked for.
+const UNSEEN: f64 = 0.01;
+
+/// Iterate from displacements and layer states until a rule ends the run.
 ///
 /// # Errors
 /// Failures of the solver library. Not converging is a status.
-pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
-    let (slopes, tolerance) = (meeting_slopes(run.model), run.stop.tolerance());
-    let mut rho = run.memory.progress.slopes(run.model, &slopes);
-    // where rounding ends the run, what it has spoilt meanwhile is taken back
-    let mut best: Option<(Row, Field, Layer)> = None;
-    // watches what corrections gain, if rounding left too much of the last step
-    let mut left: Option<Floor> = None;
-    // a correction takes half of what is left at least; of rounding the size is wanted
-    let halves = |trial: &Trial| trial.is_within(0.5);
+pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, u: Field, states: Layer) -> Result<End> {
+    let (unit, tolerance) = (meeting_slopes(run.model), run.stop.tolerance());
+    let mut newton = Newton { run, linear, unit, tolerance, u, states, correction: None, best: None };
     loop {
-        let springs = resisting(run.model, places.springs(run.model));
-        let force = run.model.forces(&places.linear(&run.model.compression(&u.trace)));
-        let (r, _) = residual(run.model, &u, &force);
-        let (before, digits) = (run.model.compression(&u.trace), of_compressions(run.model, &u.trace));
-        let mut forcing = Forcing::new(&places, before.clone(), &rho, (tolerance, &run.scale), linear.roughest());
-        let mut enough = |model: &Model, trial: &Trial| match left {
-            None => forcing.is_enough(model, trial),
-            Some(_) => halves(trial),
+        let step = match newton.linear_step()? {
+            Ok(step) => step,
+            Err(failure) => return Ok(newton.end(Status::InnerSolver(failure), None)),
         };
-        let system = System { model: run.model, places: &places, springs: &springs, residual: &r, enough: &mut enough };
-        let mut x = match linear.solve(system)? {
-            Ok(solution) => solution,
-            Err(failure) => return Ok(run.end(Status::InnerSolver(failure), u, places, linear)),
-        };
-        let end: Vec<f64> = before.iter().zip(x.field.closing()).map(|(c, closing)| c + closing).collect();
-        let pressure = places.linear(&end);
-        let share = match left {
-            None => run.memory.progress.share(run.model, &slopes, [&before, &digits], [&end, &pressure]),
-            Some(_) => 1.0,
-        };
-        rho = run.memory.progress.slopes(run.model, &slopes);
-        x.field.scale(share);
-        u.add(1.0, &x.field);
-        u.retrace(run.model);
-
-        let whole = if share < 1.0 { pressure } else { places.linear(&run.model.compression(&u.trace)) };
-        let p = run.memory.progress.go(share, whole);
-        if places.closed > 0 {
-            fit::fit(run.model, [&mut u, &mut x.field], &p, &rho, tolerance);
+        let iterate = newton.advance(step);
+        let measures = newton.measure(&iterate)?;
+        if let Some(status) = newton.check_termination(&iterate, &measures)? {
+            return Ok(newton.end(status, Some(iterate.resolved)));
         }
-        let c = run.model.compression(&u.trace);
-        let mut met = Layer::meet(run.model, &c, &p, &rho);
-
-        let (rest, energy) = residual(run.model, &u, &run.model.forces(&p));
-        let mut measured = run.measure(energy, &Layer::new(run.model, c.clone()), linear);
-        let digits = of_compressions(run.model, &u.trace);
-        let mut reached = Reached::new((run.model, &run.scale), measured.strain, &x, (&c, &digits, &p), &met, &rho);
-        let (mut is_floor, corrected) = (false, left.take());
-        if run.is_enough(&reached) {
-            // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
-            let mut enough = |_: &Model, trial: &Trial| halves(trial);
-            let (residual, enough) = (&rest[..], &mut enough);
-            let system = System { model: run.model, places: &places, springs: &springs, residual, enough };
-            let before = linear.counts();
-            let more = linear.solve(system)?;
-            measured.inner_iterations += linear.counts().inner_iterations - before.inner_iterations;
-            measured.factorizations += linear.counts().factorizations - before.factorizations;
-            if let Ok(more) = more {
-                let lost = reached.add_rounding(&run.scale, measured.strain, &more, &places, &met);
-                if !run.is_enough(&reached) {
-                    // a correction gains a digit, unless rounding gives as much again
-                    let mut floor = corrected.unwrap_or_else(Floor::of_steps);
-                    is_floor = floor.is_reached(lost);
-                    left = Some(floor);
-                }
-            }
-        }
-        let at = run.after_step((&u, &x.field, share), measured, &reached, &met, linear);
-        let ended = run.end_at(&at, linear)?;
-        if let Some(row) =
-            run.rows.last().filter(|row| best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual))
-        {
-            best = Some((row.clone(), u.clone(), met.clone()));
-        }
-        if let Some(status) = ended.or(is_floor.then_some(Status::RoundoffLimited)) {
-            if let (Status::RoundoffLimited, Some(best)) = (&status, best) {
-                (u, met) = run.go_back(best);
-            }
-            return Ok(run.end(status, u, met, linear));
-        }
-        // a step that knew of no contact runs through the other body
-        let blind = places.closed == 0 && met.closed > 0;
-        if blind {
-            search(run.model, &mut u, &x.field)?;
-            run.memory.progress.forget();
-        }
-        if left.is_none() {
-            places = if blind { Layer::at(run.model, &u.trace) } else { met.clone() };
-        }
-        if measured.asked != 0 {
-            run.memory.places = Some(places);
-            return Ok(run.end(Status::Paused { asked: measured.asked }, u, met, linear));
+        newton.update_states(&iterate);
+        if measures.measured.asked != 0 {
+            newton.run.memory.states = Some(newton.states.clone());
+            let status = Status::Paused { asked: measures.measured.asked };
+            return Ok(newton.end(status, Some(iterate.resolved)));
         }
     }
 }
 
-/// Replaces a step x that led to u by the exact search on F1 along it.
-fn search(model: &mut Model, u: &mut Field, x: &Field) -> Result<()> {
-    u.add(-1.0, x);
-    u.retrace(model);
-    let layer = Layer::at(model, &u.trace);
-    let (r, _) = residual(model, u, &layer.force);
-    let line = Line::new(model, &layer, &r, x);
-    u.add(line.minimize(1e-2).unwrap_or(0.0), x);
-    u.retrace(model);
-    Ok(())
+/// A run of Newton's method under way.
+struct Newton<'n, 'r> {
+    run: &'n mut Run<'r>,
+    linear: &'n mut dyn LinearStep,
+    /// Meeting slopes, n.
+    unit: Vec<f64>,
+    tolerance: f64,
+    u: Field,
+    /// States of the layers from which the next linear step is taken.
+    states: Layer,
+    /// Watches what corrections gain, while roundoff leaves too much of a step: a correction takes the same states once more.
+    correction: Option<Floor>,
+    /// The best iterate so far: what roundoff spoils at the end is taken back.
+    best: Option<(Row, Field, Layer)>,
+}
+
+/// What a step has led to: a state in equilibrium with the displacements.
+struct Iterate {
+    step: Solution,
+    /// The part of the linear step that was taken.
+    length: f64,
+    /// c, n, and what roundoff leaves unknown of it.
+    compression: Vec<f64>,
+    roundoff: Vec<f64>,
+    /// p, n.
+    pressure: Vec<f64>,
+    /// Slopes of the lines on which layer states are found, n.
+    rho: Vec<f64>,
+    /// States on the laws themselves.
+    resolved: Layer,
+}
+
+/// How good an iterate is.
+struct Measures {
+    measured: Measured,
+    reached: Reached,
+    is_roundoff: bool,
+}
+
+impl Newton<'_, '_> {
+    /// Solve the linear step from the states; a correction to half of what is left, as only the size of roundoff is wanted.
+    fn linear_step(&mut self) -> Result<Solved> {
+        let (model, states) = (&mut *self.run.model, &self.states);
+        let springs = resisting(model, states.springs(model));
+        let compression = model.compression(&self.u.trace);
+        let (residual, _) = residual(model, &self.u, &model.forces(&states.linear(&compression)));
+        let rho = self.run.memory.progress.slopes(model, &self.unit);
+        let scale = (self.tolerance, &self.run.scale);
+        let mut forcing = Forcing::new(states, compression, &rho, scale, self.linear.roughest());
+        let is_correction = self.correction.is_some();
+        let mut enough = |model: &Model, trial: &Trial| match is_correction {
+            true => trial.is_within(HALF),
+            false => forcing.is_enough(model, trial),
+        };
+        self.linear.solve(System { model, places: states, springs: &springs, residual: &residual, enough: &mut enough })
+    }
+
+    /// Take the step as far as it comes nearer to the laws, and resolve the laws there.
+    fn advance(&mut self, mut step: Solution) -> Iterate {
+        let (model, progress) = (&mut *self.run.model, &mut self.run.memory.progress);
+        let before = model.compression(&self.u.trace);
+        let whole: Vec<f64> = before.iter().zip(step.field.closing()).map(|(c, closing)| c + closing).collect();
+        let whole_pressure = self.states.linear(&whole);
+        let length = match self.correction {
+            None => {
+                let roundoff = of_compressions(model, &self.u.trace);
+                let states = [[&before[..], &roundoff], [&whole, &whole_pressure]];
+                progress.step_length(model, &self.unit, &self.states.smoothing, states)
+            }
+            Some(_) => 1.0,
+        };
+        step.field.scale(length);
+        self.u.add(1.0, &step.field);
+        self.u.retrace(model);
+        let end = if length < 1.0 { whole_pressure } else { self.states.linear(&model.compression(&self.u.trace)) };
+        let pressure = progress.go(length, end);
+        let rho = progress.slopes(model, &self.unit);
+        if self.states.closed > 0 && self.states.smoothing.is_empty() {
+            fit::fit(model, [&mut self.u, &mut step.field], &pressure, &rho, self.tolerance);
+        }
+        let compression = model.compression(&self.u.trace);
+        let roundoff = of_compressions(model, &self.u.trace);
+        let resolved = Layer::resolve(model, &compression, &pressure, &rho, &[]);
+        Iterate { step, length, compression, roundoff, pressure, rho, resolved }
+    }
+
+    /// Measure the errors of an iterate. One that seems good enough is asked what roundoff, or an iterative solver, has left of its equilibrium: a further
+    /// step with the same matrix tells how large that is.
+    fn measure(&mut self, iterate: &Iterate) -> Result<Measures> {
+        let Iterate { step, compression, roundoff, pressure, rho, resolved, .. } = iterate;
+        let run = &mut *self.run;
+        let (rest, energy) = residual(run.model, &self.u, &run.model.forces(pressure));
+        let mut measured = run.measure(energy, &Layer::new(run.model, compression.clone()), self.linear);
+        let state = (&compression[..], &roundoff[..], &pressure[..]);
+        let mut reached = Reached::new((run.model, &run.scale), measured.strain, step, state, resolved, rho);
+        let (mut is_roundoff, corrected) = (false, self.correction.take());
+        if run.is_enough(&reached) {
+            let springs = resisting(run.model, self.states.springs(run.model));
+            let mut enough = |_: &Model, trial: &Trial| trial.is_within(HALF);
+            let (places, before) = (&self.states, self.linear.counts());
+            let system = System { model: run.model, places, springs: &springs, residual: &rest, enough: &mut enough };
+            let more = self.linear.solve(system)?;
+            measured.inner_iterations += self.linear.counts().inner_iterations - before.inner_iterations;
+            measured.factorizations += self.linear.counts().factorizations - before.factorizations;
+            if let Ok(more) = more {
+                let lost = reached.add_rounding(&run.scale, measured.strain, &more, &self.states, resolved);
+                if !run.is_enough(&reached) {
+                    // a correction gains a digit, unless roundoff gives as much again
+                    let mut floor = corrected.unwrap_or_else(Floor::of_steps);
+                    is_roundoff = floor.is_reached(lost);
+                    self.correction = Some(floor);
+                }
+            }
+        }
+        Ok(Measures { measured, reached, is_roundoff })
+    }
+
+    /// Show and keep the row of an iterate; the status if the run ends with it.
+    fn check_termination(&mut self, iterate: &Iterate, measures: &Measures) -> Result<Option<Status>> {
+        let (run, resolved) = (&mut *self.run, &iterate.resolved);
+        let step = (&self.u, &iterate.step.field, iterate.length);
+        let at = run.after_step(step, measures.measured, &measures.reached, resolved, self.linear);
+        let ended = run.end_at(&at, self.linear)?;
+        let is_best = |row: &Row| self.best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual);
+        if let Some(row) = run.rows.last().filter(|row| is_best(row)) {
+            self.best = Some((row.clone(), self.u.clone(), resolved.clone()));
+        }
+        Ok(ended.or(measures.is_roundoff.then_some(Status::RoundoffLimited)))
+    }
+
+    /// Set the states of the next step, unless that is a correction of this one.
+    fn update_states(&mut self, iterate: &Iterate) {
+        if self.correction.is_some() {
+            return;
+        }
+        let run = &mut *self.run;
+        let Iterate { compression, roundoff, pressure, rho, .. } = iterate;
+        let state = Equilibrium { compression, roundoff, pressure, rho };
+        let unseen = (UNSEEN * self.tolerance).powi(2) * run.scale.energy(run.energy);
+        let smoothing = run.memory.progress.path.smoothing(run.model, &state, &self.states.smoothing, unseen);
+        self.states = match smoothing.is_empty() {
+            true => iterate.resolved.clone(),
+            false => Layer::resolve(run.model, compression, pressure, rho, &smoothing),
+        };
+    }
+
+    /// End the run at the last iterate, or at the best one where roundoff ends it.
+    fn end(&mut self, status: Status, resolved: Option<Layer>) -> End {
+        let (mut u, mut states) = (std::mem::take(&mut self.u), resolved.unwrap_or_else(|| self.states.clone()));
+        if let (Status::RoundoffLimited, Some(best)) = (&status, self.best.take()) {
+            (u, states) = self.run.go_back(best);
+        }
+        self.run.end(status, u, states, self.linear)
+    }
 }

@@ -1,6 +1,6 @@
-//! How far a step of Newton's method goes, and on which lines it meets the laws.
+//! How far a step of Newton's method goes, and on which lines the laws are resolved.
 //!
-//! States (c, p) in equilibrium are an affine set, so that those on the way of a step need no solve. A state is off its places (c_q, p_q) on the
+//! States (c, p) in equilibrium are an affine set, so that those on the way of a step need no solve. A state is off its states (c_q, p_q) on the
 //! laws by e = p - p_q = -rho (c - c_q). The step goes to a state c' on the tangents, so that with s = c' - c_q it begins with
 //!
 //! ```text
@@ -8,13 +8,13 @@
 //! ```
 //!
 //! and sum omega e^2/rho falls, with any weights and any rho, until a law turns a corner. Where the whole step is no nearer to the laws, a shorter
-//! one is; where that is too short, the tangents belong to the wrong side of a corner, and places on lines of another slope are on other sides.
+//! one is. Smoothed laws have no corner.
 //!
 //! Any slope leads to the same solution. The best are near those with which the bodies answer, dp = -S dc between states in equilibrium: the longest waves with that
 //! of the last step, sum omega dp^2/rho = sum omega dc^2 rho over a pair, the shortest with that of single nodes. The geometric mean is the nearest to both.
 
+use super::path::{Equilibrium, Path};
 use crate::model::Model;
-use crate::model::layer::Layer;
 use crate::model::rigid::PART;
 
 /// What Newton's method remembers of its steps.
@@ -22,33 +22,27 @@ use crate::model::rigid::PART;
 pub(super) struct Progress {
     /// Pressures in equilibrium with the iterate, n; empty before the first.
     pressure: Vec<f64>,
-    /// Steps in a row that came no nearer to the laws, and all of them.
-    row: usize,
-    failures: usize,
     /// Slopes for each pair after the last step, as multiples of [`meeting_slopes`](crate::model::surface::meeting_slopes); empty before the second.
     answer: Vec<f64>,
+    /// The way out of slow convergence.
+    pub path: Path,
 }
 
 /// How often a step is halved: to less than a hundredth. From 3 to 14 times 4000 random scenes took the same number of steps within a per cent
 /// (docs/methods.md).
-const HALVINGS: usize = 7;
-
-/// Slopes of the lines, as multiples of those by the bodies' answer, one after the other: the range in which random scenes take the same
-/// steps within a few per cent.
-const SLOPES: [f64; 3] = [1.0, 10.0, 0.1];
+const HALVINGS: i32 = 7;
 
 impl Progress {
-    /// rho, n: slopes on which places are met now, of meeting slopes `unit`, n.
+    /// Return rho, n: the slopes on which laws are resolved now, of meeting slopes `unit`, n.
     pub fn slopes(&self, model: &Model, unit: &[f64]) -> Vec<f64> {
-        let times = SLOPES[self.failures % SLOPES.len()];
-        let mut slopes: Vec<f64> = unit.iter().map(|unit| times * unit).collect();
+        let mut slopes = unit.to_vec();
         for (pair, answer) in self.answer.iter().enumerate() {
             slopes[model.range(pair)].iter_mut().for_each(|slope| *slope *= answer);
         }
         slopes
     }
 
-    /// Keeps how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of equilibrium.
+    /// Keep how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of equilibrium.
     fn observe(&mut self, model: &Model, unit: &[f64], dc: &[f64], dp: &[f64]) {
         self.answer.resize(model.pairs.len(), 1.0);
         for (pair, answer) in self.answer.iter_mut().enumerate() {
@@ -63,49 +57,37 @@ impl Progress {
         }
     }
 
-    /// The share of the way from compressions `from`, known to their `digits`, to the state (c, p), n each, that a step goes, where meeting slopes are `unit`.
-    /// Where no slope brought it nearer to the laws, which motions without resistance do, it goes all the way.
-    pub fn share(&mut self, model: &Model, unit: &[f64], [from, digits]: [&[f64]; 2], [c, p]: [&[f64]; 2]) -> f64 {
+    /// Return the length of a step from compressions `from`, known but for their `roundoff`, to the state (c, p), n each: the part of the way that comes no
+    /// farther from the laws with this smoothing. Meeting slopes are `unit`.
+    pub fn step_length(
+        &mut self,
+        model: &Model,
+        unit: &[f64],
+        smoothing: &[f64],
+        [[from, roundoff], [c, p]]: [[&[f64]; 2]; 2],
+    ) -> f64 {
         if self.pressure.is_empty() {
             return 1.0;
         }
-        let rho = self.slopes(model, unit);
         let change = |from: &[f64], to: &[f64]| to.iter().zip(from).map(|(to, from)| to - from).collect::<Vec<f64>>();
         self.observe(model, unit, &change(from, c), &change(&self.pressure, p));
-        let off = |t: f64| distance(model, &rho, [&between(from, c, t), digits], &between(&self.pressure, p, t));
+        let rho = &self.slopes(model, unit)[..];
+        let off = |t: f64| {
+            let (compression, pressure) = (&between(from, c, t)[..], &between(&self.pressure, p, t)[..]);
+            Equilibrium { compression, roundoff, pressure, rho }.distance(model, smoothing)
+        };
         let here = off(0.0);
-        let mut shares = (0..=HALVINGS as i32).map(|halvings| 0.5f64.powi(halvings));
-        if let Some(share) = shares.find(|&t| off(t) <= here) {
-            self.row = 0;
-            return share;
-        }
-        self.failures += 1;
-        self.row = (self.row + 1) % SLOPES.len();
-        if self.row == 0 { 1.0 } else { 0.5f64.powi(HALVINGS as i32) }
+        let mut lengths = (0..HALVINGS).map(|halvings| 0.5f64.powi(halvings));
+        let length = lengths.find(|&t| off(t) <= here).unwrap_or(0.5f64.powi(HALVINGS));
+        self.path.note(length, !smoothing.is_empty());
+        length
     }
 
-    /// Forgets the pressures of an iterate that was left.
-    pub fn forget(&mut self) {
-        self.pressure.clear();
-    }
-
-    /// The pressures a share of the way to `pressure`, n, which are those of the iterate from now on.
-    pub fn go(&mut self, share: f64, pressure: Vec<f64>) -> Vec<f64> {
-        self.pressure = if share < 1.0 { between(&self.pressure, &pressure, share) } else { pressure };
+    /// Return the pressures this part of the way to `pressure`, n, which are those of the iterate from now on.
+    pub fn go(&mut self, length: f64, pressure: Vec<f64>) -> Vec<f64> {
+        self.pressure = if length < 1.0 { between(&self.pressure, &pressure, length) } else { pressure };
         self.pressure.clone()
     }
-}
-
-/// How far a state in equilibrium, of compressions c known to their `digits` and pressures p, n each, is from its places on the laws: sum omega
-/// e^2/rho. Distances count beyond these digits and those of the pressures: states that differ by rounding are as far.
-pub(super) fn distance(model: &Model, rho: &[f64], [c, digits]: [&[f64]; 2], p: &[f64]) -> f64 {
-    let met = Layer::meet(model, c, p, rho);
-    let known = |q: usize| rho[q] * digits[q] + f64::EPSILON * (p[q].abs() + met.pressure[q]);
-    // a distance that is no number stays none: it is not nearer
-    let apart = |q: usize| ((p[q] - met.pressure[q]).abs() - known(q)).clamp(0.0, f64::INFINITY);
-    // lines of infinite slope lead to places at c itself
-    let sloped = (0..c.len()).filter(|&q| rho[q] < f64::INFINITY);
-    sloped.map(|q| model.weight[q] * apart(q).powi(2) / rho[q]).sum()
 }
 
 fn between(from: &[f64], to: &[f64], t: f64) -> Vec<f64> {
@@ -117,43 +99,33 @@ mod tests {
     use super::*;
     use crate::model::sample::two_pairs;
 
-    /// Of points with p = 4 c and p = c^2, n = 4: a step to the laws goes all the way, one that goes far beyond a part of it, one away from the
-    /// laws almost none of it, with another slope next, and the third of these all.
+    /// Points with p = 4 c and p = c^2, n = 4: a step to the laws goes all the way, one that goes far beyond a part of it, one away from the laws almost
+    /// none of it.
     #[test]
     fn a_step_goes_as_far_as_it_comes_nearer() {
         let model = two_pairs();
         let rho = [2.0, 0.5, 0.25, 3.0];
-        let begin = |pressure: &[f64; 4]| Progress { pressure: pressure.to_vec(), ..Progress::default() };
         let (from, start, exact) = ([0.5, 0.5, 1.0, 1.0], [2.0, 4.0, 1.0, 1.0], [0.0; 4]);
+        let length = |progress: &mut Progress, rho: &[f64; 4], roundoff: &[f64; 4], c: &[f64; 4], p: &[f64; 4]| {
+            progress.step_length(&model, rho, &[], [[&from, roundoff], [c, p]])
+        };
+        let begin = || Progress { pressure: start.to_vec(), ..Progress::default() };
         let mut progress = Progress::default();
         // the first step has no pressures to begin with
-        assert_eq!(progress.share(&model, &rho, [&from, &exact], [&[9.0; 4], &[0.0; 4]]), 1.0);
+        assert_eq!(length(&mut progress, &rho, &exact, &[9.0; 4], &[0.0; 4]), 1.0);
         assert_eq!(progress.go(1.0, start.to_vec()), start);
         // the second point is on p = 4 c then
-        assert_eq!(progress.share(&model, &rho, [&from, &exact], [&[0.5, 0.75, 1.0, 1.0], &[2.0, 3.0, 1.0, 1.0]]), 1.0);
+        assert_eq!(length(&mut progress, &rho, &exact, &[0.5, 0.75, 1.0, 1.0], &[2.0, 3.0, 1.0, 1.0]), 1.0);
         // from p = 4 to p = -4 where the law has 6
         let (to, pressure) = ([0.5, 1.5, 1.0, 1.0], [2.0, -4.0, 1.0, 1.0]);
-        let share =
-            |rho: &[f64; 4], digits: &[f64; 4]| begin(&start).share(&model, rho, [&from, digits], [&to, &pressure]);
-        assert_eq!(share(&rho, &exact), 0.25);
+        assert_eq!(length(&mut begin(), &rho, &exact, &to, &pressure), 0.25);
         // points without stiffness on either side, whose compression may be exact, have none
-        assert_eq!(share(&[f64::INFINITY, 0.5, 0.25, 3.0], &exact), 0.25);
+        assert_eq!(length(&mut begin(), &[f64::INFINITY, 0.5, 0.25, 3.0], &exact, &to, &pressure), 0.25);
         // no distance is left beyond compressions known to -+ 100
-        assert_eq!(share(&rho, &[1e2; 4]), 1.0);
-        assert_eq!(begin(&start).go(0.25, pressure.to_vec()), [2.0, 2.0, 1.0, 1.0]);
-        let mut progress = begin(&[2.0, 2.0, 1.0, 1.0]);
-        assert_eq!(progress.slopes(&model, &rho), rho);
-        let (bent, away) = ([0.5, 1.0, 1.0, 1.0], [[0.5, 2.0, 1.0, 1.0], [2.0, -9.0, 1.0, 1.0]]);
-        let away = |progress: &mut Progress| progress.share(&model, &rho, [&bent, &exact], [&away[0], &away[1]]);
-        assert_eq!([away(&mut progress), away(&mut progress)], [0.5f64.powi(7); 2]);
-        // the first pair answered with dp = -11 to dc = 1 where rho is 0.5, the second not at all
-        let answered = rho.map(|rho| 22f64.sqrt() * rho);
-        let answered = [answered[0], answered[1], 0.25, 3.0];
-        let near =
-            |slopes: Vec<f64>, times: f64| slopes.iter().zip(answered).all(|(s, a)| (s - times * a).abs() < 1e-12 * a);
-        assert!(near(progress.slopes(&model, &rho), 0.1));
-        assert_eq!(away(&mut progress), 1.0);
-        assert!(near(progress.slopes(&model, &rho), 1.0));
+        assert_eq!(length(&mut begin(), &rho, &[1e2; 4], &to, &pressure), 1.0);
+        assert_eq!(begin().go(0.25, pressure.to_vec()), [2.0, 2.0, 1.0, 1.0]);
+        let away = length(&mut begin(), &rho, &exact, &[0.5, -9.0, 1.0, 1.0], &[2.0, 99.0, 1.0, 1.0]);
+        assert_eq!(away, 0.5f64.powi(7));
     }
 
     /// The geometric mean of what a pair's points answered together and of their own stiffness; nothing counts as a thousandth.

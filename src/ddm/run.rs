@@ -172,6 +172,7 @@ impl Run<'_> {
             sweeps: at.sweeps,
             factorizations: at.measured.factorizations,
             inner_iterations: at.measured.inner_iterations,
+            smoothed: self.memory.progress.path.steps,
             seconds: self.earlier + self.began.elapsed().as_secs_f64(),
         }
     }
@@ -188,6 +189,9 @@ impl Run<'_> {
         let residual = reached.worst();
         self.energy = measured.strain + places.work;
         let closed = places.compression.iter().map(|&c| c > 0.0);
+        // F1 of iterates of Newton's method goes up and down
+        let period = self.memory.cycle.period(&u.trace, closed, residual, 0.0);
+        let period = period.filter(|_| !self.memory.progress.path.leaves_cycle());
         Iterate {
             k: self.rows.len() + 1,
             u,
@@ -204,8 +208,7 @@ impl Run<'_> {
             // pressures of compressions that are far away may be beyond the range of numbers: the places are not
             is_finite: !residual.is_nan(),
             is_still: true,
-            // F1 of iterates of Newton's method goes up and down
-            period: self.memory.cycle.period(&u.trace, closed, residual, 0.0),
+            period,
         }
     }
 

@@ -79,8 +79,10 @@ pub enum Start {
 pub struct State {
     /// Displacements. If the states of a body are not those that its solver works with, its traces count.
     pub field: Field,
-    /// Compressions of the layers' places, n.
+    /// Compressions of the layers' states, n.
     pub compression: Vec<f64>,
+    /// Energy per area by which their laws are smoothed, n; empty for the laws themselves.
+    pub smoothing: Vec<f64>,
     /// History up to there.
     pub rows: Vec<Row>,
     /// What the run remembers; none if it comes from a file.
@@ -204,7 +206,7 @@ impl Run<'_> {
                 trace.clone_from(&state.field.trace);
                 let whole = state.memory.is_some() || fits(self.model, &state.field);
                 match state.memory {
-                    Some(memory) => self.memory = memory,
+                    Some(memory) => self.memory = Memory { states: None, ..memory },
                     None => {
                         self.memory.earlier = state.rows.last().map_or(0, |row| row.sweeps);
                         self.memory.sweeper.sweeps = self.memory.earlier;
@@ -287,8 +289,8 @@ fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
         },
         Start::Resume(field) => Layer::at(model, &field.trace),
         Start::Continue(state) => {
-            let paused = state.memory.as_ref().and_then(|memory| memory.places.clone());
-            paused.unwrap_or_else(|| Layer::new(model, state.compression.clone()))
+            let paused = state.memory.as_ref().and_then(|memory| memory.states.clone());
+            paused.unwrap_or_else(|| Layer::smoothed(model, state.compression.clone(), &state.smoothing))
         }
         Start::Pressure(pressure) => {
             let mut compression = Vec::with_capacity(pressure.len());
@@ -303,8 +305,14 @@ fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
 impl Outcome {
     /// What a run can go on from.
     pub fn into_state(self) -> Box<State> {
-        let Self { iterate: field, layer, rows, memory, .. } = self;
-        Box::new(State { field, compression: layer.compression, rows, memory })
+        let Layer { compression, smoothing, .. } = self.next_states().clone();
+        let Self { iterate: field, rows, memory, .. } = self;
+        Box::new(State { field, compression, smoothing, rows, memory })
+    }
+
+    /// Return the layer states that a further step would be taken from.
+    pub fn next_states(&self) -> &Layer {
+        self.memory.as_ref().and_then(|memory| memory.states.as_ref()).unwrap_or(&self.layer)
     }
 }
 

@@ -103,7 +103,7 @@ pub fn balance(
 }
 
 fn met(model: &Model, approach: &[f64], slope: &[f64]) -> Layer {
-    Layer::meet(model, approach, &vec![0.0; approach.len()], slope)
+    Layer::resolve(model, approach, &vec![0.0; approach.len()], slope, &[])
 }
 
 struct Rigid<'a> {

@@ -4,6 +4,7 @@
 //! keeps a place (c_q, p_q) on it that need not be the compression of the bodies' traces; sweeps take the place that is.
 
 use super::Model;
+use crate::contact::law;
 
 /// A place on the law of every contact point, with the law's tangent there.
 #[derive(Debug, Clone, Default)]
@@ -22,6 +23,8 @@ pub struct Layer {
     pub work: f64,
     /// Points with c > 0.
     pub closed: usize,
+    /// mu, n: energy per area by which the laws are smoothed ([`law::resolve`]), which then have no `energy`; empty for the laws themselves.
+    pub smoothing: Vec<f64>,
 }
 
 impl Layer {
@@ -52,18 +55,39 @@ impl Layer {
         Self::new(model, model.compression(trace))
     }
 
-    /// The places where the laws meet lines of slope -`rho` (n, stiffness per area) through the states (c, p) that the linear model
-    /// of the layers gave, n each: c_q + p(c_q)/rho_q = c + p/rho_q (Minty). Such a place is the only one, and moves by no more
-    /// than the sum does, however steep or flat the law is.
-    pub fn meet(model: &Model, compression: &[f64], pressure: &[f64], rho: &[f64]) -> Self {
-        let mut places = Vec::with_capacity(compression.len());
-        for (i, pair) in model.pairs.iter().enumerate() {
-            places.extend(model.range(i).map(|q| {
-                let sum = compression[q] + pressure[q] / rho[q];
-                pair.law.meet(q - model.offset[i], sum, rho[q])
-            }));
+    /// Return the states of the layers on lines of slope -`rho` (n, stiffness per area) through the states (c, p) that the linear model of the layers
+    /// gave, n each: c_q + p_q/rho_q = c + p/rho_q (Minty). There is one on each law, and it moves by no more than the sum does, however steep or flat
+    /// the law is. Laws are smoothed by `smoothing`, an energy per area at each point, n; empty for the laws themselves.
+    pub fn resolve(model: &Model, compression: &[f64], pressure: &[f64], rho: &[f64], smoothing: &[f64]) -> Self {
+        let sum = |q: usize| compression[q] + pressure[q] / rho[q];
+        if smoothing.is_empty() {
+            let at = |(i, q): (usize, usize)| model.pairs[i].law.meet(q - model.offset[i], sum(q), rho[q]);
+            let points = (0..model.pairs.len()).flat_map(|i| model.range(i).map(move |q| (i, q)));
+            return Self::new(model, points.map(at).collect());
         }
-        Self::new(model, places)
+        let mut layer = Self { smoothing: smoothing.to_vec(), energy: vec![0.0; model.pairs.len()], ..Self::default() };
+        for (i, pair) in model.pairs.iter().enumerate() {
+            for q in model.range(i) {
+                let state = law::resolve(&*pair.law, q - model.offset[i], sum(q), rho[q], smoothing[q]);
+                let force = model.weight[q] * state.pressure;
+                layer.work += force * state.compression;
+                layer.closed += usize::from(state.compression > 0.0);
+                layer.compression.push(state.compression);
+                layer.pressure.push(state.pressure);
+                layer.tangent.push(state.tangent);
+                layer.force.push(force);
+            }
+        }
+        layer
+    }
+
+    /// Return the states at these compressions, n, on laws with this smoothing.
+    pub fn smoothed(model: &Model, compression: Vec<f64>, smoothing: &[f64]) -> Self {
+        let points = compression.len();
+        match smoothing.is_empty() {
+            true => Self::new(model, compression),
+            false => Self::resolve(model, &compression, &vec![0.0; points], &vec![f64::INFINITY; points], smoothing),
+        }
     }
 
     /// omega kappa, n: springs of the linear model at the points.
@@ -113,11 +137,23 @@ mod tests {
     fn places_lie_on_lines_through_the_states() {
         let model = two_pairs();
         let (c, p, rho) = ([0.3, -0.5, 2.0, -1.0], [4.0, 1.0, 0.5, -2.0], [2.0, 0.5, 0.25, 3.0]);
-        let met = Layer::meet(&model, &c, &p, &rho);
+        let met = Layer::resolve(&model, &c, &p, &rho, &[]);
         for q in 0..4 {
             let (here, there) = (met.compression[q] + met.pressure[q] / rho[q], c[q] + p[q] / rho[q]);
             assert!((here - there).abs() < 1e-12, "{q}: {here} {there}");
         }
         assert_eq!(met.closed, 3);
+        // the same on smoothed laws, which press everywhere, and again from their compressions
+        let mu = [0.1, 0.2, 1e-3, 4.0];
+        let smoothed = Layer::resolve(&model, &c, &p, &rho, &mu);
+        let again = Layer::smoothed(&model, smoothed.compression.clone(), &mu);
+        for q in 0..4 {
+            let (here, there) = (smoothed.compression[q] + smoothed.pressure[q] / rho[q], c[q] + p[q] / rho[q]);
+            assert!((here - there).abs() < 1e-12 && smoothed.pressure[q] > 0.0, "{q}: {here} {there}");
+            assert!((again.pressure[q] / smoothed.pressure[q] - 1.0).abs() < 1e-9, "{q}: {again:?}");
+            assert!((smoothed.force[q] - model.weight[q] * smoothed.pressure[q]).abs() < 1e-15 * smoothed.force[q]);
+        }
+        assert_eq!(again.smoothing, mu);
+        assert_eq!(Layer::smoothed(&model, c.to_vec(), &[]).pressure, Layer::new(&model, c.to_vec()).pressure);
     }
 }

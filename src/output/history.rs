@@ -25,8 +25,18 @@ impl HistoryWriter {
         header.extend(["iteration", "residual", "error", "increment"].map(String::from));
         header.extend(bodies.iter().map(|body| format!("increment_{}", body.as_ref())));
         header.extend(
-            ["gamma", "energy", "closed", "points", "sweeps", "factorizations", "inner_iterations", "seconds"]
-                .map(String::from),
+            [
+                "gamma",
+                "energy",
+                "closed",
+                "points",
+                "sweeps",
+                "factorizations",
+                "inner_iterations",
+                "smoothed",
+                "seconds",
+            ]
+            .map(String::from),
         );
         Ok(Self { rows: RowFile::create(folder, "history.csv", &header)?, bodies: bodies.len(), steps })
     }
@@ -49,7 +59,7 @@ impl Observer for HistoryWriter {
         fields.extend((0..self.bodies).map(|body| row.increments.get(body).map_or(String::new(), |&v| field(v))));
         fields.extend([field(row.gamma), field(row.energy)]);
         fields.extend(
-            [row.closed, row.points, row.sweeps, row.factorizations, row.inner_iterations]
+            [row.closed, row.points, row.sweeps, row.factorizations, row.inner_iterations, row.smoothed]
                 .map(|count| count.to_string()),
         );
         fields.push(field(row.seconds));
@@ -91,6 +101,7 @@ mod tests {
             sweeps: 2,
             factorizations: 3,
             inner_iterations: 7,
+            smoothed: 1,
             seconds: 1.5,
         });
         let text = std::fs::read_to_string(base.path().join("history.csv")).unwrap();
@@ -99,9 +110,9 @@ mod tests {
             lines,
             [
                 "step,iteration,residual,error,increment,increment_upper,increment_lower,gamma,energy,closed,points,\
-                 sweeps,factorizations,inner_iterations,seconds",
-                "0,0,1.0,,,,,,-0.1,0,9,1,0,0,0.0",
-                "2,1,1e-9,2e-9,0.5,0.5,0.3333333333333333,0.25,-0.2,4,9,2,3,7,1.5",
+                 sweeps,factorizations,inner_iterations,smoothed,seconds",
+                "0,0,1.0,,,,,,-0.1,0,9,1,0,0,0,0.0",
+                "2,1,1e-9,2e-9,0.5,0.5,0.3333333333333333,0.25,-0.2,4,9,2,3,7,1,1.5",
             ]
         );
         history.finish().unwrap();

@@ -59,6 +59,8 @@ pub struct Report {
     pub robin_updates_skipped: usize,
     /// Krylov iterations, all bodies.
     pub inner_iterations: usize,
+    /// Steps of Newton's method that were taken with smoothed laws.
+    pub smoothed_steps: usize,
     /// Collective messages between ranks.
     pub messages: usize,
     /// Load steps, if they were asked for, the full load included.

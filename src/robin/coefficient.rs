@@ -55,11 +55,16 @@ fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f
             let inside = match zone {
                 Zone::None => false,
                 Zone::Full => true,
-                Zone::Active => layer.compression[q] > 0.0,
+                Zone::Active => layer.tangent[q] > 0.0,
                 Zone::Subset(holds) => holds.is_true_at("psi", contact.position[point], k)?,
             };
             if inside {
-                weight[q] = model.weight[q] * contact.law.robin_tangent(point, layer.compression[q]);
+                // a smoothed law has a tangent of its own
+                let tangent = match layer.tangent[q] {
+                    0.0 => contact.law.robin_tangent(point, layer.compression[q]),
+                    tangent => tangent,
+                };
+                weight[q] = model.weight[q] * tangent;
             }
         }
     }

@@ -63,6 +63,7 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
         symbolic_factorizations: counts.symbolic + joint.symbolic,
         body_solves: counts.solves,
         inner_iterations: counts.inner_iterations + joint.inner_iterations,
+        smoothed_steps: last.map_or(0, |row| row.smoothed),
         robin_updates: counts.robin_updates,
         robin_updates_skipped: counts.robin_skipped,
         dense_factorizations: counts.dense_factorizations + joint.dense_factorizations,

@@ -114,6 +114,7 @@ struct Steps<'a> {
     /// Counts of the steps before.
     iterations: usize,
     sweeps: usize,
+    smoothed: usize,
     skipped: usize,
     seconds: f64,
     /// What bodies of the legs before did.
@@ -124,7 +125,7 @@ impl<'a> Steps<'a> {
     /// After the steps that another process made.
     fn new(keep: &'a mut dyn Keep, ready: &Ready) -> Self {
         ready.earlier.iter().for_each(|row| keep.row(row));
-        let (sweeps, seconds) = ready.earlier.last().map_or((0, 0.0), |row| (row.sweeps, row.seconds));
+        let last = ready.earlier.last().cloned().unwrap_or_default();
         let iterations = ready.steps.iter().map(|step| step.iterations).sum();
         Self {
             keep,
@@ -133,9 +134,10 @@ impl<'a> Steps<'a> {
             factor: 1.0,
             step: ready.steps.len(),
             iterations,
-            sweeps,
+            sweeps: last.sweeps,
+            smoothed: last.smoothed,
             skipped: 0,
-            seconds,
+            seconds: last.seconds,
             counts: BodyCounts::default(),
         }
     }
@@ -146,6 +148,7 @@ impl<'a> Steps<'a> {
         row.step = self.step;
         row.iteration += self.iterations;
         row.sweeps += self.sweeps;
+        row.smoothed += self.smoothed;
         row.seconds += self.seconds;
         row.factorizations += self.counts.factorizations;
         row.inner_iterations += self.counts.inner_iterations;
@@ -158,6 +161,7 @@ impl<'a> Steps<'a> {
         done.earlier.extend(of_step.rows.iter().map(|row| self.whole(row)));
         self.iterations += of_step.iterations;
         self.sweeps += of_step.sweeps;
+        self.smoothed += of_step.rows.last().map_or(0, |row| row.smoothed);
         self.skipped += of_step.solves_skipped;
         self.seconds += of_step.rows.last().map_or(0.0, |row| row.seconds);
     }

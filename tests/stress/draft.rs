@@ -68,6 +68,14 @@ impl Draft {
         Self { random, text, line, young, poisson, order, dimension, load, level, pressure: level, compliance: 0.0 }
     }
 
+    /// Sets the pressure of the loads, if there are any, to this share of the softest modulus.
+    pub fn press(&mut self, share: f64) {
+        self.level = share * self.young.iter().copied().fold(f64::INFINITY, f64::min);
+        self.load = if self.load == 0.0 { 0.0 } else { self.level };
+        self.pressure = self.level;
+        let _ = write!(self.line, " pressed {:.1e}", self.load);
+    }
+
     /// A spring of a body, numbered from 0, with this ratio of stiffness to its modulus.
     pub fn spring(&self, key: &str, body: usize, ratio: f64) -> String {
         format!("{key} = {:e}", ratio * self.young[body])

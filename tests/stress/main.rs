@@ -5,6 +5,7 @@ mod laws;
 mod random;
 mod runs;
 mod scenes;
+mod slender;
 mod wide;
 
 use runs::{Answer, Recipe, Verdict};
@@ -19,8 +20,9 @@ const SERIES: [(u64, &[&str]); 4] = [(1, &["auto"]), (2, &["auto"]), (3, &["auto
 /// Scenes of each series.
 const SCENES: usize = 24;
 
-/// A series of the wider box.
+/// A series of the wider box, and one of slender bodies.
 const WIDE: u64 = 100;
+const SLENDER: u64 = 100;
 
 /// Runs scenes, all in one session, as a process has but one.
 struct Bench {
@@ -79,8 +81,11 @@ fn scenes_are_solved_by_default(bench: &Bench) {
         let case = wide::scene(WIDE, index, Path::new(env!("CARGO_MANIFEST_DIR")));
         judge(format!("wide {WIDE} {index}"), &["auto"], bench.solve(case, &["auto"]));
     }
-    let advice =
-        "`scripts/stress --seed SEED --only INDEX --keep DIR` writes the scene file, with --wide of the wider box";
+    for index in 0..SCENES {
+        let case = slender::scene(SLENDER, index, Path::new(env!("CARGO_MANIFEST_DIR")));
+        judge(format!("slender {SLENDER} {index}"), &["auto"], bench.solve(case, &["auto"]));
+    }
+    let advice = "`scripts/stress --seed SEED --only INDEX --keep DIR` writes the scene file, with --wide or --slender of that family";
     assert!(bad.is_empty(), "{advice}\n{}", bad.join("\n"));
 }
 
@@ -217,4 +222,27 @@ fn wide_scenes_fill_the_box() {
     some("bodies of 1e-4", &|case| numbers(&case.text, "size = ").contains(&1e-4));
     some("a given start", &|case| case.start.is_some());
     some("no start", &|case| case.start.is_none());
+}
+
+/// Slender scenes have every kind of body, aspect ratio, hold, drive and law.
+#[test]
+fn slender_scenes_fill_the_box() {
+    let cases: Vec<_> = (0..1000).map(|index| slender::scene(SLENDER, index, Path::new(""))).collect();
+    let some = |what: &str, is: &dyn Fn(&Case) -> bool| {
+        let count = cases.iter().filter(|case| is(case)).count();
+        assert!(count >= 20, "{what}: {count} of {}", cases.len());
+    };
+    for kind in ["Leaves", "Discs", "Plates", "Frames", "Hoops"] {
+        some(kind, &|case| case.line.starts_with(kind));
+    }
+    for word in ["1:5 ", "1:200 ", "Clamped", "Carried", "bridge true", "moved", "two 1", "inner 1", "gap"] {
+        some(word, &|case| case.line.contains(word));
+    }
+    for law in ["linear = ", "power = ", "exponential = ", "cubic = ", "table = ", "sinh(", "up_to = ", "c^2/"] {
+        some(law, &|case| case.text.contains(law));
+    }
+    for word in ["force = [0, ", "plane = \"axisymmetric\"", "dimension = 3", "gap = \"-", "no gap"] {
+        some(word, &|case| if word == "no gap" { !case.text.contains("gap = ") } else { case.text.contains(word) });
+    }
+    some("no load", &|case| case.expect == Expect::Gauge);
 }

@@ -6,7 +6,7 @@
 //!
 //! With p = 0 for c <= 0 a law is a maximal monotone graph of points (c, p). Its points are found from the compression
 //! ([`LayerLaw::response`]), from the pressure ([`LayerLaw::compression`]) or from a line of slope -rho that meets the
-//! graph ([`LayerLaw::meet`]); [`LayerLaw::duality_gap`] says how far any (c, p) is from the graph. These handle the
+//! graph ([`LayerLaw::meet`], of smoothed laws [`resolve`]); [`LayerLaw::duality_gap`] says how far any (c, p) is from the graph. These handle the
 //! open layer and the ends of the range; a law implements the methods named `loaded`, if it has a better way than the
 //! common search.
 
@@ -21,6 +21,7 @@ mod power;
 mod quadrature;
 mod root;
 mod scaled;
+mod smoothed;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -33,6 +34,7 @@ pub use make::make;
 pub use own::OwnLaws;
 pub use power::Power;
 pub use scaled::Scaled;
+pub use smoothed::{LawState, resolve};
 pub use table::Table;
 pub use typed::Typed;
 

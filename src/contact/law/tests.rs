@@ -126,7 +126,7 @@ fn expressions_that_are_no_laws() {
 }
 
 /// Laws of every kind, each with a compression where it is curved.
-fn all_laws() -> Vec<(Box<dyn LayerLaw>, f64)> {
+pub(super) fn all_laws() -> Vec<(Box<dyn LayerLaw>, f64)> {
     let table = [[1e-5, 2.0], [1.5e-5, 2.1], [2e-5, 40.0], [1e-4, 41.0]];
     let mut laws: Vec<(Box<dyn LayerLaw>, f64)> = vec![
         (Box::new(Linear { stiffness: 3e7 }), 1e-5),

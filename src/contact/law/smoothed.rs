@@ -1,0 +1,123 @@
+//! Laws smoothed by an energy per area mu, as interior-point methods have them on their central path.
+//!
+//! With the inverse c = phi(p) of a law, the smoothed law is
+//!
+//! ```text
+//! c = phi(p) - mu/p,   p > 0,        kappa = dp/dc = 1 / (phi'(p) + mu/p^2)
+//! ```
+//!
+//! It is strictly monotone and has no corner. At every pressure the gap s = mu/p remains, so that s p = mu: the perturbed complementarity.
+
+use super::root::root;
+use super::{LayerLaw, Response};
+
+/// A state (c, p) on a law or a smoothed law, with the tangent there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LawState {
+    /// c.
+    pub compression: f64,
+    /// p, force per area.
+    pub pressure: f64,
+    /// kappa = dp/dc.
+    pub tangent: f64,
+}
+
+/// Return the only state with c + p/rho = `sum` on the law smoothed by `mu`, an energy per area, for a stiffness per area `rho > 0`: Minty's
+/// resolvent. With `mu` = 0 it is the state on the law itself.
+///
+/// The law need not be inverted. Let P(s) be the pressure at which the law itself meets the line with the sum s. A state with the remaining gap
+/// y = mu/p has p = P(`sum` + y), so y is the root of the increasing function y P(`sum` + y) = mu. Rigid layers, P(s) = rho s, have the least
+/// root.
+pub fn resolve(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64, mu: f64) -> LawState {
+    let at = |sum: f64| {
+        let compression = law.meet(point, sum, rho);
+        let Response { pressure, tangent, .. } = match compression > 0.0 {
+            true => {
+                let (pressure, tangent) = law.pressure_and_tangent(point, compression);
+                Response { pressure, tangent, energy: 0.0 }
+            }
+            false => law.response(point, compression),
+        };
+        LawState { compression, pressure, tangent }
+    };
+    if mu == 0.0 || !sum.is_finite() {
+        return at(sum);
+    }
+    let value = |gap: f64| {
+        let LawState { pressure, tangent, .. } = at(sum + gap);
+        (gap * pressure, pressure + gap * tangent / (1.0 + tangent / rho))
+    };
+    let diagonal = sum.hypot(2.0 * (mu / rho).sqrt());
+    let rigid = if sum > 0.0 { 2.0 * mu / rho / (sum + diagonal) } else { 0.5 * (diagonal - sum) };
+    // an infinite rho leaves the gap of a closed point without a lower bound
+    let start = if rigid > 0.0 { rigid } else { 1.0 };
+    let least = rigid * (1.0 - 4.0 * f64::EPSILON);
+    let (Ok(gap) | Err(gap)) = root(mu, [least, f64::MAX], start, value);
+    let LawState { compression, tangent, .. } = at(sum + gap);
+    let pressure = mu / gap;
+    LawState { compression: compression - gap, pressure, tangent: (tangent.recip() + gap / pressure).recip() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::law::tests::all_laws;
+
+    /// The pressure at which phi(p) - mu/p + p/rho is the sum, by bisection of its logarithm: the law is inverted here.
+    fn bisected(law: &dyn LayerLaw, sum: f64, rho: f64, mu: f64) -> f64 {
+        let excess = |pressure: f64| law.compression(0, pressure) - mu / pressure + pressure / rho - sum;
+        let (mut low, mut high) = (f64::MIN_POSITIVE, 1e300);
+        while high / low > 1.0 + 4.0 * f64::EPSILON {
+            let middle = if high / low > 4.0 { low.sqrt() * high.sqrt() } else { 0.5 * (low + high) };
+            if excess(middle) < 0.0 { low = middle } else { high = middle }
+        }
+        high
+    }
+
+    /// Every law, from points far apart to points pressed hard, from a soft to an infinite slope, from much smoothing to hardly any.
+    #[test]
+    fn states_are_those_of_the_inverted_law() {
+        for (law, scale) in all_laws() {
+            let level = law.pressure(0, scale);
+            for share in [-1e3, -1.0, -1e-6, 0.0, 1e-6, 0.3, 2.0] {
+                for rho in [1e-3, 1.0, 1e3, f64::INFINITY].map(|times: f64| times * level / scale) {
+                    for mu in [1e-12, 1e-4, 1.0, 1e3].map(|times| times * level * scale) {
+                        let sum = share * scale;
+                        let state = resolve(&*law, 0, sum, rho, mu);
+                        let expected = bisected(&*law, sum, rho, mu);
+                        let error = state.pressure / expected - 1.0;
+                        assert!(
+                            error.abs() < 1e-7,
+                            "{law:?} sum {sum:e} rho {rho:e} mu {mu:e}: {state:?} {expected:e}"
+                        );
+                        let size = sum.abs().max(state.compression.abs()).max(state.pressure / rho);
+                        let off = state.compression + state.pressure / rho - sum;
+                        assert!(off.abs() <= 1e-12 * size, "{law:?} sum {sum:e} rho {rho:e} mu {mu:e}: {off:e}");
+                        assert!(state.tangent > 0.0 && state.tangent.is_finite(), "{law:?}: {state:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_tangent_is_the_slope_and_no_smoothing_is_the_law() {
+        for (law, scale) in all_laws() {
+            let level = law.pressure(0, scale);
+            let (rho, mu) = (level / scale, 0.1 * level * scale);
+            for share in [-2.0, -0.5, 0.0, 0.4] {
+                let at = |share: f64| resolve(&*law, 0, share * scale, rho, mu);
+                let [low, here, high] = [share - 1e-5, share, share + 1e-5].map(at);
+                let slope = (high.pressure - low.pressure) / (high.compression - low.compression);
+                assert!((here.tangent / slope - 1.0).abs() < 1e-2, "{law:?}: {here:?} {slope}");
+                let exact = resolve(&*law, 0, share * scale, rho, 0.0);
+                assert_eq!(exact.compression, law.meet(0, share * scale, rho));
+                assert_eq!(exact.pressure, law.pressure(0, exact.compression));
+            }
+            for sum in [f64::NEG_INFINITY, f64::INFINITY] {
+                assert_eq!(resolve(&*law, 0, sum, rho, mu).compression, sum);
+            }
+            assert!(resolve(&*law, 0, f64::NAN, rho, mu).pressure.is_nan());
+        }
+    }
+}
