@@ -135,10 +135,10 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     // nothing holds a block that is pulled off
     let case = wide::scene(145215, 97, Path::new(env!("CARGO_MANIFEST_DIR")));
     assert_eq!(bench.solve(case, &["auto"]).0[0].1.status, "unbounded");
-    // steps that lead in a circle come to an end
+    // steps that led in a circle leave it by smoothed laws, and come to what rounding allows
     let case = wide::scene(2170544, 290, Path::new(env!("CARGO_MANIFEST_DIR")));
     let answer = &bench.solve(case, &["auto"]).0[0].1;
-    assert!(answer.status == "cycle" && answer.iterations <= 200, "{} {}", answer.iterations, answer.message);
+    assert!(answer.status == "roundoff-limited" && answer.iterations <= 30, "{} {}", answer.iterations, answer.message);
     // the residual is met, but a body is not in balance yet: that is neither converged nor rounding
     let answer = &bench.run(1, 123, &["0.6"]).0[0].1;
     assert_eq!(answer.status, "iteration-limit");
