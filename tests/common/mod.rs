@@ -171,12 +171,13 @@ fn program(ranks: usize) -> Command {
     command
 }
 
-/// Sets what tests need: Open MPI as root, one thread a rank, a cache of meshes for all tests, no options from outside.
+/// Sets what tests need: Open MPI as root, one thread a rank unless the environment asks for more, a cache of meshes for all tests, no
+/// options from outside.
 pub fn environment(command: &mut Command) {
     command
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-        .env("OPENBLAS_NUM_THREADS", "1")
+        .env("OPENBLAS_NUM_THREADS", std::env::var("OPENBLAS_NUM_THREADS").as_deref().unwrap_or("1"))
         .env("WINKLER_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("meshes"))
         .env_remove("PETSC_OPTIONS");
 }
