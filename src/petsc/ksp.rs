@@ -156,7 +156,7 @@ impl Ksp {
     ///
     /// # Errors
     /// When PETSc refuses an option; for the options that change the matrix itself, `-ksp_diagonal_scale` and
-    /// `-pc_factor_in_place`; and for `preonly` over a nested solver that keeps a preconditioner.
+    /// `-pc_factor_in_place`; for `-ksp_max_it 0`; and for `preonly` over a nested solver that keeps a preconditioner.
     pub fn set_from_options(&mut self) -> Result<()> {
         // SAFETY: the solver of this wrapper.
         unsafe { petsc!(KSPSetFromOptions(self.ksp)) }.map_err(|error| {
@@ -192,7 +192,12 @@ impl Ksp {
         }
         if self.applies_only() {
             // SAFETY: the solver of this wrapper.
-            unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, ffi::PetscBool_PETSC_FALSE)) }?;
+            return unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, ffi::PetscBool_PETSC_FALSE)) };
+        }
+        // conjugate gradients make room for an eigenvalue an iteration, and go through one all the same
+        if self.tolerances()?.1 < 1 {
+            return Err(Error::new(Kind::Solver, format!("{start}ksp_max_it is 0: the solver would do nothing"))
+                .help("give 1 or more; `-ksp_type preonly` applies the preconditioner once"));
         }
         Ok(())
     }

@@ -5,15 +5,6 @@ use crate::petsc::Session;
 use std::fs::OpenOptions;
 use std::path::Path;
 
-/// Refuses a file of options, among the words of the command line, that PETSc would read for ever.
-///
-/// # Errors
-/// It is there and no regular file.
-pub fn refuse_words(words: &[String]) -> Result<()> {
-    let files = words.windows(2).filter(|two| two[0] == "-options_file").map(|two| Path::new(&two[1]));
-    files.filter(|file| file.exists() && !file.is_file()).try_for_each(|file| crate::file::read(file).map(|_| ()))
-}
-
 /// Refuses traps of numbers that are not finite.
 ///
 /// # Errors
