@@ -169,6 +169,9 @@ impl Drop for Running {
 
 /// What the first rank found, on all of them: whether it failed, and the file of the home folder.
 fn of_first(world: &SimpleCommunicator, looked: Result<Files>) -> Result<Files> {
+    if world.size() == 1 {
+        return looked;
+    }
     let root = world.process_at_rank(0);
     let mut code = looked.as_ref().map_or_else(|error| error.kind().exit_code(), |_| 0);
     root.broadcast_into(&mut code);
@@ -180,7 +183,10 @@ fn of_first(world: &SimpleCommunicator, looked: Result<Files>) -> Result<Files> 
     let mut length = bytes.len() as u64;
     root.broadcast_into(&mut length);
     bytes.resize(length as usize, 0);
-    root.broadcast_into(&mut bytes[..]);
+    if length > 0 {
+        // MPI takes no empty message
+        root.broadcast_into(&mut bytes[..]);
+    }
     Ok(Files { home: (length > 0).then(|| PathBuf::from(OsStr::from_bytes(&bytes))), ..files })
 }
 

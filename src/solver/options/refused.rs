@@ -5,18 +5,24 @@ use crate::petsc::Session;
 use std::fs::OpenOptions;
 use std::path::Path;
 
-/// Refuses traps of numbers that are not finite.
+/// Refuses traps of numbers that are not finite, and values that PETSc would read beyond their end.
 ///
 /// # Errors
-/// `-fp_trap` is on.
+/// `-fp_trap` is on; a variable in a value, such as `${HOME}`, is not closed.
 pub fn refuse_traps(session: &Session) -> Result<()> {
     let is_off = |value: &str| ["false", "no", "off", "0"].contains(&value.to_lowercase().as_str());
-    if session.options().get("-fp_trap").is_some_and(|value| !is_off(&value)) {
-        return Err(Error::new(
-            Kind::Solver,
-            "-fp_trap would end this program: it computes with infinities on purpose",
-        )
-        .help("a number that should be finite and is not ends a run anyway, with the status `not-finite`"));
+    let is_open = |value: &str| value.rsplit_once("${").is_some_and(|(_, rest)| !rest.contains('}'));
+    for (name, value) in session.options().all()? {
+        let value = value.unwrap_or_default();
+        if is_open(&value) {
+            let message = format!("the value `{value}` of {name} begins a variable that it does not end");
+            return Err(Error::new(Kind::Solver, message).help("write `${NAME}`"));
+        }
+        if name == "-fp_trap" && !is_off(&value) {
+            let message = "-fp_trap would end this program: it computes with infinities on purpose";
+            return Err(Error::new(Kind::Solver, message)
+                .help("a number that should be finite and is not ends a run anyway, with the status `not-finite`"));
+        }
     }
     Ok(())
 }
