@@ -156,7 +156,8 @@ impl Ksp {
     ///
     /// # Errors
     /// When PETSc refuses an option; for the options that change the matrix itself, `-ksp_diagonal_scale` and
-    /// `-pc_factor_in_place`; for `-ksp_max_it 0` and a `-ksp_rtol` that is not below 1; and for `preonly` over a nested solver that keeps a preconditioner.
+    /// `-pc_factor_in_place`; for `-ksp_max_it 0` and a `-ksp_rtol` that is not below 1; and for `preonly` over a nested
+    /// solver that keeps a preconditioner.
     pub fn set_from_options(&mut self) -> Result<()> {
         // SAFETY: the solver of this wrapper.
         unsafe { petsc!(KSPSetFromOptions(self.ksp)) }.map_err(|error| {
@@ -202,11 +203,8 @@ impl Ksp {
         }
         // with 1 the zero guess would do
         if !(0.0..1.0).contains(&rtol) {
-            return Err(Error::new(
-                Kind::Solver,
-                format!("{start}ksp_rtol is {rtol}: the solver would do nothing useful"),
-            )
-            .help("give a number from 0 to below 1"));
+            return Err(Error::new(Kind::Solver, format!("{start}ksp_rtol is {rtol}, which is no tolerance"))
+                .help("give a number from 0 on, below 1"));
         }
         Ok(())
     }
