@@ -223,8 +223,9 @@ fn manual(folder: &Path) -> Result<i32> {
 
 /// Runs a command that solves.
 fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
-    let session = match options::refuse_words(petsc).and_then(|()| Session::start(petsc)) {
+    let session = match Session::start(petsc) {
         Ok(session) => session,
+        Err(error) if error.is_silent() => return error.kind().exit_code(),
         Err(error) => return complain(&error),
     };
     let ended = agree(&session, options::refuse_traps(&session)).and_then(|()| dispatch(&session, interrupt, command));

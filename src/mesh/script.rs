@@ -33,10 +33,9 @@ impl Script {
     /// A script that cannot be read. Included files that do not exist are left to Gmsh to report.
     pub fn read(path: &Path) -> Result<Script> {
         let mut script = Script::default();
-        // Canonical paths, since scripts may include each other along ever longer ones.
-        let canonical = path.canonicalize().map_err(|cause| Error::file(path, "read", &cause))?;
-        let home = canonical.parent().unwrap_or(Path::new("")).to_owned();
-        let mut found: Vec<PathBuf> = vec![canonical];
+        let place = place_of(path).map_err(|cause| Error::file(path, "read", &cause))?;
+        let home = place.parent().unwrap_or(Path::new("")).to_owned();
+        let mut found: Vec<PathBuf> = vec![place];
         let mut next = 0;
         while let Some(path) = found.get(next).cloned() {
             next += 1;
@@ -46,12 +45,16 @@ impl Script {
             let folder = path.parent().unwrap_or(Path::new(""));
             let text = String::from_utf8_lossy(&bytes);
             let tokens: Vec<Token> = tokens(&text).into_iter().map(|(_, token)| token).collect();
-            for token in &tokens {
-                let Token::Text(name) = token else { continue };
-                let Ok(file) = folder.join(name).canonicalize() else {
-                    continue;
-                };
-                if file.is_file() && !found.contains(&file) {
+            let named = tokens.iter().filter_map(|token| match token {
+                Token::Text(name) => Some(folder.join(name)),
+                _ => None,
+            });
+            // Gmsh reads the file of options beside each file as a script, too
+            let mut options = path.clone().into_os_string();
+            options.push(".opt");
+            let files = named.chain([PathBuf::from(options)]);
+            for file in files.filter(|file| file.is_file()).filter_map(|file| place_of(&file).ok()) {
+                if !found.contains(&file) {
                     found.push(file);
                 }
             }
@@ -165,6 +168,15 @@ impl Script {
     }
 }
 
+/// A path through the folder that a file lies in, which is the same however long the way to it was written. A link stays a link: Gmsh looks for
+/// other files beside the link, not beside what it leads to.
+fn place_of(file: &Path) -> std::io::Result<PathBuf> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder.canonicalize()?;
+    file.metadata()?;
+    Ok(file.file_name().map_or(folder.clone(), |name| folder.join(name)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,5 +232,31 @@ mod tests {
         assert!(script.assigned.contains("n"));
         assert!(script.files[0].starts_with(b"Include"));
         assert_eq!(script.files.len(), 3);
+    }
+
+    /// Gmsh reads `a.geo.opt` after `a.geo`, and what is named in a script that is a link lies beside the link.
+    #[test]
+    fn files_are_found_where_gmsh_finds_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        let breach = |name: &str| Script::read(&folder.path().join(name)).unwrap().breach.map(|(path, _)| path);
+        for part in ["sub", "real"] {
+            std::fs::create_dir(folder.path().join(part)).unwrap();
+        }
+        write("a.geo", "n = 1;\n");
+        assert_eq!(breach("a.geo"), None);
+        write("a.geo.opt", "SystemCall \"id\";\n");
+        assert!(breach("a.geo").is_some_and(|path| path.ends_with("a.geo.opt")));
+        write("b.geo", "Merge \"c.step\";\n");
+        write("c.step", "");
+        write("c.step.opt", "Merge \"d.opt\";\n");
+        write("d.opt", "Save \"x\";\n");
+        assert!(breach("b.geo").is_some_and(|path| path.ends_with("d.opt")));
+        write("real/e.geo", "Include \"f.geo\";\n");
+        write("real/f.geo", "n = 1;\n");
+        write("sub/f.geo", "Save \"x\";\n");
+        std::os::unix::fs::symlink("../real/e.geo", folder.path().join("sub/e.geo")).unwrap();
+        assert_eq!(breach("real/e.geo"), None);
+        assert!(breach("sub/e.geo").is_some_and(|path| path.ends_with("sub/f.geo")));
     }
 }

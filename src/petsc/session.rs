@@ -1,11 +1,16 @@
 //! The life of MPI and PETSc in this process.
 
+use super::files::Files;
 use super::library::petsc;
 use super::{blas, kernels, launcher, library, waiting};
 use crate::error::{Error, Kind, Result};
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
+use mpi::traits::Root;
+use std::ffi::OsStr;
 use std::io::Write;
+use std::os::unix::ffi::OsStrExt;
+use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -37,18 +42,21 @@ pub struct Session(Rc<Running>);
 
 struct Running {
     world: SimpleCommunicator,
+    /// Files of options in the current folder that are not read.
+    left_out: Vec<String>,
     /// Its drop ends MPI, after PETSc.
     _universe: Universe,
 }
 
 impl Session {
-    /// Starts MPI, then PETSc (at once, or where a lone process gives it no options, when it is first needed) with the options in `words` (as typed: `-ksp_type`, `cg`), in `PETSC_OPTIONS`, in
-    /// `.petscrc` and in the file of `-options_file`. PETSc installs no signal handlers. With several ranks a panic on
-    /// one of them ends them all.
+    /// Starts MPI, then PETSc (at once, or where a lone process gives it no options, when it is first needed) with the options in `words`
+    /// (as typed: `-ksp_type`, `cg`), in `PETSC_OPTIONS`, in `.petscrc` of the home folder and in the file of `-options_file`. PETSc installs
+    /// no signal handlers. With several ranks a panic on one of them ends them all.
     ///
     /// # Errors
     /// `Kind::Solver` when a session was started before in this process, when MPI runs already, or when PETSc refuses
-    /// an option; PETSc's message is among the causes.
+    /// an option; PETSc's message is among the causes. A file of options that is none, or that leads back to itself; ranks but the first
+    /// have a silent error then.
     pub fn start(words: &[String]) -> Result<Session> {
         if STARTED.swap(true, Ordering::SeqCst) {
             return Err(Error::new(Kind::Solver, "PETSc was already started in this process")
@@ -59,17 +67,25 @@ impl Session {
             .ok_or_else(|| Error::new(Kind::Solver, "MPI was already started in this process by other code"))?;
         let world = SimpleCommunicator::world();
         abort_on_panic(world.size() > 1);
-        if world.size() == 1 && library::may_wait(words) {
-            return Ok(Session(Rc::new(Running { world, _universe: universe })));
+        let looked = if world.rank() == 0 { Files::look(words) } else { Ok(Files::default()) };
+        let files = of_first(&world, looked)?;
+        let left_out = files.left_out.clone();
+        if world.size() == 1 && library::may_wait(words, &files) {
+            return Ok(Session(Rc::new(Running { world, left_out, _universe: universe })));
         }
-        if let Err(error) = library::start(words) {
+        if let Err(error) = library::start(words, files.home.as_deref()) {
             // The other ranks may still wait for this one inside PETSc; ending MPI here would wait for them.
             if world.size() > 1 {
                 std::mem::forget(universe);
             }
             return Err(error);
         }
-        Ok(Session(Rc::new(Running { world, _universe: universe })))
+        Ok(Session(Rc::new(Running { world, left_out, _universe: universe })))
+    }
+
+    /// Files of PETSc options in the current folder that PETSc alone would have read, `.petscrc` and `petscrc`, on the first rank.
+    pub fn left_out(&self) -> &[String] {
+        &self.0.left_out
     }
 
     /// Ends PETSc and MPI if this is the last clone, and tells what goes wrong with it: PETSc writes its logs then.
@@ -149,6 +165,29 @@ impl Drop for Running {
         let _ = library::end();
         drop(waiting::take());
     }
+}
+
+/// What the first rank found, on all of them: whether it failed, and the file of the home folder.
+fn of_first(world: &SimpleCommunicator, looked: Result<Files>) -> Result<Files> {
+    if world.size() == 1 {
+        return looked;
+    }
+    let root = world.process_at_rank(0);
+    let mut code = looked.as_ref().map_or_else(|error| error.kind().exit_code(), |_| 0);
+    root.broadcast_into(&mut code);
+    if code != 0 {
+        return Err(looked.err().map_or(Error::silent(code), Error::agreed));
+    }
+    let files = looked?;
+    let mut bytes = files.home.as_ref().map_or(Vec::new(), |path| path.as_os_str().as_bytes().to_vec());
+    let mut length = bytes.len() as u64;
+    root.broadcast_into(&mut length);
+    bytes.resize(length as usize, 0);
+    if length > 0 {
+        // MPI takes no empty message
+        root.broadcast_into(&mut bytes[..]);
+    }
+    Ok(Files { home: (length > 0).then(|| PathBuf::from(OsStr::from_bytes(&bytes))), ..files })
 }
 
 /// Makes a panic on one rank end the others too, which would wait for it for ever.

@@ -131,15 +131,8 @@ impl<const D: usize> Source<D> {
 
 /// PETSc options of the scene, weaker than typed ones.
 fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()> {
-    let mut words = scene.solver.options.iter().peekable();
-    while let Some(word) = words.next() {
-        if !word.starts_with('-') {
-            return Err(Error::new(Kind::Scene, format!("`{word}` in solver.options belongs to no option"))
-                .help("write options as on the command line: \"-ksp_type cg -ksp_rtol 1e-8\""));
-        }
-        let is_value = |next: &&String| !next.starts_with('-') || next.parse::<f64>().is_ok();
-        let value = words.next_if(is_value).map(String::as_str);
-        options::set_of_scene(session, bodies, word, value)?;
+    for (name, value) in options::pairs(&scene.solver.options)? {
+        options::set_of_scene(session, bodies, name, value)?;
     }
     Ok(())
 }
@@ -162,6 +155,11 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
                 .to_owned(),
         );
     }
+    warnings.extend(session.left_out().iter().map(|file| {
+        format!(
+            "{file} of this folder is not read, since PETSc options can run programs; -options_file {file} reads it"
+        )
+    }));
     if session.size() > discrete.bodies.len() && !discrete.model.is_dealt_out() {
         warnings.push(format!(
             "{} of {} ranks have no body to solve",

@@ -118,6 +118,11 @@ impl Run {
         self.table("history.csv")
     }
 
+    /// Runs a command that writes its results to `folder`.
+    pub fn of(command: Command, folder: &Path) -> Self {
+        end_of(command, TempDir::new().expect("a temporary folder"), folder.to_owned())
+    }
+
     /// The run itself, which must have ended with status `converged`.
     pub fn converged(self) -> Self {
         assert_eq!((self.code, self.report["status"].as_str()), (0, Some("converged")), "{}", self.said());
@@ -183,8 +188,13 @@ pub fn environment(command: &mut Command) {
 }
 
 fn finish(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
+    command.current_dir(scratch.path());
+    end_of(command, scratch, folder)
+}
+
+fn end_of(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
     // launchers that start at the same moment get into each other's way in a common folder
-    command.current_dir(scratch.path()).env("OMPI_MCA_orte_tmpdir_base", scratch.path());
+    command.env("OMPI_MCA_orte_tmpdir_base", scratch.path());
     let (status, stdout, stderr) = output(command, patience());
     let report = match fs::read(folder.join("report.json")) {
         Ok(bytes) => serde_json::from_slice(&bytes).expect("report.json is JSON"),
