@@ -373,9 +373,10 @@ fn a_table_on_a_full_disk_is_a_warning_and_nothing_is_lost() {
     let scratch = tempfile::tempdir().expect("a folder");
     let out = scratch.path().join("out");
     let values: Vec<String> = (0..60).map(|k| format!("{}", 0.5 + 0.005 * f64::from(k))).collect();
-    let mut command = Command::new("sh");
-    // files of 4 or 8 kB, whichever block `ulimit` has; a row has some 200 bytes
-    command.args(["-c", "ulimit -f 8; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_winkler"), "sweep"]);
+    let mut command = Command::new("bash");
+    // files of 8 kB; a row has some 200 bytes. What is printed goes through a pipe, which has no limit
+    let script = "set -o pipefail; (ulimit -f 8; exec \"$@\") | cat";
+    command.args(["-c", script, "bash", env!("CARGO_BIN_EXE_winkler"), "sweep"]);
     command.arg(case("groove-held")).arg("-o").arg(&out).args(["--set", "mesh.set.n=2", "--set", "method={}"]);
     command.args(["--set", "output.plots=false", "--json", "--over"]);
     command.arg(format!("contact.0.layer.power.a={}", values.join(","))).current_dir(scratch.path());
