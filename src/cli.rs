@@ -3,7 +3,7 @@
 use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
-use crate::output::say;
+use crate::output::{make_folder, say};
 use crate::parallel::agree;
 use crate::petsc::Session;
 use crate::report;
@@ -216,9 +216,19 @@ pub fn run(words: Vec<OsString>) -> i32 {
 
 /// Writes a man page of the program and one of each command.
 fn manual(folder: &Path) -> Result<i32> {
+    make_folder(folder)?;
+    // made aside and moved: what has the name of a page is replaced, never written through
+    let aside = folder.join(format!(".winkler-{}-man", std::process::id()));
     let wrong = |cause: std::io::Error| Error::file(folder, "write man pages to", &cause);
-    std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder)).map_err(wrong)?;
-    Ok(0)
+    let made =
+        std::fs::create_dir(&aside).and_then(|()| clap_mangen::generate_to(Cli::command(), &aside)).and_then(|()| {
+            std::fs::read_dir(&aside)?
+                .flatten()
+                .try_for_each(|page| std::fs::rename(page.path(), folder.join(page.file_name())))
+        });
+    // what is left of a failure is litter
+    let _ = std::fs::remove_dir_all(&aside);
+    made.map_err(wrong).map(|()| 0)
 }
 
 /// Runs a command that solves.

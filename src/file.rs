@@ -35,6 +35,24 @@ pub fn open(path: &Path) -> Result<File> {
         .help("name a regular file; what a pipe gives can be saved as one"))
 }
 
+/// The bytes of a text whose lines end as on Unix: those of old Macs end with carriage returns alone. Texts with other ends stay as they are,
+/// so that every line keeps its number.
+pub fn with_unix_lines(mut bytes: Vec<u8>) -> Vec<u8> {
+    if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
+        bytes.iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
+    }
+    bytes
+}
+
+/// What is wrong with bytes that should be text in UTF-8, as the rest of a sentence about their file; none where that is not seen at once.
+pub fn other_encoding(bytes: &[u8]) -> Option<&'static str> {
+    match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("is UTF-16 text, not UTF-8"),
+        _ if bytes.contains(&0) => Some("has zero bytes, so it is no text"),
+        _ => None,
+    }
+}
+
 /// Bytes on a line of a file in which Linux tells of itself, such as `MemAvailable` of /proc/meminfo; none where it does not.
 pub fn bytes_in_proc(file: &str, line: &str) -> Option<u64> {
     bytes_on_line(&std::fs::read_to_string(file).ok()?, line)
@@ -66,6 +84,16 @@ mod tests {
         assert_ne!(digest(&("ab", "c")), digest(&("a", "bc")));
         assert_ne!(digest(&[2.0, 1.0]), digest(&[2.0, 1.0 + f64::EPSILON]));
         assert!(digest(&()).starts_with("e3b0c442"), "that of no byte");
+    }
+
+    #[test]
+    fn lines_of_old_macs_are_lines() {
+        let unix = |text: &[u8]| with_unix_lines(text.to_vec());
+        assert_eq!(unix(b"a\rb\r"), b"a\nb\n");
+        assert_eq!(unix(b"a\r\nb\rc"), b"a\r\nb\rc");
+        assert_eq!(other_encoding(b"\xff\xfea\0"), Some("is UTF-16 text, not UTF-8"));
+        assert_eq!(other_encoding(b"a"), None);
+        assert!(other_encoding(b"a\0").is_some());
     }
 
     #[test]

@@ -46,7 +46,7 @@ pub fn check(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         return Ok(0);
     }
     if let Some(folder) = &request.output {
-        surfaces::draw(&built, &Folder::create(folder)?)?;
+        surfaces::draw(&built, &Folder::claim(folder)?)?;
     }
     if request.scene.json {
         let mut value = json!(report::headline(session, &built, &shared.solvers, &clock));

@@ -20,6 +20,9 @@ use std::path::{Path, PathBuf};
 /// Name of the file in the folder of results.
 pub const FILE: &str = "checkpoint";
 
+/// Name under which the next run that does not go on from it leaves it.
+pub const ASIDE: &str = "checkpoint.old";
+
 const FORMAT: &str = "winkler checkpoint 3";
 
 /// Bytes of the digest at the end.

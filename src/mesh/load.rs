@@ -7,7 +7,7 @@ use super::script::Script;
 use super::{Dealer, Mesh, foreign, msh};
 use crate::error::{Error, Located, Place, Result};
 use crate::exchange::Serial;
-use crate::file::digest_of_bytes;
+use crate::file::{digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
 use crate::problem::{Guard, MeshSource, Order};
 use std::fs::File;
@@ -87,10 +87,11 @@ fn from_file<const D: usize>(
     let mut start = Vec::new();
     let read = source.by_ref().take(START).read_to_end(&mut start);
     read.map_err(|cause| Error::file(path, "read", &cause).at(&file.place))?;
+    refuse_old_lines(path, &start)?;
     let mut loaded = match foreign::is_mesh(path, &start) {
         true => {
             let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
-            converted(file, &bytes, interrupt)?
+            converted(file, &with_unix_lines(bytes), interrupt)?
         }
         false => {
             let mesh = msh::read(path, Box::new(source), Maker::User, Some(dealer))?;
@@ -110,6 +111,17 @@ fn from_file<const D: usize>(
         _ => loaded.mesh,
     };
     Ok(loaded)
+}
+
+/// Refuses text of Gmsh whose lines are none for it.
+fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
+    let end = start.iter().position(|byte| matches!(byte, b'\r' | b'\n'));
+    let is_old_mac = end.is_some_and(|at| start[at] == b'\r' && start.get(at + 1) != Some(&b'\n'));
+    match start.starts_with(b"$") && is_old_mac && !foreign::is_mesh(path, start) {
+        true => Err(Error::mesh(path, None, "its lines end with carriage returns alone, as on old Macs")
+            .help(format!("give them the ends of today: tr '\\r' '\\n' < {} > new.msh", path.display()))),
+        false => Ok(()),
+    }
 }
 
 /// A mesh of another program, or of another version of Gmsh's format, as Gmsh writes it.
@@ -145,7 +157,7 @@ fn kept<const D: usize>(
     // A file of the cache that cannot be read or is damaged is as good as none.
     for folder in folders {
         let cached = folder.join(name);
-        if let Some(mesh) = File::open(&cached).ok().and_then(|file| parse(file).ok()) {
+        if let Some(mesh) = crate::file::open(&cached).ok().and_then(|file| parse(file).ok()) {
             return Ok(Loaded { mesh, origin: Origin::Cache, file: cached });
         }
     }
@@ -239,7 +251,7 @@ pub fn keep_final(purpose: &str, sizes: &str) -> Result<()> {
 /// The sizes that an earlier adaptation for the same `purpose` ended with.
 pub fn recall_final(purpose: &str) -> Option<String> {
     let name = final_name(purpose);
-    folders().iter().find_map(|folder| std::fs::read_to_string(folder.join(&name)).ok())
+    folders().iter().find_map(|folder| String::from_utf8(crate::file::read(&folder.join(&name)).ok()?).ok())
 }
 
 fn final_name(purpose: &str) -> String {

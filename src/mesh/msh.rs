@@ -52,7 +52,9 @@ pub fn read<const D: usize>(
         let start = cursor.position();
         let line = cursor.line()?;
         let Some(section) = line.strip_prefix('$') else {
-            return Err(cursor.error_at(start, "a section such as `$Nodes` should begin here"));
+            return Err(cursor
+                .error_at(start, "a section such as `$Nodes` should begin here")
+                .help("the file is damaged, or has something behind its end: save the mesh again with Gmsh"));
         };
         cursor.enter(section);
         match section {

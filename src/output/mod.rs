@@ -5,6 +5,7 @@
 
 #[cfg(feature = "cli")]
 mod chart;
+pub mod checksums;
 pub mod collection;
 pub mod contact;
 pub mod contacts;
@@ -13,6 +14,8 @@ mod format;
 pub mod gmsh;
 pub mod history;
 mod largest;
+pub mod leftovers;
+mod lock;
 #[cfg(feature = "cli")]
 pub mod plot;
 #[cfg(feature = "cli")]
@@ -44,9 +47,10 @@ use crate::error::{Error, Result};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
+pub use checksums::Checksums;
 pub use contact::ContactTable;
 pub use contacts::PairRow;
-pub use folder::{Folder, safe_name, write_whole};
+pub use folder::{Folder, make_folder, safe_name, write_whole};
 pub use format::{sci, seconds, trimmed};
 pub use history::HistoryWriter;
 #[cfg(feature = "cli")]

@@ -38,7 +38,7 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
         return Err(usage("`bench` starts the ranks of its runs itself").help("`--ranks 1,2` instead of mpiexec"));
     }
     let plan = Plan::new(request)?;
-    let folder = Folder::create(folder(request, &plan))?;
+    let folder = Folder::claim(folder(request, &plan))?;
     let reference = compare::References::read(request.against.as_deref(), &plan)?;
     let mut table = Table::open(&folder, &plan, request)?;
     let runner = Runner::new(interrupt, request, folder.path())?;
@@ -58,20 +58,21 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
         if !(request.quiet && row.is_good()) {
             bar.suspend(|| say(row.line(&case.label(), is_new)))?;
         }
-        table.add(row)?;
+        table.add(row, is_new).iter().for_each(|text| bar.suspend(|| eprintln!("warning: {text}")));
         bar.inc(1);
     }
     bar.finish_and_clear();
     errors::against_finest(&mut table, &plan);
     table.compare_with_linear();
-    table.rewrite()?;
+    let mut written = table.rewrite();
     for (name, plot) in charts::all(&table, &plan) {
-        folder.write(&name, |out| plot.write(out))?;
+        written = written.and(folder.write(&name, |out| plot.write(out)));
     }
     if !request.quiet {
         say(summary::of(&table, &plan))?;
     }
     say(format_args!("results in {}", folder.path().display()))?;
+    written?;
     Ok(i32::from(!table.rows.iter().all(Row::is_good)))
 }
 

@@ -280,17 +280,19 @@ impl<'a> Table<'a> {
             request.timeout,
             request.against
         );
-        let known = std::fs::read_to_string(folder.path().join(SETTINGS)).is_ok_and(|old| old == settings);
-        let old = if request.resume && known { read(folder, &columns) } else { Vec::new() };
+        let path = folder.path().join(SETTINGS);
+        let is_known = request.resume && crate::file::read(&path).is_ok_and(|old| old == settings.as_bytes());
+        let mut old = if is_known { read(folder, &columns) } else { Vec::new() };
+        old.retain(|row| !matches!(row.status.as_str(), "killed" | "failed" | SKIPPED));
         folder.write(SETTINGS, |out| out.write_all(settings.as_bytes()))?;
-        let file = RowFile::create(folder, FILE, &columns)?;
+        // rows that are kept are there all the time: a benchmark that is killed loses none
+        let file = RowFile::create(folder, FILE, &columns, &old.iter().map(Row::fields).collect::<Vec<_>>())?;
         Ok(Self { folder, columns, rows: Vec::new(), old, file })
     }
 
     /// The row of a case that an earlier benchmark made.
     pub fn kept(&self, case: &Case) -> Option<Row> {
-        let is_to_do = |row: &Row| matches!(row.status.as_str(), "killed" | "failed" | SKIPPED);
-        self.old.iter().find(|row| row.key == case.key && !is_to_do(row)).cloned()
+        self.old.iter().find(|row| row.key == case.key).cloned()
     }
 
     /// Whether a case differs by its mesh alone from a row that did not end in time: lists of meshes go from coarse to fine.
@@ -301,14 +303,13 @@ impl<'a> Table<'a> {
         self.rows.iter().any(|row| row.is_late() && like(row))
     }
 
-    /// Adds a row and writes it at once: what was measured is kept whatever comes next.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
-    pub fn add(&mut self, row: Row) -> Result<()> {
-        self.file.push(&row.fields());
+    /// Adds a row, and writes it at once if it is new: what was measured is kept whatever comes next. Why the file lacks rows, once.
+    pub fn add(&mut self, row: Row, is_new: bool) -> Option<String> {
+        if is_new {
+            self.file.push(&row.fields());
+        }
         self.rows.push(row);
-        self.file.check()
+        self.file.complaint()
     }
 
     /// Writes all rows anew, with what only the whole table could tell.
@@ -357,7 +358,8 @@ impl<'a> Table<'a> {
 
 /// The rows of the file in a folder that has these columns; none if it has others.
 fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
-    let Ok(mut file) = csv::Reader::from_path(folder.path().join(FILE)) else { return Vec::new() };
+    let Ok(bytes) = crate::file::read(&folder.path().join(FILE)) else { return Vec::new() };
+    let mut file = csv::Reader::from_reader(bytes.as_slice());
     if !file.headers().is_ok_and(|header| header.iter().eq(columns)) {
         return Vec::new();
     }
