@@ -105,6 +105,12 @@ impl Run<'_> {
         self.stop.residual.is_some_and(|tolerance| reached.worst() <= tolerance)
     }
 
+    /// Whether an iterate of Newton's method, in bodies with u'Ku = `strain`, misses no more than rounding makes of it, and less would be no progress.
+    pub fn is_at_floor(&self, reached: &Reached, u: &Field, places: &Layer, strain: f64) -> bool {
+        let missed = reached.error.powi(2) * self.scale.energy(strain + places.work);
+        self.memory.floor.is_stuck(reached.worst()) && missed <= rounding(self.model, u, places)
+    }
+
     /// Shows and keeps the row of an iterate; the status if the run ends there.
     ///
     /// # Errors

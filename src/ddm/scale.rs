@@ -50,6 +50,13 @@ impl Scale {
         energy.max(self.energy)
     }
 
+    /// Whether energies of this size cannot be told from zero or infinity to their rounding, eps^2 of them, where layers carry pressures up to `peak`.
+    pub fn is_out_of_range(&self, energy: f64, peak: f64) -> bool {
+        const LEAST: f64 = f64::MIN_POSITIVE / (f64::EPSILON * f64::EPSILON);
+        let energy = self.energy(energy);
+        if energy == 0.0 { peak > 0.0 } else { !(LEAST..f64::INFINITY).contains(&energy) }
+    }
+
     /// The relative residual: root of `numerator` = r'G^-1 r over `reference` = u'Ku + sum omega p c. A zero reference asks for
     /// an absolute zero.
     pub fn relative(&self, numerator: f64, reference: f64) -> f64 {

@@ -18,6 +18,7 @@ use crate::model::body::BodyCounts;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
+use crate::model::surface::{meeting_slopes, surface_slopes};
 use crate::problem::stop::StopRule;
 use crate::robin::coefficient::{Coefficient, underconstrained};
 use crate::robin::extend::extend;
@@ -312,7 +313,10 @@ impl Run<'_> {
     /// The result of a loop's end.
     fn conclude(self, end: End, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
         let Run { model, stop, rows, origin, memory, scale, energy, .. } = self;
-        let End { status, mut iterate, layer, weight, sweeps, skipped } = end;
+        let End { mut status, mut iterate, layer, weight, sweeps, skipped } = end;
+        if status.is_solved() && scale.is_out_of_range(energy, layer.peak()) {
+            status = Status::OutOfRange { energy };
+        }
         let mut found = None;
         let (spectrum, factor, updates) = match method {
             Method::Newton(linear) => (linear.spectrum(), None, rows.last().map_or(0, |row| row.iteration)),
@@ -327,7 +331,14 @@ impl Run<'_> {
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
-        let rounding = digits::lost(model, &iterate.trace, &layer, scale.peak(&layer.pressure, energy));
+        let answer = match method {
+            Method::Newton(_) => {
+                let lines = memory.progress.slopes(model, &meeting_slopes(model));
+                lines.iter().zip(surface_slopes(model)).map(|(line, surface)| surface.max(*line)).collect()
+            }
+            Method::Sweeps { .. } => vec![f64::INFINITY; model.points()],
+        };
+        let rounding = digits::lost(model, &iterate.trace, &layer, &answer, scale.peak(&layer.pressure, energy));
         Ok(Outcome {
             status,
             iterations: updates,
