@@ -90,7 +90,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             measured.inner_iterations += linear.counts().inner_iterations - before.inner_iterations;
             measured.factorizations += linear.counts().factorizations - before.factorizations;
             if let Ok(more) = more {
-                let lost = reached.add_rounding(&run.scale, measured.strain, &more, &places, &met);
+                let lost = reached.add_rounding((&run.scale, measured.strain), &more, &places, &met);
                 if is_enough && !run.is_enough(&reached) {
                     // a correction gains a digit, unless rounding gives as much again
                     let mut floor = corrected.unwrap_or_else(Floor::of_steps);
@@ -101,11 +101,8 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         }
         let at = run.after_step((&u, &x.field, share), measured, &reached, &met, linear);
         let ended = run.end_at(&at, linear)?;
-        if let Some(row) = run
-            .rows
-            .last()
-            .filter(|row| is_complete && best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual))
-        {
+        let row = run.rows.last().filter(|_| is_complete);
+        if let Some(row) = row.filter(|row| best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual)) {
             best = Some((row.clone(), u.clone(), met.clone()));
         }
         if let Some(status) = ended.or(is_floor.then_some(Status::RoundoffLimited)) {

@@ -170,6 +170,7 @@ pub fn solve(
         origin: None,
         scale: Scale::default(),
         energy: 0.0,
+        strain: 0.0,
         memory: Memory::new(floor, foreign),
         rows: Vec::new(),
     };
@@ -312,7 +313,7 @@ impl Outcome {
 impl Run<'_> {
     /// The result of a loop's end.
     fn conclude(self, end: End, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
-        let Run { model, stop, rows, origin, memory, scale, energy, .. } = self;
+        let Run { model, stop, rows, origin, memory, scale, energy, strain, .. } = self;
         let End { mut status, mut iterate, layer, weight, sweeps, skipped } = end;
         if status.is_solved() && scale.is_out_of_range(energy, layer.peak()) {
             status = Status::OutOfRange { energy };
@@ -331,14 +332,20 @@ impl Run<'_> {
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
-        let answer = match method {
+        let answer: Vec<f64> = match method {
             Method::Newton(_) => {
                 let lines = memory.progress.slopes(model, &meeting_slopes(model));
                 lines.iter().zip(surface_slopes(model)).map(|(line, surface)| surface.max(*line)).collect()
             }
             Method::Sweeps { .. } => vec![f64::INFINITY; model.points()],
         };
-        let rounding = digits::lost(model, &iterate.trace, &layer, &answer, scale.peak(&layer.pressure, energy));
+        let times = digits::lacking(matches!(method, Method::Sweeps { .. }), &status);
+        let peak = scale.peak(&layer.pressure, strain);
+        let mut rounding = times * digits::lost(model, &iterate.trace, &layer, &answer, peak);
+        if let (Method::Sweeps { .. }, Status::RoundoffLimited) = (&*method, &status) {
+            // pressures of compressions are not in balance to more than their digits
+            rounding = rounding.max(scale.imbalance(model, &layer.force, strain));
+        }
         Ok(Outcome {
             status,
             iterations: updates,

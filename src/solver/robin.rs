@@ -107,9 +107,8 @@ impl<S: InnerSolver> RobinMatrix<S> {
         let began = Instant::now();
         let mut solved = solve(&mut self.solver)?;
         if let (Some(reason), Some(ratio)) = (&mut solved.failure, self.steepest()) {
-            *reason += &format!(
-                ": springs of the contact are up to {ratio:.0e} times as stiff as the bodies under them, of which rounding leaves too little"
-            );
+            *reason +=
+                &format!(": springs of the contact are up to {ratio:.0e} times as stiff as the bodies under them");
         }
         self.counts.solve_seconds += began.elapsed().as_secs_f64();
         self.counts.inner_iterations += solved.iterations;
