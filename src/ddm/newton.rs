@@ -33,7 +33,7 @@ use crate::model::surface::meeting_slopes;
 pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, mut places: Layer) -> Result<End> {
     let (slopes, tolerance) = (meeting_slopes(run.model), run.stop.tolerance());
     let mut rho = run.memory.progress.slopes(run.model, &slopes);
-    // where rounding ends the run, what it has spoilt meanwhile is taken back
+    // where rounding ends the run, what it has spoilt meanwhile is taken back; of iterates whose errors tell what rounding left of equilibrium
     let mut best: Option<(Row, Field, Layer)> = None;
     // watches what corrections gain, if rounding left too much of the last step
     let mut left: Option<Floor> = None;
@@ -65,8 +65,8 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         u.add(1.0, &x.field);
         u.retrace(run.model);
 
-        let whole = if share < 1.0 { pressure } else { places.linear(&run.model.compression(&u.trace)) };
-        let p = run.memory.progress.go(share, whole);
+        // those of the step, not of the compressions that its end has: rounding of displacements, which a stiff layer makes large, stays out
+        let p = run.memory.progress.go(share, pressure);
         if places.closed > 0 {
             fit::fit(run.model, [&mut u, &mut x.field], &p, &rho, tolerance);
         }
@@ -78,7 +78,9 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         let digits = of_compressions(run.model, &u.trace);
         let mut reached = Reached::new((run.model, &run.scale), measured.strain, &x, (&c, &digits, &p), &met, &rho);
         let (mut is_floor, corrected) = (false, left.take());
-        if run.is_enough(&reached) {
+        let is_enough = run.is_enough(&reached);
+        let is_complete = is_enough || run.is_at_floor(&reached, &u, &met, measured.strain);
+        if is_complete {
             // a step has the rounding of its size, or what an iterative solver thought small: its matrix tells how large that is
             let mut enough = |_: &Model, trial: &Trial| halves(trial);
             let (residual, enough) = (&rest[..], &mut enough);
@@ -88,8 +90,8 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
             measured.inner_iterations += linear.counts().inner_iterations - before.inner_iterations;
             measured.factorizations += linear.counts().factorizations - before.factorizations;
             if let Ok(more) = more {
-                let lost = reached.add_rounding(&run.scale, measured.strain, &more, &places, &met);
-                if !run.is_enough(&reached) {
+                let lost = reached.add_rounding((&run.scale, measured.strain), &more, &places, &met);
+                if is_enough && !run.is_enough(&reached) {
                     // a correction gains a digit, unless rounding gives as much again
                     let mut floor = corrected.unwrap_or_else(Floor::of_steps);
                     is_floor = floor.is_reached(lost);
@@ -99,9 +101,8 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, mut u: Field, 
         }
         let at = run.after_step((&u, &x.field, share), measured, &reached, &met, linear);
         let ended = run.end_at(&at, linear)?;
-        if let Some(row) =
-            run.rows.last().filter(|row| best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual))
-        {
+        let row = run.rows.last().filter(|_| is_complete);
+        if let Some(row) = row.filter(|row| best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual)) {
             best = Some((row.clone(), u.clone(), met.clone()));
         }
         if let Some(status) = ended.or(is_floor.then_some(Status::RoundoffLimited)) {

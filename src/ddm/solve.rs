@@ -18,6 +18,7 @@ use crate::model::body::BodyCounts;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
+use crate::model::surface::{meeting_slopes, surface_slopes};
 use crate::problem::stop::StopRule;
 use crate::robin::coefficient::{Coefficient, underconstrained};
 use crate::robin::extend::extend;
@@ -169,6 +170,7 @@ pub fn solve(
         origin: None,
         scale: Scale::default(),
         energy: 0.0,
+        strain: 0.0,
         memory: Memory::new(floor, foreign),
         rows: Vec::new(),
     };
@@ -311,8 +313,11 @@ impl Outcome {
 impl Run<'_> {
     /// The result of a loop's end.
     fn conclude(self, end: End, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
-        let Run { model, stop, rows, origin, memory, scale, energy, .. } = self;
-        let End { status, mut iterate, layer, weight, sweeps, skipped } = end;
+        let Run { model, stop, rows, origin, memory, scale, energy, strain, .. } = self;
+        let End { mut status, mut iterate, layer, weight, sweeps, skipped } = end;
+        if status.is_solved() && scale.is_out_of_range(energy, layer.peak()) {
+            status = Status::OutOfRange { energy };
+        }
         let mut found = None;
         let (spectrum, factor, updates) = match method {
             Method::Newton(linear) => (linear.spectrum(), None, rows.last().map_or(0, |row| row.iteration)),
@@ -327,7 +332,20 @@ impl Run<'_> {
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
-        let rounding = digits::lost(model, &iterate.trace, &layer, scale.peak(&layer.pressure, energy));
+        let answer: Vec<f64> = match method {
+            Method::Newton(_) => {
+                let lines = memory.progress.slopes(model, &meeting_slopes(model));
+                lines.iter().zip(surface_slopes(model)).map(|(line, surface)| surface.max(*line)).collect()
+            }
+            Method::Sweeps { .. } => vec![f64::INFINITY; model.points()],
+        };
+        let times = digits::lacking(matches!(method, Method::Sweeps { .. }), &status);
+        let peak = scale.peak(&layer.pressure, strain);
+        let mut rounding = times * digits::lost(model, &iterate.trace, &layer, &answer, peak);
+        if let (Method::Sweeps { .. }, Status::RoundoffLimited) = (&*method, &status) {
+            // pressures of compressions are not in balance to more than their digits
+            rounding = rounding.max(scale.imbalance(model, &layer.force, strain));
+        }
         Ok(Outcome {
             status,
             iterations: updates,

@@ -20,6 +20,11 @@ pub enum Status {
         /// The first such body.
         body: usize,
     },
+    /// Energies are too large or too small for double numbers, so that no error can be told.
+    OutOfRange {
+        /// Energy of bodies and layers.
+        energy: f64,
+    },
     /// The iterates repeat.
     Cycle {
         /// Updates after which they come back; 1 where the contact stays and nothing falls.
@@ -80,6 +85,11 @@ impl Floor {
     /// rounding errors, too.
     pub fn of_sweeps() -> Self {
         Self { patience: 20, believable: 1e-4, ..Self::of_steps() }
+    }
+
+    /// Whether an iterate of this error would be no progress, and one that can be a solution.
+    pub fn is_stuck(&self, error: f64) -> bool {
+        error >= Self::FALLS * self.best && error < self.believable
     }
 
     /// Notes an error; true when it is time to compare it with the rounding errors.

@@ -5,9 +5,9 @@ use super::part::Part;
 use super::roster;
 use crate::contact::pad;
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, share};
+use crate::exchange::{Exchange, first, share};
 use crate::fem::{Extent, RigidMotion, rigid};
-use crate::mesh::{Asked, Checked, Duty, Mesh, Parts, Portion};
+use crate::mesh::{Asked, Checked, Duty, LENGTHS, Mesh, Parts, Portion};
 use crate::problem::body::BodySpec;
 use crate::scene::Scene;
 use std::rc::Rc;
@@ -29,12 +29,26 @@ pub struct Verified<const D: usize> {
 /// # Errors
 /// Patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.
 pub fn verify<const D: usize>(scene: &Scene, portion: Portion<D>, exchange: Rc<dyn Exchange>) -> Result<Verified<D>> {
+    first(&*exchange, size(&portion.mesh).map_err(|error| (0, error)))?;
     let lying = roster::lying(scene, &portion, &*exchange)?;
     let bodies = roster::bodies(scene, &portion.mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
     let checked = portion.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty(), &*exchange)?;
     Ok(Verified { portion, bodies, checked: checked.into(), exchange })
+}
+
+/// Refuses a mesh whose size no run computes with.
+fn size<const D: usize>(mesh: &Mesh<D>) -> Result<()> {
+    let mut extent = Extent::default();
+    mesh.points.iter().for_each(|x| extent.add(*x));
+    let [least, most] = LENGTHS;
+    let largest = extent.size();
+    if mesh.points.is_empty() || (least..=most).contains(&largest) {
+        return Ok(());
+    }
+    let message = format!("the mesh is {largest:.1e} long, and lengths from {least:e} to {most:e} are computed with");
+    Err(Error::mesh(&mesh.path, None, message).help("choose another unit of length"))
 }
 
 /// A body with the groups that serve it.

@@ -50,6 +50,10 @@ pub use trust::{Breach, breach};
 use crate::problem::order::Order;
 use std::path::PathBuf;
 
+/// Lengths of a mesh that a run computes with: those of atoms and of galaxies are between 1e-40 and 1e40 in all units in use, and sixth powers of
+/// these, which areas and volumes of cells lead to, are numbers still.
+pub const LENGTHS: [f64; 2] = [1e-40, 1e40];
+
 /// A mesh: points and named groups of simplices.
 ///
 /// Groups are Gmsh's physical groups. Cells are groups of dimension `D`; surfaces, edges and points have lower

@@ -20,7 +20,7 @@ pub struct Report {
     pub ranks: usize,
     /// Title of the scene.
     pub title: String,
-    /// How the run ended: `converged`, `roundoff-limited`, `iteration-limit`, `not-finite`, `cycle`, `underconstrained`,
+    /// How the run ended: `converged`, `roundoff-limited`, `iteration-limit`, `not-finite`, `out-of-range`, `cycle`, `underconstrained`,
     /// `unbounded`, `inner-solver`, `interrupted`; `running` in a snapshot.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
@@ -69,6 +69,8 @@ pub struct Report {
     pub error_bound: Option<f64>,
     /// Estimate of that error where there is no bound.
     pub error_estimate: Option<f64>,
+    /// What rounding of gaps and displacements can make of a pressure, as a share of the largest one; the errors above do not count it.
+    pub rounding: Option<f64>,
     /// Estimated errors of the discretisation, if they were asked for.
     pub discretization_error: Option<EstimateReport>,
     /// Meshes that were adapted to an error, one after another.

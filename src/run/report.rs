@@ -51,6 +51,7 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
             upper: interval.upper,
         }),
         error_bound: finite(last.filter(|row| row.is_bound).map(|row| row.error)),
+        rounding: finite(Some(outcome.rounding)),
         error_estimate: finite(last.filter(|row| !row.is_bound).map(|row| row.error)),
         factorizations: counts.factorizations + joint.factorizations,
         inner_times: InnerTimes {
@@ -109,8 +110,8 @@ fn lost(done: &Done) -> Option<String> {
     let pressure = done.outcome.rounding;
     (pressure > 10.0 * asked).then(|| {
         format!(
-            "the displacements are so large that few digits are left for the pressures, which may be off by {} of their peak: begin \
-             with a smaller gap, or let supports move bodies less",
+            "the displacements are so large beside what compresses the layers that few digits are left for the pressures, which may be off \
+             by {} of their peak: begin with a smaller gap, let supports move bodies less, or take softer layers",
             sci(pressure, 1)
         )
     })

@@ -14,6 +14,7 @@ pub fn status_name(status: &Status) -> &'static str {
         Status::RoundoffLimited => "roundoff-limited",
         Status::IterationLimit => "iteration-limit",
         Status::NotFinite { .. } => "not-finite",
+        Status::OutOfRange { .. } => "out-of-range",
         Status::Cycle { .. } => "cycle",
         Status::Underconstrained(_) | Status::Mechanism(_) => "underconstrained",
         Status::Unbounded { .. } => "unbounded",
@@ -55,6 +56,11 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
         Status::NotFinite { body } => format!(
             "body `{}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}",
             name(body)
+        ),
+        Status::OutOfRange { energy } => format!(
+            "the energy of bodies and layers, {}, is beyond what double precision can carry: choose units in which loads, moduli \
+             and lengths are nearer to 1",
+            sci(*energy, 1)
         ),
         Status::Cycle { period: 1 } => {
             format!(

@@ -2,6 +2,7 @@
 #![allow(dead_code)] // every test program uses its own part of this
 
 pub mod series;
+pub mod shapes;
 
 use serde_json::Value;
 use std::fs::{self, File};
