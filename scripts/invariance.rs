@@ -48,7 +48,15 @@ fn run(arguments: &Arguments) -> Result<usize> {
     let mut differ = 0;
     println!("| case | change | same |\n| --- | --- | --- |");
     for case in cases::CASES.iter().filter(|case| case.scene.contains(&arguments.only)) {
-        let Some((own, _)) = judge::run(&session, &root, case, None)? else { continue };
+        let own = match judge::run(&session, &root, case, None) {
+            Ok(Some((own, _))) => own,
+            Ok(None) => continue,
+            Err(error) => {
+                differ += 1;
+                println!("| {} {} | | NO: {error} |", case.scene, case.set.join(" "));
+                continue;
+            }
+        };
         for kind in KINDS.iter().filter(|kind| kind.name.contains(&arguments.change)) {
             let Case { scene, set } = case;
             let found = match judge::run(&session, &root, case, Some(kind)) {

@@ -35,7 +35,7 @@ pub const CASES: [Case; 38] = [
     case("rings/scene.toml", &["mesh.set.ni=3", "mesh.set.no=4"]),
     case("rough/scene.toml", &["mesh.set.n=4"]),
     case("shells/axisymmetric.toml", &["mesh.set.ni=3", "mesh.set.no=4"]),
-    case("shells/scene.toml", &["mesh.set.hi=0.5", "mesh.set.ho=0.4"]),
+    case("shells/scene.toml", &["mesh.set.hi=0.5", "mesh.set.ho=0.4", "body.0.order=1", "body.1.order=1"]),
     case("sphere-layer/axisymmetric.toml", &["mesh.set.n=2", "mesh.set.edge=1"]),
     case("sphere-layer/scene.toml", &["mesh.set.n=2"]),
     case("stack/scene.toml", &["mesh.set.n1=4", "mesh.set.n2=5", "mesh.set.n3=6"]),

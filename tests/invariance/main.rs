@@ -9,6 +9,7 @@ use change::Change;
 use judge::{Answer, Case, KINDS, Kind};
 use std::path::Path;
 use winkler::api::{MeshSource, Order, Session, solve};
+use winkler::fem::cross;
 use winkler::interrupt::Interrupt;
 
 /// What a test takes: a scene, which of its cases, and a change by its name. Every change is there, and order 1 and 2, the plane, bodies
@@ -96,5 +97,23 @@ fn two_pairs_far_from_each_other(session: &Session) {
         assert!((pair.peak_pressure - own.pairs[0].peak).abs() < 1e-5 * own.pairs[0].peak, "{}", pair.peak_pressure);
         assert!((pair.extent.contact() - 1.0).abs() < 1e-9, "{}", pair.extent.contact());
         assert_eq!(pair.pieces_lost, 0);
+    }
+    // moments are about the origin of the scene, wherever coordinates are measured from
+    let report = solution.report();
+    let loads = |name: &str| {
+        let body = report.bodies.iter().find(|body| body.name == name).expect("a body");
+        assert!(body.balance.moment_imbalance < 1e-9, "{}", body.balance.moment_imbalance);
+        &body.balance.loads
+    };
+    let [near, other] = ["upper", "upper_2"].map(loads);
+    let pairs = [0, 1].map(|i| (&report.pairs[i].force[1], &report.pairs[i].moment[1]));
+    for [(force, moment), (_, far_moment)] in [[(&near.force, &near.moment), (&other.force, &other.moment)], pairs] {
+        let arm = cross(change.shift, *force);
+        let size = force.iter().map(|f| f.abs()).sum::<f64>();
+        for c in 0..3 {
+            let off = (moment[c] + arm[c] - far_moment[c]).abs();
+            assert!(off < 1e-9 * 1e5 * size, "{moment:?} {far_moment:?}");
+            assert!(moment[c].abs() < 2.0 * size, "{moment:?}");
+        }
     }
 }
