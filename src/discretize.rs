@@ -181,6 +181,7 @@ pub fn discretize<const D: usize>(
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
         infos.push(BodyInfo {
             name: part.spec.name.value.clone(),
+            datum: contact::pad(part.space.datum),
             nodes: part.space.nodes.len(),
             points: Vec::new(),
             cells: part.known.cells,
@@ -308,7 +309,7 @@ fn together<const D: usize>(
     let sums = totals(exchange, &sums);
     let sums = sums.chunks_exact(3).map(|sum| [sum[0], sum[1], sum[2]]).collect();
     let poisson =
-        share(exchange, parts.iter().map(|part| elastic::poisson(part.spec, part.own(), plane)).collect::<Vec<_>>());
+        share(exchange, parts.iter().map(|part| elastic::poisson(part.spec, D, part.own(), plane)).collect::<Vec<_>>());
     let warning = |(body, part): (usize, &Part<D>)| {
         elastic::warning(part.spec, poisson.iter().map(|of_rank| of_rank[body]).fold(0.0, f64::max))
     };

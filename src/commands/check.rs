@@ -86,6 +86,7 @@ fn pairs(built: &Built) -> serde_json::Value {
             "facets_uncovered": pair.uncovered(),
             "facets_steep": pair.left(Left::Steep),
             "facets_far": pair.left(Left::Far),
+            "pieces_lost": pair.lost.map_or(0, |lost| lost.pieces),
             "facets_averaged": pair.averaged(),
             "mean_pressure": Some(coupling.pressure).filter(|&pressure| pressure > 0.0),
             "theta": coupling.theta,

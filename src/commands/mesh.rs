@@ -100,8 +100,8 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
         .groups
         .iter()
         .map(|group| {
-            let points = group.connectivity.iter().map(|&point| mesh.points[point as usize]);
-            let [low, high] = bounds(points).map(Vec::from);
+            let points = group.connectivity.iter().map(|&point| mesh.in_scene(mesh.points[point as usize]));
+            let [low, high] = bounds(points).map(|corner| corner[..D].to_vec());
             json!({ "name": group.name, "dimension": group.dimension, "simplices": group.len(), "low": low, "high": high })
         })
         .collect();
@@ -188,7 +188,7 @@ fn grid<const D: usize>(loaded: &Loaded<D>) -> Grid {
     let mesh = &loaded.mesh;
     let mut grid = Grid {
         title: mesh.path.display().to_string(),
-        points: mesh.points.iter().map(|&x| crate::contact::pad(x)).collect(),
+        points: mesh.points.iter().map(|&x| mesh.in_scene(x)).collect(),
         cell: CellKind::simplex(D, mesh.order.degree()),
         connectivity: Vec::new(),
         at_points: Vec::new(),

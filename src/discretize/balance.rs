@@ -7,7 +7,7 @@ use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, Space, assemble};
 use crate::linalg::Csr;
 use std::rc::Rc;
 
-/// A force and its moment about the origin (x, y, z).
+/// A force and its moment about the datum (x, y, z).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Resultant {
     /// The force.
@@ -29,8 +29,8 @@ impl Resultant {
 pub struct Balance {
     /// Loads, but for those on rigid surfaces; contacts; then each support, each spring, each rigid surface.
     pub parts: Vec<Resultant>,
-    /// Sum of the sizes of all nodal forces, and of these times their distances from the origin: what the sum of all parts is
-    /// small against.
+    /// Sum of the sizes of all nodal forces, and of these times their distances from the datum: what the sum of all parts is
+    /// small against. About an origin far away moments are that of the sum of forces and little else.
     pub size: [f64; 2],
 }
 

@@ -44,11 +44,12 @@ impl<const D: usize> OnPart<D> {
     /// # Errors
     /// A known displacement that is not finite at a node.
     pub fn new(spec: &BodySpec, outer: Outer, forces: Forces<D>) -> Result<Self> {
-        let nodes = &forces.part.space.nodes;
-        for (component, &x) in spec.exact.iter().flatten().flat_map(|u| nodes.iter().map(move |x| (u, x))) {
-            let value = component.eval(&x);
+        let space = &forces.part.space;
+        let places = || space.nodes.iter().map(|&x| space.in_scene(x));
+        for (component, x) in spec.exact.iter().flatten().flat_map(|u| places().map(move |x| (u, x))) {
+            let value = component.eval(&x[..D]);
             if !value.is_finite() {
-                let message = format!("the known displacement is {value} at {}", point(pad(x)));
+                let message = format!("the known displacement is {value} at {}", point(x));
                 return Err(Error::scene(component.place(), message)
                     .help("look for roots of negative numbers and divisions by zero in the expression"));
             }
@@ -72,7 +73,7 @@ impl<const D: usize> Post for OnPart<D> {
         let displacement = |&node: &u32| pad(std::array::from_fn::<f64, D, _>(|c| u[D * node as usize + c]));
         BodyField {
             name: self.name.clone(),
-            points: told.nodes.iter().map(|&x| pad(x)).collect(),
+            points: told.nodes.iter().map(|&x| told.in_scene(x)).collect(),
             cell: CellKind::simplex(D, space.order.degree()),
             connectivity: told.cells,
             displacement: shown.iter().map(displacement).collect(),
@@ -92,9 +93,12 @@ impl<const D: usize> Post for OnPart<D> {
 
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]> {
         let (exact, Forces { part, elasticity, .. }) = (self.exact.as_ref()?, &self.forces);
-        let at = |x: [f64; D]| norms::Known {
-            value: std::array::from_fn(|i| exact[i].eval(&x)),
-            gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, &x).1)),
+        let at = |x: [f64; D]| {
+            let x = &part.space.in_scene(x)[..D];
+            norms::Known {
+                value: std::array::from_fn(|i| exact[i].eval(x)),
+                gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, x).1)),
+            }
         };
         let norms = norms::error(&part.space, part.told(), elasticity, &self.nodal(v), &at);
         Some(norms.map(|norms| [norms.l2, norms.h1, norms.energy]))

@@ -3,11 +3,11 @@
 use super::find::point;
 use super::part::Part;
 use super::roster;
-use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::exchange::{Exchange, first, share};
 use crate::fem::{Extent, RigidMotion, rigid};
 use crate::mesh::{Asked, Checked, Duty, LENGTHS, Mesh, Parts, Portion};
+use crate::problem::Plane;
 use crate::problem::body::BodySpec;
 use crate::scene::Scene;
 use std::rc::Rc;
@@ -30,6 +30,8 @@ pub struct Verified<const D: usize> {
 /// Patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.
 pub fn verify<const D: usize>(scene: &Scene, portion: Portion<D>, exchange: Rc<dyn Exchange>) -> Result<Verified<D>> {
     first(&*exchange, size(&portion.mesh).map_err(|error| (0, error)))?;
+    // the radius of a body of revolution is measured from its axis
+    let portion = portion.near(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
     let lying = roster::lying(scene, &portion, &*exchange)?;
     let bodies = roster::bodies(scene, &portion.mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
@@ -76,7 +78,7 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>, excha
         let (extent, first) = &mut mine[part_of[node as usize] as usize];
         let x = space.nodes[node as usize];
         extent.add(x);
-        first.get_or_insert((node, pad(x)));
+        first.get_or_insert((node, space.in_scene(x)));
     }
     let of_ranks = share(exchange, mine);
     let extent = |number: usize| of_ranks.iter().fold(Extent::default(), |all, of_rank| all.join(&of_rank[number].0));

@@ -4,11 +4,11 @@
 //! follow from the graph by arithmetic, so that assembly writes each value straight to its place.
 
 use super::elasticity::{Elasticity, Flaw};
+use super::element;
 use super::forces::NodalForces;
 use super::frame::Frame;
 use super::quadrature::{self, Parts};
 use super::space::Space;
-use super::{element, pad};
 use crate::linalg::Csr;
 use crate::problem::order::Order;
 
@@ -215,7 +215,7 @@ pub fn stiffness<const D: usize>(space: &Space<D>, graph: &NodeGraph, elasticity
             match constant {
                 Some(material) => material.accumulate(gradient, &hoop, weight, &mut local),
                 None => {
-                    let at = pad(interpolate(&x, &element::values(space.order, l)));
+                    let at = space.in_scene(interpolate(&x, &element::values(space.order, l)));
                     let material = elasticity
                         .at(index, at)
                         .map_err(|flaw| Defect::Elasticity(elasticity.region(index), at, flaw))?;

@@ -252,7 +252,7 @@ pub struct BalanceReport {
     pub rigid: Vec<ForceReport>,
     /// Size of the sum of all forces over the sum of the sizes of all nodal forces.
     pub force_imbalance: f64,
-    /// The same for moments about the origin.
+    /// The same for moments, about the origin, or about a point near the mesh where the origin is far away (docs/meshes.md).
     pub moment_imbalance: f64,
 }
 
@@ -277,6 +277,8 @@ pub struct PairReport {
     pub facets_steep: usize,
     /// The same for facets that are too far away from it.
     pub facets_far: usize,
+    /// Pieces of the carrier that the search for common points has lost; a warning says where.
+    pub pieces_lost: usize,
     /// Facets of the carrier that are covered in part and take plain means.
     pub facets_averaged: usize,
     /// Energy of the layer, J.

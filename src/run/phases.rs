@@ -7,7 +7,7 @@ use super::stages::{Begin, Built, Done, Ready};
 use super::words::in_words;
 use super::{method, steps};
 use crate::contact::pieces::{self, Cut};
-use crate::contact::{ContactPair, Left};
+use crate::contact::{ContactPair, Left, LostPieces};
 use crate::ddm::{self, Outcome, Start, Status};
 use crate::discretize::{self, ContactInfo, Discrete, Verified};
 use crate::error::{Error, Kind, Result};
@@ -178,6 +178,7 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
     for (pair, contact) in discrete.model.pairs.iter().zip(&discrete.contacts) {
         warnings.extend(left_out(pair, contact));
+        warnings.extend(lost(pair, contact));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         if overlap < 0.0 {
             warnings.push(format!(
@@ -213,6 +214,18 @@ fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
         }
     }
     Some(text)
+}
+
+/// Pieces of a pair that the search for common points has lost, as a warning.
+fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
+    let names = contact.spec.between.each_ref().map(|name| &name.value);
+    pair.lost.map(|LostPieces { pieces, share, at: [x, y, z] }| {
+        format!(
+            "{} - {}: the search for points has lost {pieces} pieces of `{}`, {:.1e} of its {}, the most near ({x}, {y}, {z}): they \
+             carry no pressure; look at the mesh there, and refine what is strongly curved",
+            names[0], names[1], pair.surfaces[0], share, pair.measure
+        )
+    })
 }
 
 /// A free motion of several bodies as a warning.

@@ -247,6 +247,7 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         facets_uncovered: pair.uncovered(),
         facets_steep: pair.left(Left::Steep),
         facets_far: pair.left(Left::Far),
+        pieces_lost: pair.lost.map_or(0, |lost| lost.pieces),
         facets_averaged: pair.averaged(),
         layer_energy: layer.energy[i],
         force: sides.map(|side| measure::resultant(force, &pair.resultant[side])),
