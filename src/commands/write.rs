@@ -73,7 +73,8 @@ impl Writing<'_> {
         if first {
             written = written.and(self.report(&folder, &mut report, fields));
         }
-        let failed = recovered.into_iter().flatten().filter_map(Result::err).next();
+        let failed = recovered.iter().flatten().find_map(|body| body.as_ref().err());
+        let failed = failed.map(|error| Error::new(error.kind(), error.message()));
         (report, failed.map_or(written, Err))
     }
 

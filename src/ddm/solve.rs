@@ -2,6 +2,7 @@
 
 use super::acceleration::Acceleration;
 use super::balance::{Balance, Discretisation};
+use super::bound::{OffLaws, Reached};
 use super::forecast::Forecast;
 use super::history::{Observer, Row};
 use super::linear::resisting;
@@ -121,6 +122,9 @@ pub struct Outcome {
     pub iterate: Field,
     /// The layers at that iterate.
     pub layer: Layer,
+    /// How far these are from the laws at its compressions.
+    off: OffLaws,
+    scale: Scale,
     /// History, one row an iterate.
     pub rows: Vec<Row>,
     /// What it remembers besides.
@@ -301,6 +305,13 @@ fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
 }
 
 impl Outcome {
+    /// Return the relative errors of the result, with u'Ku = `strain`, if its forces lack a balance that is worth `unbalanced` in the energy norm,
+    /// and the pair whose pressures are farthest from the laws. The model is that of the run.
+    pub fn reached(&self, model: &Model, strain: f64, unbalanced: f64) -> (Reached, usize) {
+        let reached = Reached::of_result((model, &self.scale), strain, unbalanced, &self.off, &self.layer);
+        (reached, self.off.pair)
+    }
+
     /// What a run can go on from.
     pub fn into_state(self) -> Box<State> {
         let Self { iterate: field, layer, rows, memory, .. } = self;
@@ -324,6 +335,13 @@ impl Run<'_> {
                 (acceleration.spectrum(), acceleration.factor(), rows.len().saturating_sub(1))
             }
         };
+        let mut traced = iterate.clone();
+        // sweeps add to states and traces on their own
+        if matches!(method, Method::Sweeps { .. }) {
+            traced.retrace(model);
+        }
+        let (compression, digits) = (model.compression(&traced.trace), digits::of_compressions(model, &traced.trace));
+        let off = OffLaws::new(model, &layer, &compression, &digits);
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
@@ -334,9 +352,11 @@ impl Run<'_> {
             sweeps,
             solves_skipped: skipped,
             iterate,
-            layer,
+            off,
             rounding,
             forecast: stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
+            layer,
+            scale,
             rows,
             memory: Some(memory),
             method: method.name(),

@@ -53,7 +53,7 @@ pub use history::HistoryWriter;
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
-    PairReport, Report, RoundReport, busiest, warning_lines,
+    LookReport, PairReport, Report, RoundReport, busiest, warning_lines,
 };
 pub use rows::RowFile;
 pub use steps::{Extent, ReactionReport, StepPairReport, StepReport, StepTable};

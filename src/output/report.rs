@@ -21,7 +21,7 @@ pub struct Report {
     /// Title of the scene.
     pub title: String,
     /// How the run ended: `converged`, `roundoff-limited`, `iteration-limit`, `not-finite`, `cycle`, `underconstrained`,
-    /// `unbounded`, `inner-solver`, `interrupted`; `running` in a snapshot.
+    /// `unbounded`, `inner-solver`, `inaccurate`, `interrupted`; `running` in a snapshot.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
     pub message: String,
@@ -69,6 +69,8 @@ pub struct Report {
     pub error_bound: Option<f64>,
     /// Estimate of that error where there is no bound.
     pub error_estimate: Option<f64>,
+    /// What the last look at the result found; none where a run has no result.
+    pub last_look: Option<LookReport>,
     /// Estimated errors of the discretisation, if they were asked for.
     pub discretization_error: Option<EstimateReport>,
     /// Meshes that were adapted to an error, one after another.
@@ -222,6 +224,23 @@ pub struct BodyReport {
     pub error_energy: Option<f64>,
     /// Forces on it.
     pub balance: BalanceReport,
+}
+
+/// Relative errors of a result by forces that are summed anew from its displacements, at least so large.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct LookReport {
+    /// Error in the energy norm; null if it is not finite, like the others.
+    pub error: Option<f64>,
+    /// Error of the pressures, relative to the largest.
+    pub pressure: Option<f64>,
+    /// Share of its contact forces that a body lacks in balance.
+    pub imbalance: Option<f64>,
+    /// The body or the bodies with the largest of them.
+    pub at: Vec<String>,
+    /// Cells gone over.
+    pub cells: usize,
+    /// Wall seconds.
+    pub seconds: f64,
 }
 
 /// A force and its moment about the origin (x, y, z), and where it acts.
