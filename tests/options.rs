@@ -203,9 +203,9 @@ fn a_solve_that_must_converge_ends_the_run() {
 
 /// `groove-held` on a coarse mesh by a method that PETSc's options reach.
 fn held(options: &str) -> Run {
-    let words = options.split_whitespace();
-    let sets = ["--method", "auto", "--set", "mesh.set.n=8", "--set", "method.stop={residual=1e-8,iterations=200}"];
-    solve(case("groove-held"), &sets.into_iter().chain(words).collect::<Vec<_>>())
+    let method = if options.contains("--method") { "" } else { "--method auto" };
+    let all = format!("{method} --set mesh.set.n=8 --set method.stop={{residual=1e-8,iterations=200}} {options}");
+    solve(case("groove-held"), &all.split_whitespace().collect::<Vec<_>>())
 }
 
 /// Inner solvers that end too early, or solve something else: forces summed anew find it out, or the answer is right.

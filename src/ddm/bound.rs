@@ -24,7 +24,7 @@ pub struct OffLaws {
     gap: f64,
     /// Largest difference of a pressure, and its pair.
     mismatch: f64,
-    pub(super) pair: usize,
+    pair: usize,
 }
 
 impl OffLaws {
@@ -111,26 +111,30 @@ impl Reached {
         }
     }
 
-    /// Of a result with u'Ku = `strain` whose places are so far off the laws, and whose forces lack a balance that is worth `unbalanced` in the
-    /// energy norm.
+    /// Return the errors of a result with u'Ku = `strain` whose places are so far off the laws, and whose forces lack a balance that is worth `unbalanced` in the
+    /// energy norm; pressures miss that, too, in results `of_steps`, as in [`Reached::new`]. With the pair whose distance from its law is the largest of them,
+    /// if it is.
     pub(super) fn of_result(
         (model, scale): (&Model, &Scale),
         strain: f64,
         unbalanced: f64,
         off: &OffLaws,
         places: &Layer,
-    ) -> Self {
+        of_steps: bool,
+    ) -> (Self, Option<usize>) {
         let (energy, absolute) = (strain + places.work, (2.0 * off.gap).sqrt() + unbalanced);
         // as pressures, the contact is measured by PART of what all is at least
         let contact = contact_energy(model, places).max(PART * PART * energy);
-        let missed = scale.relative(unbalanced * unbalanced, contact);
+        let missed = if of_steps { scale.relative(unbalanced * unbalanced, contact) } else { 0.0 };
         let mismatch = if off.mismatch == 0.0 { 0.0 } else { off.mismatch / scale.peak(&places.pressure, energy) };
-        Self {
+        let reached = Self {
             error: scale.relative(absolute * absolute, energy),
             is_bound: false,
             pressure: if mismatch.is_nan() || mismatch > missed { mismatch } else { missed },
             imbalance: scale.imbalance(model, &places.force, energy),
-        }
+        };
+        let is_worst = mismatch > missed && mismatch >= reached.worst();
+        (reached, is_worst.then_some(off.pair))
     }
 
     /// Adds what rounding left of the equilibrium of an exact step from `before` to `places`: one `more` step with its matrix. Returns how

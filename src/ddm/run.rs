@@ -301,4 +301,4 @@ pub(super) fn rounding(model: &Model, u: &Field, layer: &Layer) -> f64 {
 
 /// Squared factor between rounding errors and their estimate, which counts each row's worst case once: smooth errors weigh more in
 /// K^-1 than in the inverse of its diagonal.
-const ROUNDING: f64 = 1e3;
+pub(super) const ROUNDING: f64 = 1e3;

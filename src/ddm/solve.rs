@@ -8,7 +8,7 @@ use super::history::{Observer, Row};
 use super::linear::resisting;
 use super::memory::Memory;
 use super::origin::Origin;
-use super::run::{End, Run};
+use super::run::{End, ROUNDING, Run, rounding};
 use super::scale::Scale;
 use super::start::{self, RigidStart};
 use super::stop::{Floor, Status};
@@ -125,6 +125,8 @@ pub struct Outcome {
     /// How far these are from the laws at its compressions.
     off: OffLaws,
     scale: Scale,
+    /// What rounding can make of it, a squared energy norm.
+    floor: f64,
     /// History, one row an iterate.
     pub rows: Vec<Row>,
     /// What it remembers besides.
@@ -304,12 +306,29 @@ fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
     }
 }
 
+/// What rounding can make of a solution, a squared energy norm: as of any iterate, and what contact forces that change by the `digits` of the compressions, n,
+/// make of the bodies. Where both bodies of a stiff layer move together, they alone resist.
+fn floor(model: &Model, u: &Field, layer: &Layer, digits: &[f64]) -> f64 {
+    let (rows, springs) = (model.row_stiffness(), layer.springs(model));
+    let forces = rows.iter().enumerate().filter(|(_, stiffness)| **stiffness > 0.0);
+    let made = |(row, stiffness): (usize, &f64)| {
+        let q = row % digits.len();
+        (springs[q] * digits[q]).powi(2) / stiffness
+    };
+    rounding(model, u, layer) + ROUNDING * forces.map(made).sum::<f64>()
+}
+
 impl Outcome {
+    /// Whether rounding can make a lack of balance that is worth `unbalanced` in the energy norm, if that is what ended the run.
+    pub fn is_rounding(&self, unbalanced: f64) -> bool {
+        self.status != Status::RoundoffLimited || unbalanced * unbalanced <= self.floor
+    }
+
     /// Return the relative errors of the result, with u'Ku = `strain`, if its forces lack a balance that is worth `unbalanced` in the energy norm,
-    /// and the pair whose pressures are farthest from the laws. The model is that of the run.
-    pub fn reached(&self, model: &Model, strain: f64, unbalanced: f64) -> (Reached, usize) {
-        let reached = Reached::of_result((model, &self.scale), strain, unbalanced, &self.off, &self.layer);
-        (reached, self.off.pair)
+    /// and the pair whose pressures are off their law by the largest of them, if they are. The model is that of the run.
+    pub fn reached(&self, model: &Model, strain: f64, unbalanced: f64) -> (Reached, Option<usize>) {
+        let of_steps = self.method.starts_with("newton");
+        Reached::of_result((model, &self.scale), strain, unbalanced, &self.off, &self.layer, of_steps)
     }
 
     /// What a run can go on from.
@@ -342,10 +361,11 @@ impl Run<'_> {
         }
         let (compression, digits) = (model.compression(&traced.trace), digits::of_compressions(model, &traced.trace));
         let off = OffLaws::new(model, &layer, &compression, &digits);
+        let floor = if status == Status::RoundoffLimited { floor(model, &iterate, &layer, &digits) } else { 0.0 };
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
-        let rounding = digits::lost(model, &iterate.trace, &layer, scale.peak(&layer.pressure, energy));
+        let lost = digits::lost(model, &iterate.trace, &layer, scale.peak(&layer.pressure, energy));
         Ok(Outcome {
             status,
             iterations: updates,
@@ -353,10 +373,11 @@ impl Run<'_> {
             solves_skipped: skipped,
             iterate,
             off,
-            rounding,
+            rounding: lost,
             forecast: stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
             layer,
             scale,
+            floor,
             rows,
             memory: Some(memory),
             method: method.name(),

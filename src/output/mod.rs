@@ -13,6 +13,7 @@ mod format;
 pub mod gmsh;
 pub mod history;
 mod largest;
+mod look;
 #[cfg(feature = "cli")]
 pub mod plot;
 #[cfg(feature = "cli")]
@@ -49,11 +50,12 @@ pub use contacts::PairRow;
 pub use folder::{Folder, safe_name, write_whole};
 pub use format::{sci, seconds, trimmed};
 pub use history::HistoryWriter;
+pub use look::LookReport;
 #[cfg(feature = "cli")]
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
-    LookReport, PairReport, Report, RoundReport, busiest, warning_lines,
+    PairReport, Report, RoundReport, busiest, warning_lines,
 };
 pub use rows::RowFile;
 pub use steps::{Extent, ReactionReport, StepPairReport, StepReport, StepTable};

@@ -84,7 +84,8 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
         let found = look_report(look, discrete, model);
         // what the iteration did not see is no bound, and no less than what was found
         let error = [report.error_bound, report.error_estimate].into_iter().flatten().next();
-        if found.error.is_some_and(|found| error.is_some_and(|error| found > error)) {
+        let is_more = |found: f64| error.map_or(matches!(outcome.status, Status::Inaccurate(_)), |error| found > error);
+        if found.error.is_some_and(is_more) {
             (report.error_bound, report.error_estimate) = (None, found.error);
         }
         report.last_look = Some(found);
