@@ -37,7 +37,7 @@
 pub use crate::contact::law::{LayerLaw, PerPoint, Response};
 pub use crate::ddm::acceleration::Here;
 pub use crate::ddm::gamma::GammaRule;
-pub use crate::ddm::{Observer, Row, Silent, Status};
+pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status, Whose};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;
 pub use crate::model::line::Unbounded;
@@ -55,11 +55,12 @@ pub use crate::scene::Scene;
 use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;
 use crate::run::{self, All, Begin, Clock, Done, report, results};
+use std::rc::Rc;
 
 /// What a run found.
 pub struct Solution {
     done: Done,
-    recovered: All,
+    recovered: Rc<All>,
     estimate: Option<Estimate>,
     report: Report,
 }

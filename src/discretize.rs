@@ -30,6 +30,7 @@ mod springs;
 mod supports;
 mod surface;
 mod totals;
+mod unbalanced;
 mod verify;
 
 use crate::contact::{self, ContactPair};
@@ -62,6 +63,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 pub use surface::ContactSurface;
 use totals::totals;
+pub use unbalanced::Unbalanced;
 pub use verify::{Verified, verify};
 
 /// The discrete problem and what reports need to know of its origin.

@@ -60,23 +60,24 @@ fn two_ranks_report_what_one_reports() {
     assert_eq!(parallel.solvers(), serial.solvers());
 }
 
-/// One collective call a sweep. Besides: largest stiffness of each body, trace of the start, spectrum, counts of the report.
+/// One collective call a sweep. Besides: largest stiffness of each body, trace of the start, spectrum, counts of the report, and of the last look traces,
+/// forces on hats, and energies.
 #[test]
-fn messages_are_one_a_sweep_and_four() {
+fn messages_are_one_a_sweep_and_seven() {
     for (ranks, gamma) in [(2, "0.6"), (2, "0.3")] {
         let gamma = format!("method.gamma={gamma}");
         let run = solve_on(ranks, case("groove"), &["--set", "mesh.set.n=8", "--set", &gamma]).converged();
-        assert_eq!(run.count("messages"), run.count("sweeps") + 4, "{gamma}");
+        assert_eq!(run.count("messages"), run.count("sweeps") + 7, "{gamma}");
     }
     assert_eq!(solve(case("groove"), &["--set", "mesh.set.n=8"]).converged().count("messages"), 0);
 }
 
 /// Conjugate gradients send two messages a step, and the last one is not needed; a Newton step sends its traces and its sums, a run the
 /// largest stiffnesses and counts of the report. Deflation sends none a step: one for the work on rigid motions before the first, and one
-/// for those of the start. The step that measures a claim adds no traces and sums.
+/// for those of the start. The step that measures a claim adds no traces and sums. The last look sends two.
 #[test]
 fn deflation_sends_no_message() {
-    for (scene, of_linear, others) in [("groove", 1, 1), ("groove-held", 2, 3)] {
+    for (scene, of_linear, others) in [("groove", 1, 3), ("groove-held", 2, 5)] {
         let sets = ["--method", "newton-robin", "--set", "mesh.set.n=8", "--set", "method.stop={residual=1e-8}"];
         let run = solve_on(2, case(scene), &sets).converged();
         let expected = 2 * run.count("sweeps") + of_linear * run.count("iterations") + others;

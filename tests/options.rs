@@ -205,6 +205,67 @@ fn a_solve_that_must_converge_ends_the_run() {
     assert!(bad.stderr.contains("not converged") && bad.stderr.contains("DIVERGED_ITS"), "{}", bad.stderr);
 }
 
+/// `groove-held` on a coarse mesh by a method that PETSc's options reach.
+fn held(options: &str) -> Run {
+    let method = if options.contains("--method") { "" } else { "--method auto" };
+    let all = format!("{method} --set mesh.set.n=8 --set method.stop={{residual=1e-8,iterations=200}} {options}");
+    solve(case("groove-held"), &all.split_whitespace().collect::<Vec<_>>())
+}
+
+/// Inner solvers that end too early, or solve something else: forces summed anew find it out, or the answer is right.
+#[test]
+fn options_that_spoil_solves_are_found_out() {
+    let exact = held("").converged();
+    let pressure = &exact.contact()["pressure"];
+    let options = [
+        "-ksp_type cg -pc_type icc -ksp_atol 1e-2",
+        "-ksp_type cg -pc_type hypre -ksp_atol 1",
+        "-newton_ksp_type cg -newton_pc_type hypre -newton_ksp_atol 1e-1",
+        "-ksp_type cg -pc_type icc -ksp_rtol 0.1",
+        "-ksp_type richardson -pc_type icc -ksp_rtol 0.5",
+        "-ksp_type preonly -pc_type icc",
+        "-ksp_type cg -pc_type icc -pc_factor_shift_type nonzero -pc_factor_shift_amount 1e3",
+        "--set solver=mumps -mat_mumps_icntl_35 1 -mat_mumps_cntl_7 1e-2",
+        "--method robin --set method.robin={floor=1e300}",
+    ];
+    let mut found_out = 0;
+    for options in options {
+        let run = held(options);
+        let off = distance(&run.contact()["pressure"], pressure);
+        match run.code {
+            0 => assert!(off < 1e-6, "{options}: {off:e}\n{}", run.said()),
+            1 if run.text("status") == "inaccurate" => {
+                assert!(off > 1e-9, "{options}: {off:e}\n{}", run.said());
+                assert!(run.text("message").contains("r`"), "the body is named\n{}", run.said());
+                // what is reported is what was found
+                let found = run.number("last_look/error");
+                assert!(found <= run.number("error_estimate") && run.report["error_bound"].is_null(), "{options}");
+                found_out += 1;
+            }
+            code => assert_eq!(code, 1, "{options}: {}", run.said()),
+        }
+    }
+    assert!(found_out > 1, "{found_out}");
+}
+
+/// The error of a run that stopped too early, from the look at its forces: never more than that from the energies, and not much less.
+#[test]
+fn the_last_look_sees_the_error_that_is_there() {
+    let sets = ["--set", "mesh.set.n=8", "--set", "contact.0.layer={linear={stiffness=1e5}}", "--method", "robin"];
+    let at = |residual: &str| {
+        let stop = format!("method.stop={{residual={residual},iterations=5000}}");
+        solve(case("groove-held"), &[&sets[..], &["--set", &stop]].concat())
+    };
+    let least = at("1e-9").number("F1");
+    for residual in ["1e-1", "1e-2", "1e-3"] {
+        let run = at(residual);
+        // the gap is small beside the compressions, so that all is about linear, and F1 half of the energy
+        let error = (1.0 - run.number("F1") / least).sqrt();
+        let share = run.number("last_look/error") / error;
+        assert!((0.1..1.3).contains(&share), "{residual}: {share} of {error:e}");
+    }
+}
+
 /// Options that look at a run leave it as it is, bit by bit, and say so where there is nothing to look at.
 #[test]
 fn options_that_look_change_nothing() {

@@ -84,7 +84,8 @@ impl Writing<'_> {
             written = written.and(self.report(&folder, &mut report, fields));
             written = written.and(Checksums::save(&folder, report.files.iter().filter(|name| self.is_final(name))));
         }
-        let failed = recovered.into_iter().flatten().filter_map(Result::err).next();
+        let failed = recovered.iter().flatten().find_map(|body| body.as_ref().err());
+        let failed = failed.map(|error| Error::new(error.kind(), error.message()));
         (report, failed.map_or(written, Err))
     }
 

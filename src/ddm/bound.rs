@@ -14,7 +14,37 @@ use crate::contact::LayerLaw;
 use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::linear::Solution;
+use crate::model::rigid::PART;
 use crate::model::surface::surface_slopes;
+
+/// How far places are from what the laws have at the compressions of the bodies.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct OffLaws {
+    /// Gap of duality, an energy.
+    gap: f64,
+    /// Largest difference of a pressure, and its pair.
+    mismatch: f64,
+    pair: usize,
+}
+
+impl OffLaws {
+    /// Of places, where the bodies have these compressions, known to their `digits`, n each.
+    pub(super) fn new(model: &Model, places: &Layer, compression: &[f64], digits: &[f64]) -> Self {
+        let mut off = Self::default();
+        for (i, pair) in model.pairs.iter().enumerate() {
+            for q in model.range(i) {
+                let (point, p) = (q - model.offset[i], places.pressure[q]);
+                let c = nearest(&*pair.law, point, (compression[q], digits[q]), p);
+                let mismatch = (p - pair.law.pressure(point, c)).abs();
+                off.gap += model.weight[q] * pair.law.duality_gap(point, c, p);
+                if mismatch.is_nan() || mismatch > off.mismatch {
+                    (off.mismatch, off.pair) = (mismatch, i);
+                }
+            }
+        }
+        off
+    }
+}
 
 /// The relative errors by which a run of Newton's method ends.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -85,6 +115,32 @@ impl Reached {
             pressure: mismatch.max(missed),
             imbalance: scale.imbalance(model, &model.forces(pressure), strain),
         }
+    }
+
+    /// Return the errors of a result with u'Ku = `strain` whose places are so far off the laws, and whose forces lack a balance that is worth `unbalanced` in the
+    /// energy norm; pressures miss that, too, in results `of_steps`, as in [`Reached::new`]. With the pair whose distance from its law is the largest of them,
+    /// if it is.
+    pub(super) fn of_result(
+        (model, scale): (&Model, &Scale),
+        strain: f64,
+        unbalanced: f64,
+        off: &OffLaws,
+        places: &Layer,
+        of_steps: bool,
+    ) -> (Self, Option<usize>) {
+        let (energy, absolute) = (strain + places.work, (2.0 * off.gap).sqrt() + unbalanced);
+        // as pressures, the contact is measured by PART of what all is at least
+        let contact = contact_energy(model, places).max(PART * PART * energy);
+        let missed = if of_steps { scale.relative(unbalanced * unbalanced, contact) } else { 0.0 };
+        let mismatch = if off.mismatch == 0.0 { 0.0 } else { off.mismatch / scale.peak(&places.pressure, strain) };
+        let reached = Self {
+            error: scale.relative(absolute * absolute, energy),
+            is_bound: false,
+            pressure: if mismatch.is_nan() || mismatch > missed { mismatch } else { missed },
+            imbalance: scale.imbalance(model, &places.force, strain),
+        };
+        let is_worst = mismatch > missed && mismatch >= reached.worst();
+        (reached, is_worst.then_some(off.pair))
     }
 
     /// Adds what rounding left of the equilibrium of an exact step from `before` to `places`: one `more` step with its matrix. That step is rounded, too,

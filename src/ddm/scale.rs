@@ -16,7 +16,7 @@ use crate::model::rigid::PART;
 use crate::model::surface::surface_slopes;
 
 /// Least scales of a run.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Scale {
     /// Energy: u'Ku + sum omega p c.
     energy: f64,

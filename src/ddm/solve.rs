@@ -2,12 +2,14 @@
 
 use super::acceleration::Acceleration;
 use super::balance::{Balance, Discretisation};
+use super::bound::{OffLaws, Reached};
+use super::digits::ROUNDING;
 use super::forecast::Forecast;
 use super::history::{Observer, Row};
 use super::linear::resisting;
 use super::memory::Memory;
 use super::origin::Origin;
-use super::run::{End, Run};
+use super::run::{End, Run, rounding};
 use super::scale::Scale;
 use super::start::{self, RigidStart};
 use super::stop::{Floor, Status};
@@ -122,6 +124,11 @@ pub struct Outcome {
     pub iterate: Field,
     /// The layers at that iterate.
     pub layer: Layer,
+    /// How far these are from the laws at its compressions.
+    off: OffLaws,
+    scale: Scale,
+    /// What rounding can make of it, a squared energy norm.
+    floor: f64,
     /// History, one row an iterate.
     pub rows: Vec<Row>,
     /// What it remembers besides.
@@ -302,7 +309,31 @@ fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
     }
 }
 
+/// What rounding can make of a solution, a squared energy norm: as of any iterate, and what contact forces that change by the `digits` of the compressions, n,
+/// make of the bodies. Where both bodies of a stiff layer move together, they alone resist.
+fn floor(model: &Model, u: &Field, layer: &Layer, digits: &[f64]) -> f64 {
+    let (rows, springs) = (model.row_stiffness(), layer.springs(model));
+    let forces = rows.iter().enumerate().filter(|(_, stiffness)| **stiffness > 0.0);
+    let made = |(row, stiffness): (usize, &f64)| {
+        let q = row % digits.len();
+        (springs[q] * digits[q]).powi(2) / stiffness
+    };
+    rounding(model, u, layer) + ROUNDING * forces.map(made).sum::<f64>()
+}
+
 impl Outcome {
+    /// Whether rounding can make a lack of balance that is worth `unbalanced` in the energy norm, if that is what ended the run.
+    pub fn is_rounding(&self, unbalanced: f64) -> bool {
+        self.status != Status::RoundoffLimited || unbalanced * unbalanced <= self.floor
+    }
+
+    /// Return the relative errors of the result, with u'Ku = `strain`, if its forces lack a balance that is worth `unbalanced` in the energy norm,
+    /// and the pair whose pressures are off their law by the largest of them, if they are. The model is that of the run.
+    pub fn reached(&self, model: &Model, strain: f64, unbalanced: f64) -> (Reached, Option<usize>) {
+        let of_steps = self.method.starts_with("newton");
+        Reached::of_result((model, &self.scale), strain, unbalanced, &self.off, &self.layer, of_steps)
+    }
+
     /// What a run can go on from.
     pub fn into_state(self) -> Box<State> {
         let Self { iterate: field, layer, rows, memory, .. } = self;
@@ -329,6 +360,14 @@ impl Run<'_> {
                 (acceleration.spectrum(), acceleration.factor(), rows.len().saturating_sub(1))
             }
         };
+        let mut traced = iterate.clone();
+        // sweeps add to states and traces on their own
+        if matches!(method, Method::Sweeps { .. }) {
+            traced.retrace(model);
+        }
+        let (compression, digits) = (model.compression(&traced.trace), digits::of_compressions(model, &traced.trace));
+        let off = OffLaws::new(model, &layer, &compression, &digits);
+        let floor = if status == Status::RoundoffLimited { floor(model, &iterate, &layer, &digits) } else { 0.0 };
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
@@ -352,9 +391,12 @@ impl Run<'_> {
             sweeps,
             solves_skipped: skipped,
             iterate,
-            layer,
+            off,
             rounding,
             forecast: stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
+            layer,
+            scale,
+            floor,
             rows,
             memory: Some(memory),
             method: method.name(),

@@ -41,11 +41,33 @@ pub enum Status {
     },
     /// An inner solver failed.
     InnerSolver(Failure),
+    /// The run thought to be at its end, and the forces of its displacements say that it is not.
+    Inaccurate(Inaccuracy),
     /// Somebody outside asked for it; the run can go on from its outcome.
     Paused {
         /// The bits of [`Observer::asked`](super::Observer::asked) of all ranks.
         asked: u8,
     },
+}
+
+/// What a solution was thought to miss, and what it misses: relative errors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inaccuracy {
+    /// The error that the run would have ended with.
+    pub told: f64,
+    /// The largest of those found.
+    pub found: f64,
+    /// Where that is.
+    pub whose: Whose,
+}
+
+/// Where an error is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Whose {
+    /// In the forces on a body.
+    Body(usize),
+    /// In the pressures of a pair.
+    Pair(usize),
 }
 
 impl Status {

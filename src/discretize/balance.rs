@@ -3,7 +3,7 @@
 use super::local::Local;
 use super::supports::Held;
 use crate::contact::{add, pad};
-use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, Space, assemble};
+use crate::fem::{Elasticity, Extent, Frame, NodalBlock, NodeGraph, Space, assemble};
 use crate::linalg::Csr;
 use std::rc::Rc;
 
@@ -48,8 +48,14 @@ pub struct Forces<const D: usize> {
     pub supports: usize,
     /// Nodal forces of its loads.
     pub load: Vec<f64>,
+    /// Forces on its rigid surfaces: a node of each, and the force.
+    pub rigid: Vec<(u32, [f64; D])>,
     /// Its contact rows for displacements of its nodes.
     pub rows: Csr,
+    /// Where the whole body is.
+    pub extent: Extent,
+    /// Nodes of the whole body.
+    pub nodes: usize,
 }
 
 impl<const D: usize> Forces<D> {

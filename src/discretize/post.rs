@@ -4,6 +4,7 @@
 use super::approach::Outer;
 use super::balance::{Balance, Forces};
 use super::find::point;
+use super::unbalanced::Unbalanced;
 use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
@@ -19,6 +20,25 @@ pub trait Post {
 
     /// Forces on the own nodes, under the forces omega p of the contact rows of the body.
     fn balance(&self, v: &[f64], force: &[f64]) -> Balance;
+
+    /// Forces that lack balance on the own nodes, under the forces omega p of the contact rows; `bent` as in [`Post::field`], `springs` are the
+    /// stiffnesses omega kappa of these rows.
+    fn unbalanced(&self, bent: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced;
+
+    /// See [`Forces::rough`].
+    fn rough(&self, unbalanced: &Unbalanced) -> Vec<f64>;
+
+    /// See [`Forces::on_hats`].
+    fn on_hats(&self, unbalanced: &Unbalanced) -> Vec<f64>;
+
+    /// See [`Forces::smooth`].
+    fn smooth(&self, sums: &[f64], with_springs: bool) -> Vec<f64>;
+
+    /// See [`Forces::products`].
+    fn products(&self, fields: &[Vec<f64>]) -> Vec<f64>;
+
+    /// See [`Forces::trace`].
+    fn trace(&self, field: &[f64]) -> Vec<f64>;
 
     /// What own nodes add to the mean displacement of where the body is loaded along a direction, else of where it is held along it, else of all
     /// of it.
@@ -85,6 +105,30 @@ impl<const D: usize> Post for OnPart<D> {
 
     fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
         self.forces.balance(&self.nodal(v), force)
+    }
+
+    fn unbalanced(&self, bent: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced {
+        self.forces.unbalanced(&self.nodal(bent), force, springs)
+    }
+
+    fn rough(&self, unbalanced: &Unbalanced) -> Vec<f64> {
+        self.forces.rough(unbalanced)
+    }
+
+    fn on_hats(&self, unbalanced: &Unbalanced) -> Vec<f64> {
+        self.forces.on_hats(unbalanced)
+    }
+
+    fn smooth(&self, sums: &[f64], with_springs: bool) -> Vec<f64> {
+        self.forces.smooth(sums, with_springs)
+    }
+
+    fn products(&self, fields: &[Vec<f64>]) -> Vec<f64> {
+        self.forces.products(fields)
+    }
+
+    fn trace(&self, field: &[f64]) -> Vec<f64> {
+        self.forces.trace(field)
     }
 
     fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3] {

@@ -16,6 +16,7 @@ pub mod history;
 mod largest;
 pub mod leftovers;
 mod lock;
+mod look;
 #[cfg(feature = "cli")]
 pub mod plot;
 #[cfg(feature = "cli")]
@@ -53,6 +54,7 @@ pub use contacts::PairRow;
 pub use folder::{Folder, make_folder, safe_name, write_whole};
 pub use format::{sci, seconds, trimmed};
 pub use history::HistoryWriter;
+pub use look::LookReport;
 #[cfg(feature = "cli")]
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{

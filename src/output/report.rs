@@ -2,6 +2,7 @@
 
 use super::format::{sci, seconds};
 use super::largest::largest;
+use super::look::LookReport;
 use super::steps::{Extent, StepReport};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -21,7 +22,7 @@ pub struct Report {
     /// Title of the scene.
     pub title: String,
     /// How the run ended: `converged`, `roundoff-limited`, `iteration-limit`, `not-finite`, `out-of-range`, `cycle`, `underconstrained`,
-    /// `unbounded`, `inner-solver`, `interrupted`; `running` in a snapshot.
+    /// `unbounded`, `inner-solver`, `inaccurate`, `interrupted`; `running` in a snapshot.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
     pub message: String,
@@ -71,6 +72,8 @@ pub struct Report {
     pub error_estimate: Option<f64>,
     /// What rounding of gaps and displacements can make of a pressure, as a share of the largest one; the errors above do not count it.
     pub rounding: Option<f64>,
+    /// What the last look at the result found; none where a run has no result.
+    pub last_look: Option<LookReport>,
     /// Estimated errors of the discretisation, if they were asked for.
     pub discretization_error: Option<EstimateReport>,
     /// Meshes that were adapted to an error, one after another.

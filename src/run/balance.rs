@@ -1,6 +1,6 @@
 //! Forces on every body, from the ranks that have parts of them to the report.
 
-use super::results::{All, Recovered};
+use super::ended::{All, Recovered};
 use super::stages::Done;
 use crate::contact::moment_in_scene;
 use crate::discretize::{Balance, BodyInfo};
