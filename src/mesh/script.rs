@@ -3,6 +3,7 @@
 //!
 //! This is a search through its text, not an interpreter: a file whose name the script computes is not seen.
 
+use super::inputs::Inputs;
 use super::tokens::{Token, tokens};
 use super::trust;
 use crate::error::{Error, Located, Place, Result};
@@ -14,6 +15,8 @@ use std::path::{Path, PathBuf};
 pub struct Script {
     /// The contents of the script itself and of every file it names, in the order they are met.
     pub files: Vec<Vec<u8>>,
+    /// What it depends on besides.
+    pub inputs: Inputs,
     /// Names that take a number from outside.
     settable: BTreeSet<String>,
     /// Names of constants whose number is set under another name, and that name.
@@ -33,10 +36,9 @@ impl Script {
     /// A script that cannot be read. Included files that do not exist are left to Gmsh to report.
     pub fn read(path: &Path) -> Result<Script> {
         let mut script = Script::default();
-        // Canonical paths, since scripts may include each other along ever longer ones.
-        let canonical = path.canonicalize().map_err(|cause| Error::file(path, "read", &cause))?;
-        let home = canonical.parent().unwrap_or(Path::new("")).to_owned();
-        let mut found: Vec<PathBuf> = vec![canonical];
+        path.canonicalize().map_err(|cause| Error::file(path, "read", &cause))?;
+        let mut found: Vec<PathBuf> = located(path).into_iter().collect();
+        let home = found.first().and_then(|first| first.parent()).unwrap_or(Path::new("")).to_owned();
         let mut next = 0;
         while let Some(path) = found.get(next).cloned() {
             next += 1;
@@ -46,16 +48,17 @@ impl Script {
             let folder = path.parent().unwrap_or(Path::new(""));
             let text = String::from_utf8_lossy(&bytes);
             let tokens: Vec<Token> = tokens(&text).into_iter().map(|(_, token)| token).collect();
-            for token in &tokens {
-                let Token::Text(name) = token else { continue };
-                let Ok(file) = folder.join(name).canonicalize() else {
-                    continue;
-                };
+            let named = tokens.iter().filter_map(|token| if let Token::Text(name) = token { Some(name) } else { None });
+            let named = named.map(|name| folder.join(name));
+            for file in named.chain([options_of(&path)]).filter_map(|file| located(&file)) {
                 if file.is_file() && !found.contains(&file) {
                     found.push(file);
                 }
             }
             script.note(&tokens);
+            if trust::is_script(&path, &bytes) {
+                script.inputs.note(&tokens);
+            }
             if script.breach.is_none() {
                 script.breach = trust::breach(&path, &bytes, &home).map(|breach| (path, breach));
             }
@@ -165,6 +168,20 @@ impl Script {
     }
 }
 
+/// Return the path of a file in its folder, links to the folder resolved and one to the file itself not: Gmsh looks for what a script
+/// names beside the link. Scripts may include each other along ever longer paths, which are the same then.
+fn located(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+    Some(folder.canonicalize().ok()?.join(path.file_name()?))
+}
+
+/// Return the file of options beside a file, which Gmsh runs as a script after it has opened or merged the file.
+fn options_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".opt");
+    name.into()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,5 +237,24 @@ mod tests {
         assert!(script.assigned.contains("n"));
         assert!(script.files[0].starts_with(b"Include"));
         assert_eq!(script.files.len(), 3);
+    }
+
+    /// Gmsh runs a file of options beside each file that it opens, and looks for files beside the link to a script.
+    #[test]
+    fn files_that_no_word_names_and_those_beside_links_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::create_dir(at("links")).unwrap();
+        std::fs::write(at("a.geo"), "Merge \"b.geo\";").unwrap();
+        std::fs::write(at("b.geo"), "n = 1;").unwrap();
+        std::fs::write(at("b.geo.opt"), "m = 1;").unwrap();
+        std::fs::write(at("links/b.geo"), "System \"id\";").unwrap();
+        std::os::unix::fs::symlink(at("a.geo"), at("links/a.geo")).unwrap();
+        let script = Script::read(&at("a.geo")).unwrap();
+        assert!(script.files.len() == 3 && script.assigned.contains("m") && script.breach.is_none());
+        let linked = Script::read(&at("links/a.geo")).unwrap();
+        assert!(!linked.assigned.contains("n") && linked.breach.is_some());
+        std::fs::write(at("a.geo.opt"), "System \"id\";").unwrap();
+        assert!(Script::read(&at("a.geo")).unwrap().breach.is_some());
     }
 }
