@@ -50,6 +50,28 @@ impl Session {
     /// `Kind::Solver` when a session was started before in this process, when MPI runs already, or when PETSc refuses
     /// an option; PETSc's message is among the causes.
     pub fn start(words: &[String]) -> Result<Session> {
+        let session = Self::start_mpi()?;
+        if let Err(error) = session.start_petsc(words) {
+            // The other ranks may still wait for this one inside PETSc; ending MPI here would wait for them.
+            if session.size() > 1 {
+                std::mem::forget(session);
+            }
+            return Err(error);
+        }
+        Ok(session)
+    }
+
+    /// Return whether a launcher such as `mpiexec` started this process as one of several ranks: the others wait until it starts MPI,
+    /// or for ever if it ends before.
+    pub fn is_one_of_several() -> bool {
+        launcher::several()
+    }
+
+    /// Start MPI alone, with which ranks can compare what they are to do before PETSc reads options.
+    ///
+    /// # Errors
+    /// When a session was started before in this process, or MPI runs already.
+    pub fn start_mpi() -> Result<Session> {
         if STARTED.swap(true, Ordering::SeqCst) {
             return Err(Error::new(Kind::Solver, "PETSc was already started in this process")
                 .help("start one session and clone it"));
@@ -59,17 +81,15 @@ impl Session {
             .ok_or_else(|| Error::new(Kind::Solver, "MPI was already started in this process by other code"))?;
         let world = SimpleCommunicator::world();
         abort_on_panic(world.size() > 1);
-        if world.size() == 1 && library::may_wait(words) {
-            return Ok(Session(Rc::new(Running { world, _universe: universe })));
-        }
-        if let Err(error) = library::start(words) {
-            // The other ranks may still wait for this one inside PETSc; ending MPI here would wait for them.
-            if world.size() > 1 {
-                std::mem::forget(universe);
-            }
-            return Err(error);
-        }
         Ok(Session(Rc::new(Running { world, _universe: universe })))
+    }
+
+    /// Start PETSc, after MPI, as [`start`](Self::start) does; once in a process. Collective.
+    ///
+    /// # Errors
+    /// PETSc refuses an option; the other ranks may wait for this one inside PETSc then.
+    pub fn start_petsc(&self, words: &[String]) -> Result<()> {
+        if self.size() == 1 && library::may_wait(words) { Ok(()) } else { library::start(words) }
     }
 
     /// Ends PETSc and MPI if this is the last clone, and tells what goes wrong with it: PETSc writes its logs then.
