@@ -11,7 +11,7 @@ use crate::exchange::share;
 use crate::interrupt::Interrupt;
 use crate::output::progress::Line;
 use crate::output::{Checksums, Folder, HistoryWriter, IterationTable, StepTable, Verbosity, say};
-use crate::parallel::agree;
+use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::run::asking::{is_snapshot, signal};
 use crate::run::{self, All, Asking, Built, Clock, Done, Keep, Ready, measure, report};
@@ -63,7 +63,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     let is_loud = first && !json && verbosity != Verbosity::Quiet;
     let mut clock = said::watched(is_loud);
     let scene = load(session, &request.scene.scene, &request.overrides())?;
-    let read = |folder: &PathBuf| Checkpoint::read(folder, &scene);
+    let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder, &scene);
     let kept = agree(session, request.restart.as_ref().map(read).transpose())?;
     let folder = agree(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
     let path = folder.path();

@@ -48,6 +48,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         crate::scene::load(&request.scene.scene, &overrides).map(Rc::new)
     };
     let scenes = agree(session, runs.iter().map(|values| load(values)).collect::<Result<Vec<_>>>())?;
+    run::refuse_other_scenes(session, &scenes)?;
     let folder = agree(session, claim(session, folder_of(&scenes[0], request.output.as_ref())))?;
     let first = session.rank() == 0;
     let (mut table, mut columns) = (None::<RowFile>, None);

@@ -3,6 +3,7 @@
 //!
 //! This is a search through its text, not an interpreter: a file whose name the script computes is not seen.
 
+use super::inputs::Inputs;
 use super::tokens::{Token, tokens};
 use super::trust;
 use crate::error::{Error, Located, Place, Result};
@@ -14,6 +15,8 @@ use std::path::{Path, PathBuf};
 pub struct Script {
     /// The contents of the script itself and of every file it names, in the order they are met.
     pub files: Vec<Vec<u8>>,
+    /// What it depends on besides.
+    pub inputs: Inputs,
     /// Names that take a number from outside.
     settable: BTreeSet<String>,
     /// Names of constants whose number is set under another name, and that name.
@@ -33,9 +36,9 @@ impl Script {
     /// A script that cannot be read. Included files that do not exist are left to Gmsh to report.
     pub fn read(path: &Path) -> Result<Script> {
         let mut script = Script::default();
-        let place = place_of(path).map_err(|cause| Error::file(path, "read", &cause))?;
-        let home = place.parent().unwrap_or(Path::new("")).to_owned();
-        let mut found: Vec<PathBuf> = vec![place];
+        path.canonicalize().map_err(|cause| Error::file(path, "read", &cause))?;
+        let mut found: Vec<PathBuf> = located(path).into_iter().collect();
+        let home = found.first().and_then(|first| first.parent()).unwrap_or(Path::new("")).to_owned();
         let mut next = 0;
         while let Some(path) = found.get(next).cloned() {
             next += 1;
@@ -45,20 +48,17 @@ impl Script {
             let folder = path.parent().unwrap_or(Path::new(""));
             let text = String::from_utf8_lossy(&bytes);
             let tokens: Vec<Token> = tokens(&text).into_iter().map(|(_, token)| token).collect();
-            let named = tokens.iter().filter_map(|token| match token {
-                Token::Text(name) => Some(folder.join(name)),
-                _ => None,
-            });
-            // Gmsh reads the file of options beside each file as a script, too
-            let mut options = path.clone().into_os_string();
-            options.push(".opt");
-            let files = named.chain([PathBuf::from(options)]);
-            for file in files.filter(|file| file.is_file()).filter_map(|file| place_of(&file).ok()) {
-                if !found.contains(&file) {
+            let named = tokens.iter().filter_map(|token| if let Token::Text(name) = token { Some(name) } else { None });
+            let named = named.map(|name| folder.join(name));
+            for file in named.chain([options_of(&path)]).filter_map(|file| located(&file)) {
+                if file.is_file() && !found.contains(&file) {
                     found.push(file);
                 }
             }
             script.note(&tokens);
+            if trust::is_script(&path, &bytes) {
+                script.inputs.note(&tokens);
+            }
             if script.breach.is_none() {
                 script.breach = trust::breach(&path, &bytes, &home).map(|breach| (path, breach));
             }
@@ -168,13 +168,18 @@ impl Script {
     }
 }
 
-/// A path through the folder that a file lies in, which is the same however long the way to it was written. A link stays a link: Gmsh looks for
-/// other files beside the link, not beside what it leads to.
-fn place_of(file: &Path) -> std::io::Result<PathBuf> {
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let folder = folder.canonicalize()?;
-    file.metadata()?;
-    Ok(file.file_name().map_or(folder.clone(), |name| folder.join(name)))
+/// Return the path of a file in its folder, links to the folder resolved and one to the file itself not: Gmsh looks for what a script
+/// names beside the link. Scripts may include each other along ever longer paths, which are the same then.
+fn located(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+    Some(folder.canonicalize().ok()?.join(path.file_name()?))
+}
+
+/// Return the file of options beside a file, which Gmsh runs as a script after it has opened or merged the file.
+fn options_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".opt");
+    name.into()
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ pub struct Breach {
 }
 
 /// Commands that run other programs or text that the script makes up.
-const RUN: [&str; 11] = [
+pub const RUN: [&str; 11] = [
     "SystemCall",
     "System",
     "NonBlockingSystemCall",
@@ -36,7 +36,7 @@ const RUN: [&str; 11] = [
 const WRITE: [&str; 5] = ["Save", "Print", "CreateDir", "RenameFile", "DeleteFile"];
 
 /// Commands that read a file as a script.
-const READ: [&str; 3] = ["Include", "Merge", "MergeWithBoundingBox"];
+pub const READ: [&str; 3] = ["Include", "Merge", "MergeWithBoundingBox"];
 
 /// Gmsh's scanner cuts texts of 1024 bytes, and reads the rest of one as commands.
 const LONGEST: usize = 1000;
@@ -49,7 +49,7 @@ const SCRIPTS: [&str; 8] = ["geo", "pos", "msh", "opt", "inc", "dat", "txt", "pa
 
 /// The first thing in a file that its user must trust it for. `home` is the folder that it may read from.
 pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
-    if is_kind(path, &DATA) || bytes.starts_with(b"$MeshFormat") {
+    if !is_script(path, bytes) {
         return None;
     }
     let text = String::from_utf8_lossy(bytes);
@@ -89,6 +89,11 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
         }
     }
     None
+}
+
+/// Return whether Gmsh reads a file as a script: not one that it hands to a reader of shapes or meshes.
+pub fn is_script(path: &Path, bytes: &[u8]) -> bool {
+    !is_kind(path, &DATA) && !bytes.starts_with(b"$MeshFormat")
 }
 
 type Spot<'a> = (std::ops::Range<usize>, Token<'a>);

@@ -4,7 +4,6 @@
 //! all condensed makes no object of PETSc and never opens it.
 
 use super::error::{check_in, record};
-use super::files::Files;
 use super::{ffi, keep_apart, table, waiting};
 use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
@@ -51,9 +50,9 @@ pub(super) fn runs() -> bool {
 }
 
 /// Whether nothing is lost if PETSc starts later, or never: it has no options to read.
-pub(super) fn may_wait(words: &[String], files: &Files) -> bool {
+pub(super) fn may_wait(words: &[String], home: Option<&Path>) -> bool {
     let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
-    words.is_empty() && files.home.is_none() && !["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"].into_iter().any(set)
+    words.is_empty() && home.is_none() && !["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"].into_iter().any(set)
 }
 
 /// The functions of the running PETSc, which is started if it waited, with the options that were set meanwhile.

@@ -7,6 +7,7 @@ use crate::error::{Error, Kind, Result};
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
 use mpi::traits::Root;
+use std::cell::OnceCell;
 use std::ffi::OsStr;
 use std::io::Write;
 use std::os::unix::ffi::OsStrExt;
@@ -43,7 +44,7 @@ pub struct Session(Rc<Running>);
 struct Running {
     world: SimpleCommunicator,
     /// Files of options in the current folder that are not read.
-    left_out: Vec<String>,
+    left_out: OnceCell<Vec<String>>,
     /// Its drop ends MPI, after PETSc.
     _universe: Universe,
 }
@@ -58,6 +59,28 @@ impl Session {
     /// an option; PETSc's message is among the causes. A file of options that is none, or that leads back to itself; ranks but the first
     /// have a silent error then.
     pub fn start(words: &[String]) -> Result<Session> {
+        let session = Self::start_mpi()?;
+        if let Err(error) = session.start_petsc(words) {
+            // The other ranks may still wait for this one inside PETSc; ending MPI here would wait for them.
+            if session.size() > 1 {
+                std::mem::forget(session);
+            }
+            return Err(error);
+        }
+        Ok(session)
+    }
+
+    /// Return whether a launcher such as `mpiexec` started this process as one of several ranks: the others wait until it starts MPI,
+    /// or for ever if it ends before.
+    pub fn is_one_of_several() -> bool {
+        launcher::several()
+    }
+
+    /// Start MPI alone, with which ranks can compare what they are to do before PETSc reads options.
+    ///
+    /// # Errors
+    /// When a session was started before in this process, or MPI runs already.
+    pub fn start_mpi() -> Result<Session> {
         if STARTED.swap(true, Ordering::SeqCst) {
             return Err(Error::new(Kind::Solver, "PETSc was already started in this process")
                 .help("start one session and clone it"));
@@ -67,25 +90,26 @@ impl Session {
             .ok_or_else(|| Error::new(Kind::Solver, "MPI was already started in this process by other code"))?;
         let world = SimpleCommunicator::world();
         abort_on_panic(world.size() > 1);
-        let looked = if world.rank() == 0 { Files::look(words) } else { Ok(Files::default()) };
-        let files = of_first(&world, looked)?;
-        let left_out = files.left_out.clone();
-        if world.size() == 1 && library::may_wait(words, &files) {
-            return Ok(Session(Rc::new(Running { world, left_out, _universe: universe })));
-        }
-        if let Err(error) = library::start(words, files.home.as_deref()) {
-            // The other ranks may still wait for this one inside PETSc; ending MPI here would wait for them.
-            if world.size() > 1 {
-                std::mem::forget(universe);
-            }
-            return Err(error);
-        }
-        Ok(Session(Rc::new(Running { world, left_out, _universe: universe })))
+        Ok(Session(Rc::new(Running { world, left_out: OnceCell::new(), _universe: universe })))
     }
 
     /// Files of PETSc options in the current folder that PETSc alone would have read, `.petscrc` and `petscrc`, on the first rank.
     pub fn left_out(&self) -> &[String] {
-        &self.0.left_out
+        self.0.left_out.get().map_or(&[], Vec::as_slice)
+    }
+
+    /// Start PETSc, after MPI, as [`start`](Self::start) does; once in a process. Collective.
+    ///
+    /// # Errors
+    /// PETSc refuses an option; the other ranks may wait for this one inside PETSc then. A file of options that is none, or that leads back to
+    /// itself; ranks but the first have a silent error then.
+    pub fn start_petsc(&self, words: &[String]) -> Result<()> {
+        let looked = if self.rank() == 0 { Files::look(words) } else { Ok(Files::default()) };
+        let Files { home, left_out } = of_first(self.world(), looked)?;
+        let may_wait = self.size() == 1 && library::may_wait(words, home.as_deref());
+        // a session starts once
+        let _ = self.0.left_out.set(left_out);
+        if may_wait { Ok(()) } else { library::start(words, home.as_deref()) }
     }
 
     /// Ends PETSc and MPI if this is the last clone, and tells what goes wrong with it: PETSc writes its logs then.

@@ -3,6 +3,7 @@
 //!
 //! Errors are failures of the solver library, but for what functions say of their own.
 
+mod alike;
 pub mod asking;
 mod balance;
 pub mod clock;
@@ -23,6 +24,7 @@ pub mod steps;
 pub mod verdict;
 pub mod words;
 
+pub use alike::refuse_other_scenes;
 pub use asking::Asking;
 pub use clock::Clock;
 pub use ended::{All, Recovered};

@@ -13,7 +13,7 @@ use crate::discretize::{self, ContactInfo, Discrete, Verified};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
-use crate::mesh::{self, Dealer, Portion};
+use crate::mesh::{self, Dealer, Loaded, Portion};
 use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::{Session, give_back, keep_apart, keep_at_hand};
@@ -69,11 +69,11 @@ fn build_in<const D: usize>(
 ) -> Result<Built> {
     let stage = session.stage("mesh");
     clock.begin();
-    let mut verified = verified::<D>(session, &scene, interrupt)?;
+    let (mut verified, read) = verified::<D>(session, &scene, interrupt)?;
     clock.phase("mesh");
     drop(stage);
     verified.portion.mesh.forget_tags();
-    let source = Source { session: session.clone(), scene, verified, cut };
+    let source = Source { session: session.clone(), scene, verified, read, cut };
     let history = &source.scene.method.steps;
     let begun = history.begun;
     let mut built = source.build(begun, kept, clock)?;
@@ -86,18 +86,27 @@ fn build_in<const D: usize>(
     Ok(built)
 }
 
+/// What is known of the file of a mesh on the rank that has read it.
+struct FileRead {
+    digest: String,
+    /// Why it was not taken from the cache, in words, if it never is.
+    unkept: Option<String>,
+}
+
 /// A scene with its mesh: what discrete problems are made of.
 struct Source<const D: usize> {
     session: Session,
     scene: Rc<Scene>,
     verified: Verified<D>,
+    /// On the rank that has read the mesh.
+    read: Option<FileRead>,
     cut: Cut<D>,
 }
 
 impl<const D: usize> Source<D> {
     /// The problem under the loads of a step of the scene's history, or the full ones. Collective.
     fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
-        let Self { session, scene, verified, cut } = self;
+        let Self { session, scene, verified, read, cut } = self;
         let stage = session.stage("discretize");
         let mut bodies = verified.bodies.clone();
         scene.method.steps.apply(step, &mut bodies);
@@ -119,13 +128,15 @@ impl<const D: usize> Source<D> {
         drop(stage);
         let mut warnings = warnings(session, &discrete);
         warnings.extend(in_parts(verified.portion.mesh.split));
+        warnings.extend(read.iter().filter_map(|read| read.unkept.clone()));
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear, inner.whole.clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());
         let interpolation = inner.interpolation.take();
         let scene = scene.clone();
         let (options, again) = (inner.into_options(), None);
-        Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, options, warnings, again })
+        let mesh = read.as_ref().map(|read| read.digest.clone());
+        Ok(Built { scene, discrete, mesh, linear, whole, interpolation, choice, condensed, options, warnings, again })
     }
 }
 
@@ -138,13 +149,23 @@ fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()
 }
 
 /// The mesh, checked: one rank lets Gmsh work and reads, and every one looks at its part. Collective.
-fn verified<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<Verified<D>> {
+fn verified<const D: usize>(
+    session: &Session,
+    scene: &Scene,
+    interrupt: &Interrupt,
+) -> Result<(Verified<D>, Option<FileRead>)> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
     interrupt.hold();
     let ranks = Ranks::new(session);
-    let read = |dealer: &mut Dealer| Ok(mesh::deal::<D>(&scene.mesh, order, interrupt, dealer)?.mesh);
+    let mut file = None;
+    let read = |dealer: &mut Dealer| {
+        let Loaded { mesh, digest, unkept, .. } = mesh::deal::<D>(&scene.mesh, order, interrupt, dealer)?;
+        file = Some(FileRead { digest, unkept });
+        Ok(mesh)
+    };
     let portion = Portion::read(&ranks, order, read).and_then(|portion| interrupt.release().map(|()| portion));
-    agree(session, discretize::verify(scene, agree(session, portion)?, Rc::new(ranks)))
+    let verified = agree(session, discretize::verify(scene, agree(session, portion)?, Rc::new(ranks)))?;
+    Ok((verified, file))
 }
 
 fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {

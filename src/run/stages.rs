@@ -20,6 +20,8 @@ pub struct Built {
     pub scene: Rc<Scene>,
     /// The discrete problem.
     pub discrete: Discrete,
+    /// SHA-256 of the file of its mesh, on the rank that has read it; none elsewhere.
+    pub mesh: Option<String>,
     /// How linear steps are solved.
     pub linear: Linear,
     /// PETSc options of the matrix of all bodies.

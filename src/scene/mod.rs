@@ -2,6 +2,7 @@
 
 mod build;
 mod check;
+mod contents;
 mod decode;
 mod overrides;
 mod read;

@@ -164,6 +164,21 @@ pub fn winkler_on(ranks: usize, args: &[&str]) -> Run {
     finish(command, scratch, folder)
 }
 
+/// Runs the program with these words on two ranks, each in a folder of its own and with more options of mpiexec for the second: variables by
+/// `-x`. Results that the words name are `results` in the folder of the run.
+pub fn apart(folders: [&Path; 2], second: &[&str], args: &[&str]) -> Run {
+    let scratch = TempDir::new().expect("a temporary folder");
+    let folder = scratch.path().join("results");
+    let mut command = Command::new("mpiexec");
+    environment(&mut command);
+    let output = ["-o", folder.to_str().expect("a path")];
+    let output = if args.contains(&"solve") { &output[..] } else { &[] };
+    let words = [&[WINKLER], args, output].concat();
+    command.args(["--oversubscribe", "-n", "1", "-wdir"]).arg(folders[0]).args(&words);
+    command.args([":", "-n", "1", "-wdir"]).arg(folders[1]).args(second).args(&words);
+    finish(command, scratch, folder)
+}
+
 /// The program, on a number of ranks, with the environment of all tests.
 fn program(ranks: usize) -> Command {
     let mut command = if ranks == 1 {
