@@ -509,13 +509,13 @@ fn options_of_a_folder_are_read_where_they_are_named() {
     assert_eq!(solver(named), "minres + jacobi");
     fs::write(home.join(".petscrc"), "-pc_type icc\n").expect("a file");
     for ranks in [1, 2] {
-        assert_eq!(solver(groove_in(folder, home, ranks, "")), "cg + icc", "{ranks} ranks");
+        assert_eq!(solver(groove_in(folder, home, ranks, "")), "cg + icc by petsc", "{ranks} ranks");
     }
     assert_eq!(solver(groove_in(folder, home, 1, "-pc_type jacobi")), "cg + jacobi");
     assert_eq!(solver(groove_in(folder, home, 1, "-skip_petscrc")), plain);
     // at home it is one file
     let run = groove_in(home, home, 1, "");
-    assert_eq!((warned(&run), solver(run).as_str()), ([0, 0], "cg + icc"));
+    assert_eq!((warned(&run), solver(run).as_str()), ([0, 0], "cg + icc by petsc"));
 }
 
 /// PETSc would follow a ring of files until its stack ends, and read a pipe for ever.

@@ -15,6 +15,8 @@ pub fn refuse_traps(session: &Session) -> Result<()> {
     for (name, value) in session.options().all()? {
         let value = value.unwrap_or_default();
         if is_open(&value) {
+            // PETSc reads it at its end, too
+            session.options().clear(&name)?;
             let message = format!("the value `{value}` of {name} begins a variable that it does not end");
             return Err(Error::new(Kind::Solver, message).help("write `${NAME}`"));
         }
