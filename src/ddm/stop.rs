@@ -68,6 +68,8 @@ pub enum Whose {
     Body(usize),
     /// In the pressures of a pair.
     Pair(usize),
+    /// In what rounding leaves of all pressures.
+    Rounding,
 }
 
 impl Status {

@@ -27,6 +27,9 @@ const TRIALS: usize = 3;
 /// few steps. Ten times what they saw is believed: an error of the mesh is ten times the one that it lets a run end with.
 const ROUGHLY: f64 = 10.0;
 
+/// Relative error beyond which a number has no correct digit: a run that rounding ended there has found nothing.
+const ONE_DIGIT: f64 = 0.1;
+
 /// Looks at a result in the units of its model, and takes the name of a solution from one whose error is larger than was asked for and than the run
 /// thought. Collective.
 pub fn look(done: &mut Done, recovered: &All) {
@@ -45,9 +48,13 @@ pub fn look(done: &mut Done, recovered: &All) {
     let is_rounding = reached.error <= asked || done.outcome.is_rounding(energy.unbalanced);
     let allowed = if told <= asked { asked } else { ROUGHLY * told };
     let is_seen = found <= allowed && is_rounding;
+    let ended = if done.outcome.status == Status::RoundoffLimited { told } else { 0.0 };
+    let lost = ended.max(done.outcome.rounding);
     // NaN is seen by nobody
     if is_solved && !is_seen {
         done.outcome.status = Status::Inaccurate(Inaccuracy { told, found, whose });
+    } else if is_solved && lost > ONE_DIGIT {
+        done.outcome.status = Status::Inaccurate(Inaccuracy { told, found: lost, whose: Whose::Rounding });
     }
     done.look = Some(Look { reached, whose, seconds: began.elapsed().as_secs_f64() });
 }

@@ -118,6 +118,7 @@ fn look_report(look: &Look, discrete: &Discrete, model: &Model) -> LookReport {
     let at = match look.whose {
         Whose::Body(body) => vec![body],
         Whose::Pair(pair) => model.pairs[pair].bodies.to_vec(),
+        Whose::Rounding => Vec::new(),
     };
     let Reached { error, pressure, imbalance, .. } = look.reached;
     LookReport {

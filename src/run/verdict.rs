@@ -116,6 +116,13 @@ fn inaccurate(Inaccuracy { told, found, whose }: &Inaccuracy, model: &Model) -> 
             let [a, b] = model.pairs[*pair].bodies.map(|body| &model.bodies[body].name);
             format!("`{a}` - `{b}`: pressures are not those of the layer at the compressions of the bodies")
         }
+        Whose::Rounding => {
+            return format!(
+                "rounding leaves the pressures no digit, with a relative error of {}: take softer layers, begin with a smaller gap, or let \
+                 supports move bodies less",
+                sci(*found, 1)
+            );
+        }
     };
     format!(
         "{what}: the relative error is {} at least, where the run saw {}: leave options of the inner solver (-ksp_..., -pc_..., -mat_...) and \
