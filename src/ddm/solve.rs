@@ -366,11 +366,12 @@ impl Run<'_> {
             traced.retrace(model);
         }
         let (compression, digits) = (model.compression(&traced.trace), digits::of_compressions(model, &traced.trace));
-        let off = OffLaws::new(model, &layer, &compression, &digits);
         let floor = if status == Status::RoundoffLimited { floor(model, &iterate, &layer, &digits) } else { 0.0 };
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
+        // displacements are given with the digits that they have as a whole
+        let off = OffLaws::new(model, &layer, &compression, &digits::of_compressions(model, &iterate.trace));
         let answer: Vec<f64> = match method {
             Method::Newton(_) => {
                 let lines = memory.progress.slopes(model, &meeting_slopes(model));

@@ -5,7 +5,7 @@
 use super::elasticity::Elasticity;
 use super::material::Material;
 use super::space::Space;
-use super::{assemble, element, pad};
+use super::{assemble, element};
 use crate::linalg::dot;
 
 /// Forces of the cells of a body on its nodes, and what these forces are measured by.
@@ -55,7 +55,7 @@ fn visit<const D: usize>(
             let at = assemble::interpolate(&x, &phi);
             let material = match constant {
                 Some(material) => *material,
-                None => match elasticity.at(index, pad(at)) {
+                None => match elasticity.at(index, space.in_scene(at)) {
                     Ok(material) => material,
                     Err(_) => continue,
                 },

@@ -118,8 +118,8 @@ fn inaccurate(Inaccuracy { told, found, whose }: &Inaccuracy, model: &Model) -> 
         }
         Whose::Rounding => {
             return format!(
-                "rounding leaves the pressures no digit, with a relative error of {}: take softer layers, begin with a smaller gap, or let \
-                 supports move bodies less",
+                "few digits are left for the pressures, which rounding may change by {} of their peak: take softer layers, begin with a smaller \
+                 gap, or let supports move bodies less",
                 sci(*found, 1)
             );
         }
