@@ -37,7 +37,7 @@
 pub use crate::contact::law::{LayerLaw, PerPoint, Response};
 pub use crate::ddm::acceleration::Here;
 pub use crate::ddm::gamma::GammaRule;
-pub use crate::ddm::{Observer, Row, Silent, Status};
+pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status, Whose};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;
 pub use crate::model::line::Unbounded;
@@ -55,11 +55,12 @@ pub use crate::scene::Scene;
 use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;
 use crate::run::{self, All, Begin, Clock, Done, report, results};
+use std::rc::Rc;
 
 /// What a run found.
 pub struct Solution {
     done: Done,
-    recovered: All,
+    recovered: Rc<All>,
     estimate: Option<Estimate>,
     report: Report,
 }
@@ -79,6 +80,7 @@ pub fn solve(session: &Session, scene: Scene) -> Result<Solution> {
 /// Those of [`solve`].
 pub fn solve_with(session: &Session, scene: Scene, keep: &mut dyn Keep) -> Result<Solution> {
     scene.check()?;
+    run::refuse_other_scenes(session, &[&scene])?;
     let (interrupt, mut clock) = (Interrupt::default(), Clock::default());
     let built = run::build(session, scene, &interrupt, &mut clock)?;
     let ready = run::set_up(session, built, Begin::default(), &mut clock)?;

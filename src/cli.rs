@@ -1,10 +1,13 @@
 //! The command line: words -> request -> command -> exit code.
 
+mod ranks;
+
 use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result};
+use crate::exchange::tell;
 use crate::interrupt::Interrupt;
-use crate::output::say;
-use crate::parallel::agree;
+use crate::output::{make_folder, say};
+use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::report;
 use crate::solver::options;
@@ -135,60 +138,109 @@ fn two_dashes(petsc: &[String]) -> Option<String> {
     bare.filter(|word| known.contains(word)).map(str::to_owned).next()
 }
 
-/// Runs the program with the words of its command line, the name first; returns the exit code.
-pub fn run(words: Vec<OsString>) -> i32 {
-    let mut words = words.into_iter();
-    let name = words.next().map_or("winkler".into(), |name| name.to_string_lossy().into_owned());
-    let words = match words.map(OsString::into_string).collect::<std::result::Result<Vec<String>, _>>() {
-        Ok(words) => words.into_iter(),
-        Err(word) => {
-            let error = Error::new(Kind::Usage, format!("this word is not UTF-8 text: `{}`", word.display()));
-            return complain(&error.help("type it in UTF-8, or rename the file"));
-        }
-    };
-    let (program, petsc) = options::split(words);
-    if let Some(flag) = two_dashes(&petsc) {
-        let error = Error::new(Kind::Usage, format!("PETSc knows no option -{flag}"));
-        return complain(&error.help(format!("did you mean --{flag}?")));
-    }
-    if let Some(flag) = program.iter().chain(&petsc).find(|word| matches!(word.as_str(), "-n" | "-np")) {
-        let error = Error::new(Kind::Usage, format!("`{flag}`: the number of ranks is an option of mpiexec"));
-        return complain(&error.help("mpiexec -n 2 winkler solve SCENE"));
-    }
-    let bare_help = program.is_empty() && petsc.iter().any(|word| word == "-help");
-    let program = if bare_help { vec!["--help".to_owned()] } else { program };
-    let cli = match Cli::try_parse_from(std::iter::once(name).chain(program)) {
-        Ok(cli) => cli,
-        Err(mut refusal) => {
-            let word = refusal.get(ContextKind::InvalidArg).map(ToString::to_string).unwrap_or_default();
-            // options of PETSc have underscores, ours have none
-            if let Some(bare) = word.strip_prefix("--").filter(|bare| bare.contains('_')) {
-                let error = Error::new(Kind::Usage, format!("`{word}`: PETSc options take one dash"));
-                return complain(&error.help(format!("did you mean -{bare}?")));
-            }
-            let command = refusal.get(ContextKind::InvalidSubcommand).map(ToString::to_string).unwrap_or_default();
-            if command.ends_with(".toml") {
-                let error = Error::new(Kind::Usage, format!("`{command}` is no command"));
-                return complain(&error.help(format!("did you mean `winkler solve {command}`?")));
-            }
-            // nothing that the program takes would help behind `--`
-            refusal.remove(ContextKind::Suggested);
-            return match refusal.print() {
+/// Why the words of a command line lead to no command.
+enum Refusal {
+    /// In our words.
+    Ours(Error),
+    /// In those of the parser, which are help or the version if the user asked for them.
+    Parser(clap::Error),
+}
+
+impl Refusal {
+    /// Print it; return the exit code.
+    fn print(&self) -> i32 {
+        match self {
+            Self::Ours(error) => complain(error),
+            Self::Parser(refusal) => match refusal.print() {
                 // a closed pipe is no reason to say more
                 Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {
                     complain(&Error::file(Path::new("standard output"), "write", &cause))
                 }
                 _ => refusal.exit_code(),
-            };
+            },
         }
+    }
+
+    fn exit_code(&self) -> i32 {
+        match self {
+            Self::Ours(error) => error.kind().exit_code(),
+            Self::Parser(refusal) => refusal.exit_code(),
+        }
+    }
+}
+
+/// Runs the program with the words of its command line, the name first; returns the exit code.
+pub fn run(words: Vec<OsString>) -> i32 {
+    // a rank that ended before it starts MPI, with help perhaps, would keep the others waiting
+    let session = match Session::is_one_of_several().then(Session::start_mpi).transpose() {
+        Ok(session) => session,
+        Err(error) => return complain(&error),
     };
-    // these start other programs and need neither MPI nor PETSc
+    let is_first = session.as_ref().is_none_or(|session| session.rank() == 0);
+    let alike = session.as_ref().map_or(Ok(()), |session| ranks::refuse_other_words(session, &words));
+    let (cli, petsc) = match alike.map_err(Refusal::Ours).and_then(|()| parse(words)) {
+        Ok(parsed) => parsed,
+        Err(refusal) => return if is_first { refusal.print() } else { refusal.exit_code() },
+    };
     let interrupt = match Interrupt::watch() {
         Ok(interrupt) => interrupt,
         Err(error) => return complain(&error),
     };
     cli.color.write_global();
-    let alone = match cli.command {
+    match (cli.command, session) {
+        (Command::Solving(command), session) => with_session(session, &petsc, &interrupt, command),
+        (command, None) => without_session(&interrupt, command, petsc),
+        // the first rank does what several cannot share
+        (command, Some(session)) => {
+            tell(&Ranks::new(&session), || Ok(without_session(&interrupt, command, petsc))).unwrap_or(1)
+        }
+    }
+}
+
+/// Reads the words of a command line; gives the command and the options of PETSc.
+fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), Refusal> {
+    let refuse = |message: String, help: String| Err(Refusal::Ours(Error::new(Kind::Usage, message).help(help)));
+    let mut words = words.into_iter();
+    let name = words.next().map_or("winkler".into(), |name| name.to_string_lossy().into_owned());
+    let words = match words.map(OsString::into_string).collect::<std::result::Result<Vec<String>, _>>() {
+        Ok(words) => words.into_iter(),
+        Err(word) => {
+            let message = format!("this word is not UTF-8 text: `{}`", word.display());
+            return refuse(message, "type it in UTF-8, or rename the file".to_owned());
+        }
+    };
+    let (program, petsc) = options::split(words);
+    if let Some(flag) = two_dashes(&petsc) {
+        return refuse(format!("PETSc knows no option -{flag}"), format!("did you mean --{flag}?"));
+    }
+    if let Some(flag) = program.iter().chain(&petsc).find(|word| matches!(word.as_str(), "-n" | "-np")) {
+        let message = format!("`{flag}`: the number of ranks is an option of mpiexec");
+        return refuse(message, "mpiexec -n 2 winkler solve SCENE".to_owned());
+    }
+    let bare_help = program.is_empty() && petsc.iter().any(|word| word == "-help");
+    let program = if bare_help { vec!["--help".to_owned()] } else { program };
+    let mut refusal = match Cli::try_parse_from(std::iter::once(name).chain(program)) {
+        Ok(cli) => return Ok((cli, petsc)),
+        Err(refusal) => refusal,
+    };
+    let word = refusal.get(ContextKind::InvalidArg).map(ToString::to_string).unwrap_or_default();
+    // options of PETSc have underscores, ours have none
+    if let Some(bare) = word.strip_prefix("--").filter(|bare| bare.contains('_')) {
+        return refuse(format!("`{word}`: PETSc options take one dash"), format!("did you mean -{bare}?"));
+    }
+    let command = refusal.get(ContextKind::InvalidSubcommand).map(ToString::to_string).unwrap_or_default();
+    if command.ends_with(".toml") {
+        return refuse(format!("`{command}` is no command"), format!("did you mean `winkler solve {command}`?"));
+    }
+    // nothing that the program takes would help behind `--`
+    refusal.remove(ContextKind::Suggested);
+    Err(Refusal::Parser(refusal))
+}
+
+/// Runs a command that starts other programs or none, and needs neither MPI nor PETSc.
+fn without_session(interrupt: &Interrupt, command: Command, petsc: Vec<String>) -> i32 {
+    let ended = match command {
+        Command::Solving(_) => unreachable!("these commands have a session"),
         Command::New { folder, space } => new::new(&folder, space),
         Command::Schema => say(format_args!("{:#}", crate::scene::schema())).map(|()| 0),
         Command::Completions { shell } => {
@@ -198,9 +250,9 @@ pub fn run(words: Vec<OsString>) -> i32 {
         Command::Man { folder } => manual(&folder),
         Command::Bench(mut request) => {
             request.petsc = petsc;
-            bench::bench(&interrupt, &request)
+            bench::bench(interrupt, &request)
         }
-        Command::Mesh(request) => mesh::mesh(&interrupt, &request),
+        Command::Mesh(request) => mesh::mesh(interrupt, &request),
         Command::Report { folder, output } => report::save(&folder, output.as_deref()).and_then(|path| {
             say(path.display())?;
             Ok(0)
@@ -209,25 +261,37 @@ pub fn run(words: Vec<OsString>) -> i32 {
             paths.iter().try_for_each(|path| say(path.display()))?;
             Ok(0)
         }),
-        Command::Solving(command) => return with_session(&petsc, &interrupt, command),
     };
-    alone.unwrap_or_else(|error| complain(&error))
+    ended.unwrap_or_else(|error| complain(&error))
 }
 
 /// Writes a man page of the program and one of each command.
 fn manual(folder: &Path) -> Result<i32> {
+    make_folder(folder)?;
+    // made aside and moved: what has the name of a page is replaced, never written through
+    let aside = folder.join(format!(".winkler-{}-man", std::process::id()));
     let wrong = |cause: std::io::Error| Error::file(folder, "write man pages to", &cause);
-    std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder)).map_err(wrong)?;
-    Ok(0)
+    let made =
+        std::fs::create_dir(&aside).and_then(|()| clap_mangen::generate_to(Cli::command(), &aside)).and_then(|()| {
+            std::fs::read_dir(&aside)?
+                .flatten()
+                .try_for_each(|page| std::fs::rename(page.path(), folder.join(page.file_name())))
+        });
+    // what is left of a failure is litter
+    let _ = std::fs::remove_dir_all(&aside);
+    made.map_err(wrong).map(|()| 0)
 }
 
-/// Runs a command that solves.
-fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
-    let session = match options::refuse_words(petsc).and_then(|()| Session::start(petsc)) {
+/// Runs a command that solves, in a session that has started MPI if there are several ranks.
+fn with_session(session: Option<Session>, petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
+    let session = match session.map_or_else(Session::start_mpi, Ok) {
         Ok(session) => session,
         Err(error) => return complain(&error),
     };
-    let ended = agree(&session, options::refuse_traps(&session)).and_then(|()| dispatch(&session, interrupt, command));
+    let ended = session
+        .start_petsc(petsc)
+        .and_then(|()| agree(&session, options::refuse_traps(&session)))
+        .and_then(|()| dispatch(&session, interrupt, command));
     match ended {
         Ok(code) => match session.finish() {
             Err(error) if code == 0 => complain(&error),

@@ -30,6 +30,7 @@ mod springs;
 mod supports;
 mod surface;
 mod totals;
+mod unbalanced;
 mod verify;
 
 use crate::contact::{self, ContactPair};
@@ -62,6 +63,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 pub use surface::ContactSurface;
 use totals::totals;
+pub use unbalanced::Unbalanced;
 pub use verify::{Verified, verify};
 
 /// The discrete problem and what reports need to know of its origin.
@@ -181,6 +183,7 @@ pub fn discretize<const D: usize>(
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
         infos.push(BodyInfo {
             name: part.spec.name.value.clone(),
+            datum: contact::pad(part.space.datum),
             nodes: part.space.nodes.len(),
             points: Vec::new(),
             cells: part.known.cells,
@@ -308,7 +311,7 @@ fn together<const D: usize>(
     let sums = totals(exchange, &sums);
     let sums = sums.chunks_exact(3).map(|sum| [sum[0], sum[1], sum[2]]).collect();
     let poisson =
-        share(exchange, parts.iter().map(|part| elastic::poisson(part.spec, part.own(), plane)).collect::<Vec<_>>());
+        share(exchange, parts.iter().map(|part| elastic::poisson(part.spec, D, part.own(), plane)).collect::<Vec<_>>());
     let warning = |(body, part): (usize, &Part<D>)| {
         elastic::warning(part.spec, poisson.iter().map(|of_rank| of_rank[body]).fold(0.0, f64::max))
     };

@@ -4,7 +4,7 @@ use crate::error::{Error, Kind, Result};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
@@ -35,6 +35,24 @@ pub fn open(path: &Path) -> Result<File> {
         .help("name a regular file; what a pipe gives can be saved as one"))
 }
 
+/// The bytes of a text whose lines end as on Unix: those of old Macs end with carriage returns alone. Texts with other ends stay as they are,
+/// so that every line keeps its number.
+pub fn with_unix_lines(mut bytes: Vec<u8>) -> Vec<u8> {
+    if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
+        bytes.iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
+    }
+    bytes
+}
+
+/// What is wrong with bytes that should be text in UTF-8, as the rest of a sentence about their file; none where that is not seen at once.
+pub fn other_encoding(bytes: &[u8]) -> Option<&'static str> {
+    match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("is UTF-16 text, not UTF-8"),
+        _ if bytes.contains(&0) => Some("has zero bytes, so it is no text"),
+        _ => None,
+    }
+}
+
 /// Bytes on a line of a file in which Linux tells of itself, such as `MemAvailable` of /proc/meminfo; none where it does not.
 pub fn bytes_in_proc(file: &str, line: &str) -> Option<u64> {
     bytes_on_line(&std::fs::read_to_string(file).ok()?, line)
@@ -45,6 +63,48 @@ fn bytes_on_line(text: &str, line: &str) -> Option<u64> {
     rest.split_whitespace().next()?.parse::<u64>().ok().map(|kibibytes| kibibytes * 1024)
 }
 
+/// A source of bytes whose contents are digested as they are read, each byte once, however often a reader goes back.
+pub struct Digested<R> {
+    source: R,
+    /// Where the next byte is read.
+    at: u64,
+    /// How many bytes from the start are in the sum.
+    summed: u64,
+    sum: Sha256,
+}
+
+impl<R: Read + Seek> Digested<R> {
+    /// Start at the first byte of a source.
+    pub fn new(source: R) -> Self {
+        Self { source, at: 0, summed: 0, sum: Sha256::new() }
+    }
+
+    /// Return the SHA-256 of the bytes from the start that were read without a hole, in hexadecimal digits.
+    pub fn digest(self) -> String {
+        hexadecimal(&self.sum.finalize())
+    }
+}
+
+impl<R: Read + Seek> Read for Digested<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.source.read(buffer)?;
+        let (from, end) = (self.at, self.at + count as u64);
+        self.at = end;
+        if (from..end).contains(&self.summed) {
+            self.sum.update(&buffer[(self.summed - from) as usize..count]);
+            self.summed = end;
+        }
+        Ok(count)
+    }
+}
+
+impl<R: Read + Seek> Seek for Digested<R> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.at = self.source.seek(to)?;
+        Ok(self.at)
+    }
+}
+
 /// SHA-256 of numbers, texts, lists and tuples of such, in hexadecimal digits. Lengths are part of it, so that pieces do not run together.
 pub fn digest(data: &impl Serialize) -> String {
     // nothing of these kinds fails
@@ -53,7 +113,11 @@ pub fn digest(data: &impl Serialize) -> String {
 
 /// The same of the contents of a file.
 pub fn digest_of_bytes(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]
@@ -66,6 +130,29 @@ mod tests {
         assert_ne!(digest(&("ab", "c")), digest(&("a", "bc")));
         assert_ne!(digest(&[2.0, 1.0]), digest(&[2.0, 1.0 + f64::EPSILON]));
         assert!(digest(&()).starts_with("e3b0c442"), "that of no byte");
+    }
+
+    #[test]
+    fn lines_of_old_macs_are_lines() {
+        let unix = |text: &[u8]| with_unix_lines(text.to_vec());
+        assert_eq!(unix(b"a\rb\r"), b"a\nb\n");
+        assert_eq!(unix(b"a\r\nb\rc"), b"a\r\nb\rc");
+        assert_eq!(other_encoding(b"\xff\xfea\0"), Some("is UTF-16 text, not UTF-8"));
+        assert_eq!(other_encoding(b"a"), None);
+        assert!(other_encoding(b"a\0").is_some());
+    }
+
+    #[test]
+    fn bytes_are_digested_once_as_they_are_read() {
+        let bytes: Vec<u8> = (0..100).collect();
+        let mut source = Digested::new(io::Cursor::new(&bytes));
+        source.seek(SeekFrom::End(0)).unwrap();
+        source.seek(SeekFrom::Start(0)).unwrap();
+        let mut some = [0; 60];
+        source.read_exact(&mut some).unwrap();
+        source.seek(SeekFrom::Start(10)).unwrap();
+        source.read_to_end(&mut Vec::new()).unwrap();
+        assert_eq!(source.digest(), digest_of_bytes(&bytes));
     }
 
     #[test]

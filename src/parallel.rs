@@ -1,12 +1,14 @@
 //! Which rank owns which body, and what ranks tell each other, over the `mpi` crate.
 
 use crate::error::{Error, Result};
-use crate::exchange::Exchange;
+use crate::exchange::{Exchange, pack, share};
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
 use mpi::point_to_point::send_receive_into;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
+use sha2::{Digest, Sha256};
 use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The ranks of a run.
 pub struct Ranks {
@@ -126,6 +128,35 @@ pub fn owners(loads: &[usize], ranks: usize) -> Vec<usize> {
         sum[rank] += loads[body];
     }
     owner
+}
+
+/// What a rank has otherwise than the first one.
+pub struct Difference {
+    /// The rank.
+    pub rank: usize,
+    /// What it is that differs.
+    pub what: String,
+}
+
+/// Compare facts, each with a name of what it tells, which all ranks should have alike; return what differs, the same on all ranks. One short
+/// message if nothing does. Collective.
+pub fn differences(session: &Session, facts: &BTreeMap<String, String>) -> Vec<Difference> {
+    let sum = Sha256::digest(pack(facts));
+    let sum = u64::from_le_bytes(std::array::from_fn(|byte| sum[byte]));
+    // the largest of all sums, and by its complement the least
+    let (mine, mut most) = ([sum, !sum], [0; 2]);
+    session.world().all_reduce_into(&mine[..], &mut most[..], SystemOperation::max());
+    if most[0] == !most[1] {
+        return Vec::new();
+    }
+    let all = share(&Ranks::new(session), facts.clone());
+    let mut found = Vec::new();
+    for (rank, other) in all.iter().enumerate().skip(1) {
+        let names: BTreeSet<&String> = other.keys().chain(all[0].keys()).collect();
+        let differing = names.into_iter().filter(|name| other.get(*name) != all[0].get(*name));
+        found.extend(differing.map(|what| Difference { rank, what: what.clone() }));
+    }
+    found
 }
 
 /// Makes a result that ranks reached separately a common one: if it failed anywhere it fails everywhere, with the error

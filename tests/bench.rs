@@ -244,6 +244,41 @@ fn a_benchmark_is_taken_up_again() {
     assert_eq!(status(&rows(&folder.path().join("out/bench.csv"))), vec!["converged"; 3]);
 }
 
+/// Rows are answers of a scene, its data and its mesh: where one of them was edited, in place, they are made anew.
+#[test]
+fn rows_of_edited_inputs_are_made_anew() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("a file");
+    let script = fs::read_to_string(case("groove").with_file_name("groove.geo")).expect("a script");
+    let text = fs::read_to_string(case("groove")).expect("a scene");
+    let gap = text.lines().find(|line| line.starts_with("gap =")).expect("a gap");
+    let text = text.replace(gap, "gap = \"rough(x)\"") + "\n[data.rough]\nfile = \"rough.csv\"\npoints = true\n";
+    let (scene, out) = (folder.path().join("scene.toml"), folder.path().join("out"));
+    let kept = || {
+        let [scene, out] = [&scene, &out].map(|path| path.to_str().expect("a path"));
+        let args = ["bench", scene, "--solver", "mumps", "--resume", "--over", "mesh.set.n=2,4", "-o", out];
+        let run = winkler(&args);
+        assert_eq!(run.code, 0, "{}", run.said());
+        run.stdout.matches("(kept)").count()
+    };
+    write("groove.geo", &script);
+    write("scene.toml", &text);
+    write("rough.csv", "0,0\n4,1e-4\n");
+    assert_eq!([kept(), kept()], [0, 2]);
+    write("rough.csv", "0,0\n4,2e-4\n");
+    assert_eq!([kept(), kept()], [0, 2]);
+    write("groove.geo", &script.replace("height = 1;", "height = 1.5;"));
+    assert_eq!([kept(), kept()], [0, 2]);
+    write("scene.toml", &text.replace("poisson = 0.3", "poisson = 0.25"));
+    assert_eq!([kept(), kept()], [0, 2]);
+    // what is written, and comments, are no part of the answer
+    write("scene.toml", &(text.replace("poisson = 0.3", "poisson = 0.25") + "# more\n[output]\nvtu = true\n"));
+    assert_eq!(kept(), 2);
+    // nobody knows the mesh of a script with random numbers beforehand
+    write("groove.geo", &(script + "If (Rand(1) > 2)\n Point(99) = {0, 0, 0};\nEndIf\n"));
+    assert_eq!([kept(), kept()], [0, 0]);
+}
+
 /// Ranks are started by mpiexec, and theta is varied by the stiffness of the layer.
 #[test]
 fn ranks_and_theta() {

@@ -295,3 +295,117 @@ fn one_bit_changes() {
         assert!(of(Kind::Refused) > 2 * of(Kind::Moved) && of(Kind::Moved) > 0);
     }
 }
+
+/// `winkler mesh` of a square as a scene's only body, in a folder of its own, with variables of the environment.
+struct Script {
+    folder: tempfile::TempDir,
+}
+
+impl Script {
+    fn new(text: &str) -> Self {
+        let script = Self { folder: tempfile::tempdir().expect("a folder") };
+        let scene = "dimension = 2\nmesh = { geo = \"a.geo\" }\n[[body]]\nname = \"all\"\nyoung = 1\npoisson = 0\n";
+        let scene = scene.to_owned() + "[[body]]\nname = \"other\"\nyoung = 1\npoisson = 0\n[[contact]]\n";
+        let scene = scene + "between = [\"top\", \"bottom\"]\nlayer = { linear = { stiffness = 1 } }\n";
+        script.write("scene.toml", &scene);
+        script.write("a.geo", &(text.to_owned() + SQUARES));
+        script
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).expect("a file");
+    }
+
+    /// Whether the mesh comes from the cache in a folder, and the number of its nodes.
+    fn mesh(&self, cache: &Path, set: &[(&str, &str)]) -> (bool, u64) {
+        let mut command = Command::new(common::WINKLER);
+        command.args(["mesh", "scene.toml", "--json"]).current_dir(self.folder.path());
+        command
+            .env_remove("XDG_CACHE_HOME")
+            .env_remove("N")
+            .envs(set.iter().copied())
+            .env("WINKLER_CACHE", cache)
+            .env("HOME", self.path("home"));
+        let (status, said, complaint) = output(command, Duration::from_secs(60));
+        assert!(status.success(), "{said}{complaint}");
+        let facts: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+        (facts["origin"] == "from the cache", facts["nodes"].as_u64().expect("a number"))
+    }
+}
+
+/// Two squares, one on the other, with `n` elements along their sides.
+const SQUARES: &str = "
+SetFactory(\"OpenCASCADE\");
+Rectangle(1) = {0, 0, 0, 1, 1}; Rectangle(2) = {0, 1, 0, 1, 1};
+Transfinite Curve {:} = n + 1; Transfinite Surface {:};
+Physical Surface(\"all\") = {1}; Physical Surface(\"other\") = {2};
+Physical Curve(\"top\") = {3}; Physical Curve(\"bottom\") = {5};
+";
+
+/// All that a script can learn from outside belongs to the key of its mesh, or its mesh is not kept.
+#[test]
+fn no_mesh_of_other_inputs_comes_from_the_cache() {
+    let nodes = |n: u64| 2 * (n + 1) * (n + 1);
+    let by_name = "n = 2; If (!StrCmp(GetEnv(\"N\"), \"three\")) n = 3; EndIf\n";
+    let script = Script::new(by_name);
+    let mesh = |set: &[(&str, &str)]| script.mesh(&script.path("cache"), set);
+    assert_eq!([mesh(&[]), mesh(&[])], [(false, nodes(2)), (true, nodes(2))]);
+    let three = [("N", "three")];
+    assert_eq!([mesh(&three), mesh(&three), mesh(&[])], [(false, nodes(3)), (true, nodes(3)), (true, nodes(2))]);
+    // options of the user do not reach Gmsh
+    std::fs::create_dir_all(script.path("home")).expect("a folder");
+    script.write("home/.gmsh-options", "Mesh.ElementOrder = 2;\n");
+    script.write(".gmsh-options", "Mesh.ElementOrder = 2;\n");
+    script.write("a.geo", &format!("n = 5;{SQUARES}"));
+    assert_eq!(mesh(&[]), (false, nodes(5)));
+    // but those beside the script do
+    script.write("a.geo.opt", "n = 4;\nTransfinite Curve {:} = n + 1;\n");
+    assert_eq!([mesh(&[]), mesh(&[])], [(false, nodes(4)), (true, nodes(4))]);
+    script.write("a.geo.opt", "n = 6;\nTransfinite Curve {:} = n + 1;\n");
+    assert_eq!(mesh(&[]), (false, nodes(6)));
+    for text in [
+        "n = 2 + 0*Rand(1);",
+        "n = 2 + 0*Cpu;",
+        "n = 2; If (FileExists(\"more\")) n = 3; EndIf",
+        "n = 2; If (StrFind(CurrentDirectory, \"nowhere\")) n = 3; EndIf",
+        "n = 2; s = Today;",
+        "n = 2; s = Str(GetEnv(StrCat(\"N\", \"\")));",
+    ] {
+        let script = Script::new(text);
+        let mesh = || script.mesh(&script.path("cache"), &[]);
+        assert_eq!([mesh(), mesh()], [(false, nodes(2)); 2], "{text}");
+    }
+    // a run says why
+    let script = Script::new("n = 2 + 0*Rand(1);");
+    let checked = common::winkler(&["check", script.path("scene.toml").to_str().expect("a path")]);
+    assert!(checked.stdout.contains("is meshed anew in each run, since it uses `Rand`"), "{}", checked.said());
+}
+
+/// What another user may have put into a cache is no answer to this scene, and nothing is written there.
+#[test]
+fn a_cache_of_others_is_not_used() {
+    use std::os::unix::fs::{PermissionsExt, chown};
+    let script = Script::new("n = 2;");
+    let (cache, own) = (script.path("cache"), script.path("home/.cache/winkler"));
+    let mesh = || script.mesh(&cache, &[]).0;
+    let count = |folder: &Path| std::fs::read_dir(folder).map_or(0, |entries| entries.count());
+    assert_eq!([mesh(), mesh()], [false, true]);
+    let file = std::fs::read_dir(&cache).expect("a cache").next().expect("a mesh").expect("a mesh").path();
+    let allow = |path: &Path, mode| std::fs::set_permissions(path, PermissionsExt::from_mode(mode)).expect("ours");
+    allow(&cache, 0o777);
+    assert_eq!(([mesh(), mesh()], count(&cache), count(&own)), ([false, true], 1, 1));
+    allow(&cache, 0o755);
+    assert!(mesh());
+    // only root gives files away
+    if chown(&file, Some(54_321), None).is_err() {
+        return;
+    }
+    assert_eq!([mesh(), mesh()], [false, true], "their file is replaced by ours");
+    chown(&cache, Some(54_321), None).expect("given away");
+    std::fs::remove_dir_all(&own).expect("removed");
+    assert_eq!(([mesh(), mesh()], count(&cache), count(&own)), ([false, true], 1, 1));
+}

@@ -10,6 +10,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
+use winkler::error::Kind;
 use winkler::output::{BodyField, CellKind};
 
 fn page(folder: &Path) -> String {
@@ -241,6 +242,8 @@ fn what_cannot_be_shown_is_refused() {
     refused(&winkler(&["plot", &folder, "pressure", "-o", "p.pdf"]), 2, &["p.pdf", "SVG or PNG"]);
     refused(&winkler(&["plot", &folder, "pressure", "-o", "no/p.png"]), 6, &["no/p.png"]);
     refused(&winkler(&["plot", "nowhere", "pressure"]), 6, &["report.json"]);
+    // of a run without sums
+    fs::remove_file(run.folder.join("SHA256SUMS")).expect("sums");
     let broken = |name: &str, text: &str, words: &[&str]| {
         let path = run.folder.join(name);
         let before = fs::read(&path).expect("a file");
@@ -257,6 +260,83 @@ fn what_cannot_be_shown_is_refused() {
     let name = "contact-lower-upper.csv";
     broken(name, "x,y\n1,2,3\n", &[name]);
     assert_eq!(winkler(&["report", &folder]).code, 0);
+}
+
+/// Numbers that look like chance, the same in every run.
+struct Chance(u64);
+
+impl Chance {
+    fn below(&mut self, end: usize) -> usize {
+        // Knuth's MMIX
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % end
+    }
+}
+
+/// A file with something wrong: a bit, a byte, a piece that is missing, or the end.
+fn damaged(whole: &[u8], chance: &mut Chance) -> Vec<u8> {
+    let (mut bytes, at) = (whole.to_vec(), chance.below(whole.len()));
+    match chance.below(4) {
+        0 => bytes[at] ^= 1 << chance.below(8),
+        1 => bytes[at] = b"0123456789-.e,<>/=AZ\0\xff"[chance.below(22)],
+        2 => bytes.truncate(at),
+        _ => drop(bytes.drain(at..(at + 1 + chance.below(40)).min(whole.len()))),
+    }
+    bytes
+}
+
+/// Files of a run that are not what it wrote make no page, or the same one: a page with other numbers would be believed.
+#[test]
+fn damaged_results_are_not_shown() {
+    let small = ["--set", "mesh.set.n=2", "--vtu"];
+    let plane = solve(case("groove-held"), &["--method", "newton", small[0], small[1], small[2]]).converged();
+    let space = solve(case("patch-3d"), &["--vtu", "--set", "output.compress=false"]).converged();
+    let mut chance = Chance(1);
+    for run in [&plane, &space] {
+        let page = || winkler::report::save(&run.folder, None).map(|path| fs::read(path).expect("a page"));
+        let good = page().expect("a page");
+        let read = ["report.json", "history.csv", "contacts.csv", "contact-lower-upper.csv", "SHA256SUMS"];
+        let fields = ["lower.vtu", "upper.vtu", "contact-lower-upper.vtu"];
+        let mut check = |names: &[&str], times: usize| {
+            let mut refused = 0;
+            for name in names {
+                let path = run.folder.join(name);
+                let whole = fs::read(&path).expect("a file");
+                for _ in 0..times {
+                    fs::write(&path, damaged(&whole, &mut chance)).expect("a file");
+                    match page() {
+                        Ok(found) => assert!(found == good, "{name} with other numbers"),
+                        Err(error) => {
+                            assert!(error.message().contains(name) && error.kind() == Kind::File, "{name}: {error}");
+                            refused += 1;
+                        }
+                    }
+                }
+                fs::write(&path, whole).expect("a file");
+            }
+            refused
+        };
+        // some pages are the same since nothing was changed, or what they do not show
+        let all = read.len() + fields.len();
+        assert!(check(&[&read[..], &fields].concat(), 25) > 20 * all);
+        // fields have sums of their own where they are compressed; without sums nothing may crash
+        fs::remove_file(run.folder.join("SHA256SUMS")).expect("sums");
+        if std::ptr::eq(run, &plane) {
+            assert!(check(&fields, 150) > 250);
+        } else {
+            for name in fields {
+                let path = run.folder.join(name);
+                let whole = fs::read(&path).expect("a file");
+                for _ in 0..100 {
+                    fs::write(&path, damaged(&whole, &mut chance)).expect("a file");
+                    // what cannot be known is shown
+                    let _ = page();
+                }
+                fs::write(&path, whole).expect("a file");
+            }
+        }
+        assert!(page().expect("a page") == good);
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Run, case, solve, solve_on, text_of, winkler_on};
+use common::{Run, Scene, apart, case, solve, solve_on, text_of, winkler_on};
 use std::fs;
 use tempfile::TempDir;
 
@@ -35,22 +35,19 @@ fn the_choice_of_solvers_is_that_of_one_rank() {
     }
 }
 
-/// Ranks other than the first have no use for the mesh: here one has the scene in a folder without it. A support that holds all cells of a body is
+/// Ranks other than the first have no use for the mesh: here each has the scene in a folder of its own. A support that holds all cells of a body is
 /// known there, too.
 #[test]
 fn one_rank_reads_the_mesh() {
     let words = ["--method", "newton", "--set", "mesh.set={nl=10,nu=8}", "--set", "solver=hypre", "--set", STOP];
     let rigid = ["--set", "body.0.fix=[{on=\"lower\",x=0,y=0,z=0}]", "--set", "contact.0.gap=\"1e-5*x\""];
-    let elsewhere = TempDir::new().expect("a temporary folder");
-    let scene = elsewhere.path().join("scene.toml");
-    fs::write(&scene, text_of("patch-3d")).expect("written");
-    let [scene, folder] = [scene, elsewhere.path().join("results")].map(|path| path.display().to_string());
+    let scenes = [(); 2].map(|()| Scene::new(text_of("patch-3d")));
+    let folders = scenes.each_ref().map(|scene| scene.path.parent().expect("a folder"));
     for more in [&rigid[..], &[]] {
         let words = [&words[..], more].concat();
         let serial = solve(case("patch-3d"), &words).converged();
-        let other = [":", "-n", "1", env!("CARGO_BIN_EXE_winkler"), "solve", &scene, "-o", &folder];
-        let parallel = solve_on(2, case("patch-3d"), &[&words, &other[..], &words].concat()).converged();
-        assert_eq!(parallel.count("ranks"), 3);
+        let parallel = apart(folders, &[], &[&["solve", "scene.toml"], &words[..]].concat()).converged();
+        assert_eq!(parallel.count("ranks"), 2);
         assert_eq!(parallel.report["bodies"][0]["dofs"], serial.report["bodies"][0]["dofs"]);
         let apart = pressures(&serial).into_iter().zip(pressures(&parallel)).map(|(a, b)| (a - b).abs());
         assert!(apart.fold(0.0, f64::max) <= 1e-8 * serial.number("pairs/0/peak_pressure"));

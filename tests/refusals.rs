@@ -281,12 +281,18 @@ fn scripts_that_do_more_than_draw() {
         ("Printf(\"x\") > \"it\";", "`Printf(...) > ...`"),
         ("Save \"it.msh\";", "`Save`"),
         ("Include \"/etc/hostname\";", "outside its own folder"),
+        ("S2N[\"SystemCall\"] \"touch it\";", "`S2N`"),
+        ("General[0].ErrorFileName = \"it\";", "ErrorFileName"),
     ] {
         let (folder, scene) = patch_with_script(&format!("{script}\n{command}\n"));
         let line = format!("own.geo:{}:", script.lines().count() + 2);
         refused(&solve(&scene, &[]), MESH, &[&line, word, "--trust-geo"]);
         assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "{command} was run");
     }
+    // Gmsh reads this file beside the script by itself
+    let (folder, scene) = patch_with_script(&script);
+    std::fs::write(folder.path().join("own.geo.opt"), "SystemCall \"touch it\";\n").expect("a file");
+    refused(&solve(&scene, &[]), MESH, &["own.geo.opt:1:", "`SystemCall`", "--trust-geo"]);
     // a script that the cache does not know from an earlier run of this test
     let now = std::time::UNIX_EPOCH.elapsed().expect("a clock").as_nanos();
     let (folder, scene) = patch_with_script(&format!("{script}\n// {now}\nCreateDir \"it\";\n"));

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Run, Scene, case, distance, environment, output, root, solve, solve_on, text_of};
+use common::{Run, Scene, case, distance, environment, output, root, solve, solve_on, text_of, winkler};
 use serde_json::Value;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -507,12 +507,75 @@ fn a_checkpoint_of_something_else_is_refused() {
     );
     let file = scratch.path().join("results/checkpoint");
     let mut bytes = fs::read(&file).expect("a checkpoint");
+    let before = [b"winkler checkpoint 3", &bytes[20..]].concat();
+    fs::write(&file, before).expect("a file");
+    refused(restart(&scratch, 1, &scene, &args("method.gamma=1e-6", "mesh.set.n=8")), 6, "another version");
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     fs::write(&file, &bytes).expect("a file");
     refused(restart(&scratch, 1, &scene, &args("method.gamma=1e-6", "mesh.set.n=8")), 6, "is damaged");
     fs::remove_file(&file).expect("a file");
     refused(restart(&scratch, 1, &scene, &args("method.gamma=1e-6", "mesh.set.n=8")), 6, "cannot read");
+}
+
+/// Meshes with as many nodes, cells and contact points, and data of the same name, are others: whatever differs between them is refused, on any
+/// number of ranks, and what is the same goes on, wherever it lies.
+#[test]
+fn a_checkpoint_of_a_mesh_or_data_of_equal_counts_is_refused() {
+    let made = winkler(&["mesh", case("groove").to_str().expect("a path"), "--set", "mesh.set.n=8", "-o", "a.msh"]);
+    assert_eq!(made.code, 0, "{}", made.said());
+    let folder = TempDir::new().expect("a folder");
+    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).expect("a file");
+    let mesh = fs::read(made.folder.join("a.msh")).expect("a mesh");
+    let data = |most: &str| format!("0,0\n8,{most}\n");
+    let text = text_of("groove");
+    let line = |key: &str| text.lines().find(|line| line.starts_with(key)).expect(key).to_owned();
+    let text = text.replace(&line("mesh ="), "mesh = \"a.msh\"").replace(&line("gap ="), "gap = \"rough(x)\"");
+    let scene = folder.path().join("scene.toml");
+    write("a.msh", &mesh);
+    write("rough.csv", data("1e-4").as_bytes());
+    write("scene.toml", (text + "\n[data.rough]\nfile = \"rough.csv\"\npoints = true\n").as_bytes());
+    let mut run = Working::start(&words(&scene, &ENDLESS), 1);
+    run.until_rows(2);
+    run.signal("INT");
+    let (_, scratch, said) = run.end();
+    let done = report(&scratch.path().join("results"))["iterations"].as_u64().expect(&said);
+    let limit = format!("method.stop={{residual=1e-12,iterations={}}}", done + 2);
+    let again = |ranks: usize| restart(&scratch, ranks, &scene, &["--set", "method.gamma=1e-6", "--set", &limit]);
+    let refused = |what: &str| {
+        for ranks in [1, 2] {
+            let run = again(ranks);
+            assert!(run.code == 3 && run.stderr.contains(&format!("is of another {what}")), "{}", run.said());
+        }
+    };
+    write("rough.csv", data("2e-4").as_bytes());
+    refused("scene");
+    write("rough.csv", data("1e-4").as_bytes());
+    // one coordinate of a node inside a body
+    let moved = moved_inside(&folder.path().join("a.msh"), &mesh);
+    write("a.msh", &moved);
+    refused("mesh");
+    write("a.msh", &mesh);
+    for ranks in [1, 2] {
+        assert_eq!(again(ranks).count("iterations"), done as usize + 2);
+    }
+}
+
+/// The mesh, in which numbers have eight bytes, with a node inside a body a little aside.
+fn moved_inside(path: &Path, bytes: &[u8]) -> Vec<u8> {
+    let mesh = winkler::mesh::parse::<2>(path, bytes, winkler::mesh::Maker::User).expect("a mesh");
+    let on_surfaces: Vec<u32> =
+        mesh.groups.iter().filter(|group| group.dimension < 2).flat_map(|group| group.connectivity.clone()).collect();
+    let inside = |point: &usize| {
+        let [x, y] = mesh.points[*point];
+        !on_surfaces.contains(&(*point as u32)) && (1.0..3.0).contains(&x) && (0.3..0.7).contains(&y)
+    };
+    let [x, y] = mesh.points[(0..mesh.points.len()).find(inside).expect("a node inside")];
+    let place = [x.to_le_bytes(), y.to_le_bytes()].concat();
+    let at = bytes.windows(16).position(|window| window == place).expect("its coordinates");
+    let mut moved = bytes.to_vec();
+    moved[at..at + 8].copy_from_slice(&(x + 1e-3).to_le_bytes());
+    moved
 }
 
 /// A script that sleeps: while Gmsh works a signal ends it, and nothing is left in the cache.

@@ -7,10 +7,11 @@ use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Sizes};
+use crate::exchange::tell;
 use crate::interrupt::Interrupt;
 use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
-use crate::parallel::agree;
+use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::problem::{MeshSource, MethodName, method};
 use crate::run::{self, Begin, Built, Clock, Done, report};
@@ -106,7 +107,8 @@ impl Plan {
             plan.finer = Some(std::mem::replace(&mut plan.scene, Rc::new(coarse)));
             return Ok(plan);
         }
-        let mut view_of_first = mesh::recall_final(&plan.purpose);
+        // the cache of another rank may know of other sizes
+        let mut view_of_first = tell(&Ranks::new(session), || Ok(mesh::recall_final(&plan.purpose)))?;
         if view_of_first.is_none() {
             view_of_first = sized(&plan.scene, |meshes, bodies| sizes::uniform(meshes, bodies, FIRST * bodies))?;
         }
@@ -133,7 +135,7 @@ impl Plan {
     /// The checkpoint is of another mesh.
     pub fn begin(&mut self, built: &Built) -> Result<Begin> {
         match self.resumed.take() {
-            Some(checkpoint) => checkpoint.resume(&built.discrete),
+            Some(checkpoint) => checkpoint.resume(built),
             None => Ok(Begin { start: self.start(built), ..Begin::default() }),
         }
     }

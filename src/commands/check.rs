@@ -46,7 +46,7 @@ pub fn check(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         return Ok(0);
     }
     if let Some(folder) = &request.output {
-        surfaces::draw(&built, &Folder::create(folder)?)?;
+        surfaces::draw(&built, &Folder::claim(folder)?)?;
     }
     if request.scene.json {
         let mut value = json!(report::headline(session, &built, &shared.solvers, &clock));
@@ -86,6 +86,7 @@ fn pairs(built: &Built) -> serde_json::Value {
             "facets_uncovered": pair.uncovered(),
             "facets_steep": pair.left(Left::Steep),
             "facets_far": pair.left(Left::Far),
+            "pieces_lost": pair.lost.map_or(0, |lost| lost.pieces),
             "facets_averaged": pair.averaged(),
             "mean_pressure": Some(coupling.pressure).filter(|&pressure| pressure > 0.0),
             "theta": coupling.theta,

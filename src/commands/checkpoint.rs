@@ -4,13 +4,12 @@
 //! It is replaced as a whole, so that there is always a good one.
 
 use crate::ddm::{Row, Start, State};
-use crate::discretize::Discrete;
 use crate::error::{Error, Kind, Result};
-use crate::exchange::share;
+use crate::exchange::{Exchange, share, tell};
 use crate::file::digest;
 use crate::model::{BodySlot, Distribution, Field, Model};
 use crate::output::{RoundReport, StepReport, write_whole};
-use crate::run::stages::{Begin, Done};
+use crate::run::stages::{Begin, Built, Done};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -20,7 +19,13 @@ use std::path::{Path, PathBuf};
 /// Name of the file in the folder of results.
 pub const FILE: &str = "checkpoint";
 
+/// Name under which the next run that does not go on from it leaves it.
+pub const ASIDE: &str = "checkpoint.old";
+
 const FORMAT: &str = "winkler checkpoint 4";
+
+/// How the first line of all versions begins.
+const KIND: &[u8] = b"winkler checkpoint ";
 
 /// Bytes of the digest at the end.
 const DIGEST: usize = 32;
@@ -30,7 +35,7 @@ const DIGEST: usize = 32;
 pub struct Head {
     /// Digest of the scene's settings.
     pub settings: String,
-    /// Digest of its mesh, as far as bodies and contact points tell it.
+    /// Digest of the file of its mesh, and of what bodies and contact points were made of it.
     pub mesh: String,
     /// Meshes of an adaptation before this one.
     pub rounds: Vec<RoundReport>,
@@ -61,7 +66,7 @@ impl Checkpoint {
         if !writes {
             return Ok(());
         }
-        let head = Head { mesh: mesh_digest(&built.discrete), steps: steps.clone(), ..head };
+        let head = Head { mesh: mesh_digest(built), steps: steps.clone(), ..head };
         let failed = |cause: String| Error::new(Kind::File, "the checkpoint cannot be written").because(cause);
         let json = serde_json::to_string(&head).map_err(|cause| failed(cause.to_string()))?;
         let next = outcome.next_states();
@@ -74,18 +79,24 @@ impl Checkpoint {
         write_whole(&folder.join(FILE), |out| out.write_all(&bytes))
     }
 
-    /// Reads the checkpoint in a folder.
+    /// Read the checkpoint in a folder, on the first rank, for all. Collective.
     ///
     /// # Errors
-    /// There is none, it is damaged, or of another scene.
-    pub fn read(folder: &Path, scene: &Scene) -> Result<Self> {
+    /// There is none, it is damaged, of another version, or of another scene.
+    pub fn read(exchange: &dyn Exchange, folder: &Path, scene: &Scene) -> Result<Self> {
         let path = folder.join(FILE);
-        let bytes = crate::file::read(&path).map_err(|error| {
-            error.help("name the folder of results of a run that was interrupted, or had `--checkpoint`")
+        let bytes = tell(exchange, || {
+            crate::file::read(&path).map_err(|error| {
+                error.help("name the folder of results of a run that was interrupted, or had `--checkpoint`")
+            })
         })?;
         let checkpoint = parse(&path, &bytes).ok_or_else(|| {
-            Error::new(Kind::File, format!("{} is damaged, or no checkpoint of this version", path.display()))
-                .help("begin anew, without `--restart`")
+            let path = path.display();
+            let wrong = match bytes.starts_with(KIND) && !bytes.starts_with(format!("{FORMAT}\n").as_bytes()) {
+                true => format!("{path} was written by another version of winkler"),
+                false => format!("{path} is damaged, or no checkpoint"),
+            };
+            Error::new(Kind::File, wrong).help("begin anew, without `--restart`")
         })?;
         match checkpoint.head.settings == settings_digest(scene) {
             true => Ok(checkpoint),
@@ -97,10 +108,12 @@ impl Checkpoint {
     ///
     /// # Errors
     /// It has another mesh.
-    pub fn resume(self, discrete: &Discrete) -> Result<Begin> {
-        if self.head.mesh != mesh_digest(discrete) {
+    pub fn resume(self, built: &Built) -> Result<Begin> {
+        // the first rank has read the mesh
+        if built.mesh.is_some() && self.head.mesh != mesh_digest(built) {
             return Err(self.other("mesh"));
         }
+        let discrete = &built.discrete;
         let Self { head, earlier, mut state, .. } = self;
         for (state, slot) in state.field.states.iter_mut().zip(&discrete.model.bodies) {
             match &slot.local {
@@ -157,25 +170,18 @@ fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
 /// Digest of what a scene asks for, without what changes neither problem nor method: where its files are, what Gmsh may take, what is written,
 /// when it ends.
 pub fn settings_digest(scene: &Scene) -> String {
-    let mut settings = scene.settings();
-    ["scene", "title", "units", "output"].iter().for_each(|key| settings[*key] = Value::Null);
-    settings["method"]["stop"] = Value::Null;
-    if let Some(steps) = settings["method"].get_mut("steps").and_then(Value::as_object_mut) {
-        steps.remove("table");
+    let mut problem = scene.problem();
+    problem["method"]["stop"] = Value::Null;
+    if let Some(mesh) = problem["mesh"].as_object_mut() {
+        ["timeout", "memory"].iter().for_each(|key| drop(mesh.remove(*key)));
     }
-    if let Some(mesh) = settings["mesh"].as_object_mut() {
-        ["geo", "msh", "timeout", "memory"].iter().for_each(|key| drop(mesh.remove(*key)));
-    }
-    // of data the contents count, wherever they are
-    for (_, data) in settings["data"].as_object_mut().into_iter().flatten() {
-        data["file"] = Value::Null;
-    }
-    digest(&(settings.to_string(), scene.data.values().flat_map(|data| data.numbers()).collect::<Vec<f64>>()))
+    digest(&problem.to_string())
 }
 
-/// Digest of the bodies' sizes and of all contact points.
-fn mesh_digest(discrete: &Discrete) -> String {
+/// Digest of the file of the mesh, whose nodes, cells and groups may be others where the counts are the same, of the bodies' sizes and of
+/// all contact points; on the rank that has read the mesh.
+fn mesh_digest(Built { mesh, discrete, .. }: &Built) -> String {
     let bodies = discrete.bodies.iter().map(|body| (&body.name, body.nodes, body.cells, body.dofs));
     let pairs = discrete.model.pairs.iter().map(|pair| (&pair.position, &pair.weight, &pair.gap));
-    digest(&(bodies.collect::<Vec<_>>(), pairs.collect::<Vec<_>>()))
+    digest(&(mesh, bodies.collect::<Vec<_>>(), pairs.collect::<Vec<_>>()))
 }

@@ -75,7 +75,7 @@ fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request)
 
 /// All that is said about a mesh.
 fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Result<Value> {
-    let Loaded { mesh, origin, file } = loaded;
+    let Loaded { mesh, origin, file, unkept, .. } = loaded;
     let verified = crate::discretize::verify(scene, Portion::whole(mesh), Rc::new(Serial))?;
     let mesh = &verified.portion.mesh;
     let mut checked = verified.checked.iter();
@@ -100,8 +100,8 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
         .groups
         .iter()
         .map(|group| {
-            let points = group.connectivity.iter().map(|&point| mesh.points[point as usize]);
-            let [low, high] = bounds(points).map(Vec::from);
+            let points = group.connectivity.iter().map(|&point| mesh.in_scene(mesh.points[point as usize]));
+            let [low, high] = bounds(points).map(|corner| corner[..D].to_vec());
             json!({ "name": group.name, "dimension": group.dimension, "simplices": group.len(), "low": low, "high": high })
         })
         .collect();
@@ -113,6 +113,7 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
             Origin::Cache => "from the cache",
             Origin::Gmsh => "made by Gmsh",
         },
+        "unkept": unkept,
         "seconds": seconds,
         "dimension": D,
         "order": mesh.order.degree(),
@@ -146,6 +147,9 @@ fn print(facts: &Value) -> Result<()> {
             number(&body["quality"]["least"]),
             number(&body["quality"]["mean"])
         ))?;
+    }
+    if let Some(why) = facts["unkept"].as_str() {
+        say(format_args!("  warning: {why}"))?;
     }
     if let Some(warning) = in_parts(facts["split"].as_u64().unwrap_or_default() as usize) {
         say(format_args!("  warning: {warning}"))?;
@@ -188,7 +192,7 @@ fn grid<const D: usize>(loaded: &Loaded<D>) -> Grid {
     let mesh = &loaded.mesh;
     let mut grid = Grid {
         title: mesh.path.display().to_string(),
-        points: mesh.points.iter().map(|&x| crate::contact::pad(x)).collect(),
+        points: mesh.points.iter().map(|&x| mesh.in_scene(x)).collect(),
         cell: CellKind::simplex(D, mesh.order.degree()),
         connectivity: Vec::new(),
         at_points: Vec::new(),

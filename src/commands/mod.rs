@@ -45,7 +45,9 @@ fn case_of(path: &Path) -> &OsStr {
 /// Reads a scene on every rank; a refusal is printed once.
 ///
 /// # Errors
-/// Refusals of the scene.
+/// Refusals of the scene, or of scenes that are not the same on all ranks.
 pub fn load(session: &Session, path: &Path, overrides: &[String]) -> Result<Rc<Scene>> {
-    crate::parallel::agree(session, crate::scene::load(path, overrides).map(Rc::new))
+    let scene = crate::parallel::agree(session, crate::scene::load(path, overrides).map(Rc::new))?;
+    crate::run::refuse_other_scenes(session, &[&*scene])?;
+    Ok(scene)
 }

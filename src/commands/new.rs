@@ -1,8 +1,8 @@
 //! `winkler new`: a small scene that works, with its script, to begin from.
 
 use crate::error::{Error, Kind, Result};
-use crate::output::say;
-use std::fs::{OpenOptions, create_dir_all};
+use crate::output::{make_folder, say};
+use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::Path;
 
@@ -22,8 +22,8 @@ pub fn new(folder: &Path, in_space: bool) -> Result<i32> {
     };
     let [scene, script] = if in_space { SPACE } else { PLANE };
     let files = [("scene.toml".to_owned(), scene), (format!("{name}.geo"), script)];
-    create_dir_all(folder).map_err(|cause| Error::file(folder, "make", &cause))?;
-    if let Some((file, _)) = files.iter().find(|(file, _)| folder.join(file).exists()) {
+    make_folder(folder)?;
+    if let Some((file, _)) = files.iter().find(|(file, _)| folder.join(file).symlink_metadata().is_ok()) {
         let message = format!("`{}` is there already", folder.join(file).display());
         return Err(Error::new(Kind::File, message).help("choose another name, or move it away"));
     }

@@ -4,18 +4,19 @@ use crate::discretize::BodyInfo;
 use crate::error::Result;
 use crate::output::collection::{Entry, write_pvd};
 use crate::output::gmsh::Tags;
+use crate::output::leftovers::STEPS;
 use crate::output::{BodyField, Folder, safe_name};
 use crate::run::measure::pair_names;
 use crate::run::{All, Done, Recovered, report};
 use std::io::Write;
 
-/// Folder of the files of steps but the last.
-const FOLDER: &str = "steps";
+/// The collection of all fields.
+const COLLECTION: &str = "bodies.pvd";
 
 /// Name of a file in a step before the last without its ending, numbered from 1 on.
 fn stem_of(name: &str, step: usize, steps: usize) -> String {
     let digits = steps.to_string().len();
-    format!("{FOLDER}/{}-{step:0digits$}", safe_name(name))
+    format!("{STEPS}/{}-{step:0digits$}", safe_name(name))
 }
 
 /// `contact-<a>-<b>` of each pair, safe as a file name, with a number from the second pair of the same bodies on.
@@ -36,17 +37,21 @@ fn ending(info: &BodyInfo) -> &'static str {
     if info.ranks.len() == 1 { "vtu" } else { "pvtu" }
 }
 
-/// The files of the bodies at the end of a run, those of other ranks included.
-pub fn of_bodies(done: &Done) -> Vec<String> {
+/// The files of the fields at the end of a run, those of other ranks included.
+pub fn of_fields(done: &Done) -> Vec<String> {
     let output = &done.built.scene.output;
+    let endings = [(output.vtu, "vtu"), (output.msh, "msh")];
+    let endings: Vec<&str> = endings.iter().filter(|(is_written, _)| *is_written).map(|(_, ending)| *ending).collect();
     let mut files = Vec::new();
     for info in &done.built.discrete.bodies {
         let stem = safe_name(&info.name);
-        for (_, ending) in [(output.vtu, "vtu"), (output.msh, "msh")].iter().filter(|(is_written, _)| *is_written) {
+        for ending in &endings {
             files.extend(info.ranks.iter().map(|&rank| part(&stem, info, rank, ending)));
         }
         files.extend(output.vtu.then(|| format!("{stem}.{}", ending(info))));
     }
+    files.extend(stems(done).iter().flat_map(|stem| endings.iter().map(move |ending| format!("{stem}.{ending}"))));
+    files.extend(output.vtu.then(|| COLLECTION.to_owned()));
     files
 }
 
@@ -61,7 +66,7 @@ fn names(done: &Done) -> Vec<String> {
 /// # Errors
 /// Files that cannot be written; the failure of a solver that should have found the interior of a body.
 pub fn write(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
-    folder.subfolder(FOLDER)?;
+    folder.subfolder(STEPS)?;
     let (step, steps) = (done.steps.len(), done.built.scene.method.steps.steps.len());
     fields(done, recovered, folder, &|name| stem_of(name, step, steps))?;
     collection(done, folder, false)
@@ -161,5 +166,5 @@ fn collection(done: &Done, folder: &Folder, ended: bool) -> Result<()> {
             }
         }
     }
-    folder.write("bodies.pvd", |out| write_pvd(&entries, out))
+    folder.write(COLLECTION, |out| write_pvd(&entries, out))
 }

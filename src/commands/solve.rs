@@ -6,12 +6,12 @@ use super::typed::{Manner, SceneArgs, flags};
 use super::write::{Writing, to_json};
 use super::{folder_of, load, said, series};
 use crate::ddm::{Observer, Row, Status};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::exchange::share;
 use crate::interrupt::Interrupt;
 use crate::output::progress::Line;
-use crate::output::{Folder, HistoryWriter, IterationTable, StepTable, Verbosity, say};
-use crate::parallel::agree;
+use crate::output::{Checksums, Folder, HistoryWriter, IterationTable, StepTable, Verbosity, say};
+use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::run::asking::{is_snapshot, signal};
 use crate::run::{self, All, Asking, Built, Clock, Done, Keep, Ready, measure, report};
@@ -63,14 +63,15 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     let is_loud = first && !json && verbosity != Verbosity::Quiet;
     let mut clock = said::watched(is_loud);
     let scene = load(session, &request.scene.scene, &request.overrides())?;
-    let read = |folder: &PathBuf| Checkpoint::read(folder, &scene);
+    let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder, &scene);
     let kept = agree(session, request.restart.as_ref().map(read).transpose())?;
-    let folder = agree(session, Folder::create(folder_of(&scene, request.output.as_ref())))?;
+    let folder = agree(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
     let path = folder.path();
     let mut plan = Plan::new(session, scene, kept, interrupt, &mut clock)?;
     // one rank has the clock
     let asking = Asking::new(interrupt, plan.scene.output.checkpoint.filter(|_| first));
     let mut saved = request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == path.canonicalize().ok());
+    let (mut has_begun, mut unwritten) = (false, Vec::new());
     let (done, estimate, failed) = loop {
         let built = run::build(session, plan.scene.clone(), interrupt, &mut clock)?;
         let begin = agree(session, plan.begin(&built))?;
@@ -81,11 +82,24 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
             let decided = said::decisions(session, &ready)?;
             decided.iter().filter(|_| first).for_each(|line| eprintln!("{line}"));
         }
+        // all refusals are behind: from here on the folder has this run alone
+        if first && !has_begun {
+            begin_in(&folder, saved)?;
+        }
+        let (history, steps) = match tables(&folder, &ready, first) {
+            // of a later mesh: the run goes on without
+            Err(error) if has_begun => {
+                unwritten.push(error.message().to_owned());
+                (None, None)
+            }
+            opened => opened?,
+        };
+        has_begun = true;
         let stop = &plan.scene.method.stop;
         let mut watchers = Watchers {
             table: IterationTable::new(is_loud && !monitored, &run::targets(&plan.scene), stop.residual),
-            history: if first { Some(history(&folder, &ready.built)?) } else { None },
-            steps: if first { steps(&folder, &ready)? } else { None },
+            history,
+            steps,
             folder: &folder,
             asking: &asking,
             session,
@@ -99,6 +113,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         let mut done = run::iterate(ready, interrupt, &mut watchers, &mut clock)?;
         drop(stage);
         done.warnings.append(&mut watchers.failed);
+        done.warnings.extend(unwritten.drain(..).map(|what| format!("of an earlier mesh: {what}")));
         saved = watchers.saved;
         let stage = session.stage("estimate");
         let estimate = run::estimate(&mut done, &mut clock)?;
@@ -113,16 +128,20 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         if plan.adapts() {
             // whatever comes of the next mesh, this one's results are there
             let estimate = estimate.as_ref();
-            let writing = Writing { session, path, plan: &plan, done: &done, estimate, fields: false };
+            let writing = Writing { session, path, plan: &plan, done: &done, estimate, fields: false, is_last: false };
             let ended = "ended while the next mesh was at work: the error asked for is not reached";
             let (_, written) = writing.all(&mut clock, |report| {
                 (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
             });
-            agree(session, failed.and(written))?;
+            // what cannot be written now may find room at the end, and what was computed goes on
+            if let Err(error) = failed.and(written) {
+                unwritten.push(error.message().to_owned());
+            }
         }
     };
     let line = is_loud.then(|| Line::new("stresses and files", None));
-    let writing = Writing { session, path, plan: &plan, done: &done, estimate: estimate.as_ref(), fields: true };
+    let writing =
+        Writing { session, path, plan: &plan, done: &done, estimate: estimate.as_ref(), fields: true, is_last: true };
     let (report, written) = writing.all(&mut clock, |report| {
         if let Some(limit) = &plan.limit {
             report.status = "mesh-limit".to_owned();
@@ -160,10 +179,39 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     Ok(code)
 }
 
+/// Takes the folder of results for this run, on the first rank, which writes its tables.
+pub(super) fn claim(session: &Session, path: PathBuf) -> Result<Folder> {
+    if session.rank() == 0 { Folder::claim(path) } else { Folder::create(path) }
+}
+
+/// Lets a folder have no results but those of the run that begins. A run that `goes_on` from the checkpoint there is the one whose files it
+/// has; another checkpoint is set aside, since hours of work may be in it.
+fn begin_in(folder: &Folder, goes_on: bool) -> Result<()> {
+    Checksums::withdraw(folder.path());
+    if goes_on {
+        return Ok(());
+    }
+    folder.clear()?;
+    let file = folder.path().join(checkpoint::FILE);
+    match file.symlink_metadata() {
+        Ok(_) => std::fs::rename(&file, folder.path().join(checkpoint::ASIDE))
+            .map_err(|cause| Error::file(&file, "set aside", &cause)),
+        Err(_) => Ok(()),
+    }
+}
+
 /// Writes the page of the results when all ranks have written their fields. Collective.
 fn page(done: &Done, path: &Path, first: bool) -> Result<()> {
     share(&*done.model().exchange, ());
     if first { crate::report::save(path, None).map(|_| ()) } else { Ok(()) }
+}
+
+/// The tables that grow, on the rank that writes them.
+fn tables(folder: &Folder, ready: &Ready, writes: bool) -> Result<(Option<HistoryWriter>, Option<StepTable>)> {
+    if !writes {
+        return Ok((None, None));
+    }
+    Ok((Some(history(folder, &ready.built)?), steps(folder, ready)?))
 }
 
 fn history(folder: &Folder, built: &Built) -> Result<HistoryWriter> {
@@ -206,6 +254,7 @@ impl Observer for Watchers<'_> {
         self.table.row(row);
         if let Some(history) = &mut self.history {
             history.row(row);
+            history.complaint().iter().for_each(|text| self.table.warn(text));
         }
     }
 
@@ -241,6 +290,7 @@ impl Keep for Watchers<'_> {
         let history = &scene.method.steps;
         if let (Some(table), Some(step)) = (&mut self.steps, done.steps.last()) {
             table.row(&history.names, step);
+            table.complaint().iter().for_each(|text| self.table.warn(text));
         }
         let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
         if scene.output.vtu && !ends {
@@ -251,7 +301,7 @@ impl Keep for Watchers<'_> {
 
     fn results(&mut self, done: &mut Done) {
         let Self { session, path, plan, .. } = *self;
-        let writing = Writing { session, path, plan, done, estimate: None, fields: true };
+        let writing = Writing { session, path, plan, done, estimate: None, fields: true, is_last: false };
         let (_, written) = writing.all(&mut self.clock.clone(), |_| {});
         self.note_failure("a snapshot", written);
     }

@@ -1,5 +1,6 @@
 //! `winkler sweep`: a scene over values of its keys, one row a run.
 
+use super::solve::claim;
 use super::typed::{Manner, SceneArgs};
 use super::write::to_json;
 use super::{curves, folder_of, reuse, said};
@@ -47,9 +48,10 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         crate::scene::load(&request.scene.scene, &overrides).map(Rc::new)
     };
     let scenes = agree(session, runs.iter().map(|values| load(values)).collect::<Result<Vec<_>>>())?;
-    let folder = agree(session, Folder::create(folder_of(&scenes[0], request.output.as_ref())))?;
+    run::refuse_other_scenes(session, &scenes)?;
+    let folder = agree(session, claim(session, folder_of(&scenes[0], request.output.as_ref())))?;
     let first = session.rank() == 0;
-    let (mut table, mut columns) = (None, None);
+    let (mut table, mut columns) = (None::<RowFile>, None);
     let mut exit = 0;
     let (mut reports, mut histories, mut pressures, mut reference) = (Vec::new(), Vec::new(), Pressures::new(), None);
     // the same pairs of all runs
@@ -66,6 +68,11 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         let header = header(&axes, &built);
         agree(session, same(columns.get_or_insert_with(|| header.clone()), &header, &label(&axes, values)))?;
         let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
+        if first && table.is_none() {
+            // before anything is computed that could be lost
+            folder.clear()?;
+            table = Some(RowFile::create(&folder, "sweep.csv", &header, &[])?);
+        }
         if verbosity == Verbosity::Verbose {
             let decided = said::decisions(session, &ready)?;
             bar.suspend(|| decided.iter().filter(|_| first).for_each(|line| eprintln!("{line}")));
@@ -83,12 +90,10 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
             continue;
         }
         let label = label(&axes, values);
-        let table = match &mut table {
-            Some(table) => table,
-            None => table.insert(RowFile::create(&folder, "sweep.csv", &header)?),
-        };
-        table.push(&line(values, &report, scene.dimension.value));
-        table.check()?;
+        if let Some(table) = &mut table {
+            table.push(&line(values, &report, scene.dimension.value));
+            table.complaint().iter().for_each(|text| bar.suspend(|| eprintln!("warning: {text}")));
+        }
         bar.inc(1);
         // with `-q` runs that are solved say nothing
         if is_loud || (!json && report::exit_code(&done) != 0) {
@@ -114,14 +119,16 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     }
     bar.finish_and_clear();
     if first {
+        let mut written = table.map_or(Ok(()), RowFile::finish);
         if scenes[0].output.plots {
-            plots(&folder, &scenes[0].title, &histories, pressures, reference)?;
+            written = written.and(plots(&folder, &scenes[0].title, &histories, pressures, reference));
         }
         if json {
             say(to_json(&reports)?.trim_end())?;
         } else {
             say(format_args!("results in {}", folder.path().display()))?;
         }
+        written?;
     }
     Ok(exit)
 }

@@ -4,7 +4,8 @@ use super::adapt::Plan;
 use super::{curves, series};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
-use crate::output::{Folder, LISTED, PairReport, PairRow, Plot, Report, StepReport, busiest, contacts};
+use crate::exchange::share;
+use crate::output::{Checksums, Folder, LISTED, PairReport, PairRow, Plot, Report, StepReport, busiest, contacts};
 use crate::petsc::Session;
 use crate::problem::{Plane, force_labels};
 use crate::run::words::numbered;
@@ -26,6 +27,8 @@ pub struct Writing<'a> {
     pub estimate: Option<&'a Estimate>,
     /// Whether fields may be written, if the scene wants them.
     pub fields: bool,
+    /// Whether these are the results that stay: tables of iterations and steps have ended.
+    pub is_last: bool,
 }
 
 impl Writing<'_> {
@@ -47,11 +50,16 @@ impl Writing<'_> {
         // names of a snapshot are no reason for others
         let folder = match Folder::create(path) {
             Ok(folder) => folder,
-            Err(error) => return (make(clock), Err(error)),
+            Err(error) => {
+                // the others wait for this rank before they end
+                share(&*done.model().exchange, ());
+                return (make(clock), Err(error));
+            }
         };
         let mut report = make(clock);
         let mut written = Ok(());
         if first {
+            Checksums::withdraw(path);
             let output = &done.built.scene.output;
             let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
             report.left_out = left_out(&report.pairs, &shown);
@@ -59,7 +67,7 @@ impl Writing<'_> {
             written = self.small(&folder, &report, &shown, &plots);
             if output.plots || fields {
                 // before what is large
-                written = written.and(self.report(&folder, &mut report, false));
+                written = written.and(self.report(&folder, &mut report, fields));
             }
             written = written.and(plots.write(done, &folder));
         }
@@ -70,10 +78,14 @@ impl Writing<'_> {
         clock.total();
         report.times.clone_from(&clock.times);
         report.memory.clone_from(&clock.memory);
+        // the sums are of the files of all ranks
+        share(&*done.model().exchange, ());
         if first {
             written = written.and(self.report(&folder, &mut report, fields));
+            written = written.and(Checksums::save(&folder, report.files.iter().filter(|name| self.is_final(name))));
         }
-        let failed = recovered.into_iter().flatten().filter_map(Result::err).next();
+        let failed = recovered.iter().flatten().find_map(|body| body.as_ref().err());
+        let failed = failed.map(|error| Error::new(error.kind(), error.message()));
         (report, failed.map_or(written, Err))
     }
 
@@ -96,6 +108,11 @@ impl Writing<'_> {
         folder.write("report.json", |out| out.write_all(json.as_bytes()))
     }
 
+    /// Whether a file is not written any more by this run, nor by `winkler report`.
+    fn is_final(&self, name: &str) -> bool {
+        name != crate::report::FILE && (self.is_last || !["history.csv", "steps.csv"].contains(&name))
+    }
+
     /// Names of the files of a run, those of other ranks included.
     fn names(&self, folder: &Folder, fields: bool) -> Vec<String> {
         let own = folder.files();
@@ -108,7 +125,7 @@ impl Writing<'_> {
             names.push(crate::report::FILE.to_owned());
         }
         if fields {
-            names.extend(series::of_bodies(self.done));
+            names.extend(series::of_fields(self.done));
         }
         names.extend(["history.csv", "report.json"].map(str::to_owned));
         names.extend(Some("steps.csv".to_owned()).filter(|_| !self.done.steps.is_empty()));

@@ -14,6 +14,8 @@ pub struct Cover {
     pub share: f64,
     /// Why it is not paired as a whole.
     pub left: Left,
+    /// Pieces, and points of pieces, that the search has lost.
+    pub lost: usize,
     /// Which of its nodes carry points; `None` where it has no partner.
     pub carriers: Option<Carriers>,
 }
@@ -29,6 +31,8 @@ pub enum Left {
     Far,
     /// Nothing lies before it.
     Bare,
+    /// The search for points on what lies before it has failed.
+    Lost,
 }
 
 /// A facet that lacks less than this share is paired as a whole: lengths of curves by quadrature differ a little between a
@@ -59,6 +63,8 @@ impl Cover {
             let refused = common.refused[i];
             let left = if share > WHOLE {
                 Left::Nothing
+            } else if refused.lost > 0 {
+                Left::Lost
             } else if refused.steep {
                 Left::Steep
             } else if refused.far {
@@ -66,7 +72,8 @@ impl Cover {
             } else {
                 Left::Bare
             };
-            Self { share, left, carriers: carriers[i] }
+            let lost = if left == Left::Lost { refused.lost } else { 0 };
+            Self { share, left, lost, carriers: carriers[i] }
         };
         (0..covered.len()).filter(|&i| asked(i)).map(|i| (i as u32, of_facet(i))).collect()
     }

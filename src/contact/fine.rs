@@ -78,6 +78,8 @@ impl<const D: usize> Fine<D> {
             near: Near::new(a, b, common, pair, (!touching).then_some(gap)),
             sides: [side(a, |p| p.facet_a, |p| p.at_a), side(b, |p| p.facet_b, |p| p.at_b)],
         };
+        // that of the coordinates of both sides, along any normal
+        let coordinates = 2.0 * (D as f64).sqrt() * a.rounding();
         for chunk in shared.chunk_by(|p, q| p.facet_a == q.facet_a) {
             let nodes = a.facets.facet(chunk[0].facet_a);
             let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk);
@@ -86,9 +88,9 @@ impl<const D: usize> Fine<D> {
                     unit(std::array::from_fn(|c| (0..D).map(|k| point.at_a[k] * a.normals[&nodes[k]][c]).sum()));
                 let x = a.facets.coordinates(point.facet_a, a.space);
                 let from = crate::fem::assemble::interpolate(&x, &element::values(a.facets.order, &point.at_a));
-                let rounding = 1e-12 * length(a.area(point.facet_a));
+                let rounding = coordinates.max(1e-12 * length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
                 let distance = if point.gap.abs() < rounding { 0.0 } else { point.gap };
-                fine.gap.push(distance + gap(super::pad(from)));
+                fine.gap.push(distance + gap(a.space.in_scene(from)));
                 let sides = (D - 1) as f64;
                 fine.size.push((sides * length(a.area(point.facet_a))).powf(1.0 / sides));
                 fine.normal.push(normal);

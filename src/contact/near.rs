@@ -31,7 +31,8 @@ impl<const D: usize> Near<D> {
         gap: Option<&dyn Fn([f64; 3]) -> f64>,
     ) -> Self {
         let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
-        let position = |q: usize| -> [f64; D] { std::array::from_fn(|c| pair.position[q][c]) };
+        let position = |q: usize| -> [f64; D] { std::array::from_fn(|c| pair.position[q][c] - a.space.datum[c]) };
+        let coordinates = 2.0 * (D as f64).sqrt() * a.rounding();
         let mut nearest = vec![(f64::INFINITY, 0); pair.len()];
         for point in &common.points {
             let x = a.facets.coordinates(point.facet_a, a.space);
@@ -52,7 +53,7 @@ impl<const D: usize> Near<D> {
                 pair.gap[q] - gap(pair.position[q]) - distance(b, facet, &at, from, normal)
             };
             // planes have no more than the rounding of coordinates
-            let rounding = 1e-12 * length(b.area(facet)).powf(1.0 / (D - 1) as f64);
+            let rounding = coordinates.max(1e-12 * length(b.area(facet)).powf(1.0 / (D - 1) as f64));
             near.distance.push(gap.map(less).filter(|distance| distance.abs() >= rounding).unwrap_or(0.0));
             near.facet.push(facet);
             near.at.push(at);

@@ -4,9 +4,10 @@ use super::basis::{Carriers, PressureBasis};
 use super::cover::{Cover, Left};
 use super::law::LayerLaw;
 use super::pieces::Common;
-use super::side::Side;
+use super::side::{Side, length};
 use crate::error::{Error, Result};
-use crate::fem::{element, pad};
+use crate::fem::assemble::interpolate;
+use crate::fem::{cross, element, pad};
 use crate::linalg::Csr;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -25,7 +26,7 @@ pub struct ContactPair {
     pub bodies: [usize; 2],
     /// Node of side a that each point belongs to, n.
     pub nodes: Vec<u32>,
-    /// Positions of the points on side a, n.
+    /// Positions of the points on side a in the scene, n.
     pub position: Vec<[f64; 3]>,
     /// omega_q > 0, length or area (in bodies of revolution that of a ring), n.
     pub weight: Vec<f64>,
@@ -43,7 +44,7 @@ pub struct ContactPair {
     /// Sum of each row's entries by component, prescribed dofs included: force vectors on a side are
     /// `-sum_q omega_q p_q resultant[side][q]`.
     pub resultant: [Vec<[f64; 3]>; 2],
-    /// Moments of these entries about the origin, for the moments on a side in the same way.
+    /// Moments of these entries about the origin of the scene, for the moments on a side in the same way.
     pub moment: [Vec<[f64; 3]>; 2],
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
@@ -53,6 +54,35 @@ pub struct ContactPair {
     pub law: Rc<dyn LayerLaw>,
     /// What the pair takes of each facet of side a.
     pub cover: Vec<Cover>,
+    /// What the search for common points has lost, if anything.
+    pub lost: Option<LostPieces>,
+}
+
+/// Pieces of a pair that are lost because the search for their points failed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LostPieces {
+    /// How many, points of pieces included.
+    pub pieces: usize,
+    /// The share of the area (length) of side a that lacks on their facets.
+    pub share: f64,
+    /// The middle of the facet that lacks most (x, y, z).
+    pub at: [f64; 3],
+}
+
+impl LostPieces {
+    /// What facets of side a with these covers have lost; none if all was found.
+    fn of<const D: usize>(a: &Side<D>, cover: &[Cover]) -> Option<Self> {
+        let lacking = |&(i, cover): &(usize, &Cover)| (1.0 - cover.share) * length(a.area(i));
+        let lost = || cover.iter().enumerate().filter(|(_, cover)| cover.left == Left::Lost);
+        let (worst, _) = lost().max_by(|p, q| lacking(p).total_cmp(&lacking(q)))?;
+        let whole = a.mean_measure() * cover.len() as f64;
+        let middle = interpolate(&a.facets.coordinates(worst, a.space)[..D], &[1.0 / D as f64; D]);
+        Some(Self {
+            pieces: lost().map(|(_, cover)| cover.lost).sum(),
+            share: lost().map(|facet| lacking(&facet)).sum::<f64>() / whole,
+            at: a.space.in_scene(middle),
+        })
+    }
 }
 
 /// Why a pair could not be made.
@@ -151,8 +181,9 @@ pub fn assemble<const D: usize>(
         let nodes = shares(&sum.sides[0], sum.weight);
         std::array::from_fn(|c| nodes.iter().map(|&(n, share)| share * a.space.nodes[n as usize][c]).sum())
     };
-    let position: Vec<[f64; 3]> = order.iter().map(|node| pad::<D>(mean(&points[node]))).collect();
+    let position: Vec<[f64; 3]> = order.iter().map(|node| a.space.in_scene(mean(&points[node]))).collect();
     let law = law(&position).map_err(Fault::Law)?;
+    let cover: Vec<Cover> = cover.into_iter().map(|(_, cover)| cover).collect();
     let mut pair = ContactPair {
         surfaces: [a.name.to_owned(), b.name.to_owned()],
         bodies,
@@ -169,8 +200,11 @@ pub fn assemble<const D: usize>(
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
         law,
-        cover: cover.into_iter().map(|(_, cover)| cover).collect(),
+        lost: LostPieces::of(a, &cover),
+        cover,
     };
+    // what lies between matching surfaces is the rounding of their coordinates: that of both, along any normal
+    let rounding = (1e-12 * size).max(2.0 * (D as f64).sqrt() * a.rounding());
     for q in 0..pair.nodes.len() {
         let node = pair.nodes[q];
         let sum = &points[&node];
@@ -197,11 +231,11 @@ pub fn assemble<const D: usize>(
             pair.rows[side].push_row(entries);
             pair.nodal[side].push_row(nodal);
             pair.resultant[side].push(resultant);
-            pair.moment[side].push(moment);
+            pair.moment[side].push(moment_in_scene(&of.space.datum, resultant, moment));
             pair.prescribed[side].push(known);
         }
         let distance = sum.gap / sum.weight;
-        let distance = if distance.abs() < 1e-12 * size { 0.0 } else { distance };
+        let distance = if distance.abs() < rounding { 0.0 } else { distance };
         let own = gap(pair.position[q]);
         if !own.is_finite() {
             return Err(Fault::Gap(pair.position[q]));
@@ -211,6 +245,12 @@ pub fn assemble<const D: usize>(
         pair.gap.push(distance + own);
     }
     Ok(pair)
+}
+
+/// Return the moment about the origin of the scene of a force whose moment about `datum` is given.
+pub fn moment_in_scene<const D: usize>(datum: &[f64; D], force: [f64; 3], moment: [f64; 3]) -> [f64; 3] {
+    let arm = cross(pad(*datum), force);
+    std::array::from_fn(|c| moment[c] + arm[c])
 }
 
 /// sum += v.

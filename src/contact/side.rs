@@ -1,6 +1,7 @@
 //! One surface of a pair: facets of a body with averaged nodal normals.
 
 use crate::fem::{Facets, Frame, Space, area_vector, element};
+use crate::mesh::datum;
 use std::collections::HashMap;
 
 /// One contact surface of a body.
@@ -59,6 +60,11 @@ impl<'a, const D: usize> Side<'a, D> {
     pub fn area(&self, i: usize) -> [f64; D] {
         let x = self.facets.coordinates(i, self.space);
         area_vector(self.facets.order, &x, &[1.0 / D as f64; D])
+    }
+
+    /// Return the largest error that rounding may have left in a coordinate of a node of the surface.
+    pub fn rounding(&self) -> f64 {
+        datum::rounding(&self.space.datum, self.facets.nodes.iter().map(|&node| &self.space.nodes[node as usize]))
     }
 
     /// Corners of the box around all facets.

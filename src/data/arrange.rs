@@ -124,22 +124,32 @@ fn only_linear(spec: &DataSpec) -> Result<()> {
     }
 }
 
+/// Steps of rounding, of the largest coordinate of all, by which two places that are meant to be one can differ: half a step each for the number
+/// read, its product with the spacing and the sum with the origin, at both. Slopes between such points are those of rounding.
+const TWINS: f64 = 3.0;
+
 /// Two points at one place have no height there.
 fn refuse_twins(spec: &DataSpec, points: &[[f64; 3]], rows: &Rows) -> Result<()> {
+    let largest = |d: usize| points.iter().fold(spec.origin[d].abs(), |most, point| most.max(point[d].abs()));
+    let near = [0, 1].map(|d| TWINS * f64::EPSILON * largest(d));
     let mut order: Vec<usize> = (0..points.len()).collect();
-    let compare = |&a: &usize, &b: &usize| {
-        let (a, b) = (points[a], points[b]);
-        a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
-    };
-    order.sort_by(compare);
-    match order.windows(2).find(|two| compare(&two[0], &two[1]).is_eq()) {
-        None => Ok(()),
-        Some(two) => {
-            let (first, second) = (two[0].min(two[1]), two[0].max(two[1]));
-            let what = format!("{} is at the place of {}", rows.line(second), rows.line(first));
-            Err(spec.refuse(what, "every point needs a place of its own"))
-        }
+    order.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));
+    // points of about the same x side by side, in the order of y
+    for column in order.chunk_by_mut(|&a, &b| points[b][0] - points[a][0] <= near[0]) {
+        column.sort_by(|&a, &b| points[a][1].total_cmp(&points[b][1]));
+        let is_near = |d: usize, a: usize, b: usize| (points[a][d] - points[b][d]).abs() <= near[d];
+        let Some(two) = column.windows(2).find(|two| is_near(0, two[0], two[1]) && is_near(1, two[0], two[1])) else {
+            continue;
+        };
+        let (first, second) = (two[0].min(two[1]), two[0].max(two[1]));
+        let places = match points[first][..2] == points[second][..2] {
+            true => "is at the place of",
+            false => "is, but for rounding, at the place of",
+        };
+        let what = format!("{} {places} {}", rows.line(second), rows.line(first));
+        return Err(spec.refuse(what, "every point needs a place of its own"));
     }
+    Ok(())
 }
 
 /// The regular axis that coordinates lie on, many of them perhaps on one point; none if they do not.

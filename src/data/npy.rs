@@ -4,6 +4,7 @@ use super::rows::Rows;
 use super::rule::DataSpec;
 use crate::error::Result;
 use npyz::{DType, Deserialize, NpyFile, NpyHeader, Order, TypeChar};
+use std::cmp::Ordering;
 
 const HELP: &str = "save the heights as they come from NumPy: np.save(\"surface.npy\", heights)";
 
@@ -15,6 +16,7 @@ pub fn is_ours(bytes: &[u8]) -> bool {
 /// An array of one direction, which becomes a column, or two.
 pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     let damaged = |cause: std::io::Error| spec.refuse(format_args!("is no file of NumPy: {cause}"), HELP);
+    refuse_short_header(spec, bytes)?;
     let mut rest = bytes;
     let file = NpyHeader::from_reader(&mut rest).map_err(damaged)?;
     let shape: Vec<usize> = file.shape().iter().map(|&length| length as usize).collect();
@@ -28,8 +30,15 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     };
     // also a header that is wrong must not ask for memory
     let size = kind.num_bytes().unwrap_or(1).max(1);
-    if count.checked_mul(columns).and_then(|all| all.checked_mul(size)).is_none_or(|all| all > rest.len()) {
-        return Err(spec.refuse(format!("ends before its {count} x {columns} numbers"), "copy it once more"));
+    let length = count.checked_mul(columns).and_then(|all| all.checked_mul(size));
+    match length.map(|length| length.cmp(&rest.len())) {
+        Some(Ordering::Equal) => {}
+        Some(Ordering::Less) => {
+            let more = rest.len() - length.unwrap_or_default();
+            let what = format!("has {more} bytes more than its {count} x {columns} numbers");
+            return Err(spec.refuse(what, "one array a file: it is damaged, or has several"));
+        }
+        _ => return Err(spec.refuse(format!("ends before its {count} x {columns} numbers"), "copy it once more")),
     }
     let order = file.order();
     let kind = kind.clone();
@@ -51,6 +60,24 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
         Order::Fortran => (0..count * columns).map(|k| values[k / columns + count * (k % columns)]).collect(),
     };
     Ok(Rows { columns, values, lines: Vec::new() })
+}
+
+/// Refuses a header that is longer than the file, before anybody takes memory for it: NumPy writes its length, of two bytes in version 1 and
+/// of four in later ones, behind the six bytes of the name and the two of the version.
+fn refuse_short_header(spec: &DataSpec, bytes: &[u8]) -> Result<()> {
+    let (version, length) = (bytes.get(6), bytes.get(8..).unwrap_or_default());
+    let (at, length) = match version {
+        Some(1) => (10, length.first_chunk().map(|two| usize::from(u16::from_le_bytes(*two)))),
+        _ => (12, length.first_chunk().map(|four| u32::from_le_bytes(*four) as usize)),
+    };
+    match length {
+        Some(length) if length <= bytes.len().saturating_sub(at) => Ok(()),
+        Some(length) => {
+            let what = format!("has {} bytes, but a header of {length} bytes by its own words", bytes.len());
+            Err(spec.refuse(what, "it was cut short or damaged: copy it once more"))
+        }
+        None => Err(spec.refuse("ends within its header", "it was cut short: copy it once more")),
+    }
 }
 
 fn numbers<T: Deserialize + Into<f64>>(file: NpyFile<&[u8]>) -> std::io::Result<Vec<f64>> {

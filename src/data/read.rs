@@ -11,7 +11,10 @@ use crate::error::Result;
 /// The file cannot be read, or what is wrong with its contents.
 pub fn rows(spec: &DataSpec) -> Result<Rows> {
     let bytes = crate::file::read(&spec.file).map_err(|error| error.at(&spec.place))?;
-    let rows = if npy::is_ours(&bytes) { npy::rows(spec, &bytes)? } else { text::rows(spec, &bytes)? };
+    let rows = match npy::is_ours(&bytes) {
+        true => npy::rows(spec, &bytes)?,
+        false => text::rows(spec, &crate::file::with_unix_lines(bytes))?,
+    };
     let Some(at) = rows.values.iter().position(|value| !value.is_finite()) else { return Ok(rows) };
     let (row, column) = (at / rows.columns, at % rows.columns);
     let what = format!("{}, column {column} (from 0) is {}", rows.line(row), rows.values[at]);

@@ -207,6 +207,8 @@ fn points_of_a_regular_grid_are_one() {
     let holed: String = text.lines().skip(9).map(|line| format!("{line}\n")).collect();
     assert!(load(&holed, |spec| spec.points = true).unwrap().grid().is_none());
     // of a profile, too
+    // fields may be quoted
+    assert_eq!(load("\"1\";\"2,5\"\n\"3\";\"4\"\n", |_| ()).unwrap().sample(&[1.0, 0.0]).value, 2.5);
     let even = load("0 1\n2 5\n1 3\n", |spec| spec.points = true).unwrap();
     assert_eq!((even.sample(&[1.5]).value, even.grid().is_some()), (4.0, true));
     let uneven = load("0 1\n2 5\n0.5 3\n", |spec| (spec.points, spec.outside) = (true, Outside::Clamp)).unwrap();
@@ -225,7 +227,7 @@ fn bad_files_are_refused_with_their_line() {
         error.message().to_owned()
     };
     type Case<'a> = (&'a str, &'a dyn Fn(&mut DataSpec), &'a str);
-    let cases: [Case; 12] = [
+    let cases: [Case; 16] = [
         ("", &|_| (), "has no numbers"),
         ("a,b\nc,d\n", &|_| (), "has no numbers"),
         ("7", &|_| (), "has one number"),
@@ -235,6 +237,10 @@ fn bad_files_are_refused_with_their_line() {
         ("1,2\n3,nan\n", &|_| (), "line 2, column 1 (from 0) is NaN"),
         ("1 2\n\0", &|_| (), "is neither text nor a file of NumPy"),
         ("1 2 3 4\n", &points, "has 4 numbers in a row"),
+        ("1 2\r3 4\r5\r", &|_| (), "line 3 has 1 numbers, lines before it 2"),
+        ("0 1\n1 2\n3e-16 1\n", &points, "line 3 is, but for rounding, at the place of line 1"),
+        ("0 1\n1 2\n1.0000000000000002 1\n", &points, "line 3 is, but for rounding, at the place of line 2"),
+        ("0 0 1\n1 0 1\n0 1 1\n1e-16 1 2\n", &points, "line 4 is, but for rounding, at the place of line 3"),
         ("0 0 1\n1 0 1\n0 1 1\n# c\n1 0 2\n", &points, "line 5 is at the place of line 2"),
         ("0 0 1\n1 1 1\n3 3 1\n", &points, "points on one line alone"),
         ("0 0 1\n1 0 1\n0.3 1 1\n", &cubic, "no cubic interpolation"),
@@ -243,6 +249,31 @@ fn bad_files_are_refused_with_their_line() {
         let found = refused(text, change);
         assert!(found.contains(message), "{text}: {found}");
     }
+}
+
+#[test]
+fn files_of_numpy_are_as_long_as_they_say() {
+    let refused = |bytes: &[u8]| load(bytes, |_| ()).expect_err("a damaged file").message().to_owned();
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (3,), }";
+    let array = |numbers: &[f64]| {
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16 + 1).to_le_bytes());
+        bytes.extend(format!("{header}\n").bytes());
+        numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+        bytes
+    };
+    let whole = array(&[1.0, 2.0, 4.0]);
+    assert_eq!(load(&whole, |_| ()).unwrap().sample(&[1.5]).value, 3.0);
+    assert!(refused(&array(&[1.0, 2.0])).contains("ends before its 3 x 1 numbers"));
+    assert!(refused(&[&whole[..], b"more"].concat()).contains("has 4 bytes more than its 3 x 1 numbers"));
+    for length in 0..whole.len() {
+        // of fewer bytes than a name it is a text
+        let words = refused(&whole[..length]);
+        assert!(length < 6 || words.contains("ends") || words.contains("its own words"), "{length}: {words}");
+    }
+    // 15 bytes that claim a header of 4 GB
+    let claims = [&b"\x93NUMPY\x02\x00"[..], &u32::MAX.to_le_bytes(), b"{'d"].concat();
+    assert!(refused(&claims).contains("has 15 bytes, but a header of 4294967295 bytes by its own words"));
 }
 
 /// A wave of amplitude a and two directions: moments in closed form, of the differences with their own factor; a summit a period.

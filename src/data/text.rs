@@ -7,12 +7,14 @@
 use super::rows::Rows;
 use super::rule::DataSpec;
 use crate::error::Result;
+use crate::file::other_encoding;
 
 /// Reads a text.
 pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    if bytes.contains(&0) {
-        return Err(spec.refuse("is neither text nor a file of NumPy", "export the heights as CSV or text in UTF-8"));
+    if let Some(other) = other_encoding(bytes) {
+        let what = format!("is neither text nor a file of NumPy: it {other}");
+        return Err(spec.refuse(what, "export the heights as CSV or text in UTF-8"));
     }
     let is_row = |line: &&[u8]| !line.is_empty() && !line.starts_with(b"#");
     let is_end = |byte: &u8| *byte == b'\n';
@@ -37,7 +39,7 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
             let value = number(field, separator).ok_or_else(|| {
                 let what = match field.is_empty() {
                     true => format!("line {line} lacks a number between two separators"),
-                    false => format!("line {line}: `{}` is not a number", String::from_utf8_lossy(field)),
+                    false => format!("line {line}: `{}` is not a number", start_of(field)),
                 };
                 spec.refuse(what, "lines that are no data begin with #; decimal commas need fields parted by ; or tabs")
             })?;
@@ -56,6 +58,14 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     Ok(rows)
 }
 
+/// What a message shows of a field.
+fn start_of(field: &[u8]) -> String {
+    const SHOWN: usize = 40;
+    let text = String::from_utf8_lossy(field);
+    let start: String = text.chars().take(SHOWN).collect();
+    if start.len() < text.len() { start + "..." } else { start }
+}
+
 /// What parts the fields of a line, if there are several.
 fn separator(line: &[u8]) -> Option<u8> {
     b";\t, ".iter().copied().find(|separator| line.contains(separator))
@@ -63,7 +73,9 @@ fn separator(line: &[u8]) -> Option<u8> {
 
 /// The number that a field is.
 fn number(field: &[u8], separator: u8) -> Option<f64> {
-    let text = std::str::from_utf8(field).ok()?;
+    // as spreadsheets may quote every field
+    let bare = field.strip_prefix(b"\"").and_then(|rest| rest.strip_suffix(b"\"")).unwrap_or(field);
+    let text = std::str::from_utf8(bare.trim_ascii()).ok()?;
     match matches!(separator, b';' | b'\t') && text.contains(',') {
         true => text.replace(',', ".").parse().ok(),
         false => text.parse().ok(),

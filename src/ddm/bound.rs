@@ -14,7 +14,37 @@ use crate::contact::LayerLaw;
 use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::linear::Solution;
+use crate::model::rigid::PART;
 use crate::model::surface::surface_slopes;
+
+/// How far places are from what the laws have at the compressions of the bodies.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct OffLaws {
+    /// Gap of duality, an energy.
+    gap: f64,
+    /// Largest difference of a pressure, and its pair.
+    mismatch: f64,
+    pair: usize,
+}
+
+impl OffLaws {
+    /// Of places, where the bodies have these compressions, known to their `digits`, n each.
+    pub(super) fn new(model: &Model, places: &Layer, compression: &[f64], digits: &[f64]) -> Self {
+        let mut off = Self::default();
+        for (i, pair) in model.pairs.iter().enumerate() {
+            for q in model.range(i) {
+                let (point, p) = (q - model.offset[i], places.pressure[q]);
+                let c = nearest(&*pair.law, point, (compression[q], digits[q]), p);
+                let mismatch = (p - pair.law.pressure(point, c)).abs();
+                off.gap += model.weight[q] * pair.law.duality_gap(point, c, p);
+                if mismatch.is_nan() || mismatch > off.mismatch {
+                    (off.mismatch, off.pair) = (mismatch, i);
+                }
+            }
+        }
+        off
+    }
+}
 
 /// The relative errors by which a run of Newton's method ends.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -36,6 +66,12 @@ pub(super) fn contact_energy(model: &Model, places: &Layer) -> f64 {
     let slopes = surface_slopes(model);
     let at = |q: usize| places.force[q] * places.pressure[q] * (places.tangent[q].recip() + slopes[q].recip());
     (0..slopes.len()).filter(|&q| places.force[q] > 0.0).map(at).sum()
+}
+
+/// The share of it that the surfaces have.
+pub(super) fn surface_energy(model: &Model, places: &Layer) -> f64 {
+    let slopes = surface_slopes(model);
+    (0..slopes.len()).map(|q| places.force[q] * places.pressure[q] / slopes[q]).sum()
 }
 
 /// The compression within c -+ `digits` at which the pressure of a law is nearest to p.
@@ -72,31 +108,58 @@ impl Reached {
         let absolute = (2.0 * gap).sqrt() + linear;
         let contact = if linear > 0.0 { contact_energy(model, places) } else { 0.0 };
         let missed = if linear > 0.0 { scale.relative(linear * linear, contact) } else { 0.0 };
-        let mismatch = if mismatch == 0.0 { 0.0 } else { mismatch / scale.peak(&places.pressure, energy) };
+        let mismatch = if mismatch == 0.0 { 0.0 } else { mismatch / scale.peak(&places.pressure, strain) };
         Self {
             error: scale.relative(absolute * absolute, energy),
             is_bound,
             pressure: mismatch.max(missed),
-            imbalance: scale.imbalance(model, &model.forces(pressure), energy),
+            imbalance: scale.imbalance(model, &model.forces(pressure), strain),
         }
     }
 
-    /// Adds what rounding left of the equilibrium of an exact step from `before` to `places`: one `more` step with its matrix. Returns how
-    /// much the largest of the errors grew.
+    /// Return the errors of a result with u'Ku = `strain` whose places are so far off the laws, and whose forces lack a balance that is worth `unbalanced` in the
+    /// energy norm; pressures miss that, too, in results `of_steps`, as in [`Reached::new`]. With the pair whose distance from its law is the largest of them,
+    /// if it is.
+    pub(super) fn of_result(
+        (model, scale): (&Model, &Scale),
+        strain: f64,
+        unbalanced: f64,
+        off: &OffLaws,
+        places: &Layer,
+        of_steps: bool,
+    ) -> (Self, Option<usize>) {
+        let (energy, absolute) = (strain + places.work, (2.0 * off.gap).sqrt() + unbalanced);
+        // as pressures, the contact is measured by PART of what all is at least
+        let contact = contact_energy(model, places).max(PART * PART * energy);
+        let missed = if of_steps { scale.relative(unbalanced * unbalanced, contact) } else { 0.0 };
+        let mismatch = if off.mismatch == 0.0 { 0.0 } else { off.mismatch / scale.peak(&places.pressure, strain) };
+        let reached = Self {
+            error: scale.relative(absolute * absolute, energy),
+            is_bound: false,
+            pressure: if mismatch.is_nan() || mismatch > missed { mismatch } else { missed },
+            imbalance: scale.imbalance(model, &places.force, strain),
+        };
+        let is_worst = mismatch > missed && mismatch >= reached.worst();
+        (reached, is_worst.then_some(off.pair))
+    }
+
+    /// Adds what rounding left of the equilibrium of an exact step from `before` to `places`: one `more` step with its matrix. That step is rounded, too,
+    /// and may miss as much again; an inexact one knows its own error. Returns the larger of what was added.
     pub(super) fn add_rounding(
         &mut self,
-        scale: &Scale,
-        strain: f64,
+        (scale, strain): (&Scale, f64),
         more: &Solution,
         before: &Layer,
         places: &Layer,
     ) -> f64 {
-        let (exact, energy) = (self.worst(), strain + places.work);
-        self.error += scale.relative(more.energy + more.error * more.error, energy);
+        let times = if more.is_exact { 2.0 } else { 1.0 };
+        let missed = scale.relative(more.energy + more.error * more.error, strain + places.work);
         let closing = more.field.closing();
         let off = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
-        self.pressure += if off == 0.0 { 0.0 } else { off / scale.peak(&places.pressure, energy) };
-        self.worst() - exact
+        let off = if off == 0.0 { 0.0 } else { off / scale.peak(&places.pressure, strain) };
+        self.error += times * missed;
+        self.pressure += times * off;
+        times * missed.max(off)
     }
 
     /// The largest of the errors.
@@ -165,7 +228,7 @@ mod tests {
         assert!(exact.is_bound);
         // a further step that closes the points by 0.01, -0.03, 0 and 0.02
         let more = step(vec![0.01, -0.01, 0.0, 0.0, 0.0, -0.02, 0.0, 0.02], 0.05, 0.1);
-        exact.add_rounding(&scale, 5.0, &more, &places, &places);
+        close(exact.add_rounding((&scale, 5.0), &more, &places, &places), (0.06 / all).sqrt());
         close(exact.error, ((2.0 * gap).sqrt() + 0.06f64.sqrt()) / all.sqrt());
         close(exact.pressure, 0.1 + 0.04 / 4.0);
     }

@@ -1,7 +1,7 @@
 //! How far inexact linear steps of Newton's method are solved: until what the linear solver leaves is small beside what the laws leave
 //! (Ern and Vohralík, Adaptive inexact Newton methods, 2013). Both are known after each iteration of the linear solver.
 
-use super::bound::contact_energy;
+use super::bound::{contact_energy, surface_energy};
 use super::scale::Scale;
 use crate::model::Model;
 use crate::model::layer::Layer;
@@ -60,7 +60,7 @@ impl<'a> Forcing<'a> {
             let energy = contact_energy(model, &met);
             most <= self.tolerance * peak
                 && trial.error <= 0.5 * self.tolerance * energy.sqrt()
-                && self.scale.imbalance(model, &model.forces(&p), energy) <= self.tolerance
+                && self.scale.imbalance(model, &model.forces(&p), surface_energy(model, &met)) <= self.tolerance
         };
         let settled = moved < apart || ends();
         let enough = trial.is_within(if settled { self.roughest } else { f64::EPSILON });

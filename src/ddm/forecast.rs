@@ -1,6 +1,7 @@
 //! What a run that ends now would still need: iterations left, from the spectrum of G^-1 F1'' and the method's own rate.
 
 use super::history::Row;
+use crate::linalg::portable::{log, pow};
 
 /// What bounds of the spectrum tell of the iterations to come.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,7 +21,7 @@ impl Forecast {
         let last = rows.last()?.residual;
         let seen = || {
             let before = rows.len().checked_sub(RECENT + 1)?;
-            Some((last / rows[before].residual).powf(1.0 / RECENT as f64))
+            Some(pow(last / rows[before].residual, 1.0 / RECENT as f64))
         };
         let factor = match (factor, seen()) {
             // a mode that grows from little is seen before the spectrum knows it
@@ -35,7 +36,7 @@ impl Forecast {
             _ if gain >= 1.0 => 0.0,
             factor if factor >= 1.0 => f64::INFINITY,
             // less than a thousandth of an iteration is rounding
-            factor => (gain.ln() / factor.ln() - 1e-3).ceil(),
+            factor => (log(gain) / log(factor) - 1e-3).ceil(),
         };
         (!iterations.is_nan()).then_some(Self { factor, iterations })
     }

@@ -28,7 +28,8 @@ pub mod stop;
 
 use crate::model::origin;
 pub use balance::{Discretisation, SHARE};
+pub use bound::Reached;
 pub use forecast::Forecast;
 pub use history::{Observer, Row, Silent};
 pub use solve::{Method, Outcome, Settings, Start, State, first_springs, solve};
-pub use stop::Status;
+pub use stop::{Inaccuracy, Status, Whose};

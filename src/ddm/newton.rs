@@ -71,7 +71,7 @@ struct Newton<'n, 'r> {
     states: Layer,
     /// Watches what corrections gain, while roundoff leaves too much of a step: a correction takes the same states once more.
     correction: Option<Floor>,
-    /// The best iterate so far: what roundoff spoils at the end is taken back.
+    /// The best iterate so far of those whose errors tell what roundoff left of equilibrium: what roundoff spoils at the end is taken back.
     best: Option<(Row, Field, Layer)>,
 }
 
@@ -95,6 +95,8 @@ struct Iterate {
 struct Measures {
     measured: Measured,
     reached: Reached,
+    /// Whether the errors tell what roundoff left of equilibrium.
+    is_complete: bool,
     is_roundoff: bool,
 }
 
@@ -133,8 +135,8 @@ impl Newton<'_, '_> {
         step.field.scale(length);
         self.u.add(1.0, &step.field);
         self.u.retrace(model);
-        let end = if length < 1.0 { whole_pressure } else { self.states.linear(&model.compression(&self.u.trace)) };
-        let pressure = progress.go(length, end);
+        // pressures of the step, not of the compressions at its end: roundoff of displacements, which a stiff layer makes large, stays out
+        let pressure = progress.go(length, whole_pressure);
         let rho = progress.slopes(model, &self.unit);
         if self.states.closed > 0 && self.states.smoothing.is_empty() {
             fit::fit(model, [&mut self.u, &mut step.field], &pressure, &rho, self.tolerance);
@@ -145,8 +147,8 @@ impl Newton<'_, '_> {
         Iterate { step, length, compression, roundoff, pressure, rho, resolved }
     }
 
-    /// Measure the errors of an iterate. One that seems good enough is asked what roundoff, or an iterative solver, has left of its equilibrium: a further
-    /// step with the same matrix tells how large that is.
+    /// Measure the errors of an iterate. One that seems good enough, or at the roundoff level, is asked what roundoff, or an iterative solver, has left of its
+    /// equilibrium: a further step with the same matrix tells how large that is.
     fn measure(&mut self, iterate: &Iterate) -> Result<Measures> {
         let Iterate { step, compression, roundoff, pressure, rho, resolved, .. } = iterate;
         let run = &mut *self.run;
@@ -155,7 +157,9 @@ impl Newton<'_, '_> {
         let state = (&compression[..], &roundoff[..], &pressure[..]);
         let mut reached = Reached::new((run.model, &run.scale), measured.strain, step, state, resolved, rho);
         let (mut is_roundoff, corrected) = (false, self.correction.take());
-        if run.is_enough(&reached) {
+        let is_enough = run.is_enough(&reached);
+        let is_complete = is_enough || run.is_at_floor(&reached, &self.u, resolved, measured.strain);
+        if is_complete {
             let springs = resisting(run.model, self.states.springs(run.model));
             let mut enough = |_: &Model, trial: &Trial| trial.is_within(HALF);
             let (places, before) = (&self.states, self.linear.counts());
@@ -164,8 +168,8 @@ impl Newton<'_, '_> {
             measured.inner_iterations += self.linear.counts().inner_iterations - before.inner_iterations;
             measured.factorizations += self.linear.counts().factorizations - before.factorizations;
             if let Ok(more) = more {
-                let lost = reached.add_rounding(&run.scale, measured.strain, &more, &self.states, resolved);
-                if !run.is_enough(&reached) {
+                let lost = reached.add_rounding((&run.scale, measured.strain), &more, &self.states, resolved);
+                if is_enough && !run.is_enough(&reached) {
                     // a correction gains a digit, unless roundoff gives as much again
                     let mut floor = corrected.unwrap_or_else(Floor::of_steps);
                     is_roundoff = floor.is_reached(lost);
@@ -173,7 +177,7 @@ impl Newton<'_, '_> {
                 }
             }
         }
-        Ok(Measures { measured, reached, is_roundoff })
+        Ok(Measures { measured, reached, is_complete, is_roundoff })
     }
 
     /// Show and keep the row of an iterate; the status if the run ends with it.
@@ -183,7 +187,7 @@ impl Newton<'_, '_> {
         let at = run.after_step(step, measures.measured, &measures.reached, resolved, self.linear);
         let ended = run.end_at(&at, self.linear)?;
         let is_best = |row: &Row| self.best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual);
-        if let Some(row) = run.rows.last().filter(|row| is_best(row)) {
+        if let Some(row) = run.rows.last().filter(|row| measures.is_complete && is_best(row)) {
             self.best = Some((row.clone(), self.u.clone(), resolved.clone()));
         }
         Ok(ended.or(measures.is_roundoff.then_some(Status::RoundoffLimited)))

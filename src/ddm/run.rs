@@ -32,6 +32,8 @@ pub(super) struct Run<'a> {
     pub scale: Scale,
     /// That of bodies and layers at the last iterate, u'Ku + sum omega p c.
     pub energy: f64,
+    /// That of the bodies alone, u'Ku.
+    pub strain: f64,
     pub memory: Memory,
     /// From its first iterate on, also where it goes on.
     pub rows: Vec<Row>,
@@ -103,6 +105,16 @@ impl Run<'_> {
     /// Whether these errors are as small as was asked for.
     pub fn is_enough(&self, reached: &Reached) -> bool {
         self.stop.residual.is_some_and(|tolerance| reached.worst() <= tolerance)
+    }
+
+    /// Whether the error of an iterate of Newton's method, in bodies with u'Ku = `strain`, may be nothing beside rounding: it has three quarters of all
+    /// digits, or it is no progress and misses no more than rounding makes of it.
+    pub fn is_at_floor(&self, reached: &Reached, u: &Field, places: &Layer, strain: f64) -> bool {
+        if reached.worst() <= f64::EPSILON.powf(0.75) {
+            return true;
+        }
+        let missed = reached.error.powi(2) * self.scale.energy(strain + places.work);
+        self.memory.floor.is_stuck(reached.worst()) && missed <= rounding(self.model, u, places)
     }
 
     /// Shows and keeps the row of an iterate; the status if the run ends there.
@@ -187,7 +199,7 @@ impl Run<'_> {
         linear: &dyn LinearStep,
     ) -> Iterate<'a> {
         let residual = reached.worst();
-        self.energy = measured.strain + places.work;
+        (self.energy, self.strain) = (measured.strain + places.work, measured.strain);
         let closed = places.compression.iter().map(|&c| c > 0.0);
         // F1 of iterates of Newton's method goes up and down
         let period = self.memory.cycle.period(&u.trace, closed, residual, 0.0);
@@ -228,11 +240,11 @@ impl Run<'_> {
         let (factorizations, inner_iterations, asked) = (sweep.factorizations, sweep.inner_iterations, sweep.asked);
         let f1 = potential + layer.energy.iter().sum::<f64>();
         let all = strain + layer.work;
-        self.energy = all;
+        (self.energy, self.strain) = (all, strain);
         let residual = self.scale.relative(missed, all);
         // a small residual of a slow mode is no small error: the pressures stand still, too
-        let is_balanced = |tolerance: f64| self.scale.imbalance(self.model, &layer.force, all) <= tolerance;
-        let peak = self.scale.peak(&layer.pressure, all);
+        let is_balanced = |tolerance: f64| self.scale.imbalance(self.model, &layer.force, strain) <= tolerance;
+        let peak = self.scale.peak(&layer.pressure, strain);
         let missing = self.memory.steady.missing(residual, &layer.pressure, peak);
         let is_still = |tolerance| missing <= tolerance * peak && is_balanced(tolerance);
         let is_still = self.stop.residual.is_none_or(is_still) && self.stop.increment.is_none_or(is_balanced);
@@ -299,9 +311,5 @@ pub(super) fn rounding(model: &Model, u: &Field, layer: &Layer) -> f64 {
     for (q, digits) in digits::of_compressions(model, &u.trace).into_iter().enumerate() {
         floor[0] += model.weight[q] * layer.tangent[q] * digits.powi(2);
     }
-    ROUNDING * floor[0]
+    digits::ROUNDING * floor[0]
 }
-
-/// Squared factor between rounding errors and their estimate, which counts each row's worst case once: smooth errors weigh more in
-/// K^-1 than in the inverse of its diagonal.
-const ROUNDING: f64 = 1e3;

@@ -4,7 +4,7 @@
 //! Bodies that nothing presses together but an initial overlap, and that nothing holds, move apart until no pressure is left: all
 //! that a relative tolerance could refer to vanishes with the error. What remains then is rest, or the start. Its layers may answer
 //! an overlap with any pressure, so the surfaces give way first ([`start::at`]). A contact may vanish while bodies are loaded otherwise. Then what remains
-//! is their energy: that of a pressure on all surfaces. A solution below [`PART`] of these is measured by that share: with a tolerance of
+//! is the energy of their strains: that of a pressure on all surfaces. A solution below [`PART`] of these is measured by that share: with a tolerance of
 //! 1e-8 that is 1e-14 of what the bodies carry, which rounding of their forces leaves unknown.
 //!
 //! A start that the scene gives is no measure: it may be any.
@@ -16,7 +16,7 @@ use crate::model::rigid::PART;
 use crate::model::surface::surface_slopes;
 
 /// Least scales of a run.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Scale {
     /// Energy: u'Ku + sum omega p c.
     energy: f64,
@@ -50,6 +50,13 @@ impl Scale {
         energy.max(self.energy)
     }
 
+    /// Whether energies of this size cannot be told from zero or infinity to their rounding, eps^2 of them, where layers carry pressures up to `peak`.
+    pub fn is_out_of_range(&self, energy: f64, peak: f64) -> bool {
+        const LEAST: f64 = f64::MIN_POSITIVE / (f64::EPSILON * f64::EPSILON);
+        let energy = self.energy(energy);
+        if energy == 0.0 { peak > 0.0 } else { !(LEAST..f64::INFINITY).contains(&energy) }
+    }
+
     /// The relative residual: root of `numerator` = r'G^-1 r over `reference` = u'Ku + sum omega p c. A zero reference asks for
     /// an absolute zero.
     pub fn relative(&self, numerator: f64, reference: f64) -> f64 {
@@ -60,23 +67,24 @@ impl Scale {
         if numerator <= 0.0 { 0.0 } else { (numerator / self.energy(reference)).sqrt() }
     }
 
-    /// [`PART`] of the pressure that gives all contact surfaces the energy u'Ku + sum omega p c of bodies and layers.
-    fn stress(&self, energy: f64) -> f64 {
-        if self.compliance > 0.0 { PART * (energy / self.compliance).sqrt() } else { 0.0 }
+    /// [`PART`] of the pressure that gives all contact surfaces the energy u'Ku of the bodies. That of soft layers between stiff bodies is no measure of
+    /// what the bodies carry.
+    fn stress(&self, strain: f64) -> f64 {
+        if self.compliance > 0.0 { PART * (strain.max(0.0) / self.compliance).sqrt() } else { 0.0 }
     }
 
-    /// The largest pressure, by which errors of pressures are measured, of bodies and layers with this energy.
-    pub fn peak(&self, pressure: &[f64], energy: f64) -> f64 {
-        pressure.iter().copied().fold(self.pressure.max(self.stress(energy)), f64::max)
+    /// The largest pressure, by which errors of pressures are measured, in bodies with u'Ku = `strain`.
+    pub fn peak(&self, pressure: &[f64], strain: f64) -> f64 {
+        pressure.iter().copied().fold(self.pressure.max(self.stress(strain)), f64::max)
     }
 
-    /// What the forces on a body lack in balance under the contact forces `force` (n) in bodies and layers with this energy, as a share of them, the
+    /// What the forces on a body lack in balance under the contact forces `force` (n), with u'Ku = `strain` over all bodies, as a share of them, the
     /// most over all rigid motions that supports leave free. For such a motion m, K m = 0: only loads and contact forces work on it.
     ///
     /// The residual sees too little of this where a Robin term much stiffer than the layer holds the body.
-    pub fn imbalance(&self, model: &Model, force: &[f64], energy: f64) -> f64 {
+    pub fn imbalance(&self, model: &Model, force: &[f64], strain: f64) -> f64 {
         let mut most = 0.0f64;
-        let least = self.force.max(self.area * self.stress(energy));
+        let least = self.force.max(self.area * self.stress(strain));
         for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()) {
             let force = model.at_rows(body, force);
             let total = least.max(force.iter().map(|force| force.abs()).sum());

@@ -2,12 +2,14 @@
 
 use super::acceleration::Acceleration;
 use super::balance::{Balance, Discretisation};
+use super::bound::{OffLaws, Reached};
+use super::digits::ROUNDING;
 use super::forecast::Forecast;
 use super::history::{Observer, Row};
 use super::linear::resisting;
 use super::memory::Memory;
 use super::origin::Origin;
-use super::run::{End, Run};
+use super::run::{End, Run, rounding};
 use super::scale::Scale;
 use super::start::{self, RigidStart};
 use super::stop::{Floor, Status};
@@ -18,6 +20,7 @@ use crate::model::body::BodyCounts;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
+use crate::model::surface::{meeting_slopes, surface_slopes};
 use crate::problem::stop::StopRule;
 use crate::robin::coefficient::{Coefficient, underconstrained};
 use crate::robin::extend::extend;
@@ -123,6 +126,11 @@ pub struct Outcome {
     pub iterate: Field,
     /// The layers at that iterate.
     pub layer: Layer,
+    /// How far these are from the laws at its compressions.
+    off: OffLaws,
+    scale: Scale,
+    /// What rounding can make of it, a squared energy norm.
+    floor: f64,
     /// History, one row an iterate.
     pub rows: Vec<Row>,
     /// What it remembers besides.
@@ -171,6 +179,7 @@ pub fn solve(
         origin: None,
         scale: Scale::default(),
         energy: 0.0,
+        strain: 0.0,
         memory: Memory::new(floor, foreign),
         rows: Vec::new(),
     };
@@ -302,7 +311,31 @@ fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
     }
 }
 
+/// What rounding can make of a solution, a squared energy norm: as of any iterate, and what contact forces that change by the `digits` of the compressions, n,
+/// make of the bodies. Where both bodies of a stiff layer move together, they alone resist.
+fn floor(model: &Model, u: &Field, layer: &Layer, digits: &[f64]) -> f64 {
+    let (rows, springs) = (model.row_stiffness(), layer.springs(model));
+    let forces = rows.iter().enumerate().filter(|(_, stiffness)| **stiffness > 0.0);
+    let made = |(row, stiffness): (usize, &f64)| {
+        let q = row % digits.len();
+        (springs[q] * digits[q]).powi(2) / stiffness
+    };
+    rounding(model, u, layer) + ROUNDING * forces.map(made).sum::<f64>()
+}
+
 impl Outcome {
+    /// Whether rounding can make a lack of balance that is worth `unbalanced` in the energy norm, if that is what ended the run.
+    pub fn is_rounding(&self, unbalanced: f64) -> bool {
+        self.status != Status::RoundoffLimited || unbalanced * unbalanced <= self.floor
+    }
+
+    /// Return the relative errors of the result, with u'Ku = `strain`, if its forces lack a balance that is worth `unbalanced` in the energy norm,
+    /// and the pair whose pressures are off their law by the largest of them, if they are. The model is that of the run.
+    pub fn reached(&self, model: &Model, strain: f64, unbalanced: f64) -> (Reached, Option<usize>) {
+        let of_steps = self.method.starts_with("newton");
+        Reached::of_result((model, &self.scale), strain, unbalanced, &self.off, &self.layer, of_steps)
+    }
+
     /// What a run can go on from.
     pub fn into_state(self) -> Box<State> {
         let Layer { compression, smoothing, .. } = self.next_states().clone();
@@ -319,8 +352,11 @@ impl Outcome {
 impl Run<'_> {
     /// The result of a loop's end.
     fn conclude(self, end: End, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
-        let Run { model, stop, rows, origin, memory, scale, energy, .. } = self;
-        let End { status, mut iterate, layer, weight, sweeps, skipped } = end;
+        let Run { model, stop, rows, origin, memory, scale, energy, strain, .. } = self;
+        let End { mut status, mut iterate, layer, weight, sweeps, skipped } = end;
+        if status.is_solved() && scale.is_out_of_range(energy, layer.peak()) {
+            status = Status::OutOfRange { energy };
+        }
         let mut found = None;
         let (spectrum, factor, updates) = match method {
             Method::Newton(linear) => (linear.spectrum(), None, rows.last().map_or(0, |row| row.iteration)),
@@ -332,19 +368,44 @@ impl Run<'_> {
                 (acceleration.spectrum(), acceleration.factor(), rows.len().saturating_sub(1))
             }
         };
+        let mut traced = iterate.clone();
+        // sweeps add to states and traces on their own
+        if matches!(method, Method::Sweeps { .. }) {
+            traced.retrace(model);
+        }
+        let (compression, digits) = (model.compression(&traced.trace), digits::of_compressions(model, &traced.trace));
+        let floor = if status == Status::RoundoffLimited { floor(model, &iterate, &layer, &digits) } else { 0.0 };
         if let Some(origin) = origin {
             origin.give(model, &mut iterate);
         }
-        let rounding = digits::lost(model, &iterate.trace, &layer, scale.peak(&layer.pressure, energy));
+        // displacements are given with the digits that they have as a whole
+        let off = OffLaws::new(model, &layer, &compression, &digits::of_compressions(model, &iterate.trace));
+        let answer: Vec<f64> = match method {
+            Method::Newton(_) => {
+                let lines = memory.progress.slopes(model, &meeting_slopes(model));
+                lines.iter().zip(surface_slopes(model)).map(|(line, surface)| surface.max(*line)).collect()
+            }
+            Method::Sweeps { .. } => vec![f64::INFINITY; model.points()],
+        };
+        let times = digits::lacking(matches!(method, Method::Sweeps { .. }), &status);
+        let peak = scale.peak(&layer.pressure, strain);
+        let mut rounding = times * digits::lost(model, &iterate.trace, &layer, &answer, peak);
+        if let (Method::Sweeps { .. }, Status::RoundoffLimited) = (&*method, &status) {
+            // pressures of compressions are not in balance to more than their digits
+            rounding = rounding.max(scale.imbalance(model, &layer.force, strain));
+        }
         Ok(Outcome {
             status,
             iterations: updates,
             sweeps,
             solves_skipped: skipped,
             iterate,
-            layer,
+            off,
             rounding,
             forecast: stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
+            layer,
+            scale,
+            floor,
             rows,
             memory: Some(memory),
             method: method.name(),

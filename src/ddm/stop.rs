@@ -20,6 +20,11 @@ pub enum Status {
         /// The first such body.
         body: usize,
     },
+    /// Energies are too large or too small for double numbers, so that no error can be told.
+    OutOfRange {
+        /// Energy of bodies and layers.
+        energy: f64,
+    },
     /// The iterates repeat.
     Cycle {
         /// Updates after which they come back; 1 where the contact stays and nothing falls.
@@ -36,11 +41,35 @@ pub enum Status {
     },
     /// An inner solver failed.
     InnerSolver(Failure),
+    /// The run thought to be at its end, and the forces of its displacements say that it is not.
+    Inaccurate(Inaccuracy),
     /// Somebody outside asked for it; the run can go on from its outcome.
     Paused {
         /// The bits of [`Observer::asked`](super::Observer::asked) of all ranks.
         asked: u8,
     },
+}
+
+/// What a solution was thought to miss, and what it misses: relative errors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inaccuracy {
+    /// The error that the run would have ended with.
+    pub told: f64,
+    /// The largest of those found.
+    pub found: f64,
+    /// Where that is.
+    pub whose: Whose,
+}
+
+/// Where an error is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Whose {
+    /// In the forces on a body.
+    Body(usize),
+    /// In the pressures of a pair.
+    Pair(usize),
+    /// In what rounding leaves of all pressures.
+    Rounding,
 }
 
 impl Status {
@@ -80,6 +109,11 @@ impl Floor {
     /// rounding errors, too.
     pub fn of_sweeps() -> Self {
         Self { patience: 20, believable: 1e-4, ..Self::of_steps() }
+    }
+
+    /// Whether an iterate of this error would be no progress, and one that can be a solution.
+    pub fn is_stuck(&self, error: f64) -> bool {
+        error >= Self::FALLS * self.best && error < self.believable
     }
 
     /// Notes an error; true when it is time to compare it with the rounding errors.

@@ -3,11 +3,11 @@
 use super::local::Local;
 use super::supports::Held;
 use crate::contact::{add, pad};
-use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, Space, assemble};
+use crate::fem::{Elasticity, Extent, Frame, NodalBlock, NodeGraph, Space, assemble};
 use crate::linalg::Csr;
 use std::rc::Rc;
 
-/// A force and its moment about the origin (x, y, z).
+/// A force and its moment about the datum (x, y, z).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Resultant {
     /// The force.
@@ -29,8 +29,8 @@ impl Resultant {
 pub struct Balance {
     /// Loads, but for those on rigid surfaces; contacts; then each support, each spring, each rigid surface.
     pub parts: Vec<Resultant>,
-    /// Sum of the sizes of all nodal forces, and of these times their distances from the origin: what the sum of all parts is
-    /// small against.
+    /// Sum of the sizes of all nodal forces, and of these times their distances from the datum: what the sum of all parts is
+    /// small against. About an origin far away moments are that of the sum of forces and little else.
     pub size: [f64; 2],
 }
 
@@ -48,8 +48,14 @@ pub struct Forces<const D: usize> {
     pub supports: usize,
     /// Nodal forces of its loads.
     pub load: Vec<f64>,
+    /// Forces on its rigid surfaces: a node of each, and the force.
+    pub rigid: Vec<(u32, [f64; D])>,
     /// Its contact rows for displacements of its nodes.
     pub rows: Csr,
+    /// Where the whole body is.
+    pub extent: Extent,
+    /// Nodes of the whole body.
+    pub nodes: usize,
 }
 
 impl<const D: usize> Forces<D> {

@@ -1,7 +1,6 @@
 //! Elasticity of the bodies of a scene: constants, regions, and refusals that name body and place.
 
 use super::find::{find_group, not_on_body, of_body, point};
-use crate::contact::pad;
 use crate::error::{Error, Result, shown};
 use crate::exchange::{Exchange, first};
 use crate::fem::Space;
@@ -32,7 +31,7 @@ pub fn of<const D: usize>(
         for cell in cells {
             if of_cell[cell] != 0 && found.is_ok() {
                 let (first, second) = (&spec.regions[of_cell[cell] - 1].on.value, &region.on.value);
-                let at = point(pad(space.centroid(cell)));
+                let at = point(space.in_scene(space.centroid(cell)));
                 let message = format!("the regions `{first}` and `{second}` share the cell at {at}");
                 let error = Error::scene(&region.on.place, message).help("let each cell be in one region at most");
                 found = Err((key(cell), error));
@@ -100,19 +99,19 @@ pub fn moduli<const D: usize>(
 ) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for cell in cells {
-        let moduli = elasticity.moduli(cell, pad(space.centroid(cell))).unwrap_or_default();
+        let moduli = elasticity.moduli(cell, space.in_scene(space.centroid(cell))).unwrap_or_default();
         crate::contact::add(&mut sum, moduli.map(|modulus| space.share(cell) * modulus));
     }
     sum
 }
 
-/// The largest Poisson's ratio at these places of a body with linear elements; zero where these do not lock, or no element is linear.
-pub fn poisson<const D: usize>(spec: &BodySpec, own: impl Iterator<Item = [f64; D]> + Clone, plane: Plane) -> f64 {
-    if spec.order == Order::P2 || (D == 2 && plane == Plane::Stress) {
+/// The largest Poisson's ratio at these places in the scene of a body with linear elements; zero where these do not lock, or no element is linear.
+pub fn poisson(spec: &BodySpec, dimension: usize, own: impl Iterator<Item = [f64; 3]> + Clone, plane: Plane) -> f64 {
+    if spec.order == Order::P2 || (dimension == 2 && plane == Plane::Stress) {
         return 0.0;
     }
     let largest = |spec: &ElasticitySpec| match &spec.constants {
-        Constants::Isotropic { poisson, .. } => own.clone().map(|x| poisson.eval(pad(x))).fold(0.0, f64::max),
+        Constants::Isotropic { poisson, .. } => own.clone().map(|x| poisson.eval(x)).fold(0.0, f64::max),
         _ => 0.0,
     };
     specs(spec).map(largest).fold(0.0, f64::max)

@@ -1,6 +1,5 @@
 //! Mesh groups by name, and refusals that point into the scene.
 
-use crate::contact;
 use crate::error::{Error, Located, Result, few};
 use crate::exchange::{Exchange, gather};
 use crate::expression::Field;
@@ -85,9 +84,9 @@ impl<'a> Values<'a> {
         Self { what, body, refused: RefCell::new(None) }
     }
 
-    /// The value at a point; zero where there is none.
-    pub fn at<const D: usize>(&self, field: &Field, x: [f64; D]) -> f64 {
-        field.eval_finite(self.what, contact::pad(x)).unwrap_or_else(|error| {
+    /// The value at a point of the scene; zero where there is none.
+    pub fn at(&self, field: &Field, x: [f64; 3]) -> f64 {
+        field.eval_finite(self.what, x).unwrap_or_else(|error| {
             self.refused.borrow_mut().get_or_insert_with(|| error.because(of_body(self.body)));
             0.0
         })

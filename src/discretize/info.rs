@@ -9,6 +9,8 @@ use crate::problem::ContactSpec;
 pub struct BodyInfo {
     /// Name in the scene.
     pub name: String,
+    /// The point of the scene about which its [`Balance`](super::Balance) has moments.
+    pub datum: [f64; 3],
     /// Nodes.
     pub nodes: usize,
     /// Number among the points of the mesh of each node of the cells that this rank shows.

@@ -2,7 +2,7 @@
 
 use super::supports::Held;
 use crate::contact::{Fine, length};
-use crate::fem::{EDGES, Elasticity, Recovery, Space, element, pad};
+use crate::fem::{EDGES, Elasticity, Recovery, Space, element};
 use crate::linalg::Csr;
 use crate::problem::order::Order;
 use std::rc::Rc;
@@ -33,7 +33,7 @@ pub trait Meshes {
 
 /// The cells of a body by their corners.
 pub struct Cells {
-    /// Coordinates of the nodes, on boundaries that bow outwards so far out that the straight cells cover the body.
+    /// Coordinates of the nodes in the scene, on boundaries that bow outwards so far out that the straight cells cover the body.
     pub nodes: Vec<[f64; 3]>,
     /// Corners of a cell.
     pub stride: usize,
@@ -170,7 +170,7 @@ fn covering<const D: usize>(space: &Space<D>) -> Vec<[f64; 3]> {
         }
     }
     let moved = |(node, &x): (usize, &[f64; D])| {
-        pad(rise.get(node).map_or(x, |rise| std::array::from_fn(|c| x[c] + 2.0 * rise[c])))
+        space.in_scene(rise.get(node).map_or(x, |rise| std::array::from_fn(|c| x[c] + 2.0 * rise[c])))
     };
     space.nodes.iter().enumerate().map(moved).collect()
 }
@@ -185,7 +185,10 @@ struct OnBody<'a, const D: usize> {
 impl<const D: usize> OnBody<'_, D> {
     /// Stress of a strain at an integration point of a cell; assembly was there, so the law has a value.
     fn stress(&self, cell: usize, x: [f64; D], strain: &[f64; 6]) -> [f64; 6] {
-        self.shape.elasticity.at(cell, pad(x)).map_or([0.0; 6], |material| material.stress(strain))
+        self.shape
+            .elasticity
+            .at(cell, self.shape.space.in_scene(x))
+            .map_or([0.0; 6], |material| material.stress(strain))
     }
 }
 

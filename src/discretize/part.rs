@@ -135,9 +135,9 @@ impl<'a, const D: usize> Part<'a, D> {
         motion.at(&self.space.nodes[node as usize])
     }
 
-    /// Places of own nodes.
-    pub fn own(&self) -> impl Iterator<Item = [f64; D]> + Clone {
-        self.known.own.iter().map(|&node| self.space.nodes[node as usize])
+    /// Places of own nodes in the scene.
+    pub fn own(&self) -> impl Iterator<Item = [f64; 3]> + Clone {
+        self.known.own.iter().map(|&node| self.space.in_scene(self.space.nodes[node as usize]))
     }
 
     /// The dof of the body at which a value is largest; `size` has none for dofs that do not count, and is asked for at own nodes. Collective.
@@ -248,10 +248,13 @@ impl<'a, const D: usize> Part<'a, D> {
         let values = Values::of("this load", &name.value);
         let load = surface::surface_load(&self.space, &facets, parts, &|x, n| match &spec.kind {
             LoadKind::Pressure(field) => {
-                let pressure = factor * values.at(field, x);
+                let pressure = factor * values.at(field, self.space.in_scene(x));
                 n.map(|n| -pressure * n)
             }
-            LoadKind::Traction(fields) => std::array::from_fn(|c| factor * values.at(&fields[c], x)),
+            LoadKind::Traction(fields) => {
+                let x = self.space.in_scene(x);
+                std::array::from_fn(|c| factor * values.at(&fields[c], x))
+            }
             LoadKind::Force { rigid: true, .. } => [0.0; D],
             LoadKind::Force { total, .. } => std::array::from_fn(|c| factor * total[c] / area),
         });
@@ -329,7 +332,7 @@ impl<'a, const D: usize> Part<'a, D> {
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
         let mut stiffness = assemble::stiffness(&self.space, graph, elasticity).map_err(|defect| match defect {
             assemble::Defect::Inverted(cell) => {
-                let corner = contact::pad(self.space.cell_nodes(cell)[0]);
+                let corner = self.space.in_scene(self.space.cell_nodes(cell)[0]);
                 let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
                 Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
             }
@@ -354,7 +357,10 @@ impl<'a, const D: usize> Part<'a, D> {
 pub fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Parts) -> Result<NodalForces<D>> {
     let (name, Some(fields)) = (&spec.name, &spec.force) else { return Ok(NodalForces::default()) };
     let values = Values::of("this body force", &name.value);
-    let density = |x: [f64; D]| std::array::from_fn(|c| spec.force_factor * values.at(&fields[c], x));
+    let density = |x: [f64; D]| {
+        let x = space.in_scene(x);
+        std::array::from_fn(|c| spec.force_factor * values.at(&fields[c], x))
+    };
     let load = assemble::body_force(space, parts, &density);
     values.refused()?;
     if !load.is_finite() {

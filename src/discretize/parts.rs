@@ -145,7 +145,7 @@ fn read<const D: usize>(
         space = space.revolved(largest);
         let negative = |node: &&u32| space.nodes[**node as usize][0] < 0.0;
         let refuse = |&node: &u32| {
-            let x = point(pad(space.nodes[node as usize]));
+            let x = point(space.in_scene(space.nodes[node as usize]));
             let message = format!("body `{}` has a negative radius at {x}", spec.name.value);
             let help = "axisymmetric bodies are drawn as meridians, x >= 0 with the axis at x = 0: leave out one half";
             Err((node, Error::mesh(&mesh.path, None, message).help(help)))

@@ -4,6 +4,7 @@
 use super::approach::Outer;
 use super::balance::{Balance, Forces};
 use super::find::point;
+use super::unbalanced::Unbalanced;
 use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
@@ -19,6 +20,25 @@ pub trait Post {
 
     /// Forces on the own nodes, under the forces omega p of the contact rows of the body.
     fn balance(&self, v: &[f64], force: &[f64]) -> Balance;
+
+    /// Forces that lack balance on the own nodes, under the forces omega p of the contact rows; `bent` as in [`Post::field`], `springs` are the
+    /// stiffnesses omega kappa of these rows.
+    fn unbalanced(&self, bent: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced;
+
+    /// See [`Forces::rough`].
+    fn rough(&self, unbalanced: &Unbalanced) -> Vec<f64>;
+
+    /// See [`Forces::on_hats`].
+    fn on_hats(&self, unbalanced: &Unbalanced) -> Vec<f64>;
+
+    /// See [`Forces::smooth`].
+    fn smooth(&self, sums: &[f64], with_springs: bool) -> Vec<f64>;
+
+    /// See [`Forces::products`].
+    fn products(&self, fields: &[Vec<f64>]) -> Vec<f64>;
+
+    /// See [`Forces::trace`].
+    fn trace(&self, field: &[f64]) -> Vec<f64>;
 
     /// What own nodes add to the mean displacement of where the body is loaded along a direction, else of where it is held along it, else of all
     /// of it.
@@ -44,11 +64,12 @@ impl<const D: usize> OnPart<D> {
     /// # Errors
     /// A known displacement that is not finite at a node.
     pub fn new(spec: &BodySpec, outer: Outer, forces: Forces<D>) -> Result<Self> {
-        let nodes = &forces.part.space.nodes;
-        for (component, &x) in spec.exact.iter().flatten().flat_map(|u| nodes.iter().map(move |x| (u, x))) {
-            let value = component.eval(&x);
+        let space = &forces.part.space;
+        let places = || space.nodes.iter().map(|&x| space.in_scene(x));
+        for (component, x) in spec.exact.iter().flatten().flat_map(|u| places().map(move |x| (u, x))) {
+            let value = component.eval(&x[..D]);
             if !value.is_finite() {
-                let message = format!("the known displacement is {value} at {}", point(pad(x)));
+                let message = format!("the known displacement is {value} at {}", point(x));
                 return Err(Error::scene(component.place(), message)
                     .help("look for roots of negative numbers and divisions by zero in the expression"));
             }
@@ -72,7 +93,7 @@ impl<const D: usize> Post for OnPart<D> {
         let displacement = |&node: &u32| pad(std::array::from_fn::<f64, D, _>(|c| u[D * node as usize + c]));
         BodyField {
             name: self.name.clone(),
-            points: told.nodes.iter().map(|&x| pad(x)).collect(),
+            points: told.nodes.iter().map(|&x| told.in_scene(x)).collect(),
             cell: CellKind::simplex(D, space.order.degree()),
             connectivity: told.cells,
             displacement: shown.iter().map(displacement).collect(),
@@ -86,15 +107,42 @@ impl<const D: usize> Post for OnPart<D> {
         self.forces.balance(&self.nodal(v), force)
     }
 
+    fn unbalanced(&self, bent: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced {
+        self.forces.unbalanced(&self.nodal(bent), force, springs)
+    }
+
+    fn rough(&self, unbalanced: &Unbalanced) -> Vec<f64> {
+        self.forces.rough(unbalanced)
+    }
+
+    fn on_hats(&self, unbalanced: &Unbalanced) -> Vec<f64> {
+        self.forces.on_hats(unbalanced)
+    }
+
+    fn smooth(&self, sums: &[f64], with_springs: bool) -> Vec<f64> {
+        self.forces.smooth(sums, with_springs)
+    }
+
+    fn products(&self, fields: &[Vec<f64>]) -> Vec<f64> {
+        self.forces.products(fields)
+    }
+
+    fn trace(&self, field: &[f64]) -> Vec<f64> {
+        self.forces.trace(field)
+    }
+
     fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3] {
         self.outer.mean::<D>(&self.nodal(v), &self.forces.part.own, direction)
     }
 
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]> {
         let (exact, Forces { part, elasticity, .. }) = (self.exact.as_ref()?, &self.forces);
-        let at = |x: [f64; D]| norms::Known {
-            value: std::array::from_fn(|i| exact[i].eval(&x)),
-            gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, &x).1)),
+        let at = |x: [f64; D]| {
+            let x = &part.space.in_scene(x)[..D];
+            norms::Known {
+                value: std::array::from_fn(|i| exact[i].eval(x)),
+                gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, x).1)),
+            }
         };
         let norms = norms::error(&part.space, part.told(), elasticity, &self.nodal(v), &at);
         Some(norms.map(|norms| [norms.l2, norms.h1, norms.energy]))

@@ -133,6 +133,7 @@ impl<const D: usize> Ready<'_, D> {
                 interpolation,
             })?);
         }
+        let rigid = part.rigid_forces().map(|(node, total)| (node, std::array::from_fn(|c| total[c]))).collect();
         let (space, held) = (Rc::new(part.space), Rc::new(part.held));
         let is_whole = info.ranks.len() == 1 && !own.contains(&false);
         let here = Local { space: space.clone(), own };
@@ -145,6 +146,9 @@ impl<const D: usize> Ready<'_, D> {
             springs: part.springs,
             supports: part.spec.fix.len(),
             load: load.all(space.nodes.len()),
+            rigid,
+            extent: part.known.extent,
+            nodes: info.nodes,
             held: held.clone(),
             elasticity: elasticity.clone(),
             part: here,

@@ -1,7 +1,6 @@
 //! Springs of a body to the ground: per area on surfaces, each at the points of point groups.
 
 use super::find::{find_group, not_on_body, of_body, without_area};
-use crate::contact::pad;
 use crate::error::{Error, Result, shown};
 use crate::expression::Field;
 use crate::fem::{NodalBlock, Space, surface};
@@ -21,7 +20,7 @@ pub fn blocks<const D: usize>(
 ) -> Result<Vec<NodalBlock<D>>> {
     let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
     let fault = RefCell::new(None);
-    let value = |field: &Field, x: [f64; D]| match stiffness(field, spring, pad(x)) {
+    let value = |field: &Field, x: [f64; D]| match stiffness(field, spring, space.in_scene(x)) {
         Ok(value) => value,
         Err(error) => {
             fault.borrow_mut().get_or_insert(error.because(of_body(&spec.name.value)));

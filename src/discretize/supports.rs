@@ -64,7 +64,7 @@ impl<const D: usize> Held<D> {
             for node in nodes {
                 for &(direction, field) in &held_here {
                     let value = field
-                        .eval_finite("the displacement of this support", pad(space.nodes[node as usize]))
+                        .eval_finite("the displacement of this support", space.in_scene(space.nodes[node as usize]))
                         .map_err(|error| error.because(of_body(&spec.name.value)))?;
                     let value = fix.factor * value;
                     let support = Some(support);
@@ -158,7 +158,7 @@ impl<const D: usize> Held<D> {
             let largest = conditions[..=position].iter().map(|other| other.value.abs()).fold(0.0, f64::max);
             if value.abs() > 1e-12 * largest {
                 let earlier_one = conditions[..position].iter().rev().find(|other| other.support != condition.support);
-                return Err(contradiction(spec, condition, earlier_one, space.nodes[node as usize]));
+                return Err(contradiction(spec, condition, earlier_one, space.in_scene(space.nodes[node as usize])));
             }
         }
         let turned = basis.iter().any(|(axis, _)| !axis.contains(&1.0));
@@ -255,7 +255,7 @@ fn contradiction<const D: usize>(
     spec: &BodySpec,
     condition: &Condition<D>,
     other: Option<&Condition<D>>,
-    x: [f64; D],
+    x: [f64; 3],
 ) -> Error {
     // symmetry comes first: what contradicts it is a support
     let on = condition.support.map_or(&spec.name, |support| &spec.fix[support].on);
@@ -263,7 +263,7 @@ fn contradiction<const D: usize>(
         Some(c) => format!("the {} displacement", ["x", "y", "z"][c]),
         None => format!("the displacement along {}", point(pad(condition.direction))),
     };
-    let message = format!("body `{}`: supports prescribe two values of {what} at {}", spec.name.value, point(pad(x)));
+    let message = format!("body `{}`: supports prescribe two values of {what} at {}", spec.name.value, point(x));
     let error = Error::scene(&on.place, message)
         .label("this one and an earlier one")
         .help("make both values equal, or let the surfaces not meet");

@@ -1,6 +1,6 @@
 //! A contact surface of a pair; its mesh for output: the facets of side a, and where their values come from.
 
-use crate::contact::{Carriers, ContactPair, Side, pad};
+use crate::contact::{Carriers, ContactPair, Side};
 use crate::fem::{Facets, element};
 use crate::output::vtu::{CellKind, Grid};
 use crate::problem::order::Order;
@@ -62,7 +62,7 @@ impl ContactSurface {
                 let at = *number.entry(*node).or_insert(surface.points.len() as u32);
                 surface.connectivity.push(at);
                 if at as usize == surface.points.len() {
-                    surface.points.push(pad(a.space.nodes[*node as usize]));
+                    surface.points.push(a.space.in_scene(a.space.nodes[*node as usize]));
                     sums.push((0.0, BTreeMap::new()));
                 }
                 let Some(carriers) = cover.carriers else { continue };

@@ -3,11 +3,11 @@
 use super::find::point;
 use super::part::Part;
 use super::roster;
-use crate::contact::pad;
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, share};
+use crate::exchange::{Exchange, first, share};
 use crate::fem::{Extent, RigidMotion, rigid};
-use crate::mesh::{Asked, Checked, Duty, Mesh, Parts, Portion};
+use crate::mesh::{Asked, Checked, Duty, LENGTHS, Mesh, Parts, Portion};
+use crate::problem::Plane;
 use crate::problem::body::BodySpec;
 use crate::scene::Scene;
 use std::rc::Rc;
@@ -29,12 +29,28 @@ pub struct Verified<const D: usize> {
 /// # Errors
 /// Patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.
 pub fn verify<const D: usize>(scene: &Scene, portion: Portion<D>, exchange: Rc<dyn Exchange>) -> Result<Verified<D>> {
+    first(&*exchange, size(&portion.mesh).map_err(|error| (0, error)))?;
+    // the radius of a body of revolution is measured from its axis
+    let portion = portion.near(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
     let lying = roster::lying(scene, &portion, &*exchange)?;
     let bodies = roster::bodies(scene, &portion.mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
     let checked = portion.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty(), &*exchange)?;
     Ok(Verified { portion, bodies, checked: checked.into(), exchange })
+}
+
+/// Refuses a mesh whose size no run computes with.
+fn size<const D: usize>(mesh: &Mesh<D>) -> Result<()> {
+    let mut extent = Extent::default();
+    mesh.points.iter().for_each(|x| extent.add(*x));
+    let [least, most] = LENGTHS;
+    let largest = extent.size();
+    if mesh.points.is_empty() || (least..=most).contains(&largest) {
+        return Ok(());
+    }
+    let message = format!("the mesh is {largest:.1e} long, and lengths from {least:e} to {most:e} are computed with");
+    Err(Error::mesh(&mesh.path, None, message).help("choose another unit of length"))
 }
 
 /// A body with the groups that serve it.
@@ -62,7 +78,7 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>, excha
         let (extent, first) = &mut mine[part_of[node as usize] as usize];
         let x = space.nodes[node as usize];
         extent.add(x);
-        first.get_or_insert((node, pad(x)));
+        first.get_or_insert((node, space.in_scene(x)));
     }
     let of_ranks = share(exchange, mine);
     let extent = |number: usize| of_ranks.iter().fold(Extent::default(), |all, of_rank| all.join(&of_rank[number].0));

@@ -3,6 +3,8 @@
 //! Truth is a number: comparisons give 1 or 0, and a number > 0 is true. Nothing hides a NaN, so that a value
 //! outside the domain of a function can be refused where it is used.
 
+use crate::linalg::portable;
+
 /// A sign or a function of one value.
 #[derive(Debug)]
 pub(super) struct Unary {
@@ -45,23 +47,23 @@ const fn steps(name: &'static str, value: fn(f64) -> f64) -> Unary {
 /// Functions of one value.
 pub(super) static UNARY: [Unary; 17] = [
     smooth("abs", f64::abs, |a, _| a.signum()),
-    smooth("acos", f64::acos, |a, _| -1.0 / (1.0 - a * a).sqrt()),
-    smooth("asin", f64::asin, |a, _| 1.0 / (1.0 - a * a).sqrt()),
-    smooth("atan", f64::atan, |a, _| 1.0 / (1.0 + a * a)),
+    smooth("acos", portable::acos, |a, _| -1.0 / (1.0 - a * a).sqrt()),
+    smooth("asin", portable::asin, |a, _| 1.0 / (1.0 - a * a).sqrt()),
+    smooth("atan", portable::atan, |a, _| 1.0 / (1.0 + a * a)),
     steps("ceil", f64::ceil),
-    smooth("cos", f64::cos, |a, _| -a.sin()),
-    smooth("cosh", f64::cosh, |a, _| a.sinh()),
-    smooth("exp", f64::exp, |_, value| value),
+    smooth("cos", portable::cos, |a, _| -portable::sin(a)),
+    smooth("cosh", portable::cosh, |a, _| portable::sinh(a)),
+    smooth("exp", portable::exp, |_, value| value),
     steps("floor", f64::floor),
-    smooth("log", f64::ln, |a, _| 1.0 / a),
-    smooth("log10", f64::log10, |a, _| 1.0 / (a * std::f64::consts::LN_10)),
+    smooth("log", portable::log, |a, _| 1.0 / a),
+    smooth("log10", portable::log10, |a, _| 1.0 / (a * std::f64::consts::LN_10)),
     // 0 for 0
     steps("sign", |a| if a == 0.0 { 0.0 } else { a.signum() }),
-    smooth("sin", f64::sin, |a, _| a.cos()),
-    smooth("sinh", f64::sinh, |a, _| a.cosh()),
+    smooth("sin", portable::sin, |a, _| portable::cos(a)),
+    smooth("sinh", portable::sinh, |a, _| portable::cosh(a)),
     smooth("sqrt", f64::sqrt, |_, value| 0.5 / value),
-    smooth("tan", f64::tan, |_, value| 1.0 + value * value),
-    smooth("tanh", f64::tanh, |_, value| 1.0 - value * value),
+    smooth("tan", portable::tan, |_, value| 1.0 + value * value),
+    smooth("tanh", portable::tanh, |_, value| 1.0 - value * value),
 ];
 
 /// Signs.
@@ -69,7 +71,7 @@ pub(super) static SIGNS: [Unary; 2] = [smooth("-", |a| -a, |_, _| -1.0), steps("
 
 /// Functions of two values; `min` and `max` take more, one after the other, and unlike those of `f64` they keep a NaN.
 pub(super) static BINARY: [Binary; 3] = [
-    two("atan2", Two::Smooth(f64::atan2, |a, b, _| [b, -a].map(|x| x / (a * a + b * b)))),
+    two("atan2", Two::Smooth(portable::atan2, |a, b, _| [b, -a].map(|x| x / (a * a + b * b)))),
     two("max", Two::Pick(|a, b| a.is_nan() || a > b)),
     two("min", Two::Pick(|a, b| a.is_nan() || a < b)),
 ];
@@ -90,7 +92,10 @@ pub(super) static INFIX: [(u8, Binary); 13] = [
     (4, two("-", Two::Smooth(|a, b| a - b, |_, _, _| [1.0, -1.0]))),
     (5, two("*", Two::Smooth(|a, b| a * b, |a, b, _| [b, a]))),
     (5, two("/", Two::Smooth(|a, b| a / b, |_, b, value| [1.0 / b, -value / b]))),
-    (POWER, two("^", Two::Smooth(f64::powf, |a, b, value| [b * a.powf(b - 1.0), value * a.ln()]))),
+    (
+        POWER,
+        two("^", Two::Smooth(portable::pow, |a, b, value| [b * portable::pow(a, b - 1.0), value * portable::log(a)])),
+    ),
 ];
 
 const fn two(name: &'static str, kind: Two) -> Binary {

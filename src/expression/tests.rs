@@ -1,6 +1,7 @@
 use super::*;
 use crate::data::{DataSpec, Interpolation, Outside};
 use crate::error::Source;
+use crate::linalg::portable;
 
 const VARIABLES: &[&str] = &["x", "y", "z", "k"];
 
@@ -101,7 +102,7 @@ fn random(state: &mut u64, depth: usize, point: [f64; 4]) -> (String, f64, u8) {
         3 => {
             let (text, value, _) = random(state, depth - 1, point);
             let name = ["sin", "abs", "exp", "floor", "sqrt"][choice];
-            let value = [value.sin(), value.abs(), value.exp(), value.floor(), value.sqrt()][choice];
+            let value = [portable::sin(value), value.abs(), portable::exp(value), value.floor(), value.sqrt()][choice];
             (format!("{name}({text})"), value, 9)
         }
         4 => {
@@ -115,7 +116,7 @@ fn random(state: &mut u64, depth: usize, point: [f64; 4]) -> (String, f64, u8) {
             let (a, b) = (random(state, depth - 1, point), random(state, depth - 1, point));
             let (left, a) = within(a, if power == 7 { 8 } else { power });
             let (right, b) = within(b, if power == 7 { 6 } else { power + 1 });
-            let value = [a + b, a - b, a * b, a / b, a.powf(b)][choice];
+            let value = [a + b, a - b, a * b, a / b, portable::pow(a, b)][choice];
             (format!("{left} {} {right}", ["+", "-", "*", "/", "^"][choice]), value, power)
         }
     }

@@ -4,11 +4,11 @@
 //! follow from the graph by arithmetic, so that assembly writes each value straight to its place.
 
 use super::elasticity::{Elasticity, Flaw};
+use super::element;
 use super::forces::NodalForces;
 use super::frame::Frame;
-use super::quadrature::{self, Parts};
+use super::quadrature::{self, Parts, Rule};
 use super::space::Space;
-use super::{element, pad};
 use crate::linalg::Csr;
 use crate::problem::order::Order;
 
@@ -170,6 +170,31 @@ pub enum Defect {
     Elasticity(usize, [f64; 3], Flaw),
 }
 
+/// Quadrature of strain energies.
+pub struct Rules {
+    affine: Rule,
+    curved: Rule,
+    varying: Rule,
+}
+
+impl Rules {
+    /// Of elements of this order.
+    pub fn new<const D: usize>(order: Order) -> Self {
+        let of_degree = |degree: usize| quadrature::simplex(D + 1, degree);
+        let (affine, varying) = if order == Order::P1 { (1, 2) } else { (2, 5) };
+        Self { affine: of_degree(affine), curved: of_degree(5), varying: of_degree(varying) }
+    }
+
+    /// Return the rule for a cell with these nodes, where Hooke's law `is_constant` or not.
+    pub fn of<const D: usize>(&self, x: &[[f64; D]], is_constant: bool, axisymmetric: bool) -> &Rule {
+        match is_constant && !axisymmetric {
+            false => &self.varying,
+            true if is_straight(x, D + 1) => &self.affine,
+            true => &self.curved,
+        }
+    }
+}
+
 /// Stiffness matrix of a space on a graph, which may have the rows of some nodes only. Where the elasticity varies within a cell, and
 /// in bodies of revolution, it is taken at the points of a rule of degree 2 (P1) or 5 (P2); all of these lie off the axis.
 ///
@@ -177,9 +202,7 @@ pub enum Defect {
 /// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity.
 pub fn stiffness<const D: usize>(space: &Space<D>, graph: &NodeGraph, elasticity: &Elasticity) -> Result<Csr, Defect> {
     let mut matrix = graph.matrix::<D>();
-    let affine = quadrature::simplex(D + 1, if space.order == Order::P1 { 1 } else { 2 });
-    let curved = quadrature::simplex(D + 1, 5);
-    let varying = quadrature::simplex(D + 1, if space.order == Order::P1 { 2 } else { 5 });
+    let rules = Rules::new::<D>(space.order);
     let mut hoop = Vec::new();
     let stride = space.stride;
     let mut local = vec![[[0.0; D]; D]; stride * stride];
@@ -194,12 +217,7 @@ pub fn stiffness<const D: usize>(space: &Space<D>, graph: &NodeGraph, elasticity
             *x = space.nodes[node as usize];
         }
         let constant = elasticity.constant_in(index);
-        let rule = match (constant, is_straight(&x, D + 1)) {
-            (None, _) => &varying,
-            _ if space.axisymmetric => &varying,
-            (_, true) => &affine,
-            _ => &curved,
-        };
+        let rule = rules.of(&x, constant.is_some(), space.axisymmetric);
         local.fill([[0.0; D]; D]);
         for (l, weight) in rule.iter() {
             let (gradient, measure) = element::gradients(space.order, &x, l).ok_or(Defect::Inverted(index))?;
@@ -215,7 +233,7 @@ pub fn stiffness<const D: usize>(space: &Space<D>, graph: &NodeGraph, elasticity
             match constant {
                 Some(material) => material.accumulate(gradient, &hoop, weight, &mut local),
                 None => {
-                    let at = pad(interpolate(&x, &element::values(space.order, l)));
+                    let at = space.in_scene(interpolate(&x, &element::values(space.order, l)));
                     let material = elasticity
                         .at(index, at)
                         .map_err(|flaw| Defect::Elasticity(elasticity.region(index), at, flaw))?;

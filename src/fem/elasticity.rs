@@ -116,11 +116,22 @@ fn material(spec: &ElasticitySpec, tensor: Tensor, x: [f64; 3], dimension: usize
     }
 }
 
+/// Moduli that a run computes with: those of known materials are between 1e-30 and 1e30 in all units in use. Energies are products of up to a modulus,
+/// two displacements and lengths of [1e-40, 1e40](crate::mesh::LENGTHS), and rounding takes a share of 1e-32 of them; forces are squared.
+const MODULI: [f64; 2] = [1e-50, 1e50];
+
+/// Whether a modulus is one that a run computes with.
+fn is_modulus(value: f64) -> bool {
+    (MODULI[0]..=MODULI[1]).contains(&value)
+}
+
 /// C in x, y, z at a point, coercive (4).
 fn tensor(spec: &ElasticitySpec, x: [f64; 3], plane: Plane) -> Result<Tensor, Flaw> {
     const POSITIVE: &str = "must be greater than 0";
-    let positive = |name, value| match value > 0.0 && value < f64::INFINITY {
-        true => Ok(()),
+    const RANGE: &str = "must lie between 1e-50 and 1e50: choose another unit of stress";
+    let positive = |name, value: f64| match value > 0.0 && value < f64::INFINITY {
+        true if is_modulus(value) => Ok(()),
+        true => Err(Flaw::Constant(name, value, RANGE)),
         false => Err(Flaw::Constant(name, value, POSITIVE)),
     };
     let own = match &spec.constants {
@@ -149,6 +160,11 @@ fn tensor(spec: &ElasticitySpec, x: [f64; 3], plane: Plane) -> Result<Tensor, Fl
     };
     if !own.is_coercive() {
         return Err(Flaw::NotCoercive(own.least_eigenvalue()));
+    }
+    if let Constants::Anisotropic(_) = &spec.constants
+        && let Some(value) = (0..6).map(|i| own.0[i][i]).find(|value| !is_modulus(*value))
+    {
+        return Err(Flaw::Constant("an elastic constant", value, RANGE));
     }
     let tensor = match &spec.axes {
         Some(axes) => own.rotated(&directions(axes, x)?),

@@ -85,7 +85,8 @@ impl Tensor {
     /// Whether C eps : eps > 0 for every strain (4), beyond rounding.
     pub fn is_coercive(&self) -> bool {
         // scaled to ones on the diagonal; none for NaN
-        let scaled = Matrix6::from_fn(|i, j| self.0[i][j] / (self.0[i][i] * self.0[j][j]).sqrt());
+        let root: [f64; 6] = std::array::from_fn(|i| self.0[i][i].sqrt());
+        let scaled = Matrix6::from_fn(|i, j| self.0[i][j] / root[i] / root[j]);
         (scaled - SINGULAR * Matrix6::identity()).cholesky().is_some()
     }
 
@@ -198,6 +199,11 @@ impl Material {
                 }
             }
         }
+    }
+
+    /// Largest sum of the sizes of a row of C: no less than its largest eigenvalue.
+    pub fn norm(&self) -> f64 {
+        self.stiffness.0.iter().map(|row| row.iter().map(|c| c.abs()).sum()).fold(0.0, f64::max)
     }
 
     /// Stress (xx yy zz xy yz xz) of a strain (xx yy zz, and 2 eps of xy yz xz) (2).

@@ -10,6 +10,7 @@ pub mod element;
 pub mod extent;
 pub mod forces;
 pub mod frame;
+pub mod internal;
 pub mod interpolation;
 pub mod material;
 pub mod norms;

@@ -2,7 +2,7 @@
 
 use super::elasticity::Elasticity;
 use super::space::Space;
-use super::{Slope, assemble, element, pad, quadrature};
+use super::{Slope, assemble, element, quadrature};
 
 /// Norms of a displacement of one body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -51,7 +51,7 @@ pub fn error<const D: usize>(
             let mut difference = space.slope(cell, &at, &phi, &gradient, u);
             difference.add(-1.0, &exact_slope);
             let off = std::array::from_fn(|i| value[i] - known.value[i]);
-            let material = elasticity.at(index, pad(at)).ok();
+            let material = elasticity.at(index, space.in_scene(at)).ok();
             let weight = weight * measure * space.circle(&at);
             for (sum, (value, slope)) in squares.iter_mut().zip([(off, difference), (known.value, exact_slope)]) {
                 let strain = slope.strain();

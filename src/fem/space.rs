@@ -1,7 +1,7 @@
 //! The finite element space of one body: its nodes, cells and boundary facets, numbered within the body.
 
 use super::{Places, Slope, cross, element, pad};
-use crate::mesh::{Group, Mesh, Nodes, Numbering};
+use crate::mesh::{Group, Mesh, Nodes, Numbering, datum};
 use crate::problem::order::Order;
 use std::cell::OnceCell;
 use std::collections::{HashMap, HashSet};
@@ -15,8 +15,10 @@ pub const ON_AXIS: f64 = 1e-10;
 pub struct Space<const D: usize> {
     /// Polynomial order.
     pub order: Order,
-    /// Where the nodes are.
+    /// Where the nodes are, measured from `datum`.
     pub nodes: Places<D>,
+    /// The point of the scene from which coordinates are measured; see [`Mesh::datum`].
+    pub datum: [f64; D],
     /// Nodes per cell.
     pub stride: usize,
     /// Body node numbers, `stride` per cell, in the local order of [`element`].
@@ -49,6 +51,7 @@ impl<const D: usize> Space<D> {
         let mut space = Space {
             order,
             nodes: Places::default(),
+            datum: mesh.datum,
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
             axisymmetric: false,
@@ -80,6 +83,7 @@ impl<const D: usize> Space<D> {
         Space {
             order,
             nodes,
+            datum: mesh.datum,
             stride,
             cells: corners.filter_map(|&point| from_mesh.get(point)).collect(),
             axisymmetric: false,
@@ -157,7 +161,12 @@ impl<const D: usize> Space<D> {
         net
     }
 
-    /// What a force at a node adds to the sum of moments about the origin: nothing in a body of revolution.
+    /// Return the coordinates (x, y, z) that a point has in the scene.
+    pub fn in_scene(&self, x: [f64; D]) -> [f64; 3] {
+        pad(datum::in_scene(&self.datum, x))
+    }
+
+    /// What a force at a node adds to the sum of moments about the datum: nothing in a body of revolution.
     pub fn net_moment(&self, node: u32, force: [f64; D]) -> [f64; 3] {
         let (x, f) = (pad(self.nodes[node as usize]), pad(force));
         if self.axisymmetric { [0.0; 3] } else { cross(x, f) }

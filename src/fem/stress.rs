@@ -2,7 +2,7 @@
 
 use super::elasticity::Elasticity;
 use super::space::Space;
-use super::{assemble, element, pad, quadrature};
+use super::{assemble, element, quadrature};
 use crate::problem::order::Order;
 use nalgebra::Matrix3;
 
@@ -25,8 +25,8 @@ pub fn nodal<const D: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64
             let at = space.nodes[node as usize];
             let slope = space.slope(cell, &at, &element::values(space.order, l), &gradient, u);
             let material = elasticity
-                .at(index, pad(at))
-                .or_else(|_| elasticity.at(index, pad(assemble::interpolate(&x, &inside))));
+                .at(index, space.in_scene(at))
+                .or_else(|_| elasticity.at(index, space.in_scene(assemble::interpolate(&x, &inside))));
             // assembly was there: it has a value
             let Ok(material) = material else { continue };
             let stress = material.stress(&slope.strain());

@@ -8,6 +8,7 @@ mod blocks;
 mod blocks_tests;
 mod degree;
 mod factor;
+pub mod portable;
 mod symbolic;
 mod total;
 

@@ -2,9 +2,11 @@
 
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
+use nix::unistd::geteuid;
 use serde::Serialize;
-use std::fs::File;
+use std::fs::{DirBuilder, File, Metadata, Permissions};
 use std::io::Write;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -14,27 +16,46 @@ use std::time::Duration;
 pub fn file_name(made_from: impl Serialize, path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     // 128 bits are plenty.
-    format!("{stem}-{:.32}.msh", digest(&("winkler mesh 2", made_from)))
+    format!("{stem}-{:.32}.msh", digest(&("winkler mesh 3", made_from)))
 }
 
-/// Folders that may hold the cache, best first: $WINKLER_CACHE alone, or else $XDG_CACHE_HOME/winkler,
-/// ~/.cache/winkler and a folder for temporary files.
+/// Return the folders that may hold the cache, best first: $WINKLER_CACHE alone, or else $XDG_CACHE_HOME/winkler,
+/// ~/.cache/winkler and a folder of this user for temporary files. Folders into which others may put files are left out.
 pub fn folders() -> Vec<PathBuf> {
     choose(|name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from))
 }
 
 fn choose(variable: impl Fn(&str) -> Option<PathBuf>) -> Vec<PathBuf> {
-    if let Some(folder) = variable("WINKLER_CACHE") {
+    if let Some(folder) = variable("WINKLER_CACHE").filter(|folder| !is_open_to_others(folder)) {
         return vec![folder];
     }
-    [
+    let usual = [
         variable("XDG_CACHE_HOME").map(|folder| folder.join("winkler")),
         variable("HOME").map(|folder| folder.join(".cache").join("winkler")),
-        Some(std::env::temp_dir().join("winkler")),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+        Some(std::env::temp_dir().join(format!("winkler-{}", geteuid()))),
+    ];
+    usual.into_iter().flatten().filter(|folder| !is_open_to_others(folder)).collect()
+}
+
+/// Return whether another user may have made this file or folder, or may change it.
+fn is_of_others(data: &Metadata) -> bool {
+    let is_writable = !data.is_symlink() && data.permissions().mode() & WRITABLE_BY_ALL != 0;
+    data.uid() != geteuid().as_raw() || is_writable
+}
+
+/// The bit of a mode that lets everybody write.
+const WRITABLE_BY_ALL: u32 = 0o002;
+
+/// Return whether a folder that exists, or the link to it, is another user's or may be written by everybody: a mesh in it may be
+/// anybody's, and would be the answer to another problem.
+fn is_open_to_others(folder: &Path) -> bool {
+    [std::fs::symlink_metadata(folder), std::fs::metadata(folder)].iter().flatten().any(is_of_others)
+}
+
+/// Open a file of the cache, unless it is another user's.
+pub fn open(path: &Path) -> Option<File> {
+    let file = File::open(path).ok()?;
+    file.metadata().ok().filter(|data| !is_of_others(data)).map(|_| file)
 }
 
 /// Bytes that a disk must still take after a mesh failed, else it was full: some pages, more than what the end of a file leaves.
@@ -66,7 +87,8 @@ impl Workshop {
         let mut failure = None;
         for cache in folders {
             let folder = cache.join(&name);
-            match std::fs::create_dir_all(&folder) {
+            // nobody else writes there, whatever the umask
+            match DirBuilder::new().recursive(true).mode(0o755).create(&folder) {
                 Ok(()) => {
                     remove_left(cache);
                     return Ok(Workshop { cache: cache.clone(), _lock: lock(&folder), folder });
@@ -105,7 +127,9 @@ impl Workshop {
     /// The file system refuses.
     pub fn publish(&self, file: &Path, name: &str) -> Result<PathBuf> {
         let to = self.cache.join(name);
-        std::fs::rename(file, &to).map_err(|cause| Error::file(&to, "create", &cause))?;
+        let owned = |data: Metadata| Permissions::from_mode(data.permissions().mode() & !WRITABLE_BY_ALL);
+        let ours = std::fs::metadata(file).and_then(|data| std::fs::set_permissions(file, owned(data)));
+        ours.and_then(|()| std::fs::rename(file, &to)).map_err(|cause| Error::file(&to, "create", &cause))?;
         Ok(to)
     }
 }
@@ -155,7 +179,46 @@ mod tests {
         assert_eq!(choose(all), [PathBuf::from("/WINKLER_CACHE")]);
         let some = choose(|name| all(name).filter(|_| name != "WINKLER_CACHE"));
         assert_eq!(some[..2], [PathBuf::from("/XDG_CACHE_HOME/winkler"), PathBuf::from("/HOME/.cache/winkler")]);
-        assert_eq!(choose(|_| None).len(), 1);
+        let last = choose(|_| None);
+        assert!(last.len() == 1 && last[0].ends_with(format!("winkler-{}", geteuid())), "{last:?}");
+    }
+
+    /// Others may have written what lies in a folder that is open to all, or have made a file that is theirs.
+    #[test]
+    fn what_others_may_have_written_is_not_used() {
+        let base = tempfile::tempdir().unwrap();
+        let set = |path: &Path, mode| std::fs::set_permissions(path, Permissions::from_mode(mode)).unwrap();
+        let make = |name: &str, mode| {
+            let folder = base.path().join(name);
+            std::fs::create_dir(&folder).unwrap();
+            set(&folder, mode);
+            folder
+        };
+        let (own, shared) = (make("own", 0o775), make("shared", 0o1777));
+        let chosen = |folder: &Path| choose(|name| (name == "WINKLER_CACHE").then(|| folder.to_owned()));
+        assert_eq!(chosen(&own), [own.clone()]);
+        assert!(!chosen(&shared).contains(&shared));
+        let link = base.path().join("link");
+        std::os::unix::fs::symlink(&own, &link).unwrap();
+        assert_eq!(chosen(&link), [link]);
+        let file = own.join("a.msh");
+        std::fs::write(&file, "").unwrap();
+        set(&file, 0o664);
+        assert!(open(&file).is_some());
+        set(&file, 0o666);
+        assert!(open(&file).is_none());
+        set(&file, 0o644);
+        // only root gives files away
+        if std::os::unix::fs::chown(&file, Some(54_321), None).is_ok() {
+            assert!(open(&file).is_none());
+            std::os::unix::fs::chown(&own, Some(54_321), None).unwrap();
+            assert!(!chosen(&own).contains(&own));
+            // nor is a link that another user made
+            let theirs = base.path().join("theirs");
+            std::os::unix::fs::symlink(make("target", 0o755), &theirs).unwrap();
+            std::os::unix::fs::lchown(&theirs, Some(54_321), None).unwrap();
+            assert!(!chosen(&theirs).contains(&theirs));
+        }
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! From what the scene names to a mesh: Gmsh, or the cache, or a file.
 
-use super::cache::{Workshop, file_name, folders};
+use super::cache::{self, Workshop, file_name, folders};
 use super::gmsh::{Gmsh, Task};
 use super::msh::Maker;
 use super::script::Script;
 use super::{Dealer, Mesh, foreign, msh};
 use crate::error::{Error, Located, Place, Result};
 use crate::exchange::Serial;
-use crate::file::digest_of_bytes;
+use crate::file::{Digested, digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
 use crate::problem::{Guard, MeshSource, Order};
 use std::fs::File;
@@ -23,6 +23,10 @@ pub struct Loaded<const D: usize> {
     pub origin: Origin,
     /// The `.msh` file that was read: the user's own, or the one in the cache; empty for arrays.
     pub file: PathBuf,
+    /// SHA-256 of its contents; empty for arrays.
+    pub digest: String,
+    /// Why it is not taken from the cache, where that is so, in words.
+    pub unkept: Option<String>,
 }
 
 /// Where a mesh came from.
@@ -68,7 +72,8 @@ pub fn deal<const D: usize>(
         }
         MeshSource::Msh { file } => from_file(file, order, interrupt, dealer),
         MeshSource::Arrays(arrays) => {
-            Ok(Loaded { mesh: super::arrays::mesh(arrays, order)?, origin: Origin::File, file: PathBuf::new() })
+            let mesh = super::arrays::mesh(arrays, order)?;
+            Ok(Loaded { mesh, origin: Origin::File, file: PathBuf::new(), digest: String::new(), unkept: None })
         }
     }
 }
@@ -87,14 +92,16 @@ fn from_file<const D: usize>(
     let mut start = Vec::new();
     let read = source.by_ref().take(START).read_to_end(&mut start);
     read.map_err(|cause| Error::file(path, "read", &cause).at(&file.place))?;
+    refuse_old_lines(path, &start)?;
     let mut loaded = match foreign::is_mesh(path, &start) {
         true => {
             let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
-            converted(file, &bytes, interrupt)?
+            converted(file, &with_unix_lines(bytes), interrupt)?
         }
         false => {
-            let mesh = msh::read(path, Box::new(source), Maker::User, Some(dealer))?;
-            Loaded { mesh, origin: Origin::File, file: path.clone() }
+            let mut source = Digested::new(source);
+            let mesh = msh::read(path, Box::new(&mut source), Maker::User, Some(dealer))?;
+            Loaded { mesh, origin: Origin::File, file: path.clone(), digest: source.digest(), unkept: None }
         }
     };
     loaded.mesh = match (loaded.mesh.order, order) {
@@ -112,13 +119,24 @@ fn from_file<const D: usize>(
     Ok(loaded)
 }
 
+/// Refuses text of Gmsh whose lines are none for it.
+fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
+    let end = start.iter().position(|byte| matches!(byte, b'\r' | b'\n'));
+    let is_old_mac = end.is_some_and(|at| start[at] == b'\r' && start.get(at + 1) != Some(&b'\n'));
+    match start.starts_with(b"$") && is_old_mac && !foreign::is_mesh(path, start) {
+        true => Err(Error::mesh(path, None, "its lines end with carriage returns alone, as on old Macs")
+            .help(format!("give them the ends of today: tr '\\r' '\\n' < {} > new.msh", path.display()))),
+        false => Ok(()),
+    }
+}
+
 /// A mesh of another program, or of another version of Gmsh's format, as Gmsh writes it.
 fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &Interrupt) -> Result<Loaded<D>> {
     let path = &file.value;
     let gmsh = Gmsh::find()?;
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     let name = file_name(("converted", gmsh.identity(), ending, digest_of_bytes(bytes)), path);
-    let parse = |file: File| {
+    let parse = |file: &mut Digested<File>| {
         msh::read(path, Box::new(file), Maker::Other, None).map_err(|error| match error.advice() {
             // what helps a script helps nobody here
             Some(advice) if !advice.contains("Physical") => error,
@@ -132,21 +150,27 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
             Task { script, shown: path, set: &[], is_mesh: true, dimension: D, order: Order::P1, guard, interrupt };
         gmsh.run(&task, made, work)
     };
-    kept(&name, &folders(), parse, make).map_err(|error| error.at(&file.place))
+    kept(&name, None, &folders(), parse, make).map_err(|error| error.at(&file.place))
 }
 
-/// The mesh of this name in the cache, which is in one of `folders`; or what `make` makes of it in a folder to work in, and in a file there.
+/// The mesh of this name in the cache, which is in one of `folders`; or what `make` makes of it in a folder to work in, and in a file there. If
+/// `unkept` says why the name does not tell all that the mesh is made from, it is made anew.
 fn kept<const D: usize>(
     name: &str,
+    unkept: Option<String>,
     folders: &[PathBuf],
-    mut parse: impl FnMut(File) -> Result<Mesh<D>>,
+    mut parse: impl FnMut(&mut Digested<File>) -> Result<Mesh<D>>,
     make: impl FnOnce(&Path, &Path) -> Result<()>,
 ) -> Result<Loaded<D>> {
+    let mut parse = |file: File| {
+        let mut source = Digested::new(file);
+        parse(&mut source).map(|mesh| (mesh, source.digest()))
+    };
     // A file of the cache that cannot be read or is damaged is as good as none.
-    for folder in folders {
+    for folder in folders.iter().filter(|_| unkept.is_none()) {
         let cached = folder.join(name);
-        if let Some(mesh) = File::open(&cached).ok().and_then(|file| parse(file).ok()) {
-            return Ok(Loaded { mesh, origin: Origin::Cache, file: cached });
+        if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| parse(file).ok()) {
+            return Ok(Loaded { mesh, origin: Origin::Cache, file: cached, digest, unkept });
         }
     }
     let workshop = Workshop::open(folders)?;
@@ -154,8 +178,42 @@ fn kept<const D: usize>(
     let open = || File::open(&made).map_err(|cause| Error::file(&made, "read", &cause));
     let mesh = make(workshop.path(), &made).and_then(|()| parse(open()?));
     // half a file is no fault of the script
-    let mesh = mesh.map_err(|error| workshop.blame(error))?;
-    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, name)? })
+    let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
+    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, name)?, digest, unkept })
+}
+
+/// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. None if there is more
+/// that it depends on, or a file that cannot be read.
+pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<String> {
+    match source {
+        MeshSource::Geo { file, set, sizes, guard, .. } => {
+            let script = script(&file.value).ok()?;
+            let known = script.inputs.unknown.is_none();
+            known.then(|| key(&file.value, &script, dimension, order, (set, sizes.as_deref(), guard)).ok())?
+        }
+        MeshSource::Msh { file } => crate::file::read(&file.value).ok().map(|bytes| digest_of_bytes(&bytes)),
+        MeshSource::Arrays(_) => None,
+    }
+}
+
+/// Read the script, or the shape of another program.
+fn script(path: &Path) -> Result<Script> {
+    if foreign::is_shape(path) { Script::of_shape(path) } else { Script::read(path) }
+}
+
+/// Return the name in the cache of the mesh of a script: with these numbers set in it, sizes to follow, and limits.
+fn key(
+    path: &Path,
+    script: &Script,
+    dimension: usize,
+    order: Order,
+    (set, sizes, guard): (&[(String, f64)], Option<&str>, &Guard),
+) -> Result<String> {
+    // one thread or many: the same algorithm
+    let asked = (dimension, order.degree(), guard.threads.is_some(), guard.size, set, sizes);
+    let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
+    let made_from = (Gmsh::find()?.identity(), asked, files, script.is_ended(), script.inputs.environment());
+    Ok(file_name(made_from, path))
 }
 
 /// Meshes a script on one rank.
@@ -183,8 +241,7 @@ fn meshed<const D: usize>(
 ) -> Result<Loaded<D>> {
     let path = &file.value;
     let is_shape = foreign::is_shape(path);
-    let script = if is_shape { Script::of_shape(path) } else { Script::read(path) };
-    let script = script.map_err(|error| error.at(&file.place))?;
+    let script = script(path).map_err(|error| error.at(&file.place))?;
     for (number, (name, _)) in set.iter().enumerate() {
         script.check(name, path, places.get(number).unwrap_or(&file.place))?;
     }
@@ -192,10 +249,9 @@ fn meshed<const D: usize>(
         script.judge(file)?;
     }
     let gmsh = Gmsh::find()?;
-    // one thread or many: the same algorithm
-    let asked = (D, order.degree(), guard.threads.is_some(), guard.size, set, sizes);
-    let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
-    let name = file_name((gmsh.identity(), asked, files, script.is_ended()), path);
+    let name = key(path, &script, D, order, (set, sizes, guard))?;
+    let unkept = script.inputs.unknown.as_ref();
+    let unkept = unkept.map(|word| format!("{} is meshed anew in each run, since it uses `{word}`", path.display()));
     let make = |work: &Path, made: &Path| {
         let own = match is_shape {
             true => foreign::script(path, &script.files[0], D, guard.size, work)?,
@@ -210,7 +266,7 @@ fn meshed<const D: usize>(
         let script = sized.as_deref().unwrap_or(&own);
         gmsh.run(&Task { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt }, made, work)
     };
-    kept(&name, folders, |file| checked(path, file, order, dealer), make)
+    kept(&name, unkept, folders, |file| checked(path, file, order, dealer), make)
 }
 
 /// For a script whose last line is not ended: one in the folder `work` that includes it.
@@ -239,7 +295,7 @@ pub fn keep_final(purpose: &str, sizes: &str) -> Result<()> {
 /// The sizes that an earlier adaptation for the same `purpose` ended with.
 pub fn recall_final(purpose: &str) -> Option<String> {
     let name = final_name(purpose);
-    folders().iter().find_map(|folder| std::fs::read_to_string(folder.join(&name)).ok())
+    folders().iter().find_map(|folder| std::io::read_to_string(cache::open(&folder.join(&name))?).ok())
 }
 
 fn final_name(purpose: &str) -> String {
@@ -247,7 +303,12 @@ fn final_name(purpose: &str) -> String {
 }
 
 /// The mesh in a file that Gmsh made from a script, of the order asked for.
-fn checked<const D: usize>(path: &Path, file: File, order: Order, dealer: &mut Dealer) -> Result<Mesh<D>> {
+fn checked<const D: usize>(
+    path: &Path,
+    file: &mut Digested<File>,
+    order: Order,
+    dealer: &mut Dealer,
+) -> Result<Mesh<D>> {
     // an earlier file may have been damaged
     dealer.reset();
     let mesh: Mesh<D> = msh::read(path, Box::new(file), Maker::Script, Some(dealer))?;

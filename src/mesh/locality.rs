@@ -66,6 +66,7 @@ mod tests {
         let mut mesh = Mesh {
             path: "line.msh".into(),
             points: at.iter().flat_map(|&i| cell(i)).collect(),
+            datum: [0.0; 3],
             order: Order::P1,
             groups: vec![Group {
                 name: "body".into(),

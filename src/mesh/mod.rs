@@ -10,12 +10,14 @@ mod bisect;
 mod cache;
 mod check;
 mod cursor;
+pub mod datum;
 mod dealer;
 mod elements;
 mod foreign;
 mod gmsh;
 mod groups;
 mod guard;
+mod inputs;
 mod load;
 mod locality;
 mod msh;
@@ -39,7 +41,7 @@ pub use check::{Asked, Checked, Duty, Joined, Nodes, Parts};
 pub use dealer::Dealer;
 pub use foreign::is_shape;
 pub use groups::{Group, Groups};
-pub use load::{Loaded, Origin, deal, keep_final, load, recall_final};
+pub use load::{Loaded, Origin, deal, keep_final, load, made_from, recall_final};
 pub use msh::{Maker, parse};
 pub use numbering::Numbering;
 pub use portion::{Key, Portion};
@@ -47,8 +49,13 @@ pub use quality::Quality;
 pub use sizes::{unstructured, view};
 pub use trust::{Breach, breach};
 
+use crate::linalg::pad;
 use crate::problem::order::Order;
 use std::path::PathBuf;
+
+/// Lengths of a mesh that a run computes with: those of atoms and of galaxies are between 1e-40 and 1e40 in all units in use, and sixth powers of
+/// these, which areas and volumes of cells lead to, are numbers still.
+pub const LENGTHS: [f64; 2] = [1e-40, 1e40];
 
 /// A mesh: points and named groups of simplices.
 ///
@@ -62,8 +69,11 @@ use std::path::PathBuf;
 pub struct Mesh<const D: usize> {
     /// The file that the user named (`.geo` or `.msh`), for messages.
     pub path: PathBuf,
-    /// Coordinates of the points in the order of the file, only those that some group uses; all of arrays.
+    /// Coordinates of the points relative to `datum`, in the order of the file; only those that some group uses, all of arrays.
     pub points: Vec<[f64; D]>,
+    /// The point of the scene from which coordinates are measured; the scene's own origin unless the mesh is far from it
+    /// ([`Portion::near`]).
+    pub datum: [f64; D],
     /// Order of all elements (points have none).
     pub order: Order,
     /// Named groups, in the order of the file.
@@ -83,6 +93,11 @@ impl<const D: usize> Mesh<D> {
         self.groups.iter().filter(move |group| group.dimension == dimension).map(|group| group.name.as_str())
     }
 
+    /// Return the coordinates (x, y, z) that a point has in the scene.
+    pub fn in_scene(&self, x: [f64; D]) -> [f64; 3] {
+        pad(datum::in_scene(&self.datum, x))
+    }
+
     /// Forgets the numbers of elements in the file, which messages of the checks name.
     pub fn forget_tags(&mut self) {
         self.groups.iter_mut().for_each(|group| group.tags = Vec::new());
@@ -98,6 +113,6 @@ impl<const D: usize> Mesh<D> {
         }
         let used = groups::used(&groups, self.points.len());
         let points = groups::renumber(&mut groups, used).map(|old| self.points[old]).collect();
-        Mesh { path: self.path.clone(), points, order: Order::P1, groups, split: self.split }
+        Mesh { points, order: Order::P1, groups, path: self.path.clone(), ..*self }
     }
 }

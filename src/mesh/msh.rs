@@ -52,7 +52,9 @@ pub fn read<const D: usize>(
         let start = cursor.position();
         let line = cursor.line()?;
         let Some(section) = line.strip_prefix('$') else {
-            return Err(cursor.error_at(start, "a section such as `$Nodes` should begin here"));
+            return Err(cursor
+                .error_at(start, "a section such as `$Nodes` should begin here")
+                .help("the file is damaged, or has something behind its end: save the mesh again with Gmsh"));
         };
         cursor.enter(section);
         match section {
@@ -182,5 +184,5 @@ fn finish<const D: usize>(
             groups::renumber(&mut groups, used).map(|old| point(nodes.points[old])).collect()
         }
     };
-    Ok(Mesh { path: path.to_owned(), points, order, groups: groups.into(), split })
+    Ok(Mesh { path: path.to_owned(), points, datum: [0.0; D], order, groups: groups.into(), split })
 }

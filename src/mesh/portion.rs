@@ -5,7 +5,7 @@
 //! they have among all, so that ranks compare them alike; keys put the cells of all ranks into the order in which one rank has them.
 
 use super::dealer::{self, Cells, Dealer, Head};
-use super::{Cuts, Group, Mesh, Numbering, groups};
+use super::{Cuts, Group, Mesh, Numbering, datum, groups};
 use crate::error::Result;
 use crate::exchange::{Exchange, pack, tell, unpack};
 use crate::linalg::{bounds, pad};
@@ -21,6 +21,8 @@ pub struct Portion<const D: usize> {
     pub mesh: Mesh<D>,
     /// Number of points of the mesh on all ranks.
     pub points: usize,
+    /// Corners of the box around the points of all ranks, in coordinates of the scene.
+    bounds: [[f64; 3]; 2],
     /// The rank of each point; empty where one rank has all.
     owner: Vec<u32>,
     /// Numbers of the points among all, sorted; empty where one rank has all.
@@ -60,7 +62,7 @@ impl<const D: usize> Portion<D> {
             return read.map(Self::whole);
         }
         let is_dealt = dealer.has_begun();
-        let read = read.map(|Mesh { path, points, order, groups, split }| {
+        let read = read.map(|Mesh { path, points, order, groups, split, .. }| {
             let mut groups = groups.into_list();
             if !is_dealt {
                 // it was read whole
@@ -102,11 +104,24 @@ impl<const D: usize> Portion<D> {
 
     /// All of a mesh.
     pub fn whole(mut mesh: Mesh<D>) -> Self {
+        let bounds = bounds(mesh.points.iter().copied().map(pad));
         if D == 3 {
-            mesh.sort_cells(bounds(mesh.points.iter().copied().map(pad)), &[]);
+            mesh.sort_cells(bounds, &[]);
         }
         let points = mesh.points.len();
-        Self { mesh, points, owner: Vec::new(), numbers: Vec::new(), keys: Vec::new(), rank: 0 }
+        Self { mesh, points, bounds, owner: Vec::new(), numbers: Vec::new(), keys: Vec::new(), rank: 0 }
+    }
+
+    /// Measure the coordinates from a datum near the mesh, the same on all ranks, if the origin is far away; see [`datum`]. `along` says
+    /// along which axes the origin may move.
+    #[must_use]
+    pub fn near(mut self, along: [bool; D]) -> Self {
+        let datum = datum::of(self.bounds, along);
+        for x in &mut self.mesh.points {
+            (0..D).for_each(|c| x[c] -= datum[c]);
+        }
+        self.mesh.datum = datum;
+        self
     }
 
     fn of(
@@ -126,12 +141,12 @@ impl<const D: usize> Portion<D> {
         for point in groups.iter_mut().flat_map(|group| &mut group.connectivity) {
             *point = place.get(*point).unwrap_or_default();
         }
-        let mut mesh = Mesh { path, points, order, groups: groups.into(), split };
+        let mut mesh = Mesh { path, points, datum: [0.0; D], order, groups: groups.into(), split };
         let keys = match D {
             3 => mesh.sort_cells(bounds, &index),
             _ => index.into_iter().map(|index| index.into_iter().map(|index| (0, index)).collect()).collect(),
         };
-        Self { mesh, points: count, owner, numbers, keys, rank: rank as u32 }
+        Self { mesh, points: count, bounds, owner, numbers, keys, rank: rank as u32 }
     }
 
     /// Whether a point is one of this rank.

@@ -3,6 +3,7 @@
 //!
 //! This is a search through its text, not an interpreter: a file whose name the script computes is not seen.
 
+use super::inputs::Inputs;
 use super::tokens::{Token, tokens};
 use super::trust;
 use crate::error::{Error, Located, Place, Result};
@@ -14,6 +15,8 @@ use std::path::{Path, PathBuf};
 pub struct Script {
     /// The contents of the script itself and of every file it names, in the order they are met.
     pub files: Vec<Vec<u8>>,
+    /// What it depends on besides.
+    pub inputs: Inputs,
     /// Names that take a number from outside.
     settable: BTreeSet<String>,
     /// Names of constants whose number is set under another name, and that name.
@@ -33,10 +36,9 @@ impl Script {
     /// A script that cannot be read. Included files that do not exist are left to Gmsh to report.
     pub fn read(path: &Path) -> Result<Script> {
         let mut script = Script::default();
-        // Canonical paths, since scripts may include each other along ever longer ones.
-        let canonical = path.canonicalize().map_err(|cause| Error::file(path, "read", &cause))?;
-        let home = canonical.parent().unwrap_or(Path::new("")).to_owned();
-        let mut found: Vec<PathBuf> = vec![canonical];
+        path.canonicalize().map_err(|cause| Error::file(path, "read", &cause))?;
+        let mut found: Vec<PathBuf> = located(path).into_iter().collect();
+        let home = found.first().and_then(|first| first.parent()).unwrap_or(Path::new("")).to_owned();
         let mut next = 0;
         while let Some(path) = found.get(next).cloned() {
             next += 1;
@@ -46,16 +48,17 @@ impl Script {
             let folder = path.parent().unwrap_or(Path::new(""));
             let text = String::from_utf8_lossy(&bytes);
             let tokens: Vec<Token> = tokens(&text).into_iter().map(|(_, token)| token).collect();
-            for token in &tokens {
-                let Token::Text(name) = token else { continue };
-                let Ok(file) = folder.join(name).canonicalize() else {
-                    continue;
-                };
+            let named = tokens.iter().filter_map(|token| if let Token::Text(name) = token { Some(name) } else { None });
+            let named = named.map(|name| folder.join(name));
+            for file in named.chain([options_of(&path)]).filter_map(|file| located(&file)) {
                 if file.is_file() && !found.contains(&file) {
                     found.push(file);
                 }
             }
             script.note(&tokens);
+            if trust::is_script(&path, &bytes) {
+                script.inputs.note(&tokens);
+            }
             if script.breach.is_none() {
                 script.breach = trust::breach(&path, &bytes, &home).map(|breach| (path, breach));
             }
@@ -165,6 +168,20 @@ impl Script {
     }
 }
 
+/// Return the path of a file in its folder, links to the folder resolved and one to the file itself not: Gmsh looks for what a script
+/// names beside the link. Scripts may include each other along ever longer paths, which are the same then.
+fn located(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+    Some(folder.canonicalize().ok()?.join(path.file_name()?))
+}
+
+/// Return the file of options beside a file, which Gmsh runs as a script after it has opened or merged the file.
+fn options_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".opt");
+    name.into()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,5 +237,31 @@ mod tests {
         assert!(script.assigned.contains("n"));
         assert!(script.files[0].starts_with(b"Include"));
         assert_eq!(script.files.len(), 3);
+    }
+
+    /// Gmsh reads `a.geo.opt` after `a.geo`, and what is named in a script that is a link lies beside the link.
+    #[test]
+    fn files_are_found_where_gmsh_finds_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        let breach = |name: &str| Script::read(&folder.path().join(name)).unwrap().breach.map(|(path, _)| path);
+        for part in ["sub", "real"] {
+            std::fs::create_dir(folder.path().join(part)).unwrap();
+        }
+        write("a.geo", "n = 1;\n");
+        assert_eq!(breach("a.geo"), None);
+        write("a.geo.opt", "SystemCall \"id\";\n");
+        assert!(breach("a.geo").is_some_and(|path| path.ends_with("a.geo.opt")));
+        write("b.geo", "Merge \"c.step\";\n");
+        write("c.step", "");
+        write("c.step.opt", "Merge \"d.opt\";\n");
+        write("d.opt", "Save \"x\";\n");
+        assert!(breach("b.geo").is_some_and(|path| path.ends_with("d.opt")));
+        write("real/e.geo", "Include \"f.geo\";\n");
+        write("real/f.geo", "n = 1;\n");
+        write("sub/f.geo", "Save \"x\";\n");
+        std::os::unix::fs::symlink("../real/e.geo", folder.path().join("sub/e.geo")).unwrap();
+        assert_eq!(breach("real/e.geo"), None);
+        assert!(breach("sub/e.geo").is_some_and(|path| path.ends_with("sub/f.geo")));
     }
 }

@@ -98,6 +98,7 @@ pub fn turn(simplex: &mut [u32], points: &[[f64; 3]], dimension: usize, space: u
     let mut vertices = [[0.0; 3]; 4];
     vertices.iter_mut().zip(&simplex[..=dimension]).for_each(|(vertex, point)| *vertex = points[*point as usize]);
     let vertices = &vertices[..=dimension];
+    let vertices = &of_unit_size(vertices)[..=dimension];
     let measure = measure(vertices, space);
     if is_degenerate(vertices, measure) {
         return false;
@@ -106,6 +107,20 @@ pub fn turn(simplex: &mut [u32], points: &[[f64; 3]], dimension: usize, space: u
         mirror(simplex);
     }
     true
+}
+
+/// Up to four vertices seen from the first and scaled, exactly, by a power of two such that the largest difference of coordinates is near one:
+/// powers of lengths neither vanish nor overflow then.
+fn of_unit_size(vertices: &[[f64; 3]]) -> [[f64; 3]; 4] {
+    let mut scaled = [[0.0; 3]; 4];
+    for (edge, vertex) in scaled.iter_mut().zip(vertices) {
+        *edge = std::array::from_fn(|c| vertex[c] - vertices[0][c]);
+    }
+    let largest = scaled.iter().flatten().fold(0.0f64, |most, x| most.max(x.abs()));
+    // by its root, since the reciprocal of a tiny number overflows
+    let root = if largest > 0.0 { (-0.5 * largest.log2()).round().exp2() } else { 1.0 };
+    scaled.iter_mut().flatten().for_each(|x| *x = *x * root * root);
+    scaled
 }
 
 /// Signed measure of the simplex on these vertices, times the factorial of its dimension. The sign means something
@@ -121,7 +136,7 @@ pub fn measure(vertices: &[[f64; 3]], space: usize) -> f64 {
     }
 }
 
-/// Whether a simplex of this [`measure`] has, to rounding, no extent: true for numbers that overflowed, too.
+/// Whether a simplex of this [`measure`] and of unit size has, to rounding, no extent: true for numbers that are none, too.
 fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
     let mut longest = 0.0_f64;
     for (i, a) in vertices.iter().enumerate() {
@@ -130,7 +145,7 @@ fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
         }
     }
     let smallest = 1e-12 * longest.powi(vertices.len() as i32 - 1);
-    // Overflow leaves infinity or NaN; a point has measure 1 and passes.
+    // A point has measure 1 and passes.
     !measure.is_finite() || measure.abs() <= smallest
 }
 
@@ -151,14 +166,17 @@ mod tests {
     }
 
     #[test]
-    fn flat_and_overflown_simplices_are_degenerate() {
-        let [a, b, c, _] = TETRAHEDRON;
-        let flat = [a, b, c, [0.3, 0.3, 1e-14]];
-        assert!(is_degenerate(&flat, measure(&flat, 3)));
-        assert!(!is_degenerate(&TETRAHEDRON, measure(&TETRAHEDRON, 3)));
-        assert!(!is_degenerate(&[a], measure(&[a], 3)));
-        let far = [a, [1e300, 0.0, 0.0], [0.0, 1e300, 0.0]];
-        assert!(is_degenerate(&far, measure(&far, 2)));
+    fn flat_simplices_are_degenerate_whatever_their_size() {
+        let [a, b, c, d] = TETRAHEDRON;
+        for size in [1.0, 1e-120, 1e120, 1e-300, 1e300] {
+            let turns = |points: &[[f64; 3]]| {
+                let points: Vec<_> = points.iter().map(|x| x.map(|x| size * x)).collect();
+                turn(&mut [0, 1, 2, 3][..points.len()], &points, points.len() - 1, 3)
+            };
+            assert!(turns(&[a, b, c, d]) && turns(&[a, b, c]) && turns(&[a, b]) && turns(&[a]));
+            assert!(!turns(&[a, b, c, [0.3, 0.3, 1e-14]]) && !turns(&[a, b, [2.0, 1e-13, 0.0]]) && !turns(&[a, a]));
+        }
+        assert!(!turn(&mut [0, 1], &[a, [f64::INFINITY, 0.0, 0.0]], 1, 3));
     }
 
     /// Mid-edges must stay between the same two vertices, whatever their order.

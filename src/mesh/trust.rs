@@ -17,7 +17,7 @@ pub struct Breach {
 }
 
 /// Commands that run other programs or text that the script makes up.
-const RUN: [&str; 9] = [
+pub const RUN: [&str; 11] = [
     "SystemCall",
     "System",
     "NonBlockingSystemCall",
@@ -27,13 +27,16 @@ const RUN: [&str; 9] = [
     "ExternalProcess",
     "Parse",
     "Plugin",
+    // a command whose name is a text
+    "StringToName",
+    "S2N",
 ];
 
 /// Commands that write a file or a folder. `Print.Background` and the like are numbers.
 const WRITE: [&str; 5] = ["Save", "Print", "CreateDir", "RenameFile", "DeleteFile"];
 
 /// Commands that read a file as a script.
-const READ: [&str; 3] = ["Include", "Merge", "MergeWithBoundingBox"];
+pub const READ: [&str; 3] = ["Include", "Merge", "MergeWithBoundingBox"];
 
 /// Gmsh's scanner cuts texts of 1024 bytes, and reads the rest of one as commands.
 const LONGEST: usize = 1000;
@@ -46,7 +49,7 @@ const SCRIPTS: [&str; 8] = ["geo", "pos", "msh", "opt", "inc", "dat", "txt", "pa
 
 /// The first thing in a file that its user must trust it for. `home` is the folder that it may read from.
 pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
-    if is_kind(path, &DATA) || bytes.starts_with(b"$MeshFormat") {
+    if !is_script(path, bytes) {
         return None;
     }
     let text = String::from_utf8_lossy(bytes);
@@ -62,7 +65,7 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
         let next = all.get(index + 1).map(|(_, token)| *token);
         let what = match *token {
             Token::Text(text) if text.len() > LONGEST => Some("has a text that is too long for Gmsh".to_owned()),
-            Token::Name(name) if name.ends_with("FileName") && follows(&all[..index], "General") => {
+            Token::Name(name) if chooses_file(name, &all[..index]) => {
                 Some(format!("chooses files that Gmsh writes: `General.{name}`"))
             }
             // a variable of this name is no command
@@ -74,7 +77,10 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
             Token::Name(name @ ("Printf" | "Error" | "Warning")) if redirects(&all[index + 1..]) => {
                 Some(format!("writes files: `{name}(...) > ...`"))
             }
-            Token::Name("Solver") if next == Some(Token::Sign('.')) => Some("sets programs: `Solver`".to_owned()),
+            // also as `Solver[0].Executable0`
+            Token::Name("Solver") if matches!(next, Some(Token::Sign('.' | '['))) => {
+                Some("sets programs: `Solver`".to_owned())
+            }
             Token::Name(name) if READ.contains(&name) => reads(name, &all[index + 1..], path, home),
             _ => None,
         };
@@ -85,11 +91,19 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
     None
 }
 
+/// Return whether Gmsh reads a file as a script: not one that it hands to a reader of shapes or meshes.
+pub fn is_script(path: &Path, bytes: &[u8]) -> bool {
+    !is_kind(path, &DATA) && !bytes.starts_with(b"$MeshFormat")
+}
+
 type Spot<'a> = (std::ops::Range<usize>, Token<'a>);
 
-/// Whether these words end with `name` and a point.
-fn follows(before: &[Spot], name: &str) -> bool {
-    matches!(before, [.., (_, Token::Name(first)), (_, Token::Sign('.'))] if *first == name)
+/// Whether a name is an option of Gmsh that names a file to write. The name of its category may be computed or have an index. Fields and views
+/// have a `FileName` that is read.
+fn chooses_file(name: &str, before: &[Spot]) -> bool {
+    let is_general = matches!(before, [.., (_, Token::Name("General")), (_, Token::Sign('.'))]);
+    let is_option = matches!(before, [.., (_, Token::Sign('.'))]);
+    name.ends_with("FileName") && is_option && (is_general || name != "FileName")
 }
 
 /// Whether an argument in parentheses or brackets comes first, and then `>`.
@@ -160,6 +174,10 @@ mod tests {
             ("Include \"/etc/passwd\";", "outside its own folder"),
             ("Solver.Executable0 = \"id\";", "`Solver`"),
             ("General.ErrorFileName = \"../a\";", "`General.ErrorFileName`"),
+            ("General[0].ErrorFileName = \"../a\";", "`General.ErrorFileName`"),
+            ("Solver[0].Executable0 = \"id\";", "`Solver`"),
+            ("S2N[\"SystemCall\"] \"id\";", "`S2N`"),
+            ("StringToName[StrCat(\"Sys\", \"tem\")] \"id\";", "`StringToName`"),
             ("// \0 SystemCall \"id\";", "zero byte"),
             ("\u{1f}", ""),
         ] {
@@ -180,6 +198,7 @@ mod tests {
             "Physical Surface(\"Save\") = {1}; Mesh.SaveAll = 1; Systematic = 3; System = 2;",
             "Merge \"part.step\"; Merge 'sizes.pos'; Include \"not there\";",
             "Error(\"n must be greater than %g\", 3);",
+            "myFileName = \"a\"; Field[1] = Structured; Field[1].FileName = myFileName;",
         ] {
             assert_eq!(verdict(text), None, "{text}");
         }

@@ -1,10 +1,13 @@
-//! The folder of results: made before the work starts, and never left with half a file.
+//! The folder of results: made before the work starts, written by one run at a time, and never left with half a file.
 
-use crate::error::{Error, Result};
+use super::leftovers;
+use super::lock::Lock;
+use crate::error::{Error, Kind, Result};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs::{self, File, FileType, OpenOptions};
 use std::io::{self, BufWriter, Write};
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// A folder for the results of one run.
@@ -12,25 +15,58 @@ use std::path::{Path, PathBuf};
 pub struct Folder {
     path: PathBuf,
     files: RefCell<BTreeSet<PathBuf>>,
+    /// Held by the process that writes the tables of a run.
+    _lock: Option<Lock>,
 }
 
 impl Folder {
     /// Makes the folder with its parents, or takes the one that is there, and tries whether it can be written.
     ///
     /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) when it cannot be made, is no folder, or cannot be written.
+    /// [`Kind::File`] when it cannot be made, is no folder, belongs to somebody else, or cannot be written.
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref().to_owned();
-        fs::create_dir_all(&path).map_err(|cause| {
-            Error::file(&path, "create the folder", &cause).help("name a folder that can be made with `-o FOLDER`")
-        })?;
-        remove_parts(&path);
+        make_folder(&path)?;
         let probe = path.join(format!(".winkler-{}", std::process::id()));
-        File::create(&probe).and_then(|_| fs::remove_file(&probe)).map_err(|cause| {
+        let owner = create_new(&probe).and_then(|file| file.metadata()).map(|data| data.uid());
+        let _ = fs::remove_file(&probe);
+        let owner = owner.map_err(|cause| {
             Error::file(&path, "write to the folder", &cause)
                 .help("give yourself write permission, or name another folder with `-o FOLDER`")
         })?;
-        Ok(Self { path, files: RefCell::default() })
+        refuse_foreign(&path, owner)?;
+        Ok(Self { path, files: RefCell::default(), _lock: None })
+    }
+
+    /// The same for the results of a run, which no other run may write to until this value is dropped. Temporary files of processes that
+    /// were killed are removed.
+    ///
+    /// # Errors
+    /// Those of [`Self::create`], and [`Kind::File`] while another process has the folder.
+    pub fn claim(path: impl AsRef<Path>) -> Result<Self> {
+        let folder = Self::create(path)?;
+        let lock = Lock::take(&folder.path)?;
+        remove_parts(&folder.path);
+        remove_parts(&folder.path.join(leftovers::STEPS));
+        Ok(Self { _lock: Some(lock), ..folder })
+    }
+
+    /// Removes what an earlier run left, and nothing else.
+    ///
+    /// # Errors
+    /// [`Kind::File`] when a file cannot be removed.
+    pub fn clear(&self) -> Result<()> {
+        for name in leftovers::of_runs(&self.path) {
+            let path = self.path.join(&name);
+            // never below a link that leads elsewhere; what is no file is no result
+            let is_inside = path.parent().is_some_and(|parent| parent == self.path || !parent.is_symlink());
+            if is_inside && fs::symlink_metadata(&path).is_ok_and(|data| !data.is_dir()) {
+                fs::remove_file(&path).map_err(|cause| Error::file(&path, "remove the old", &cause))?;
+            }
+        }
+        // one that still has something in it stays
+        let _ = fs::remove_dir(self.path.join(leftovers::STEPS));
+        Ok(())
     }
 
     /// The folder as it was named.
@@ -48,7 +84,7 @@ impl Folder {
     /// The text goes to a temporary file in the same folder, which takes the name only when it is complete.
     ///
     /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) with the path and the cause; then nothing was changed.
+    /// [`Kind::File`] with the path and the cause; then nothing was changed.
     pub fn write(&self, name: &str, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
         let path = self.path.join(name);
         write_whole(&path, fill)?;
@@ -56,13 +92,13 @@ impl Folder {
         Ok(())
     }
 
-    /// Opens a file `name` that grows while the program works, replacing one of this name.
+    /// Opens a file `name` that begins with `start` and grows while the program works, replacing one of this name.
     ///
     /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) with the path and the cause.
-    pub fn open(&self, name: &str) -> Result<(PathBuf, File)> {
+    /// [`Kind::File`] with the path and the cause; then nothing was changed.
+    pub fn open(&self, name: &str, start: &[u8]) -> Result<(PathBuf, File)> {
         let path = self.path.join(name);
-        let file = File::create(&path).map_err(|cause| failed(&path, &cause))?;
+        let file = replace(&path, |out| out.write_all(start))?;
         self.files.borrow_mut().insert(path.clone());
         Ok((path, file))
     }
@@ -70,31 +106,97 @@ impl Folder {
     /// Makes a folder in it, or takes the one that is there.
     ///
     /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) with the path and the cause.
+    /// [`Kind::File`] with the path and the cause.
     pub fn subfolder(&self, name: &str) -> Result<()> {
         let path = self.path.join(name);
-        fs::create_dir_all(&path).map_err(|cause| Error::file(&path, "create the folder", &cause))?;
-        remove_parts(&path);
-        Ok(())
+        if path.is_symlink() {
+            return Err(Error::new(Kind::File, format!("{} is a link to another place", path.display()))
+                .help("remove it: results stay in their folder"));
+        }
+        make_folder(&path)
     }
 }
 
-/// Writes a whole file or nothing: fills a temporary file beside `path` and renames it.
+/// Makes a folder with its parents, or takes the one that is there.
 ///
 /// # Errors
-/// [`Kind::File`](crate::error::Kind::File) with the path and the cause; then nothing was changed.
+/// [`Kind::File`] when it cannot be made, or something else has its name.
+pub fn make_folder(path: &Path) -> Result<()> {
+    let help = "remove it, or name another folder (`-o FOLDER`)";
+    // the first that is there and no folder is in the way
+    let in_the_way = path.ancestors().find(|part| part.symlink_metadata().is_ok()).filter(|part| !part.is_dir());
+    if let Some(part) = in_the_way {
+        let part_is = match (fs::read_link(part), fs::metadata(part)) {
+            (Ok(target), Err(_)) => format!("a link to {}, which is not there", target.display()),
+            (_, Ok(data)) => kind_of(data.file_type()).to_owned(),
+            (Err(_), Err(_)) => "no folder".to_owned(),
+        };
+        return Err(Error::new(Kind::File, format!("cannot create the folder {}", path.display()))
+            .because(format!("{} is {part_is}", part.display()))
+            .help(help));
+    }
+    fs::create_dir_all(path).map_err(|cause| Error::file(path, "create the folder", &cause).help(help))
+}
+
+/// Refuses to write into a folder of somebody else, who might not expect it, as root could; one that its owner lets a group or all write to
+/// is meant for that. `user` is the owner of a file that this process has made there.
+fn refuse_foreign(path: &Path, user: u32) -> Result<()> {
+    const SHARED: u32 = 0o022;
+    match fs::metadata(path) {
+        Ok(data) if data.uid() != user && data.mode() & SHARED == 0 => {
+            Err(Error::new(Kind::File, format!("the folder {} belongs to another user", path.display()))
+                .because(format!("its owner has the number {}, you have {user}", data.uid()))
+                .help("name a folder of your own with `-o FOLDER`, or let its owner share it: chmod g+w"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What a thing in a folder is, in words.
+fn kind_of(kind: FileType) -> &'static str {
+    match () {
+        _ if kind.is_file() => "a file, not a folder",
+        _ if kind.is_dir() => "a folder",
+        _ if kind.is_fifo() => "a pipe",
+        _ if kind.is_socket() => "a socket",
+        _ => "a device",
+    }
+}
+
+/// Makes a file that is not there, never through a link.
+fn create_new(path: &Path) -> io::Result<File> {
+    // of a process of this number that was killed
+    let _ = fs::remove_file(path);
+    OpenOptions::new().write(true).create_new(true).open(path)
+}
+
+/// Writes a whole file or nothing: fills a temporary file beside `path` and renames it. A link of this name is replaced, not followed.
+///
+/// # Errors
+/// [`Kind::File`] with the path and the cause; then nothing was changed.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
+    replace(path, fill).map(|_| ())
+}
+
+/// The same; gives the file, at its end.
+fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<File> {
+    // a folder cannot be replaced; a pipe or a device has its name for a purpose, which a file would not serve
+    if let Some(kind) = fs::metadata(path).ok().map(|data| data.file_type()).filter(|kind| !kind.is_file()) {
+        return Err(Error::new(Kind::File, format!("{} is {}, not a file", path.display(), kind_of(kind)))
+            .help("rename or remove it, or name another file or folder with `-o`"));
+    }
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(path.file_name().unwrap_or_default());
     hidden.push(format!(".{}.part", std::process::id()));
     let part = path.with_file_name(hidden);
     let written = (|| {
-        let mut out = BufWriter::new(File::create(&part)?);
+        let mut out = BufWriter::new(create_new(&part)?);
         fill(&mut out)?;
         let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
         // Network file systems and quotas may refuse the data only here.
         file.sync_all()?;
-        fs::rename(&part, path)
+        fs::rename(&part, path)?;
+        Ok(file)
     })();
     written.map_err(|cause| {
         // The first failure is the one to tell; the part may not even exist.
@@ -107,9 +209,11 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<
 fn remove_parts(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
-        let process = name.strip_prefix('.').and_then(|name| name.strip_suffix(".part")?.rsplit_once('.'));
+        let hidden = name.strip_prefix('.').unwrap_or_default();
+        let process = hidden.strip_suffix(".part").and_then(|name| name.rsplit_once('.'));
+        let process = process.map(|(_, id)| id).or(hidden.strip_prefix("winkler-"));
         let is_dead = |id: &str| id.parse::<u32>().is_ok() && !Path::new("/proc").join(id).exists();
-        if process.is_some_and(|(_, id)| is_dead(id)) {
+        if process.is_some_and(is_dead) {
             let _ = fs::remove_file(entry.path());
         }
     }
@@ -124,7 +228,6 @@ pub(super) fn failed(path: &Path, cause: &io::Error) -> Error {
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
             "give yourself write permission, or name another folder with `-o FOLDER`"
         }
-        io::ErrorKind::IsADirectory => "a folder has the name of this file: rename or remove it",
         _ => "name another folder with `-o FOLDER`",
     };
     Error::file(path, "write", cause).help(help)
@@ -140,7 +243,6 @@ pub fn safe_name(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Kind;
 
     fn names(folder: &Path) -> Vec<String> {
         let mut names: Vec<_> =
@@ -188,7 +290,7 @@ mod tests {
         for name in [".x.txt.4194305.part", ".notes.part", "x.4194305.part", &own] {
             fs::write(base.path().join(name), "").unwrap();
         }
-        Folder::create(base.path()).unwrap();
+        Folder::claim(base.path()).unwrap();
         let mut left = [own.as_str(), ".notes.part", "x.4194305.part"];
         left.sort_unstable();
         assert_eq!(names(base.path()), left);

@@ -38,13 +38,18 @@ impl HistoryWriter {
             ]
             .map(String::from),
         );
-        Ok(Self { rows: RowFile::create(folder, "history.csv", &header)?, bodies: bodies.len(), steps })
+        Ok(Self { rows: RowFile::create(folder, "history.csv", &header, &[])?, bodies: bodies.len(), steps })
+    }
+
+    /// Why rows are missing, in words, once.
+    pub fn complaint(&mut self) -> Option<String> {
+        self.rows.complaint()
     }
 
     /// Ends the file.
     ///
     /// # Errors
-    /// The first failure to write a row: later rows were dropped then.
+    /// Rows that could not be written to the end.
     pub fn finish(self) -> Result<()> {
         self.rows.finish()
     }

@@ -5,6 +5,7 @@
 
 #[cfg(feature = "cli")]
 mod chart;
+pub mod checksums;
 pub mod collection;
 pub mod contact;
 pub mod contacts;
@@ -13,6 +14,9 @@ mod format;
 pub mod gmsh;
 pub mod history;
 mod largest;
+pub mod leftovers;
+mod lock;
+mod look;
 #[cfg(feature = "cli")]
 pub mod plot;
 #[cfg(feature = "cli")]
@@ -44,11 +48,13 @@ use crate::error::{Error, Result};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
+pub use checksums::Checksums;
 pub use contact::ContactTable;
 pub use contacts::PairRow;
-pub use folder::{Folder, safe_name, write_whole};
+pub use folder::{Folder, make_folder, safe_name, write_whole};
 pub use format::{sci, seconds, trimmed};
 pub use history::HistoryWriter;
+pub use look::LookReport;
 #[cfg(feature = "cli")]
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{

@@ -2,6 +2,7 @@
 
 use super::format::{sci, seconds};
 use super::largest::largest;
+use super::look::LookReport;
 use super::steps::{Extent, StepReport};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -20,8 +21,8 @@ pub struct Report {
     pub ranks: usize,
     /// Title of the scene.
     pub title: String,
-    /// How the run ended: `converged`, `roundoff-limited`, `iteration-limit`, `not-finite`, `cycle`, `underconstrained`,
-    /// `unbounded`, `inner-solver`, `interrupted`; `running` in a snapshot.
+    /// How the run ended: `converged`, `roundoff-limited`, `iteration-limit`, `not-finite`, `out-of-range`, `cycle`, `underconstrained`,
+    /// `unbounded`, `inner-solver`, `inaccurate`, `interrupted`; `running` in a snapshot.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
     pub message: String,
@@ -71,6 +72,10 @@ pub struct Report {
     pub error_bound: Option<f64>,
     /// Estimate of that error where there is no bound.
     pub error_estimate: Option<f64>,
+    /// What rounding of gaps and displacements can make of a pressure, as a share of the largest one; the errors above do not count it.
+    pub rounding: Option<f64>,
+    /// What the last look at the result found; none where a run has no result.
+    pub last_look: Option<LookReport>,
     /// Estimated errors of the discretisation, if they were asked for.
     pub discretization_error: Option<EstimateReport>,
     /// Meshes that were adapted to an error, one after another.
@@ -252,7 +257,7 @@ pub struct BalanceReport {
     pub rigid: Vec<ForceReport>,
     /// Size of the sum of all forces over the sum of the sizes of all nodal forces.
     pub force_imbalance: f64,
-    /// The same for moments about the origin.
+    /// The same for moments, about the origin, or about a point near the mesh where the origin is far away (docs/meshes.md).
     pub moment_imbalance: f64,
 }
 
@@ -277,6 +282,8 @@ pub struct PairReport {
     pub facets_steep: usize,
     /// The same for facets that are too far away from it.
     pub facets_far: usize,
+    /// Pieces of the carrier that the search for common points has lost; a warning says where.
+    pub pieces_lost: usize,
     /// Facets of the carrier that are covered in part and take plain means.
     pub facets_averaged: usize,
     /// Energy of the layer, J.

@@ -1,53 +1,88 @@
 //! A CSV file that grows by a row at a time.
 
 use super::folder::{Folder, failed};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use std::fs::File;
+use std::io;
+use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 
 /// Writes rows as they come. Every row reaches the file at once, so that a run that is killed keeps all that it had computed.
+///
+/// A row that cannot be written, as on a full disk, is kept and tried again with each later one and at the end.
 pub struct RowFile {
     path: PathBuf,
-    csv: csv::Writer<File>,
-    failure: Option<Error>,
+    file: File,
+    /// Bytes of the file: whole rows.
+    length: u64,
+    /// Rows that it does not have yet.
+    waiting: Vec<u8>,
+    /// Why not, if not.
+    failure: Option<io::Error>,
+    /// Whether somebody was told.
+    is_told: bool,
 }
 
 impl RowFile {
-    /// Opens a file of this name and writes its header.
+    /// Opens a file of this name, which replaces one that is there, with its header and the rows that are known already.
     ///
     /// # Errors
     /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
-    pub fn create(folder: &Folder, name: &str, header: &[String]) -> Result<Self> {
-        let (path, file) = folder.open(name)?;
-        let mut rows = Self { path, csv: csv::Writer::from_writer(file), failure: None };
-        rows.push(header);
-        rows.check().map(|()| rows)
+    pub fn create(folder: &Folder, name: &str, header: &[String], known: &[Vec<String>]) -> Result<Self> {
+        let mut start = line(header);
+        known.iter().for_each(|row| start.extend(line(row)));
+        let (path, file) = folder.open(name, &start)?;
+        let (length, waiting) = (start.len() as u64, Vec::new());
+        Ok(Self { path, file, length, waiting, failure: None, is_told: false })
     }
 
-    /// The first failure so far, once.
-    ///
-    /// # Errors
-    /// That of a row that could not be written.
-    pub fn check(&mut self) -> Result<()> {
-        self.failure.take().map_or(Ok(()), Err)
+    /// The words of the first failure, once: for a warning while the program goes on.
+    pub fn complaint(&mut self) -> Option<String> {
+        let failure = self.failure.as_ref().filter(|_| !self.is_told)?;
+        self.is_told = true;
+        Some(format!("{} lacks rows: {failure}; they are kept in memory and tried again", self.path.display()))
     }
 
-    /// Appends a row. After a failure the file ends with whole rows: going on would leave a hole.
+    /// Appends a row.
     pub fn push(&mut self, fields: &[String]) {
-        if self.failure.is_some() {
-            return;
+        self.waiting.extend(line(fields));
+        self.write();
+    }
+
+    /// Writes the rows that wait, or nothing: after half a row the next one would not begin a line.
+    fn write(&mut self) {
+        match self.file.write_all_at(&self.waiting, self.length) {
+            Ok(()) => {
+                self.length += self.waiting.len() as u64;
+                self.waiting.clear();
+                self.failure = None;
+            }
+            Err(cause) => {
+                // where even this fails half a row stays at the end
+                let _ = self.file.set_len(self.length);
+                self.failure = Some(cause);
+            }
         }
-        let written = self.csv.write_record(fields).map_err(Into::into).and_then(|()| self.csv.flush());
-        self.failure = written.err().map(|cause| failed(&self.path, &cause));
     }
 
     /// Ends the file.
     ///
     /// # Errors
-    /// The first failure to write a row: later rows were dropped then.
-    pub fn finish(self) -> Result<()> {
-        self.failure.map_or(Ok(()), Err)
+    /// Rows that could not be written to the end.
+    pub fn finish(mut self) -> Result<()> {
+        if self.failure.is_some() {
+            self.write();
+        }
+        self.failure.map_or(Ok(()), |cause| Err(failed(&self.path, &cause)))
     }
+}
+
+/// A row as a line of CSV.
+fn line(fields: &[String]) -> Vec<u8> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    // memory takes what is written
+    let _ = csv.write_record(fields);
+    csv.into_inner().unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -56,11 +91,28 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_full_disk_is_told_once_at_the_end() {
-        let file = File::options().write(true).open("/dev/full").unwrap();
-        let mut rows = RowFile { path: "history.csv".into(), csv: csv::Writer::from_writer(file), failure: None };
+    fn a_full_disk_is_told_once_and_tried_again() {
+        let full = || File::options().write(true).open("/dev/full").unwrap();
+        let failure = None;
+        let mut rows = RowFile {
+            path: "history.csv".into(),
+            file: full(),
+            length: 0,
+            waiting: Vec::new(),
+            failure,
+            is_told: false,
+        };
         rows.push(&["1".to_owned()]);
+        assert!(rows.complaint().unwrap().contains("history.csv lacks rows"));
         rows.push(&["2".to_owned()]);
+        assert_eq!(rows.complaint(), None);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows");
+        rows.file = File::create(&path).unwrap();
+        rows.push(&["3, 4".to_owned()]);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "1\n2\n\"3, 4\"\n");
+        rows.file = full();
+        rows.push(&["5".to_owned()]);
         let error = rows.finish().unwrap_err();
         assert!(error.message().contains("history.csv"), "{error}");
         assert!(error.advice().unwrap().contains("space"), "{error}");

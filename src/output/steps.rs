@@ -142,7 +142,7 @@ impl StepTable {
             header.extend(numbers.map(|what| format!("{what} {pair}")));
         }
         header.extend(reactions.iter().flat_map(|name| vector_columns("reaction", name, dimension)));
-        Ok(Self { rows: RowFile::create(folder, "steps.csv", &header)?, dimension, count: 0 })
+        Ok(Self { rows: RowFile::create(folder, "steps.csv", &header, &[])?, dimension, count: 0 })
     }
 
     /// Writes a step; `names` are those of its factors in the order of the header.
@@ -161,10 +161,15 @@ impl StepTable {
         self.rows.push(&line);
     }
 
+    /// Why rows are missing, in words, once.
+    pub fn complaint(&mut self) -> Option<String> {
+        self.rows.complaint()
+    }
+
     /// Ends the file.
     ///
     /// # Errors
-    /// The first failure to write a row: later rows were dropped then.
+    /// Rows that could not be written to the end.
     pub fn finish(self) -> Result<()> {
         self.rows.finish()
     }

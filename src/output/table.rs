@@ -69,6 +69,11 @@ impl IterationTable {
         self.bar.finish_and_clear();
     }
 
+    /// Prints a warning to standard error, above the progress line.
+    pub fn warn(&self, text: &str) {
+        self.bar.suspend(|| eprintln!("warning: {text}"));
+    }
+
     fn print(&mut self, row: &Row) {
         let Some(table) = &mut self.table else { return };
         let mut text = String::new();

@@ -156,7 +156,8 @@ impl Ksp {
     ///
     /// # Errors
     /// When PETSc refuses an option; for the options that change the matrix itself, `-ksp_diagonal_scale` and
-    /// `-pc_factor_in_place`; and for `preonly` over a nested solver that keeps a preconditioner.
+    /// `-pc_factor_in_place`; for `-ksp_max_it 0` and a `-ksp_rtol` that is not below 1; and for `preonly` over a nested
+    /// solver that keeps a preconditioner.
     pub fn set_from_options(&mut self) -> Result<()> {
         // SAFETY: the solver of this wrapper.
         unsafe { petsc!(KSPSetFromOptions(self.ksp)) }.map_err(|error| {
@@ -192,7 +193,18 @@ impl Ksp {
         }
         if self.applies_only() {
             // SAFETY: the solver of this wrapper.
-            unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, ffi::PetscBool_PETSC_FALSE)) }?;
+            return unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, ffi::PetscBool_PETSC_FALSE)) };
+        }
+        let ([rtol, ..], limit) = self.tolerances()?;
+        // conjugate gradients make room for an eigenvalue an iteration, and go through one all the same
+        if limit < 1 {
+            return Err(Error::new(Kind::Solver, format!("{start}ksp_max_it is {limit}: the solver would do nothing"))
+                .help("give 1 or more; `-ksp_type preonly` applies the preconditioner once"));
+        }
+        // with 1 the zero guess would do
+        if !(0.0..1.0).contains(&rtol) {
+            return Err(Error::new(Kind::Solver, format!("{start}ksp_rtol is {rtol}, which is no tolerance"))
+                .help("give a number from 0 on, below 1"));
         }
         Ok(())
     }

@@ -46,6 +46,25 @@ pub(super) fn seen() -> bool {
     LAUNCHERS.split_whitespace().any(|name| env::var_os(name).is_some())
 }
 
+/// Variables in which launchers say how many ranks they started. `SLURM_NTASKS` is not among them: it is set in a batch script, too.
+const SIZES: &str = "OMPI_COMM_WORLD_SIZE PMI_SIZE MPI_LOCALNRANKS SLURM_STEP_NUM_TASKS FLUX_JOB_SIZE";
+
+/// Set by launchers that say the number of a rank, and perhaps nowhere how many there are.
+const NUMBERS: &str = "PMIX_RANK PMI_RANK PALS_RANKID ALPS_APP_PE";
+
+/// Whether a launcher started this process as one of several ranks, or may have done so.
+pub(super) fn several() -> bool {
+    is_several(|name| env::var(name).ok())
+}
+
+fn is_several(variable: impl Fn(&str) -> Option<String>) -> bool {
+    let sizes = SIZES.split_whitespace().filter_map(&variable).filter_map(|size| size.parse::<usize>().ok());
+    match sizes.max() {
+        Some(largest) => largest > 1,
+        None => NUMBERS.split_whitespace().any(|name| variable(name).is_some()),
+    }
+}
+
 /// Runs `start` with the settings of a lone process, or of one among others on its machine, if the user set none of them.
 pub(super) fn quick<T>(start: impl FnOnce() -> T) -> T {
     let settings = match seen() {
@@ -67,4 +86,26 @@ pub(super) fn quick<T>(start: impl FnOnce() -> T) -> T {
         unsafe { env::remove_var(name) };
     }
     result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_several;
+
+    #[test]
+    fn launchers_are_known_by_what_they_set() {
+        for (set, several) in [
+            (&[][..], false),
+            (&[("OMPI_COMM_WORLD_SIZE", "2"), ("PMIX_RANK", "0")], true),
+            (&[("OMPI_COMM_WORLD_SIZE", "1"), ("PMIX_RANK", "0")], false),
+            (&[("PMI_RANK", "0"), ("PMI_SIZE", "3")], true),
+            (&[("PMIX_RANK", "1")], true),
+            // a batch script of Slurm that starts no step
+            (&[("SLURM_PROCID", "0"), ("SLURM_NTASKS", "8"), ("SLURM_STEP_NUM_TASKS", "1")], false),
+            (&[("SLURM_PROCID", "0"), ("SLURM_STEP_NUM_TASKS", "8")], true),
+        ] {
+            let of = |name: &str| set.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned());
+            assert_eq!(is_several(of), several, "{set:?}");
+        }
+    }
 }

@@ -18,6 +18,9 @@ const FILE: &str = env!("WINKLER_PETSC_LIBRARY");
 /// Leaves the signals to Rust, so that a panic or a stack overflow prints its own message.
 const NO_SIGNALS: &str = "-no_signal_handler";
 
+/// Keeps PETSc from the files of options that it looks for by itself; that of the home folder is handed to it.
+const NO_FILES: &str = "-skip_petscrc";
+
 thread_local! {
     /// Whether PETSc runs; it belongs to the thread of the session.
     static RUNS: Cell<bool> = const { Cell::new(false) };
@@ -47,19 +50,15 @@ pub(super) fn runs() -> bool {
 }
 
 /// Whether nothing is lost if PETSc starts later, or never: it has no options to read.
-pub(super) fn may_wait(words: &[String]) -> bool {
+pub(super) fn may_wait(words: &[String], home: Option<&Path>) -> bool {
     let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
-    let home = std::env::var_os("HOME").map(|home| Path::new(&home).join(".petscrc"));
-    words.is_empty()
-        && !["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"].into_iter().any(set)
-        && !home.is_some_and(|path| path.exists())
-        && ![".petscrc", "petscrc"].into_iter().any(|name| Path::new(name).exists())
+    words.is_empty() && home.is_none() && !["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"].into_iter().any(set)
 }
 
 /// The functions of the running PETSc, which is started if it waited, with the options that were set meanwhile.
 pub(super) fn running() -> Result<&'static ffi::Library> {
     if !runs() {
-        start(&[])?;
+        start(&[], None)?;
         let library = open()?;
         for (name, value, is_read) in waiting::take() {
             table::set(library, &name, value.as_deref())?;
@@ -89,13 +88,14 @@ pub(super) fn check(function: &str, call: impl FnOnce(&ffi::Library) -> ffi::Pet
     check_in(running()?, function, call)
 }
 
-/// Starts PETSc with the options in `words`, in the environment and in its files. MPI runs already.
-pub(super) fn start(words: &[String]) -> Result<()> {
+/// Starts PETSc with the options in `words`, in the environment, in the `home` file, which is there on the first process, and in files that
+/// these name. MPI runs already.
+pub(super) fn start(words: &[String], home: Option<&Path>) -> Result<()> {
     let library = open()?;
     let nul = |_| Error::new(Kind::Solver, "a PETSc option contains a zero byte");
     // PETSc keeps a pointer to these words till its end; they are leaked, once.
-    let mut arguments = Vec::with_capacity(words.len() + 3);
-    for word in std::iter::once("winkler").chain(words.iter().map(String::as_str)).chain([NO_SIGNALS]) {
+    let mut arguments = Vec::with_capacity(words.len() + 4);
+    for word in std::iter::once("winkler").chain(words.iter().map(String::as_str)).chain([NO_SIGNALS, NO_FILES]) {
         arguments.push(CString::new(word).map_err(nul)?.into_raw());
     }
     let mut count = arguments.len() as c_int;
@@ -108,14 +108,19 @@ pub(super) fn start(words: &[String]) -> Result<()> {
     check_in(library, "PetscPushErrorHandler", |petsc| unsafe {
         petsc.PetscPushErrorHandler(Some(record), null_mut())
     })?;
-    // SAFETY: MPI runs; words and count live till the end of the process.
-    check_in(library, "PetscInitialize", |petsc| unsafe { petsc.PetscInitialize(count, arguments, null(), null()) })?;
+    let home = home.map(|path| CString::new(path.as_os_str().as_encoded_bytes())).transpose().map_err(nul)?;
+    let file = home.as_ref().map_or(null(), |path| path.as_ptr());
+    // SAFETY: MPI runs; words and count live till the end of the process, the name of the file till that of the call.
+    check_in(library, "PetscInitialize", |petsc| unsafe { petsc.PetscInitialize(count, arguments, file, null()) })?;
     RUNS.set(true);
-    let name = CString::new(NO_SIGNALS).map_err(nul)?;
-    // SAFETY: the name lives till the end of the call.
-    check_in(library, "PetscOptionsClearValue", |petsc| unsafe {
-        petsc.PetscOptionsClearValue(null_mut(), name.as_ptr())
-    })
+    for name in [NO_SIGNALS, NO_FILES] {
+        let name = CString::new(name).map_err(nul)?;
+        // SAFETY: the name lives till the end of the call.
+        check_in(library, "PetscOptionsClearValue", |petsc| unsafe {
+            petsc.PetscOptionsClearValue(null_mut(), name.as_ptr())
+        })?;
+    }
+    Ok(())
 }
 
 /// Ends PETSc, if it runs. What the user asked to see at the end (-log_view) is printed here.

@@ -29,6 +29,7 @@ mod error;
 mod factor;
 mod failure;
 mod ffi;
+mod files;
 mod halves;
 mod heap;
 mod indices;

@@ -56,6 +56,8 @@ pub struct Schur {
     positions: Vec<Int>,
     retained: Vec<Int>,
     complement: Vec<f64>,
+    /// Powers of two, one a dof, that give the matrix in MUMPS diagonal entries near one.
+    scale: Vec<f64>,
     _session: Session,
 }
 
@@ -65,6 +67,9 @@ impl Schur {
     ///
     /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1), in small bodies of the plane MUMPS' own approximate
     /// minimum degree (0).
+    ///
+    /// MUMPS treats pivots below an absolute size as zeros (about 1e-20), and scales no matrix itself of which it makes a Schur complement. So it
+    /// gets D K D with powers of two D, by which nothing is rounded: what counts as small does not depend on units or on other regions.
     ///
     /// # Errors
     /// When METIS is needed and missing, an option cannot be used, or MUMPS refuses the pattern.
@@ -81,12 +86,14 @@ impl Schur {
         if !inside || retained.len() >= rows || !rows.is_multiple_of(block_size) {
             return Err(Error::new(Kind::Solver, "not a lower triangle with interior rows"));
         }
+        let scale = scales(rows, lower);
         let mut schur = Schur {
             // SAFETY: MUMPS' struct is plain C data; zeros are null pointers and empty sizes.
             mumps: Box::new(unsafe { std::mem::zeroed() }),
             rows: lower.iter().map(|entry| one(entry.0)).collect(),
             columns: lower.iter().map(|entry| one(entry.1)).collect(),
-            values: lower.iter().map(|entry| entry.2).collect(),
+            values: lower.iter().map(|&(i, j, value)| value * scale[i] * scale[j]).collect(),
+            scale,
             positions: Vec::new(),
             retained: retained.iter().map(|&i| one(i)).collect(),
             complement: vec![0.0; retained.len() * retained.len()],
@@ -147,14 +154,21 @@ impl Schur {
         // MUMPS has its own copy by now
         (self.rows, self.columns, self.values) = Default::default();
         (self.mumps.irn, self.mumps.jcn, self.mumps.a) = (null_mut(), null_mut(), null_mut());
-        // of a symmetric matrix it writes one triangle, row by row
-        let n = self.retained.len();
+        self.complete();
+        Ok(())
+    }
+
+    /// Completes S, of which MUMPS writes one triangle, row by row, and takes the scales out.
+    fn complete(&mut self) {
+        let (n, scale) = (self.retained.len(), &self.scale);
+        let of = |i: usize| scale[self.retained[i] as usize - 1];
         for i in 0..n {
-            for j in 0..i {
-                self.complement[j * n + i] = self.complement[i * n + j];
+            for j in 0..=i {
+                let value = self.complement[i * n + j] / of(i) / of(j);
+                self.complement[i * n + j] = value;
+                self.complement[j * n + i] = value;
             }
         }
-        Ok(())
     }
 
     /// Takes S out, all of it, row by row, in the order of the retained dofs; nothing here needs it any more.
@@ -171,7 +185,8 @@ impl Schur {
         if reduced.is_empty() {
             return Ok(reduced);
         }
-        self.solve(1, &mut b.to_vec(), &mut reduced)?;
+        self.solve(1, &mut self.scaled(b), &mut reduced)?;
+        self.retained.iter().zip(&mut reduced).for_each(|(&dof, value)| *value /= self.scale[dof as usize - 1]);
         Ok(reduced)
     }
 
@@ -189,12 +204,20 @@ impl Schur {
     /// # Errors
     /// Failures of MUMPS.
     pub fn expand_condensed(&mut self, b: &[f64], x_retained: &[f64]) -> Result<Vec<f64>> {
-        let mut x = b.to_vec();
-        self.solve(2, &mut x, &mut x_retained.to_vec())?;
+        let mut x = self.scaled(b);
+        let mut reduced: Vec<f64> =
+            self.retained.iter().zip(x_retained).map(|(&dof, x)| x / self.scale[dof as usize - 1]).collect();
+        self.solve(2, &mut x, &mut reduced)?;
+        x.iter_mut().zip(&self.scale).for_each(|(x, scale)| *x *= scale);
         for (&dof, value) in self.retained.iter().zip(x_retained) {
             x[dof as usize - 1] = *value;
         }
         Ok(x)
+    }
+
+    /// D b.
+    fn scaled(&self, b: &[f64]) -> Vec<f64> {
+        b.iter().zip(&self.scale).map(|(b, scale)| b * scale).collect()
     }
 
     /// One phase of the solution (ICNTL(26)): 1 condenses `b` into `reduced`, 2 expands `reduced` into `b`.
@@ -268,6 +291,15 @@ impl Drop for Schur {
         // Nobody is left to tell an error.
         let _ = self.call(-2);
     }
+}
+
+/// The powers of two nearest to 1/sqrt(K_ii), one a row of a lower triangle; 1 where the diagonal is not positive.
+fn scales(rows: usize, lower: &[(usize, usize, f64)]) -> Vec<f64> {
+    let mut scale = vec![1.0; rows];
+    for &(i, _, diagonal) in lower.iter().filter(|&&(i, j, value)| i == j && value > 0.0 && value.is_finite()) {
+        scale[i] = (-0.5 * diagonal.log2()).round().exp2();
+    }
+    scale
 }
 
 /// Position of each dof in the order of elimination, from 1: nested dissection of the nodes, and the retained dofs last, in

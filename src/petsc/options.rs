@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::ffi::c_char;
 use std::ptr::null_mut;
 
-/// PETSc's table of options, filled from the command line, `PETSC_OPTIONS`, `.petscrc` and `-options_file`.
+/// PETSc's table of options, filled from the command line, `PETSC_OPTIONS`, `.petscrc` of the home folder and `-options_file`.
 ///
 /// Names may be given with or without their dash and come back with it; PETSc does not tell capital from small letters
 /// in them. Looking at an option here does not count as reading it.

@@ -1,11 +1,17 @@
 //! The life of MPI and PETSc in this process.
 
+use super::files::Files;
 use super::library::petsc;
 use super::{blas, kernels, launcher, library, waiting};
 use crate::error::{Error, Kind, Result};
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
+use mpi::traits::Root;
+use std::cell::OnceCell;
+use std::ffi::OsStr;
 use std::io::Write;
+use std::os::unix::ffi::OsStrExt;
+use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -37,19 +43,44 @@ pub struct Session(Rc<Running>);
 
 struct Running {
     world: SimpleCommunicator,
+    /// Files of options in the current folder that are not read.
+    left_out: OnceCell<Vec<String>>,
     /// Its drop ends MPI, after PETSc.
     _universe: Universe,
 }
 
 impl Session {
-    /// Starts MPI, then PETSc (at once, or where a lone process gives it no options, when it is first needed) with the options in `words` (as typed: `-ksp_type`, `cg`), in `PETSC_OPTIONS`, in
-    /// `.petscrc` and in the file of `-options_file`. PETSc installs no signal handlers. With several ranks a panic on
-    /// one of them ends them all.
+    /// Starts MPI, then PETSc (at once, or where a lone process gives it no options, when it is first needed) with the options in `words`
+    /// (as typed: `-ksp_type`, `cg`), in `PETSC_OPTIONS`, in `.petscrc` of the home folder and in the file of `-options_file`. PETSc installs
+    /// no signal handlers. With several ranks a panic on one of them ends them all.
     ///
     /// # Errors
     /// `Kind::Solver` when a session was started before in this process, when MPI runs already, or when PETSc refuses
-    /// an option; PETSc's message is among the causes.
+    /// an option; PETSc's message is among the causes. A file of options that is none, or that leads back to itself; ranks but the first
+    /// have a silent error then.
     pub fn start(words: &[String]) -> Result<Session> {
+        let session = Self::start_mpi()?;
+        if let Err(error) = session.start_petsc(words) {
+            // The other ranks may still wait for this one inside PETSc; ending MPI here would wait for them.
+            if session.size() > 1 {
+                std::mem::forget(session);
+            }
+            return Err(error);
+        }
+        Ok(session)
+    }
+
+    /// Return whether a launcher such as `mpiexec` started this process as one of several ranks: the others wait until it starts MPI,
+    /// or for ever if it ends before.
+    pub fn is_one_of_several() -> bool {
+        launcher::several()
+    }
+
+    /// Start MPI alone, with which ranks can compare what they are to do before PETSc reads options.
+    ///
+    /// # Errors
+    /// When a session was started before in this process, or MPI runs already.
+    pub fn start_mpi() -> Result<Session> {
         if STARTED.swap(true, Ordering::SeqCst) {
             return Err(Error::new(Kind::Solver, "PETSc was already started in this process")
                 .help("start one session and clone it"));
@@ -59,17 +90,26 @@ impl Session {
             .ok_or_else(|| Error::new(Kind::Solver, "MPI was already started in this process by other code"))?;
         let world = SimpleCommunicator::world();
         abort_on_panic(world.size() > 1);
-        if world.size() == 1 && library::may_wait(words) {
-            return Ok(Session(Rc::new(Running { world, _universe: universe })));
-        }
-        if let Err(error) = library::start(words) {
-            // The other ranks may still wait for this one inside PETSc; ending MPI here would wait for them.
-            if world.size() > 1 {
-                std::mem::forget(universe);
-            }
-            return Err(error);
-        }
-        Ok(Session(Rc::new(Running { world, _universe: universe })))
+        Ok(Session(Rc::new(Running { world, left_out: OnceCell::new(), _universe: universe })))
+    }
+
+    /// Files of PETSc options in the current folder that PETSc alone would have read, `.petscrc` and `petscrc`, on the first rank.
+    pub fn left_out(&self) -> &[String] {
+        self.0.left_out.get().map_or(&[], Vec::as_slice)
+    }
+
+    /// Start PETSc, after MPI, as [`start`](Self::start) does; once in a process. Collective.
+    ///
+    /// # Errors
+    /// PETSc refuses an option; the other ranks may wait for this one inside PETSc then. A file of options that is none, or that leads back to
+    /// itself; ranks but the first have a silent error then.
+    pub fn start_petsc(&self, words: &[String]) -> Result<()> {
+        let looked = if self.rank() == 0 { Files::look(words) } else { Ok(Files::default()) };
+        let Files { home, left_out } = of_first(self.world(), looked)?;
+        let may_wait = self.size() == 1 && library::may_wait(words, home.as_deref());
+        // a session starts once
+        let _ = self.0.left_out.set(left_out);
+        if may_wait { Ok(()) } else { library::start(words, home.as_deref()) }
     }
 
     /// Ends PETSc and MPI if this is the last clone, and tells what goes wrong with it: PETSc writes its logs then.
@@ -149,6 +189,29 @@ impl Drop for Running {
         let _ = library::end();
         drop(waiting::take());
     }
+}
+
+/// What the first rank found, on all of them: whether it failed, and the file of the home folder.
+fn of_first(world: &SimpleCommunicator, looked: Result<Files>) -> Result<Files> {
+    if world.size() == 1 {
+        return looked;
+    }
+    let root = world.process_at_rank(0);
+    let mut code = looked.as_ref().map_or_else(|error| error.kind().exit_code(), |_| 0);
+    root.broadcast_into(&mut code);
+    if code != 0 {
+        return Err(looked.err().map_or(Error::silent(code), Error::agreed));
+    }
+    let files = looked?;
+    let mut bytes = files.home.as_ref().map_or(Vec::new(), |path| path.as_os_str().as_bytes().to_vec());
+    let mut length = bytes.len() as u64;
+    root.broadcast_into(&mut length);
+    bytes.resize(length as usize, 0);
+    if length > 0 {
+        // MPI takes no empty message
+        root.broadcast_into(&mut bytes[..]);
+    }
+    Ok(Files { home: (length > 0).then(|| PathBuf::from(OsStr::from_bytes(&bytes))), ..files })
 }
 
 /// Makes a panic on one rank end the others too, which would wait for it for ever.

@@ -1,10 +1,11 @@
 //! Triangles of bodies and contact surfaces from `.vtu` files: all cells in the plane, the surface in space.
 
+use super::files::Files;
+use super::vtu::{self, Content, Piece};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::bounds;
 use std::collections::HashMap;
 use std::path::Path;
-use vtkio::model::{Attribute, CellType, DataSet, Piece, UnstructuredGridPiece, Vtk};
 
 /// A body or a contact surface as triangles.
 pub struct Part {
@@ -22,6 +23,15 @@ pub struct Part {
     pub is_solid: bool,
 }
 
+/// The array of contact surfaces.
+const SURFACE: &str = "pressure";
+
+/// VTK's numbers of kinds of cells.
+const TRIANGLE: u8 = 5;
+const TETRA: u8 = 10;
+const QUADRATIC_TRIANGLE: u8 = 22;
+const QUADRATIC_TETRA: u8 = 24;
+
 /// Parts of a quadratic triangle (corners, then mid-edges 01 12 02).
 const QUADRATIC: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
 /// Faces of a tetrahedron, seen from outside, with the mid-edges that a quadratic one has.
@@ -31,39 +41,29 @@ impl Part {
     /// Reads a file with the array `value` at its points, as float32 or float64, compressed or not; or those that a `.pvtu` joins.
     ///
     /// # Errors
-    /// [`Kind::File`] when a file is not there, is no VTU file or lacks the array.
-    pub fn read(path: &Path, name: &str, value: &str) -> Result<Self> {
-        let refuse = |path: &Path, cause: String| {
-            Error::new(Kind::File, format!("{} cannot be read as VTU", path.display()))
+    /// [`Kind::File`] when a file is not there, is damaged, is no VTU file or lacks the array.
+    pub fn read(files: &Files, file: &str, name: &str, value: &str) -> Result<Self> {
+        let refuse = |file: &str, cause: String| {
+            Error::new(Kind::File, format!("{} cannot be read as VTU", files.path(file).display()))
                 .because(cause)
                 .help("solve the scene again with --vtu")
         };
-        let pieces = |path: &Path| {
-            let bytes = crate::file::read(path)?;
-            let vtk = Vtk::parse_xml(bytes.as_slice()).map_err(|cause| refuse(path, cause.to_string()))?;
-            let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
-                return Err(refuse(path, "it has no unstructured grid".to_owned()));
-            };
-            Ok(pieces)
-        };
+        let content = |file: &str| vtu::read(&files.read(file)?).map_err(|cause| refuse(file, cause));
         let mut points = Points::default();
-        let all = pieces(path)?;
-        if all.is_empty() {
-            return Err(refuse(path, "it has no piece".to_owned()));
-        }
-        for piece in all {
-            let (file, pieces) = match piece {
-                // beside this file
-                Piece::Source(file, _) => {
-                    let file = path.with_file_name(Path::new(&file).file_name().unwrap_or_default());
-                    let pieces = pieces(&file)?;
-                    (file, pieces)
+        let mut add = |file: &str, pieces: Vec<Piece>| {
+            pieces.into_iter().try_for_each(|piece| points.add(piece, value)).map_err(|cause| refuse(file, cause))
+        };
+        match content(file)? {
+            Content::Pieces(pieces) => add(file, pieces)?,
+            Content::Sources(parts) => {
+                for part in parts {
+                    // beside this file
+                    let part = Path::new(&part).file_name().unwrap_or_default().to_string_lossy();
+                    let Content::Pieces(pieces) = content(&part)? else {
+                        return Err(refuse(&part, "it has no piece".to_owned()));
+                    };
+                    add(&part, pieces)?;
                 }
-                piece => (path.to_owned(), vec![piece]),
-            };
-            for piece in pieces {
-                let Piece::Inline(piece) = piece else { return Err(refuse(&file, "it has no piece".to_owned())) };
-                points.add(*piece, value).map_err(|cause| refuse(&file, cause))?;
             }
         }
         Ok(points.part(name))
@@ -105,26 +105,27 @@ struct Points {
     points: Vec<[f64; 3]>,
     displacement: Vec<[f64; 3]>,
     value: Vec<f64>,
-    cells: Vec<(CellType, Vec<usize>)>,
+    cells: Vec<(u8, Vec<usize>)>,
     /// Where these points lie.
     places: HashMap<[u64; 3], usize>,
 }
 
 impl Points {
     /// Adds a part; a point that lies where an earlier part has one is that point.
-    fn add(&mut self, piece: UnstructuredGridPiece, value: &str) -> std::result::Result<(), String> {
-        let array = |name: &str| {
-            piece.data.point.iter().find_map(|attribute| match attribute {
-                Attribute::DataArray(array) if array.name == name => array.data.cast_into::<f64>(),
-                _ => None,
-            })
+    fn add(&mut self, mut piece: Piece, name: &str) -> std::result::Result<(), String> {
+        let points = piece.points;
+        let mut array = |name: &str, components: usize| {
+            piece.at_points.remove(name).filter(|values| values.len() == components * points.len())
         };
-        let points = piece.points.cast_into::<f64>().ok_or("its points are no numbers")?;
-        let points: Vec<[f64; 3]> = points.as_chunks().0.to_vec();
-        let value = array(value).ok_or_else(|| format!("it has no array `{value}` at its points"))?;
-        let displacement = array("displacement").map_or(vec![[0.0; 3]; points.len()], |all| all.as_chunks().0.to_vec());
-        if value.len() != points.len() || displacement.len() != points.len() {
-            return Err(format!("{} points, but {} values", points.len(), value.len()));
+        let value = array(name, 1).ok_or_else(|| format!("it has no array `{name}` with a number at each point"))?;
+        let displacement = match array("displacement", 3) {
+            Some(all) => all.as_chunks().0.to_vec(),
+            // surfaces of contact have none
+            None if name == SURFACE => vec![[0.0; 3]; points.len()],
+            None => return Err("it has no array `displacement` with a vector at each point".to_owned()),
+        };
+        if displacement.iter().flatten().any(|u| u.is_nan()) {
+            return Err("a displacement is not a number".to_owned());
         }
         let bits = |x: &[f64; 3]| x.map(f64::to_bits);
         let mut number = Vec::new();
@@ -137,29 +138,22 @@ impl Points {
             }
         }
         self.places.extend(points.iter().map(bits).zip(number.iter().copied()));
-        let types = piece.cells.types;
-        let (connectivity, offsets) = piece.cells.cell_verts.into_xml();
-        let mut start = 0;
-        for (kind, &end) in types.into_iter().zip(&offsets) {
-            let nodes = connectivity.get(start..end as usize).ok_or("a cell ends beyond the list of cells")?;
-            let cell: Option<Vec<usize>> = nodes.iter().map(|&node| number.get(node as usize).copied()).collect();
-            self.cells.push((kind, cell.ok_or("a cell has a point that is not there")?));
-            start = end as usize;
-        }
+        let cells = piece.cells.into_iter();
+        self.cells.extend(cells.map(|(kind, nodes)| (kind, nodes.into_iter().map(|node| number[node]).collect())));
         Ok(())
     }
 
     /// The triangles.
     fn part(self, name: &str) -> Part {
         let Self { points, displacement, value, cells, .. } = self;
-        let is_solid = cells.iter().any(|(kind, _)| matches!(kind, CellType::Tetra | CellType::QuadraticTetra));
+        let is_solid = cells.iter().any(|(kind, _)| matches!(*kind, TETRA | QUADRATIC_TETRA));
         let mut triangles: Vec<[usize; 3]> = Vec::new();
         let mut faces: HashMap<[usize; 3], Option<Vec<usize>>> = HashMap::new();
         for (kind, cell) in &cells {
-            match (kind, cell.len()) {
-                (CellType::Triangle, 3) => triangles.push([cell[0], cell[1], cell[2]]),
-                (CellType::QuadraticTriangle, 6) => triangles.extend(QUADRATIC.map(|corners| corners.map(|k| cell[k]))),
-                (CellType::Tetra, 4) | (CellType::QuadraticTetra, 10) => {
+            match (*kind, cell.len()) {
+                (TRIANGLE, 3) => triangles.push([cell[0], cell[1], cell[2]]),
+                (QUADRATIC_TRIANGLE, 6) => triangles.extend(QUADRATIC.map(|corners| corners.map(|k| cell[k]))),
+                (TETRA, 4) | (QUADRATIC_TETRA, 10) => {
                     for face in FACES {
                         let face: Vec<usize> =
                             face[..if cell.len() == 4 { 3 } else { 6 }].iter().map(|&k| cell[k]).collect();

@@ -2,14 +2,13 @@
 
 use super::bands::{self, BANDS, colors, range};
 use super::body::Part;
+use super::files::{Files, Row, value};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::bounds;
 use crate::output::{Plot, Series, Style};
 use crate::problem::units::{Units, label};
 use minijinja::context;
 use serde::Serialize;
-use std::collections::HashMap;
-use std::path::Path;
 
 /// A picture of the pressure of a pair.
 #[derive(Serialize)]
@@ -25,32 +24,14 @@ pub struct Picture {
 /// Most points of a map.
 const POINTS: usize = 8000;
 
-/// Rows of a table by the names of their columns; none if the file is not there.
-///
-/// # Errors
-/// [`Kind::File`] when it is no CSV file.
-pub fn rows(path: &Path) -> Result<Vec<HashMap<String, String>>> {
-    if !path.exists() {
-        return Ok(Vec::new());
-    }
-    let bytes = crate::file::read(path)?;
-    let all = csv::Reader::from_reader(bytes.as_slice()).deserialize().collect::<std::result::Result<_, csv::Error>>();
-    all.map_err(|cause| Error::new(Kind::File, format!("{} is no table", path.display())).because(cause.to_string()))
-}
-
-/// A number of a row; NaN if it has none.
-pub fn value(row: &HashMap<String, String>, column: &str) -> f64 {
-    row.get(column).and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)
-}
-
 /// The pressures of all pairs that have a table and touch, by the rows of `contacts.csv`.
-pub fn pictures(folder: &Path, is_space: bool, units: Option<&Units>, alone: bool) -> Result<Vec<Picture>> {
-    let pairs = rows(&folder.join("contacts.csv"))?;
-    let touching = |pair: &&HashMap<String, String>| value(pair, "peak_pressure") > 0.0;
+pub fn pictures(files: &Files, is_space: bool, units: Option<&Units>, alone: bool) -> Result<Vec<Picture>> {
+    let pairs = files.rows("contacts.csv")?;
+    let touching = |pair: &&Row| value(pair, "peak_pressure") > 0.0;
     let mut pictures = Vec::new();
     for pair in pairs.iter().filter(touching) {
-        let Some(table) = pair.get("table").filter(|table| !table.is_empty()) else { continue };
-        let points = rows(&folder.join(table))?;
+        let Some(table) = pair.get("table").filter(|table| !table.is_empty() && !table.contains('/')) else { continue };
+        let points = files.rows(table)?;
         let places: Vec<[f64; 3]> = points.iter().map(|row| ["x", "y", "z"].map(|axis| value(row, axis))).collect();
         let pressures: Vec<f64> = points.iter().map(|row| value(row, "pressure")).collect();
         let name = |column: &str| pair.get(column).map_or("", String::as_str);
@@ -70,9 +51,9 @@ pub fn pictures(folder: &Path, is_space: bool, units: Option<&Units>, alone: boo
         let (across, up) = (axes[0].min(axes[1]), axes[0].max(axes[1]));
         let title = format!("{title}: {pressure}");
         // the facets, if the run wrote them
-        let file = folder.join(Path::new(table).with_extension("vtu"));
-        if file.is_file() && !table.contains('/') {
-            let surface = Part::read(&file, &title, "pressure")?;
+        let file = format!("{}.vtu", table.strip_suffix(".csv").unwrap_or(table));
+        if files.path(&file).is_file() {
+            let surface = Part::read(files, &file, &title, "pressure")?;
             let svg = bands::pressure(&surface, [across, up], &title, alone).map_err(failed)?;
             pictures.push(Picture { kind: "map", svg, note: None });
             continue;

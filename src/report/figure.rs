@@ -4,7 +4,7 @@ use super::contact::failed;
 use super::page::Results;
 use super::raster;
 use crate::error::{Error, Kind, Result};
-use crate::output::write_whole;
+use crate::output::{Folder, write_whole};
 use std::path::{Path, PathBuf};
 
 /// What can be drawn.
@@ -30,6 +30,10 @@ pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf
             .help("pictures are SVG or PNG; rsvg-convert or Inkscape make PDF of SVG"));
     }
     let results = Results::read(folder)?;
+    if out.is_none() {
+        // results of others are read, never written to
+        Folder::create(folder)?;
+    }
     let lacks = |lacking: &str, advice: &str| {
         Error::new(Kind::File, format!("{} has {lacking}", folder.display())).help(advice)
     };

@@ -6,10 +6,12 @@ pub mod bands;
 pub mod body;
 mod contact;
 mod figure;
+mod files;
 pub mod page;
 mod raster;
 mod solid;
 mod space;
+mod vtu;
 mod words;
 
 pub use figure::draw;

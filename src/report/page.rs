@@ -1,10 +1,11 @@
 //! The page of a run: one HTML file with all that is in its folder, without anything from elsewhere.
 
 use super::body::{Part, magnification};
-use super::contact::{Picture, failed, pictures, rows, value};
+use super::contact::{Picture, failed, pictures};
+use super::files::{Files, value};
 use super::{bands, solid, space, words};
 use crate::error::{Error, Kind, Result};
-use crate::output::{Axis, LISTED, Plot, Series, Style, safe_name, write_whole};
+use crate::output::{Axis, Folder, LISTED, Plot, Series, Style, safe_name, write_whole};
 use crate::problem::units::{Units, force_labels, label};
 use minijinja::{UndefinedBehavior, context};
 use serde_json::Value;
@@ -32,6 +33,10 @@ fn force(pair: &Value) -> f64 {
 /// [`Kind::File`] when the folder has no readable `report.json`, or a file that it names is broken.
 pub fn save(folder: &Path, out: Option<&Path>) -> Result<PathBuf> {
     let text = Results::read(folder)?.page()?;
+    if out.is_none() {
+        // results of others are read, never written to
+        Folder::create(folder)?;
+    }
     let path = out.map_or_else(|| folder.join(FILE), Path::to_owned);
     write_whole(&path, |out| out.write_all(text.as_bytes()))?;
     Ok(path)
@@ -39,7 +44,7 @@ pub fn save(folder: &Path, out: Option<&Path>) -> Result<PathBuf> {
 
 /// What a folder of results has.
 pub struct Results {
-    folder: PathBuf,
+    files: Files,
     report: Value,
     /// Units of the scene, if it names them.
     pub units: Option<Units>,
@@ -61,8 +66,9 @@ impl Results {
                 .because(cause)
                 .help("solve the scene again")
         };
+        let files = Files::open(folder)?;
         let report: Value =
-            serde_json::from_slice(&crate::file::read(&path)?).map_err(|cause| refuse(cause.to_string()))?;
+            serde_json::from_slice(&files.read("report.json")?).map_err(|cause| refuse(cause.to_string()))?;
         for key in ["status", "bodies", "pairs", "settings", "files", "times", "inner_times"] {
             if report.get(key).is_none() {
                 return Err(refuse(format!("it has no `{key}`")));
@@ -72,7 +78,7 @@ impl Results {
         let units = settings["units"].as_str().and_then(|text| Units::parse(text).ok());
         let is_whole = settings["dimension"] == 3 || settings["plane"] == "axisymmetric";
         let units = if is_whole { units } else { units.map(Units::per_thickness) };
-        Ok(Self { folder: folder.to_owned(), report, units })
+        Ok(Self { files, report, units })
     }
 
     /// Whether the scene is in space.
@@ -84,15 +90,15 @@ impl Results {
     pub fn bodies(&self) -> Result<Vec<Part>> {
         let names = self.names("bodies", |body| body["name"].as_str().map(str::to_owned));
         let parts = names.iter().filter_map(|name| Some((name, self.file(&[&safe_name(name), name])?)));
-        parts.map(|(name, path)| Part::read(&path, name, "von_mises")).collect()
+        parts.map(|(name, file)| Part::read(&self.files, &file, name, "von_mises")).collect()
     }
 
     /// The contact surfaces, if the run wrote them.
     pub fn surfaces(&self) -> Result<Vec<Part>> {
         let files = self.names("files", |file| Some(file.as_str()?.strip_suffix(".vtu")?.to_owned()));
         let surfaces = files.iter().filter(|name| name.starts_with("contact-"));
-        let paths = surfaces.filter_map(|name| Some((name, self.file(&[name])?)));
-        paths.map(|(name, path)| Part::read(&path, name, "pressure")).collect()
+        let parts = surfaces.filter_map(|name| Some((name, self.file(&[name])?)));
+        parts.map(|(name, file)| Part::read(&self.files, &file, name, "pressure")).collect()
     }
 
     fn names(&self, key: &str, name: impl Fn(&Value) -> Option<String>) -> Vec<String> {
@@ -100,14 +106,14 @@ impl Results {
     }
 
     /// The first VTU file of these names that the run wrote.
-    fn file(&self, stems: &[&str]) -> Option<PathBuf> {
+    fn file(&self, stems: &[&str]) -> Option<String> {
         let files = self.report["files"].as_array()?;
         let written = |name: &String| files.iter().any(|file| file == name);
         // the name of a file is no path that leads elsewhere
         let stems = stems.iter().flat_map(|stem| ["pvtu", "vtu"].map(|ending| format!("{stem}.{ending}")));
         let stems = stems.filter(|name| !name.contains('/'));
-        let path = stems.filter(written).map(|name| self.folder.join(name)).next();
-        path.filter(|path| path.exists())
+        let name = stems.filter(written).next();
+        name.filter(|name| self.files.path(name).exists())
     }
 
     /// A label with the unit of a length or a stress.
@@ -117,7 +123,7 @@ impl Results {
 
     /// Residual, error and increment of each iteration; none without iterations.
     pub fn convergence(&self) -> Result<Option<Plot>> {
-        let rows = rows(&self.folder.join("history.csv"))?;
+        let rows = self.files.rows("history.csv")?;
         // load steps begin to count anew
         let place = |k: usize| if rows[k].contains_key("step") { k as f64 + 1.0 } else { value(&rows[k], "iteration") };
         let curve = |name: &str, column: &str, style| {
@@ -176,7 +182,7 @@ impl Results {
 
     /// A picture of the pressure of each pair that touches and has a table.
     pub fn pressures(&self, alone: bool) -> Result<Vec<Picture>> {
-        pictures(&self.folder, self.is_space(), self.units.as_ref(), alone)
+        pictures(&self.files, self.is_space(), self.units.as_ref(), alone)
     }
 
     /// A picture of the stress, or else the displacement, on deformed bodies: of those in space their surfaces.

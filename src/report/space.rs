@@ -9,27 +9,34 @@ use serde_json::{Value, json};
 /// Marks points without a value.
 const NONE: u16 = u16::MAX;
 
-/// Numbers of a view: of each part points and displacements (float32), triangles (uint32), and its value (uint16 between
+/// Numbers of a view: of each part points, seen from the least coordinates, and displacements (float32), triangles (uint32), and its value (uint16 between
 /// `low` and `high`, 65535 for none), little endian in base64.
 pub fn view(bodies: &[Part], surfaces: &[Part], scale: f64) -> Value {
     let [low, high] = bounds(bodies.iter().chain(surfaces).flat_map(|part| &part.points).copied());
     json!({
-        "bodies": parts(bodies),
-        "surfaces": parts(surfaces),
+        "bodies": parts(bodies, low),
+        "surfaces": parts(surfaces, low),
         "travel": super::bands::range(bodies.iter().flat_map(Part::travel).collect::<Vec<_>>().iter()),
         "stress": super::bands::range(bodies.iter().flat_map(|part| &part.value)),
         "pressure": super::bands::range(surfaces.iter().flat_map(|part| &part.value)),
-        "low": low,
-        "high": high,
+        "low": [0.0, 0.0, 0.0],
+        "high": from(low, &high),
         "scale": scale,
         "colors": super::bands::colors().to_vec(),
     })
 }
 
-fn parts(parts: &[Part]) -> Vec<Value> {
-    let [low, high] = super::bands::range(parts.iter().flat_map(|part| &part.value));
+/// Return a point as it is seen from another one.
+fn from(low: [f64; 3], x: &[f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| x[c] - low[c])
+}
+
+fn parts(parts: &[Part], low: [f64; 3]) -> Vec<Value> {
+    // float32 has no digits for a small body far from the origin
+    let places = |part: &Part| part.points.iter().map(|x| from(low, x)).collect::<Vec<_>>();
+    let [least, most] = super::bands::range(parts.iter().flat_map(|part| &part.value));
     let short = |value: &f64| match value.is_finite() {
-        true => ((value - low) / (high - low) * f64::from(NONE - 1)).round() as u16,
+        true => ((value - least) / (most - least) * f64::from(NONE - 1)).round() as u16,
         false => NONE,
     };
     let floats = |points: &[[f64; 3]]| -> Vec<u8> {
@@ -38,7 +45,7 @@ fn parts(parts: &[Part]) -> Vec<Value> {
     let part = |part: &Part| {
         json!({
             "name": part.name,
-            "points": STANDARD.encode(floats(&part.points)),
+            "points": STANDARD.encode(floats(&places(part))),
             "displacement": STANDARD.encode(floats(&part.displacement)),
             "value": STANDARD.encode(part.value.iter().map(short).flat_map(u16::to_le_bytes).collect::<Vec<_>>()),
             "triangles": STANDARD.encode(part.triangles.as_flattened().iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>()),

@@ -100,7 +100,8 @@ fn pencil(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<(f64, f64)> {
     let basis = DMatrix::from_fn(kept.len(), new.len(), |i, j| {
         eigen.eigenvectors[(i, new[j])] / eigen.eigenvalues[new[j]].sqrt()
     });
-    let values = SymmetricEigen::new(basis.transpose() * a * &basis).eigenvalues;
+    // a is symmetric; sums of products are the same on all processors, which `*` of large matrices is not
+    let values = SymmetricEigen::new(basis.tr_mul(&a.tr_mul(&basis))).eigenvalues;
     let (low, high) = (values.min(), values.max());
     (low > 0.0 && high.is_finite()).then_some((low, high))
 }

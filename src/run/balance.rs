@@ -1,7 +1,8 @@
 //! Forces on every body, from the ranks that have parts of them to the report.
 
-use super::results::{All, Recovered};
+use super::ended::{All, Recovered};
 use super::stages::Done;
+use crate::contact::moment_in_scene;
 use crate::discretize::{Balance, BodyInfo};
 use crate::output::{BalanceReport, ForceReport};
 
@@ -53,6 +54,9 @@ pub fn gather(done: &Done, recovered: &All) -> Vec<BalanceReport> {
         };
         let (force_imbalance, moment_imbalance) =
             (share(|part| part.force, size[0]), share(|part| part.moment, size[1]));
+        for part in &mut parts {
+            part.moment = moment_in_scene(&info.datum, part.force, part.moment);
+        }
         let rigid = parts.split_off(2 + info.supports.len() + info.springs.len());
         let springs = parts.split_off(2 + info.supports.len());
         let supports = parts.split_off(2);

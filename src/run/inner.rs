@@ -212,12 +212,14 @@ impl<'a> Inner<'a> {
             // bodies that are kept have their memory already
             let are_kept = plans.iter().all(|plan| self.kept.contains_key(&plan.name));
             let memory = if are_kept { usize::MAX } else { self.memory };
-            let mut comparison = Comparison::of_cubes(&candidates, step);
+            // decided once: powers are not the same to the last digit on all processors
+            let ranks = Ranks::new(self.session);
+            let mut comparison = tell(&ranks, || Ok(Comparison::of_cubes(&candidates, step)))?;
             if !comparison.is_known(&candidates, memory) {
                 let graphs = outlines.iter().map(|outline| (outline.graph)());
                 let graphs: Vec<(&[u32], &[u32])> = graphs.map(|graph| (&graph.ptr[..], &graph.col[..])).collect();
                 let analysed = || Ok(comparison.analysed(&candidates, &graphs));
-                comparison = tell(&Ranks::new(self.session), analysed)?;
+                comparison = tell(&ranks, analysed)?;
             }
             let is_direct = comparison.is_direct(memory);
             let Comparison { direct, multigrid, .. } = comparison;

@@ -1,8 +1,9 @@
 //! Runs that pause: who watches them and keeps what they have, and how they go on.
 
 use super::asking;
-use super::results::All;
+use super::ended::All;
 use super::stages::{Done, Ready};
+use super::{look, results};
 use crate::ddm::{self, Observer, Settings, Silent, Start, Status};
 use crate::error::Result;
 
@@ -32,8 +33,14 @@ pub fn solve(mut ready: Ready, full: bool, keep: &mut dyn Keep) -> Result<Done> 
         let (stop, interval) = (built.scene.method.stop.clone(), built.scene.method.interval && full);
         let mut settings = Settings { stop, interval, balance: built.balance().filter(|_| full), start };
         let outcome = ddm::solve(&mut built.discrete.model, &mut method, &mut settings, keep)?;
-        let mut done = Done { built, method, outcome, share: 1.0, steps, earlier, warnings };
-        let Status::Paused { asked } = done.outcome.status else { return Ok(done) };
+        let (recovered, look) = (None, None);
+        let mut done = Done { built, method, outcome, share: 1.0, steps, earlier, warnings, recovered, look };
+        let Status::Paused { asked } = done.outcome.status else {
+            let recovered = results::recover(&done);
+            look::look(&mut done, &recovered);
+            done.recovered = Some(recovered);
+            return Ok(done);
+        };
         keep.state(&done);
         if asking::signal(asked).is_some() {
             return Ok(done);

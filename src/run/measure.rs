@@ -1,7 +1,7 @@
 //! What is measured of a result: forces, approach and contact of each pair, reactions of each body.
 
 use super::balance;
-use super::results::{All, Recovered};
+use super::ended::{All, Recovered};
 use super::stages::{Built, Done};
 use super::words::numbered;
 use crate::ddm::Status;

@@ -3,12 +3,15 @@
 //!
 //! Errors are failures of the solver library, but for what functions say of their own.
 
+mod alike;
 pub mod asking;
 mod balance;
 pub mod clock;
 mod deal;
+pub mod ended;
 pub mod inner;
 pub mod keep;
+pub mod look;
 pub mod measure;
 pub mod method;
 mod phases;
@@ -21,9 +24,10 @@ pub mod steps;
 pub mod verdict;
 pub mod words;
 
+pub use alike::refuse_other_scenes;
 pub use asking::Asking;
 pub use clock::Clock;
+pub use ended::{All, Recovered};
 pub use keep::Keep;
 pub use phases::{build, build_with, estimate, in_parts, iterate, set_up, targets};
-pub use results::{All, Recovered};
 pub use stages::{Begin, Built, Done, Ready};

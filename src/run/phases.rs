@@ -7,13 +7,13 @@ use super::stages::{Begin, Built, Done, Ready};
 use super::words::in_words;
 use super::{method, steps};
 use crate::contact::pieces::{self, Cut};
-use crate::contact::{ContactPair, Left};
+use crate::contact::{ContactPair, Left, LostPieces};
 use crate::ddm::{self, Outcome, Start, Status};
 use crate::discretize::{self, ContactInfo, Discrete, Verified};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
-use crate::mesh::{self, Dealer, Portion};
+use crate::mesh::{self, Dealer, Loaded, Portion};
 use crate::model::{BodySlot, Mechanism};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::{Session, give_back, keep_apart, keep_at_hand};
@@ -69,11 +69,11 @@ fn build_in<const D: usize>(
 ) -> Result<Built> {
     let stage = session.stage("mesh");
     clock.begin();
-    let mut verified = verified::<D>(session, &scene, interrupt)?;
+    let (mut verified, read) = verified::<D>(session, &scene, interrupt)?;
     clock.phase("mesh");
     drop(stage);
     verified.portion.mesh.forget_tags();
-    let source = Source { session: session.clone(), scene, verified, cut };
+    let source = Source { session: session.clone(), scene, verified, read, cut };
     let history = &source.scene.method.steps;
     let begun = history.begun;
     let mut built = source.build(begun, kept, clock)?;
@@ -86,18 +86,27 @@ fn build_in<const D: usize>(
     Ok(built)
 }
 
+/// What is known of the file of a mesh on the rank that has read it.
+struct FileRead {
+    digest: String,
+    /// Why it was not taken from the cache, in words, if it never is.
+    unkept: Option<String>,
+}
+
 /// A scene with its mesh: what discrete problems are made of.
 struct Source<const D: usize> {
     session: Session,
     scene: Rc<Scene>,
     verified: Verified<D>,
+    /// On the rank that has read the mesh.
+    read: Option<FileRead>,
     cut: Cut<D>,
 }
 
 impl<const D: usize> Source<D> {
     /// The problem under the loads of a step of the scene's history, or the full ones. Collective.
     fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
-        let Self { session, scene, verified, cut } = self;
+        let Self { session, scene, verified, read, cut } = self;
         let stage = session.stage("discretize");
         let mut bodies = verified.bodies.clone();
         scene.method.steps.apply(step, &mut bodies);
@@ -119,39 +128,44 @@ impl<const D: usize> Source<D> {
         drop(stage);
         let mut warnings = warnings(session, &discrete);
         warnings.extend(in_parts(verified.portion.mesh.split));
+        warnings.extend(read.iter().filter_map(|read| read.unkept.clone()));
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear, inner.whole.clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());
         let interpolation = inner.interpolation.take();
         let scene = scene.clone();
         let (options, again) = (inner.into_options(), None);
-        Ok(Built { scene, discrete, linear, whole, interpolation, choice, condensed, options, warnings, again })
+        let mesh = read.as_ref().map(|read| read.digest.clone());
+        Ok(Built { scene, discrete, mesh, linear, whole, interpolation, choice, condensed, options, warnings, again })
     }
 }
 
 /// PETSc options of the scene, weaker than typed ones.
 fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()> {
-    let mut words = scene.solver.options.iter().peekable();
-    while let Some(word) = words.next() {
-        if !word.starts_with('-') {
-            return Err(Error::new(Kind::Scene, format!("`{word}` in solver.options belongs to no option"))
-                .help("write options as on the command line: \"-ksp_type cg -ksp_rtol 1e-8\""));
-        }
-        let is_value = |next: &&String| !next.starts_with('-') || next.parse::<f64>().is_ok();
-        let value = words.next_if(is_value).map(String::as_str);
-        options::set_of_scene(session, bodies, word, value)?;
+    for (name, value) in options::pairs(&scene.solver.options)? {
+        options::set_of_scene(session, bodies, name, value)?;
     }
     Ok(())
 }
 
 /// The mesh, checked: one rank lets Gmsh work and reads, and every one looks at its part. Collective.
-fn verified<const D: usize>(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<Verified<D>> {
+fn verified<const D: usize>(
+    session: &Session,
+    scene: &Scene,
+    interrupt: &Interrupt,
+) -> Result<(Verified<D>, Option<FileRead>)> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
     interrupt.hold();
     let ranks = Ranks::new(session);
-    let read = |dealer: &mut Dealer| Ok(mesh::deal::<D>(&scene.mesh, order, interrupt, dealer)?.mesh);
+    let mut file = None;
+    let read = |dealer: &mut Dealer| {
+        let Loaded { mesh, digest, unkept, .. } = mesh::deal::<D>(&scene.mesh, order, interrupt, dealer)?;
+        file = Some(FileRead { digest, unkept });
+        Ok(mesh)
+    };
     let portion = Portion::read(&ranks, order, read).and_then(|portion| interrupt.release().map(|()| portion));
-    agree(session, discretize::verify(scene, agree(session, portion)?, Rc::new(ranks)))
+    let verified = agree(session, discretize::verify(scene, agree(session, portion)?, Rc::new(ranks)))?;
+    Ok((verified, file))
 }
 
 fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
@@ -162,6 +176,11 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
                 .to_owned(),
         );
     }
+    warnings.extend(session.left_out().iter().map(|file| {
+        format!(
+            "{file} of this folder is not read, since PETSc options can run programs; -options_file {file} reads it"
+        )
+    }));
     if session.size() > discrete.bodies.len() && !discrete.model.is_dealt_out() {
         warnings.push(format!(
             "{} of {} ranks have no body to solve",
@@ -180,6 +199,7 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
     for (pair, contact) in discrete.model.pairs.iter().zip(&discrete.contacts) {
         warnings.extend(left_out(pair, contact));
+        warnings.extend(lost(pair, contact));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         if overlap < 0.0 {
             warnings.push(format!(
@@ -215,6 +235,18 @@ fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
         }
     }
     Some(text)
+}
+
+/// Pieces of a pair that the search for common points has lost, as a warning.
+fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
+    let names = contact.spec.between.each_ref().map(|name| &name.value);
+    pair.lost.map(|LostPieces { pieces, share, at: [x, y, z] }| {
+        format!(
+            "{} - {}: the search for points has lost {pieces} pieces of `{}`, {:.1e} of its {}, the most near ({x}, {y}, {z}): they \
+             carry no pressure; look at the mesh there, and refine what is strongly curved",
+            names[0], names[1], pair.surfaces[0], share, pair.measure
+        )
+    })
 }
 
 /// A free motion of several bodies as a warning.

@@ -1,19 +1,20 @@
 //! Outcome -> report and contact tables.
 
 use super::clock::Clock;
+use super::ended::{All, Look};
 use super::stages::{Built, Done};
 use super::verdict::{self, forecast, message, status_name};
 use super::{asking, balance, measure, preflight, results};
 use crate::contact::{ContactPair, Left};
-use crate::ddm::Status;
+use crate::ddm::{Reached, Status, Whose};
 use crate::discretize::Discrete;
 use crate::error::{Kind, few};
 use crate::estimate::Estimate;
 use crate::exchange::share;
-use crate::model::BodyCounts;
+use crate::model::{BodyCounts, Model};
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, Extent, Grid, InnerTimes, IntervalReport, LISTED, PairReport, PairRow,
-    Report, sci,
+    BodyReport, ContactTable, EstimateReport, Extent, Grid, InnerTimes, IntervalReport, LISTED, LookReport, PairReport,
+    PairRow, Report, sci,
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
@@ -29,7 +30,7 @@ pub fn exit_code(done: &Done) -> i32 {
 }
 
 /// Fills the report of a run.
-pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &Clock) -> Report {
+pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) -> Report {
     let (discrete, model, outcome) = (&done.built.discrete, done.model(), &done.outcome);
     let shared = Shared::gather(discrete);
     let counts = &shared.counts;
@@ -51,6 +52,7 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
             upper: interval.upper,
         }),
         error_bound: finite(last.filter(|row| row.is_bound).map(|row| row.error)),
+        rounding: finite(Some(outcome.rounding)),
         error_estimate: finite(last.filter(|row| !row.is_bound).map(|row| row.error)),
         factorizations: counts.factorizations + joint.factorizations,
         inner_times: InnerTimes {
@@ -80,6 +82,16 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
         f1: finite(last.map(|row| row.energy)),
         ..headline(session, &done.built, &shared.solvers, clock)
     };
+    if let Some(look) = &done.look {
+        let found = look_report(look, discrete, model);
+        // what the iteration did not see is no bound, and no less than what was found
+        let error = [report.error_bound, report.error_estimate].into_iter().flatten().next();
+        let is_more = |found: f64| error.map_or(matches!(outcome.status, Status::Inaccurate(_)), |error| found > error);
+        if found.error.is_some_and(is_more) {
+            (report.error_bound, report.error_estimate) = (None, found.error);
+        }
+        report.last_look = Some(found);
+    }
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::of_steps(&done.steps)));
     let moved = results::fill(discrete, recovered, &mut report.bodies);
     report.warnings.extend(moved);
@@ -101,6 +113,25 @@ pub fn report(session: &Session, done: &Done, recovered: &results::All, clock: &
     report
 }
 
+/// The last look for the report.
+fn look_report(look: &Look, discrete: &Discrete, model: &Model) -> LookReport {
+    let finite = |value: f64| value.is_finite().then_some(value);
+    let at = match look.whose {
+        Whose::Body(body) => vec![body],
+        Whose::Pair(pair) => model.pairs[pair].bodies.to_vec(),
+        Whose::Rounding => Vec::new(),
+    };
+    let Reached { error, pressure, imbalance, .. } = look.reached;
+    LookReport {
+        error: finite(error),
+        pressure: finite(pressure),
+        imbalance: finite(imbalance),
+        at: at.into_iter().map(|body| model.bodies[body].name.clone()).collect(),
+        cells: discrete.bodies.iter().map(|body| body.cells).sum(),
+        seconds: look.seconds,
+    }
+}
+
 /// What displacements that are far larger than the deformations have cost the pressures, in words: more than ten times what the run or its
 /// inner solvers were asked for.
 fn lost(done: &Done) -> Option<String> {
@@ -110,8 +141,8 @@ fn lost(done: &Done) -> Option<String> {
     let pressure = done.outcome.rounding;
     (pressure > 10.0 * asked).then(|| {
         format!(
-            "the displacements are so large that few digits are left for the pressures, which may be off by {} of their peak: begin \
-             with a smaller gap, or let supports move bodies less",
+            "the displacements are so large beside what compresses the layers that few digits are left for the pressures, which may be off \
+             by {} of their peak: begin with a smaller gap, let supports move bodies less, or take softer layers",
             sci(pressure, 1)
         )
     })
@@ -247,6 +278,7 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         facets_uncovered: pair.uncovered(),
         facets_steep: pair.left(Left::Steep),
         facets_far: pair.left(Left::Far),
+        pieces_lost: pair.lost.map_or(0, |lost| lost.pieces),
         facets_averaged: pair.averaged(),
         layer_energy: layer.energy[i],
         force: sides.map(|side| measure::resultant(force, &pair.resultant[side])),

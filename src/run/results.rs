@@ -1,36 +1,21 @@
 //! What the displacements of a body say: fields for output, largest stresses with their places, errors against a known answer.
 
+use super::ended::{All, Recovered};
 use super::stages::Done;
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Result, few};
 use crate::exchange::share;
 use crate::linalg::{around, bounds};
-use crate::output::{BodyField, BodyReport};
+use crate::output::BodyReport;
 use serde::{Deserialize, Serialize};
-use std::cell::OnceCell;
+use std::rc::Rc;
 
-/// The end of a run in one body that this rank has a part of.
-pub struct Recovered {
-    /// Displacements of the nodes that this rank knows.
-    pub state: Vec<f64>,
-    /// The same without the rigid motions that supports leave or carry the body by, which strain nothing.
-    pub bent: Vec<f64>,
-    field: OnceCell<BodyField>,
+/// The bodies that this rank has a part of: as the end of the run has left them, else recovered. Collective.
+pub fn recover(done: &Done) -> Rc<All> {
+    done.recovered.clone().unwrap_or_else(|| Rc::new(anew(done)))
 }
 
-impl Recovered {
-    /// Displacements and stresses of the cells that this rank shows, made when they are first asked for.
-    pub fn field(&self, info: &BodyInfo) -> &BodyField {
-        self.field.get_or_init(|| info.post().field(&self.state, &self.bent))
-    }
-}
-
-/// The end of a run in every body: none for those of other ranks, and the failure of a solver that should have found the
-/// interior of a body.
-pub type All = Vec<Option<Result<Recovered>>>;
-
-/// Recovers the bodies that this rank has a part of. Collective.
-pub fn recover(done: &Done) -> All {
+fn anew(done: &Done) -> All {
     let bodies = done.model().bodies.iter().zip(&done.outcome.iterate.states);
     bodies
         .map(|(slot, state)| {
@@ -48,7 +33,7 @@ pub fn recover(done: &Done) -> All {
                 let mut state = if is_still { bent.clone() } else { body.recover(&state)? };
                 state.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
                 bent.iter_mut().chain(&mut state).for_each(|u| *u *= done.share);
-                Ok(Recovered { state, bent, field: OnceCell::new() })
+                Ok(Recovered::new(state, bent))
             };
             Some(recover())
         })

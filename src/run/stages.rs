@@ -1,6 +1,7 @@
 //! The stages of a run, each made from the one before: [`Scene`], [`Built`], [`Ready`], [`Done`].
 
 use super::clock::Clock;
+use super::ended::{All, Look};
 use crate::ddm::{Discretisation, Method, Outcome, Row, Start};
 use crate::discretize::Discrete;
 use crate::error::Result;
@@ -19,6 +20,8 @@ pub struct Built {
     pub scene: Rc<Scene>,
     /// The discrete problem.
     pub discrete: Discrete,
+    /// SHA-256 of the file of its mesh, on the rank that has read it; none elsewhere.
+    pub mesh: Option<String>,
     /// How linear steps are solved.
     pub linear: Linear,
     /// PETSc options of the matrix of all bodies.
@@ -84,6 +87,10 @@ pub struct Done {
     pub earlier: Vec<Row>,
     /// What the user should know of the set-up.
     pub warnings: Vec<String>,
+    /// Displacements of its bodies, once it has ended.
+    pub recovered: Option<Rc<All>>,
+    /// What the last look found, at a result that may be a solution.
+    pub look: Option<Look>,
 }
 
 impl Built {

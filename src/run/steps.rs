@@ -5,10 +5,11 @@
 //! assembled, reduced or factored anew. Another leg is another problem on the same mesh, to which condensed bodies are kept.
 
 use super::clock::Clock;
+use super::ended::{self, All};
 use super::keep::{self, Keep};
 use super::measure;
 use super::report::Shared;
-use super::results::{self, All};
+use super::results;
 use super::stages::{Begin, Done, Ready};
 use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
@@ -54,6 +55,7 @@ pub fn iterate(mut ready: Ready, keep: &mut dyn Keep, clock: &mut Clock) -> Resu
         let usable = measure::is_usable(&of_step.status);
         if history.leg(all.step).contains(&(all.step - 1)) {
             all.end_step(&mut done, &of_step);
+            done.recovered = None;
             (done.outcome, done.share) = (of_step, 1.0);
             load(&mut done.built.discrete.model, &all.laws, share);
             ready = done.go_on(|outcome| if usable { Start::Resume(outcome.iterate) } else { Start::Automatic });
@@ -201,7 +203,7 @@ impl<'a> Steps<'a> {
 
     /// Brings what this step has found, and the model, to the units of the scene, with the counts and the history of all steps.
     /// Gives its bodies. Collective.
-    fn complete(&self, done: &mut Done) -> All {
+    fn complete(&self, done: &mut Done) -> Rc<All> {
         let Done { built, outcome, share, earlier, .. } = &mut *done;
         *share = self.factor;
         let iterations = outcome.iterations;
@@ -217,6 +219,8 @@ impl<'a> Steps<'a> {
             let compression = outcome.layer.compression.iter().map(|c| self.factor * c).collect();
             outcome.layer = Layer::new(&built.discrete.model, compression);
         }
+        let scaled = done.recovered.take().map(|all| Rc::new(ended::scaled(&all, self.factor)));
+        done.recovered = scaled;
         let recovered = results::recover(done);
         let step = measure::step(done, &recovered, &self.history, self.step - 1, iterations, status, message);
         done.steps.push(step);

@@ -3,7 +3,7 @@
 use super::asking;
 use super::words::in_words;
 use crate::ddm::forecast::{best_factor, best_gamma};
-use crate::ddm::{Outcome, Status};
+use crate::ddm::{Inaccuracy, Outcome, Status, Whose};
 use crate::model::{Mechanism, Model, Moved};
 use crate::output::{ForecastReport, StepReport, sci};
 
@@ -14,10 +14,12 @@ pub fn status_name(status: &Status) -> &'static str {
         Status::RoundoffLimited => "roundoff-limited",
         Status::IterationLimit => "iteration-limit",
         Status::NotFinite { .. } => "not-finite",
+        Status::OutOfRange { .. } => "out-of-range",
         Status::Cycle { .. } => "cycle",
         Status::Underconstrained(_) | Status::Mechanism(_) => "underconstrained",
         Status::Unbounded { .. } => "unbounded",
         Status::InnerSolver { .. } => "inner-solver",
+        Status::Inaccurate(_) => "inaccurate",
         Status::Paused { asked } => {
             if asking::signal(*asked).is_some() {
                 "interrupted"
@@ -56,6 +58,11 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
             "body `{}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}",
             name(body)
         ),
+        Status::OutOfRange { energy } => format!(
+            "the energy of bodies and layers, {}, is beyond what double precision can carry: choose units in which loads, moduli \
+             and lengths are nearer to 1",
+            sci(*energy, 1)
+        ),
         Status::Cycle { period: 1 } => {
             format!(
                 "the contact stays as it is, and neither residual nor F1 falls (seen in iteration {k}): try {other}"
@@ -90,6 +97,7 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
             let whose = failure.body.map_or("all bodies".to_owned(), |body| format!("body `{}`", name(&body)));
             format!("{whose}: the inner solver failed in iteration {k}: {reason}")
         }
+        Status::Inaccurate(found) => inaccurate(found, model),
         Status::Paused { asked } => {
             let what = match asking::signal_name(*asked) {
                 "" => "snapshot".to_owned(),
@@ -98,6 +106,30 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
             format!("{what} after {k} iterations, {} {}", measure(outcome), sci(residual, 1))
         }
     }
+}
+
+/// What the last look found, in words.
+fn inaccurate(Inaccuracy { told, found, whose }: &Inaccuracy, model: &Model) -> String {
+    let what = match whose {
+        Whose::Body(body) => format!("body `{}`: its forces, summed anew, lack balance", model.bodies[*body].name),
+        Whose::Pair(pair) => {
+            let [a, b] = model.pairs[*pair].bodies.map(|body| &model.bodies[body].name);
+            format!("`{a}` - `{b}`: pressures are not those of the layer at the compressions of the bodies")
+        }
+        Whose::Rounding => {
+            return format!(
+                "few digits are left for the pressures, which rounding may change by {} of their peak: take softer layers, begin with a smaller \
+                 gap, or let supports move bodies less",
+                sci(*found, 1)
+            );
+        }
+    };
+    format!(
+        "{what}: the relative error is {} at least, where the run saw {}: leave options of the inner solver (-ksp_..., -pc_..., -mat_...) and \
+         method.robin at their defaults, or take another solver (--set solver=mumps)",
+        sci(*found, 1),
+        sci(*told, 1)
+    )
 }
 
 /// What the number is by which a run ends.

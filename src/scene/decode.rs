@@ -17,6 +17,7 @@ use crate::mesh::is_shape;
 use crate::output::vtu::Encoding;
 use crate::problem::{Guard, MeshSource, Own, Plane, Preset, SolverSpec, Units};
 use crate::scene::{AdaptSpec, OutputSpec, Scene};
+use crate::solver::options;
 use decoder::{Decoder, choose, file, pattern};
 use std::path::Path;
 
@@ -69,7 +70,7 @@ fn solver_table() -> Table {
     Table::new("the solver").key("preset", word(&Preset::ALL), "the inner solver of all bodies").key(
         "options",
         Form::Text,
-        "PETSc options as on the command line: \"-ksp_rtol 1e-10\"",
+        "PETSc options that choose solvers and set their parameters: \"-ksp_rtol 1e-10\"",
     )
 }
 
@@ -244,13 +245,17 @@ fn solver(node: Option<&Node>) -> Result<SolverSpec> {
     let mut options = Vec::new();
     if let Some(node) = keys.get("options") {
         options.extend(node.string()?.split_whitespace().map(str::to_owned));
-        if let Some(first) = options.first().filter(|word| !word.starts_with('-')) {
-            return Err(node
-                .refuse(format!("`{first}` is no PETSc option"))
-                .help("options start with a dash: -ksp_rtol 1e-10"));
-        }
+        only_solvers(node, &options)?;
     }
     Ok(SolverSpec { preset: keys.get("preset").map(preset).transpose()?, options })
+}
+
+/// Check that options choose solvers and set their parameters, and do nothing else. `node` is the text that they stand in.
+fn only_solvers(node: &Node, words: &[String]) -> Result<()> {
+    for (name, value) in options::pairs(words).map_err(|error| error.at(&node.place))? {
+        options::check_of_scene(name, value).map_err(|error| error.at(&node.place_of_word(name)))?;
+    }
+    Ok(())
 }
 
 fn adapt(node: &Node) -> Result<AdaptSpec> {

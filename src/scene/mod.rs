@@ -2,6 +2,7 @@
 
 mod build;
 mod check;
+mod contents;
 mod decode;
 mod overrides;
 mod read;
@@ -51,7 +52,10 @@ fn read_text(path: &Path) -> Result<String> {
             false => error,
         });
     }
-    let bytes = crate::file::read(path)?;
+    let bytes = crate::file::with_unix_lines(crate::file::read(path)?);
+    if let Some(other) = crate::file::other_encoding(&bytes) {
+        return Err(Error::new(Kind::File, format!("{} {other}", path.display())).help("save the scene file as UTF-8"));
+    }
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let line = 1 + error.as_bytes()[..valid].iter().filter(|byte| **byte == b'\n').count();

@@ -143,6 +143,13 @@ impl Node {
         Error::scene(&self.place, message)
     }
 
+    /// The place of the first such word in a text, or of the whole where it is not written as it reads.
+    pub fn place_of_word(&self, word: &str) -> Place {
+        let Place { source, span } = &self.place;
+        let found = source.text[span.clone()].find(word).map(|at| span.start + at);
+        Place { source: source.clone(), span: found.map_or(span.clone(), |at| at..at + word.len()) }
+    }
+
     /// The place of the value at a dotted path, or of the nearest one around it.
     pub fn place_of(&self, path: &str) -> &Place {
         let mut node = self;

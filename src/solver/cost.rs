@@ -7,6 +7,7 @@
 use super::Retained;
 use crate::error::Result;
 use crate::linalg::factorisation;
+use crate::linalg::portable::pow;
 use crate::petsc::nested_dissection;
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
@@ -163,7 +164,7 @@ impl Candidate<'_> {
 /// At most: nested dissection of a cube, measured on blocks of 32 000 to 500 000 dofs.
 fn of_cube(body: &Candidate) -> Cost {
     let n = body.dofs as f64;
-    Cost { seconds: body.times() * 19.0 * n * n / RATE, bytes: 220.0 * n.powf(4.0 / 3.0) }
+    Cost { seconds: body.times() * 19.0 * n * n / RATE, bytes: 220.0 * pow(n, 4.0 / 3.0) }
 }
 
 /// By the symbolic factorisation of the nodes.

@@ -5,6 +5,7 @@ use super::{Change, InnerSolver, Seen};
 use crate::error::Result;
 use crate::fem::Interpolation;
 use crate::linalg::Csr;
+use crate::linalg::portable::log10;
 use crate::model::Solved;
 use crate::petsc::{Enough, Ksp, Matrix, Rows, Session};
 
@@ -157,7 +158,7 @@ impl Krylov {
     /// Remembers the pace of a solve: the next change of G brings a new preconditioner if this one is worn.
     fn learn(&mut self, solved: &Solved) {
         if self.keeps && solved.iterations > FEW {
-            let pace = solved.iterations as f64 / -self.reached.log10();
+            let pace = solved.iterations as f64 / -log10(self.reached);
             self.stale |= pace > WORN * *self.fresh.get_or_insert(pace);
         }
     }

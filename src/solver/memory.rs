@@ -1,5 +1,7 @@
 //! Memory that factorisations take, and what the machine has.
 
+use crate::linalg::portable::{log2, pow};
+
 /// Bytes that programs can still take without swapping, as Linux tells; no limit where it does not.
 pub fn available() -> usize {
     crate::file::bytes_in_proc("/proc/meminfo", "MemAvailable").map_or(usize::MAX, |bytes| bytes as usize)
@@ -9,7 +11,7 @@ pub fn available() -> usize {
 /// measured on blocks of 32 000 to 500 000 dofs.
 pub fn in_plane(dofs: usize) -> usize {
     let n = dofs as f64;
-    (60.0 * n * (n + 2.0).log2()) as usize
+    (60.0 * n * log2(n + 2.0)) as usize
 }
 
 /// Bytes of a condensed body besides its sparse factor: S with its pattern, G, and the factor of G.
@@ -19,7 +21,7 @@ pub fn of_condensed(retained: usize) -> usize {
 
 /// Estimated operations of a sparse Cholesky factorisation in the plane by nested dissection; factors as for [`in_plane`].
 pub fn work_in_plane(dofs: usize) -> f64 {
-    56.0 * (dofs as f64).powf(1.5)
+    56.0 * pow(dofs as f64, 1.5)
 }
 
 #[cfg(test)]

@@ -278,8 +278,9 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
             left = Some(error);
             enough(model, &Trial { closing: &closing, energy, error })
         };
-        if let Some(reason) = matrix.apply(|solver| solver.solve_until(&whole, &mut x, &mut enough))?.failure {
-            return Ok(Err(Failure { body: None, reason }));
+        let failure = matrix.apply(|solver| solver.solve_until(&whole, &mut x, &mut enough))?.failure;
+        if let (false, Some(reason)) = (self.is_redundant, &failure) {
+            return Ok(Err(Failure { body: None, reason: reason.clone() }));
         }
         let state = |(slot, part): (&BodySlot, Range<usize>)| {
             let Some(body) = &slot.local else { return Vec::new() };
@@ -291,11 +292,17 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
         let states: Vec<Vec<f64>> = model.bodies.iter().zip(joined.parts()).map(state).collect();
         let energy: f64 = states.iter().zip(residual).map(|(x, r)| dot(x, r)).sum();
         let mut field = Field { states, trace: vec![0.0; 2 * model.points()] };
-        // one message: traces, then the energy
+        // one message: traces, then the energy, then whether a rank has failed, each in the rounding of its processor
         field.trace_here(model);
-        field.trace.push(energy);
+        field.trace.extend([energy, f64::from(u8::from(failure.is_some()))]);
         model.exchange.sum(&mut field.trace);
+        let failures = field.trace.pop().unwrap_or_default();
         let energy = field.trace.pop().unwrap_or_default();
+        if failures > 0.0 {
+            let reason =
+                failure.unwrap_or_else(|| "the matrix of all bodies cannot be factored on another rank".to_owned());
+            return Ok(Err(Failure { body: None, reason }));
+        }
         let accuracy = joined.matrix.solver().accuracy();
         let error = left.unwrap_or(accuracy * energy.max(0.0).sqrt());
         Ok(Ok(Solution { field, energy, error, is_exact: accuracy == 0.0 }))

@@ -8,12 +8,14 @@
 //! 2. [`Chosen::set_default`] and [`Chosen::prefer_mumps`] add what the program chooses where nothing was written;
 //! 3. the list is [lent](Chosen::lend) to PETSc's table while the solver is made and set up: the table holds 512 options, and a scene
 //!    may have thousands of bodies;
-//! 4. [`unread()`] finds what nobody read: a slip of the keyboard ends the run before it starts.
+//! 4. what stands in a scene chooses solvers and sets their parameters, and does nothing else ([`check_of_scene`]);
+//! 5. [`unread()`] finds what nobody read: a slip of the keyboard ends the run before it starts.
 
 mod chosen;
 mod looks;
 mod probe;
 mod refused;
+mod scene;
 mod split;
 mod typed;
 mod unread;
@@ -21,7 +23,8 @@ mod unread;
 pub use chosen::Chosen;
 pub use looks::looks;
 pub use probe::show_help;
-pub use refused::{refuse_log, refuse_traps, refuse_words};
+pub use refused::{refuse_log, refuse_traps};
+pub use scene::{check_of_scene, pairs};
 pub use split::split;
 pub use typed::{Typed, set_of_scene, watching, withdraw};
 pub use unread::{Unread, UnreadKind, unread};

@@ -144,6 +144,8 @@ pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
     chosen.prefer_mumps();
     if !is(chosen, "ksp_type", &["preonly"]) {
         chosen.set_default("ksp_rtol", TOLERANCE);
+        // PETSc's own is 1e-50, whatever the unit of forces is
+        chosen.set_default("ksp_atol", "0");
         if is(chosen, "ksp_type", &["cg", "fcg", "pipecg"]) {
             // r'M^-1 r: with a good preconditioner the energy of the error, which the outer residual measures
             chosen.set_default("ksp_norm_type", "natural");

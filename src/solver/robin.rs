@@ -105,10 +105,21 @@ impl<S: InnerSolver> RobinMatrix<S> {
         self.set_up()?;
         self.counts.solves += 1;
         let began = Instant::now();
-        let solved = solve(&mut self.solver)?;
+        let mut solved = solve(&mut self.solver)?;
+        if let (Some(reason), Some(ratio)) = (&mut solved.failure, self.steepest()) {
+            *reason +=
+                &format!(": springs of the contact are up to {ratio:.0e} times as stiff as the bodies under them");
+        }
         self.counts.solve_seconds += began.elapsed().as_secs_f64();
         self.counts.inner_iterations += solved.iterations;
         Ok(solved)
+    }
+
+    /// How many times the stiffness under its row a spring has at most, if that takes more than half of the digits of K.
+    fn steepest(&self) -> Option<f64> {
+        let ratio = self.weight.iter().zip(&self.soft).map(|(weight, soft)| weight / soft);
+        let most = ratio.filter(|ratio| ratio.is_finite()).fold(0.0, f64::max);
+        (most > f64::EPSILON.sqrt().recip()).then_some(most)
     }
 
     /// y = K x, by G with the springs taken out meanwhile; numbers that are none if PETSc fails, with which the run ends. The solver has G in

@@ -6,6 +6,7 @@
 //! sums over states are the work on displacements; their rigid part comes from loads and contact forces, without K.
 
 use crate::fem::rigid::FreeMotion;
+use crate::linalg::portable::log2;
 use crate::linalg::{Csr, axpy, dot};
 use crate::model::Distribution;
 use nalgebra::DVector;
@@ -51,7 +52,7 @@ impl Split {
                     work -= part * split.work[k];
                 }
             }
-            let scale = product((&motion, &weight), (&motion, &weight)).sqrt().log2().floor().exp2();
+            let scale = log2(product((&motion, &weight), (&motion, &weight)).sqrt()).floor().exp2();
             motion.iter_mut().for_each(|u| *u /= scale);
             weight /= scale;
             split.squares.push(product((&motion, &weight), (&motion, &weight)));

@@ -2,6 +2,7 @@
 #![allow(dead_code)] // every test program uses its own part of this
 
 pub mod series;
+pub mod shapes;
 
 use serde_json::Value;
 use std::fs::{self, File};
@@ -118,6 +119,11 @@ impl Run {
         self.table("history.csv")
     }
 
+    /// Runs a command that writes its results to `folder`.
+    pub fn of(command: Command, folder: &Path) -> Self {
+        end_of(command, TempDir::new().expect("a temporary folder"), folder.to_owned())
+    }
+
     /// The run itself, which must have ended with status `converged`.
     pub fn converged(self) -> Self {
         assert_eq!((self.code, self.report["status"].as_str()), (0, Some("converged")), "{}", self.said());
@@ -158,6 +164,21 @@ pub fn winkler_on(ranks: usize, args: &[&str]) -> Run {
     finish(command, scratch, folder)
 }
 
+/// Runs the program with these words on two ranks, each in a folder of its own and with more options of mpiexec for the second: variables by
+/// `-x`. Results that the words name are `results` in the folder of the run.
+pub fn apart(folders: [&Path; 2], second: &[&str], args: &[&str]) -> Run {
+    let scratch = TempDir::new().expect("a temporary folder");
+    let folder = scratch.path().join("results");
+    let mut command = Command::new("mpiexec");
+    environment(&mut command);
+    let output = ["-o", folder.to_str().expect("a path")];
+    let output = if args.contains(&"solve") { &output[..] } else { &[] };
+    let words = [&[WINKLER], args, output].concat();
+    command.args(["--oversubscribe", "-n", "1", "-wdir"]).arg(folders[0]).args(&words);
+    command.args([":", "-n", "1", "-wdir"]).arg(folders[1]).args(second).args(&words);
+    finish(command, scratch, folder)
+}
+
 /// The program, on a number of ranks, with the environment of all tests.
 fn program(ranks: usize) -> Command {
     let mut command = if ranks == 1 {
@@ -171,19 +192,25 @@ fn program(ranks: usize) -> Command {
     command
 }
 
-/// Sets what tests need: Open MPI as root, one thread a rank, a cache of meshes for all tests, no options from outside.
+/// Sets what tests need: Open MPI as root, one thread a rank unless the environment asks for more, a cache of meshes for all tests, no
+/// options from outside.
 pub fn environment(command: &mut Command) {
     command
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-        .env("OPENBLAS_NUM_THREADS", "1")
+        .env("OPENBLAS_NUM_THREADS", std::env::var("OPENBLAS_NUM_THREADS").as_deref().unwrap_or("1"))
         .env("WINKLER_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("meshes"))
         .env_remove("PETSC_OPTIONS");
 }
 
 fn finish(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
+    command.current_dir(scratch.path());
+    end_of(command, scratch, folder)
+}
+
+fn end_of(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
     // launchers that start at the same moment get into each other's way in a common folder
-    command.current_dir(scratch.path()).env("OMPI_MCA_orte_tmpdir_base", scratch.path());
+    command.env("OMPI_MCA_orte_tmpdir_base", scratch.path());
     let (status, stdout, stderr) = output(command, patience());
     let report = match fs::read(folder.join("report.json")) {
         Ok(bytes) => serde_json::from_slice(&bytes).expect("report.json is JSON"),

@@ -3,14 +3,15 @@
 use super::plan::Plan;
 use super::request::usage;
 use crate::error::{Error, Kind, Result};
+use crate::file::digest;
 use crate::scene::Scene;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Contact points of one pair with their weights and pressures, in the order of the file.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct Points {
     /// File without its folder.
     name: String,
@@ -55,6 +56,11 @@ impl References {
             return Err(usage(message).help(help));
         }
         Ok(Self(found))
+    }
+
+    /// Return a digest of all tables.
+    pub fn digest(&self) -> String {
+        digest(&self.0)
     }
 
     /// Relative error of the pressures of a run; `None` without `--against`.

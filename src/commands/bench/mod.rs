@@ -14,6 +14,7 @@ pub use request::Request;
 
 use super::folder_of;
 use crate::error::Result;
+use crate::file::digest;
 use crate::interrupt::Interrupt;
 use crate::output::{Folder, progress, say};
 use crate::scene::Scene;
@@ -38,40 +39,44 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
         return Err(usage("`bench` starts the ranks of its runs itself").help("`--ranks 1,2` instead of mpiexec"));
     }
     let plan = Plan::new(request)?;
-    let folder = Folder::create(folder(request, &plan))?;
+    let folder = Folder::claim(folder(request, &plan))?;
     let reference = compare::References::read(request.against.as_deref(), &plan)?;
-    let mut table = Table::open(&folder, &plan, request)?;
+    let mut table = Table::open(&folder, &plan, request, &reference)?;
     let runner = Runner::new(interrupt, request, folder.path())?;
     let bar = progress::runs(plan.cases.len(), !request.quiet);
     let mut meshed = BTreeSet::new();
     let began = Instant::now();
     for case in &plan.cases {
         bar.set_message(case.label());
-        let kept = table.kept(case);
+        let scene = crate::scene::load(&case.scene, &case.overrides);
+        let inputs = scene.as_ref().ok().and_then(inputs);
+        let kept = table.kept(case, inputs.as_deref());
         let is_new = kept.is_none();
-        let row = match kept {
+        let mut row = match kept {
             Some(row) => row,
             None if table.is_beyond(&plan, case) => Row::skipped(case, "an earlier mesh took too long"),
             None if began.elapsed().as_secs_f64() >= request.budget => Row::skipped(case, "the budget is spent"),
-            None => measure(case, &runner, &reference, &mut meshed)?,
+            None => measure(case, scene, &runner, &reference, &mut meshed)?,
         };
+        row.inputs = inputs.unwrap_or_default();
         if !(request.quiet && row.is_good()) {
             bar.suspend(|| say(row.line(&case.label(), is_new)))?;
         }
-        table.add(row)?;
+        table.add(row, is_new).iter().for_each(|text| bar.suspend(|| eprintln!("warning: {text}")));
         bar.inc(1);
     }
     bar.finish_and_clear();
     errors::against_finest(&mut table, &plan);
     table.compare_with_linear();
-    table.rewrite()?;
+    let mut written = table.rewrite();
     for (name, plot) in charts::all(&table, &plan) {
-        folder.write(&name, |out| plot.write(out))?;
+        written = written.and(folder.write(&name, |out| plot.write(out)));
     }
     if !request.quiet {
         say(summary::of(&table, &plan))?;
     }
     say(format_args!("results in {}", folder.path().display()))?;
+    written?;
     Ok(i32::from(!table.rows.iter().all(Row::is_good)))
 }
 
@@ -83,14 +88,23 @@ fn folder(request: &Request, plan: &Plan) -> PathBuf {
     }
 }
 
+/// Return a digest of all that a run of a scene computes with: the scene, its data, and what its mesh is made from. None if that is not
+/// known beforehand.
+fn inputs(scene: &Scene) -> Option<String> {
+    let order = scene.bodies.iter().map(|body| body.order).max()?;
+    let mesh = crate::mesh::made_from(&scene.mesh, scene.dimension.value, order)?;
+    Some(digest(&(scene.problem().to_string(), mesh)))
+}
+
 /// One row: as many runs as asked for, and what they say.
 fn measure(
     case: &Case,
+    scene: Result<Scene>,
     runner: &Runner,
     reference: &compare::References,
     meshed: &mut BTreeSet<Vec<String>>,
 ) -> Result<Row> {
-    let scene = match crate::scene::load(&case.scene, &case.overrides) {
+    let scene = match scene {
         Ok(scene) => scene,
         Err(error) => return Ok(Row::refused(case, &error)),
     };

@@ -152,7 +152,9 @@ impl Runner {
         fs::create_dir_all(folder).map_err(|cause| Error::file(folder, "create the folder", &cause))?;
         let path = folder.join("output.txt");
         let failed = |cause: &std::io::Error| Error::file(&path, "write", cause);
-        let file = File::create(&path).map_err(|cause| failed(&cause))?;
+        // what has this name is replaced: a pipe would keep its writer waiting
+        let _ = fs::remove_file(&path);
+        let file = File::create_new(&path).map_err(|cause| failed(&cause))?;
         let both = file.try_clone().map_err(|cause| failed(&cause))?;
         command.stdin(Stdio::null()).stdout(file).stderr(both);
         let began = Instant::now();

@@ -1,5 +1,6 @@
 //! The rows of a benchmark, in memory and in `bench.csv`.
 
+use super::compare::References;
 use super::plan::{Case, LINEAR, Plan};
 use super::process::{RUNS, Run};
 use super::request::Request;
@@ -51,6 +52,9 @@ const NUMBERS: [(&str, Of); 25] = [
     ("error_energy", Of::Other),
 ];
 
+/// Columns after the numbers.
+const LAST: [&str; 2] = ["error_of", "inputs"];
+
 /// One combination and what was measured.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
@@ -65,6 +69,8 @@ pub(super) struct Row {
     numbers: BTreeMap<&'static str, f64>,
     /// What the error is measured in and against; empty without an error.
     pub error_of: String,
+    /// Digest of what the run computed with; empty if that is not known.
+    pub inputs: String,
     /// Relative error of the displacements that the run itself told, where the scene has their closed form.
     pub displacement_error: Option<f64>,
 }
@@ -190,6 +196,7 @@ impl Row {
             method: case.asked().to_owned(),
             numbers: BTreeMap::new(),
             error_of: String::new(),
+            inputs: String::new(),
             displacement_error: None,
         }
     }
@@ -240,7 +247,7 @@ impl Row {
         fields.extend(
             NUMBERS.iter().map(|(name, _)| self.number(name).map_or(String::new(), |value| format!("{value}"))),
         );
-        fields.push(self.error_of.clone());
+        fields.extend([self.error_of.clone(), self.inputs.clone()]);
         fields
     }
 }
@@ -266,31 +273,36 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn open(folder: &'a Folder, plan: &Plan, request: &Request) -> Result<Self> {
+    pub fn open(folder: &'a Folder, plan: &Plan, request: &Request, reference: &References) -> Result<Self> {
         let mut columns = plan.columns();
         columns.extend(WORDS.map(str::to_owned));
         columns.extend(NUMBERS.map(|(name, _)| name.to_owned()));
-        columns.push("error_of".to_owned());
+        columns.extend(LAST.map(str::to_owned));
         let settings = format!(
-            "winkler {}\n--set {:?}\nPETSc {:?}\n--repeat {}\n--timeout {}\n--against {:?}\n",
+            "winkler {}\n--set {:?}\nPETSc {:?} {:?}\n--repeat {}\n--timeout {}\n--against {:?} {}\n",
             env!("CARGO_PKG_VERSION"),
             request.all_overrides(),
             request.petsc,
+            std::env::var_os("PETSC_OPTIONS").unwrap_or_default(),
             request.repeat,
             request.timeout,
-            request.against
+            request.against,
+            reference.digest()
         );
-        let known = std::fs::read_to_string(folder.path().join(SETTINGS)).is_ok_and(|old| old == settings);
-        let old = if request.resume && known { read(folder, &columns) } else { Vec::new() };
+        let path = folder.path().join(SETTINGS);
+        let is_known = request.resume && crate::file::read(&path).is_ok_and(|old| old == settings.as_bytes());
+        let mut old = if is_known { read(folder, &columns) } else { Vec::new() };
+        old.retain(|row| !matches!(row.status.as_str(), "killed" | "failed" | SKIPPED));
         folder.write(SETTINGS, |out| out.write_all(settings.as_bytes()))?;
-        let file = RowFile::create(folder, FILE, &columns)?;
+        // rows that are kept are there all the time: a benchmark that is killed loses none
+        let file = RowFile::create(folder, FILE, &columns, &old.iter().map(Row::fields).collect::<Vec<_>>())?;
         Ok(Self { folder, columns, rows: Vec::new(), old, file })
     }
 
-    /// The row of a case that an earlier benchmark made.
-    pub fn kept(&self, case: &Case) -> Option<Row> {
-        let is_to_do = |row: &Row| matches!(row.status.as_str(), "killed" | "failed" | SKIPPED);
-        self.old.iter().find(|row| row.key == case.key && !is_to_do(row)).cloned()
+    /// The row of a case that an earlier benchmark made from the same inputs: scenes, data and meshes may have been edited meanwhile.
+    pub fn kept(&self, case: &Case, inputs: Option<&str>) -> Option<Row> {
+        let is_same = |row: &&Row| row.key == case.key && Some(row.inputs.as_str()) == inputs;
+        self.old.iter().find(is_same).cloned()
     }
 
     /// Whether a case differs by its mesh alone from a row that did not end in time: lists of meshes go from coarse to fine.
@@ -301,14 +313,13 @@ impl<'a> Table<'a> {
         self.rows.iter().any(|row| row.is_late() && like(row))
     }
 
-    /// Adds a row and writes it at once: what was measured is kept whatever comes next.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
-    pub fn add(&mut self, row: Row) -> Result<()> {
-        self.file.push(&row.fields());
+    /// Adds a row, and writes it at once if it is new: what was measured is kept whatever comes next. Why the file lacks rows, once.
+    pub fn add(&mut self, row: Row, is_new: bool) -> Option<String> {
+        if is_new {
+            self.file.push(&row.fields());
+        }
         self.rows.push(row);
-        self.file.check()
+        self.file.complaint()
     }
 
     /// Writes all rows anew, with what only the whole table could tell.
@@ -357,11 +368,12 @@ impl<'a> Table<'a> {
 
 /// The rows of the file in a folder that has these columns; none if it has others.
 fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
-    let Ok(mut file) = csv::Reader::from_path(folder.path().join(FILE)) else { return Vec::new() };
+    let Ok(bytes) = crate::file::read(&folder.path().join(FILE)) else { return Vec::new() };
+    let mut file = csv::Reader::from_reader(bytes.as_slice());
     if !file.headers().is_ok_and(|header| header.iter().eq(columns)) {
         return Vec::new();
     }
-    let keys = columns.len() - NUMBERS.len() - WORDS.len() - 1;
+    let keys = columns.len() - NUMBERS.len() - WORDS.len() - LAST.len();
     let row = |record: csv::StringRecord| {
         let numbers = NUMBERS.iter().enumerate();
         let numbers = numbers.filter_map(|(k, &(name, _))| Some((name, record[keys + WORDS.len() + k].parse().ok()?)));
@@ -372,7 +384,8 @@ fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
             message: record[keys + 2].to_owned(),
             method: record[keys + 3].to_owned(),
             numbers: numbers.collect(),
-            error_of: record[columns.len() - 1].to_owned(),
+            error_of: record[columns.len() - 2].to_owned(),
+            inputs: record[columns.len() - 1].to_owned(),
             displacement_error: None,
         }
     };

@@ -8,6 +8,7 @@
 
 use super::Table;
 use super::quadrature::integral;
+use crate::linalg::portable::exp;
 use crate::problem::layer::{AsperitySpec, Depths};
 use std::f64::consts::PI;
 
@@ -50,7 +51,7 @@ pub fn asperities(spec: &AsperitySpec) -> Table {
 fn moments(depths: &Depths, c: f64) -> [f64; 2] {
     match depths {
         Depths::Normal { deviation, highest } => {
-            let density = |s: f64| (-0.5 * ((highest - s) / deviation).powi(2)).exp() / (deviation * (2.0 * PI).sqrt());
+            let density = |s: f64| exp(-0.5 * ((highest - s) / deviation).powi(2)) / (deviation * (2.0 * PI).sqrt());
             // with s = c - t^2 the root is gone; beyond so many deviations there is nothing in double numbers
             let [from, to] = [highest + BEYOND * deviation, highest - BEYOND * deviation];
             let [from, to] = [from, to].map(|s| (c - s.clamp(0.0, c)).sqrt());

@@ -1,6 +1,7 @@
 //! Cubic layer.
 
 use super::{LayerLaw, Response};
+use crate::linalg::portable::cbrt;
 
 /// p(c) = k1 c + k3 c^3: a linear layer that hardens.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,7 +16,7 @@ impl Cubic {
     /// The c > 0 with k1 c + k3 c^3 = target > 0, for a k1 that need not be the law's.
     fn root(self, k1: f64, target: f64) -> f64 {
         // without one of the terms c is larger: Newton falls from there, the function is convex
-        let mut c = (target / k1).min((target / self.k3).cbrt());
+        let mut c = (target / k1).min(cbrt(target / self.k3));
         for _ in 0..MOST {
             let square = c * c;
             let step = (c * (k1 + self.k3 * square) - target) / (k1 + 3.0 * self.k3 * square);

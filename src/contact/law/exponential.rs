@@ -3,6 +3,7 @@
 use super::gap::{by_quadrature, exp_less_line};
 use super::root::meeting;
 use super::{LayerLaw, Response};
+use crate::linalg::portable::{exp, expm1, log1p};
 
 /// p(c) = p0 (e^(c/c0) - 1), continued as a straight line beyond e^60: no load gets there, but trial states do, and
 /// their numbers must stay finite.
@@ -30,10 +31,10 @@ impl Exponential {
 impl LayerLaw for Exponential {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         let s = (c / self.c0).min(LINE);
-        let growth = s.exp_m1();
+        let growth = expm1(s);
         let curve = Response {
             pressure: self.p0 * growth,
-            tangent: self.p0 / self.c0 * s.exp(),
+            tangent: self.p0 / self.c0 * exp(s),
             energy: self.p0 * self.c0 * exp_less_line(s),
         };
         if c <= self.end { curve } else { curve.straight(c - self.end) }
@@ -51,7 +52,7 @@ impl LayerLaw for Exponential {
 
     fn compression_loaded(&self, _point: usize, pressure: f64) -> f64 {
         match pressure <= self.at_end.pressure {
-            true => self.c0 * (pressure / self.p0).ln_1p(),
+            true => self.c0 * log1p(pressure / self.p0),
             false => self.end + self.at_end.straight_compression(pressure),
         }
     }
@@ -63,7 +64,7 @@ impl LayerLaw for Exponential {
         }
         // with c's distance d from the graph, in c0: (p + p0) c0 (e^d - 1 - d)
         let slope = pressure + self.p0;
-        let way = ((self.pressure(point, c) - pressure) / slope).ln_1p();
+        let way = log1p((self.pressure(point, c) - pressure) / slope);
         slope * self.c0 * exp_less_line(way)
     }
 }

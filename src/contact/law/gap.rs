@@ -1,6 +1,7 @@
 //! Fenchel's gap: the area between a law's graph and the corner of a compression and a pressure.
 
 use super::quadrature::integral_to;
+use crate::linalg::portable::expm1;
 
 /// Error of a quadrature, as a share of the gap: it goes into bounds that are a factor above the error they bound.
 const SHARE: f64 = 1e-5;
@@ -49,6 +50,6 @@ pub(super) fn exp_less_line(x: f64) -> f64 {
     if x.abs() < 1e-2 {
         x * x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x * (1.0 / 120.0 + x / 720.0))))
     } else {
-        x.exp_m1() - x
+        expm1(x) - x
     }
 }

@@ -2,6 +2,7 @@
 
 use super::gap::exp_less_line;
 use super::{LayerLaw, Response};
+use crate::linalg::portable::{exp, log, log1p, pow};
 
 /// log((c + p/rho)/s) after which the next error, of fourth order, is rounding; for exponents up to 50 even 1e-4 leaves
 /// 1e-14.
@@ -25,7 +26,7 @@ impl Power {
 
 impl LayerLaw for Power {
     fn compressed(&self, _point: usize, c: f64) -> Response {
-        let pressure = (c / self.b).powf(self.exponent);
+        let pressure = pow(c / self.b, self.exponent);
         Response {
             pressure, // exact for a = 1, so that a settled contact set changes no matrix
             tangent: if self.exponent == 1.0 { 1.0 / self.b } else { self.exponent * pressure / c },
@@ -43,21 +44,21 @@ impl LayerLaw for Power {
         }
         // Householder's method of fourth order for log(c + p(c)/rho) against log c, whose derivatives cost nothing,
         // from the smaller of the c that p = 0 and c = 0 would give: the sum is between s and 2 s there
-        let spring = |c: f64| (c / self.b).powf(m) / rho;
+        let spring = |c: f64| pow(c / self.b, m) / rho;
         let closed = self.compression_loaded(0, rho * s);
         let (mut c, mut pressed) = if s < closed { (s, spring(s)) } else { (closed, s) };
         // p at `closed` has the rounding of an inverse
         let mut exact = s < closed;
         for _ in 0..MOST {
             let sum = c + pressed;
-            let excess = (sum / s).ln();
+            let excess = log(sum / s);
             let share = pressed / sum;
             let slope = 1.0 + (m - 1.0) * share;
             let second = (m - 1.0).powi(2) * share * (1.0 - share);
             let third = second * (m - 1.0) * (1.0 - 2.0 * share);
             let newton = excess / slope;
             let (bend, twist) = (0.5 * newton * second / slope, newton * newton * third / (6.0 * slope));
-            c *= (-newton * (1.0 - bend) / (1.0 - 2.0 * bend + twist)).exp();
+            c *= exp(-newton * (1.0 - bend) / (1.0 - 2.0 * bend + twist));
             if exact && excess.abs() < SETTLED {
                 break;
             }
@@ -67,7 +68,7 @@ impl LayerLaw for Power {
     }
 
     fn compression_loaded(&self, _point: usize, pressure: f64) -> f64 {
-        self.b * pressure.powf(1.0 / self.exponent)
+        self.b * pow(pressure, 1.0 / self.exponent)
     }
 
     fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
@@ -75,7 +76,7 @@ impl LayerLaw for Power {
         let excess = (at_c - pressure) / pressure;
         if excess.abs() < 0.5 {
             // with u = log(p(c)/p), the gap is c p (e^u - 1 + m (e^(-u/m) - 1))/(m + 1): no term of first order is left
-            let u = excess.ln_1p();
+            let u = log1p(excess);
             c * pressure * (exp_less_line(u) + m * exp_less_line(-u / m)) / (m + 1.0)
         } else {
             (c * at_c + m * self.compression_loaded(point, pressure) * pressure) / (m + 1.0) - c * pressure

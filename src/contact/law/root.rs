@@ -1,5 +1,7 @@
 //! Where an increasing function of the compression has a given value.
 
+use crate::linalg::portable::{exp, log};
+
 /// Relative distance below which two numbers are the same to rounding.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
 /// First factor by which the search goes down from a bound while it knows no lower one; the next is its square. 5 of
@@ -39,7 +41,7 @@ pub(super) fn root(
             high = c;
             reached = here >= target;
         }
-        let excess = (here / target).ln();
+        let excess = log(here / target);
         if excess.abs() <= ROUNDING {
             return Ok(c);
         }
@@ -51,7 +53,7 @@ pub(super) fn root(
         }
         slow = if step.abs() > SLOW * last { slow + 1 } else { 0 };
         last = step.abs();
-        let newton = if slow > 0 { c * (1.0 - step) } else { c * (-step).exp() };
+        let newton = if slow > 0 { c * (1.0 - step) } else { c * exp(-step) };
         c = if low < newton && newton < high && slow < 2 {
             newton
         } else if low == 0.0 && high * down > 0.0 {

@@ -2,6 +2,7 @@
 
 use super::root::{meeting, root};
 use super::{LayerLaw, Response};
+use crate::linalg::portable::hypot;
 
 /// Monotone piecewise cubic curve through (0, 0) and points (c, p), continued as a straight line beyond the last one.
 ///
@@ -62,7 +63,7 @@ impl Table {
     /// The curve through knots with slopes, which are cut down where p would fall.
     fn through(mut knots: Vec<Knot>, secants: &[f64]) -> Self {
         for (i, secant) in secants.iter().enumerate() {
-            let size = (knots[i].slope / secant).hypot(knots[i + 1].slope / secant);
+            let size = hypot(knots[i].slope / secant, knots[i + 1].slope / secant);
             if size > STEEPEST {
                 knots[i].slope *= STEEPEST / size;
                 knots[i + 1].slope *= STEEPEST / size;

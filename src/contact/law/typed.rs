@@ -5,6 +5,7 @@ use super::root::{meeting, root};
 use super::{LayerLaw, Response};
 use crate::error::{Error, Result, shown};
 use crate::expression::Expression;
+use crate::linalg::portable::pow;
 
 /// An expression p(c) at one place, continued as a straight line beyond its end.
 #[derive(Debug, Clone)]
@@ -51,7 +52,7 @@ impl Typed {
         }
         let mut before = (0.0, first.min(least - f64::MIN_POSITIVE));
         for step in 0..=DECADES * STEPS {
-            let c = top * 10f64.powf(f64::from(step) / f64::from(STEPS) - f64::from(DECADES));
+            let c = top * pow(10.0, f64::from(step) / f64::from(STEPS) - f64::from(DECADES));
             let (pressure, slope) = typed.value(c);
             if before.1 > HUGE {
                 break;

@@ -47,6 +47,21 @@ pub struct Common<const D: usize> {
 /// Finds the common pieces of two surfaces on those facets of side a that are asked for.
 pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach, &dyn Fn(usize) -> bool) -> Common<D>;
 
+/// The search for a point on a facet came to no end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Lost;
+
+/// Steps of Newton's method for a point on a facet. It begins within a facet's size of the point, and from there the digits double: six
+/// steps are enough for a double, twice as many make up for a bad start.
+const MOST_STEPS: usize = 30;
+
+/// A sum that is zero may be this share of the sizes of its terms. The coordinate of a point on a facet adds six products, whose factors
+/// have three roundings each, to a point that was found in the same way: less than 32 roundings of half an epsilon.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+/// Parameters beyond this are no place on a facet or near it: they have fewer digits than [`SNAP`] asks for.
+const AWAY: f64 = SNAP / f64::EPSILON;
+
 /// Parameters closer than this to a facet's end are its end: surfaces that match do match.
 const SNAP: f64 = 1e-9;
 

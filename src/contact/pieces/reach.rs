@@ -20,6 +20,8 @@ pub struct Refused {
     pub steep: bool,
     /// The distance is too large.
     pub far: bool,
+    /// Pieces and points of pieces that the search has lost.
+    pub lost: usize,
 }
 
 impl Reach {

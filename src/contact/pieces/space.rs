@@ -6,7 +6,7 @@
 //! is split into four at its mid-edges.
 
 use super::polygon::{self, Polygon};
-use super::{Common, Reach, Refused, SNAP, Search, Shared};
+use super::{AWAY, Common, Lost, MOST_STEPS, ROUNDING, Reach, Refused, SNAP, Search, Shared};
 use crate::contact::side::{Side, length, unit};
 use crate::fem::{area_vector, assemble, cross, element, quadrature};
 use crate::linalg::dot;
@@ -33,35 +33,33 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach, asked: &dyn Fn(usize) -> b
     for i in (0..a.facets.count()).filter(|&i| asked(i)) {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
-        let mut found: Vec<Piece> = Vec::new();
-        for index in search.around(a, i, reach) {
-            let other = &facets_b[index];
-            let pieces = Piece::between(&facet, other, index).into_iter();
-            found.extend(pieces.filter(|p| refused.admits(reach, p.gap, facet.direction, other.direction)));
-        }
-        found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
+        let found = facing(&facet, &facets_b, &search.around(a, i, reach), reach, refused);
         // the nearest facets take what they face, and nobody else gets it
         let mut taken: Vec<Polygon> = Vec::new();
         for Piece { polygon, index, .. } in found {
             let free = taken.iter().fold(vec![polygon], |parts, other| {
                 parts.into_iter().flat_map(|part| polygon::difference(part, other, 0.5 * TINY)).collect()
             });
-            for part in &free {
-                for triangle in polygon::fan(part) {
-                    let share = 2.0 * polygon::area(&triangle);
-                    for (l, weight) in rule.iter() {
-                        let [u, v] = [0, 1].map(|c| (0..3).map(|k| l[k] * triangle[k][c]).sum());
-                        let at_a = [1.0 - u - v, u, v];
-                        let normal = facet.normal(u, v);
-                        let Some((at_b, t)) = facets_b[index].hit(facet.at(u, v), normal) else { continue };
-                        let weight = weight * share * length(facet.area(u, v));
-                        let gap = t * length(normal);
-                        if !reach.holds(gap) {
-                            refused.far = true;
-                            continue;
-                        }
-                        common.points.push(Shared { facet_a: i, at_a, facet_b: index, at_b, weight, gap });
+            let other = &facets_b[index];
+            let offset = minus(facet.from, other.from);
+            for triangle in free.iter().flat_map(|part| polygon::fan(part)) {
+                let share = 2.0 * polygon::area(&triangle);
+                for (l, weight) in rule.iter() {
+                    let [u, v] = [0, 1].map(|c| (0..3).map(|k| l[k] * triangle[k][c]).sum());
+                    let normal = facet.normal(u, v);
+                    let Ok(Some((at_b, t))) = other.hit(plus(facet.at(u, v), offset), normal) else {
+                        // the point lies under the image of this very facet
+                        refused.lost += 1;
+                        continue;
+                    };
+                    let weight = weight * share * length(facet.area(u, v));
+                    let gap = t * length(normal);
+                    if !reach.holds(gap) {
+                        refused.far = true;
+                        continue;
                     }
+                    let at_a = [1.0 - u - v, u, v];
+                    common.points.push(Shared { facet_a: i, at_a, facet_b: index, at_b, weight, gap });
                 }
             }
             taken.extend(free);
@@ -70,10 +68,35 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach, asked: &dyn Fn(usize) -> b
     common
 }
 
+/// Return the pieces of a facet of side a that face these facets of side b, the nearest first; note in `refused` what is none.
+fn facing(facet: &Facet, b: &[Facet], near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
+    let mut found: Vec<Piece> = Vec::new();
+    for &index in near {
+        let other = &b[index];
+        match Piece::between(facet, other, index) {
+            Ok(pieces) => {
+                let pieces = pieces.into_iter();
+                found.extend(pieces.filter(|p| refused.admits(reach, p.gap, facet.direction, other.direction)));
+            }
+            Err(Lost) => refused.lost += usize::from(reach.faces(facet.direction, other.direction)),
+        }
+    }
+    found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
+    found
+}
+
 /// A facet as a parametrised surface x(u, v), u, v >= 0, u + v <= 1: barycentric coordinates 1 - u - v, u, v.
+///
+/// Coordinates are measured from its first corner: what is interpolated or subtracted then rounds relative to the facet, also if the
+/// two bodies of a pair lie far from the others of the scene.
 struct Facet {
     order: Order,
+    /// Its first corner.
+    from: [f64; 3],
+    /// Its nodes, measured from there.
     x: Vec<[f64; 3]>,
+    /// The largest distance of a node from there.
+    size: f64,
     normals: [[f64; 3]; 3],
     /// Outer unit normal in the middle.
     direction: [f64; 3],
@@ -83,18 +106,29 @@ struct Facet {
 impl Facet {
     fn of(side: &Side<3>, i: usize) -> Self {
         let nodes = side.facets.facet(i);
-        let x = side.facets.coordinates(i, side.space);
+        let mut x = side.facets.coordinates(i, side.space);
+        let from = x[0];
+        x.iter_mut().for_each(|x| *x = minus(*x, from));
         Self {
             order: side.facets.order,
+            from,
             straight: assemble::is_straight(&x, 3),
-            x,
+            size: x.iter().map(|&x| length(x)).fold(0.0, f64::max),
+            direction: unit(area_vector(side.facets.order, &x, &[1.0 / 3.0; 3])),
             normals: [0, 1, 2].map(|k| side.normals[&nodes[k]]),
-            direction: unit(side.area(i)),
+            x,
         }
     }
 
     fn at(&self, u: f64, v: f64) -> [f64; 3] {
         assemble::interpolate(&self.x, &element::values(self.order, &[1.0 - u - v, u, v]))
+    }
+
+    /// Return a bound of the sum of sizes of the terms that [`Facet::at`] adds.
+    fn terms(&self, u: f64, v: f64) -> f64 {
+        let reach = 1.0 + 2.0 * (u.abs() + v.abs());
+        // |l (2l - 1)| and |4 l m| of the six quadratic functions together are below 3 reach^2
+        self.size * if self.order == Order::P1 { reach } else { 3.0 * reach * reach }
     }
 
     fn area(&self, u: f64, v: f64) -> [f64; 3] {
@@ -113,58 +147,82 @@ impl Facet {
     }
 
     /// Where the line x + t n meets the surface: barycentric coordinates and t. `None` if it does not.
-    fn hit(&self, x: [f64; 3], n: [f64; 3]) -> Option<([f64; 3], f64)> {
+    fn hit(&self, x: [f64; 3], n: [f64; 3]) -> Result<Option<([f64; 3], f64)>, Lost> {
         let middle = self.at(1.0 / 3.0, 1.0 / 3.0);
-        let [u, v, t] = newton(dot(&minus(middle, x), &n) / dot(&n, &n), |[u, v, t]| {
+        let found = newton(dot(&minus(middle, x), &n) / dot(&n, &n), |[u, v, t]| {
             let here = self.at(u, v);
             let [along_u, along_v] = self.tangents(u, v);
-            let miss = std::array::from_fn(|c| here[c] - x[c] - t * n[c]);
-            (miss, [along_u, along_v, n.map(|n| -n)])
+            System {
+                value: std::array::from_fn(|c| here[c] - x[c] - t * n[c]),
+                columns: [along_u, along_v, n.map(|n| -n)],
+                terms: self.terms(u, v) + length(x) + t.abs() * length(n),
+            }
         })?;
+        let Some([u, v, t]) = found else { return Ok(None) };
         let at = [1.0 - u - v, u, v];
-        at.iter().all(|l| (-ON_FACET..=1.0 + ON_FACET).contains(l)).then_some((at, t))
+        Ok(at.iter().all(|l| (-ON_FACET..=1.0 + ON_FACET).contains(l)).then_some((at, t)))
     }
 
-    /// Parameters (u, v) whose normal passes through `x`.
-    fn foot(&self, x: [f64; 3]) -> Option<[f64; 2]> {
+    /// Parameters (u, v) whose normal passes through `x`. `None` if there are none.
+    fn foot(&self, x: [f64; 3]) -> Result<Option<[f64; 2]>, Lost> {
         let [n, m, o] = self.normals;
         let turns = [minus(m, n), minus(o, n)];
         let third = 1.0 / 3.0;
         let (middle, normal) = (self.at(third, third), self.normal(third, third));
-        let [u, v, _] = newton(dot(&minus(x, middle), &normal) / dot(&normal, &normal), |[u, v, t]| {
+        let found = newton(dot(&minus(x, middle), &normal) / dot(&normal, &normal), |[u, v, t]| {
             let (here, n, tangents) = (self.at(u, v), self.normal(u, v), self.tangents(u, v));
             let column = |k: usize| std::array::from_fn(|c| tangents[k][c] + t * turns[k][c]);
-            (std::array::from_fn(|c| here[c] + t * n[c] - x[c]), [column(0), column(1), n])
+            System {
+                value: std::array::from_fn(|c| here[c] + t * n[c] - x[c]),
+                columns: [column(0), column(1), n],
+                terms: self.terms(u, v) + length(x) + t.abs() * (1.0 + 2.0 * (u.abs() + v.abs())),
+            }
         })?;
-        Some([u, v])
+        Ok(found.map(|[u, v, _]| [u, v]))
     }
 }
 
-/// Zero (u, v, t) of three functions by Newton's method from the middle of a facet; `system` gives values and columns of
-/// derivatives. `None` if it runs away.
-fn newton(t: f64, system: impl Fn([f64; 3]) -> ([f64; 3], [[f64; 3]; 3])) -> Option<[f64; 3]> {
+/// Three equations in (u, v, t) at one place.
+struct System {
+    value: [f64; 3],
+    /// Derivatives by u, v and t.
+    columns: [[f64; 3]; 3],
+    /// A bound of the sum of sizes of the terms that a value adds.
+    terms: f64,
+}
+
+/// Return a zero (u, v, t) by Newton's method from the middle of a facet; `None` if it runs away.
+///
+/// A value is a zero once it is within the rounding of its own evaluation. Whatever the step is then, no other arithmetic would know
+/// better; it is made all the same, since the value may have come here by a quadratic step from far above.
+///
+/// # Errors
+/// [`Lost`] if values stay larger.
+fn newton(t: f64, system: impl Fn([f64; 3]) -> System) -> Result<Option<[f64; 3]>, Lost> {
     let mut at = [1.0 / 3.0, 1.0 / 3.0, t];
-    let mut last = f64::INFINITY;
-    for _ in 0..30 {
-        let (value, [p, q, r]) = system(at);
+    for _ in 0..MOST_STEPS {
+        let System { value, columns: [p, q, r], terms } = system(at);
         let det = dot(&cross(p, q), &r);
         let step = [cross(q, r), cross(r, p), cross(p, q)].map(|column| dot(&column, &value) / det);
-        at = minus(at, step);
-        let moved = step[0].abs().max(step[1].abs());
-        if !moved.is_finite() || !at[2].is_finite() || at[0].abs().max(at[1].abs()) > 1e3 {
-            return None;
+        let next = minus(at, step);
+        let is_away = next.iter().any(|x| !x.is_finite()) || next[0].abs().max(next[1].abs()) > AWAY;
+        if value.iter().all(|value| value.abs() <= ROUNDING * terms) {
+            return Ok(Some(if is_away { at } else { next }));
         }
-        // the last digits of t come with those of u and v
-        if moved < 1e-14 || (moved < 1e-11 && moved >= last) {
-            return Some(at);
+        if is_away {
+            return Ok(None);
         }
-        last = moved;
+        at = next;
     }
-    None
+    Err(Lost)
 }
 
 fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| a[c] - b[c])
+}
+
+fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[c] + b[c])
 }
 
 /// Part of a facet of side a that faces (a part of) one facet of side b.
@@ -175,33 +233,42 @@ struct Piece {
 }
 
 impl Piece {
-    fn between(a: &Facet, b: &Facet, index: usize) -> Vec<Self> {
+    /// Return the pieces before one facet of b.
+    ///
+    /// # Errors
+    /// [`Lost`] if a corner of b or the middle of a piece cannot be brought to the other facet.
+    fn between(a: &Facet, b: &Facet, index: usize) -> Result<Vec<Self>, Lost> {
         if dot(&a.direction, &b.direction) >= 0.0 {
-            return Vec::new();
+            return Ok(Vec::new());
         }
         let flat = |n: &[f64; 3]| length(minus(*n, a.normals[0])) < SNAP;
         let whole = b.order == Order::P1 || (a.straight && b.straight && a.normals.iter().all(flat));
         let corners = if whole { 3 } else { 6 };
-        let feet: Option<Vec<[f64; 2]>> = b.x[..corners].iter().map(|&x| a.foot(x).map(snap)).collect();
-        let Some(feet) = feet else { return Vec::new() };
+        let offset = minus(b.from, a.from);
+        let mut feet = Vec::with_capacity(corners);
+        for &x in &b.x[..corners] {
+            let Some(foot) = a.foot(plus(x, offset))? else { return Ok(Vec::new()) };
+            feet.push(snap(foot));
+        }
         let triangles = if whole { &WHOLE[..] } else { &QUARTERS[..] };
-        triangles.iter().filter_map(|nodes| Self::of(a, b, index, nodes.map(|node| feet[node]))).collect()
+        let pieces = triangles.iter().map(|nodes| Self::of(a, b, index, nodes.map(|node| feet[node])));
+        Ok(pieces.collect::<Result<Vec<_>, Lost>>()?.into_iter().flatten().collect())
     }
 
     /// The piece under the image of one triangle of b, which looks the other way.
-    fn of(a: &Facet, b: &Facet, index: usize, [p, q, r]: [[f64; 2]; 3]) -> Option<Self> {
+    fn of(a: &Facet, b: &Facet, index: usize, [p, q, r]: [[f64; 2]; 3]) -> Result<Option<Self>, Lost> {
         let image = [p, r, q];
         if polygon::area(&image) <= 0.0 {
-            return None;
+            return Ok(None);
         }
         let polygon = polygon::intersection(&image, &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
         if polygon::area(&polygon) <= 0.5 * TINY {
-            return None;
+            return Ok(None);
         }
         let [u, v] = polygon::middle(&polygon);
         let normal = a.normal(u, v);
-        let (_, t) = b.hit(a.at(u, v), normal)?;
-        Some(Self { polygon, index, gap: t * length(normal) })
+        let hit = b.hit(plus(a.at(u, v), minus(a.from, b.from)), normal)?;
+        Ok(hit.map(|(_, t)| Self { polygon, index, gap: t * length(normal) }))
     }
 }
 

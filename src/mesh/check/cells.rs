@@ -152,8 +152,10 @@ impl<'a, const D: usize> Cells<'a, D> {
 
     /// The refusal of the body for what is the matter with some of its cells, at a point.
     pub fn refuse(&self, what: &str, cells: &[usize], at: [f64; 3]) -> Error {
-        let place = &at[..D].iter().map(|x| x.to_string()).collect::<Vec<_>>().join(", ");
-        let error = Error::mesh(&self.portion.mesh.path, None, format!("body `{}`: {what} at ({place})", self.name));
+        let mesh = &self.portion.mesh;
+        let at = mesh.in_scene(std::array::from_fn(|c| at[c]));
+        let place = at[..D].iter().map(|x| x.to_string()).collect::<Vec<_>>().join(", ");
+        let error = Error::mesh(&mesh.path, None, format!("body `{}`: {what} at ({place})", self.name));
         let tags: Vec<String> = cells.iter().filter_map(|&cell| self.tags.get(cell)).map(u64::to_string).collect();
         match &tags[..] {
             [] => error,

@@ -137,7 +137,8 @@ impl<'a> InUse<'a> {
     fn refuse<const D: usize>(&self, mesh: &Mesh<D>, index: usize, what: &str, help: &str) -> Error {
         let points = &self.group.connectivity[index * self.group.stride..][..=self.group.dimension];
         let mean = |c: usize| points.iter().map(|&p| mesh.points[p as usize][c]).sum::<f64>() / points.len() as f64;
-        let place = (0..D).map(|c| mean(c).to_string()).collect::<Vec<_>>().join(", ");
+        let place = mesh.in_scene(std::array::from_fn(mean));
+        let place = place[..D].iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
         let thing = match (self.group.dimension, D) {
             (0, _) => "point",
             (1, 3) => "edge",

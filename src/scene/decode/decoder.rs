@@ -17,13 +17,24 @@ pub struct Decoder<'a> {
     pub data: Library,
 }
 
+/// The smallest size of a quantity that is not zero; its reciprocal is the largest. Energies hold squares of loads and displacements, and rounding is
+/// a share of 1e-32 of them.
+const LEAST: f64 = 1e-110;
+
 impl Decoder<'_> {
-    /// A number, or an expression in the coordinates.
+    /// A number, or an expression in the coordinates. Numbers of sizes that no run computes with are refused.
     pub fn field(&self, node: &Node) -> Result<Field> {
-        match &node.value {
-            Value::Integer(_) | Value::Float(_) => Ok(Field::Constant(node.number()?)),
-            Value::String(text) => Field::parse(text, &node.place, self.dimension, false, &self.data),
-            _ => Err(node.expected("a number or an expression", "")),
+        let field = match &node.value {
+            Value::Integer(_) | Value::Float(_) => Field::Constant(node.number()?),
+            Value::String(text) => Field::parse(text, &node.place, self.dimension, false, &self.data)?,
+            _ => return Err(node.expected("a number or an expression", "")),
+        };
+        match field {
+            Field::Constant(value) if value != 0.0 && !(LEAST..=LEAST.recip()).contains(&value.abs()) => Err(node
+                .refuse(format!("no run computes with a number like {value:e}"))
+                .label("must be 0, or of a size from 1e-110 to 1e110")
+                .help("choose other units of length and force")),
+            field => Ok(field),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::{Decoder, Form, Keys, Node, Table, Value, file};
 use crate::error::{Error, Kind, Located, Place, Result, Source, joined};
+use crate::file::{other_encoding, with_unix_lines};
 use crate::problem::body::BodySpec;
 use crate::problem::history::{COMMON, History, Step, has_common, paths};
 use std::path::PathBuf;
@@ -66,9 +67,12 @@ impl Decoder<'_> {
 fn read(file: Located<PathBuf>) -> Result<History> {
     let bytes = crate::file::read(&file.value).map_err(|error| error.at(&file.place))?;
     let name = file.value.display().to_string();
-    let Ok(text) = String::from_utf8(bytes) else {
-        return Err(Error::new(Kind::Scene, format!("{name} is not UTF-8 text")).at(&file.place));
-    };
+    let refuse =
+        |what: &str| Error::new(Kind::Scene, format!("{name} {what}")).help("save it as CSV in UTF-8").at(&file.place);
+    if let Some(other) = other_encoding(&bytes) {
+        return Err(refuse(other));
+    }
+    let text = String::from_utf8(with_unix_lines(bytes)).map_err(|_| refuse("is not UTF-8 text"))?;
     let source = Arc::new(Source { name, text });
     let text = source.text.as_str();
     let place = |from: usize, to: usize| {

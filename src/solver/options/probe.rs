@@ -10,12 +10,12 @@ use std::cell::Cell;
 use std::collections::BTreeSet;
 
 /// Krylov methods that serve a symmetric positive definite matrix or at least start on it.
-const METHODS: &str = "richardson chebyshev cg groppcg pipecg pipecgrr pipelcg pipeprcg pipecg2 cgne nash stcg gltr fcg \
+pub(super) const METHODS: &str = "richardson chebyshev cg groppcg pipecg pipecgrr pipelcg pipeprcg pipecg2 cgne nash stcg gltr fcg \
     pipefcg gmres pipefgmres fgmres lgmres dgmres pgmres tcqmr bcgs ibcgs qmrcgs fbcgs fbcgsr bcgsl pipebcgs cgs tfqmr \
     cr pipecr lsqr preonly bicg minres symmlq lcd gcr pipegcr tsirm cgls";
 
 /// Preconditioners, and for some a second option that leads to more options.
-const PRECONDITIONERS: &str = "none jacobi pbjacobi vpbjacobi sor eisenstat ilu icc bjacobi asm gasm mg gamg redundant ksp \
+pub(super) const PRECONDITIONERS: &str = "none jacobi pbjacobi vpbjacobi sor eisenstat ilu icc bjacobi asm gasm mg gamg redundant ksp \
     svd kaczmarz telescope composite fieldsplit \
     hypre:hypre_type=boomeramg hypre:hypre_type=euclid hypre:hypre_type=parasails hypre:hypre_type=pilut ml \
     lu:factor_mat_solver_type=petsc cholesky:factor_mat_solver_type=petsc lu:factor_mat_solver_type=mumps \

@@ -5,27 +5,26 @@ use crate::petsc::Session;
 use std::fs::OpenOptions;
 use std::path::Path;
 
-/// Refuses a file of options, among the words of the command line, that PETSc would read for ever.
+/// Refuses traps of numbers that are not finite, and values that PETSc would read beyond their end.
 ///
 /// # Errors
-/// It is there and no regular file.
-pub fn refuse_words(words: &[String]) -> Result<()> {
-    let files = words.windows(2).filter(|two| two[0] == "-options_file").map(|two| Path::new(&two[1]));
-    files.filter(|file| file.exists() && !file.is_file()).try_for_each(|file| crate::file::read(file).map(|_| ()))
-}
-
-/// Refuses traps of numbers that are not finite.
-///
-/// # Errors
-/// `-fp_trap` is on.
+/// `-fp_trap` is on; a variable in a value, such as `${HOME}`, is not closed.
 pub fn refuse_traps(session: &Session) -> Result<()> {
     let is_off = |value: &str| ["false", "no", "off", "0"].contains(&value.to_lowercase().as_str());
-    if session.options().get("-fp_trap").is_some_and(|value| !is_off(&value)) {
-        return Err(Error::new(
-            Kind::Solver,
-            "-fp_trap would end this program: it computes with infinities on purpose",
-        )
-        .help("a number that should be finite and is not ends a run anyway, with the status `not-finite`"));
+    let is_open = |value: &str| value.rsplit_once("${").is_some_and(|(_, rest)| !rest.contains('}'));
+    for (name, value) in session.options().all()? {
+        let value = value.unwrap_or_default();
+        if is_open(&value) {
+            // PETSc reads it at its end, too
+            session.options().clear(&name)?;
+            let message = format!("the value `{value}` of {name} begins a variable that it does not end");
+            return Err(Error::new(Kind::Solver, message).help("write `${NAME}`"));
+        }
+        if name == "-fp_trap" && !is_off(&value) {
+            let message = "-fp_trap would end this program: it computes with infinities on purpose";
+            return Err(Error::new(Kind::Solver, message)
+                .help("a number that should be finite and is not ends a run anyway, with the status `not-finite`"));
+        }
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! What the user wrote: options for all solvers, and for one.
 
-use super::{Chosen, looks};
+use super::{Chosen, check_of_scene, looks};
 use crate::error::Result;
 use crate::petsc::{Entry, Session, is_of_family};
 use std::cell::RefCell;
@@ -41,8 +41,9 @@ impl<'a> Prefixes<'a> {
 /// one of a body.
 ///
 /// # Errors
-/// When PETSc refuses the name.
+/// When it is not one that a scene may have, or PETSc refuses the name.
 pub fn set_of_scene(session: &Session, bodies: &[&str], name: &str, value: Option<&str>) -> Result<()> {
+    check_of_scene(name, value)?;
     let options = session.options();
     let typed = |name: &str| options.has(name) && !OF_SCENE.with_borrow(|names| names.contains(name));
     let plain = Prefixes::new(bodies).split(name).map(|(_, bare)| format!("-{bare}"));

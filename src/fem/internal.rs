@@ -1,0 +1,176 @@
+//! Internal forces and strain energies of displacements, cell by cell, without a matrix.
+//!
+//! They check what solvers have made of assembled matrices, so they share nothing with these but shape functions, quadrature and Hooke's law.
+
+use super::elasticity::Elasticity;
+use super::material::Material;
+use super::space::Space;
+use super::{assemble, element};
+use crate::linalg::dot;
+
+/// Forces of the cells of a body on its nodes, and what these forces are measured by.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Internal {
+    /// K u, one entry a dof.
+    pub force: Vec<f64>,
+    /// Bound of the rounding errors in `force`, one entry a node.
+    pub rounding: Vec<f64>,
+    /// Bound of the diagonal entries of K, one entry a node.
+    pub diagonal: Vec<f64>,
+    /// Integral of the norm of Hooke's law, shared among the nodes of each cell, one entry a node.
+    pub bulk: Vec<f64>,
+}
+
+/// An integration point of a cell.
+struct Point<'a, const D: usize> {
+    /// Nodes of the cell.
+    cell: &'a [u32],
+    at: [f64; D],
+    /// Values and gradients of the shape functions.
+    phi: [f64; element::MOST],
+    gradient: &'a [[f64; D]],
+    /// Weight of the point in an integral over the body.
+    weight: f64,
+    material: Material,
+}
+
+/// Visits the integration points of some cells, those of [`assemble::stiffness`]. A cell that cannot be integrated has made the assembly fail, and
+/// is left out.
+fn visit<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    cells: impl Iterator<Item = usize>,
+    mut each: impl FnMut(Point<D>),
+) {
+    let rules = assemble::Rules::new::<D>(space.order);
+    let stride = space.stride;
+    let mut x = vec![[0.0; D]; stride];
+    for index in cells {
+        let cell = &space.cells[index * stride..(index + 1) * stride];
+        x.iter_mut().zip(cell).for_each(|(x, &node)| *x = space.nodes[node as usize]);
+        let constant = elasticity.constant_in(index);
+        for (l, weight) in rules.of(&x, constant.is_some(), space.axisymmetric).iter() {
+            let Some((gradient, measure)) = element::gradients(space.order, &x, l) else { continue };
+            let phi = element::values(space.order, l);
+            let at = assemble::interpolate(&x, &phi);
+            let material = match constant {
+                Some(material) => *material,
+                None => match elasticity.at(index, space.in_scene(at)) {
+                    Ok(material) => material,
+                    Err(_) => continue,
+                },
+            };
+            let weight = weight * measure * space.circle(&at);
+            each(Point { cell, at, phi, gradient: &gradient[..stride], weight, material });
+        }
+    }
+}
+
+/// Internal forces of a displacement `u`, one entry a dof, of some cells. Right at nodes all of whose cells are among them.
+///
+/// A force is a sum of products of stresses, which are sums of products of strains, which are sums of products of displacements. A sum of n terms has
+/// a rounding error of at most n eps times the sum of their sizes, so that eps times the lengths of all three sums, times the sizes, is a bound.
+pub fn forces<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    cells: impl Iterator<Item = usize>,
+    u: &[f64],
+) -> Internal {
+    let count = space.nodes.len();
+    let zero = || vec![0.0; count];
+    let mut all = Internal { force: vec![0.0; D * count], rounding: zero(), diagonal: zero(), bulk: zero() };
+    let mut terms = zero();
+    let size = |v: &[f64]| v.iter().map(|v| v.abs()).sum::<f64>();
+    visit(space, elasticity, cells, |Point { cell, at, phi, gradient, weight, material }: Point<D>| {
+        let stress = material.stress(&space.slope(cell, &at, &phi, gradient, u).strain());
+        let stiffness = weight * material.norm();
+        let slope = |a: usize| size(&gradient[a]) + space.hoop(&at, phi[a]).abs();
+        let moved = |(a, &node): (usize, &u32)| slope(a) * size(&u[D * node as usize..][..D]);
+        let strains: f64 = cell.iter().enumerate().map(moved).sum();
+        for (a, &node) in cell.iter().enumerate() {
+            let node = node as usize;
+            let force = material_force(&stress, &gradient[a], space.hoop(&at, phi[a]));
+            (0..D).for_each(|c| all.force[D * node + c] += weight * force[c]);
+            all.rounding[node] += stiffness * slope(a) * strains;
+            all.diagonal[node] += stiffness * slope(a).powi(2);
+            all.bulk[node] += stiffness / space.stride as f64;
+            terms[node] += 1.0;
+        }
+    });
+    // six strains in a stress, D stresses in a force
+    let inner = (D * space.stride + 6 + D) as f64;
+    all.rounding.iter_mut().zip(terms).for_each(|(rounding, terms)| *rounding *= f64::EPSILON * (inner + terms));
+    all
+}
+
+/// Force of a stress on the node of a shape function with this gradient; `hoop` is the function over r in a body of revolution, zero in others.
+fn material_force<const D: usize>(stress: &[f64; 6], gradient: &[f64; D], hoop: f64) -> [f64; D] {
+    const PLACE: [[usize; 3]; 3] = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
+    let mut force = std::array::from_fn(|c| (0..D).map(|j| stress[PLACE[c][j]] * gradient[j]).sum());
+    force[0] += stress[2] * hoop;
+    force
+}
+
+/// Products v_i'K v_j of displacements, one entry a dof each, over some cells; i-th row, j-th column, n x n.
+pub fn products<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    cells: impl Iterator<Item = usize>,
+    fields: &[Vec<f64>],
+) -> Vec<f64> {
+    let n = fields.len();
+    let mut products = vec![0.0; n * n];
+    visit(space, elasticity, cells, |Point { cell, at, phi, gradient, weight, material }: Point<D>| {
+        let strain = |u: &Vec<f64>| space.slope(cell, &at, &phi, gradient, u).strain();
+        let strains: Vec<[f64; 6]> = fields.iter().map(strain).collect();
+        for (i, strain) in strains.iter().enumerate() {
+            let stress = material.stress(strain);
+            (0..n).for_each(|j| products[n * i + j] += weight * dot(&stress, &strains[j]));
+        }
+    });
+    products
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::sample::block;
+    use crate::fem::{Frame, NodeGraph};
+    use crate::problem::{BodySpec, Order, Plane};
+
+    /// The assembled matrix says the same, and its entries lie below the bounds.
+    fn same_as_matrix<const D: usize>(order: Order, plane: Plane) {
+        let mut space = block::<D>(2, order);
+        space.axisymmetric = plane == Plane::Axisymmetric;
+        space.nodes.iter_mut().for_each(|x| x[0] += 1.0);
+        let spec = BodySpec::new("block", 3.0, 0.3).elasticity;
+        let elasticity = Elasticity::new(&[&spec], Vec::new(), D, plane).expect("a material");
+        let graph = NodeGraph::new(&space, &[], &Frame::default());
+        let matrix = assemble::stiffness(&space, &graph, &elasticity).expect("a matrix");
+        let u: Vec<f64> = (0..space.dofs()).map(|i| (i as f64 * 0.7).sin()).collect();
+        let v: Vec<f64> = (0..space.dofs()).map(|i| (i as f64 * 0.3).cos()).collect();
+        let mut expected = vec![0.0; u.len()];
+        matrix.multiply(&u, &mut expected);
+        let found = forces(&space, &elasticity, 0..space.cell_count(), &u);
+        for (i, (force, expected)) in found.force.iter().zip(&expected).enumerate() {
+            assert!((force - expected).abs() <= 2.0 * found.rounding[i / D], "{i}: {force} {expected}");
+            assert!(matrix.diagonal(i) <= found.diagonal[i / D] && found.rounding[i / D] < 1e-11);
+        }
+        let fields = [u, v];
+        let products = products(&space, &elasticity, 0..space.cell_count(), &fields);
+        for (j, field) in fields.iter().enumerate() {
+            assert!((products[j] - dot(&expected, field)).abs() < 1e-12 * products[0]);
+        }
+        assert!((products[1] - products[2]).abs() < 1e-12 * products[0]);
+    }
+
+    #[test]
+    fn internal_forces_are_those_of_the_matrix() {
+        for order in [Order::P1, Order::P2] {
+            for plane in [Plane::Strain, Plane::Stress, Plane::Axisymmetric] {
+                same_as_matrix::<2>(order, plane);
+            }
+            same_as_matrix::<3>(order, Plane::Strain);
+        }
+    }
+}

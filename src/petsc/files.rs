@@ -1,0 +1,233 @@
+//! Files of options: which of them PETSc reads, and a look at them before it does.
+//!
+//! PETSc reads `.petscrc` of the home folder, and `.petscrc` and `petscrc` of the current one. Options can load libraries and start
+//! programs, and a current folder may be anybody's. So those of the current folder are left out unless `-options_file` names them. PETSc follows
+//! files that name each other until its stack ends, and waits for ever at a pipe.
+
+use crate::error::{Error, Kind, Result};
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Files of options that PETSc looks for in the current folder by itself.
+const OF_FOLDER: [&str; 2] = [".petscrc", "petscrc"];
+
+/// Most bytes of a file. PETSc's table has 512 options, so this is 2 kB for each.
+const MOST_BYTES: u64 = 1 << 20;
+
+/// Most files that lead to each other. PETSc's stack takes some 15 kB for each, of which there are 8 MB.
+const MOST_FILES: usize = 100;
+
+/// What PETSc reads, and what it does not.
+#[derive(Debug, Default)]
+pub(super) struct Files {
+    /// The file of the home folder, if there is one that is read.
+    pub home: Option<PathBuf>,
+    /// Files of the current folder that are not read.
+    pub left_out: Vec<String>,
+}
+
+impl Files {
+    /// Look at all files of options that PETSc would read with these `words` of the command line.
+    ///
+    /// # Errors
+    /// One that is no file or no text, that is too large, or that leads back to itself.
+    pub fn look(words: &[String]) -> Result<Self> {
+        let skips = is_on(words, "-skip_petscrc");
+        let home =
+            std::env::var_os("HOME").filter(|home| !home.is_empty()).map(|home| Path::new(&home).join(".petscrc"));
+        let home = home.filter(|path| !skips && path.is_file() && File::open(path).is_ok());
+        let mut look = Look::default();
+        if let Some(path) = &home {
+            look.file(&path.to_string_lossy())?;
+        }
+        look.words(tokens(&std::env::var("PETSC_OPTIONS").unwrap_or_default()))?;
+        look.words(words.iter().map(String::as_str))?;
+        let is_left_out = |name: &str| {
+            let path = Path::new(name);
+            !skips && path.is_file() && path.canonicalize().is_ok_and(|path| !look.seen.contains(&path))
+        };
+        let left_out = OF_FOLDER.into_iter().filter(|name| is_left_out(name)).map(str::to_owned).collect();
+        Ok(Self { home, left_out })
+    }
+}
+
+/// Whether a switch of the command line is on; the last one counts.
+fn is_on(words: &[String], name: &str) -> bool {
+    let Some(at) = words.iter().rposition(|word| word.eq_ignore_ascii_case(name)) else { return false };
+    let value = words.get(at + 1).map(|value| value.to_lowercase()).unwrap_or_default();
+    !["0", "no", "off", "false"].contains(&value.as_str())
+}
+
+/// A look at files that lead to each other.
+#[derive(Default)]
+struct Look {
+    /// The files from the first one to this one.
+    chain: Vec<PathBuf>,
+    /// All files so far.
+    seen: BTreeSet<PathBuf>,
+    /// How often one was read.
+    count: usize,
+}
+
+impl Look {
+    /// Looks at the files that options name.
+    fn words<'a>(&mut self, words: impl IntoIterator<Item = &'a str>) -> Result<()> {
+        let mut words = words.into_iter();
+        while let Some(word) = words.next() {
+            if ["-options_file", "-options_file_yaml"].iter().any(|name| word.eq_ignore_ascii_case(name)) {
+                let name = words.next().filter(|name| !name.is_empty() && !name.starts_with('-'));
+                let name = name.ok_or_else(|| wrong(format!("{word} names no file"), &self.chain))?;
+                self.file(name)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Looks at a file. One that is missing is left to PETSc, which says so.
+    fn file(&mut self, name: &str) -> Result<()> {
+        if name.contains("${") {
+            return Err(wrong(format!("the name of the options file `{name}` is not written out"), &self.chain)
+                .help("write the name of the file itself: winkler looks at it before PETSc does"));
+        }
+        // as PETSc does
+        let name = name.replace('\\', "/");
+        let path = Path::new(name.strip_suffix(":yaml").unwrap_or(&name));
+        let Ok(place) = path.canonicalize() else { return Ok(()) };
+        if self.chain.contains(&place) {
+            return Err(wrong(format!("the options file {} leads back to itself", path.display()), &self.chain)
+                .help("take -options_file out of one of these files"));
+        }
+        self.count += 1;
+        if self.count > MOST_FILES {
+            return Err(wrong(format!("more than {MOST_FILES} options files lead to each other"), &self.chain)
+                .help("write the options into one file"));
+        }
+        let text = text(path)?;
+        self.seen.insert(place.clone());
+        self.chain.push(place);
+        let is_yaml = name != path.to_string_lossy()
+            || [".yaml", ".yml", ".json"].iter().any(|end| name.ends_with(end))
+            || ["%YAML ", "---"].iter().any(|start| text.starts_with(start));
+        if !is_yaml {
+            // PETSc makes one string of the file
+            let lines: String = text.lines().map(joined).collect();
+            self.words(tokens(&lines))?;
+        }
+        self.chain.pop();
+        Ok(())
+    }
+}
+
+/// An error about an option of the command line, or of the last of these files.
+fn wrong(message: String, chain: &[PathBuf]) -> Error {
+    chain
+        .iter()
+        .rev()
+        .fold(Error::new(Kind::Solver, message), |error, file| error.because(format!("named in {}", file.display())))
+}
+
+/// The text of a file of options.
+fn text(path: &Path) -> Result<String> {
+    let (file, mut bytes) = (crate::file::open(path)?, Vec::new());
+    let failed = |cause| Error::file(path, "read", &cause);
+    file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    let is_sign = |byte: &u8| !byte.is_ascii_control() || b"\t\n\r\x0c".contains(byte);
+    let wrong = match () {
+        _ if bytes.len() as u64 > MOST_BYTES => format!("has more than {} kB", MOST_BYTES >> 10),
+        _ if !bytes.iter().all(is_sign) => "is no text".to_owned(),
+        _ => return Ok(String::from_utf8_lossy(&bytes).into_owned()),
+    };
+    Err(Error::new(Kind::File, format!("the options file {} {wrong}", path.display()))
+        .help("-options_file names a text file with one PETSc option a line"))
+}
+
+/// The option of a line as PETSc puts it into one string with those of other lines.
+fn joined(line: &str) -> String {
+    let line = line.split('#').next().unwrap_or_default().replace(['\t', '\r'], " ");
+    let words: Vec<&str> = tokens(line.trim_start_matches(' ')).collect();
+    match words[..] {
+        [] => String::new(),
+        [name] => format!("{name} "),
+        [name, value, ..] => format!("{name} \"{value}\" "),
+    }
+}
+
+/// The words of a string as PETSc finds them: between blanks, or from a double quote to the next one.
+fn tokens(text: &str) -> impl Iterator<Item = &str> {
+    let mut rest = text;
+    std::iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
+        let (from, end) = rest.strip_prefix('"').map_or((rest, ' '), |quoted| (quoted, '"'));
+        let (word, after) = from.split_once(end).unwrap_or((from, ""));
+        rest = after.trim_start_matches(' ');
+        Some(word)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn looked(text: &str) -> Result<()> {
+        Look::default().words(tokens(text))
+    }
+
+    #[test]
+    fn words_are_those_of_petsc() {
+        let of = |text| tokens(text).collect::<Vec<_>>();
+        assert_eq!(of("-a  1 \"b c\"  -d"), ["-a", "1", "b c", "-d"]);
+        assert_eq!(of("\"open end"), ["open end"]);
+        let lines = ["  -a\t1 # b", "# all", "", "-c", "\"-options_file x\""];
+        assert_eq!(lines.map(joined).concat(), "-a \"1\" -c -options_file x ");
+    }
+
+    #[test]
+    fn rings_and_odd_files_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+        write("good", &format!("-ksp_type cg # -options_file {}\n", path("self")));
+        write("twice", &format!("-options_file {0}\n-options_file {0}\n", path("good")));
+        write("self", &format!("-Options_File {}\n", path("self")));
+        write("a", &format!("\t-options_file \"{}\"\n", path("b")));
+        write("b", &format!("-ksp_type cg\n\"-x -options_file {}\"\n", path("a")));
+        write("open", "-options_file\n");
+        write("hidden", "-options_file ${HOME}/x\n");
+        write("zero", "-a \0");
+        write("huge", &"# \n".repeat(400_000));
+        write("ring.yaml", &format!("options_file: {}\n", path("ring.yaml")));
+        for name in ["good", "twice", "missing", "ring.yaml"] {
+            assert!(looked(&format!("-options_file {}", path(name))).is_ok(), "{name}");
+        }
+        for (name, words) in [
+            ("self", "leads back to itself"),
+            ("a", "leads back to itself"),
+            ("open", "names no file"),
+            ("hidden", "not written out"),
+            ("zero", "is no text"),
+            ("huge", "has more than 1024 kB"),
+            ("", "is a folder"),
+        ] {
+            let error = looked(&format!("-ksp_rtol 1 -options_file {}", path(name))).unwrap_err();
+            assert!(error.message().contains(words), "{name}: {}", error.message());
+        }
+        assert!(looked("-options_file").is_err() && looked("-options_file -ksp_view").is_err());
+        for k in 0..200 {
+            write(&format!("chain{k}"), &format!("-options_file {}\n", path(&format!("chain{}", k + 1))));
+        }
+        assert!(looked(&format!("-options_file {}", path("chain150"))).is_ok());
+        assert!(looked(&format!("-options_file {}", path("chain0"))).is_err());
+    }
+
+    #[test]
+    fn the_last_switch_counts() {
+        let of = |text: &str| is_on(&text.split(' ').map(str::to_owned).collect::<Vec<_>>(), "-skip_petscrc");
+        assert!(of("-skip_petscrc") && of("-a -Skip_PetscRC 1") && of("-skip_petscrc no -skip_petscrc -x"));
+        assert!(!of("-a") && !of("-skip_petscrc -skip_petscrc False"));
+    }
+}

@@ -1,0 +1,35 @@
+//! What a scene asks for, wherever its files are: equal for scenes that have the same answer.
+
+use super::Scene;
+use crate::file::digest;
+use serde_json::{Value, json};
+
+impl Scene {
+    /// Return the settings without the names of files and folders, and with digests of the numbers of data files in their place. Tables
+    /// are in the settings with their numbers. The contents of the mesh's files are not in it.
+    pub fn contents(&self) -> Value {
+        let mut settings = self.settings();
+        let mut remove = |place: &str, keys: &[&str]| {
+            if let Some(table) = settings.pointer_mut(place).and_then(Value::as_object_mut) {
+                keys.iter().for_each(|key| drop(table.remove(*key)));
+            }
+        };
+        remove("", &["scene"]);
+        remove("/mesh", &["geo", "msh"]);
+        remove("/method/steps", &["table"]);
+        remove("/output", &["dir"]);
+        for data in self.data.values() {
+            settings["data"][&data.spec.name]["file"] = json!(digest(&data.numbers().collect::<Vec<f64>>()));
+        }
+        settings
+    }
+
+    /// Return the contents without what changes neither problem nor method: what is written and how it is called.
+    pub fn problem(&self) -> Value {
+        let mut contents = self.contents();
+        if let Some(table) = contents.as_object_mut() {
+            ["title", "units", "output"].iter().for_each(|key| drop(table.remove(*key)));
+        }
+        contents
+    }
+}

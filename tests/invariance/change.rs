@@ -1,0 +1,266 @@
+//! A scene in other coordinates and units: moved, turned, mirrored, scaled. Its answer is known from that of the scene itself.
+
+use std::rc::Rc;
+use winkler::api::{
+    Constants, ContactSpec, ElasticitySpec, Error, Field, LayerSpec, LoadKind, MeshArrays, MeshSource, Plane, Result,
+    Scene, SpringKind, Start,
+};
+use winkler::expression::{Expression, Scope};
+use winkler::fem::cross;
+use winkler::mesh::Mesh;
+use winkler::problem::{AxesSpec, BodySpec, Depths, LawKind};
+
+/// x' = length * (Q x + shift), with a signed permutation Q: (Q x)_i = sign_i x_axis_i. Stresses are multiplied by `stress`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    pub axis: [usize; 3],
+    pub sign: [f64; 3],
+    /// In units of the scene.
+    pub shift: [f64; 3],
+    pub length: f64,
+    pub stress: f64,
+}
+
+impl Change {
+    /// Return the change that does nothing.
+    pub fn none() -> Self {
+        Self { axis: [0, 1, 2], sign: [1.0; 3], shift: [0.0; 3], length: 1.0, stress: 1.0 }
+    }
+
+    /// Return Q v.
+    pub fn vector(&self, v: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|i| self.sign[i] * v[self.axis[i]])
+    }
+
+    /// Return the vector of which Q makes `v`.
+    pub fn back(&self, v: [f64; 3]) -> [f64; 3] {
+        let mut back = [0.0; 3];
+        (0..3).for_each(|i| back[self.axis[i]] = self.sign[i] * v[i]);
+        back
+    }
+
+    fn point(&self, x: [f64; 3]) -> [f64; 3] {
+        let turned = self.vector(x);
+        std::array::from_fn(|i| self.length * (turned[i] + self.shift[i]))
+    }
+
+    /// Return the factor of forces; in the plane they are those on a thickness of one.
+    pub fn force(&self, scene: &Scene) -> f64 {
+        let is_thin = scene.dimension.value == 2 && scene.plane != Plane::Axisymmetric;
+        self.stress * if is_thin { self.length } else { self.length * self.length }
+    }
+
+    /// Return a field of the changed scene: `factor` times the old one at the old point.
+    fn field(&self, field: &Field, factor: f64) -> Field {
+        if let Field::Constant(value) = field {
+            return Field::Constant(factor * value);
+        }
+        let (old, change) = (field.clone(), *self);
+        Field::from(move |x: [f64; 3]| {
+            let local = std::array::from_fn(|i| x[i] / change.length - change.shift[i]);
+            factor * old.eval(change.back(local))
+        })
+    }
+
+    /// Return the fields of the components of a vector.
+    fn fields(&self, fields: &[Field; 3], factor: f64) -> [Field; 3] {
+        std::array::from_fn(|i| self.field(&fields[self.axis[i]], self.sign[i] * factor))
+    }
+
+    /// Change a scene on its mesh.
+    ///
+    /// # Errors
+    /// What the new scene refuses.
+    pub fn apply<const D: usize>(&self, scene: &mut Scene, mesh: &Mesh<D>) -> Result<()> {
+        let force = self.force(scene);
+        scene.mesh = self.mesh(mesh);
+        for body in &mut scene.bodies {
+            self.body(body, mesh, force);
+        }
+        for contact in &mut scene.contacts {
+            self.contact(contact, D)?;
+        }
+        for rule in &mut scene.auto {
+            rule.distance *= self.length;
+            self.contact(&mut rule.contact, D)?;
+        }
+        if let Start::Normal(field) = &mut scene.method.start {
+            *field = self.field(field, self.length);
+        }
+        Ok(())
+    }
+
+    fn mesh<const D: usize>(&self, mesh: &Mesh<D>) -> MeshSource {
+        let mut arrays = MeshArrays::new(mesh.points.iter().map(|&x| self.point(mesh.in_scene(x))).collect());
+        arrays.order = mesh.order;
+        for group in mesh.groups.iter() {
+            arrays = arrays.group(&group.name, group.dimension, group.connectivity.clone());
+        }
+        arrays.into()
+    }
+
+    fn body<const D: usize>(&self, body: &mut BodySpec, mesh: &Mesh<D>, force: f64) {
+        let (l, s) = (self.length, self.stress);
+        self.elasticity(&mut body.elasticity);
+        body.regions.iter_mut().for_each(|region| self.elasticity(&mut region.elasticity));
+        for fix in &mut body.fix {
+            let old = fix.value.clone();
+            let value = |i: usize| Some(self.field(old[self.axis[i]].as_ref()?, self.sign[i] * l));
+            fix.value = std::array::from_fn(value);
+            fix.normal = fix.normal.as_ref().map(|field| self.field(field, l));
+        }
+        for load in &mut body.load {
+            match &mut load.kind {
+                LoadKind::Pressure(field) => *field = self.field(field, s),
+                LoadKind::Traction(fields) => *fields = self.fields(fields, s),
+                LoadKind::Force { total, .. } => *total = self.vector(*total).map(|f| force * f),
+            }
+        }
+        for spring in &mut body.spring {
+            let is_point = mesh.group(&spring.on.value).is_some_and(|group| group.dimension == 0);
+            let factor = if is_point { force / l } else { s / l };
+            match &mut spring.kind {
+                SpringKind::Normal(field) => *field = self.field(field, factor),
+                SpringKind::Vector(k) => *k = std::array::from_fn(|i| self.field(&k[self.axis[i]], factor)),
+            }
+        }
+        body.force = body.force.as_ref().map(|fields| self.fields(fields, s / l));
+        // it has no part in the answer
+        body.exact = None;
+    }
+
+    fn elasticity(&self, elasticity: &mut ElasticitySpec) {
+        let s = self.stress;
+        match &mut elasticity.constants {
+            Constants::Isotropic { young, poisson } => {
+                (*young, *poisson) = (self.field(young, s), self.field(poisson, 1.0));
+                return;
+            }
+            Constants::Orthotropic(fields) => {
+                for (field, name) in fields.iter_mut().zip(Constants::ORTHOTROPIC) {
+                    *field = self.field(field, if name.starts_with("nu") { 1.0 } else { s });
+                }
+            }
+            Constants::Anisotropic(fields) => fields.iter_mut().for_each(|field| *field = self.field(field, s)),
+        }
+        let constant = |v: [f64; 3]| v.map(Field::Constant);
+        let [first, second] = match elasticity.axes.take() {
+            None => [constant([1.0, 0.0, 0.0]), constant([0.0, 1.0, 0.0])],
+            Some(AxesSpec::Directions { first, second: Some(second) }) => [first, second],
+            Some(AxesSpec::Directions { first, second: None }) => {
+                let across = |f: [f64; 3]| cross([0.0, 0.0, 1.0], f);
+                let old = first.clone();
+                let at = move |i: usize| {
+                    let old = old.clone();
+                    Field::from(move |x: [f64; 3]| across(old.each_ref().map(|field| field.eval(x)))[i])
+                };
+                [first, std::array::from_fn(at)]
+            }
+            Some(AxesSpec::Angle { angle, axis }) => {
+                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(|from| turned(from, &angle, &axis))
+            }
+        };
+        // the third axis is the cross product of these: orthotropic constants do not see its sign
+        let (first, second) = (self.fields(&first, 1.0), Some(self.fields(&second, 1.0)));
+        elasticity.axes = Some(AxesSpec::Directions { first, second });
+    }
+
+    fn contact(&self, contact: &mut ContactSpec, dimension: usize) -> Result<()> {
+        let (l, s) = (self.length, self.stress);
+        contact.gap = self.field(&contact.gap, l);
+        contact.reference = None;
+        match &mut contact.layer {
+            LayerSpec::Form { form, values } => {
+                let scaled = |k: usize, factor: f64| self.field(&values[k], factor);
+                *values = match form.kind {
+                    LawKind::Linear => vec![scaled(0, s / l)],
+                    LawKind::Exponential => vec![scaled(0, s), scaled(1, l)],
+                    LawKind::Cubic => vec![scaled(0, s / l), scaled(1, s / l.powi(3))],
+                    // p = (c/B)^(1/a): B is the compression under p = 1
+                    LawKind::Power => {
+                        let (b, a) = (scaled(0, l), scaled(1, 1.0));
+                        let exponent = a.clone();
+                        vec![product(b, move |x| s.powf(-exponent.eval(x))), a]
+                    }
+                }
+            }
+            LayerSpec::Table(points) => points.iter_mut().for_each(|[c, p]| (*c, *p) = (l * *c, s * *p)),
+            LayerSpec::Asperities(spec) => {
+                spec.density /= l * l;
+                spec.radius *= l;
+                spec.modulus *= s;
+                spec.depths = match &spec.depths {
+                    Depths::Normal { deviation, highest } => {
+                        Depths::Normal { deviation: l * deviation, highest: l * highest }
+                    }
+                    Depths::Measured(depths) => Depths::Measured(depths.iter().map(|depth| l * depth).collect()),
+                };
+            }
+            LayerSpec::Own(name) => {
+                return Err(Error::new(winkler::api::Kind::Scene, format!("the law `{name}` has no text")));
+            }
+            LayerSpec::Pressure { law, up_to } => {
+                *law = self.law(law, dimension)?;
+                *up_to = up_to.map(|c| l * c);
+            }
+        }
+        Ok(())
+    }
+
+    /// Return a law in c and coordinates with the old ones substituted, as a user would write it.
+    fn law(&self, law: &Expression, dimension: usize) -> Result<Expression> {
+        let names = ["c", "x", "y", "z"];
+        let old = |name: &str| -> Option<String> {
+            let place = names.iter().position(|known| *known == name)?;
+            let Some(j) = place.checked_sub(1) else { return Some(format!("(c/({:e}))", self.length)) };
+            let i = (0..3).find(|&i| self.axis[i] == j)?;
+            Some(format!("(({:e})*({}/({:e}) - ({:e})))", self.sign[i], names[1 + i], self.length, self.shift[i]))
+        };
+        let text = format!("({:e})*({})", self.stress, substituted(law.text(), &old));
+        Expression::parse(&text, law.place(), Scope::of(&names[..=dimension]))
+    }
+}
+
+/// Return a vector turned by an angle about an axis of unit length, component by component.
+fn turned(from: [f64; 3], angle: &Field, axis: &[Field; 3]) -> [Field; 3] {
+    let (angle, axis) = (angle.clone(), axis.clone());
+    let at = Rc::new(move |x: [f64; 3]| {
+        let n = axis.each_ref().map(|field| field.eval(x));
+        let size = n.iter().map(|n| n * n).sum::<f64>().sqrt();
+        let n = n.map(|n| n / size);
+        let (sine, cosine) = angle.eval(x).sin_cos();
+        let (along, across) = ((0..3).map(|c| n[c] * from[c]).sum::<f64>(), cross(n, from));
+        let part = |c: usize| cosine * from[c] + sine * across[c] + (1.0 - cosine) * along * n[c];
+        [part(0), part(1), part(2)]
+    });
+    std::array::from_fn(|c| {
+        let at = at.clone();
+        Field::from(move |x: [f64; 3]| at(x)[c])
+    })
+}
+
+/// Return the product of two functions of the place.
+fn product(field: Field, factor: impl Fn([f64; 3]) -> f64 + 'static) -> Field {
+    match field {
+        // a law whose constants are numbers is one for all points
+        Field::Constant(value) => Field::Constant(value * factor([0.0; 3])),
+        field => Field::from(move |x: [f64; 3]| field.eval(x) * factor(x)),
+    }
+}
+
+/// Return an expression with other texts for some of its names.
+fn substituted(text: &str, other: &dyn Fn(&str) -> Option<String>) -> String {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
+    let (mut made, mut rest) = (String::new(), text);
+    while let Some(first) = rest.chars().next() {
+        let end = match is_word(first) {
+            // 1e3 is a word, too, and none of these names
+            true => rest.find(|c| !is_word(c)).unwrap_or(rest.len()),
+            false => first.len_utf8(),
+        };
+        let (word, after) = rest.split_at(end);
+        made += &other(word).unwrap_or_else(|| word.to_owned());
+        rest = after;
+    }
+    made
+}
