@@ -8,7 +8,7 @@
 //! far Newton's method is.
 //!
 //! ```text
-//! enter    at the second step in a row of the laws themselves that is not taken whole, or one of a cycle:  mu = 100 D
+//! enter    at the second step with the laws themselves that is not taken whole, or in a cycle:  mu = 100 D
 //! step     mu <- min(mu, D),  D from the smoothed laws: it stays while the states are far, and falls as fast as Newton's method converges
 //! leave    when mu times the area is below all that the run can see
 //! ```
