@@ -185,7 +185,9 @@ impl Newton<'_, '_> {
         let (run, resolved) = (&mut *self.run, &iterate.resolved);
         let step = (&self.u, &iterate.step.field, iterate.length);
         let at = run.after_step(step, measures.measured, &measures.reached, resolved, self.linear);
-        let ended = run.end_at(&at, self.linear)?;
+        // errors of states on smoothed laws fall with mu, and tell nothing of roundoff
+        let is_smoothed = !self.states.smoothing.is_empty();
+        let ended = run.end_at(&at, self.linear)?.filter(|status| !(is_smoothed && *status == Status::RoundoffLimited));
         let is_best = |row: &Row| self.best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual);
         if let Some(row) = run.rows.last().filter(|row| measures.is_complete && is_best(row)) {
             self.best = Some((row.clone(), self.u.clone(), resolved.clone()));

@@ -16,12 +16,12 @@
 use crate::model::Model;
 use crate::model::layer::Layer;
 
-/// Steps of the laws themselves that are not taken whole before the laws are smoothed. With one, 58 slender scenes took 337 steps, with two 321; 100 usual ones
-/// 142 and 136 (docs/methods.md).
+/// Steps of the laws themselves that are not taken whole before the laws are smoothed. With one, 58 slender scenes took 335 steps, with two 321, both with an
+/// earlier rule for the fall of mu.
 const SHORTENED: usize = 2;
 
 /// mu at the beginning over the mean squared distance D of the states. D counts the mismatch of few points, while the contact is far from its place: from 30
-/// to 300 a peeling leaf took the same number of steps within one, with 1 nine times as many (docs/methods.md).
+/// to 300 beams with linear layers that peel took the same number of steps within one, with 1 nine times as many (docs/methods.md).
 const AHEAD: f64 = 100.0;
 
 /// Cycles of which a run may leave by smoothing; more end it.
