@@ -154,7 +154,7 @@ mod tests {
         let found = forces(&space, &elasticity, 0..space.cell_count(), &u);
         for (i, (force, expected)) in found.force.iter().zip(&expected).enumerate() {
             assert!((force - expected).abs() <= 2.0 * found.rounding[i / D], "{i}: {force} {expected}");
-            assert!(matrix.diagonal(i) <= found.diagonal[i / D] && found.rounding[i / D] < 1e-11);
+            assert!(matrix.diagonal(i) <= found.diagonal[i / D] && found.rounding[i / D] < 1e-8);
         }
         let fields = [u, v];
         let products = products(&space, &elasticity, 0..space.cell_count(), &fields);

@@ -130,8 +130,15 @@ fn wrong(message: String, chain: &[PathBuf]) -> Error {
 
 /// The text of a file of options.
 fn text(path: &Path) -> Result<String> {
-    let (file, mut bytes) = (crate::file::open(path)?, Vec::new());
     let failed = |cause| Error::file(path, "read", &cause);
+    // the opening of a pipe waits for its other end
+    let kind = path.metadata().map_err(failed)?;
+    if !kind.is_file() {
+        let odd = if kind.is_dir() { "a folder" } else { "a pipe or a device" };
+        return Err(Error::new(Kind::File, format!("{} is {odd}, not a file", path.display()))
+            .help("name a regular file; what a pipe gives can be saved as one"));
+    }
+    let (file, mut bytes) = (File::open(path).map_err(failed)?, Vec::new());
     file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
     let is_sign = |byte: &u8| !byte.is_ascii_control() || b"\t\n\r\x0c".contains(byte);
     let wrong = match () {

@@ -46,15 +46,17 @@ pub fn look(done: &mut Done, recovered: &All) {
     let asked = done.built.scene.method.stop.residual.unwrap_or(0.0);
     // forces count beyond their rounding: those that the layers' compressions can have from rounding are left
     let is_rounding = reached.error <= asked || done.outcome.is_rounding(energy.unbalanced);
-    let allowed = if told <= asked { asked } else { ROUGHLY * told };
+    let rounding = done.outcome.rounding;
+    // what rounding makes of pressures is told apart
+    let allowed = if told <= asked { asked } else { ROUGHLY * told }.max(rounding);
     let is_seen = found <= allowed && is_rounding;
     let ended = if done.outcome.status == Status::RoundoffLimited { told } else { 0.0 };
-    let lost = ended.max(done.outcome.rounding);
+    let lost = ended.max(rounding);
     // NaN is seen by nobody
-    if is_solved && !is_seen {
-        done.outcome.status = Status::Inaccurate(Inaccuracy { told, found, whose });
-    } else if is_solved && lost > ONE_DIGIT {
+    if is_solved && lost > ONE_DIGIT {
         done.outcome.status = Status::Inaccurate(Inaccuracy { told, found: lost, whose: Whose::Rounding });
+    } else if is_solved && !is_seen {
+        done.outcome.status = Status::Inaccurate(Inaccuracy { told, found, whose });
     }
     done.look = Some(Look { reached, whose, seconds: began.elapsed().as_secs_f64() });
 }
