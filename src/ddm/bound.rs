@@ -15,7 +15,7 @@ use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::linear::Solution;
 use crate::model::rigid::PART;
-use crate::model::surface::surface_slopes;
+use crate::model::surface::{meeting_slopes, surface_slopes};
 
 /// How far places are from what the laws have at the compressions of the bodies.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -31,11 +31,20 @@ impl OffLaws {
     /// Of places, where the bodies have these compressions, known to their `digits`, n each.
     pub(super) fn new(model: &Model, places: &Layer, compression: &[f64], digits: &[f64]) -> Self {
         let mut off = Self::default();
+        // bodies and layer answer an error of a compression like springs in a row: a steep law alone would make any pressure of it
+        let rho = meeting_slopes(model);
+        let resolved = Layer::resolve(model, compression, &places.pressure, &rho, &[]);
         for (i, pair) in model.pairs.iter().enumerate() {
             for q in model.range(i) {
                 let (point, p) = (q - model.offset[i], places.pressure[q]);
                 let c = nearest(&*pair.law, point, (compression[q], digits[q]), p);
-                let mismatch = (p - pair.law.pressure(point, c)).abs();
+                let mismatch = if rho[q] < f64::INFINITY {
+                    let roundoff = rho[q] * digits[q] + f64::EPSILON * (p.abs() + resolved.pressure[q].abs());
+                    // a difference that is no number stays none
+                    ((p - resolved.pressure[q]).abs() - roundoff).clamp(0.0, f64::INFINITY)
+                } else {
+                    (p - pair.law.pressure(point, c)).abs()
+                };
                 off.gap += model.weight[q] * pair.law.duality_gap(point, c, p);
                 if mismatch.is_nan() || mismatch > off.mismatch {
                     (off.mismatch, off.pair) = (mismatch, i);

@@ -196,7 +196,7 @@ mod tests {
         };
         let (own, shared) = (make("own", 0o775), make("shared", 0o1777));
         let chosen = |folder: &Path| choose(|name| (name == "WINKLER_CACHE").then(|| folder.to_owned()));
-        assert_eq!(chosen(&own), [own.clone()]);
+        assert_eq!(chosen(&own), std::slice::from_ref(&own));
         assert!(!chosen(&shared).contains(&shared));
         let link = base.path().join("link");
         std::os::unix::fs::symlink(&own, &link).unwrap();

@@ -6,7 +6,8 @@ use super::substructures::Substructures;
 use super::{Ksp, Matrix, ffi};
 use crate::error::Result;
 
-/// P'AP, factored: of a matrix A and some of its dofs P.
+/// P'AP, factored: of a matrix A and some of its dofs P. A run has one or two.
+#[allow(clippy::large_enum_variant)]
 pub(super) enum Factor {
     /// In two halves.
     Halves(Substructures),

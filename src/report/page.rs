@@ -111,8 +111,7 @@ impl Results {
         let written = |name: &String| files.iter().any(|file| file == name);
         // the name of a file is no path that leads elsewhere
         let stems = stems.iter().flat_map(|stem| ["pvtu", "vtu"].map(|ending| format!("{stem}.{ending}")));
-        let stems = stems.filter(|name| !name.contains('/'));
-        let name = stems.filter(written).next();
+        let name = stems.filter(|name| !name.contains('/')).find(written);
         name.filter(|name| self.files.path(name).exists())
     }
 
