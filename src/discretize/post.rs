@@ -25,19 +25,19 @@ pub trait Post {
     /// stiffnesses omega kappa of these rows.
     fn unbalanced(&self, bent: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced;
 
-    /// See [`Forces::rough`].
+    /// See `Forces::rough`.
     fn rough(&self, unbalanced: &Unbalanced) -> Vec<f64>;
 
-    /// See [`Forces::on_hats`].
+    /// See `Forces::on_hats`.
     fn on_hats(&self, unbalanced: &Unbalanced) -> Vec<f64>;
 
-    /// See [`Forces::smooth`].
+    /// See `Forces::smooth`.
     fn smooth(&self, sums: &[f64], with_springs: bool) -> Vec<f64>;
 
-    /// See [`Forces::products`].
+    /// See `Forces::products`.
     fn products(&self, fields: &[Vec<f64>]) -> Vec<f64>;
 
-    /// See [`Forces::trace`].
+    /// See `Forces::trace`.
     fn trace(&self, field: &[f64]) -> Vec<f64>;
 
     /// What own nodes add to the mean displacement of where the body is loaded along a direction, else of where it is held along it, else of all

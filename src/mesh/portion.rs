@@ -112,7 +112,7 @@ impl<const D: usize> Portion<D> {
         Self { mesh, points, bounds, owner: Vec::new(), numbers: Vec::new(), keys: Vec::new(), rank: 0 }
     }
 
-    /// Measure the coordinates from a datum near the mesh, the same on all ranks, if the origin is far away; see [`datum`]. `along` says
+    /// Measure the coordinates from a datum near the mesh, the same on all ranks, if the origin is far away; see the module `datum`. `along` says
     /// along which axes the origin may move.
     #[must_use]
     pub fn near(mut self, along: [bool; D]) -> Self {

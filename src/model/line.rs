@@ -68,7 +68,7 @@ impl<'a> Line<'a> {
     /// descend.
     ///
     /// # Errors
-    /// [`Unbounded`] if F1 still falls at the [longest](LONGEST) step.
+    /// [`Unbounded`] if F1 still falls at the longest step.
     pub fn minimize(&self, accuracy: f64) -> Result<f64, Unbounded> {
         zero(|t| self.derivative(t), self.derivative(0.0), accuracy)
     }
@@ -81,7 +81,7 @@ const LONGEST: f64 = 1e150;
 /// The zero t >= 0 of an increasing function with the value `start` at 0, to `accuracy` relative to it; 0 if that is not negative.
 ///
 /// # Errors
-/// [`Unbounded`] if the function is still negative at the [longest](LONGEST) step.
+/// [`Unbounded`] if the function is still negative at the longest step.
 pub fn zero(value: impl Fn(f64) -> f64, start: f64, accuracy: f64) -> Result<f64, Unbounded> {
     if start >= 0.0 {
         return Ok(0.0);
