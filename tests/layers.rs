@@ -7,7 +7,7 @@ use common::{Run, Scene, case, solve};
 /// Solves the patch under q = 10 with a layer and further settings.
 fn patch(layer: &str, more: &[&str]) -> Run {
     let layer = format!("contact.0.layer={layer}");
-    let sets = [&["method={stop={residual=1e-12}}", &layer], more].concat();
+    let sets = [&["method={stop={residual=1e-11}}", &layer], more].concat();
     solve(case("patch"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
 }
 

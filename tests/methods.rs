@@ -101,7 +101,7 @@ fn the_default_is_fast() {
 /// cannot be had to 1e-8 it is said so.
 #[test]
 fn any_power_law_takes_few_steps() {
-    for (scene, most) in [("groove-held", 5), ("groove", 10)] {
+    for (scene, most) in [("groove-held", 5), ("groove", 12)] {
         for start in ["\"auto\"", "{normal=1e-4}"] {
             for b in ["1e-12", "1e-7", "1e-5", "2e-4", "1e-2"] {
                 for a in ["0.02", "0.1", "0.3", "1"] {

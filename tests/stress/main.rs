@@ -139,7 +139,7 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     // steps that led in a circle leave it by smoothed laws, and come to what rounding allows
     let case = wide::scene(2170544, 290, Path::new(env!("CARGO_MANIFEST_DIR")));
     let answer = &bench.solve(case, &["auto"]).0[0].1;
-    assert!(answer.status == "roundoff-limited" && answer.iterations <= 30, "{} {}", answer.iterations, answer.message);
+    assert!(answer.claims && answer.iterations <= 30, "{} {}", answer.iterations, answer.message);
     // the residual is met, but a body is not in balance yet: that is neither converged nor rounding
     let answer = &bench.run(1, 123, &["0.6"]).0[0].1;
     assert_eq!(answer.status, "iteration-limit");
