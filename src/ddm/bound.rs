@@ -28,7 +28,7 @@ pub struct OffLaws {
 }
 
 impl OffLaws {
-    /// Of places, where the bodies have these compressions, known to their `digits`, n each.
+    /// Measure layer states where the bodies have these compressions, known to their `digits`, n each.
     pub(super) fn new(model: &Model, places: &Layer, compression: &[f64], digits: &[f64]) -> Self {
         let mut off = Self::default();
         // bodies and layer answer an error of a compression like springs in a row: a steep law alone would make any pressure of it

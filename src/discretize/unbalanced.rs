@@ -19,7 +19,7 @@ pub struct Unbalanced {
 }
 
 impl Unbalanced {
-    /// Of a body whose displacements are not known.
+    /// Return what stands for a body whose displacements are not known.
     pub fn unknown() -> Self {
         Self { strain: f64::NAN, ..Self::default() }
     }

@@ -178,7 +178,7 @@ pub struct Rules {
 }
 
 impl Rules {
-    /// Of elements of this order.
+    /// Make the rules for elements of this order.
     pub fn new<const D: usize>(order: Order) -> Self {
         let of_degree = |degree: usize| quadrature::simplex(D + 1, degree);
         let (affine, varying) = if order == Order::P1 { (1, 2) } else { (2, 5) };

@@ -158,7 +158,7 @@ impl Schur {
         Ok(())
     }
 
-    /// Completes S, of which MUMPS writes one triangle, row by row, and takes the scales out.
+    /// Complete S and take the scales out. MUMPS writes one triangle of it, row by row.
     fn complete(&mut self) {
         let (n, scale) = (self.retained.len(), &self.scale);
         let of = |i: usize| scale[self.retained[i] as usize - 1];

@@ -47,7 +47,7 @@ pub fn look(done: &mut Done, recovered: &All) {
     // forces count beyond their rounding: those that the layers' compressions can have from rounding are left
     let is_rounding = reached.error <= asked || done.outcome.is_rounding(energy.unbalanced);
     let rounding = done.outcome.rounding;
-    // what rounding makes of pressures is told apart
+    // the report states what rounding makes of pressures by itself
     let allowed = if told <= asked { asked } else { ROUGHLY * told }.max(rounding);
     let is_seen = found <= allowed && is_rounding;
     let ended = if done.outcome.status == Status::RoundoffLimited { told } else { 0.0 };
@@ -77,7 +77,7 @@ struct Energy {
 }
 
 impl Energy {
-    /// Of the result of a run. Collective.
+    /// Measure the result of a run. Collective.
     fn of(done: &Done, recovered: &All) -> Self {
         let (discrete, model) = (&done.built.discrete, done.model());
         let layer = &done.outcome.layer;
@@ -160,7 +160,7 @@ impl Energy {
     }
 }
 
-/// A field that is right at own nodes, made right at all nodes that this rank knows. Collective where the body is dealt out.
+/// Return a field that is right at owned nodes with the values of ghost nodes. Collective where the body is dealt out.
 fn near(slot: &BodySlot, field: Vec<f64>) -> Vec<f64> {
     match slot.local.as_ref().and_then(|body| body.distribution()) {
         Some(distribution) => distribution.near(&distribution.of_known(&field)),
