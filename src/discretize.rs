@@ -26,6 +26,7 @@ mod post;
 mod ready;
 pub mod resolution;
 mod roster;
+mod round;
 mod springs;
 mod supports;
 mod surface;
@@ -120,7 +121,7 @@ pub fn discretize<const D: usize>(
     let drafts = parts.iter().zip(draft::segments(parts.len(), &pairs));
     let drafts = drafts.map(|(part, segments)| Draft::new(part, segments, &pairs, mesh, others));
     let mut drafts = drafts.collect::<Result<Vec<_>>>()?;
-    let Fixed { gauged, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs, others);
+    let Fixed { gauged, spinning, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs, others);
     let supported: Vec<Supported<D>> =
         parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
     let lazy = Coupled::new((&parts, &stocks, &drafts), others);
@@ -164,10 +165,12 @@ pub fn discretize<const D: usize>(
         .zip(&mut owner)
         .for_each(|(dealt, owner)| *owner = dealt.as_ref().map_or(*owner, |dealt| dealt.leader));
     let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt).zip(totals.into_iter().zip(warnings));
-    let known = gauged.into_iter().zip(loose).zip(elasticities);
+    let known = gauged.into_iter().zip(spinning).zip(loose).zip(elasticities);
     let (mut infos, mut offsets, mut ready) = (Vec::new(), Vec::new(), Vec::new());
-    for (index, ((part, ((((draft, supported), graph), mut dealt), of_all)), ((gauged, loose), elasticity))) in
-        parts.into_iter().zip(drafts).zip(known).enumerate()
+    for (
+        index,
+        ((part, ((((draft, supported), graph), mut dealt), of_all)), (((gauged, spinning), loose), elasticity)),
+    ) in parts.into_iter().zip(drafts).zip(known).enumerate()
     {
         let Draft { segments, rows, nodal_rows, nodal_load, .. } = draft;
         let carried = |q: usize| {
@@ -193,6 +196,7 @@ pub fn discretize<const D: usize>(
             left_by_supports: loose.left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: loose.unfelt.iter().map(|(name, _)| name.clone()).collect(),
             gauged,
+            spinning,
             warning,
             stiffness: if held && surface > 0.0 { modulus / depth } else { 0.0 },
             load: resultant,

@@ -32,6 +32,8 @@ pub struct ContactPair {
     pub weight: Vec<f64>,
     /// Unit normals from side a to side b, n.
     pub normal: Vec<[f64; 3]>,
+    /// How well these are known, n: [`Side::spread`].
+    pub spread: Vec<f64>,
     /// Initial gap d_q along the normal, n: geometry and the scene's own gap.
     pub gap: Vec<f64>,
     /// What prescribed displacements contribute to the outer normal displacement of each side, n each.
@@ -191,6 +193,7 @@ pub fn assemble<const D: usize>(
         position,
         weight: Vec::new(),
         normal: Vec::new(),
+        spread: Vec::new(),
         gap: Vec::new(),
         prescribed: [Vec::new(), Vec::new()],
         rows: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
@@ -203,6 +206,7 @@ pub fn assemble<const D: usize>(
         lost: LostPieces::of(a, &cover),
         cover,
     };
+    let spread = a.spread();
     // what lies between matching surfaces is the rounding of their coordinates: that of both, along any normal
     let rounding = (1e-12 * size).max(2.0 * (D as f64).sqrt() * a.rounding());
     for q in 0..pair.nodes.len() {
@@ -242,6 +246,7 @@ pub fn assemble<const D: usize>(
         }
         pair.weight.push(sum.weight);
         pair.normal.push(pad(normal));
+        pair.spread.push(spread[&node]);
         pair.gap.push(distance + own);
     }
     Ok(pair)

@@ -50,6 +50,30 @@ impl<'a, const D: usize> Side<'a, D> {
         Self { name, space, facets, prescribed, frame, normals }
     }
 
+    /// Return how well the normal near each node is known: the largest difference between the unit normals of facets and nodes, of all nodes
+    /// that share a facet with it. It is zero where all is flat.
+    pub fn spread(&self) -> HashMap<u32, f64> {
+        let places = element::nodes::<D>(self.facets.order);
+        let mut at_node: HashMap<u32, f64> = HashMap::new();
+        for i in 0..self.facets.count() {
+            let x = self.facets.coordinates(i, self.space);
+            for (l, node) in places.iter().zip(self.facets.facet(i)) {
+                let (own, mean) = (unit(area_vector(self.facets.order, &x, l)), self.normals[node]);
+                let most = at_node.entry(*node).or_default();
+                *most = most.max(length(std::array::from_fn::<f64, D, _>(|c| own[c] - mean[c])));
+            }
+        }
+        let mut near: HashMap<u32, f64> = HashMap::new();
+        for nodes in (0..self.facets.count()).map(|i| self.facets.facet(i)) {
+            let most = nodes.iter().map(|node| at_node[node]).fold(0.0, f64::max);
+            for node in nodes {
+                let near = near.entry(*node).or_default();
+                *near = near.max(most);
+            }
+        }
+        near
+    }
+
     /// Mean measure (length, area) of a facet.
     pub fn mean_measure(&self) -> f64 {
         let total: f64 = (0..self.facets.count()).map(|i| length(self.area(i))).sum();

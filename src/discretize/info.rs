@@ -29,6 +29,8 @@ pub struct BodyInfo {
     pub left_by_all: Vec<String>,
     /// Names of the rigid motions without work that a gauge fixes at one node each.
     pub gauged: Vec<String>,
+    /// Names of the rigid motions that only the facets of its mesh resist, although loads work on them.
+    pub spinning: Vec<String>,
     /// What the user should know of its elasticity.
     pub warning: Option<String>,
     /// Stiffness of the body against a uniform contact pressure, per area: modulus over depth (area or volume over the length

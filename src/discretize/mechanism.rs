@@ -6,6 +6,7 @@
 use super::draft::{Draft, Loose, NO_WORK};
 use super::gauge;
 use super::part::{Candidate, Part};
+use super::round::Points;
 use super::totals::totals;
 use crate::contact::ContactPair;
 use crate::error::few;
@@ -26,6 +27,8 @@ const FLAWED: f64 = 0.03;
 pub struct Fixed<const D: usize> {
     /// Names of the motions of each body alone that are fixed.
     pub gauged: Vec<Vec<String>>,
+    /// Names of the motions of each body that only the facets of its mesh resist and loads work on.
+    pub spinning: Vec<Vec<String>>,
     /// Motions of several bodies.
     pub mechanisms: Vec<Mechanism>,
     /// The motions left to each body.
@@ -50,11 +53,12 @@ pub fn fix<const D: usize>(
         }
     }
     let bodies = search.parts.iter_mut().zip(drafts).zip(&mut search.loose);
-    let gauged = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose, exchange)).collect();
+    let mut gauged: Vec<_> = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose, exchange)).collect();
+    let spinning = gauged.iter_mut().enumerate().map(|(body, fixed)| search.fix_round(body, fixed)).collect();
     if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
         search.fix_some();
     }
-    Fixed { gauged, mechanisms: search.found, loose: search.loose }
+    Fixed { gauged, spinning, mechanisms: search.found, loose: search.loose }
 }
 
 /// Bodies that pairs connect, two at least, in the order of the first of them.
@@ -234,6 +238,31 @@ impl<const D: usize> Search<'_, '_, D> {
             if !goes_on {
                 return;
             }
+        }
+    }
+
+    /// Fixes the motions of a body along its own round surface on which no load works, and adds them to the names of those that are `fixed`. Returns the names of
+    /// those on which loads work.
+    fn fix_round(&mut self, body: usize, fixed: &mut Vec<String>) -> Vec<String> {
+        if self.loose[body].left.is_empty() || !self.loose[body].unfelt.is_empty() {
+            return Vec::new();
+        }
+        let points = Points::of(&self.drafts[body], self.parts, self.pairs);
+        loop {
+            let round = points.along_surface(&self.loose[body].left, FLAWED);
+            // the centre of a load is known no better than that of the meshed body
+            let moving = |motion: RigidMotion<D>| Moving {
+                bodies: vec![body],
+                name: motion.name.clone(),
+                motions: vec![motion],
+                error: FLAWED,
+            };
+            let (idle, worked): (Vec<_>, Vec<_>) =
+                round.into_iter().map(moving).partition(|moving| self.work(moving) == 0.0);
+            if idle.first().and_then(|moving| self.pin(moving)).is_none() {
+                return worked.into_iter().map(|moving| moving.name).collect();
+            }
+            fixed.push(idle[0].name.clone());
         }
     }
 

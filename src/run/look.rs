@@ -53,10 +53,10 @@ pub fn look(done: &mut Done, recovered: &All) {
     let ended = if done.outcome.status == Status::RoundoffLimited { told } else { 0.0 };
     let lost = ended.max(rounding);
     // NaN is seen by nobody
-    if is_solved && lost > ONE_DIGIT {
-        done.outcome.status = Status::Inaccurate(Inaccuracy { told, found: lost, whose: Whose::Rounding });
-    } else if is_solved && !is_seen {
+    if is_solved && !is_seen {
         done.outcome.status = Status::Inaccurate(Inaccuracy { told, found, whose });
+    } else if is_solved && lost > ONE_DIGIT {
+        done.outcome.status = Status::Inaccurate(Inaccuracy { told, found: lost, whose: Whose::Rounding });
     }
     done.look = Some(Look { reached, whose, seconds: began.elapsed().as_secs_f64() });
 }

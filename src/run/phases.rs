@@ -195,6 +195,13 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
             body.name
         ));
     }
+    for body in discrete.bodies.iter().filter(|body| !body.spinning.is_empty()) {
+        let motions = body.spinning.join("; ");
+        warnings.push(format!(
+            "body {}: only the facets of the mesh resist its {motions}, and loads work on it: its displacements mean nothing; hold it, or load it through its centre",
+            body.name
+        ));
+    }
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
     for (pair, contact) in discrete.model.pairs.iter().zip(&discrete.contacts) {
