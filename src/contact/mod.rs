@@ -18,5 +18,5 @@ pub use basis::{Carriers, STEADY};
 pub use cover::{Cover, Left};
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
-pub use pair::{ContactPair, Fault, Integrals, LostPieces, add, assemble, integrate, moment_in_scene};
+pub use pair::{ContactPair, Fault, Integrals, LostPieces, OwnSurface, add, assemble, integrate, moment_in_scene};
 pub use side::{Side, length, unit};

@@ -10,7 +10,7 @@ use crate::fem::assemble::interpolate;
 use crate::fem::{cross, element, pad};
 use crate::linalg::Csr;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
 /// A pair of surfaces, discretised: n points with one pressure each.
@@ -32,8 +32,6 @@ pub struct ContactPair {
     pub weight: Vec<f64>,
     /// Unit normals from side a to side b, n.
     pub normal: Vec<[f64; 3]>,
-    /// How well these are known, n: [`Side::spread`].
-    pub spread: Vec<f64>,
     /// Initial gap d_q along the normal, n: geometry and the scene's own gap.
     pub gap: Vec<f64>,
     /// What prescribed displacements contribute to the outer normal displacement of each side, n each.
@@ -48,6 +46,8 @@ pub struct ContactPair {
     pub resultant: [Vec<[f64; 3]>; 2],
     /// Moments of these entries about the origin of the scene, for the moments on a side in the same way.
     pub moment: [Vec<[f64; 3]>; 2],
+    /// The surfaces of both sides at the points, n each.
+    pub surface: [Vec<OwnSurface>; 2],
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
     /// What the weights are: `"length"`, or in space and for bodies of revolution `"area"`.
@@ -58,6 +58,30 @@ pub struct ContactPair {
     pub cover: Vec<Cover>,
     /// What the search for common points has lost, if anything.
     pub lost: Option<LostPieces>,
+}
+
+/// What the surface of one side itself is like around a point: means over its nodes with the shares that they have in the point.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct OwnSurface {
+    /// Where it is, measured from the datum of the mesh.
+    pub at: [f64; 3],
+    /// The mean of its outer unit normals.
+    pub normal: [f64; 3],
+    /// How well that is known: [`Side::spread`].
+    pub spread: f64,
+}
+
+impl OwnSurface {
+    fn mean<const D: usize>(side: &Side<D>, shares: &[(u32, f64)], spread: &HashMap<u32, f64>) -> Self {
+        let mut mean = Self::default();
+        for (node, share) in shares {
+            let (x, normal) = (side.space.nodes[*node as usize], side.normals[node]);
+            add(&mut mean.at, pad(x.map(|x| share * x)));
+            add(&mut mean.normal, pad(normal.map(|n| share * n)));
+            mean.spread += share.abs() * spread[node];
+        }
+        mean
+    }
 }
 
 /// Pieces of a pair that are lost because the search for their points failed.
@@ -193,20 +217,20 @@ pub fn assemble<const D: usize>(
         position,
         weight: Vec::new(),
         normal: Vec::new(),
-        spread: Vec::new(),
         gap: Vec::new(),
         prescribed: [Vec::new(), Vec::new()],
         rows: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
         nodal: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
         resultant: [Vec::new(), Vec::new()],
         moment: [Vec::new(), Vec::new()],
+        surface: [Vec::new(), Vec::new()],
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
         law,
         lost: LostPieces::of(a, &cover),
         cover,
     };
-    let spread = a.spread();
+    let spread = [a.spread(), b.spread()];
     // what lies between matching surfaces is the rounding of their coordinates: that of both, along any normal
     let rounding = (1e-12 * size).max(2.0 * (D as f64).sqrt() * a.rounding());
     for q in 0..pair.nodes.len() {
@@ -216,7 +240,9 @@ pub fn assemble<const D: usize>(
         for (side, sign, of) in [(0, 1.0, a), (1, -1.0, b)] {
             let (mut nodal, mut entries) = (Vec::new(), BTreeMap::new());
             let (mut resultant, mut moment) = ([0.0; 3], [0.0; 3]);
-            for (n, share) in shares(&sum.sides[side], sum.weight) {
+            let shares = shares(&sum.sides[side], sum.weight);
+            pair.surface[side].push(OwnSurface::mean(of, &shares, &spread[side]));
+            for (n, share) in shares {
                 let entry = normal.map(|normal| sign * share * normal);
                 nodal.extend((0..D).map(|c| (D * n as usize + c, entry[c])));
                 add(&mut resultant, of.space.net_force(entry));
@@ -246,7 +272,6 @@ pub fn assemble<const D: usize>(
         }
         pair.weight.push(sum.weight);
         pair.normal.push(pad(normal));
-        pair.spread.push(spread[&node]);
         pair.gap.push(distance + own);
     }
     Ok(pair)

@@ -4,6 +4,10 @@ use crate::fem::{Facets, Frame, Space, area_vector, element};
 use crate::mesh::datum;
 use std::collections::HashMap;
 
+/// The difference between unit normals of facets and their mean beyond which these form an edge: half of the angle between chords that leave their arc
+/// by 3 % of its radius, the worst that is taken for round.
+const EDGE: f64 = 0.245;
+
 /// One contact surface of a body.
 #[derive(Debug, Clone)]
 pub struct Side<'a, const D: usize> {
@@ -51,16 +55,19 @@ impl<'a, const D: usize> Side<'a, D> {
     }
 
     /// Return how well the normal near each node is known: the largest difference between the unit normals of facets and nodes, of all nodes
-    /// that share a facet with it. It is zero where all is flat.
+    /// that share a facet with it. Where all is flat it is rounding, and edges do not count.
     pub fn spread(&self) -> HashMap<u32, f64> {
-        let places = element::nodes::<D>(self.facets.order);
+        let (places, rounding) = (element::nodes::<D>(self.facets.order), self.rounding());
         let mut at_node: HashMap<u32, f64> = HashMap::new();
         for i in 0..self.facets.count() {
             let x = self.facets.coordinates(i, self.space);
             for (l, node) in places.iter().zip(self.facets.facet(i)) {
-                let (own, mean) = (unit(area_vector(self.facets.order, &x, l)), self.normals[node]);
+                let (area, mean) = (area_vector(self.facets.order, &x, l), self.normals[node]);
+                let own = unit(area);
+                let off = length(std::array::from_fn::<f64, D, _>(|c| own[c] - mean[c]));
+                let least = f64::EPSILON + 2.0 * rounding / length(area).powf(1.0 / (D - 1) as f64);
                 let most = at_node.entry(*node).or_default();
-                *most = most.max(length(std::array::from_fn::<f64, D, _>(|c| own[c] - mean[c])));
+                *most = most.max(least).max(if off < EDGE { off } else { 0.0 });
             }
         }
         let mut near: HashMap<u32, f64> = HashMap::new();

@@ -241,15 +241,15 @@ impl<const D: usize> Search<'_, '_, D> {
         }
     }
 
-    /// Fixes the motions of a body along its own round surface on which no load works, and adds them to the names of those that are `fixed`. Returns the names of
+    /// Fixes the motions of a body along its own surface on which no load works, and adds them to the names of those that are `fixed`. Returns the names of
     /// those on which loads work.
     fn fix_round(&mut self, body: usize, fixed: &mut Vec<String>) -> Vec<String> {
         if self.loose[body].left.is_empty() || !self.loose[body].unfelt.is_empty() {
             return Vec::new();
         }
-        let points = Points::of(&self.drafts[body], self.parts, self.pairs);
+        let points = Points::of(&self.drafts[body], self.pairs);
         loop {
-            let round = points.along_surface(&self.loose[body].left, FLAWED);
+            let round = points.along_surface(&self.loose[body].left);
             // the centre of a load is known no better than that of the meshed body
             let moving = |motion: RigidMotion<D>| Moving {
                 bodies: vec![body],
