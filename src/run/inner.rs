@@ -19,6 +19,7 @@ use crate::scene::Scene;
 use crate::solver::cost::{Candidate, Comparison, Step};
 use crate::solver::options::{Chosen, Typed};
 use crate::solver::preset::{self, Size, Smoother};
+use crate::solver::speed;
 use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
@@ -214,7 +215,15 @@ impl<'a> Inner<'a> {
             let memory = if are_kept { usize::MAX } else { self.memory };
             // decided once: powers are not the same to the last digit on all processors
             let ranks = Ranks::new(self.session);
-            let mut comparison = tell(&ranks, || Ok(Comparison::of_cubes(&candidates, step)))?;
+            let compared = || {
+                let usual = Comparison::of_cubes(&candidates, step, speed::REFERENCE);
+                Ok(if usual.is_worth_a_look() {
+                    Comparison::of_cubes(&candidates, step, speed::products())
+                } else {
+                    usual
+                })
+            };
+            let mut comparison = tell(&ranks, compared)?;
             if !comparison.is_known(&candidates, memory) {
                 let graphs = outlines.iter().map(|outline| (outline.graph)());
                 let graphs: Vec<(&[u32], &[u32])> = graphs.map(|graph| (&graph.ptr[..], &graph.col[..])).collect();

@@ -17,6 +17,7 @@ pub mod preset;
 mod retained;
 mod robin;
 mod sparse;
+pub mod speed;
 mod split;
 
 pub use coarse::RigidSpace;

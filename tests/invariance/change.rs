@@ -39,6 +39,15 @@ impl Change {
         back
     }
 
+    /// Return the moment about the origin of the scene itself, as it is before the change, of a force and its moment about the origin of the changed scene. Moments
+    /// turn with their scene, and change their sign in a mirror.
+    pub fn moment_back(&self, force: [f64; 3], moment: [f64; 3], factor: f64) -> [f64; 3] {
+        let arm = cross(self.shift.map(|x| self.length * x), force);
+        let is_cyclic = (self.axis[0] + 1) % 3 == self.axis[1];
+        let parity = self.sign.iter().product::<f64>() * if is_cyclic { 1.0 } else { -1.0 };
+        self.back(std::array::from_fn(|c| moment[c] - arm[c])).map(|m| parity * m / (factor * self.length))
+    }
+
     fn point(&self, x: [f64; 3]) -> [f64; 3] {
         let turned = self.vector(x);
         std::array::from_fn(|i| self.length * (turned[i] + self.shift[i]))

@@ -5,7 +5,6 @@ use std::path::Path;
 use winkler::api::{Constants, Field, MeshSource, Order, Plane, Result, Scene, Session, Solution, solve};
 use winkler::interrupt::Interrupt;
 use winkler::linalg::bounds;
-use winkler::mesh::Mesh;
 
 /// Relative difference that is none.
 const SAME: f64 = 1e-8;
@@ -63,8 +62,12 @@ pub struct Answer {
     pub status: String,
     /// Updates of the iterate.
     pub iterations: usize,
+    /// Largest extent of the scene along an axis.
+    pub size: f64,
     /// What each pair came to.
     pub pairs: Vec<PairAnswer>,
+    /// Moments of the loads on each body about the origin.
+    pub loads: Vec<[f64; 3]>,
 }
 
 /// What a pair came to.
@@ -72,6 +75,8 @@ pub struct Answer {
 pub struct PairAnswer {
     /// Force on the first side.
     pub force: [f64; 3],
+    /// Moment on it about the origin.
+    pub moment: [f64; 3],
     /// Largest pressure.
     pub peak: f64,
     /// Area in contact.
@@ -104,13 +109,16 @@ fn run_in<const D: usize>(
 ) -> Result<Option<(Answer, Change)>> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
     let mesh = winkler::mesh::load::<D>(&scene.mesh, order, &Interrupt::default())?.mesh;
-    let Some(change) = change(scene, &mesh, kind) else { return Ok(None) };
+    let [low, high] = bounds(mesh.points.iter().map(|&x| mesh.in_scene(x)));
+    let size = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
+    let Some(change) = change::<D>(scene, size, kind) else { return Ok(None) };
     let modulus = scene.bodies.iter().map(|body| largest(&body.elasticity.constants)).fold(0.0, f64::max);
     change.apply(scene, &mesh)?;
     debug_assert!(matches!(scene.mesh, MeshSource::Arrays(_)));
     let force = change.force(scene);
     let solution = solve(session, scene.clone())?;
-    Ok(Some((answer::<D>(&solution, &change, force, modulus), change)))
+    let factors = Factors { force, modulus, size };
+    Ok(Some((answer::<D>(&solution, &change, &factors), change)))
 }
 
 /// Return the largest modulus of a material whose constants are numbers.
@@ -123,7 +131,7 @@ fn largest(constants: &Constants) -> f64 {
     fields.into_iter().map(|field| field.eval([0.0; 3])).fold(0.0, f64::max)
 }
 
-fn change<const D: usize>(scene: &Scene, mesh: &Mesh<D>, kind: Option<&Kind>) -> Option<Change> {
+fn change<const D: usize>(scene: &Scene, size: f64, kind: Option<&Kind>) -> Option<Change> {
     let mut change = Change::none();
     let Some(kind) = kind else { return Some(change) };
     let revolves = scene.plane == Plane::Axisymmetric;
@@ -136,8 +144,6 @@ fn change<const D: usize>(scene: &Scene, mesh: &Mesh<D>, kind: Option<&Kind>) ->
     if kind.mirror {
         change.sign[usize::from(revolves)] *= -1.0;
     }
-    let [low, high] = bounds(mesh.points.iter().map(|&x| mesh.in_scene(x)));
-    let size = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
     // directions that are no simple ones
     let towards = [0.9182736, -0.7310529, 0.4567891];
     change.shift = std::array::from_fn(|c| kind.sizes * size * if c < D { towards[c] } else { 0.0 });
@@ -148,8 +154,18 @@ fn change<const D: usize>(scene: &Scene, mesh: &Mesh<D>, kind: Option<&Kind>) ->
     (!(revolves && kind.turn && !kind.mirror)).then_some(change)
 }
 
-fn answer<const D: usize>(solution: &Solution, change: &Change, force: f64, modulus: f64) -> Answer {
+/// What an answer is measured by.
+struct Factors {
+    /// Factor of forces.
+    force: f64,
+    /// Largest modulus and largest extent of the scene itself.
+    modulus: f64,
+    size: f64,
+}
+
+fn answer<const D: usize>(solution: &Solution, change: &Change, factors: &Factors) -> Answer {
     let (l, s) = (change.length, change.stress);
+    let Factors { force, modulus, size } = *factors;
     let report = solution.report();
     let per_point = force / s;
     let pair = |(i, pair): (usize, &winkler::api::PairReport)| {
@@ -161,6 +177,7 @@ fn answer<const D: usize>(solution: &Solution, change: &Change, force: f64, modu
         let peak = pair.peak_pressure / s;
         PairAnswer {
             force: change.back(pair.force[0]).map(|f| f / force),
+            moment: change.moment_back(pair.force[0], pair.moment[0], force),
             peak,
             area: pair.extent.contact() / per_point,
             approach: pair.approach.map(|approach| approach / l),
@@ -168,9 +185,12 @@ fn answer<const D: usize>(solution: &Solution, change: &Change, force: f64, modu
             points: table.compression.iter().zip(&table.weight).map(|(c, w)| [c / l, w / per_point]).collect(),
         }
     };
+    let loads = report.bodies.iter().map(|body| &body.balance.loads);
     Answer {
         status: report.status.clone(),
         iterations: report.iterations,
+        size,
+        loads: loads.map(|loads| change.moment_back(loads.force, loads.moment, force)).collect(),
         pairs: report.pairs.iter().enumerate().map(pair).collect(),
     }
 }
@@ -194,7 +214,16 @@ pub fn differences(own: &Answer, other: &Answer, change: &Change) -> Vec<String>
         return all;
     }
     let size = |f: &[f64; 3]| f.iter().map(|f| f * f).sum::<f64>().sqrt();
+    let apart = |a: &[f64; 3], b: &[f64; 3]| size(&std::array::from_fn(|c| a[c] - b[c]));
     let largest = own.pairs.iter().map(|pair| size(&pair.force)).fold(0.0, f64::max);
+    // moments of the changed scene are about an origin that may be far away
+    let reach = own.size + size(&change.shift);
+    for (body, (a, b)) in own.loads.iter().zip(&other.loads).enumerate() {
+        let off = apart(a, b) / (size(a) + largest * reach);
+        if off > worst {
+            all.push(format!("body {body}: moment {a:?} of the loads is {b:?}: {off:.1e} off, {worst:.1e} allowed"));
+        }
+    }
     let highest = own.pairs.iter().map(|pair| pair.peak).fold(0.0, f64::max);
     for (i, (own, other)) in own.pairs.iter().zip(&other.pairs).enumerate() {
         let mut compare = |what: &str, a: f64, b: f64, scale: f64, allowed: f64| {
@@ -203,8 +232,9 @@ pub fn differences(own: &Answer, other: &Answer, change: &Change) -> Vec<String>
                 all.push(format!("pair {i}: {what} {a:e} is {b:e}: {off:.1e} off, {allowed:.1e} allowed"));
             }
         };
-        let off = std::array::from_fn(|c| own.force[c] - other.force[c]);
-        compare("force", size(&own.force), size(&own.force) + size(&off), largest, worst);
+        compare("force", size(&own.force), size(&own.force) + apart(&own.force, &other.force), largest, worst);
+        let turned = size(&own.moment) + apart(&own.moment, &other.moment);
+        compare("moment", size(&own.moment), turned, largest * reach, worst);
         compare("peak", own.peak, other.peak, highest, worst);
         // a point whose compression is zero to these digits may be open or closed
         let deepest = own.points.iter().map(|point| point[0].abs()).fold(0.0, f64::max);
