@@ -23,9 +23,6 @@ const FACTORED: f64 = 320.0;
 /// 380 to 1260 with quadratic ones. Most of that range is the number of iterations, 20 to 140, which neither dofs nor shapes of cells foretell.
 const MULTIGRID: f64 = 900.0;
 
-/// The same of quadratic elements, which have a level of their own.
-const MULTIGRID_P2: f64 = 715.0;
-
 /// Seconds that the cheaper way must take on the machine there for the speed of this one to be measured: ten times what that takes.
 const WORTH: f64 = 0.5;
 
@@ -162,11 +159,11 @@ impl Cost {
 impl Candidate<'_> {
     /// By multigrid.
     fn multigrid(&self, step: Step, speed: f64) -> Cost {
-        let [products, bytes] = match self.order {
-            Order::P1 => [MULTIGRID, LEVELS],
-            Order::P2 => [MULTIGRID_P2, LEVELS_P2],
+        let bytes = match self.order {
+            Order::P1 => LEVELS,
+            Order::P2 => LEVELS_P2,
         };
-        let seconds = products * step.times() * self.entries() / speed;
+        let seconds = MULTIGRID * step.times() * self.entries() / speed;
         Cost { seconds, bytes: bytes * self.entries() }
     }
 
