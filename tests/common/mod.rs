@@ -185,7 +185,8 @@ fn program(ranks: usize) -> Command {
         Command::new(WINKLER)
     } else {
         let mut command = Command::new("mpiexec");
-        command.args(["--oversubscribe", "-n", &ranks.to_string(), WINKLER]);
+        // bound to one core a rank would have one thread of OpenBLAS, whatever the environment asks for
+        command.args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string(), WINKLER]);
         command
     };
     environment(&mut command);
