@@ -53,7 +53,7 @@ use draft::Draft;
 pub use factory::{Assembled, Factory, Outline};
 use free::Free;
 use here::Here;
-pub use info::{BodyInfo, ContactInfo};
+pub use info::{BodyInfo, ContactInfo, Gauged};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes};
 use part::Part;
@@ -121,7 +121,7 @@ pub fn discretize<const D: usize>(
     let drafts = parts.iter().zip(draft::segments(parts.len(), &pairs));
     let drafts = drafts.map(|(part, segments)| Draft::new(part, segments, &pairs, mesh, others));
     let mut drafts = drafts.collect::<Result<Vec<_>>>()?;
-    let Fixed { gauged, spinning, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs, others);
+    let Fixed { gauged, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs, others);
     let supported: Vec<Supported<D>> =
         parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
     let lazy = Coupled::new((&parts, &stocks, &drafts), others);
@@ -165,12 +165,10 @@ pub fn discretize<const D: usize>(
         .zip(&mut owner)
         .for_each(|(dealt, owner)| *owner = dealt.as_ref().map_or(*owner, |dealt| dealt.leader));
     let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt).zip(totals.into_iter().zip(warnings));
-    let known = gauged.into_iter().zip(spinning).zip(loose).zip(elasticities);
+    let known = gauged.into_iter().zip(loose).zip(elasticities);
     let (mut infos, mut offsets, mut ready) = (Vec::new(), Vec::new(), Vec::new());
-    for (
-        index,
-        ((part, ((((draft, supported), graph), mut dealt), of_all)), (((gauged, spinning), loose), elasticity)),
-    ) in parts.into_iter().zip(drafts).zip(known).enumerate()
+    for (index, ((part, ((((draft, supported), graph), mut dealt), of_all)), ((gauged, loose), elasticity))) in
+        parts.into_iter().zip(drafts).zip(known).enumerate()
     {
         let Draft { segments, rows, nodal_rows, nodal_load, .. } = draft;
         let carried = |q: usize| {
@@ -196,7 +194,6 @@ pub fn discretize<const D: usize>(
             left_by_supports: loose.left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: loose.unfelt.iter().map(|(name, _)| name.clone()).collect(),
             gauged,
-            spinning,
             warning,
             stiffness: if held && surface > 0.0 { modulus / depth } else { 0.0 },
             load: resultant,

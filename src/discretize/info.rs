@@ -5,6 +5,15 @@ use super::surface::ContactSurface;
 use crate::mesh::Checked;
 use crate::problem::ContactSpec;
 
+/// Names of the rigid motions of a body that neither supports nor smooth surfaces resist.
+#[derive(Debug, Clone, Default)]
+pub struct Gauged {
+    /// Those without work of the loads, fixed at one node each.
+    pub fixed: Vec<String>,
+    /// Those on which loads work: only the facets of the mesh resist them.
+    pub spinning: Vec<String>,
+}
+
 /// What is known of a body besides its matrices.
 pub struct BodyInfo {
     /// Name in the scene.
@@ -27,10 +36,8 @@ pub struct BodyInfo {
     pub left_by_supports: Vec<String>,
     /// Names of those that no contact row can hold either.
     pub left_by_all: Vec<String>,
-    /// Names of the rigid motions without work that a gauge fixes at one node each.
-    pub gauged: Vec<String>,
-    /// Names of the rigid motions that only the facets of its mesh resist, although loads work on them.
-    pub spinning: Vec<String>,
+    /// Rigid motions that nothing but its mesh resists.
+    pub gauged: Gauged,
     /// What the user should know of its elasticity.
     pub warning: Option<String>,
     /// Stiffness of the body against a uniform contact pressure, per area: modulus over depth (area or volume over the length

@@ -5,6 +5,7 @@
 
 use super::draft::{Draft, Loose, NO_WORK};
 use super::gauge;
+use super::info::Gauged;
 use super::part::{Candidate, Part};
 use super::round::Points;
 use super::totals::totals;
@@ -25,10 +26,8 @@ const FLAWED: f64 = 0.03;
 
 /// What was fixed, and what cannot be.
 pub struct Fixed<const D: usize> {
-    /// Names of the motions of each body alone that are fixed.
-    pub gauged: Vec<Vec<String>>,
-    /// Names of the motions of each body that only the facets of its mesh resist and loads work on.
-    pub spinning: Vec<Vec<String>>,
+    /// Motions of each body alone.
+    pub gauged: Vec<Gauged>,
     /// Motions of several bodies.
     pub mechanisms: Vec<Mechanism>,
     /// The motions left to each body.
@@ -53,12 +52,12 @@ pub fn fix<const D: usize>(
         }
     }
     let bodies = search.parts.iter_mut().zip(drafts).zip(&mut search.loose);
-    let mut gauged: Vec<_> = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose, exchange)).collect();
-    let spinning = gauged.iter_mut().enumerate().map(|(body, fixed)| search.fix_round(body, fixed)).collect();
+    let fixed: Vec<_> = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose, exchange)).collect();
+    let gauged = fixed.into_iter().enumerate().map(|(body, fixed)| search.fix_round(body, fixed)).collect();
     if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
         search.fix_some();
     }
-    Fixed { gauged, spinning, mechanisms: search.found, loose: search.loose }
+    Fixed { gauged, mechanisms: search.found, loose: search.loose }
 }
 
 /// Bodies that pairs connect, two at least, in the order of the first of them.
@@ -241,11 +240,10 @@ impl<const D: usize> Search<'_, '_, D> {
         }
     }
 
-    /// Fixes the motions of a body along its own surface on which no load works, and adds them to the names of those that are `fixed`. Returns the names of
-    /// those on which loads work.
-    fn fix_round(&mut self, body: usize, fixed: &mut Vec<String>) -> Vec<String> {
+    /// Fixes the motions of a body along its own surface on which no load works, besides those that are `fixed` already.
+    fn fix_round(&mut self, body: usize, mut fixed: Vec<String>) -> Gauged {
         if self.loose[body].left.is_empty() || !self.loose[body].unfelt.is_empty() {
-            return Vec::new();
+            return Gauged { fixed, spinning: Vec::new() };
         }
         let points = Points::of(&self.drafts[body], self.pairs);
         loop {
@@ -260,7 +258,7 @@ impl<const D: usize> Search<'_, '_, D> {
             let (idle, worked): (Vec<_>, Vec<_>) =
                 round.into_iter().map(moving).partition(|moving| self.work(moving) == 0.0);
             if idle.first().and_then(|moving| self.pin(moving)).is_none() {
-                return worked.into_iter().map(|moving| moving.name).collect();
+                return Gauged { fixed, spinning: worked.into_iter().map(|moving| moving.name).collect() };
             }
             fixed.push(idle[0].name.clone());
         }

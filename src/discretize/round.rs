@@ -21,61 +21,68 @@ use nalgebra::{DMatrix, DVector};
 /// How many times the difference between facets and their mean a motion may close: once for the normal, once for the motion itself.
 const UNSURE: f64 = 2.0;
 
-/// The surface of a body at its contact points.
-pub struct Points<const D: usize> {
-    /// Where they are, measured from the datum.
-    at: Vec<[f64; D]>,
-    normal: Vec<[f64; D]>,
-    /// How well normals are known: s_q.
-    spread: Vec<f64>,
-    /// Shares of the points in all of them.
-    share: Vec<f64>,
+/// A contact point on the own surface of a body.
+struct Point<const D: usize> {
+    /// Where it is, measured from the datum.
+    at: [f64; D],
+    normal: [f64; D],
+    /// How well the normal is known: s_q.
+    spread: f64,
+    /// Root of its share in the weight of all points.
+    root: f64,
 }
+
+/// The surface of a body at its contact points.
+pub struct Points<const D: usize>(Vec<Point<D>>);
 
 impl<const D: usize> Points<D> {
     /// Collect the points of all pairs of a body.
     pub fn of(draft: &Draft<D>, pairs: &[ContactPair]) -> Self {
-        let mut points = Self { at: Vec::new(), normal: Vec::new(), spread: Vec::new(), share: Vec::new() };
+        let weights = |segment: &Segment| pairs[segment.pair].weight.iter();
+        let all: f64 = draft.segments.iter().flat_map(weights).sum();
         let first = |x: [f64; 3]| std::array::from_fn(|c| x[c]);
-        for &Segment { pair, side } in &draft.segments {
-            let surface = &pairs[pair].surface[side];
-            points.at.extend(surface.iter().map(|point| first(point.at)));
-            points.normal.extend(surface.iter().map(|point| first(point.normal)));
-            points.spread.extend(surface.iter().map(|point| point.spread));
-            points.share.extend(&pairs[pair].weight);
+        let mut points = Vec::new();
+        for segment in &draft.segments {
+            let surface = pairs[segment.pair].surface[segment.side].iter();
+            points.extend(surface.zip(weights(segment)).map(|(point, weight)| Point {
+                at: first(point.at),
+                normal: first(point.normal),
+                spread: point.spread,
+                root: (weight / all).sqrt(),
+            }));
         }
-        let all: f64 = points.share.iter().sum();
-        points.share.iter_mut().for_each(|share| *share /= all);
-        points
+        Self(points)
     }
 
     /// Return those combinations of motions that only facets resist, pure motions as such.
     pub fn along_surface(&self, motions: &[RigidMotion<D>]) -> Vec<RigidMotion<D>> {
-        let moved: Vec<Vec<[f64; D]>> =
-            self.at.iter().map(|x| motions.iter().map(|motion| motion.at(x)).collect()).collect();
-        let size = DMatrix::from_fn(motions.len(), motions.len(), |i, j| {
-            moved.iter().zip(&self.share).map(|(moved, share)| share * dot(&moved[i], &moved[j])).sum()
+        let rows = D * self.0.len();
+        let moved = DMatrix::from_fn(rows, motions.len(), |row, j| {
+            let point = &self.0[row / D];
+            point.root * motions[j].at(&point.at)[row % D]
         });
-        let closing = DMatrix::from_fn(self.at.len(), motions.len(), |q, j| {
-            self.share[q].sqrt() * dot(&moved[q][j], &self.normal[q]) / self.spread[q]
+        let closing = DMatrix::from_fn(self.0.len(), motions.len(), |q, j| {
+            let Point { at, normal, spread, root } = &self.0[q];
+            root * dot(&motions[j].at(at), normal) / spread
         });
-        let mut round = lowest(&closing, &size, UNSURE);
+        let mut round = lowest(&closing, &(moved.transpose() * &moved), UNSURE);
         round.retain(|weights| self.passes(&rigid::sum(motions, weights)));
         pure(&round).iter().map(|weights| rigid::combine(motions, weights)).collect()
     }
 
     /// Whether a motion closes no point by more than that.
     fn passes(&self, motion: &RigidMotion<D>) -> bool {
-        self.at.iter().zip(&self.normal).zip(&self.spread).all(|((x, normal), spread)| {
-            let moved = motion.at(x);
-            dot(&moved, normal).abs() <= UNSURE * spread * dot(&moved, &moved).sqrt()
+        self.0.iter().all(|point| {
+            let moved = motion.at(&point.at);
+            dot(&moved, &point.normal).abs() <= UNSURE * point.spread * dot(&moved, &moved).sqrt()
         })
     }
 }
 
 /// Right singular vectors x of A with |A x|^2 <= most^2 x'B x, B positive semidefinite; what B does not see is left out.
 fn lowest(a: &DMatrix<f64>, b: &DMatrix<f64>, most: f64) -> Vec<DVector<f64>> {
-    if b.is_empty() {
+    // decompositions of what is no number do not end
+    if b.is_empty() || a.iter().chain(b).any(|value| !value.is_finite()) {
         return Vec::new();
     }
     let of_b = b.clone().symmetric_eigen();

@@ -160,7 +160,7 @@ impl Energy {
     }
 }
 
-/// Return a field that is right at owned nodes with the values of ghost nodes. Collective where the body is dealt out.
+/// Fill in the values of a field at ghost nodes from the ranks that own them. Collective where the nodes of the body are distributed.
 fn near(slot: &BodySlot, field: Vec<f64>) -> Vec<f64> {
     match slot.local.as_ref().and_then(|body| body.distribution()) {
         Some(distribution) => distribution.near(&distribution.of_known(&field)),

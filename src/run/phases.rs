@@ -188,15 +188,15 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
             session.size()
         ));
     }
-    for body in discrete.bodies.iter().filter(|body| !body.gauged.is_empty()) {
-        let motions = body.gauged.join("; ");
+    for body in discrete.bodies.iter().filter(|body| !body.gauged.fixed.is_empty()) {
+        let motions = body.gauged.fixed.join("; ");
         warnings.push(format!(
             "body {}: nothing holds its {motions}, and no load works on it: it is fixed at one node",
             body.name
         ));
     }
-    for body in discrete.bodies.iter().filter(|body| !body.spinning.is_empty()) {
-        let motions = body.spinning.join("; ");
+    for body in discrete.bodies.iter().filter(|body| !body.gauged.spinning.is_empty()) {
+        let motions = body.gauged.spinning.join("; ");
         warnings.push(format!(
             "body {}: only the facets of the mesh resist its {motions}, and loads work on it: its displacements mean nothing; hold it, or load it through its centre",
             body.name

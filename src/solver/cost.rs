@@ -15,12 +15,12 @@ use serde::{Deserialize, Serialize};
 /// Dense operations in a second, of two cores with AVX2 or one with AVX-512 (docs/solvers.md, "The choice").
 const RATE: f64 = 2.8e10;
 
-/// What a factorisation takes besides dense operations, in products with K: order, assembly of fronts, small fronts. The scenes there that are
-/// little more than this took 170 to 420.
+/// What a factorisation takes besides dense operations, in products with K: order, assembly of fronts, small fronts. Most scenes there
+/// took 100 to 400, thin slices less.
 const FACTORED: f64 = 320.0;
 
 /// What multigrid takes from its set-up to the last of Newton's steps, in products with K: the scenes there took 690 to 1290 with linear elements and
-/// 380 to 1260 with quadratic ones. Most of that range is the number of iterations, 20 to 140, which neither dofs nor shapes of cells foretell.
+/// 380 to 1260 with quadratic ones. Most of that range is the number of iterations, which neither dofs nor shapes of cells foretell.
 const MULTIGRID: f64 = 900.0;
 
 /// Seconds that the cheaper way must take on the machine there for the speed of this one to be measured: ten times what that takes.
