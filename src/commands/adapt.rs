@@ -1,6 +1,6 @@
 //! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
 
-use super::carry;
+use super::carry::{self, Norms};
 use super::checkpoint::{Checkpoint, Head, settings_digest};
 use crate::ddm::{Start, Status};
 use crate::discretize::meshes::Meshes;
@@ -18,6 +18,7 @@ use crate::run::{self, Begin, Built, Clock, Done, report};
 use crate::scene::{AdaptSpec, Scene};
 use crate::solver::options;
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// Cells of a body's first mesh.
 const FIRST: usize = 150;
@@ -27,6 +28,13 @@ const AIM: f64 = 0.7;
 
 /// Part of an error that the next mesh may leave at least: what a coarse mesh tells of a kink does not hold for a very fine one.
 const LEAST: f64 = 0.1;
+
+/// A mesh has so many times the cells of the one before at least: all before the last one then cost no more than that one together. What the errors promise of fewer
+/// cells does not come where they fall more slowly than h^p, at edges of supports, loads and contact.
+const MORE: f64 = 2.0;
+
+/// Meshes in a row with larger errors than the best one that end the run.
+const WORSE: usize = 2;
 
 /// What remains to be done of a run of several meshes.
 pub struct Plan {
@@ -44,8 +52,39 @@ pub struct Plan {
     /// The scene as it was asked for.
     asked: Rc<Scene>,
     purpose: String,
+    /// The solution that the next mesh starts from.
     carried: Vec<ContactTable>,
     seconds: f64,
+    /// The errors told of the mesh before.
+    told: Option<Told>,
+    /// The best mesh so far.
+    best: Option<Best>,
+    /// Whether this round is the best mesh once more, with which the run ends.
+    ends: bool,
+}
+
+/// The errors told of a mesh.
+struct Told {
+    /// Of the pressures of each pair.
+    pressure: Vec<f64>,
+    displacement: f64,
+    /// The solution on it.
+    tables: Vec<ContactTable>,
+}
+
+/// The mesh with the least error so far.
+struct Best {
+    error: f64,
+    /// Its number, from 1 on.
+    round: usize,
+    /// Its sizes.
+    view: Option<Arc<str>>,
+    /// Sizes for a mesh with more cells than the one that followed it, which was worse.
+    finer: String,
+    /// The solution on it.
+    tables: Vec<ContactTable>,
+    /// Meshes since then, all worse.
+    worse: usize,
 }
 
 impl Plan {
@@ -75,6 +114,9 @@ impl Plan {
             finer: None,
             carried: Vec::new(),
             seconds: 0.0,
+            told: None,
+            best: None,
+            ends: false,
         };
         if plan.goal.is_none() && !nested {
             if let Some(checkpoint) = plan.resumed.as_ref().filter(|checkpoint| !checkpoint.head.steps.is_empty()) {
@@ -84,9 +126,7 @@ impl Plan {
         }
         agree(session, plan.refuse_finished_mesh())?;
         if plan.adapts() {
-            let scene = Rc::make_mut(&mut plan.scene);
-            scene.estimate = true;
-            scene.method.stop.balanced = true;
+            Rc::make_mut(&mut plan.scene).estimate = true;
         }
         if let Some(checkpoint) = &plan.resumed {
             follow(Rc::make_mut(&mut plan.scene), checkpoint.head.sizes.clone());
@@ -110,7 +150,7 @@ impl Plan {
         // the cache of another rank may know of other sizes
         let mut view_of_first = tell(&Ranks::new(session), || Ok(mesh::recall_final(&plan.purpose)))?;
         if view_of_first.is_none() {
-            view_of_first = sized(&plan.scene, |meshes, bodies| sizes::uniform(meshes, bodies, FIRST * bodies))?;
+            view_of_first = sized(&plan.scene, |meshes, bodies| sizes::coarse(meshes, bodies, FIRST * bodies))?;
         }
         follow(Rc::make_mut(&mut plan.scene), view_of_first);
         Ok(plan)
@@ -185,11 +225,68 @@ impl Plan {
             options::withdraw(session)?;
             return Ok(true);
         }
-        let (Some(goal), Some(estimate), Some(meshes)) = (&self.goal, estimate, &discrete.meshes) else {
+        let (Some(goal), Some(estimate), Some(meshes)) = (self.goal.clone(), estimate, &discrete.meshes) else {
             return Ok(false);
         };
-        let total = clock.total();
+        self.record(done, estimate, clock);
+        if !good || self.ends {
+            return Ok(false);
+        }
         let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
+        if error <= goal.error {
+            if let MeshSource::Geo { sizes: Some(view), .. } = &self.scene.mesh {
+                let kept = if session.rank() == 0 { mesh::keep_final(&self.purpose, view) } else { Ok(()) };
+                agree(session, kept)?;
+            }
+            return Ok(false);
+        }
+        if self.rounds.len() >= goal.rounds {
+            self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
+            return self.end_with_best(session, error);
+        }
+        let next = match self.best.as_mut().filter(|best| best.error <= error) {
+            Some(best) => {
+                best.worse += 1;
+                if best.worse == WORSE {
+                    let (round, error) = (best.round, best.error);
+                    self.limit = Some(format!(
+                        "mesh {round} has an error of {error:.1e}, and {WORSE} meshes with more cells are no better"
+                    ));
+                    return self.end_with_best(session, f64::INFINITY);
+                }
+                self.carried = best.tables.clone();
+                best.finer.clone()
+            }
+            None => {
+                let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
+                let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
+                let wanted = |more| sizes::wanted(&**meshes, model, estimate, (share, more), goal.cells);
+                let next = wanted(MORE);
+                let now = self.rounds[self.rounds.len() - 1].cells as f64;
+                if next.cells >= 0.9 * goal.cells as f64 && now >= 0.7 * goal.cells as f64 {
+                    self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
+                    return Ok(false);
+                }
+                self.carried = tables();
+                self.best = Some(Best {
+                    error,
+                    round: self.rounds.len(),
+                    view: self.sizes(),
+                    finer: view(wanted(MORE * MORE)),
+                    tables: tables(),
+                    worse: 0,
+                });
+                view(next)
+            }
+        };
+        follow(Rc::make_mut(&mut self.scene), Some(next));
+        options::withdraw(session)?;
+        Ok(true)
+    }
+
+    /// Note the mesh of this round.
+    fn record(&mut self, done: &Done, estimate: &Estimate, clock: &mut Clock) {
+        let (discrete, total) = (&done.built.discrete, clock.total());
         self.rounds.push(RoundReport {
             cells: discrete.bodies.iter().map(|body| body.cells).sum(),
             dofs: discrete.bodies.iter().map(|body| body.dofs).sum(),
@@ -200,33 +297,52 @@ impl Plan {
             seconds: total - self.seconds,
         });
         self.seconds = total;
-        if !good {
-            return Ok(false);
-        }
-        if error <= goal.error {
-            if let MeshSource::Geo { sizes: Some(view), .. } = &self.scene.mesh {
-                let kept = if session.rank() == 0 { mesh::keep_final(&self.purpose, view) } else { Ok(()) };
-                agree(session, kept)?;
-            }
-            return Ok(false);
-        }
-        if self.rounds.len() >= goal.rounds {
-            self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
-            return Ok(false);
-        }
-        let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
-        let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
-        let wanted = sizes::wanted(&**meshes, model, estimate, share, goal.cells);
-        let now = self.rounds[self.rounds.len() - 1].cells as f64;
-        if wanted.cells >= 0.9 * goal.cells as f64 && now >= 0.7 * goal.cells as f64 {
-            self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
-            return Ok(false);
-        }
-        self.carried = tables();
-        follow(Rc::make_mut(&mut self.scene), Some(view(wanted)));
+    }
+
+    /// End the run with the best mesh: with one more round on it, unless the last one, with this `error`, is no worse.
+    fn end_with_best(&mut self, session: &Session, error: f64) -> Result<bool> {
+        let Some(best) = self.best.take().filter(|best| best.error < error) else { return Ok(false) };
+        self.ends = true;
+        self.carried = best.tables;
+        follow(Rc::make_mut(&mut self.scene), best.view.as_deref().map(str::to_owned));
         options::withdraw(session)?;
         Ok(true)
     }
+
+    /// The field of sizes that the mesh of this round follows.
+    fn sizes(&self) -> Option<Arc<str>> {
+        match &self.scene.mesh {
+            MeshSource::Geo { sizes, .. } => sizes.clone(),
+            _ => None,
+        }
+    }
+
+    /// Hold the estimate of a mesh against what the solution differs from that on the mesh before.
+    ///
+    /// Errors that were told right, e of this mesh and e' of the one before, leave a difference of e + e' at most. Where it is larger, both were told too small, and
+    /// this one becomes as much larger as the difference is.
+    pub fn hold(&mut self, done: &Done, estimate: &mut Estimate) {
+        if self.goal.is_none() || !done.outcome.status.is_solved() {
+            return;
+        }
+        let tables: Vec<_> = (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect();
+        if let Some(told) = &self.told {
+            let apart = carry::difference(&told.tables, &tables);
+            let before = told.pressure.iter().zip(&apart.pressure);
+            for (now, (before, norms)) in estimate.pressure.iter_mut().zip(before) {
+                *now *= excess(norms, *now, *before);
+            }
+            estimate.displacement *= excess(&apart.displacement, estimate.displacement, told.displacement);
+        }
+        let (pressure, displacement) = (estimate.pressure.clone(), estimate.displacement);
+        self.told = Some(Told { pressure, displacement, tables });
+    }
+}
+
+/// How many times a difference is larger than the relative errors told `now` and `before` explain, at least one.
+fn excess(norms: &Norms, now: f64, before: f64) -> f64 {
+    let most = now * norms.new + before * norms.old;
+    if most > 0.0 && norms.apart.is_finite() { (norms.apart / most).max(1.0) } else { 1.0 }
 }
 
 fn view(sizes: Sizes) -> String {
@@ -237,5 +353,17 @@ fn view(sizes: Sizes) -> String {
 fn follow(scene: &mut Scene, view: Option<String>) {
     if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
         *sizes = view.map(Into::into);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Norms, excess};
+
+    #[test]
+    fn a_difference_that_errors_explain_changes_none() {
+        let norms = |apart| Norms { apart, old: 2.0, new: 1.0 };
+        assert_eq!([0.1, 0.5, 1.0].map(|apart| excess(&norms(apart), 0.1, 0.2)), [1.0, 1.0, 2.0]);
+        assert_eq!([excess(&norms(0.1), 0.0, 0.0), excess(&norms(f64::NAN), 0.1, 0.1)], [1.0, 1.0]);
     }
 }

@@ -116,11 +116,12 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         done.warnings.extend(unwritten.drain(..).map(|what| format!("of an earlier mesh: {what}")));
         saved = watchers.saved;
         let stage = session.stage("estimate");
-        let estimate = run::estimate(&mut done, &mut clock)?;
+        let mut estimate = run::estimate(&mut done, &mut clock)?;
         drop(stage);
         watchers.table.finish();
         let failed = watchers.history.map_or(Ok(()), |history| history.finish());
         let failed = failed.and(watchers.steps.map_or(Ok(()), |steps| steps.finish()));
+        estimate.iter_mut().for_each(|estimate| plan.hold(&done, estimate));
         let more = plan.goes_on(session, &done, estimate.as_ref(), &mut clock)?;
         if !more {
             break (done, estimate, failed);

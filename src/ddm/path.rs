@@ -8,7 +8,7 @@
 //! far Newton's method is.
 //!
 //! ```text
-//! enter    at the second step with the laws themselves that is not taken whole, or in a cycle:  mu = 100 D
+//! enter    at the second step with the laws themselves that is not taken whole:  mu = 100 D
 //! step     mu <- min(mu, D),  D from the smoothed laws: it stays while the states are far, and falls as fast as Newton's method converges
 //! leave    when mu times the area is below all that the run can see
 //! ```
@@ -24,16 +24,11 @@ const SHORTENED: usize = 2;
 /// to 300 beams with linear layers that peel took the same number of steps within one, with 1 nine times as many (docs/methods.md).
 const AHEAD: f64 = 100.0;
 
-/// Cycles of which a run may leave by smoothing; more end it.
-const CYCLES: usize = 2;
-
 /// What is remembered of a run's paths.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Path {
     /// Steps since the last path that were not taken whole.
     shortened: usize,
-    /// Paths that were entered.
-    entered: usize,
     /// Steps taken with smoothed laws.
     pub steps: usize,
 }
@@ -79,15 +74,6 @@ impl Path {
         self.shortened += usize::from(length < 1.0 && !is_smoothed);
     }
 
-    /// Whether the laws are to be smoothed instead of ending the run in a cycle; the next step begins that.
-    pub fn leaves_cycle(&mut self) -> bool {
-        let leaves = self.entered < CYCLES;
-        if leaves {
-            self.shortened = SHORTENED;
-        }
-        leaves
-    }
-
     /// Return mu of the next step at each point, n, after a step to `state` with `smoothing`; empty for the laws themselves. What is below the energy
     /// `unseen` changes nothing any more.
     pub fn smoothing(&mut self, model: &Model, state: &Equilibrium, smoothing: &[f64], unseen: f64) -> Vec<f64> {
@@ -105,7 +91,6 @@ impl Path {
             }
         }
         self.shortened = 0;
-        self.entered += usize::from(enters);
         // of a distance that is no number nothing follows
         if total > unseen && total.is_finite() { next } else { Vec::new() }
     }
@@ -144,7 +129,5 @@ mod tests {
         let on = Equilibrium { compression: &smoothed.compression, pressure: &smoothed.pressure, ..off };
         assert!(path.smoothing(&model, &on, &mu, 1e-20).is_empty());
         assert_eq!((path.steps, path.shortened), (1, 0));
-        assert!(path.leaves_cycle() && !path.smoothing(&model, &off, &[], 0.0).is_empty());
-        assert!(!path.leaves_cycle());
     }
 }

@@ -135,7 +135,7 @@ impl Run<'_> {
             return Ok(Some(Status::Converged));
         }
         if let Some(balance) = &mut self.balance
-            && balance.is_met(self.model, linear, at.u, at.layer, at.error)?
+            && balance.is_met(self.model, linear, at.u, at.layer, at.error.max(at.residual))?
         {
             return Ok(Some(Status::Converged));
         }
@@ -203,7 +203,6 @@ impl Run<'_> {
         let closed = places.compression.iter().map(|&c| c > 0.0);
         // F1 of iterates of Newton's method goes up and down
         let period = self.memory.cycle.period(&u.trace, closed, residual, 0.0);
-        let period = period.filter(|_| !self.memory.progress.path.leaves_cycle());
         Iterate {
             k: self.rows.len() + 1,
             u,

@@ -1,10 +1,9 @@
 //! What an estimate of the error asks of meshes, without their dimension.
 
 use super::supports::Held;
-use crate::contact::{Fine, length};
-use crate::fem::{EDGES, Elasticity, Recovery, Space, element};
+use crate::contact::Fine;
+use crate::fem::{Elasticity, Recovery, Space, element};
 use crate::linalg::Csr;
-use crate::problem::order::Order;
 use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
@@ -33,12 +32,14 @@ pub trait Meshes {
 
 /// The cells of a body by their corners.
 pub struct Cells {
-    /// Coordinates of the nodes in the scene, on boundaries that bow outwards so far out that the straight cells cover the body.
+    /// Coordinates of the nodes in the scene.
     pub nodes: Vec<[f64; 3]>,
     /// Corners of a cell.
     pub stride: usize,
     /// Node numbers of the corners, `stride` per cell.
     pub corners: Vec<u32>,
+    /// Node numbers of the corners of the facets of the boundary, `stride - 1` per facet, oriented outwards; none on an axis of revolution.
+    pub facets: Vec<u32>,
     /// Size of each cell: edge of the regular simplex of its measure.
     pub sizes: Vec<f64>,
 }
@@ -134,10 +135,14 @@ impl<const D: usize> Meshes for Kept<D> {
         // measure of the regular simplex with edges of length one
         let regular = if D == 2 { 3f64.sqrt() / 4.0 } else { 2f64.sqrt() / 12.0 };
         let size = |index| (space.cell_measure(index) / regular).powf(1.0 / D as f64);
+        let boundary = space.boundary();
+        let facets = (0..boundary.count()).map(|i| &boundary.facet(i)[..D]);
+        let facets = facets.filter(|facet| !facet.iter().all(|&node| space.on_axis(node))).flatten().copied();
         Cells {
-            nodes: covering(space),
+            nodes: space.nodes.iter().map(|&x| space.in_scene(x)).collect(),
             stride: D + 1,
             corners: space.cells.chunks_exact(space.stride).flat_map(|cell| &cell[..=D]).copied().collect(),
+            facets: facets.collect(),
             sizes: (0..space.cell_count()).map(size).collect(),
         }
     }
@@ -145,34 +150,6 @@ impl<const D: usize> Meshes for Kept<D> {
     fn degree(&self, body: usize) -> usize {
         self.shapes[body].space.order as usize + 1
     }
-}
-
-/// The nodes of a space, moved out along curved quadratic edges by twice the rise of the edge: its tangents meet there. The
-/// mesher looks for sizes on the curved boundary, and finds none where no straight cell is.
-fn covering<const D: usize>(space: &Space<D>) -> Vec<[f64; 3]> {
-    let mut rise = vec![[0.0; D]; if space.order == Order::P2 { space.nodes.len() } else { 0 }];
-    for (index, cell) in space.cells.chunks_exact(space.stride).enumerate().filter(|_| space.order == Order::P2) {
-        let centre = space.centroid(index);
-        for (&(i, j), &between) in EDGES.iter().zip(&cell[D + 1..]) {
-            let (x, y) = (space.nodes[cell[i] as usize], space.nodes[cell[j] as usize]);
-            let middle: [f64; D] = std::array::from_fn(|c| 0.5 * (x[c] + y[c]));
-            let up: [f64; D] = std::array::from_fn(|c| space.nodes[between as usize][c] - middle[c]);
-            let outwards: f64 = (0..D).map(|c| up[c] * (middle[c] - centre[c])).sum();
-            // a straight edge rises by rounding
-            if outwards <= 0.0 || length(up) < 1e-9 * length(std::array::from_fn::<f64, D, _>(|c| y[c] - x[c])) {
-                continue;
-            }
-            for node in [cell[i], cell[j]].map(|node| node as usize) {
-                if length(up) > length(rise[node]) {
-                    rise[node] = up;
-                }
-            }
-        }
-    }
-    let moved = |(node, &x): (usize, &[f64; D])| {
-        space.in_scene(rise.get(node).map_or(x, |rise| std::array::from_fn(|c| x[c] + 2.0 * rise[c])))
-    };
-    space.nodes.iter().enumerate().map(moved).collect()
 }
 
 struct OnBody<'a, const D: usize> {

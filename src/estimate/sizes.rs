@@ -1,6 +1,7 @@
 //! From the error of each cell to the sizes of the next mesh.
 
 use super::Estimate;
+use super::field;
 use crate::discretize::meshes::Meshes;
 use crate::model::Model;
 
@@ -16,17 +17,23 @@ pub struct Sizes {
     pub cells: f64,
 }
 
-/// Largest and least ratio of a new size to the old one: an estimate does not see farther.
-const RANGE: (f64, f64) = (0.08, 2.0);
+/// Least and largest ratio of a new size to the old one. Errors of a mesh foretell those of cells a few times smaller, not of cells an order smaller.
+const RANGE: (f64, f64) = (0.25, 2.0);
 
-/// Sizes that cut the squared energy error to `share` of what it is, with as few cells as possible, or as far as `most` cells
-/// go. Collective.
+/// Sizes that cut the squared energy error to `share` of what it is, with as few cells as possible, but `more` times those of the meshes at least, or as far as `most`
+/// cells go. Collective.
 ///
 /// With h -> s h the squared error of a cell becomes s^(2p) eta^2, and s^-D cells take its place. The number of cells is least
 /// where s^(2p + D) eta^2 is the same everywhere: every cell of the new mesh then has nearly the same error.
-pub fn wanted(meshes: &dyn Meshes, model: &Model, estimate: &Estimate, share: f64, most: usize) -> Sizes {
+pub fn wanted(
+    meshes: &dyn Meshes,
+    model: &Model,
+    estimate: &Estimate,
+    (share, more): (f64, f64),
+    most: usize,
+) -> Sizes {
     let bodies = model.bodies.len();
-    let counts: Vec<usize> = (0..bodies).map(|body| meshes.cells(body).sizes.len()).collect();
+    let counts = counts(meshes, bodies);
     // every rank knows the meshes, the owner of a body its errors
     let mut errors = vec![0.0; counts.iter().sum()];
     let mut first = 0;
@@ -50,54 +57,76 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, estimate: &Estimate, share: f6
     let (mut low, mut high) = (largest.ln() - 100.0, largest.ln() + 10.0);
     for _ in 0..60 {
         let middle: f64 = 0.5 * (low + high);
-        if left(middle.exp()) <= goal || cells(middle.exp()) > most as f64 {
+        let is_enough = left(middle.exp()) <= goal && cells(middle.exp()) >= more * all.len() as f64;
+        if is_enough || cells(middle.exp()) > most as f64 {
             low = middle;
         } else {
             high = middle;
         }
     }
     let level = low.exp();
-    gather(meshes, &counts, |index| ratio(level, all[index]), cells(level))
+    let size = |cell: usize, size: f64| size * ratio(level, all[cell]);
+    gather(meshes, &counts, size).within(most)
 }
 
 /// Sizes `factor` times those of the meshes.
 pub fn scaled(meshes: &dyn Meshes, bodies: usize, factor: f64) -> Sizes {
-    let counts: Vec<usize> = (0..bodies).map(|body| meshes.cells(body).sizes.len()).collect();
-    let total: usize = counts.iter().sum();
-    gather(meshes, &counts, |_| factor, total as f64)
+    gather(meshes, &counts(meshes, bodies), |_, size| factor * size)
 }
 
-/// One size everywhere, so that the bodies together have about so many `cells`.
-pub fn uniform(meshes: &dyn Meshes, bodies: usize, cells: usize) -> Sizes {
-    let mut sizes = scaled(meshes, bodies, 1.0);
-    let power = sizes.stride as f64 - 1.0;
+/// The sizes of the meshes, but none below the one with which the bodies together would have about so many `cells`.
+pub fn coarse(meshes: &dyn Meshes, bodies: usize, cells: usize) -> Sizes {
+    let power = meshes.cells(0).stride as f64 - 1.0;
     let volume: f64 = (0..bodies).flat_map(|body| meshes.cells(body).sizes).map(|size| size.powf(power)).sum::<f64>();
-    sizes.sizes.fill((volume / cells as f64).powf(1.0 / power));
-    sizes.cells = cells as f64;
-    sizes
+    let least = (volume / cells as f64).powf(1.0 / power);
+    gather(meshes, &counts(meshes, bodies), |_, size| size.max(least))
 }
 
-fn gather(meshes: &dyn Meshes, counts: &[usize], ratio: impl Fn(usize) -> f64, cells: f64) -> Sizes {
-    let mut wanted = Sizes { stride: 0, corners: Vec::new(), sizes: Vec::new(), cells };
+/// Cells of each body.
+fn counts(meshes: &dyn Meshes, bodies: usize) -> Vec<usize> {
+    (0..bodies).map(|body| meshes.cells(body).sizes.len()).collect()
+}
+
+/// The field of sizes that are wanted in the cells, of which `wanted` makes one from the number of the cell among those of all bodies and its size.
+fn gather(meshes: &dyn Meshes, counts: &[usize], wanted: impl Fn(usize, f64) -> f64) -> Sizes {
+    let mut field = Sizes { stride: 0, corners: Vec::new(), sizes: Vec::new(), cells: 0.0 };
     let mut first = 0;
     for (body, &count) in counts.iter().enumerate() {
         let of_body = meshes.cells(body);
-        wanted.stride = of_body.stride;
+        field.stride = of_body.stride;
         // geometric mean over the cells around each corner
         let mut logs = vec![(0.0, 0.0); of_body.nodes.len()];
         for (index, corners) in of_body.corners.chunks_exact(of_body.stride).enumerate() {
             for &node in corners {
                 let (sum, count) = &mut logs[node as usize];
-                *sum += (of_body.sizes[index] * ratio(first + index)).ln();
+                *sum += wanted(first + index, of_body.sizes[index]).ln();
                 *count += 1.0;
             }
         }
-        for &node in &of_body.corners {
-            let (sum, count) = logs[node as usize];
-            wanted.corners.push(of_body.nodes[node as usize]);
-            wanted.sizes.push((sum / count).exp());
+        let mut sizes: Vec<f64> = logs.into_iter().map(|(sum, count): (f64, f64)| (sum / count).exp()).collect();
+        field::smooth(&of_body, &mut sizes);
+        for (corners, old) in of_body.corners.chunks_exact(of_body.stride).zip(&of_body.sizes) {
+            let power = of_body.stride as f64 - 1.0;
+            let share = |&node: &u32| (old / sizes[node as usize]).powf(power) / of_body.stride as f64;
+            field.cells += corners.iter().map(share).sum::<f64>();
         }
+        let (corners, sizes) = field::simplices(&of_body, &sizes);
+        field.corners.extend(corners);
+        field.sizes.extend(sizes);
         first += count;
     }
-    wanted
+    field
+}
+
+impl Sizes {
+    /// The same, but no more than `most` cells.
+    fn within(mut self, most: usize) -> Self {
+        let power = self.stride as f64 - 1.0;
+        let factor = (self.cells / most as f64).powf(1.0 / power);
+        if factor > 1.0 {
+            self.sizes.iter_mut().for_each(|size| *size *= factor);
+            self.cells = most as f64;
+        }
+        self
+    }
 }

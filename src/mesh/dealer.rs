@@ -18,6 +18,8 @@ pub struct Head {
     pub groups: Vec<Group>,
     /// Elements that were split.
     pub split: usize,
+    /// Quadratic cells that were made straight.
+    pub straightened: usize,
     /// Corners of the box around all points that are used, z = 0 in the plane.
     pub bounds: [[f64; 3]; 2],
     /// How many there are.

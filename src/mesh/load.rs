@@ -48,6 +48,7 @@ pub enum Origin {
 /// # Errors
 /// A file that cannot be read, a number that the script does not take, Gmsh missing or failing, a mesh that is not one
 /// of named simplices in `D` dimensions (see [`parse`](super::parse)), or of too low an order; the signal.
+/// Quadratic cells that are folded become straight ([`Mesh::straightened`]).
 pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     deal(source, order, interrupt, &mut Dealer::new(&Serial, order))
 }
@@ -62,7 +63,7 @@ pub fn deal<const D: usize>(
     interrupt: &Interrupt,
     dealer: &mut Dealer,
 ) -> Result<Loaded<D>> {
-    match source {
+    let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes, guard } => {
             if let (true, Some(place)) = (foreign::is_shape(&file.value), places.first()) {
                 return Err(Error::scene(place, "numbers for a shape of another program, which has none")
@@ -75,7 +76,9 @@ pub fn deal<const D: usize>(
             let mesh = super::arrays::mesh(arrays, order)?;
             Ok(Loaded { mesh, origin: Origin::File, file: PathBuf::new(), digest: String::new(), unkept: None })
         }
-    }
+    }?;
+    loaded.mesh.straighten();
+    Ok(loaded)
 }
 
 /// Bytes by which a file shows its kind.

@@ -77,6 +77,7 @@ mod tests {
             }]
             .into(),
             split: 0,
+            straightened: 0,
         };
         mesh.sort_cells([[0.0; 3], [4.0, 1.0, 1.0]], &[]);
         let first: Vec<f64> = mesh.groups[0].simplices().map(|cell| mesh.points[cell[0] as usize][0]).collect();

@@ -30,6 +30,7 @@ mod script;
 mod simplex;
 mod sizes;
 mod split;
+mod straighten;
 #[cfg(test)]
 mod tests;
 mod tokens;
@@ -80,6 +81,8 @@ pub struct Mesh<const D: usize> {
     pub groups: Groups,
     /// Quadrangles, hexahedra, prisms and pyramids in them that were split into simplices.
     pub split: usize,
+    /// Quadratic cells whose edges were made straight, since the curved boundary folded them.
+    pub straightened: usize,
 }
 
 impl<const D: usize> Mesh<D> {

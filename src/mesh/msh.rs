@@ -184,5 +184,5 @@ fn finish<const D: usize>(
             groups::renumber(&mut groups, used).map(|old| point(nodes.points[old])).collect()
         }
     };
-    Ok(Mesh { path: path.to_owned(), points, datum: [0.0; D], order, groups: groups.into(), split })
+    Ok(Mesh { path: path.to_owned(), points, datum: [0.0; D], order, groups: groups.into(), split, straightened: 0 })
 }

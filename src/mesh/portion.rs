@@ -62,7 +62,7 @@ impl<const D: usize> Portion<D> {
             return read.map(Self::whole);
         }
         let is_dealt = dealer.has_begun();
-        let read = read.map(|Mesh { path, points, order, groups, split, .. }| {
+        let read = read.map(|Mesh { path, points, order, groups, split, straightened, .. }| {
             let mut groups = groups.into_list();
             if !is_dealt {
                 // it was read whole
@@ -74,7 +74,7 @@ impl<const D: usize> Portion<D> {
                     (group.connectivity, group.tags) = (Vec::new(), Vec::new());
                 }
             }
-            (Head { path, order, groups, split, bounds: [[0.0; 3]; 2], points: 0 }, points)
+            (Head { path, order, groups, split, straightened, bounds: [[0.0; 3]; 2], points: 0 }, points)
         });
         let (cuts, cells, of_cells) = dealer.finish();
         let (mut points, mut number) = (Vec::new(), Vec::new());
@@ -130,7 +130,7 @@ impl<const D: usize> Portion<D> {
         (points, numbers): Points<D>,
         rank: usize,
     ) -> Self {
-        let Head { path, order, mut groups, split, bounds, points: count } = head;
+        let Head { path, order, mut groups, split, straightened, bounds, points: count } = head;
         let owner = points.iter().zip(before).map(|(x, number)| cuts.part(x, number) as u32).collect();
         let mut index = vec![Vec::new(); groups.len()];
         for ((group, index), cells) in groups.iter_mut().zip(&mut index).zip(cells) {
@@ -141,7 +141,7 @@ impl<const D: usize> Portion<D> {
         for point in groups.iter_mut().flat_map(|group| &mut group.connectivity) {
             *point = place.get(*point).unwrap_or_default();
         }
-        let mut mesh = Mesh { path, points, datum: [0.0; D], order, groups: groups.into(), split };
+        let mut mesh = Mesh { path, points, datum: [0.0; D], order, groups: groups.into(), split, straightened };
         let keys = match D {
             3 => mesh.sort_cells(bounds, &index),
             _ => index.into_iter().map(|index| index.into_iter().map(|index| (0, index)).collect()).collect(),

@@ -6,7 +6,7 @@ use crate::error::{Error, Located, Result};
 use std::path::{Path, PathBuf};
 
 /// Writes the script that meshes another one to a field of sizes into the folder `work`; gives its path. `field` is a view of
-/// Gmsh (`.pos`). Structured meshes cannot follow sizes: their commands are left out of a copy.
+/// Gmsh (`.pos`); where a point is in none of its cells, Gmsh would make cells as large as the part. Structured meshes cannot follow sizes: their commands are left out of a copy.
 ///
 /// # Errors
 /// A structured script that reads other files, which a copy would not find; a folder that cannot be written.
@@ -29,7 +29,8 @@ pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: 
     let sizes = write("sizes.pos", field)?;
     let text = format!(
         "Include \"{}\";\nMesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\n\
-         Mesh.MeshSizeFromCurvature = 0;\nMerge \"{}\";\nBackground Mesh View[PostProcessing.NbViews - 1];\n",
+         Merge \"{}\";\nBackground Mesh View[PostProcessing.NbViews - 1];\n\
+         Mesh.MeshSizeMax = View[PostProcessing.NbViews - 1].Max;\n",
         script.display(),
         sizes.display()
     );

@@ -128,6 +128,7 @@ impl<const D: usize> Source<D> {
         drop(stage);
         let mut warnings = warnings(session, &discrete);
         warnings.extend(in_parts(verified.portion.mesh.split));
+        warnings.extend(made_straight(verified.portion.mesh.straightened));
         warnings.extend(read.iter().filter_map(|read| read.unkept.clone()));
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear, inner.whole.clone());
@@ -222,6 +223,12 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
 pub fn in_parts(split: usize) -> Option<String> {
     let what = "quadrangles, hexahedra, prisms or pyramids of the mesh were split into triangles or tetrahedra";
     (split > 0).then(|| format!("{split} {what}"))
+}
+
+/// Quadratic cells that were made straight, in words.
+pub fn made_straight(cells: usize) -> Option<String> {
+    let why = "were folded by the curved boundary and have straight edges now: a finer mesh there follows the boundary";
+    (cells > 0).then(|| format!("{cells} quadratic cells {why}"))
 }
 
 /// Facets that a pair leaves out as a warning.

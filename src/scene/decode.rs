@@ -113,6 +113,9 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     let units = keys.get("units").map(units).transpose()?;
     let (contacts, auto) = decoder.contacts(&keys)?;
     let mut method = decoder.method(keys.get("method"))?;
+    // meshes that are adapted need no more digits than they are worth, unless the scene says how many
+    let says_stop = keys.get("method").is_some_and(|method| method.holds("stop"));
+    method.stop.balanced |= keys.get("adapt").is_some() && !says_stop;
     let mesh = decoder.mesh(keys.require("mesh")?, trust(tree, &keys)?)?;
     let bodies = decoder.bodies(&keys)?;
     decoder.join(&mut method.steps, &bodies)?;

@@ -36,10 +36,15 @@ pub fn check<const D: usize>(cells: &Cells<D>) -> Found {
         let x = control_points(&cells.cell(cell).iter().map(|&node| cells.at(node)).collect::<Vec<_>>(), D);
         if folded(&x, D, DEPTH) {
             let error = cells.refuse("a curved cell is folded", &[cell], cells.at(nodes[0]));
-            return Err((at(place + 1), error.help("refine the mesh there, or use order = 1")));
+            return Err((at(place + 1), error.help("refine the mesh there, use order = 1, or let one process solve it, which makes such cells straight")));
         }
     }
     Ok(())
+}
+
+/// Whether a quadratic cell with these nodes, corners first, is folded: its Jacobian is negative somewhere.
+pub fn is_folded(x: &[[f64; 3]], dimension: usize) -> bool {
+    folded(&control_points(x, dimension), dimension, DEPTH)
 }
 
 /// Points `b_ij` of the quadratic map `sum_ij l_i l_j b_ij`, from corners and mid-edge nodes.

@@ -44,6 +44,9 @@ pub use groups::Duty;
 pub use nodes::Nodes;
 pub use parts::{Joined, Parts};
 
+pub(super) use cells::EDGES;
+pub(super) use curved::is_folded;
+
 use super::Portion;
 use crate::error::{Error, Result};
 use crate::exchange::{Exchange, first, trade};
