@@ -126,6 +126,62 @@ fn wrong_elements_are_named() {
     refused(&on_mesh(contact.as_bytes(), "", ""), &["group `upper_bottom` bounds no body"]);
 }
 
+/// Two thin rings, one around the other.
+const RINGS: &str = r#"SetFactory("OpenCASCADE");
+// two thin rings, one around the other, with few elements along the circles: the arcs are higher than the rings are thick
+DefineConstant[ h = {1, Name "h"} ];
+For s In {0 : 1}
+  inner = 1.0 + 0.05*s; outer = inner + 0.05;
+  Circle(10*s + 1) = {0, 0, 0, inner, 0, Pi/2};
+  Circle(10*s + 2) = {0, 0, 0, outer, 0, Pi/2};
+  Line(10*s + 3) = {4*s + 1, 4*s + 3};
+  Line(10*s + 4) = {4*s + 2, 4*s + 4};
+  Curve Loop(s + 1) = {10*s + 1, 10*s + 4, -(10*s + 2), -(10*s + 3)};
+  Plane Surface(s + 1) = {s + 1};
+  Physical Surface(Sprintf("ring%g", s)) = {s + 1};
+  Physical Curve(Sprintf("inner%g", s)) = {10*s + 1};
+  Physical Curve(Sprintf("outer%g", s)) = {10*s + 2};
+  Physical Curve(Sprintf("x%g", s)) = {10*s + 4};
+  Physical Curve(Sprintf("y%g", s)) = {10*s + 3};
+EndFor
+Mesh.MeshSizeMin = h; Mesh.MeshSizeMax = h; Mesh.MinimumCirclePoints = 4;
+"#;
+
+const RINGS_SCENE: &str = r#"dimension = 2
+mesh = "ring.geo"
+[[body]]
+name = "ring0"
+young = 1e3
+poisson = 0.3
+order = 2
+fix = [{ on = "x0", symmetry = true }, { on = "y0", symmetry = true }]
+load = [{ on = "inner0", pressure = 1 }]
+[[body]]
+name = "ring1"
+young = 1e3
+poisson = 0.3
+order = 2
+fix = [{ on = "x1", symmetry = true }, { on = "y1", symmetry = true }]
+[[contact]]
+between = ["outer0", "inner1"]
+layer = { linear = { stiffness = 1e5 } }
+"#;
+
+/// Arcs that are higher than a ring is thick fold its quadratic cells: these become straight, and are counted.
+#[test]
+fn folded_cells_become_straight() {
+    let scene = Scene::new(RINGS_SCENE);
+    std::fs::write(scene.path.with_file_name("ring.geo"), RINGS).expect("a file");
+    let with = |h: &str| solve(&scene, &["--set", &format!("mesh={{geo=\"ring.geo\",set={{h={h}}}}}")]).converged();
+    let coarse = with("0.5");
+    assert!(coarse.warnings().contains("8 quadratic cells were folded"), "{}", coarse.warnings());
+    let fine = with("0.2");
+    assert!(!fine.warnings().contains("folded"), "{}", fine.warnings());
+    // several ranks have no mesh to make straight
+    let two = solve_on(2, &scene, &["--set", "mesh={geo=\"ring.geo\",set={h=0.5}}"]);
+    assert!(two.code == 4 && two.stderr.contains("let one process solve it"), "{}", two.said());
+}
+
 #[test]
 fn bodies_in_parts() {
     // a third block for the group of the upper one, far from it

@@ -11,7 +11,7 @@ use crate::output::progress::Line;
 use crate::output::report::readable;
 use crate::output::{CellKind, Encoding, Grid, say, write_whole};
 use crate::problem::order::Order;
-use crate::run::in_parts;
+use crate::run::{in_parts, made_straight};
 use crate::scene::Scene;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -119,6 +119,7 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
         "order": mesh.order.degree(),
         "nodes": mesh.points.len(),
         "split": mesh.split,
+        "straightened": mesh.straightened,
         "bodies": bodies,
         "groups": groups,
     }))
@@ -151,7 +152,8 @@ fn print(facts: &Value) -> Result<()> {
     if let Some(why) = facts["unkept"].as_str() {
         say(format_args!("  warning: {why}"))?;
     }
-    if let Some(warning) = in_parts(facts["split"].as_u64().unwrap_or_default() as usize) {
+    let count = |key: &str| facts[key].as_u64().unwrap_or_default() as usize;
+    for warning in [in_parts(count("split")), made_straight(count("straightened"))].into_iter().flatten() {
         say(format_args!("  warning: {warning}"))?;
     }
     let cells = facts["dimension"].clone();

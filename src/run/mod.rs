@@ -29,5 +29,5 @@ pub use asking::Asking;
 pub use clock::Clock;
 pub use ended::{All, Recovered};
 pub use keep::Keep;
-pub use phases::{build, build_with, estimate, in_parts, iterate, set_up, targets};
+pub use phases::{build, build_with, estimate, in_parts, iterate, made_straight, set_up, targets};
 pub use stages::{Begin, Built, Done, Ready};

@@ -227,7 +227,7 @@ pub fn in_parts(split: usize) -> Option<String> {
 
 /// Quadratic cells that were made straight, in words.
 pub fn made_straight(cells: usize) -> Option<String> {
-    let why = "were folded by the curved boundary and have straight edges now: a finer mesh there follows the boundary";
+    let why = "were folded by the curved boundary and have straight edges now, so that gaps there are those of chords: a finer mesh follows the boundary";
     (cells > 0).then(|| format!("{cells} quadratic cells {why}"))
 }
 
