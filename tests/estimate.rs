@@ -375,8 +375,7 @@ fn pressures_of_quadratic_tetrahedra() {
     }
 }
 
-/// Two plates with holes and curved outer edges, whose first mesh is a sixth as fine as the script's: every mesh keeps its cells whole and of good shape, and the error that was
-/// asked for is reached. The scene's own stop rule is respected.
+/// Two plates with holes and round edges: the error that was asked for is reached on meshes none of whose cells is folded. The scene's own stop rule is respected.
 #[test]
 fn adapted_meshes_of_a_flange() {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
@@ -389,7 +388,7 @@ fn adapted_meshes_of_a_flange() {
     let number = |round: &serde_json::Value, name: &str| round[name].as_f64().expect("a number");
     let last = &rounds[rounds.len() - 1];
     assert!(number(last, "pressure") <= 2e-2 && number(last, "displacement") <= 2e-2, "{}", run.said());
-    assert!((2..=6).contains(&rounds.len()), "{}", run.said());
+    assert!((2..=6).contains(&rounds.len()) && !run.warnings().contains("folded"), "{}", run.said());
     // the loads lack the squared energy error of their work
     assert!(rounds.iter().all(|round| number(round, "displacement") >= number(round, "energy").powi(2)));
     assert_eq!(run.report["settings"]["method"]["stop"]["balanced"], true, "{}", run.said());

@@ -6,7 +6,7 @@ use crate::ddm::{Start, Status};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
-use crate::estimate::sizes::{self, Sizes};
+use crate::estimate::sizes::{self, Aim, Sizes};
 use crate::exchange::tell;
 use crate::interrupt::Interrupt;
 use crate::mesh;
@@ -33,7 +33,7 @@ const LEAST: f64 = 0.1;
 /// cells does not come where they fall more slowly than h^p, at edges of supports, loads and contact.
 const MORE: f64 = 2.0;
 
-/// Meshes in a row with larger errors than the best one that end the run.
+/// So many meshes in a row that are worse than the best one end the run. One may be worse by chance of the mesher; the second has twice its cells.
 const WORSE: usize = 2;
 
 /// What remains to be done of a run of several meshes.
@@ -65,10 +65,11 @@ pub struct Plan {
 
 /// The errors told of a mesh.
 struct Told {
-    /// Of the pressures of each pair.
+    /// Relative errors of the pressures, one for each pair.
     pressure: Vec<f64>,
+    /// Relative error of the normal displacements.
     displacement: f64,
-    /// The solution on it.
+    /// The solution on the mesh.
     tables: Vec<ContactTable>,
 }
 
@@ -79,8 +80,8 @@ struct Best {
     round: usize,
     /// Its sizes.
     view: Option<Arc<str>>,
-    /// Sizes for a mesh with more cells than the one that followed it, which was worse.
-    finer: String,
+    /// Sizes that its errors ask for.
+    next: Sizes,
     /// The solution on it.
     tables: Vec<ContactTable>,
     /// Meshes since then, all worse.
@@ -135,7 +136,7 @@ impl Plan {
         let mut sized = |scene: &Scene, sizes: fn(&dyn Meshes, usize) -> Sizes| {
             let built = run::build(session, scene.clone(), interrupt, clock)?;
             let bodies = built.discrete.bodies.len();
-            let sizes = built.discrete.meshes.as_ref().map(|meshes| view(sizes(&**meshes, bodies)));
+            let sizes = built.discrete.meshes.as_ref().map(|meshes| view(&sizes(&**meshes, bodies)));
             options::withdraw(session).map(|()| sizes)
         };
         if plan.goal.is_none() {
@@ -244,42 +245,41 @@ impl Plan {
             self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
             return self.end_with_best(session, error);
         }
-        let next = match self.best.as_mut().filter(|best| best.error <= error) {
-            Some(best) => {
-                best.worse += 1;
-                if best.worse == WORSE {
-                    let (round, error) = (best.round, best.error);
-                    self.limit = Some(format!(
-                        "mesh {round} has an error of {error:.1e}, and {WORSE} meshes with more cells are no better"
-                    ));
-                    return self.end_with_best(session, f64::INFINITY);
-                }
-                self.carried = best.tables.clone();
-                best.finer.clone()
-            }
-            None => {
-                let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
-                let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
-                let wanted = |more| sizes::wanted(&**meshes, model, estimate, (share, more), goal.cells);
-                let next = wanted(MORE);
-                let now = self.rounds[self.rounds.len() - 1].cells as f64;
-                if next.cells >= 0.9 * goal.cells as f64 && now >= 0.7 * goal.cells as f64 {
-                    self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
-                    return Ok(false);
-                }
-                self.carried = tables();
-                self.best = Some(Best {
-                    error,
-                    round: self.rounds.len(),
-                    view: self.sizes(),
-                    finer: view(wanted(MORE * MORE)),
-                    tables: tables(),
-                    worse: 0,
-                });
-                view(next)
-            }
-        };
-        follow(Rc::make_mut(&mut self.scene), Some(next));
+        if self.best.as_ref().is_some_and(|best| best.error <= error) {
+            return self.follow_best(session);
+        }
+        let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
+        let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
+        let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more: MORE, most: goal.cells });
+        let now = self.rounds[self.rounds.len() - 1].cells as f64;
+        if next.cells >= 0.9 * goal.cells as f64 && now >= 0.7 * goal.cells as f64 {
+            self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
+            return Ok(false);
+        }
+        let (round, sizes, tables) = (self.rounds.len(), self.sizes(), tables());
+        self.best = Some(Best { error, round, view: sizes, next, tables, worse: 0 });
+        self.go_from_best(session)
+    }
+
+    /// After a mesh that is worse than the best one: let another follow the best one, with more cells, or end the run.
+    fn follow_best(&mut self, session: &Session) -> Result<bool> {
+        let Some(best) = &mut self.best else { return Ok(false) };
+        best.worse += 1;
+        if best.worse == WORSE {
+            let Best { round, error, .. } = best;
+            self.limit =
+                Some(format!("mesh {round} has an error of {error:.1e}, and {WORSE} more meshes are no better"));
+            return self.end_with_best(session, f64::INFINITY);
+        }
+        best.next.refine(MORE);
+        self.go_from_best(session)
+    }
+
+    /// Let the next mesh follow the sizes that the errors of the best one ask for, and start from the solution there.
+    fn go_from_best(&mut self, session: &Session) -> Result<bool> {
+        let Some(best) = &self.best else { return Ok(false) };
+        self.carried = best.tables.clone();
+        follow(Rc::make_mut(&mut self.scene), Some(view(&best.next)));
         options::withdraw(session)?;
         Ok(true)
     }
@@ -345,7 +345,7 @@ fn excess(norms: &Norms, now: f64, before: f64) -> f64 {
     if most > 0.0 && norms.apart.is_finite() { (norms.apart / most).max(1.0) } else { 1.0 }
 }
 
-fn view(sizes: Sizes) -> String {
+fn view(sizes: &Sizes) -> String {
     mesh::view(sizes.stride, &sizes.corners, &sizes.sizes)
 }
 

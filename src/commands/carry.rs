@@ -51,22 +51,22 @@ fn neighbours<'a>(pair: &'a ContactPair, table: &ContactTable) -> impl Iterator<
     })
 }
 
-/// What a solution differs from the one on the mesh before.
+/// Norms of the difference between the solutions on two meshes.
 pub struct Difference {
-    /// In the pressures of each pair.
+    /// Pressures, one entry for each pair.
     pub pressure: Vec<Norms>,
-    /// In the normal displacements of all contact surfaces.
+    /// Normal displacements, all contact surfaces together.
     pub displacement: Norms,
 }
 
 /// Norms over the surfaces: roots of weighted sums of squares.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Norms {
-    /// Of the difference.
+    /// Norm of the difference of both solutions.
     pub apart: f64,
-    /// Of the solution before.
+    /// Norm of the solution on the earlier mesh.
     pub old: f64,
-    /// Of the new one.
+    /// Norm of the solution on the later mesh.
     pub new: f64,
 }
 
@@ -107,7 +107,7 @@ struct Planes {
 }
 
 impl Planes {
-    /// Points for a linear function in space; twice the four that determine one.
+    /// Points that a linear function is fitted to: twice the four that determine one in space.
     const NEAREST: usize = 8;
 
     fn new(points: &[[f64; 3]]) -> Self {
@@ -117,7 +117,8 @@ impl Planes {
 
     /// The shares that the values of the nearest points have in the fitted value. Squares of misfits have the weight of the inverse distance to the fourth.
     ///
-    /// Slopes have a small weight of their own: none is made of what points of a surface differ across it.
+    /// The slopes are held near zero by a small weight. Points of a surface hardly differ across it, so that no slope is found there; along it the squares of their weights
+    /// are some hundred times that of `SLOPES`, as each of them is one at least.
     fn shares(&self, at: &[f64; 3]) -> Vec<(usize, f64)> {
         const SLOPES: f64 = 0.1;
         let nearest: Vec<_> = self.tree.nearest_neighbor_iter_with_distance_2(*at).take(Self::NEAREST).collect();

@@ -45,14 +45,6 @@ pub fn block<const D: usize>(n: usize, order: Order) -> Space<D> {
     let stride = element::node_count(D + 1, Order::P2);
     let group = Group { name: "block".into(), dimension: D, stride, connectivity, tags: Vec::new() };
     let points = (0..count.pow(D as u32)).map(place).collect();
-    let mesh = Mesh {
-        path: "block".into(),
-        points,
-        datum: [0.0; D],
-        order: Order::P2,
-        groups: vec![group].into(),
-        split: 0,
-        straightened: 0,
-    };
+    let mesh = Mesh::new("block".into(), points, Order::P2, vec![group].into());
     Space::new(&mesh, &mesh.groups[0], order)
 }

@@ -33,15 +33,7 @@ pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>
     }
     let groups = groups.iter().map(|group| self::group::<D>(group, points, *own)).collect::<Result<Vec<_>>>()?;
     let points = points.iter().map(|x| std::array::from_fn(|c| x[c])).collect();
-    Ok(Mesh {
-        path: NAME.into(),
-        points,
-        datum: [0.0; D],
-        order: *own,
-        groups: groups.into(),
-        split: 0,
-        straightened: 0,
-    })
+    Ok(Mesh::new(NAME.into(), points, *own, groups.into()))
 }
 
 fn group<const D: usize>(arrays: &GroupArrays, points: &[[f64; 3]], order: Order) -> Result<Group> {

@@ -86,6 +86,11 @@ pub struct Mesh<const D: usize> {
 }
 
 impl<const D: usize> Mesh<D> {
+    /// Return the mesh of these points and groups of simplices of one order, measured from the scene's own origin.
+    pub fn new(path: PathBuf, points: Vec<[f64; D]>, order: Order, groups: Groups) -> Self {
+        Self { path, points, datum: [0.0; D], order, groups, split: 0, straightened: 0 }
+    }
+
     /// The group of a name, of whatever dimension.
     pub fn group(&self, name: &str) -> Option<&Group> {
         self.groups.named(name)

@@ -11,15 +11,7 @@ fn mesh<const D: usize>(points: Vec<[f64; D]>, cells: &[u32]) -> Mesh<D> {
     let stride = D + 1;
     let tags = (1..=(cells.len() / stride) as u64).collect();
     let body = Group { name: "body".into(), dimension: D, stride, connectivity: cells.to_vec(), tags };
-    Mesh {
-        path: "a.msh".into(),
-        points,
-        datum: [0.0; D],
-        order: Order::P1,
-        groups: vec![body].into(),
-        split: 0,
-        straightened: 0,
-    }
+    Mesh::new("a.msh".into(), points, Order::P1, vec![body].into())
 }
 
 fn with_group<const D: usize>(mesh: Mesh<D>, name: &str, dimension: usize, connectivity: Vec<u32>) -> Mesh<D> {
