@@ -6,6 +6,7 @@ mod series;
 
 use clap::Parser;
 use series::{Boxes, Series};
+use std::f64::consts::PI;
 use std::path::Path;
 use winkler::api::{ContactTable, Error, Kind, Result, Session, solve};
 use winkler::data::{Data, DataSpec};
@@ -38,6 +39,7 @@ fn row(session: &Session, case: &str, order: usize, stiffness: f64, sets: &[Stri
         return Err(Error::new(Kind::Solver, format!("{case} was not solved")));
     };
     let (estimated, sets) = (estimate.pressure[0], sets.join(" "));
+    let sets: String = sets.chars().take(80).collect();
     println!("| {case} {sets} | P{order} | {stiffness:e} | {error:.1e} | {estimated:.1e} | {:.2} |", estimated / error);
     Ok(())
 }
@@ -84,6 +86,29 @@ fn regular(session: &Session, stiffness: f64, meshes: &[(usize, usize, usize)]) 
     Ok(())
 }
 
+/// A gap of 80 waves, the shortest with three elements in a wave on a face of 12, regular tetrahedra.
+fn waves(session: &Session, stiffness: f64, meshes: &[(usize, usize)]) -> Result<()> {
+    let all: Vec<[f64; 3]> = (1..81)
+        .map(|wave| [wave / 9, wave % 9].map(f64::from))
+        .map(|[k, l]| [2.4e-4 * ((7.0 * k + 13.0 * l) % 10.0 / 10.0 - 0.45) / k.hypot(l).powf(1.5), k, l])
+        .collect();
+    let height = |[a, k, l]: &[f64; 3], x: f64, y: f64| a * (1.0 - (k * PI * x).cos() * (l * PI * y).cos());
+    let gap = |x: f64, y: f64| all.iter().map(|wave| height(wave, x, y)).sum::<f64>();
+    let terms: Vec<String> =
+        all.iter().map(|[a, k, l]| format!("({a:e})*(1 - cos({k}*pi*x)*cos({l}*pi*y))")).collect();
+    let boxes = Boxes { side: 1.0, height: 0.5, young: 2.1e5, poisson: 0.3, stiffness, approach: 3e-4, points: 128 };
+    let series = Series::new(boxes, gap);
+    for (order, n) in meshes {
+        let sets = [
+            format!("mesh.set.n={n}"),
+            "body.upper.fix.2.z=-3e-4".to_owned(),
+            format!("contact.0.gap=\"{}\"", terms.join(" + ")),
+        ];
+        row(session, "rough", *order, stiffness, &sets, &|table| at(&series, table, &gap))?;
+    }
+    Ok(())
+}
+
 /// The rough face.
 fn rough(session: &Session) -> Result<()> {
     let scene = load(Path::new("meshes/rough/scene.toml"), &[])?;
@@ -111,6 +136,7 @@ fn main() -> Result<()> {
         spheres(&session, 1e9, &[(1, 6, 1)])?;
         regular(&session, 1e6, &[(1, 16, 6)])?;
         regular(&session, 1e7, &[(2, 8, 6)])?;
+        waves(&session, 1e6, &[(1, 12), (2, 12)])?;
         return spheres(&session, 1e8, &[(2, 3, 1)]);
     }
     let meshes = [(1, 0.03), (1, 0.02), (2, 0.05), (2, 0.03), (2, 0.02)];
@@ -119,5 +145,6 @@ fn main() -> Result<()> {
     [1e4, 1e5, 1e6, 1e7, 1e8].iter().try_for_each(|k| regular(&session, *k, &meshes))?;
     let meshes = [(1, 6, 1), (1, 12, 1), (2, 3, 1), (2, 4, 1), (2, 3, 3)];
     [1e7, 1e9].iter().try_for_each(|k| spheres(&session, *k, &meshes))?;
+    [1e4, 1e6, 1e8].iter().try_for_each(|k| waves(&session, *k, &[(1, 12), (1, 16), (2, 8), (2, 12), (2, 16)]))?;
     rough(&session)
 }

@@ -4,7 +4,7 @@ use super::carry::{self, Norms};
 use super::checkpoint::{Checkpoint, Head, settings_digest};
 use crate::ddm::{Start, Status};
 use crate::discretize::meshes::Meshes;
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Aim, Sizes};
 use crate::exchange::tell;
@@ -61,6 +61,8 @@ pub struct Plan {
     best: Option<Best>,
     /// Whether this round is the best mesh once more, with which the run ends.
     ends: bool,
+    /// Cells that the sizes of this round foretold.
+    foretold: Option<f64>,
 }
 
 /// The errors told of a mesh.
@@ -76,6 +78,8 @@ struct Told {
 /// The mesh with the least error so far.
 struct Best {
     error: f64,
+    /// Its relative error in the energy norm.
+    energy: f64,
     /// Its number, from 1 on.
     round: usize,
     /// Its sizes.
@@ -118,6 +122,7 @@ impl Plan {
             told: None,
             best: None,
             ends: false,
+            foretold: None,
         };
         if plan.goal.is_none() && !nested {
             if let Some(checkpoint) = plan.resumed.as_ref().filter(|checkpoint| !checkpoint.head.steps.is_empty()) {
@@ -168,6 +173,31 @@ impl Plan {
         let place = self.goal.as_ref().map_or(&file.place, |goal| &goal.place);
         Err(Error::scene(place, "a finished mesh cannot be made anew with other sizes")
             .help("let the scene name a Gmsh script: mesh = \"file.geo\""))
+    }
+
+    /// Build the scene of this round. Where no mesh comes of the sizes that follow the best mesh, coarser ones are tried, down to those that promise no more cells than
+    /// the best mesh has; the run then ends with that one. Collective.
+    ///
+    /// # Errors
+    /// What [`run::build`] refuses, but a later mesh.
+    pub fn build(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<Built> {
+        loop {
+            match run::build(session, self.scene.clone(), interrupt, clock) {
+                Err(error) if error.kind() == Kind::Mesh && self.best.is_some() => self.coarsen(session, &error)?,
+                built => return built,
+            }
+        }
+    }
+
+    /// After sizes of which no mesh came: follow coarser ones, or the best mesh once more.
+    fn coarsen(&mut self, session: &Session, error: &Error) -> Result<()> {
+        let Some(best) = &mut self.best else { return Ok(()) };
+        best.next.refine(1.0 / MORE);
+        if best.next.cells > self.rounds[best.round - 1].cells as f64 {
+            return self.go_from_best(session).map(drop);
+        }
+        self.limit = Some(format!("no mesh comes of the sizes after mesh {}: {}", best.round, error.message()));
+        self.end_with_best(session, f64::INFINITY).map(drop)
     }
 
     /// Where this round begins: where a checkpoint or an earlier round ended.
@@ -245,19 +275,23 @@ impl Plan {
             self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
             return self.end_with_best(session, error);
         }
-        if self.best.as_ref().is_some_and(|best| best.error <= error) {
+        // a finer mesh may see a singular place that coarse ones did not: its error is told larger, its energy error smaller
+        if self.best.as_ref().is_some_and(|best| best.error <= error && best.energy <= estimate.energy) {
             return self.follow_best(session);
         }
         let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
         let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
-        let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more: MORE, most: goal.cells });
         let now = self.rounds[self.rounds.len() - 1].cells as f64;
-        if next.cells >= 0.9 * goal.cells as f64 && now >= 0.7 * goal.cells as f64 {
+        // a mesher does not make as many cells as its sizes foretell: the mesh before tells how many of them
+        let made = self.foretold.map_or(1.0, |foretold| now / foretold);
+        let (more, most) = (MORE / made, goal.cells as f64 / made);
+        let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more, most });
+        if next.cells >= 0.9 * most && now >= 0.7 * goal.cells as f64 {
             self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
             return Ok(false);
         }
         let (round, sizes, tables) = (self.rounds.len(), self.sizes(), tables());
-        self.best = Some(Best { error, round, view: sizes, next, tables, worse: 0 });
+        self.best = Some(Best { error, energy: estimate.energy, round, view: sizes, next, tables, worse: 0 });
         self.go_from_best(session)
     }
 
@@ -279,6 +313,7 @@ impl Plan {
     fn go_from_best(&mut self, session: &Session) -> Result<bool> {
         let Some(best) = &self.best else { return Ok(false) };
         self.carried = best.tables.clone();
+        self.foretold = Some(best.next.cells);
         follow(Rc::make_mut(&mut self.scene), Some(view(&best.next)));
         options::withdraw(session)?;
         Ok(true)

@@ -73,7 +73,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     let mut saved = request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == path.canonicalize().ok());
     let (mut has_begun, mut unwritten) = (false, Vec::new());
     let (done, estimate, failed) = loop {
-        let built = run::build(session, plan.scene.clone(), interrupt, &mut clock)?;
+        let built = plan.build(session, interrupt, &mut clock)?;
         let begin = agree(session, plan.begin(&built))?;
         let ready = run::set_up(session, built, begin, &mut clock)?;
         let all = session.options().all()?;

@@ -175,7 +175,7 @@ const SIGN: [f64; 2] = [1.0, -1.0];
 impl<const D: usize> OnBody<'_, D> {
     /// Displacement at barycentric coordinates of a facet, the interpolation error added.
     fn displacement(&self, nodes: &[u32], l: &[f64; D]) -> [f64; D] {
-        let mut u = self.recovery.bubble(&nodes[..D], l);
+        let mut u = self.recovery.missed(nodes, l);
         for (&node, phi) in nodes.iter().zip(element::values(self.shape.space.order, l)) {
             (0..D).for_each(|c| u[c] += phi * self.u[D * node as usize + c]);
         }

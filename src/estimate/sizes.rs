@@ -29,7 +29,7 @@ pub struct Aim {
     /// Fewest cells, as a multiple of those of the present mesh.
     pub more: f64,
     /// Most cells; they count more than the other two.
-    pub most: usize,
+    pub most: f64,
 }
 
 /// Return the sizes of the mesh with the fewest cells that meets an aim. Collective.
@@ -64,7 +64,7 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, estimate: &Estimate, aim: Aim)
     for _ in 0..60 {
         let middle: f64 = 0.5 * (low + high);
         let is_enough = left(middle.exp()) <= goal && cells(middle.exp()) >= more * all.len() as f64;
-        if is_enough || cells(middle.exp()) > most as f64 {
+        if is_enough || cells(middle.exp()) > most {
             low = middle;
         } else {
             high = middle;
@@ -133,9 +133,9 @@ impl Sizes {
     }
 
     /// Return the same field, or larger sizes where a mesh would have more than `most` cells.
-    fn within(mut self, most: usize) -> Self {
-        if self.cells > most as f64 {
-            self.refine(most as f64 / self.cells);
+    fn within(mut self, most: f64) -> Self {
+        if self.cells > most {
+            self.refine(most / self.cells);
         }
         self
     }

@@ -23,7 +23,7 @@ use std::time::Instant;
 /// Displacements that are tried: of nodes, of hats with and without contact springs.
 const TRIALS: usize = 3;
 
-/// Runs that end above the tolerance asked for, by increments of displacements, by the error of the mesh or by rounding, know their errors by estimates from
+/// Runs know their errors in norms of their own, or, where they end by increments of displacements, by the error of the mesh or by rounding, by estimates from
 /// few steps. Ten times what they saw is believed: an error of the mesh is ten times the one that it lets a run end with.
 const ROUGHLY: f64 = 10.0;
 
@@ -48,7 +48,7 @@ pub fn look(done: &mut Done, recovered: &All) {
     let is_rounding = reached.error <= asked || done.outcome.is_rounding(energy.unbalanced);
     let rounding = done.outcome.rounding;
     // the report states what rounding makes of pressures by itself
-    let allowed = if told <= asked { asked } else { ROUGHLY * told }.max(rounding);
+    let allowed = asked.max(ROUGHLY * told).max(rounding);
     let is_seen = found <= allowed && is_rounding;
     let ended = if done.outcome.status == Status::RoundoffLimited { told } else { 0.0 };
     let lost = ended.max(rounding);

@@ -369,6 +369,13 @@ pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> 
     let discrete = &mut done.built.discrete;
     let Some(meshes) = discrete.meshes.clone().filter(|_| good) else { return Ok(None) };
     let estimate = estimate::estimate(&*meshes, &mut discrete.model, done.method.linear(), iterate, layer)?;
+    if let Some((body, place)) = estimate::lost_at(&*meshes, &discrete.model, &estimate) {
+        let (name, place) = (&discrete.bodies[body].name, point(place));
+        done.warnings.push(format!(
+            "the estimated error of the mesh is a guess: that of body `{name}` is as large as the solution, most of it at {place}; \
+             make cells smaller there, or less flat"
+        ));
+    }
     clock.phase("estimate");
     Ok(Some(estimate))
 }
