@@ -22,6 +22,7 @@ pub mod rigid;
 pub mod sample;
 pub mod slope;
 pub mod space;
+pub mod strain;
 pub mod stress;
 mod support;
 pub mod surface;
