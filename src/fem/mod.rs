@@ -26,6 +26,7 @@ pub mod strain;
 pub mod stress;
 mod support;
 pub mod surface;
+pub mod turn;
 
 pub use crate::linalg::pad;
 pub use assemble::{NodalBlock, NodeGraph};
