@@ -94,8 +94,7 @@ fn waves(session: &Session, stiffness: f64, meshes: &[(usize, usize)]) -> Result
         .collect();
     let height = |[a, k, l]: &[f64; 3], x: f64, y: f64| a * (1.0 - (k * PI * x).cos() * (l * PI * y).cos());
     let gap = |x: f64, y: f64| all.iter().map(|wave| height(wave, x, y)).sum::<f64>();
-    let terms: Vec<String> =
-        all.iter().map(|[a, k, l]| format!("({a:e})*(1 - cos({k}*pi*x)*cos({l}*pi*y))")).collect();
+    let terms: Vec<String> = all.iter().map(|[a, k, l]| format!("({a:e})*(1 - cos({k}*pi*x)*cos({l}*pi*y))")).collect();
     let boxes = Boxes { side: 1.0, height: 0.5, young: 2.1e5, poisson: 0.3, stiffness, approach: 3e-4, points: 128 };
     let series = Series::new(boxes, gap);
     for (order, n) in meshes {

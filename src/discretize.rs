@@ -19,6 +19,8 @@ mod known;
 mod local;
 mod mechanism;
 pub mod meshes;
+mod missed;
+mod moving;
 mod pairs;
 mod part;
 mod parts;
@@ -51,9 +53,10 @@ use couplings::Coupled;
 use distribute::Deal;
 use draft::Draft;
 pub use factory::{Assembled, Factory, Outline};
+pub use find::point;
 use free::Free;
 use here::Here;
-pub use info::{BodyInfo, ContactInfo, Gauged};
+pub use info::{Balanced, BodyInfo, ContactInfo, Gauged};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes};
 use part::Part;
@@ -77,6 +80,8 @@ pub struct Discrete {
     pub contacts: Vec<ContactInfo>,
     /// Free motions of several bodies together.
     pub mechanisms: Vec<Mechanism>,
+    /// Loads that were balanced.
+    pub balanced: Vec<Balanced>,
     /// Trace of the rigid motions that supports give bodies: states, and so the traces of iterates, are relative to them.
     pub carried: Vec<f64>,
     /// The meshes, kept only when an estimate of the error was asked for.
@@ -121,7 +126,7 @@ pub fn discretize<const D: usize>(
     let drafts = parts.iter().zip(draft::segments(parts.len(), &pairs));
     let drafts = drafts.map(|(part, segments)| Draft::new(part, segments, &pairs, mesh, others));
     let mut drafts = drafts.collect::<Result<Vec<_>>>()?;
-    let Fixed { gauged, mechanisms, loose } = mechanism::fix(&mut parts, &drafts, &pairs, others);
+    let Fixed { gauged, mechanisms, loose, balanced } = mechanism::fix(&mut parts, &mut drafts, &pairs, mesh, others);
     let supported: Vec<Supported<D>> =
         parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
     let lazy = Coupled::new((&parts, &stocks, &drafts), others);
@@ -247,7 +252,18 @@ pub fn discretize<const D: usize>(
     model.carry(&carried);
     let Counts { assemblies, avoided: assemblies_avoided } = counts;
     let bodies = infos;
-    Ok(Discrete { model, bodies, contacts, mechanisms, meshes, carried, assemblies, assemblies_avoided, known_nodes })
+    Ok(Discrete {
+        model,
+        bodies,
+        contacts,
+        mechanisms,
+        balanced,
+        meshes,
+        carried,
+        assemblies,
+        assemblies_avoided,
+        known_nodes,
+    })
 }
 
 impl Discrete {

@@ -5,6 +5,7 @@
 //! on the discrete problem; its response is what nodal displacements and nodal pressures lack.
 
 mod field;
+mod held;
 mod layer;
 pub mod sizes;
 
@@ -14,6 +15,7 @@ use crate::error::{Error, Kind, Result};
 use crate::model::field::residual;
 use crate::model::surface::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
+use held::Held;
 use layer::LayerError;
 use std::rc::Rc;
 
@@ -117,6 +119,8 @@ pub fn estimate(
         }
     }
     drop(recovered);
+    let held = Held::of(model, layer);
+    held.balance(meshes, model, &mut loads);
     for (body, load) in loads.iter_mut().enumerate().filter(|(_, load)| !load.is_empty()) {
         meshes.forces(body, load);
     }
@@ -135,15 +139,17 @@ pub fn estimate(
     }
     let mut strain = [residual(model, iterate, &vec![0.0; model.points()]).1.strain];
     model.exchange.sum(&mut strain);
-    let reference = strain[0] + layer.work;
+    let reference = strain[0] - held.energy + layer.work;
     let relative = |squared: f64| if reference > 0.0 { (squared.max(0.0) / reference).sqrt() } else { 0.0 };
     // that of the nodal values is a part of the whole
     let error = bodies.iter().chain(&layers).sum::<f64>().max(squared);
     let pressure_error = pressure_errors(model, layer, &closing);
     let energy = relative(error);
+    let mut trace = iterate.trace.clone();
+    held.add_trace(model, -1.0, &mut trace);
     let displacement = ratio((0..2 * model.points()).map(|i| {
         let point = model.weight[i % model.points()];
-        (point, nodal.trace[i], iterate.trace[i])
+        (point, nodal.trace[i], trace[i])
     }));
     Ok(Estimate {
         energy,
@@ -151,7 +157,8 @@ pub fn estimate(
         pressure: relative_errors(model, layer, &pressure_error),
         pressure_error,
         // the loads f work on the error e as f'e = a(u, e) = a(e, e), since a(u_h, e) = 0: so much they lack where they act
-        displacement: SAFETY * if std::env::var("WK_NOFLOOR").is_ok() { displacement } else { displacement.max(energy * energy) },
+        displacement: SAFETY
+            * if std::env::var("WK_NOFLOOR").is_ok() { displacement } else { displacement.max(energy * energy) },
         cells,
         bodies,
         layers,

@@ -270,3 +270,24 @@ fn nearly_incompressible() {
     assert!(said.contains("body lower: Poisson's ratio is 0.4999") && said.contains("order = 2"), "{said}");
     assert!(silent.is_empty(), "{silent}");
 }
+
+/// Strains of more than 3 per cent are told of, with the bodies and the place. Under q = 10 a block in plane strain, free sideways, has
+/// strains -q (1 - nu^2)/E and q nu (1 + nu)/E.
+#[test]
+fn strains_that_are_not_small() {
+    let run = |young: f64| {
+        let young = format!("body.lower.young={young}");
+        let sets = ["method={stop={residual=1e-10}}", &young, "body.upper.young=1e4"];
+        solve(case("patch"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+    };
+    let soft = run(100.0);
+    let warnings = soft.warnings();
+    assert!(warnings.contains("strains of more than 3 per cent: `lower` up to 9.1e-02 at ("), "{warnings}");
+    assert!(warnings.contains("in 100.0 per cent of the body") && !warnings.contains("`upper` up to"), "{warnings}");
+    assert!((soft.number("bodies/0/max_strain") / 0.091 - 1.0).abs() < 1e-8, "{}", soft.said());
+    assert!((soft.number("bodies/1/max_strain") / 9.1e-4 - 1.0).abs() < 1e-8, "{}", soft.said());
+    assert!((0.0..1.0).contains(&soft.number("bodies/0/max_strain_at/1")), "{}", soft.said());
+    // 9.1/E on both sides of 0.03
+    let told = |young| run(young).warnings().contains("strains of more");
+    assert_eq!([told(300.0), told(310.0)], [true, false]);
+}

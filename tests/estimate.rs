@@ -416,6 +416,43 @@ fn limits_of_adaptation() {
     assert_eq!((two.code, two.stderr.matches("cannot be made anew").count()), (3, 1), "{}", two.said());
 }
 
+/// Springs to the ground that only hold bodies whose loads balance: the estimate is the same however soft they are, while what quadrature misses of the
+/// loads moves the bodies by more than all of their deformation. Springs that carry a load count.
+#[test]
+fn springs_that_only_hold() {
+    let bump = "10*exp(-4*(x - 0.5)^2)";
+    let pressed = |above: &str, stiffness: &str| {
+        let script = root().join("meshes/patch/patch.geo");
+        let body = |name: &str, pressure: &str| {
+            format!(
+                "[[body]]\nname = \"{name}\"\nyoung = 2.1e5\npoisson = 0.3\nload = [{{ on = \"{name}_face\", pressure = \"{pressure}\" }}]\n\
+                 spring = [{{ on = \"{name}_face\", stiffness = {stiffness} }}]\n"
+            )
+        };
+        let text = format!(
+            "dimension = 2\nmesh = {{ geo = \"{}\", set = {{ nl = 8, nu = 10 }} }}\n{}{}[[contact]]\nbetween = [\"lower_top\", \"upper_bottom\"]\n\
+             layer = {{ power = {{ B = 2.5e-5, a = 0.5 }} }}\n",
+            script.display(),
+            body("lower", bump),
+            body("upper", above)
+        );
+        let run = solve(Scene::new(text), &["--estimate"]).converged();
+        let errors = ["energy", "nodal", "displacement", "pressure/0"];
+        let errors = errors.map(|name| run.number(&format!("discretization_error/{name}")));
+        (run.number("bodies/0/max_displacement"), errors)
+    };
+    let (held, stiff) = pressed(bump, "1");
+    let (moved, soft) = pressed(bump, "1e-3");
+    assert!(moved > 10.0 * held, "{moved} {held}");
+    for (soft, stiff) in soft.iter().zip(stiff) {
+        assert!((soft / stiff - 1.0).abs() < 1e-3, "{soft} {stiff}");
+    }
+    assert!(stiff[2] < 1e-2 && stiff[1] < 1e-2, "{stiff:?}");
+    // a fifth more on one side, which springs carry: the body moves by it, far more than the mesh misses
+    let (_, loaded) = pressed("12*exp(-4*(x - 0.5)^2)", "1");
+    assert!(10.0 * loaded[0] < stiff[0] && 10.0 * loaded[2] < stiff[2], "{loaded:?} {stiff:?}");
+}
+
 /// A start from a coarser mesh saves iterations and changes nothing else.
 #[test]
 fn nested_start() {

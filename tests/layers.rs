@@ -94,3 +94,31 @@ fn coating() {
     // the coating is used up to a third at most, far from the end of its law
     assert!(table["compression"].iter().all(|&c| c < 2e-4));
 }
+
+/// A table, or an expression with an end, that the layer leaves is told of with what it is compressed to and where it ends; with load steps that
+/// of the step which goes farthest.
+#[test]
+fn laws_that_a_run_leaves() {
+    let left = |layer: &str, steps: &str| {
+        let warnings = patch(layer, &["mesh.set={nl=2,nu=3}", &format!("method.steps={steps}")]).warnings();
+        let found: Vec<&str> = warnings.lines().filter(|warning| warning.contains("its law ends")).collect();
+        assert!(found.len() < 2, "{warnings}");
+        found.first().map(|warning| warning.to_string()).unwrap_or_default()
+    };
+    // q = 10 under the last slopes, 2e5 and 1e5
+    let said = left("{table=[[5e-5,2],[6e-5,4]]}", "[1]");
+    let words = "lower_top - upper_bottom: the layer is compressed by 9.00e-05 in load step 1, under a pressure of 1.00e+01, and its law ends at a \
+                 compression of 6.00e-05";
+    assert!(said.starts_with(words), "{said}");
+    let said = left("{pressure=\"5e4*c*(1 + c/1e-4)\",up_to=5e-5}", "[1]");
+    assert!(said.contains("by 1.13e-04") && said.contains("a compression of 5.00e-05"), "{said}");
+    assert_eq!(left("{table=[[5e-5,2],[1e-4,10.001]]}", "[1]"), "");
+    assert_eq!(left("{pressure=\"5e4*c*(1 + c/1e-4)\",up_to=2e-4}", "[1]"), "");
+    // only the larger load leaves the table
+    let table = "{table=[[5e-5,2],[1e-4,12]]}";
+    assert!(left(table, "[0.5,2,1]").contains("by 1.40e-04 in load step 2, under a pressure of 2.00e+01"));
+    assert_eq!(left(table, "[0.5,1]"), "");
+    let alone = patch("{table=[[5e-5,2],[6e-5,4]]}", &[]);
+    assert!(alone.warnings().contains("by 9.00e-05, under a pressure"), "{}", alone.warnings());
+    assert!((alone.number("pairs/0/peak_compression") / 9e-5 - 1.0).abs() < 1e-9);
+}

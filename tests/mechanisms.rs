@@ -2,7 +2,9 @@
 
 mod common;
 
-use common::{Run, Scene, root, solve, solve_on, winkler};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use common::{Run, Scene, distance, root, solve, solve_on, winkler};
 
 const METHODS: [&str; 6] = ["auto", "newton", "newton-robin", "robin", "ncg", "anderson"];
 
@@ -258,4 +260,81 @@ fn an_overlap_that_no_load_keeps() {
         assert!(run.count("iterations") <= most, "{}", run.said());
         assert!((0..2).all(|pair| run.number(&format!("pairs/{pair}/peak_pressure")) <= rounding), "{}", run.said());
     }
+}
+
+/// Two domes that loads of the same length of arc press together, along their flat sides; the arcs have other facets, so that the loads differ by some 1e-4.
+fn domes(lower: f64, traction: f64) -> Scene {
+    let text = format!(
+        "dimension = 2\nmesh = {{ geo = \"domes.geo\", set = {{ h = {lower} }} }}\n\
+         [[body]]\nname = \"lower\"\nyoung = 2e5\npoisson = 0.3\nload = [{{ on = \"under\", traction = [0, 10] }}]\n\
+         [[body]]\nname = \"upper\"\nyoung = 2e5\npoisson = 0.3\nload = [{{ on = \"over\", traction = [0, {}] }}]\n\
+         [[contact]]\nbetween = [\"top\", \"bottom\"]\nlayer = {{ linear = {{ stiffness = 1e6 }} }}\n",
+        -traction
+    );
+    let scene = Scene::new(text);
+    let dome = |first: usize, side: i32, size: &str, names: [&str; 3]| {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| first + k);
+        format!(
+            "Point({a}) = {{-2, 0, 0, {size}}}; Point({b}) = {{2, 0, 0, {size}}}; Point({c}) = {{0, {}, 0, {size}}}; Point({d}) = {{0, 0, 0}};\n\
+             Line({a}) = {{{a}, {b}}}; Circle({b}) = {{{b}, {d}, {c}}}; Circle({c}) = {{{c}, {d}, {a}}};\n\
+             Curve Loop({a}) = {{{a}, {b}, {c}}}; Plane Surface({a}) = {{{a}}};\nPhysical Surface(\"{}\") = {{{a}}};\n\
+             Physical Curve(\"{}\") = {{{a}}}; Physical Curve(\"{}\") = {{{b}, {c}}};\n",
+            2 * side,
+            names[0],
+            names[1],
+            names[2]
+        )
+    };
+    let script = "DefineConstant[ h = 0.3 ];\n".to_owned()
+        + &dome(1, -1, "h", ["lower", "top", "under"])
+        + &dome(11, 1, "0.2", ["upper", "bottom", "over"]);
+    std::fs::write(scene.path.with_file_name("domes.geo"), script).expect("a script");
+    scene
+}
+
+/// Loads that lack balance by what straight facets miss of a circle are balanced, on every mesh and on two ranks, with a warning that has the share; those that
+/// lack ten times as much are refused.
+#[test]
+fn loads_that_the_mesh_puts_out_of_balance() {
+    let share = |run: &Run| -> f64 {
+        let warnings = run.warnings();
+        let line =
+            warnings.lines().find(|line| line.contains("to balance")).unwrap_or_else(|| panic!("{}", run.said()));
+        assert!(line.starts_with("bodies `lower` and `upper`: nothing holds them in translation along y"), "{line}");
+        let (_, rest) = line.split_once("lack balance there by ").expect("a share");
+        rest.split(' ').next().and_then(|share| share.parse().ok()).expect("a number")
+    };
+    for h in [0.1, 0.3, 0.5] {
+        let run = solve(domes(h, 10.0), &[]).converged();
+        // half of the difference of the angles' squares over 24; 16 edges are in a quarter of the other arc
+        let angle = |edges: f64| FRAC_PI_2 / edges;
+        let expected = (angle((PI / h).ceil()).powi(2) - angle(16.0).powi(2)) / 48.0;
+        assert!((share(&run) / expected.abs() - 1.0).abs() < 0.2, "{h}: {} {expected}", share(&run));
+        let [below, above] = run.forces(0).map(|force| force[1]);
+        assert!((below + above).abs() < 1e-9 && (above / 62.8 - 1.0).abs() < 5e-3, "{above}");
+        for body in 0..2 {
+            let imbalance = run.number(&format!("bodies/{body}/balance/force_imbalance"));
+            assert!(imbalance < 1e-11, "{h}, body {body}: {imbalance:e}");
+        }
+    }
+    let two = solve_on(2, domes(0.3, 10.0), &[]).converged();
+    let one = solve(domes(0.3, 10.0), &[]).converged();
+    assert_eq!(share(&one), share(&two));
+    assert!(distance(&one.contact()["pressure"], &two.contact()["pressure"]) < 1e-9);
+    lost(&solve(domes(0.3, 10.2), &[]), "underconstrained", &["bodies `lower` and `upper`", "translation along y"]);
+}
+
+/// A pressure that begins within an element: its quadrature misses the more the larger elements are, and no more than that is balanced.
+#[test]
+fn loads_that_quadrature_puts_out_of_balance() {
+    let pressed = |above: f64| {
+        let load = |on: &str, value: f64| {
+            format!("load = [{{ on = \"{on}\", pressure = \"{value} * (x > 0.23) * (x < 0.77)\" }}]")
+        };
+        let text = blocks([2, 1], &[&load("b1_bottom", 10.0), &load("b2_top", above)], &TWO);
+        Scene::new(text.replace("n1 = 2, n2 = 3", "n1 = 16, n2 = 19"))
+    };
+    let run = solve(pressed(10.0), &[]).converged();
+    assert!(run.warnings().contains("the loads were changed by that share to balance"), "{}", run.warnings());
+    lost(&solve(pressed(14.0), &[]), "underconstrained", &["bodies `b1` and `b2`", "translation along y"]);
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Run, Scene, case, distance, solve, solve_on};
+use common::{Run, Scene, case, distance, root, solve, solve_on, winkler};
 
 fn groove(method: &str, more: &[&str]) -> Run {
     let method = format!("method={method}");
@@ -137,11 +137,65 @@ fn steps_on_two_ranks() {
     assert_eq!(serial.contact()["pressure"], parallel.contact()["pressure"]);
 }
 
-/// Each mesh of an adaptation has a load of its own to start from: not both.
+/// The mesh is adapted under the largest step, and all steps run on it: the largest one is the last mesh of a run with these loads alone, and each is the
+/// run with its share of the loads on that mesh, which `winkler mesh` writes.
 #[test]
-fn steps_on_adapted_meshes_are_refused() {
-    let run = groove("{steps=2}", &["--set", "adapt.error=1e-3"]);
-    assert!(run.code == 3 && run.stderr.contains("an adapted mesh and load steps in one scene"), "{}", run.said());
+fn steps_run_on_the_mesh_of_the_largest_one() {
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
+    let graded = root().join("meshes/groove-held/graded.toml");
+    let title = format!("title={now} steps");
+    let adapted = ["--tolerance", "2e-3", "--set", "mesh.set.n=1", "--set", &title];
+    let method = |steps: &str| format!("method={{{steps} stop={{residual=1e-9}}}}");
+    let run = solve(&graded, &[&adapted[..], &["--set", &method("steps=[0.5, 2, 1],")]].concat()).converged();
+    let load = ["--set", "body.1.load.0.pressure=20"];
+    let largest = solve(&graded, &[&adapted[..], &load, &["--set", &method("")]].concat()).converged();
+    assert_eq!(run.report["steps"].as_array().map(Vec::len), Some(3), "{}", run.said());
+    let rounds = |run: &Run| {
+        let all = run.report["rounds"].as_array().expect("rounds").clone();
+        all.iter().map(|round| (round["cells"].clone(), round["pressure"].clone())).collect::<Vec<_>>()
+    };
+    assert!(rounds(&run).len() > 1 && rounds(&run) == rounds(&largest), "{}\n{}", run.said(), largest.said());
+    assert_same(step(&run, 1), result(&largest), "the largest step");
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("adapted.msh");
+    let write = |more: &[&str]| {
+        let words = ["mesh", graded.to_str().expect("a path"), "-o", file.to_str().expect("a path")];
+        winkler(&[&words[..], more].concat())
+    };
+    let missing = write(&adapted);
+    assert!(missing.code == 3 && missing.stderr.contains("was adapted to an error of 0.002"), "{}", missing.said());
+    let steps = method("steps=[0.5, 2, 1],");
+    let written = write(&[&adapted[..], &["--set", &steps]].concat());
+    assert!(written.code == 0 && !written.stdout.contains("warning"), "{}", written.said());
+    let mesh = format!("mesh={}", file.display());
+    for (number, factor) in [0.5, 2.0, 1.0].into_iter().enumerate() {
+        let load = format!("body.1.load.0.pressure={}", 10.0 * factor);
+        let sets = ["--set", &mesh, "--set", &load, "--set", "method={stop={residual=1e-9}}"];
+        let alone = solve(&graded, &sets).converged();
+        assert_same(step(&run, number), result(&alone), &format!("step {number}"));
+        assert_eq!(alone.count("dofs"), run.count("dofs"));
+        if number == 2 {
+            assert!(distance(&run.contact()["pressure"], &alone.contact()["pressure"]) < 1e-7);
+        }
+    }
+    let none = winkler(&["mesh", graded.to_str().expect("a path"), "--adapted"]);
+    assert!(none.code == 2 && none.stderr.contains("adapts no mesh"), "{}", none.said());
+}
+
+/// Load steps on the last of a few meshes that do not reach the error: the best one is written, and said to be so.
+#[test]
+fn steps_on_a_mesh_that_is_not_fine_enough() {
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
+    let (graded, title) = (root().join("meshes/groove-held/graded.toml"), format!("title={now} coarse"));
+    let sets = ["adapt.error=1e-5", "adapt.rounds=2", "mesh.set.n=1", "method.steps=[0.5,1]", &title];
+    let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+    let run = solve(&graded, &sets);
+    assert_eq!((run.code, run.text("status"), run.text("steps/1/status")), (1, "mesh-limit", "converged"));
+    let steps = run.report["steps"].as_array().map(Vec::len);
+    assert_eq!((steps, run.report["rounds"].as_array().map(Vec::len)), (Some(2), Some(2)), "{}", run.said());
+    let written = winkler(&[&["mesh", graded.to_str().expect("a path"), "--adapted"], &sets[..]].concat());
+    assert!(written.code == 0 && written.stdout.contains("did not reach its error"), "{}", written.said());
 }
 
 /// A step that begins at its solution makes fewer sweeps than the one before; those are not counted again.

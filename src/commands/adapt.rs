@@ -1,5 +1,6 @@
 //! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
 
+use super::adapted;
 use super::carry::{self, Norms};
 use super::checkpoint::{Checkpoint, Head, settings_digest};
 use crate::ddm::{Start, Status};
@@ -13,6 +14,7 @@ use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
+use crate::problem::history::History;
 use crate::problem::{MeshSource, MethodName, method};
 use crate::run::{self, Begin, Built, Clock, Done, report};
 use crate::scene::{AdaptSpec, Scene};
@@ -63,6 +65,8 @@ pub struct Plan {
     ends: bool,
     /// Cells that the sizes of this round foretold.
     foretold: Option<f64>,
+    /// The load steps that follow on the last mesh, while meshes are adapted under the largest of them.
+    steps: Option<History>,
 }
 
 /// The errors told of a mesh.
@@ -106,10 +110,8 @@ impl Plan {
     ) -> Result<Self> {
         let goal = scene.adapt.clone();
         let nested = matches!(scene.method.start, method::Start::Nested);
-        let mut settings = scene.settings();
-        ["output", "solver", "method"].iter().for_each(|key| settings[*key] = serde_json::Value::Null);
         let mut plan = Self {
-            purpose: settings.to_string(),
+            purpose: adapted::purpose(&scene),
             asked: scene.clone(),
             scene,
             rounds: resumed.as_ref().map_or(Vec::new(), |checkpoint| checkpoint.head.rounds.clone()),
@@ -123,6 +125,7 @@ impl Plan {
             best: None,
             ends: false,
             foretold: None,
+            steps: None,
         };
         if plan.goal.is_none() && !nested {
             if let Some(checkpoint) = plan.resumed.as_ref().filter(|checkpoint| !checkpoint.head.steps.is_empty()) {
@@ -134,8 +137,17 @@ impl Plan {
         if plan.adapts() {
             Rc::make_mut(&mut plan.scene).estimate = true;
         }
-        if let Some(checkpoint) = &plan.resumed {
-            follow(Rc::make_mut(&mut plan.scene), checkpoint.head.sizes.clone());
+        if let Some(Checkpoint { head, .. }) = &plan.resumed {
+            let scene = Rc::make_mut(&mut plan.scene);
+            follow(scene, head.sizes.clone());
+            if head.on_last_mesh {
+                scene.method.steps.begun = head.steps.len();
+                plan.limit.clone_from(&head.limit);
+                return Ok(plan);
+            }
+        }
+        plan.keep_steps_for_the_end();
+        if plan.resumed.is_some() {
             return Ok(plan);
         }
         let mut sized = |scene: &Scene, sizes: fn(&dyn Meshes, usize) -> Sizes| {
@@ -154,7 +166,7 @@ impl Plan {
             return Ok(plan);
         }
         // the cache of another rank may know of other sizes
-        let mut view_of_first = tell(&Ranks::new(session), || Ok(mesh::recall_final(&plan.purpose)))?;
+        let mut view_of_first = tell(&Ranks::new(session), || Ok(adapted::recall(&plan.purpose, true)))?;
         if view_of_first.is_none() {
             view_of_first = sized(&plan.scene, |meshes, bodies| sizes::coarse(meshes, bodies, FIRST * bodies))?;
         }
@@ -165,6 +177,30 @@ impl Plan {
     /// Whether meshes are adapted to an error.
     pub fn adapts(&self) -> bool {
         self.goal.is_some()
+    }
+
+    /// Adapt meshes under the largest load step alone: its mesh serves smaller loads, too, and steps would cost as often as there are meshes.
+    fn keep_steps_for_the_end(&mut self) {
+        let history = &self.scene.method.steps;
+        if self.adapts() && !history.is_empty() {
+            let largest = history.heaviest();
+            self.steps = Some(std::mem::replace(&mut Rc::make_mut(&mut self.scene).method.steps, largest));
+        }
+    }
+
+    /// Whether this round makes all load steps on the last mesh of an adaptation.
+    pub fn is_stepping(&self) -> bool {
+        self.adapts() && self.steps.is_none() && !self.scene.method.steps.is_empty()
+    }
+
+    /// End the adaptation on the mesh of this round. Return whether another round makes all load steps on it.
+    fn end_meshes(&mut self, session: &Session) -> Result<bool> {
+        let Some(steps) = self.steps.take() else { return Ok(false) };
+        // the first step is another load than the largest one: it finds its own start
+        self.carried.clear();
+        Rc::make_mut(&mut self.scene).method.steps = steps;
+        options::withdraw(session)?;
+        Ok(true)
     }
 
     /// A mesh that is a file cannot follow sizes.
@@ -213,12 +249,14 @@ impl Plan {
 
     /// What a checkpoint of this round says of it; none of a coarse mesh that only gives the start.
     pub fn head(&self) -> Option<Head> {
-        let sizes = match &self.scene.mesh {
-            MeshSource::Geo { sizes: Some(view), .. } => Some(view.to_string()),
-            _ => None,
-        };
-        let rounds = self.rounds.clone();
-        self.finer.is_none().then(|| Head { settings: settings_digest(&self.asked), rounds, sizes, ..Head::default() })
+        self.finer.is_none().then(|| Head {
+            settings: settings_digest(&self.asked),
+            rounds: self.rounds.clone(),
+            sizes: self.sizes().map(|view| view.to_string()),
+            on_last_mesh: self.is_stepping(),
+            limit: self.limit.clone(),
+            ..Head::default()
+        })
     }
 
     /// The start of this round, if an earlier one gives it.
@@ -234,7 +272,7 @@ impl Plan {
     /// Whether another round follows this one. Collective.
     ///
     /// # Errors
-    /// The cache of meshes cannot be written.
+    /// Failures of PETSc.
     pub fn goes_on(
         &mut self,
         session: &Session,
@@ -242,7 +280,7 @@ impl Plan {
         estimate: Option<&Estimate>,
         clock: &mut Clock,
     ) -> Result<bool> {
-        if matches!(done.outcome.status, Status::Paused { .. }) {
+        if matches!(done.outcome.status, Status::Paused { .. }) || self.is_stepping() {
             return Ok(false);
         }
         let good = done.outcome.status.is_solved();
@@ -265,11 +303,7 @@ impl Plan {
         }
         let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
         if error <= goal.error {
-            if let MeshSource::Geo { sizes: Some(view), .. } = &self.scene.mesh {
-                let kept = if session.rank() == 0 { mesh::keep_final(&self.purpose, view) } else { Ok(()) };
-                agree(session, kept)?;
-            }
-            return Ok(false);
+            return self.end_meshes(session);
         }
         if self.rounds.len() >= goal.rounds {
             self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
@@ -288,7 +322,7 @@ impl Plan {
         let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more, most });
         if next.cells >= 0.9 * most && now >= 0.7 * goal.cells as f64 {
             self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
-            return Ok(false);
+            return self.end_meshes(session);
         }
         let (round, sizes, tables) = (self.rounds.len(), self.sizes(), tables());
         self.best = Some(Best { error, energy: estimate.energy, round, view: sizes, next, tables, worse: 0 });
@@ -336,12 +370,24 @@ impl Plan {
 
     /// End the run with the best mesh: with one more round on it, unless the last one, with this `error`, is no worse.
     fn end_with_best(&mut self, session: &Session, error: f64) -> Result<bool> {
-        let Some(best) = self.best.take().filter(|best| best.error < error) else { return Ok(false) };
+        let Some(best) = self.best.take().filter(|best| best.error < error) else { return self.end_meshes(session) };
         self.ends = true;
         self.carried = best.tables;
         follow(Rc::make_mut(&mut self.scene), best.view.as_deref().map(str::to_owned));
+        if self.steps.is_some() {
+            return self.end_meshes(session);
+        }
         options::withdraw(session)?;
         Ok(true)
+    }
+
+    /// Keep the sizes of the mesh with which the run has ended, on the rank that writes.
+    ///
+    /// # Errors
+    /// The cache of meshes cannot be written.
+    pub fn keep_mesh(&self, done: &Done) -> Result<()> {
+        let sizes = self.sizes().filter(|_| self.adapts() && done.outcome.status.is_solved());
+        sizes.map_or(Ok(()), |sizes| adapted::keep(&self.purpose, self.limit.is_none(), &sizes))
     }
 
     /// The field of sizes that the mesh of this round follows.
@@ -357,7 +403,7 @@ impl Plan {
     /// Errors that were told right, e of this mesh and e' of the one before, leave a difference of e + e' at most. Where it is larger, both were told too small, and
     /// this one becomes as much larger as the difference is.
     pub fn hold(&mut self, done: &Done, estimate: &mut Estimate) {
-        if self.goal.is_none() || !done.outcome.status.is_solved() {
+        if self.goal.is_none() || self.is_stepping() || !done.outcome.status.is_solved() {
             return;
         }
         let tables: Vec<_> = (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect();

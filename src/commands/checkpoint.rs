@@ -22,7 +22,7 @@ pub const FILE: &str = "checkpoint";
 /// Name under which the next run that does not go on from it leaves it.
 pub const ASIDE: &str = "checkpoint.old";
 
-const FORMAT: &str = "winkler checkpoint 4";
+const FORMAT: &str = "winkler checkpoint 5";
 
 /// How the first line of all versions begins.
 const KIND: &[u8] = b"winkler checkpoint ";
@@ -43,6 +43,10 @@ pub struct Head {
     pub sizes: Option<String>,
     /// Load steps before this one.
     pub steps: Vec<StepReport>,
+    /// Whether these are all load steps on the last mesh of an adaptation, not the largest one alone.
+    pub on_last_mesh: bool,
+    /// Why the error was not reached on that mesh, if it was not.
+    pub limit: Option<String>,
 }
 
 /// A state that was read.

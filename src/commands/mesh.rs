@@ -1,5 +1,6 @@
 //! `winkler mesh`: makes the mesh of a scene, or finds it, and says what is in it.
 
+use super::adapted;
 use super::typed::flags;
 use crate::error::{Error, Kind, Result};
 use crate::exchange::Serial;
@@ -10,7 +11,7 @@ use crate::mesh::{Loaded, Origin, Portion};
 use crate::output::progress::Line;
 use crate::output::report::readable;
 use crate::output::{CellKind, Encoding, Grid, say, write_whole};
-use crate::problem::order::Order;
+use crate::problem::{MeshSource, Order};
 use crate::run::{in_parts, made_straight};
 use crate::scene::Scene;
 use serde_json::{Value, json};
@@ -27,10 +28,16 @@ pub struct Request {
     /// Replace a key of the scene, for example mesh.set.n=64; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
+    /// The mesh that `winkler solve` has adapted to this error, with the same scene and overrides (short for --set adapt.error=E)
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
+    tolerance: Option<String>,
+    /// The mesh that `winkler solve` has adapted to the error of the scene's `adapt`, or of --tolerance, which implies this
+    #[arg(long)]
+    adapted: bool,
     /// Run the mesh's .geo script even if it can start programs or write files
     #[arg(long)]
     trust_geo: bool,
-    /// File to write: .msh or .vtu
+    /// File to write: .msh, which a scene can name as its mesh, or .vtu
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Print it as JSON
@@ -45,16 +52,48 @@ pub struct Request {
 /// Refusals of scene and mesh, a body without cells, a file that cannot be written.
 pub fn mesh(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     interrupt.hold();
-    let overrides: Vec<String> =
-        request.overrides.iter().cloned().chain(flags([(request.trust_geo, "--trust-geo")])).collect();
-    let scene = crate::scene::load(&request.scene, &overrides)?;
+    let tolerance = request.tolerance.iter().map(|error| format!("--tolerance {error}"));
+    let flags = flags([(request.trust_geo, "--trust-geo")]);
+    let overrides: Vec<String> = request.overrides.iter().cloned().chain(tolerance).chain(flags).collect();
+    let mut scene = crate::scene::load(&request.scene, &overrides)?;
+    let is_adapted = request.adapted || request.tolerance.is_some();
+    let is_reached = is_adapted.then(|| follow_adapted(&mut scene)).transpose()?;
     match scene.dimension.value {
-        2 => show::<2>(&scene, interrupt, request),
-        _ => show::<3>(&scene, interrupt, request),
+        2 => show::<2>(&scene, is_reached, interrupt, request),
+        _ => show::<3>(&scene, is_reached, interrupt, request),
     }
 }
 
-fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request) -> Result<i32> {
+/// Let the mesh of a scene follow the sizes with which the last run that adapted it has ended. Return whether that run reached its error.
+///
+/// # Errors
+/// A scene that is not adapted, or has not been.
+fn follow_adapted(scene: &mut Scene) -> Result<bool> {
+    let purpose = adapted::purpose(scene);
+    let (MeshSource::Geo { file, sizes, .. }, Some(adapt)) = (&mut scene.mesh, &scene.adapt) else {
+        let error = Error::new(Kind::Usage, format!("{} adapts no mesh", scene.path.display()));
+        return Err(
+            error.help("the scene needs a script for its mesh and `adapt = { error = E }`, or type --tolerance E")
+        );
+    };
+    let kept = |is_reached| Some((is_reached, adapted::recall(&purpose, is_reached)?));
+    let missing = || {
+        let message = format!("no mesh of {} was adapted to an error of {}", file.value.display(), adapt.error);
+        Error::scene(&adapt.place, message).help(
+            "first run `winkler solve` with the same scene, --set and --tolerance; meshes are kept in the cache ($WINKLER_CACHE)",
+        )
+    };
+    let (is_reached, view) = [true, false].into_iter().find_map(kept).ok_or_else(missing)?;
+    *sizes = Some(view.into());
+    Ok(is_reached)
+}
+
+fn show<const D: usize>(
+    scene: &Scene,
+    is_reached: Option<bool>,
+    interrupt: &Interrupt,
+    request: &Request,
+) -> Result<i32> {
     let began = Instant::now();
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
     let line = (!request.json).then(|| Line::new("mesh", None));
@@ -64,7 +103,8 @@ fn show<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &Request)
     if let Some(path) = &request.output {
         write(path, &loaded)?;
     }
-    let facts = facts(scene, loaded, seconds)?;
+    let mut facts = facts(scene, loaded, seconds)?;
+    facts["reached"] = json!(is_reached);
     if request.json {
         say(format_args!("{facts:#}"))?;
     } else {
@@ -151,6 +191,9 @@ fn print(facts: &Value) -> Result<()> {
     }
     if let Some(why) = facts["unkept"].as_str() {
         say(format_args!("  warning: {why}"))?;
+    }
+    if facts["reached"] == json!(false) {
+        say("  warning: the run that adapted this mesh did not reach its error: it is the best one of that run")?;
     }
     let count = |key: &str| facts[key].as_u64().unwrap_or_default() as usize;
     for warning in [in_parts(count("split")), made_straight(count("straightened"))].into_iter().flatten() {

@@ -2,6 +2,7 @@
 //! that solve share with the library is in [`run`](crate::run).
 
 pub mod adapt;
+mod adapted;
 pub mod bench;
 pub mod carry;
 pub mod check;

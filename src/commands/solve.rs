@@ -130,7 +130,10 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
             // whatever comes of the next mesh, this one's results are there
             let estimate = estimate.as_ref();
             let writing = Writing { session, path, plan: &plan, done: &done, estimate, fields: false, is_last: false };
-            let ended = "ended while the next mesh was at work: the error asked for is not reached";
+            let ended = match plan.is_stepping() {
+                true => "ended while load steps were at work on the last mesh",
+                false => "ended while the next mesh was at work: the error asked for is not reached",
+            };
             let (_, written) = writing.all(&mut clock, |report| {
                 (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
             });
@@ -176,7 +179,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
             })?;
         }
     }
-    failed.and(written)?;
+    failed.and(written).and(if first { plan.keep_mesh(&done) } else { Ok(()) })?;
     Ok(code)
 }
 

@@ -39,6 +39,8 @@ pub struct Loose<const D: usize> {
     pub motions: Vec<Motion>,
     /// Those that supports alone leave, if springs resist some of them.
     pub sprung: Option<Sprung>,
+    /// Combinations of those of the free body that supports alone leave.
+    pub unsupported: Vec<RigidMotion<D>>,
     /// Combinations of the motions that no contact row feels: name and weights.
     pub unfelt: Vec<(String, DVector<f64>)>,
 }
@@ -94,6 +96,16 @@ impl<const D: usize> Draft<D> {
         totals(exchange, &works).chunks_exact(2).map(work).collect()
     }
 
+    /// Change each nodal force f by -|f| u, with the vector u of its place.
+    pub fn change_loads(&mut self, part: &Part<D>, u: impl Fn(&[f64; D]) -> [f64; D]) {
+        let change = |(node, force): (u32, [f64; D])| {
+            let (size, u) = (dot(&force, &force).sqrt(), u(&part.space.nodes[node as usize]));
+            (node, std::array::from_fn(|c| force[c] - size * u[c]))
+        };
+        self.nodal_load = self.nodal_load.iter().map(change).collect();
+        self.load = part.load_on_dofs(&self.nodal_load);
+    }
+
     /// What supports and springs leave to the body now. Collective.
     pub fn loose(&self, part: &Part<D>, exchange: &dyn Exchange) -> Loose<D> {
         let at = |k: usize, node: u32| self.free[k].at(&part.space.nodes[node as usize]);
@@ -102,8 +114,9 @@ impl<const D: usize> Draft<D> {
         let motions = self.motions(part, &left, exchange);
         let unfelt = felt_by_none(&motions);
         let sprung = part.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
+        let unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
         let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions(part, &all, exchange), stiffness });
-        Loose { left, motions, sprung, unfelt }
+        Loose { left, motions, sprung, unsupported, unfelt }
     }
 
     /// The dof outside the contact rows, so that these stay as they are, that a motion moves most, unless that is little. Collective.

@@ -14,6 +14,17 @@ pub struct Gauged {
     pub spinning: Vec<String>,
 }
 
+/// Loads that lacked balance on motions by no more than the mesh may miss of them, and were balanced.
+#[derive(Debug, Clone)]
+pub struct Balanced {
+    /// The bodies that the motions move.
+    pub bodies: Vec<usize>,
+    /// Names of the motions.
+    pub motion: String,
+    /// Work of the loads on them, as a share of what forces of their sizes could do: the largest.
+    pub share: f64,
+}
+
 /// What is known of a body besides its matrices.
 pub struct BodyInfo {
     /// Name in the scene.

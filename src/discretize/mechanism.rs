@@ -5,7 +5,9 @@
 
 use super::draft::{Draft, Loose, NO_WORK};
 use super::gauge;
-use super::info::Gauged;
+use super::info::{Balanced, Gauged};
+use super::missed;
+use super::moving::{self, Moving};
 use super::part::{Candidate, Part};
 use super::round::Points;
 use super::totals::totals;
@@ -14,7 +16,7 @@ use crate::error::few;
 use crate::exchange::Exchange;
 use crate::fem::{Extent, RigidMotion, rigid};
 use crate::linalg::{Blocks, PART, TOLERANCE, Total, axpy, dot, fit};
-use crate::mesh::Joined;
+use crate::mesh::{Joined, Mesh};
 use crate::model::{Mechanism, Motion, Motions, Segment};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
@@ -32,32 +34,38 @@ pub struct Fixed<const D: usize> {
     pub mechanisms: Vec<Mechanism>,
     /// The motions left to each body.
     pub loose: Vec<Loose<D>>,
+    /// Loads that were balanced.
+    pub balanced: Vec<Balanced>,
 }
 
 /// Fixes the motions that nothing feels and no load works on: of whole groups of bodies, of each body alone, then what is left. Collective.
 pub fn fix<const D: usize>(
     parts: &mut [Part<D>],
-    drafts: &[Draft<D>],
+    drafts: &mut [Draft<D>],
     pairs: &[ContactPair],
+    mesh: &Mesh<D>,
     exchange: &dyn Exchange,
 ) -> Fixed<D> {
-    let loose = parts.iter().zip(drafts).map(|(part, draft)| draft.loose(part, exchange)).collect();
-    let mut search = Search { parts, drafts, pairs, exchange, loose, found: Vec::new() };
-    for group in groups(drafts.len(), pairs) {
+    let loose = parts.iter().zip(&*drafts).map(|(part, draft)| draft.loose(part, exchange)).collect();
+    let (found, balanced) = (Vec::new(), Vec::new());
+    let mut search = Search { parts, drafts, pairs, mesh, exchange, loose, found, balanced };
+    for group in groups(search.drafts.len(), pairs) {
         if group.iter().all(|&body| !search.loose[body].left.is_empty()) {
             let all = search.of_group(&group);
+            search.balance(&all);
             if !search.works_on(&all) {
                 search.fix(all, |search| search.of_group(&group));
             }
         }
     }
-    let bodies = search.parts.iter_mut().zip(drafts).zip(&mut search.loose);
+    (0..search.parts.len()).for_each(|body| search.balance(&search.of_one(body)));
+    let bodies = search.parts.iter_mut().zip(&*search.drafts).zip(&mut search.loose);
     let fixed: Vec<_> = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose, exchange)).collect();
     let gauged = fixed.into_iter().enumerate().map(|(body, fixed)| search.fix_round(body, fixed)).collect();
     if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
         search.fix_some();
     }
-    Fixed { gauged, mechanisms: search.found, loose: search.loose }
+    Fixed { gauged, mechanisms: search.found, loose: search.loose, balanced: search.balanced }
 }
 
 /// Bodies that pairs connect, two at least, in the order of the first of them.
@@ -69,15 +77,6 @@ fn groups(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<usize>> {
     (0..bodies).for_each(|body| members[group[body] as usize].push(body));
     members.retain(|bodies| bodies.len() > 1);
     members
-}
-
-/// A motion of some bodies, each of which is rigid.
-struct Moving<const D: usize> {
-    bodies: Vec<usize>,
-    motions: Vec<RigidMotion<D>>,
-    name: String,
-    /// Root of the mean square of what it closes.
-    error: f64,
 }
 
 /// The contact rows of some bodies, pairs numbered among those that these touch.
@@ -118,12 +117,14 @@ impl Rows {
 
 struct Search<'p, 's, const D: usize> {
     parts: &'p mut [Part<'s, D>],
-    drafts: &'p [Draft<D>],
+    drafts: &'p mut [Draft<D>],
     pairs: &'p [ContactPair],
+    mesh: &'p Mesh<D>,
     exchange: &'p dyn Exchange,
     /// The motions that supports and springs leave to each body now.
     loose: Vec<Loose<D>>,
     found: Vec<Mechanism>,
+    balanced: Vec<Balanced>,
 }
 
 impl<const D: usize> Search<'_, '_, D> {
@@ -219,6 +220,7 @@ impl<const D: usize> Search<'_, '_, D> {
         let every: Vec<usize> = (0..self.drafts.len()).collect();
         loop {
             let mut all = self.of_some(&every);
+            self.balance(&all);
             let mut goes_on = !self.works_on(&all) && !all.is_empty();
             if !goes_on {
                 return;
@@ -303,17 +305,65 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// Work of the loads on a motion, as a share of the largest possible; zero if it is rounding or an error of the mesh.
     fn work(&self, moving: &Moving<D>) -> f64 {
-        let of = |(&body, motion): (&usize, &RigidMotion<D>)| {
-            self.drafts[body].load.works(|node| self.parts[body].at_dofs(motion, node))
-        };
-        let each = moving.bodies.iter().zip(&moving.motions).map(of);
-        let works = each.fold([Total::default(); 2], |mut sums, more| {
-            sums.iter_mut().zip(&more).for_each(|(sum, more)| sum.join(more));
-            sums
-        });
-        let works = totals(self.exchange, &works);
-        let (work, largest) = (works[0], works[1]);
+        let [work, largest] = moving.works(self.parts, self.drafts, self.exchange);
         if work.abs() <= largest * moving.error.max(NO_WORK) { 0.0 } else { work / largest }
+    }
+
+    /// Balance the loads on motions that nothing holds, if what they lack on each is no more than what the mesh may miss of them.
+    fn balance(&mut self, all: &[Moving<D>]) {
+        let works: Vec<[f64; 2]> =
+            all.iter().map(|moving| moving.works(self.parts, self.drafts, self.exchange)).collect();
+        let shares = || works.iter().map(|[work, largest]| work.abs() / largest.max(f64::MIN_POSITIVE));
+        let may_be_missed = |(moving, [work, largest]): (&Moving<D>, &[f64; 2])| {
+            work.abs() <= NO_WORK * largest || work.abs() <= self.missed(moving, *largest)
+        };
+        if shares().all(|share| share <= NO_WORK) || !all.iter().zip(&works).all(may_be_missed) {
+            return;
+        }
+        let lacking: Vec<f64> = works.iter().map(|[work, _]| *work).collect();
+        if moving::balance(all, &lacking, self.parts, self.drafts, self.exchange) {
+            for (moving, share) in all.iter().zip(shares()).filter(|(_, share)| *share > NO_WORK) {
+                self.note_balanced(moving, share);
+            }
+            for body in all.iter().flat_map(|moving| &moving.bodies) {
+                self.loose[*body] = self.drafts[*body].loose(&self.parts[*body], self.exchange);
+            }
+        }
+    }
+
+    /// Note that loads were balanced on a motion, beside others of the same bodies.
+    fn note_balanced(&mut self, moving: &Moving<D>, share: f64) {
+        match self.balanced.iter_mut().find(|balanced| balanced.bodies == moving.bodies) {
+            Some(balanced) => {
+                balanced.motion = format!("{}; {}", balanced.motion, moving.name);
+                balanced.share = balanced.share.max(share);
+            }
+            None => {
+                let (bodies, motion) = (moving.bodies.clone(), moving.name.clone());
+                self.balanced.push(Balanced { bodies, motion, share });
+            }
+        }
+    }
+
+    /// The work of the loads on a motion that the mesh may miss, where they could do the `largest`.
+    fn missed(&self, moving: &Moving<D>, largest: f64) -> f64 {
+        let (mut share, mut quadrature) = (moving.error, Total::default());
+        for (&body, motion) in moving.bodies.iter().zip(&moving.motions) {
+            let part = &self.parts[body];
+            share = share.max(missed::by_facets(part, &self.drafts[body], self.pairs, self.mesh));
+            quadrature.join(&missed::by_quadrature(part, motion, self.mesh));
+        }
+        share * largest + totals(self.exchange, &[quadrature])[0]
+    }
+
+    /// The motions of a body that no contact feels.
+    fn of_one(&self, body: usize) -> Vec<Moving<D>> {
+        let Loose { left, unfelt, .. } = &self.loose[body];
+        let moving = |(name, weights): &(String, DVector<f64>)| {
+            let motions = vec![rigid::combine(left, weights)];
+            Moving { bodies: vec![body], motions, name: name.clone(), error: 0.0 }
+        };
+        unfelt.iter().map(moving).collect()
     }
 
     /// Fixes a motion at one node of the largest body that has one where the motion is not small; returns the body.

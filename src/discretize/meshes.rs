@@ -2,8 +2,8 @@
 
 use super::supports::Held;
 use crate::contact::Fine;
-use crate::fem::{Elasticity, Recovery, Space, element};
-use crate::linalg::Csr;
+use crate::fem::{Elasticity, Recovery, RigidMotion, Space, element};
+use crate::linalg::{Csr, axpy, dot};
 use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
@@ -19,6 +19,12 @@ pub trait Meshes {
 
     /// Forces at the nodes of a body that the quadrature of its loads misses; empty for none.
     fn unloaded(&self, body: usize) -> &[f64];
+
+    /// Displacements of all nodes of a body in the rigid motions that its supports leave, by their amounts.
+    fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64>;
+
+    /// The size of the force at the node of each entry of forces at all nodes of a body.
+    fn sizes(&self, body: usize, load: &[f64]) -> Vec<f64>;
 
     /// The integration points of a pair.
     fn points(&self, pair: usize) -> FinePoints<'_>;
@@ -95,6 +101,8 @@ pub struct Shape<const D: usize> {
     pub held: Rc<Held<D>>,
     /// See [`Meshes::unloaded`].
     pub unloaded: Vec<f64>,
+    /// The rigid motions that its supports leave, in the order of [`Motions::with_springs`](crate::model::Motions::with_springs).
+    pub motions: Vec<RigidMotion<D>>,
 }
 
 /// [`Meshes`] in `D` dimensions.
@@ -121,6 +129,19 @@ impl<const D: usize> Meshes for Kept<D> {
 
     fn unloaded(&self, body: usize) -> &[f64] {
         &self.shapes[body].unloaded
+    }
+
+    fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64> {
+        let Shape { space, motions, .. } = &self.shapes[body];
+        let mut moved = vec![0.0; space.dofs()];
+        for (motion, amount) in motions.iter().zip(amounts) {
+            axpy(*amount, &motion.nodal(space.nodes.iter().copied()), &mut moved);
+        }
+        moved
+    }
+
+    fn sizes(&self, _body: usize, load: &[f64]) -> Vec<f64> {
+        load.chunks_exact(D).flat_map(|force| [dot(force, force).sqrt(); D]).collect()
     }
 
     fn points(&self, pair: usize) -> FinePoints<'_> {

@@ -224,6 +224,16 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(missed)
     }
 
+    /// What the quadrature of the nodal forces of loads on surfaces misses at own nodes.
+    ///
+    /// # Errors
+    /// Those of [`Part::load`].
+    pub fn missed_load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
+        let whole: NodalForces<D> =
+            self.on_surfaces(mesh, Parts::Whole)?.iter().map(|(node, force)| (node, force.map(|f| -f))).collect();
+        Ok(self.on_surfaces(mesh, Parts::Halves)?.and(whole).only(|node| self.known.is_own(node)))
+    }
+
     /// Nodal forces of all loads on surfaces that are not rigid.
     fn on_surfaces(&self, mesh: &Mesh<D>, parts: Parts) -> Result<NodalForces<D>> {
         let mut load = NodalForces::default();

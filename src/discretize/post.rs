@@ -8,7 +8,7 @@ use super::unbalanced::Unbalanced;
 use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
-use crate::fem::{norms, stress};
+use crate::fem::{norms, strain, strain::Strained, stress};
 use crate::output::{BodyField, CellKind};
 use crate::problem::BodySpec;
 
@@ -17,6 +17,9 @@ pub trait Post {
     /// Displacements and stresses of the cells that this rank shows. `bent` is the same state without the rigid
     /// motion that supports leave: beside a large one the digits of the deformation are few.
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField;
+
+    /// The largest strain in the cells that this rank shows; `bent` as in [`Post::field`].
+    fn strain(&self, bent: &[f64]) -> Strained;
 
     /// Forces on the own nodes, under the forces omega p of the contact rows of the body.
     fn balance(&self, v: &[f64], force: &[f64]) -> Balance;
@@ -101,6 +104,11 @@ impl<const D: usize> Post for OnPart<D> {
             principal: stress.iter().map(stress::principal).collect(),
             stress,
         }
+    }
+
+    fn strain(&self, bent: &[f64]) -> Strained {
+        let part = &self.forces.part;
+        strain::largest(&part.space, part.told(), &self.nodal(bent))
     }
 
     fn balance(&self, v: &[f64], force: &[f64]) -> Balance {

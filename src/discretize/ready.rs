@@ -67,14 +67,20 @@ impl<const D: usize> Ready<'_, D> {
         counts: &mut Counts,
     ) -> Result<(BodySlot, Option<Shape<D>>)> {
         let Self { segments, loose, scales: [modulus, depth], unloaded, .. } = self;
-        let Loose { left, motions, sprung, .. } = loose;
+        let Loose { left, motions, sprung, unsupported, .. } = loose;
         let name = info.name.clone();
         // what only the owner knows, until all ranks share it
         let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
         let elasticity = Rc::new(self.elasticity);
         let Some(here) = self.here else {
-            let of =
-                |(space, held)| Shape { space: Rc::new(space), held: Rc::new(held), elasticity, modulus, unloaded };
+            let of = |(space, held)| Shape {
+                space: Rc::new(space),
+                held: Rc::new(held),
+                elasticity,
+                modulus,
+                unloaded,
+                motions: unsupported,
+            };
             let shape = self.elsewhere.map(of);
             return Ok((
                 BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness },
@@ -157,6 +163,6 @@ impl<const D: usize> Ready<'_, D> {
         outer.weigh(&space);
         info.post = Some(Box::new(OnPart::new(part.spec, outer, forces)?) as Box<dyn Post>);
         let slot = BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness };
-        Ok((slot, Some(Shape { space, elasticity, modulus, held, unloaded })))
+        Ok((slot, Some(Shape { space, elasticity, modulus, held, unloaded, motions: unsupported })))
     }
 }

@@ -22,9 +22,11 @@ pub mod rigid;
 pub mod sample;
 pub mod slope;
 pub mod space;
+pub mod strain;
 pub mod stress;
 mod support;
 pub mod surface;
+pub mod turn;
 
 pub use crate::linalg::pad;
 pub use assemble::{NodalBlock, NodeGraph};

@@ -221,6 +221,10 @@ pub struct BodyReport {
     pub max_displacement: Option<f64>,
     /// Largest and least principal stress at the nodes.
     pub principal_range: Option<[f64; 2]>,
+    /// Largest principal strain in absolute value, at the centres of cells.
+    pub max_strain: Option<f64>,
+    /// Where it is (x, y, z).
+    pub max_strain_at: Option<[f64; 3]>,
     /// Error against the scene's `exact` over its own norm: of displacements in L2.
     pub error_l2: Option<f64>,
     /// The same of displacement gradients in L2: the H1 seminorm.
@@ -298,6 +302,8 @@ pub struct PairReport {
     pub peak_pressure: f64,
     /// Where it is (x, y, z).
     pub peak_at: [f64; 3],
+    /// Largest compression of the layer; negative where all of it is open.
+    pub peak_compression: f64,
     /// How much is in contact, and how much is covered by both surfaces and open.
     #[serde(flatten)]
     pub extent: Extent,

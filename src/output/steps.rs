@@ -40,6 +40,8 @@ pub struct StepPairReport {
     pub extent: Extent,
     /// Largest pressure.
     pub peak_pressure: f64,
+    /// Largest compression of the layer; negative where all of it is open.
+    pub peak_compression: f64,
     /// Points with c > 0.
     pub closed: usize,
 }

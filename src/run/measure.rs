@@ -83,6 +83,11 @@ pub fn resultant(force: &[f64], rows: &[[f64; 3]]) -> [f64; 3] {
     std::array::from_fn(|k| force.iter().zip(rows).fold(0.0, |sum, (force, row)| sum - force * row[k]))
 }
 
+/// Largest compression of a layer, which has a point at least; negative where all of it is open.
+pub fn peak(compression: &[f64]) -> f64 {
+    compression.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+}
+
 /// Forces and contact of pair `i`.
 pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
     let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
@@ -94,6 +99,7 @@ pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
         approach,
         extent: Extent::new(pair.measure, &pair.weight, c),
         peak_pressure: layer.pressure[range].iter().copied().fold(0.0, f64::max),
+        peak_compression: peak(c),
         closed: closed().count(),
     }
 }

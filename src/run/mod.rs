@@ -6,6 +6,7 @@
 mod alike;
 pub mod asking;
 mod balance;
+mod beyond;
 pub mod clock;
 mod deal;
 pub mod ended;

@@ -9,12 +9,13 @@ use super::{method, steps};
 use crate::contact::pieces::{self, Cut};
 use crate::contact::{ContactPair, Left, LostPieces};
 use crate::ddm::{self, Outcome, Start, Status};
-use crate::discretize::{self, ContactInfo, Discrete, Verified};
+use crate::discretize::{self, Balanced, ContactInfo, Discrete, Verified, point};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
 use crate::mesh::{self, Dealer, Loaded, Portion};
 use crate::model::{BodySlot, Mechanism};
+use crate::output::sci;
 use crate::parallel::{Ranks, agree};
 use crate::petsc::{Session, give_back, keep_apart, keep_at_hand};
 use crate::problem::{Linear, Order};
@@ -203,6 +204,7 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
             body.name
         ));
     }
+    warnings.extend(discrete.balanced.iter().map(|balanced| balanced_in_words(discrete, balanced)));
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
     for (pair, contact) in discrete.model.pairs.iter().zip(&discrete.contacts) {
@@ -261,6 +263,18 @@ fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
             names[0], names[1], pair.surfaces[0], share, pair.measure
         )
     })
+}
+
+/// Loads that were balanced as a warning.
+fn balanced_in_words(discrete: &Discrete, Balanced { bodies, motion, share }: &Balanced) -> String {
+    let names = in_words(bodies.iter().map(|&body| &discrete.bodies[body].name));
+    format!(
+        "{} {names}: nothing holds {} in {motion}, and loads lack balance there by {} of what forces of their sizes could do: no more than facets \
+         and quadrature may miss of them, so that the loads were changed by that share to balance",
+        if bodies.len() == 1 { "body" } else { "bodies" },
+        if bodies.len() == 1 { "it" } else { "them" },
+        sci(*share, 1)
+    )
 }
 
 /// A free motion of several bodies as a warning.

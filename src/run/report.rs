@@ -4,7 +4,7 @@ use super::clock::Clock;
 use super::ended::{All, Look};
 use super::stages::{Built, Done};
 use super::verdict::{self, forecast, message, status_name};
-use super::{asking, balance, measure, preflight, results};
+use super::{asking, balance, beyond, measure, preflight, results};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{Reached, Status, Whose};
 use crate::discretize::Discrete;
@@ -93,8 +93,8 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
         report.last_look = Some(found);
     }
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::of_steps(&done.steps)));
-    let moved = results::fill(discrete, recovered, &mut report.bodies);
-    report.warnings.extend(moved);
+    let too_large = results::fill(discrete, recovered, &mut report.bodies);
+    report.warnings.extend(too_large.into_iter().chain(beyond::warnings(done)));
     let approaches = measure::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = balance::gather(done, recovered);
@@ -286,6 +286,7 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         approach,
         peak_pressure: p[peak],
         peak_at: pair.position[peak],
+        peak_compression: measure::peak(c),
         extent: Extent::new(pair.measure, &pair.weight, c),
         contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
     }

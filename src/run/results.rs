@@ -5,8 +5,10 @@ use super::stages::Done;
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Result, few};
 use crate::exchange::share;
+use crate::fem::strain::{self, Strained};
 use crate::linalg::{around, bounds};
-use crate::output::BodyReport;
+use crate::output::report::readable;
+use crate::output::{BodyReport, sci};
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
@@ -52,6 +54,8 @@ struct Found {
     /// Largest displacement, and the box around the points: least and largest coordinates.
     displacement: f64,
     extent: [[f64; 3]; 2],
+    /// Largest strain.
+    strain: Strained,
     /// Norms of the error and of the known displacements.
     norms: Option<[[f64; 3]; 2]>,
 }
@@ -64,6 +68,7 @@ impl Found {
             principal: [f64::INFINITY, f64::NEG_INFINITY],
             displacement: 0.0,
             extent: bounds([]),
+            strain: Strained::NONE,
             norms: None,
         };
         let Ok(recovered) = recovered else { return Self { von_mises: f64::NAN, ..found } };
@@ -79,6 +84,7 @@ impl Found {
         let length = |u: &[f64; 3]| u.iter().map(|x| x * x).sum::<f64>().sqrt();
         found.displacement = field.displacement.iter().map(length).fold(0.0, f64::max);
         found.extent = bounds(field.points.iter().copied());
+        found.strain = info.post().strain(&recovered.bent);
         found.norms = info.post().errors(&recovered.state);
         found
     }
@@ -92,9 +98,10 @@ impl Found {
             .map(|(a, b)| std::array::from_fn(|of| std::array::from_fn(|norm| f64::hypot(a[of][norm], b[of][norm]))));
         let displacement = self.displacement.max(other.displacement);
         let extent = around(self.extent, other.extent);
+        let strain = self.strain.with(other.strain);
         // NaN is above all numbers
         let larger = if other.von_mises.total_cmp(&self.von_mises).is_gt() { other } else { self };
-        Self { principal: [low.min(least), high.max(largest)], displacement, extent, norms, ..larger }
+        Self { principal: [low.min(least), high.max(largest)], displacement, extent, strain, norms, ..larger }
     }
 }
 
@@ -102,8 +109,8 @@ impl Found {
 const SMALL: f64 = 0.1;
 
 /// Puts largest stresses, displacements and errors of all bodies into their reports; null where there is none. Collective.
-/// Returns a warning of displacements that are too large for the theory.
-pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) -> Option<String> {
+/// Returns warnings of displacements and of strains that are too large for the theory.
+pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) -> Vec<String> {
     let bodies = discrete.bodies.iter().zip(recovered).enumerate();
     let mine: Vec<(usize, Found)> =
         bodies.filter_map(|(index, (info, recovered))| Some((index, Found::new(info, recovered.as_ref()?)))).collect();
@@ -116,7 +123,7 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) ->
         all[body] = Some(found);
     }
     let finite = |value: f64| value.is_finite().then_some(value);
-    let mut moved = Vec::new();
+    let (mut moved, mut strained) = (Vec::new(), Vec::new());
     for (report, found) in reports.iter_mut().zip(all) {
         let Some(found) = found.filter(|found| found.von_mises.is_finite()) else { continue };
         report.max_displacement = Some(found.displacement);
@@ -125,17 +132,37 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) ->
         if found.displacement > SMALL * diagonal {
             moved.push(report.name.clone());
         }
+        if found.strain.most > strain::SMALL {
+            strained.push(strain_in_words(&report.name, &found.strain));
+        }
+        (report.max_strain, report.max_strain_at) = (Some(found.strain.most), Some(found.strain.at));
         report.max_von_mises = Some(found.von_mises);
         report.max_von_mises_at = Some(found.at);
         report.principal_range = Some([found.principal[1], found.principal[0]]);
         let error = |norm: usize| found.norms.and_then(|[error, whole]| finite(error[norm] / whole[norm]));
         (report.error_l2, report.error_h1, report.error_energy) = (error(0), error(1), error(2));
     }
-    (!moved.is_empty()).then(|| {
+    let moved = (!moved.is_empty()).then(|| {
         format!(
             "displacements of more than a tenth of the body's size: {}. The theory is that of small ones: look at the gaps, the units and \
              the supports",
             few(moved).join(", ")
         )
-    })
+    });
+    let strained = (!strained.is_empty()).then(|| {
+        format!(
+            "strains of more than {} per cent: {}. Linear elasticity is the theory of small ones: look at the moduli, the loads and the units",
+            100.0 * strain::SMALL,
+            few(strained).join("; ")
+        )
+    });
+    moved.into_iter().chain(strained).collect()
+}
+
+/// The largest strain of a body in words, with its place and how much of the body is strained like that: near a sharp corner it is a few cells.
+fn strain_in_words(name: &str, strain: &Strained) -> String {
+    let [over, all] = strain.measure;
+    let [x, y, z] = strain.at.map(|x| readable(x, 4));
+    let share = readable(100.0 * over / all, 1);
+    format!("`{name}` up to {} at ({x}, {y}, {z}), in {share} per cent of the body", sci(strain.most, 1))
 }

@@ -171,11 +171,15 @@ fn advice(outcome: &Outcome) -> Option<String> {
     Some(format!("--method auto; the best number for method.gamma is {gamma:.2}, a factor of {factor} an iteration"))
 }
 
+/// Whether a load step has found its solution.
+pub fn is_solved(step: &StepReport) -> bool {
+    [Status::Converged, Status::RoundoffLimited].iter().any(|status| step.status == status_name(status))
+}
+
 /// Warnings of the steps before the last one that were not solved.
 pub fn of_steps(steps: &[StepReport]) -> Vec<String> {
-    let solved = [Status::Converged, Status::RoundoffLimited].map(|status| status_name(&status));
     let before = steps.iter().take(steps.len().saturating_sub(1)).enumerate();
-    let bad = before.filter(|(_, step)| !solved.contains(&step.status.as_str()));
+    let bad = before.filter(|(_, step)| !is_solved(step));
     let told = |(i, step): (usize, &StepReport)| {
         let factors: Vec<String> = step.factors.iter().map(|(name, factor)| format!("{name} {factor}")).collect();
         format!("load step {} ({}): {}", i + 1, factors.join(", "), step.message)

@@ -136,10 +136,6 @@ impl Scene {
                 let message = format!("the error is {}", shown(adapt.error));
                 return at("adapt.error").refuse(message, "must be less than 1", "it is a share: 0.01 is one per cent");
             }
-            if !self.method.steps.is_empty() {
-                let help = "leave out `adapt` or `method.steps`";
-                return at("adapt").refuse("an adapted mesh and load steps in one scene", "", help);
-            }
         }
         self.output.checkpoint.map_or(Ok(()), |time| at("output.checkpoint").positive("the time in minutes", time))
     }

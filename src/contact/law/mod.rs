@@ -86,6 +86,12 @@ pub trait LayerLaw: std::fmt::Debug {
         self.response(point, c).pressure
     }
 
+    /// Compression up to which the law is given at contact point `point`; infinite if it is for all. Beyond it the law goes on as a straight
+    /// line, so that iterates may pass it.
+    fn end(&self, _point: usize) -> f64 {
+        f64::INFINITY
+    }
+
     /// g'(-c) of (38): the tangent of the paper's law g, which also runs through tension as an odd function. For `c > 0` it is
     /// p'(c). Robin terms of open points use it; pressure never does.
     fn robin_tangent(&self, point: usize, c: f64) -> f64 {
@@ -190,5 +196,9 @@ impl<L: LayerLaw> LayerLaw for PerPoint<L> {
 
     fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
         self.0[point].gap_loaded(0, c, pressure)
+    }
+
+    fn end(&self, point: usize) -> f64 {
+        self.0[point].end(0)
     }
 }

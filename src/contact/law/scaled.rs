@@ -43,4 +43,8 @@ impl LayerLaw for Scaled {
         let s = self.factor;
         self.law.duality_gap(point, s * c, s * pressure) / (s * s)
     }
+
+    fn end(&self, point: usize) -> f64 {
+        self.law.end(point) / self.factor
+    }
 }

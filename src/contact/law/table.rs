@@ -12,6 +12,8 @@ use crate::linalg::portable::hypot;
 pub struct Table {
     /// Points with their slopes and the energy up to them, from (0, 0) on.
     knots: Vec<Knot>,
+    /// Compression up to which the curve is known; infinite for that of a formula.
+    end: f64,
 }
 
 /// Slopes at both ends of a piece, as shares of its secant, have at most this for the root of their squares' sum: three, less what is far above
@@ -43,7 +45,8 @@ impl Table {
         for (i, knot) in knots.iter_mut().enumerate() {
             knot.slope = 0.5 * (secants[i.saturating_sub(1)] + secants[i.min(last)]);
         }
-        Self::through(knots, &secants)
+        let end = knots[last + 1].c;
+        Self::through(knots, &secants, end)
     }
 
     /// The curve of a known function with p(0) = p'(0) = 0: points (c, p, p'), c and p increasing. Its error is of fourth order in their
@@ -57,11 +60,11 @@ impl Table {
             }
         }
         let secants = secants(&knots);
-        Self::through(knots, &secants)
+        Self::through(knots, &secants, f64::INFINITY)
     }
 
     /// The curve through knots with slopes, which are cut down where p would fall.
-    fn through(mut knots: Vec<Knot>, secants: &[f64]) -> Self {
+    fn through(mut knots: Vec<Knot>, secants: &[f64], end: f64) -> Self {
         for (i, secant) in secants.iter().enumerate() {
             let size = hypot(knots[i].slope / secant, knots[i + 1].slope / secant);
             if size > STEEPEST {
@@ -72,7 +75,7 @@ impl Table {
         for i in 0..secants.len() {
             knots[i + 1].energy = piece(&knots[i], &knots[i + 1], knots[i + 1].c).energy;
         }
-        Self { knots }
+        Self { knots, end }
     }
 }
 
@@ -137,5 +140,9 @@ impl LayerLaw for Table {
             }
             (end, None) => end.c + end.response().straight_compression(pressure),
         }
+    }
+
+    fn end(&self, _point: usize) -> f64 {
+        self.end
     }
 }

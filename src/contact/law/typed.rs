@@ -152,4 +152,8 @@ impl LayerLaw for Typed {
         let (start, high) = if self.end.is_finite() { (self.end, self.end) } else { (1.0, f64::MAX) };
         root(pressure, [0.0, high], start, |c| self.value(c)).unwrap_or(f64::INFINITY)
     }
+
+    fn end(&self, _point: usize) -> f64 {
+        self.end
+    }
 }

@@ -1,0 +1,33 @@
+//! What a mesh may miss of the loads of a body, so that loads which balance on the true surfaces do not on the facets.
+
+use super::draft::Draft;
+use super::find::find_group;
+use super::part::Part;
+use crate::contact::ContactPair;
+use crate::fem::{RigidMotion, turn};
+use crate::linalg::Total;
+use crate::mesh::Mesh;
+
+/// Of a load that jumps within an element, quadrature on halves of elements misses half as much as that on whole ones: the difference is half of the
+/// error. Of smooth loads it is nearly all of it.
+const HALVES: f64 = 2.0;
+
+/// The share of the loads of a body that facets may miss ([`turn::missed`]). A body force acts on the volume within all surfaces: those in contact
+/// stand for it.
+pub fn by_facets<const D: usize>(part: &Part<D>, draft: &Draft<D>, pairs: &[ContactPair], mesh: &Mesh<D>) -> f64 {
+    let groups = part.spec.load.iter().filter_map(|load| find_group(mesh, &load.on, &[D - 1], "load").ok());
+    let on_groups = groups.map(|group| turn::missed(&part.space, &part.space.facets(group))).fold(0.0, f64::max);
+    if part.spec.force.is_none() {
+        return on_groups;
+    }
+    let points = draft.segments.iter().flat_map(|segment| &pairs[segment.pair].surface[segment.side]);
+    // facets differ from their mean by half of the angle between them
+    points.map(|point| turn::by_chords(2.0 * point.spread)).fold(on_groups, f64::max)
+}
+
+/// The largest work on a motion that the nodal forces of loads on surfaces can do by which their quadrature misses them, at own nodes.
+pub fn by_quadrature<const D: usize>(part: &Part<D>, motion: &RigidMotion<D>, mesh: &Mesh<D>) -> Total {
+    let missed = part.missed_load(mesh).unwrap_or_default();
+    let [_, largest] = missed.works(|node| motion.at(&part.space.nodes[node as usize]));
+    [HALVES * largest.value()].into_iter().collect()
+}

@@ -1,0 +1,88 @@
+//! Rigid motions of some bodies together, and loads that are to do no work on them.
+
+use super::draft::Draft;
+use super::part::Part;
+use super::totals::totals;
+use crate::exchange::Exchange;
+use crate::fem::RigidMotion;
+use crate::linalg::{Total, dot};
+use nalgebra::{DMatrix, DVector};
+
+/// A motion of some bodies, each of which is rigid.
+pub struct Moving<const D: usize> {
+    /// The bodies that it moves.
+    pub bodies: Vec<usize>,
+    /// What it does to each of them.
+    pub motions: Vec<RigidMotion<D>>,
+    /// Its name.
+    pub name: String,
+    /// Root of the mean square of what it closes.
+    pub error: f64,
+}
+
+impl<const D: usize> Moving<D> {
+    /// Return the work of the loads on the motion, and the largest that forces of their sizes could do. Collective.
+    pub fn works(&self, parts: &[Part<D>], drafts: &[Draft<D>], exchange: &dyn Exchange) -> [f64; 2] {
+        let mut sums = [Total::default(); 2];
+        for (&body, motion) in self.bodies.iter().zip(&self.motions) {
+            let works = drafts[body].load.works(|node| parts[body].at_dofs(motion, node));
+            sums.iter_mut().zip(&works).for_each(|(sum, more)| sum.join(more));
+        }
+        let works = totals(exchange, &sums);
+        [works[0], works[1]]
+    }
+
+    /// What the motion does to a body, if it moves it.
+    fn of(&self, body: usize) -> Option<&RigidMotion<D>> {
+        let place = self.bodies.iter().position(|&moved| moved == body)?;
+        Some(&self.motions[place])
+    }
+}
+
+/// Change the loads so that they do no work on any of these motions m_j, on which they do the `works` w_j. Return whether that was possible: rigid
+/// surfaces keep their forces. Collective.
+///
+/// Each nodal force f changes along the motions in proportion to its size, by -|f| sum_j b_j m_j at its node, with
+///
+/// ```text
+/// sum_k G_jk b_k = w_j,      G_jk = sum_nodes |f| m_j . m_k,
+/// ```
+///
+/// so that no node takes more of what is lacking than others that are loaded alike.
+pub fn balance<const D: usize>(
+    all: &[Moving<D>],
+    works: &[f64],
+    parts: &[Part<D>],
+    drafts: &mut [Draft<D>],
+    exchange: &dyn Exchange,
+) -> bool {
+    let count = all.len();
+    let mut products = vec![Total::default(); count * count];
+    for (body, (part, draft)) in parts.iter().zip(&*drafts).enumerate() {
+        let motions: Vec<(usize, &RigidMotion<D>)> =
+            all.iter().enumerate().filter_map(|(j, moving)| Some((j, moving.of(body)?))).collect();
+        for (node, force) in draft.nodal_load.iter().filter(|_| !motions.is_empty()) {
+            let size = dot(&force, &force).sqrt();
+            let at = motions.iter().map(|(j, motion)| (*j, motion.at(&part.space.nodes[node as usize])));
+            let at: Vec<(usize, [f64; D])> = at.collect();
+            for (j, u) in &at {
+                at.iter().for_each(|(k, v)| products[count * j + k].add(size * dot(u, v)));
+            }
+        }
+    }
+    let products = DMatrix::from_row_slice(count, count, &totals(exchange, &products));
+    let Some(factor) = products.cholesky() else { return false };
+    let amounts = factor.solve(&DVector::from_column_slice(works));
+    for (body, (part, draft)) in parts.iter().zip(drafts).enumerate() {
+        let moved = |x: &[f64; D]| {
+            let mut sum = [0.0; D];
+            for (moving, amount) in all.iter().zip(amounts.iter()) {
+                let at = moving.of(body).map_or([0.0; D], |motion| motion.at(x));
+                (0..D).for_each(|c| sum[c] += amount * at[c]);
+            }
+            sum
+        };
+        draft.change_loads(part, moved);
+    }
+    true
+}

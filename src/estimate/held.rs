@@ -1,0 +1,96 @@
+//! Rigid motions that springs to the ground alone hold, where they carry next to nothing: they keep a body in place whose loads balance.
+//!
+//! There a spring of stiffness k carries what the mesh leaves of the balance of the loads, however soft it is. That force F moves the bodies by F/k and stores
+//! the energy F^2/k, which grow without end as k becomes soft, and so do those of the errors. They say nothing of deformations and
+//! pressures, so that neither the error nor the solution counts them.
+
+use crate::discretize::meshes::Meshes;
+use crate::linalg::dot;
+use crate::model::rigid::{Motions, TOLERANCE};
+use crate::model::{Layer, Model};
+use nalgebra::{DMatrix, DVector};
+
+/// Share of the work that contact forces could do on a motion up to which springs do not carry loads: a hundredth of them is less than errors that coarse
+/// meshes leave in pressures.
+const CARRIED: f64 = 1e-2;
+
+/// The motions n_k of all bodies that springs only hold, as amounts of the motions of each body.
+pub struct Held {
+    motions: Vec<DVector<f64>>,
+    /// How far the solution goes along each.
+    amounts: DVector<f64>,
+    /// Energy of the springs in the solution, u'Ku of these motions.
+    pub energy: f64,
+}
+
+impl Held {
+    /// Find the motions that neither the closed contacts of `layer` nor supports resist, and on which springs carry next to nothing.
+    pub fn of(model: &Model, layer: &Layer) -> Self {
+        let none = || Self { motions: Vec::new(), amounts: DVector::zeros(0), energy: 0.0 };
+        if model.bodies.iter().all(|slot| slot.sprung.is_none()) {
+            return none();
+        }
+        let all = Motions::with_springs(model);
+        let mut ground = all.blocks();
+        let sprung = model.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)));
+        sprung.for_each(|(body, sprung)| ground.add(body, body, &sprung.stiffness));
+        let (loads, acting) = (all.loads(), all.sizes(&layer.force));
+        let only_holds = |motion: &DVector<f64>| {
+            let could = motion.iter().zip(acting.iter()).map(|(amount, size)| (amount * size).abs()).sum::<f64>();
+            motion.dot(&ground.multiply(motion)) > 0.0 && motion.dot(&loads).abs() <= CARRIED * could
+        };
+        let mut motions = all.springs(&layer.springs(model)).factor(TOLERANCE).kernel();
+        motions.retain(only_holds);
+        let pulls: Vec<DVector<f64>> = motions.iter().map(|motion| ground.multiply(motion)).collect();
+        let stiffness = DMatrix::from_fn(motions.len(), motions.len(), |i, j| motions[i].dot(&pulls[j]));
+        let work = DVector::from_fn(motions.len(), |k, _| motions[k].dot(&loads));
+        // springs that do not resist all of them
+        let Some(factor) = stiffness.cholesky() else { return none() };
+        let amounts = factor.solve(&work);
+        let energy = amounts.dot(&work);
+        Self { motions, amounts, energy }
+    }
+
+    /// The trace of these motions in the solution, added to `trace` with a sign.
+    pub fn add_trace(&self, model: &Model, sign: f64, trace: &mut [f64]) {
+        let all = Motions::with_springs(model);
+        for (motion, amount) in self.motions.iter().zip(self.amounts.iter()) {
+            crate::linalg::axpy(sign * amount, &all.trace(model, motion), trace);
+        }
+    }
+
+    /// Balance loads at all nodes of the bodies, empty for those of other ranks, on these motions: each nodal force f changes by a share of its size. Collective.
+    ///
+    /// What the springs would carry of them then acts on the bodies themselves, as in a solution without springs.
+    pub fn balance(&self, meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {
+        let count = self.motions.len();
+        if count == 0 {
+            return;
+        }
+        let all = Motions::with_springs(model);
+        let amounts = |k: usize, body: usize| self.motions[k].as_slice()[all.of_body(body)].to_vec();
+        let mut sums = vec![0.0; count * (count + 1)];
+        for (body, load) in loads.iter().enumerate().filter(|(_, load)| !load.is_empty()) {
+            let moved: Vec<Vec<f64>> = (0..count).map(|k| meshes.moved(body, &amounts(k, body))).collect();
+            let sizes = meshes.sizes(body, load);
+            for (i, u) in moved.iter().enumerate() {
+                sums[i] += dot(u, load);
+                let weighted: Vec<f64> = u.iter().zip(&sizes).map(|(u, size)| u * size).collect();
+                moved.iter().enumerate().for_each(|(j, v)| sums[count * (i + 1) + j] += dot(&weighted, v));
+            }
+        }
+        model.exchange.sum(&mut sums);
+        let (work, products) = sums.split_at(count);
+        let Some(factor) = DMatrix::from_row_slice(count, count, products).cholesky() else { return };
+        let shares = factor.solve(&DVector::from_column_slice(work));
+        for (body, load) in loads.iter_mut().enumerate().filter(|(_, load)| !load.is_empty()) {
+            let sizes = meshes.sizes(body, load);
+            for k in 0..count {
+                let moved = meshes.moved(body, &amounts(k, body));
+                for ((load, u), size) in load.iter_mut().zip(moved).zip(&sizes) {
+                    *load -= shares[k] * size * u;
+                }
+            }
+        }
+    }
+}
