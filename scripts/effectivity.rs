@@ -135,7 +135,6 @@ fn main() -> Result<()> {
         spheres(&session, 1e9, &[(1, 6, 1)])?;
         regular(&session, 1e6, &[(1, 16, 6)])?;
         regular(&session, 1e7, &[(2, 8, 6)])?;
-        waves(&session, 1e6, &[(1, 12), (2, 12)])?;
         return spheres(&session, 1e8, &[(2, 3, 1)]);
     }
     let meshes = [(1, 0.03), (1, 0.02), (2, 0.05), (2, 0.03), (2, 0.02)];

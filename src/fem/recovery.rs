@@ -3,7 +3,7 @@
 //! Around each vertex a polynomial of one degree more than the elements is fitted to the nodal displacements. Its gradient
 //! is of higher order than the discrete one on any mesh, at boundaries too; between vertices the polynomials are blended by
 //! the linear hats. Patches end with their body, so nothing is smoothed across a contact. A vertex on the boundary takes two
-//! rings of cells and a cubic polynomial with elements of any order, since its patch is one-sided.
+//! rings of cells, since one is one-sided.
 
 mod blend;
 mod patch;
@@ -22,13 +22,6 @@ use rings::Rings;
 /// Stress (xx yy zz xy yz xz) in a cell at a point of a strain (xx yy zz, and 2 eps of xy yz xz).
 pub type Law<'a, const D: usize> = &'a dyn Fn(usize, [f64; D], &[f64; 6]) -> [f64; 6];
 
-/// Degree of the polynomials of vertices on the boundary.
-///
-/// A patch around an inner vertex is nearly symmetric, and the second derivatives of a parabola fitted there are those at the vertex. At the boundary all nodes lie
-/// on one side, and they would be those of a point inside: under a wave of pressure on a half space, of the wavenumber k, they are 0.83 (k h = 0.4) to 0.36 (k h = 1.6) of those at the surface.
-/// Those of a cubic are 0.97 to 0.62. Quadratic elements take cubics everywhere.
-const OUTER: usize = 3;
-
 /// A displacement with the polynomials recovered from it.
 pub struct Recovery<'a, const D: usize> {
     space: &'a Space<D>,
@@ -37,7 +30,7 @@ pub struct Recovery<'a, const D: usize> {
     patches: Vec<Option<Patch<D>>>,
     /// Nodal values of the blend of the polynomials, one entry a dof.
     blended: Vec<f64>,
-    /// Those of the polynomials: of degree [`OUTER`], and of each lower one.
+    /// Those of the polynomials: of one degree more than the elements, and of each lower one.
     monomials: Vec<Monomials>,
 }
 
@@ -45,10 +38,10 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// Recovers the gradient of the displacement `u`, one entry a dof.
     pub fn new(space: &'a Space<D>, u: &'a [f64]) -> Self {
         let degree = if space.order == Order::P1 { 2 } else { 3 };
-        let monomials = (0..=OUTER).rev().map(|fitted| Monomials::new(D, fitted, degree)).collect();
+        let monomials = (0..=degree).rev().map(|degree| Monomials::new(D, degree)).collect();
         let mut recovery = Self { space, displacement: u, patches: Vec::new(), blended: Vec::new(), monomials };
         let (mut rings, outer) = (Rings::new(space), recovery.outer_vertices());
-        let fit = |node| if rings.is_vertex(node) { recovery.fit(node, degree, outer[node], &mut rings) } else { None };
+        let fit = |node| if rings.is_vertex(node) { recovery.fit(node, outer[node], &mut rings) } else { None };
         recovery.patches = (0..space.nodes.len()).map(fit).collect();
         recovery.blended = recovery.blend_nodes();
         recovery
@@ -67,31 +60,26 @@ impl<'a, const D: usize> Recovery<'a, D> {
     }
 
     /// The polynomial of a vertex; of a lower degree in a body of so few cells that its nodes determine no more.
-    fn fit(&self, node: usize, degree: usize, is_outer: bool, rings: &mut Rings<D>) -> Option<Patch<D>> {
+    fn fit(&self, node: usize, is_outer: bool, rings: &mut Rings<D>) -> Option<Patch<D>> {
         let (space, u) = (self.space, self.displacement);
-        let all = &self.monomials[if is_outer { 0 } else { OUTER - degree }..];
         let fit = |nodes: &[u32], monomials| Patch::fit(space, u, space.nodes[node], nodes, monomials);
         rings.begin(node);
         if is_outer {
             rings.widen();
         }
         while !rings.is_whole() {
-            let fitted = fit(rings.nodes(), &all[0]);
+            let fitted = fit(rings.nodes(), &self.monomials[0]);
             if fitted.is_some() {
                 return fitted;
             }
             rings.widen();
         }
         let nodes = rings.nodes();
-        all.iter().find_map(|monomials| fit(nodes, monomials))
+        self.monomials.iter().find_map(|monomials| fit(nodes, monomials))
     }
 
     fn cell(&self, index: usize) -> &'a [u32] {
         &self.space.cells[index * self.space.stride..(index + 1) * self.space.stride]
-    }
-
-    fn vertices(&self, index: usize) -> &'a [u32] {
-        &self.cell(index)[..=D]
     }
 
     fn patch(&self, node: u32) -> &Patch<D> {

@@ -59,14 +59,11 @@ impl<const D: usize> Recovery<'_, D> {
     /// With b the error of the nodal interpolant, a displacement w with this residual is what the nodal values lack.
     pub fn interpolation_residual(&self, law: Law<D>) -> Vec<f64> {
         let space = self.space;
-        // the gradient of b has the degree of the polynomials, that of v one less than the elements
-        let lean = quadrature::simplex(D + 1, if space.order == Order::P1 { 2 } else { 5 });
-        let rich = quadrature::simplex(D + 1, 5);
+        // the gradient of b has one degree more than the elements, that of v one less
+        let rule = quadrature::simplex(D + 1, if space.order == Order::P1 { 2 } else { 5 });
         let mut residual = vec![0.0; space.dofs()];
         for index in 0..space.cell_count() {
             let x = space.cell_nodes(index);
-            let rule =
-                if self.vertices(index).iter().all(|&node| self.patch(node).degree() <= 2) { &lean } else { &rich };
             for (l, weight) in rule.iter() {
                 let Some((gradient, measure)) = element::gradients(space.order, &x, l) else { continue };
                 let phi = element::values(space.order, l);
@@ -80,7 +77,14 @@ impl<const D: usize> Recovery<'_, D> {
     }
 
     /// Gradient of b at a point `at` of a cell with barycentric coordinates `l`, and there the values and gradients of the shape functions.
-    fn missed_slope(&self, index: usize, at: &[f64; D], l: &[f64], phi: &[f64], gradient: &[[f64; D]]) -> Slope<D> {
+    pub(super) fn missed_slope(
+        &self,
+        index: usize,
+        at: &[f64; D],
+        l: &[f64],
+        phi: &[f64],
+        gradient: &[[f64; D]],
+    ) -> Slope<D> {
         let cell = self.cell(index);
         let hats = hats(gradient, cell.len());
         let mut slope = Slope::ZERO;

@@ -1,6 +1,7 @@
 //! A polynomial fitted to nodal displacements.
 
 use crate::fem::Space;
+use nalgebra::DMatrix;
 
 /// Most monomials: those of degree 3 in space.
 const MOST: usize = 20;
@@ -10,31 +11,26 @@ pub(super) struct Monomials {
     degree: usize,
     /// Number of the earlier one, and the coordinate.
     made: Vec<(usize, usize)>,
-    /// The first ones, which nodes have to determine; others are left out of a fit where they do not.
-    needed: usize,
 }
 
 impl Monomials {
-    /// Those up to a degree; those up to the degree `needed` have to be determined.
-    pub fn new(dimension: usize, degree: usize, needed: usize) -> Self {
-        let mut monomials = Self { degree, made: vec![(0, 0)], needed: 1 };
+    /// Those up to a degree.
+    pub fn new(dimension: usize, degree: usize) -> Self {
+        let mut made = vec![(0, 0)];
         // the last coordinate of each
         let mut last = vec![0];
         let mut first = 0;
-        for of_degree in 1..=degree {
+        for _ in 0..degree {
             let end = last.len();
             for k in first..end {
                 for i in last[k]..dimension {
                     last.push(i);
-                    monomials.made.push((k, i));
+                    made.push((k, i));
                 }
             }
             first = end;
-            if of_degree <= needed {
-                monomials.needed = last.len();
-            }
         }
-        monomials
+        Self { degree, made }
     }
 
     /// Their values.
@@ -52,7 +48,6 @@ impl Monomials {
 pub(super) struct Patch<const D: usize> {
     centre: [f64; D],
     size: f64,
-    degree: usize,
     /// Coefficients of the monomials in (x - centre)/size.
     terms: Vec<[f64; D]>,
 }
@@ -60,10 +55,6 @@ pub(super) struct Patch<const D: usize> {
 /// Least pivot of a fit whose monomials have norm one: the part of a monomial that the others do not make. Its square is what rounding of
 /// sums is amplified by: a fit has six digits of sixteen at least.
 const DETERMINED: f64 = 1e-5;
-
-/// The same of a monomial that is not needed. On patches of cubes with nodes moved by up to 0.3 of their edges, the cubic monomials have 0.2 to 0.9, and the cube of the depth 0 to 0.06: its
-/// nodes stand in three layers.
-const CLEAR: f64 = 0.1;
 
 impl<const D: usize> Patch<D> {
     /// The least-squares fit to the values `u` at nodes; `None` where they do not determine it.
@@ -100,13 +91,16 @@ impl<const D: usize> Patch<D> {
                 add(x, u, weight);
             }
         }
-        let solution = solve(n, &gram, &right, monomials.needed)?;
-        Some(Self { centre, size, degree: monomials.degree, terms: solution[..n].to_vec() })
-    }
-
-    /// Degree of the polynomial.
-    pub fn degree(&self) -> usize {
-        self.degree
+        // scaled to a diagonal of ones
+        let scale: Vec<f64> = (0..n).map(|i| gram[i][i].sqrt().recip()).collect();
+        let factor = DMatrix::from_fn(n, n, |i, j| scale[i] * scale[j] * gram[i.max(j)][i.min(j)]).cholesky()?;
+        let pivots = factor.l_dirty().diagonal();
+        if pivots.min() <= DETERMINED {
+            return None;
+        }
+        let solution = factor.solve(&DMatrix::from_fn(n, D, |i, c| scale[i] * right[i][c]));
+        let terms = (0..n).map(|i| std::array::from_fn(|c| scale[i] * solution[(i, c)])).collect();
+        Some(Self { centre, size, terms })
     }
 
     /// Value and gradient u_c,j at a point.
@@ -127,46 +121,4 @@ impl<const D: usize> Patch<D> {
         }
         (value, gradient)
     }
-}
-
-/// Solve the normal equations of a fit, `gram` with its lower half, by Cholesky's factors. A monomial that those before it make gets zero; `None` if it is one of the
-/// first ones, which are needed.
-fn solve<const D: usize>(
-    n: usize,
-    gram: &[[f64; MOST]; MOST],
-    right: &[[f64; D]; MOST],
-    needed: usize,
-) -> Option<[[f64; D]; MOST]> {
-    // scaled to a diagonal of ones
-    let scale: [f64; MOST] = std::array::from_fn(|i| if gram[i][i] > 0.0 { gram[i][i].sqrt().recip() } else { 0.0 });
-    let (mut factor, mut x) = ([[0.0; MOST]; MOST], [[0.0; D]; MOST]);
-    for i in 0..n {
-        let mut pivot = scale[i] * scale[i] * gram[i][i];
-        for j in 0..i {
-            let product: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
-            factor[i][j] = (scale[i] * scale[j] * gram[i][j] - product) / factor[j][j];
-            pivot -= factor[i][j] * factor[i][j];
-        }
-        if pivot.max(0.0).sqrt() > if i < needed { DETERMINED } else { CLEAR } {
-            factor[i][i] = pivot.sqrt();
-            x[i] = std::array::from_fn(|c| {
-                let known: f64 = (0..i).map(|k| factor[i][k] * x[k][c]).sum();
-                (scale[i] * right[i][c] - known) / factor[i][i]
-            });
-        } else if i < needed {
-            return None;
-        } else {
-            factor[i] = [0.0; MOST];
-            // what is divided by it is zero
-            factor[i][i] = f64::INFINITY;
-        }
-    }
-    for i in (0..n).rev() {
-        for c in 0..D {
-            let known: f64 = (i + 1..n).map(|k| factor[k][i] * x[k][c]).sum();
-            x[i][c] = (x[i][c] - known) / factor[i][i];
-        }
-    }
-    (0..n).for_each(|i| x[i] = x[i].map(|x| scale[i] * x));
-    Some(x)
 }

@@ -42,3 +42,66 @@ fn a_polynomial_of_the_next_degree_is_recovered() {
     next_degree_is_exact::<2, 3>(Order::P2);
     next_degree_is_exact::<3, 4>(Order::P2);
 }
+
+/// A wave of wavenumber k that falls off from the face z = 1, with k h = 0.8.
+fn wave(x: &[f64; 3]) -> [f64; 3] {
+    let k = 0.8 * 6.0;
+    let falling = (k * (x[2] - 1.0)).exp();
+    [(k * x[0]).sin() * falling, 0.3 * (k * x[1]).cos() * falling, (k * x[0]).cos() * falling]
+}
+
+/// Return how much of the error of the interpolant of a wave is seen in the cells at its face: the factor by which what is seen has to be taken to be nearest to it.
+fn seen_of_wave(order: Order) -> f64 {
+    let space = block::<3>(6, order);
+    let u: Vec<f64> = space.nodes.iter().flat_map(wave).collect();
+    let recovery = Recovery::new(&space, &u);
+    let (mut product, mut square) = (0.0, 0.0);
+    for index in 0..space.cell_count() {
+        let (x, cell) = (space.cell_nodes(index), recovery.cell(index));
+        if x[..4].iter().all(|x| x[2] < 0.99) {
+            continue;
+        }
+        for (l, weight) in quadrature::simplex(4, 5).iter() {
+            let phi = element::values(order, l);
+            let (exact, seen) = (wave(&interpolate(&x, &phi)), recovery.missed(cell, l));
+            for c in 0..3 {
+                let interpolated: f64 = cell.iter().zip(phi).map(|(&n, phi)| phi * u[3 * n as usize + c]).sum();
+                product += weight * seen[c] * (exact[c] - interpolated);
+                square += weight * (exact[c] - interpolated).powi(2);
+            }
+        }
+    }
+    product / square
+}
+
+#[test]
+fn a_wave_is_seen_at_the_boundary() {
+    for order in [Order::P1, Order::P2] {
+        let seen = seen_of_wave(order);
+        assert!((0.85..1.15).contains(&seen), "{order:?}: {seen}");
+    }
+}
+
+/// In curved cells the gradient of what the interpolant misses is that of its values.
+#[test]
+fn the_gradient_is_that_of_the_values_in_curved_cells() {
+    let mut space = block::<3>(3, Order::P2);
+    space.nodes.iter_mut().for_each(|x| x[2] += 0.3 * x[0] * x[0] - 0.2 * x[0] * x[1]);
+    let u: Vec<f64> = space.nodes.iter().flat_map(wave).collect();
+    let recovery = Recovery::new(&space, &u);
+    let (l, step) = ([0.1, 0.2, 0.3, 0.4], 1e-5);
+    for index in 0..space.cell_count() {
+        let (x, cell) = (space.cell_nodes(index), recovery.cell(index));
+        let phi = element::values(Order::P2, &l);
+        let (gradient, _) = element::gradients(Order::P2, &x, &l).expect("a cell");
+        let slope = recovery.missed_slope(index, &interpolate(&x, &phi), &l, &phi, &gradient);
+        let moved = |sign: f64| [l[0] - sign * step, l[1] + sign * step, l[2], l[3]];
+        let ends = [1.0, -1.0].map(|sign| (interpolate(&x, &element::values(Order::P2, &moved(sign))), moved(sign)));
+        let values = ends.map(|(_, l)| recovery.missed(cell, &l));
+        for c in 0..3 {
+            let along: f64 = (0..3).map(|j| slope.h[c][j] * (ends[0].0[j] - ends[1].0[j])).sum();
+            let apart = values[0][c] - values[1][c];
+            assert!((apart - along).abs() < 1e-9 + 1e-5 * apart.abs(), "cell {index}: {apart} {along}");
+        }
+    }
+}
