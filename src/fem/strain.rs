@@ -87,7 +87,7 @@ mod tests {
             let space = block::<3>(2, order);
             let u: Vec<f64> = space.nodes.iter().flat_map(|x| [0.08 * (x[2] - 0.5).max(0.0), 0.0, 0.0]).collect();
             let found = largest(&space, 0..space.cell_count(), &u);
-            assert!((found.most - 0.04).abs() < 1e-15 && found.at[2] > 0.5, "{found:?}");
+            assert!((found.most - 0.04).abs() < 1e-12 && found.at[2] > 0.5, "{found:?}");
             assert!((found.measure[0] / found.measure[1] - 0.5).abs() < 1e-12, "{found:?}");
             let lower = |cell: &usize| space.cell_nodes(*cell)[..4].iter().all(|x| x[2] < 0.6);
             let still = largest(&space, (0..space.cell_count()).filter(lower), &u);
