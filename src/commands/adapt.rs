@@ -1,8 +1,9 @@
 //! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
 
 use super::adapted;
-use super::carry::{self, Norms};
+use super::carry;
 use super::checkpoint::{Checkpoint, Head, settings_digest};
+use super::told::Told;
 use crate::ddm::{Start, Status};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
@@ -69,16 +70,6 @@ pub struct Plan {
     steps: Option<History>,
 }
 
-/// The errors told of a mesh.
-struct Told {
-    /// Relative errors of the pressures, one for each pair.
-    pressure: Vec<f64>,
-    /// Relative error of the normal displacements.
-    displacement: f64,
-    /// The solution on the mesh.
-    tables: Vec<ContactTable>,
-}
-
 /// The mesh with the least error so far.
 struct Best {
     error: f64,
@@ -108,16 +99,14 @@ impl Plan {
         interrupt: &Interrupt,
         clock: &mut Clock,
     ) -> Result<Self> {
-        let goal = scene.adapt.clone();
-        let nested = matches!(scene.method.start, method::Start::Nested);
         let mut plan = Self {
             purpose: adapted::purpose(&scene),
+            goal: scene.adapt.clone(),
             asked: scene.clone(),
             scene,
             rounds: resumed.as_ref().map_or(Vec::new(), |checkpoint| checkpoint.head.rounds.clone()),
             resumed,
             limit: None,
-            goal,
             finer: None,
             carried: Vec::new(),
             seconds: 0.0,
@@ -127,51 +116,58 @@ impl Plan {
             foretold: None,
             steps: None,
         };
-        if plan.goal.is_none() && !nested {
-            if let Some(checkpoint) = plan.resumed.as_ref().filter(|checkpoint| !checkpoint.head.steps.is_empty()) {
-                Rc::make_mut(&mut plan.scene).method.steps.begun = checkpoint.head.steps.len();
-            }
-            return Ok(plan);
+        let is_nested = matches!(plan.scene.method.start, method::Start::Nested);
+        if plan.adapts() || is_nested {
+            agree(session, plan.refuse_finished_mesh())?;
         }
-        agree(session, plan.refuse_finished_mesh())?;
         if plan.adapts() {
             Rc::make_mut(&mut plan.scene).estimate = true;
         }
-        if let Some(Checkpoint { head, .. }) = &plan.resumed {
-            let scene = Rc::make_mut(&mut plan.scene);
-            follow(scene, head.sizes.clone());
-            if head.on_last_mesh {
-                scene.method.steps.begun = head.steps.len();
-                plan.limit.clone_from(&head.limit);
-                return Ok(plan);
-            }
-        }
-        plan.keep_steps_for_the_end();
         if plan.resumed.is_some() {
-            return Ok(plan);
+            plan.resume();
+        } else if plan.adapts() {
+            plan.keep_steps_for_the_end();
+            plan.begin_coarse(session, interrupt, clock)?;
+        } else if is_nested {
+            plan.begin_nested(session, interrupt, clock)?;
         }
-        let mut sized = |scene: &Scene, sizes: fn(&dyn Meshes, usize) -> Sizes| {
-            let built = run::build(session, scene.clone(), interrupt, clock)?;
-            let bodies = built.discrete.bodies.len();
-            let sizes = built.discrete.meshes.as_ref().map(|meshes| view(&sizes(&**meshes, bodies)));
-            options::withdraw(session).map(|()| sizes)
-        };
-        if plan.goal.is_none() {
-            let mut coarse = Scene::clone(&plan.scene);
-            coarse.estimate = true;
-            let sizes = sized(&coarse, |meshes, bodies| sizes::scaled(meshes, bodies, 2.0))?;
-            coarse.method.stop.balanced = true;
-            follow(&mut coarse, sizes);
-            plan.finer = Some(std::mem::replace(&mut plan.scene, Rc::new(coarse)));
-            return Ok(plan);
-        }
-        // the cache of another rank may know of other sizes
-        let mut view_of_first = tell(&Ranks::new(session), || Ok(adapted::recall(&plan.purpose, true)))?;
-        if view_of_first.is_none() {
-            view_of_first = sized(&plan.scene, |meshes, bodies| sizes::coarse(meshes, bodies, FIRST * bodies))?;
-        }
-        follow(Rc::make_mut(&mut plan.scene), view_of_first);
         Ok(plan)
+    }
+
+    /// Go on where the checkpoint ended: with its mesh, and behind its load steps.
+    fn resume(&mut self) {
+        let Some(Checkpoint { head, .. }) = &self.resumed else { return };
+        let scene = Rc::make_mut(&mut self.scene);
+        follow(scene, head.sizes.clone());
+        if self.goal.is_none() || head.on_last_mesh {
+            scene.method.steps.begun = head.steps.len();
+            self.limit.clone_from(&head.limit);
+        } else {
+            self.keep_steps_for_the_end();
+        }
+    }
+
+    /// Begin an adaptation with the mesh that the last one ended with, or with a coarse one.
+    fn begin_coarse(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<()> {
+        // the cache of another rank may know of other sizes
+        let mut view = tell(&Ranks::new(session), || Ok(adapted::recall(&self.purpose, true)))?;
+        if view.is_none() {
+            let coarse: Sizing = |meshes, bodies| sizes::coarse(meshes, bodies, FIRST * bodies);
+            view = sized(session, &self.scene, coarse, interrupt, clock)?;
+        }
+        follow(Rc::make_mut(&mut self.scene), view);
+        Ok(())
+    }
+
+    /// Begin with a mesh of twice the sizes, whose solution is the start of the scene's own.
+    fn begin_nested(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<()> {
+        let mut coarse = Scene::clone(&self.scene);
+        coarse.estimate = true;
+        let view = sized(session, &coarse, |meshes, bodies| sizes::scaled(meshes, bodies, 2.0), interrupt, clock)?;
+        coarse.method.stop.balanced = true;
+        follow(&mut coarse, view);
+        self.finer = Some(std::mem::replace(&mut self.scene, Rc::new(coarse)));
+        Ok(())
     }
 
     /// Whether meshes are adapted to an error.
@@ -317,9 +313,8 @@ impl Plan {
         let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
         let now = self.rounds[self.rounds.len() - 1].cells as f64;
         // a mesher does not make as many cells as its sizes foretell: the mesh before tells how many of them
-        let made = self.foretold.map_or(1.0, |foretold| now / foretold);
-        let (more, most) = (MORE / made, goal.cells as f64 / made);
-        let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more, most });
+        let most = goal.cells as f64 * self.foretold.map_or(1.0, |foretold| foretold / now);
+        let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more: MORE, most });
         if next.cells >= 0.9 * most && now >= 0.7 * goal.cells as f64 {
             self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
             return self.end_meshes(session);
@@ -399,31 +394,31 @@ impl Plan {
     }
 
     /// Hold the estimate of a mesh against what the solution differs from that on the mesh before.
-    ///
-    /// Errors that were told right, e of this mesh and e' of the one before, leave a difference of e + e' at most. Where it is larger, both were told too small, and
-    /// this one becomes as much larger as the difference is.
     pub fn hold(&mut self, done: &Done, estimate: &mut Estimate) {
         if self.goal.is_none() || self.is_stepping() || !done.outcome.status.is_solved() {
             return;
         }
         let tables: Vec<_> = (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect();
-        if let Some(told) = &self.told {
-            let apart = carry::difference(&told.tables, &tables);
-            let before = told.pressure.iter().zip(&apart.pressure);
-            for (now, (before, norms)) in estimate.pressure.iter_mut().zip(before) {
-                *now *= excess(norms, *now, *before);
-            }
-            estimate.displacement *= excess(&apart.displacement, estimate.displacement, told.displacement);
-        }
-        let (pressure, displacement) = (estimate.pressure.clone(), estimate.displacement);
-        self.told = Some(Told { pressure, displacement, tables });
+        self.told.iter().for_each(|told| told.hold(&tables, estimate));
+        self.told = Some(Told::new(estimate, tables));
     }
 }
 
-/// How many times a difference is larger than the relative errors told `now` and `before` explain, at least one.
-fn excess(norms: &Norms, now: f64, before: f64) -> f64 {
-    let most = now * norms.new + before * norms.old;
-    if most > 0.0 && norms.apart.is_finite() { (norms.apart / most).max(1.0) } else { 1.0 }
+/// Sizes of the next mesh from the meshes of a number of bodies.
+type Sizing = fn(&dyn Meshes, usize) -> Sizes;
+
+/// The view of sizes that follow from the own mesh of a scene.
+fn sized(
+    session: &Session,
+    scene: &Scene,
+    sizing: Sizing,
+    interrupt: &Interrupt,
+    clock: &mut Clock,
+) -> Result<Option<String>> {
+    let built = run::build(session, scene.clone(), interrupt, clock)?;
+    let bodies = built.discrete.bodies.len();
+    let sizes = built.discrete.meshes.as_ref().map(|meshes| view(&sizing(&**meshes, bodies)));
+    options::withdraw(session).map(|()| sizes)
 }
 
 fn view(sizes: &Sizes) -> String {
@@ -434,17 +429,5 @@ fn view(sizes: &Sizes) -> String {
 fn follow(scene: &mut Scene, view: Option<String>) {
     if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
         *sizes = view.map(Into::into);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{Norms, excess};
-
-    #[test]
-    fn a_difference_that_errors_explain_changes_none() {
-        let norms = |apart| Norms { apart, old: 2.0, new: 1.0 };
-        assert_eq!([0.1, 0.5, 1.0].map(|apart| excess(&norms(apart), 0.1, 0.2)), [1.0, 1.0, 2.0]);
-        assert_eq!([excess(&norms(0.1), 0.0, 0.0), excess(&norms(f64::NAN), 0.1, 0.1)], [1.0, 1.0]);
     }
 }

@@ -16,6 +16,7 @@ mod series;
 pub mod solve;
 pub mod surfaces;
 pub mod sweep;
+mod told;
 mod typed;
 pub mod write;
 
