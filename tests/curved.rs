@@ -156,3 +156,26 @@ fn an_adapted_run_reaches_its_tolerance() {
     assert!(error(&rounds[rounds.len() - 1]) < 1e-3 && rounds.len() <= 8, "{rounds:?}");
     assert!(rounds.iter().all(|round| error(round) < 2.0), "{rounds:?}");
 }
+
+/// Quadratic facets with curved edges in a plane, beside facets of another size: all of the plate with the hole is covered, and carries the pressure on it.
+#[test]
+fn a_plane_face_with_a_hole_is_covered() {
+    let geo = root().join("tests/curved/hole.geo");
+    let scene = Scene::new(format!(
+        "dimension = 3\nmesh = {{ geo = \"{}\" }}\n\
+         [[body]]\nname = \"foot\"\nyoung = 2.1e5\npoisson = 0.3\norder = 2\n\
+         fix = [{{ on = \"foot_top\", x = 0, y = 0 }}]\nload = [{{ on = \"foot_top\", pressure = 10 }}]\n\
+         [[body]]\nname = \"plate\"\nyoung = 2.1e5\npoisson = 0.3\norder = 2\n\
+         fix = [{{ on = \"plate_bottom\", x = 0, y = 0, z = 0 }}]\n\
+         [[contact]]\nbetween = [\"foot_bottom\", \"plate_top\"]\ntouching = true\n\
+         layer = {{ linear = {{ stiffness = 1e5 }} }}\n[output]\nvtu = false\nplots = false\n",
+        geo.display()
+    ));
+    let run = solve(&scene, &[]).converged();
+    assert_eq!((run.count("pairs/0/pieces_lost"), run.count("pairs/0/facets_uncovered")), (0, 0), "{}", run.warnings());
+    let table = run.contact();
+    let area: f64 = (0..table.rows()).map(|q| table["weight"][q]).sum();
+    // twelve chords of parabolas on the circle of the hole
+    let exact = 144.0 - 9.0 * std::f64::consts::PI;
+    assert!((area / exact - 1.0).abs() < 2e-3, "{area} {exact}");
+}

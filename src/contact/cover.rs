@@ -37,7 +37,7 @@ pub enum Left {
 
 /// A facet that lacks less than this share is paired as a whole: lengths of curves by quadrature differ a little between a
 /// facet and its pieces.
-const WHOLE: f64 = 1.0 - 1e-3;
+pub(super) const WHOLE: f64 = 1.0 - 1e-3;
 
 impl Cover {
     /// The cover of those facets that are `asked` for, from the common pieces and the nodes that carry points on them; with their numbers.

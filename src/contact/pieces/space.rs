@@ -3,10 +3,11 @@
 //! The corners of a facet of side b are brought to the parameters of a facet of side a along the normals of a, which is to
 //! solve x = x_a(u, v) + t n(u, v). There the image is clipped by the facet. Straight edges of the image stand for what may
 //! be slightly curved; each facet of a is still covered once, since neighbours in b share their edges. A curved facet of b
-//! is split into four at its mid-edges.
+//! is split into four at the middle of its edges, and all facets of b into more where corners of some have no image.
 
 use super::polygon::{self, Polygon};
 use super::{AWAY, Common, Lost, MOST_STEPS, ROUNDING, Reach, Refused, SNAP, Search, Shared};
+use crate::contact::cover::WHOLE;
 use crate::contact::side::{Side, length, unit};
 use crate::fem::{area_vector, assemble, cross, element, quadrature};
 use crate::linalg::dot;
@@ -19,9 +20,9 @@ const TINY: f64 = 1e-11;
 /// bows by an eighth of the angle that the normals turn along it: with a radian a facet a tenth.
 const ON_FACET: f64 = 0.1;
 
-/// Triangles of a facet, by its nodes: the facet itself, or four between its mid-edges.
-const WHOLE: [[usize; 3]; 1] = [[0, 1, 2]];
-const QUARTERS: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
+/// Into how many parts the edges of facets of side b are cut, one number after the other, until each corner that comes of it lies on a normal of a facet of side a. Beyond a
+/// curved facet its parabolas turn back, so that places further away than some facets' sizes are on none.
+const PARTS: [usize; 4] = [1, 2, 4, 8];
 
 /// The common pieces of two surfaces in space on those facets of side a that are `asked` for.
 pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach, asked: &dyn Fn(usize) -> bool) -> Common<3> {
@@ -70,16 +71,26 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach, asked: &dyn Fn(usize) -> b
 
 /// Return the pieces of a facet of side a that face these facets of side b, the nearest first; note in `refused` what is none.
 fn facing(facet: &Facet, b: &[Facet], near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
-    let mut found: Vec<Piece> = Vec::new();
-    for &index in near {
-        let other = &b[index];
-        match Piece::between(facet, other, index) {
-            Ok(pieces) => {
-                let pieces = pieces.into_iter();
-                found.extend(pieces.filter(|p| refused.admits(reach, p.gap, facet.direction, other.direction)));
+    let mut found = Vec::new();
+    for parts in PARTS {
+        let before = *refused;
+        found.clear();
+        let mut unseen = 0;
+        for &index in near {
+            let other = &b[index];
+            let cut = Piece::between(facet, other, index, parts);
+            if reach.faces(facet.direction, other.direction) {
+                unseen += cut.unseen;
+                refused.lost += cut.lost;
             }
-            Err(Lost) => refused.lost += usize::from(reach.faces(facet.direction, other.direction)),
+            let pieces = cut.pieces.into_iter();
+            found.extend(pieces.filter(|p| refused.admits(reach, p.gap, facet.direction, other.direction)));
         }
+        let covered: f64 = found.iter().map(|piece| polygon::area(&piece.polygon)).sum();
+        if unseen == 0 || covered >= 0.5 * WHOLE || parts == PARTS[PARTS.len() - 1] {
+            break;
+        }
+        *refused = before;
     }
     found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
     found
@@ -232,27 +243,48 @@ struct Piece {
     gap: f64,
 }
 
+/// The pieces before one facet of side b.
+#[derive(Default)]
+struct CutFacet {
+    pieces: Vec<Piece>,
+    /// Triangles with a corner that is on no normal of the facet of side a, or of which that could not be found out.
+    unseen: usize,
+    /// Triangles of which it could not be found out.
+    lost: usize,
+}
+
 impl Piece {
-    /// Return the pieces before one facet of b.
-    ///
-    /// # Errors
-    /// [`Lost`] if a corner of b or the middle of a piece cannot be brought to the other facet.
-    fn between(a: &Facet, b: &Facet, index: usize) -> Result<Vec<Self>, Lost> {
+    /// Return the pieces before one facet of b, whose edges are cut into so many `parts`, twice as many where it is curved.
+    fn between(a: &Facet, b: &Facet, index: usize, parts: usize) -> CutFacet {
+        let mut cut = CutFacet::default();
         if dot(&a.direction, &b.direction) >= 0.0 {
-            return Ok(Vec::new());
+            return cut;
         }
         let flat = |n: &[f64; 3]| length(minus(*n, a.normals[0])) < SNAP;
-        let whole = b.order == Order::P1 || (a.straight && b.straight && a.normals.iter().all(flat));
-        let corners = if whole { 3 } else { 6 };
+        let is_whole = b.order == Order::P1 || (a.straight && b.straight && a.normals.iter().all(flat));
+        let parts = if is_whole { parts } else { 2 * parts };
         let offset = minus(b.from, a.from);
-        let mut feet = Vec::with_capacity(corners);
-        for &x in &b.x[..corners] {
-            let Some(foot) = a.foot(plus(x, offset))? else { return Ok(Vec::new()) };
-            feet.push(snap(foot));
+        let foot = |[i, j]: [usize; 2]| {
+            let [u, v] = [i, j].map(|k| k as f64 / parts as f64);
+            a.foot(plus(b.at(u, v), offset)).map(|foot| foot.map(snap))
+        };
+        let rows = (0..=parts).map(|j| (0..=parts - j).map(|i| foot([i, j])).collect::<Vec<_>>());
+        let feet: Vec<Vec<Foot>> = rows.collect();
+        for corners in triangles(parts) {
+            let of = corners.map(|[i, j]| feet[j][i]);
+            let piece = match of {
+                [Ok(Some(p)), Ok(Some(q)), Ok(Some(r))] => Self::of(a, b, index, [p, q, r]),
+                _ => {
+                    cut.unseen += 1;
+                    if of.iter().any(Result::is_err) { Err(Lost) } else { Ok(None) }
+                }
+            };
+            match piece {
+                Ok(piece) => cut.pieces.extend(piece),
+                Err(Lost) => cut.lost += 1,
+            }
         }
-        let triangles = if whole { &WHOLE[..] } else { &QUARTERS[..] };
-        let pieces = triangles.iter().map(|nodes| Self::of(a, b, index, nodes.map(|node| feet[node])));
-        Ok(pieces.collect::<Result<Vec<_>, Lost>>()?.into_iter().flatten().collect())
+        cut
     }
 
     /// The piece under the image of one triangle of b, which looks the other way.
@@ -270,6 +302,23 @@ impl Piece {
         let hit = b.hit(plus(a.at(u, v), minus(a.from, b.from)), normal)?;
         Ok(hit.map(|(_, t)| Self { polygon, index, gap: t * length(normal) }))
     }
+}
+
+/// Parameters on a facet of side a whose normal passes through a place; none if there are none.
+type Foot = Result<Option<[f64; 2]>, Lost>;
+
+/// The triangles between the points (i, j), i + j <= parts, of a triangle whose edges are cut into so many parts.
+fn triangles(parts: usize) -> Vec<[[usize; 2]; 3]> {
+    let mut all = Vec::new();
+    for j in 0..parts {
+        for i in 0..parts - j {
+            all.push([[i, j], [i + 1, j], [i, j + 1]]);
+            if i + j + 2 <= parts {
+                all.push([[i + 1, j], [i + 1, j + 1], [i, j + 1]]);
+            }
+        }
+    }
+    all
 }
 
 /// Moves what almost lies on an edge of the parameter triangle there.

@@ -65,72 +65,71 @@ impl<const D: usize> Recovery<'_, D> {
         for index in 0..space.cell_count() {
             let x = space.cell_nodes(index);
             for (l, weight) in rule.iter() {
-                let Some((gradient, measure)) = element::gradients(space.order, &x, l) else { continue };
-                let phi = element::values(space.order, l);
-                let at = interpolate(&x, &phi);
-                let stress = law(index, at, &self.missed_slope(index, &at, l, &phi, &gradient).strain());
-                let weight = weight * measure * space.circle(&at);
-                self.add_stress(index, &at, -weight, &stress, &phi, &gradient, &mut residual);
+                let Some((at, measure)) = At::new(space.order, self.cell(index), &x, l) else { continue };
+                let stress = law(index, at.x, &self.missed_slope(&at).strain());
+                self.add_stress(&at, -weight * measure * space.circle(&at.x), &stress, &mut residual);
             }
         }
         residual
     }
 
-    /// Gradient of b at a point `at` of a cell with barycentric coordinates `l`, and there the values and gradients of the shape functions.
-    pub(super) fn missed_slope(
-        &self,
-        index: usize,
-        at: &[f64; D],
-        l: &[f64],
-        phi: &[f64],
-        gradient: &[[f64; D]],
-    ) -> Slope<D> {
-        let cell = self.cell(index);
-        let hats = hats(gradient, cell.len());
+    /// Gradient of b at a point of a cell.
+    pub(super) fn missed_slope(&self, at: &At<D>) -> Slope<D> {
+        let hats = at.hats();
         let mut slope = Slope::ZERO;
-        for (k, &vertex) in cell[..=D].iter().enumerate() {
-            let (value, h) = self.patch(vertex).jet(&self.monomials[0], at);
+        for (k, &vertex) in at.cell[..=D].iter().enumerate() {
+            let (value, h) = self.patch(vertex).jet(&self.monomials[0], &at.x);
             for c in 0..D {
-                (0..D).for_each(|j| slope.h[c][j] += l[k] * h[c][j] + value[c] * hats[k][j]);
+                (0..D).for_each(|j| slope.h[c][j] += at.l[k] * h[c][j] + value[c] * hats[k][j]);
             }
-            slope.hoop += l[k] * self.space.hoop(at, value[0]);
+            slope.hoop += at.l[k] * self.space.hoop(&at.x, value[0]);
         }
-        slope.add(-1.0, &self.space.slope(cell, at, phi, gradient, &self.blended));
+        slope.add(-1.0, &self.space.slope(at.cell, &at.x, &at.phi, &at.gradient, &self.blended));
         slope
     }
 
     /// Add `weight sigma : grad v` for the shape functions v of a cell to `sum`.
-    fn add_stress(
-        &self,
-        index: usize,
-        at: &[f64; D],
-        weight: f64,
-        stress: &[f64; 6],
-        phi: &[f64],
-        gradient: &[[f64; D]],
-        sum: &mut [f64],
-    ) {
+    fn add_stress(&self, at: &At<D>, weight: f64, stress: &[f64; 6], sum: &mut [f64]) {
         let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
-        for (a, &node) in self.cell(index).iter().enumerate() {
+        for (a, &node) in at.cell.iter().enumerate() {
             let first = D * node as usize;
             for c in 0..D {
-                let work: f64 = (0..D).map(|j| stress[place[c][j]] * gradient[a][j]).sum();
+                let work: f64 = (0..D).map(|j| stress[place[c][j]] * at.gradient[a][j]).sum();
                 sum[first + c] += weight * work;
             }
-            sum[first] += weight * stress[2] * self.space.hoop(at, phi[a]);
+            sum[first] += weight * stress[2] * self.space.hoop(&at.x, at.phi[a]);
         }
     }
 }
 
-/// Gradients of the barycentric coordinates of a cell, which may be curved, from those of its shape functions: l_k is one at vertex k and a half in the middle of
-/// each edge there.
-fn hats<const D: usize>(gradient: &[[f64; D]], nodes: usize) -> [[f64; D]; 4] {
-    let mut hats = [[0.0; D]; 4];
-    hats[..=D].copy_from_slice(&gradient[..=D]);
-    for (middle, &(i, j)) in gradient[D + 1..nodes].iter().zip(&EDGES) {
-        for k in [i, j] {
-            (0..D).for_each(|c| hats[k][c] += 0.5 * middle[c]);
-        }
+/// A point of a cell, with the shape functions there.
+pub(super) struct At<'a, const D: usize> {
+    /// Nodes of the cell.
+    cell: &'a [u32],
+    /// Barycentric coordinates.
+    l: &'a [f64],
+    x: [f64; D],
+    phi: [f64; element::MOST],
+    gradient: [[f64; D]; element::MOST],
+}
+
+impl<'a, const D: usize> At<'a, D> {
+    /// The point with these barycentric coordinates in a cell whose nodes lie at `x`, and the measure there; `None` where the cell is folded.
+    pub fn new(order: Order, cell: &'a [u32], x: &[[f64; D]], l: &'a [f64]) -> Option<(Self, f64)> {
+        let (gradient, measure) = element::gradients(order, x, l)?;
+        let phi = element::values(order, l);
+        Some((Self { cell, l, x: interpolate(x, &phi), phi, gradient }, measure))
     }
-    hats
+
+    /// Gradients of the barycentric coordinates, also in curved cells: l_k is one at vertex k and a half in the middle of each edge there.
+    fn hats(&self) -> [[f64; D]; 4] {
+        let mut hats = [[0.0; D]; 4];
+        hats[..=D].copy_from_slice(&self.gradient[..=D]);
+        for (middle, &(i, j)) in self.gradient[D + 1..self.cell.len()].iter().zip(&EDGES) {
+            for k in [i, j] {
+                (0..D).for_each(|c| hats[k][c] += 0.5 * middle[c]);
+            }
+        }
+        hats
+    }
 }

@@ -92,9 +92,8 @@ fn the_gradient_is_that_of_the_values_in_curved_cells() {
     let (l, step) = ([0.1, 0.2, 0.3, 0.4], 1e-5);
     for index in 0..space.cell_count() {
         let (x, cell) = (space.cell_nodes(index), recovery.cell(index));
-        let phi = element::values(Order::P2, &l);
-        let (gradient, _) = element::gradients(Order::P2, &x, &l).expect("a cell");
-        let slope = recovery.missed_slope(index, &interpolate(&x, &phi), &l, &phi, &gradient);
+        let (at, _) = blend::At::new(Order::P2, cell, &x, &l).expect("a cell");
+        let slope = recovery.missed_slope(&at);
         let moved = |sign: f64| [l[0] - sign * step, l[1] + sign * step, l[2], l[3]];
         let ends = [1.0, -1.0].map(|sign| (interpolate(&x, &element::values(Order::P2, &moved(sign))), moved(sign)));
         let values = ends.map(|(_, l)| recovery.missed(cell, &l));
