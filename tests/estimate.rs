@@ -466,3 +466,20 @@ fn nested_start() {
     let distance = common::distance(&nested.contact()["pressure"], &auto.contact()["pressure"]);
     assert!(distance < 1e-6, "{distance:e}");
 }
+
+/// A wave of pressure that the mesh cannot have: the estimate is called a guess, with the body and a place under the load.
+#[test]
+fn an_estimate_as_large_as_the_solution_is_a_guess() {
+    let scene = Scene::new(format!(
+        "dimension = 2\nestimate = true\nmesh = {{ geo = \"{}\", set = {{ n = 4 }} }}\n[[body]]\nname = \"lower\"\nyoung = 2.1e5\n\
+         poisson = 0.3\nfix = [{{ on = \"lower_sides\", x = 0 }}, {{ on = \"lower_face\", y = 0 }}]\n\
+         load = [{{ on = \"lower_top\", pressure = \"10*cos(12*pi*x)\" }}]\n",
+        root().join("meshes/wavy/wavy.geo").display()
+    ));
+    let coarse = solve(&scene, &[]).converged();
+    assert!(coarse.number("discretization_error/energy") >= 1.0);
+    let said = coarse.warnings();
+    assert!(said.contains("is a guess: that of body `lower`") && said.contains(", 0.9"), "{said}");
+    let fine = solve(&scene, &["--set", "mesh.set.n=24"]).converged();
+    assert!(!fine.warnings().contains("guess"), "{}", fine.warnings());
+}
