@@ -140,7 +140,12 @@ pub fn estimate(
     let mut strain = [residual(model, iterate, &vec![0.0; model.points()]).1.strain];
     model.exchange.sum(&mut strain);
     let reference = strain[0] - held.energy + layer.work;
-    let relative = |squared: f64| if reference > 0.0 { (squared.max(0.0) / reference).sqrt() } else { 0.0 };
+    let relative = |squared: f64| match () {
+        () if reference > 0.0 => (squared.max(0.0) / reference).sqrt(),
+        // rounding is all that is left beside springs that only hold
+        () if held.energy > 0.0 => f64::INFINITY,
+        () => 0.0,
+    };
     // that of the nodal values is a part of the whole
     let error = bodies.iter().chain(&layers).sum::<f64>().max(squared);
     let pressure_error = pressure_errors(model, layer, &closing);

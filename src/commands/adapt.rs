@@ -70,7 +70,7 @@ pub struct Plan {
     steps: Option<History>,
 }
 
-/// The mesh with the least error so far.
+/// The last mesh that was better than the best one before it: with a smaller error, or with a smaller energy error.
 struct Best {
     error: f64,
     /// Its relative error in the energy norm.
@@ -207,8 +207,8 @@ impl Plan {
             .help("let the scene name a Gmsh script: mesh = \"file.geo\""))
     }
 
-    /// Build the scene of this round. Where no mesh comes of the sizes that follow the best mesh, coarser ones are tried, down to those that promise no more cells than
-    /// the best mesh has; the run then ends with that one. Collective.
+    /// Build the scene of this round. If Gmsh makes no mesh of the sizes that the best mesh leads to, or one that is refused, coarser sizes are tried, down to those that promise no more
+    /// cells than the best mesh has; the run then ends with that one. Collective.
     ///
     /// # Errors
     /// What [`run::build`] refuses, but a later mesh.
@@ -317,7 +317,7 @@ impl Plan {
         let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more: MORE, most });
         if next.cells >= 0.9 * most && now >= 0.7 * goal.cells as f64 {
             self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
-            return self.end_meshes(session);
+            return self.end_with_best(session, error);
         }
         let (round, sizes, tables) = (self.rounds.len(), self.sizes(), tables());
         self.best = Some(Best { error, energy: estimate.energy, round, view: sizes, next, tables, worse: 0 });

@@ -9,7 +9,7 @@ use serde_json::Value;
 pub fn purpose(scene: &Scene) -> String {
     let mut settings = scene.settings();
     let steps = settings["method"]["steps"].take();
-    ["output", "solver"].iter().for_each(|key| settings[*key] = Value::Null);
+    ["output", "solver", "estimate"].iter().for_each(|key| settings[*key] = Value::Null);
     settings["method"] = steps;
     settings.to_string()
 }

@@ -179,7 +179,8 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
             })?;
         }
     }
-    failed.and(written).and(if first { plan.keep_mesh(&done) } else { Ok(()) })?;
+    failed.and(written)?;
+    agree(session, if first { plan.keep_mesh(&done) } else { Ok(()) })?;
     Ok(code)
 }
 

@@ -23,14 +23,24 @@ impl Told {
     /// Hold the estimate of the next mesh, with the solution `tables`, against what that differs from the one here.
     ///
     /// Errors that were told right, e of the next mesh and e' of this one, leave a difference of e + e' at most. Where it is larger, both were told too small, and
-    /// e becomes as much larger as the difference is.
+    /// e becomes as much larger as the difference is. Surfaces that are paired by themselves may be other pairs on another mesh, which are not compared.
     pub fn hold(&self, tables: &[ContactTable], estimate: &mut Estimate) {
+        if !self.tables.iter().map(bodies).eq(tables.iter().map(bodies)) {
+            return;
+        }
         let apart = carry::difference(&self.tables, tables);
-        for (i, now) in estimate.pressure.iter_mut().enumerate() {
-            *now *= excess(&apart.pressure[i], *now, self.pressure[i]);
+        for (now, (before, norms)) in estimate.pressure.iter_mut().zip(self.pressure.iter().zip(&apart.pressure)) {
+            *now *= excess(norms, *now, *before);
         }
         estimate.displacement *= excess(&apart.displacement, estimate.displacement, self.displacement);
     }
+}
+
+/// The bodies of a pair, whichever carries the points.
+fn bodies(table: &ContactTable) -> [&str; 2] {
+    let mut names = table.side_names.each_ref().map(String::as_str);
+    names.sort_unstable();
+    names
 }
 
 /// How many times a difference is larger than the relative errors told `now` and `before` explain, at least one.

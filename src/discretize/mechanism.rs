@@ -311,17 +311,19 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// Balance the loads on motions that nothing holds, if what they lack on each is no more than what the mesh may miss of them.
     fn balance(&mut self, all: &[Moving<D>]) {
-        let works: Vec<[f64; 2]> =
-            all.iter().map(|moving| moving.works(self.parts, self.drafts, self.exchange)).collect();
+        // bodies without loads have nothing to balance
+        let works_on = |moving: &Moving<D>| moving.works(self.parts, self.drafts, self.exchange);
+        let (all, works): (Vec<&Moving<D>>, Vec<[f64; 2]>) =
+            all.iter().map(|moving| (moving, works_on(moving))).filter(|(_, [_, largest])| *largest > 0.0).unzip();
         let shares = || works.iter().map(|[work, largest]| work.abs() / largest.max(f64::MIN_POSITIVE));
-        let may_be_missed = |(moving, [work, largest]): (&Moving<D>, &[f64; 2])| {
+        let may_be_missed = |(moving, [work, largest]): (&&Moving<D>, &[f64; 2])| {
             work.abs() <= NO_WORK * largest || work.abs() <= self.missed(moving, *largest)
         };
         if shares().all(|share| share <= NO_WORK) || !all.iter().zip(&works).all(may_be_missed) {
             return;
         }
         let lacking: Vec<f64> = works.iter().map(|[work, _]| *work).collect();
-        if moving::balance(all, &lacking, self.parts, self.drafts, self.exchange) {
+        if moving::balance(&all, &lacking, self.parts, self.drafts, self.exchange) {
             for (moving, share) in all.iter().zip(shares()).filter(|(_, share)| *share > NO_WORK) {
                 self.note_balanced(moving, share);
             }

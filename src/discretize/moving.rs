@@ -50,7 +50,7 @@ impl<const D: usize> Moving<D> {
 ///
 /// so that no node takes more of what is lacking than others that are loaded alike.
 pub fn balance<const D: usize>(
-    all: &[Moving<D>],
+    all: &[&Moving<D>],
     works: &[f64],
     parts: &[Part<D>],
     drafts: &mut [Draft<D>],

@@ -22,6 +22,10 @@ use rings::Rings;
 /// Stress (xx yy zz xy yz xz) in a cell at a point of a strain (xx yy zz, and 2 eps of xy yz xz).
 pub type Law<'a, const D: usize> = &'a dyn Fn(usize, [f64; D], &[f64; 6]) -> [f64; 6];
 
+/// How often a patch gets another ring of cells where its nodes do not determine the polynomial. Cells at a corner of a body have few nodes, and with two more rings as many as
+/// others; what is not determined then, as the second derivative through a plate one cell thick, no larger patch determines.
+const MORE_RINGS: usize = 3;
+
 /// A displacement with the polynomials recovered from it.
 pub struct Recovery<'a, const D: usize> {
     space: &'a Space<D>,
@@ -59,7 +63,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
         outer
     }
 
-    /// The polynomial of a vertex; of a lower degree in a body of so few cells that its nodes determine no more.
+    /// The polynomial of a vertex; of a lower degree in a body, or a plate, of so few cells that its nodes determine no more.
     fn fit(&self, node: usize, is_outer: bool, rings: &mut Rings<D>) -> Option<Patch<D>> {
         let (space, u) = (self.space, self.displacement);
         let fit = |nodes: &[u32], monomials| Patch::fit(space, u, space.nodes[node], nodes, monomials);
@@ -67,7 +71,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
         if is_outer {
             rings.widen();
         }
-        while !rings.is_whole() {
+        for _ in 0..MORE_RINGS {
             let fitted = fit(rings.nodes(), &self.monomials[0]);
             if fitted.is_some() {
                 return fitted;

@@ -30,7 +30,7 @@ const ROUGHLY: f64 = 10.0;
 /// Relative error beyond which a number has no correct digit: a run that rounding ended there has found nothing.
 const ONE_DIGIT: f64 = 0.1;
 
-/// Looks at a result in the units of its model, and takes the name of a solution from one whose error is larger than was asked for and than the run
+/// Looks at a result in the units of its model, and takes the name of a solution from one whose error is larger than was asked for and than ten times what the run
 /// thought. Collective.
 pub fn look(done: &mut Done, recovered: &All) {
     let is_solved = done.outcome.status.is_solved();

@@ -386,8 +386,8 @@ pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> 
     if let Some((body, place)) = estimate::lost_at(&*meshes, &discrete.model, &estimate) {
         let (name, place) = (&discrete.bodies[body].name, point(place));
         done.warnings.push(format!(
-            "the estimated error of the mesh is a guess: that of body `{name}` is as large as the solution, most of it at {place}; \
-             make cells smaller there, or less flat"
+            "the estimated error of the mesh is a guess: it is as large as the solution; of all bodies `{name}` has most of it, at {place}: make \
+             cells smaller there, or less flat"
         ));
     }
     clock.phase("estimate");

@@ -49,11 +49,6 @@ impl<'a, const D: usize> Rings<'a, D> {
         }
         &self.nodes.list
     }
-
-    /// Whether all cells are taken.
-    pub fn is_whole(&self) -> bool {
-        self.cells.list.len() == self.space.cell_count()
-    }
 }
 
 fn nodes_of<const D: usize>(space: &Space<D>, cell: u32) -> &[u32] {
