@@ -169,8 +169,8 @@ pub fn estimate(
     })
 }
 
-/// Return the body with the largest error and the middle of its worst cell, in the scene, if the energy error is told to be as large as the solution: the mesh is then too
-/// coarse, or its cells too flat, for the estimate to know anything. Collective.
+/// Return the body with the largest error, and the centre of its worst cell in the scene, if the estimated energy error is as large as the solution. The mesh is then too
+/// coarse, or its cells are too flat, for the estimate to mean anything. Collective.
 pub fn lost_at(meshes: &dyn Meshes, model: &Model, estimate: &Estimate) -> Option<(usize, [f64; 3])> {
     if estimate.energy < 1.0 {
         return None;

@@ -305,7 +305,7 @@ impl Plan {
             self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
             return self.end_with_best(session, error);
         }
-        // a finer mesh may see a singular place that coarse ones did not: its error is told larger, its energy error smaller
+        // coarse meshes may miss a singularity of the pressure; on the first mesh that resolves it the estimated error of pressures grows while that in energy falls
         if self.best.as_ref().is_some_and(|best| best.error <= error && best.energy <= estimate.energy) {
             return self.follow_best(session);
         }

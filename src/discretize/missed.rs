@@ -8,8 +8,8 @@ use crate::fem::{RigidMotion, turn};
 use crate::linalg::Total;
 use crate::mesh::Mesh;
 
-/// Of a load that jumps within an element, quadrature on halves of elements misses half as much as that on whole ones: the difference is half of the
-/// error. Of smooth loads it is nearly all of it.
+/// Ratio of the error of a quadrature to the difference between it and the same rule on halves of the elements. Where a load jumps within an element, the error on
+/// halves is half as large, so that the difference is half of the error. Where the load is smooth, the ratio is nearly one.
 const HALVES: f64 = 2.0;
 
 /// The share of the loads of a body that facets may miss ([`turn::missed`]). A body force acts on the volume within all surfaces: those in contact
