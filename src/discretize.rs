@@ -24,6 +24,7 @@ mod moving;
 mod pairs;
 mod part;
 mod parts;
+mod plan;
 mod post;
 mod ready;
 pub mod resolution;
@@ -33,6 +34,7 @@ mod springs;
 mod supports;
 mod surface;
 mod totals;
+mod unassembled;
 mod unbalanced;
 mod verify;
 
@@ -40,10 +42,9 @@ use crate::contact::{self, ContactPair};
 
 use crate::error::Result;
 use crate::exchange::{Exchange, share};
-use crate::fem::rigid::AtDofs;
-use crate::linalg::{Total, axpy, dot};
-use crate::mesh::Checked;
-use crate::model::{Mechanism, Model, Segment};
+use crate::linalg::{Total, axpy};
+use crate::mesh::Mesh;
+use crate::model::{Mechanism, Model};
 use crate::problem::{BodySpec, Plane, Start};
 use crate::scene::Scene;
 pub use balance::{Balance, Resultant};
@@ -54,19 +55,18 @@ use distribute::Deal;
 use draft::Draft;
 pub use factory::{Assembled, Factory, Outline};
 pub use find::point;
-use free::Free;
-use here::Here;
 pub use info::{Balanced, BodyInfo, ContactInfo, Gauged};
 use mechanism::Fixed;
 use meshes::{Kept, Meshes};
 use part::Part;
 use parts::parts;
+use plan::plan;
 pub use post::Post;
-use ready::{Counts, Ready};
+use ready::Counts;
 use std::rc::Rc;
-use std::sync::Arc;
 pub use surface::ContactSurface;
 use totals::totals;
+use unassembled::Unassembled;
 pub use unbalanced::Unbalanced;
 pub use verify::{Verified, verify};
 
@@ -111,159 +111,137 @@ pub fn discretize<const D: usize>(
     exchange: Rc<dyn Exchange>,
     factory: &mut dyn Factory,
 ) -> Result<Discrete> {
-    let Verified { portion, checked, .. } = verified;
-    let (mesh, rank, alone) = (&portion.mesh, exchange.rank(), exchange.ranks() == 1);
+    let (mesh, others) = (&verified.portion.mesh, &*verified.exchange);
     let (mut parts, stocks) = parts(scene, verified, bodies)?;
-    let (mut pairs, mut contacts) = (Vec::new(), Vec::new());
-    let mut fine = Vec::new();
-    for found in pairs::all(scene, mesh, cut, &parts, keep, &*verified.exchange)? {
-        let pairs::Contact { spec, pair, fine: points, swapped, surface } = found;
-        pairs.push(pair);
-        fine.extend(points);
-        contacts.push(ContactInfo { spec, swapped, surface });
-    }
-    let others = &*verified.exchange;
-    let drafts = parts.iter().zip(draft::segments(parts.len(), &pairs));
-    let drafts = drafts.map(|(part, segments)| Draft::new(part, segments, &pairs, mesh, others));
-    let mut drafts = drafts.collect::<Result<Vec<_>>>()?;
-    let Fixed { gauged, mechanisms, loose, balanced } = mechanism::fix(&mut parts, &mut drafts, &pairs, mesh, others);
-    let supported: Vec<Supported<D>> =
-        parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
-    let lazy = Coupled::new((&parts, &stocks, &drafts), others);
-    let coupled = &lazy;
-    let asked: Vec<_> = (0..parts.len()).map(|i| (move || coupled.graph(i), move || coupled.count(i))).collect();
-    let motions: Vec<_> = parts.iter().zip(&drafts).map(|(part, draft)| Free::new(part, draft, others)).collect();
-    let at: Vec<_> = motions.iter().map(|free| |k: usize, dof: usize| free.at(k, dof)).collect();
-    let largest: Vec<_> = motions.iter().map(|free| |size: &dyn Fn(usize) -> Option<f64>| free.largest(size)).collect();
-    let outlines = parts.iter().zip(&drafts).zip(&supported).zip(asked.iter().zip(at.iter().zip(&largest)));
-    let outlines = outlines.map(|(((part, draft), supported), ((graph, couplings), (at, largest)))| Outline {
-        name: &part.spec.name.value,
-        dimension: D,
-        order: part.space.order,
-        rows: &draft.rows,
-        prescribed: &supported.prescribed,
-        motions: AtDofs { count: draft.free.len(), at, largest },
-        couplings,
-        graph,
-    });
-    factory.plan(&outlines.collect::<Vec<_>>())?;
-    let deal = |bodies: Vec<usize>| {
-        let couplings = coupled.of(&bodies, &pairs);
-        Deal::new(bodies, &parts, &couplings, others)
-    };
-    let deals: Vec<Deal> = factory.dealt_out().into_iter().map(deal).collect();
-    let graphs = lazy.into_graphs();
-    let is_dealt = |body: usize| deals.iter().any(|deal| deal.bodies.contains(&body));
-    let loads = parts.iter().enumerate().map(|(body, part)| if is_dealt(body) { 0 } else { part.space.dofs() });
-    let mut owner = crate::parallel::owners(&loads.collect::<Vec<_>>(), exchange.ranks());
+    let Paired { pairs, contacts, fine } = pair_surfaces(scene, verified, cut, &parts, keep)?;
+    let mut drafts = draft_bodies(&parts, &pairs, mesh, others)?;
+    let fixed = mechanism::fix(&mut parts, &mut drafts, &pairs, mesh, others);
+    let supported = parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free));
+    let supported: Vec<Supported<D>> = supported.collect();
+    let coupled = Coupled::new((&parts, &stocks, &drafts), others);
+    let deals = plan((&parts, &drafts, &supported), &coupled, &pairs, factory, others)?;
+    let graphs = coupled.into_graphs();
     let known_nodes = parts.iter().map(|part| part.space.nodes.known().count()).sum();
-    let needs = if keep { vec![Needs::Everywhere; parts.len()] } else { Needs::of(&owner, &deals) };
-    let (totals, warnings) = together(&parts, &drafts, scene.plane, others);
+    let owners = owners(&parts, &deals, exchange.ranks());
+    let totals = totals_of(&parts, &drafts, scene.plane, others);
+    let needs = if keep { vec![Needs::Everywhere; parts.len()] } else { Needs::of(&owners, &deals) };
     let mut loads: Vec<_> = drafts.iter_mut().map(|draft| &mut draft.nodal_load).collect();
     let elasticities = cells::deal(&mut parts, stocks, &mut loads, &needs, scene.plane, others)?;
     drop(needs);
     let wants_coarse = |body: usize| factory.wants_interpolation(&parts[body].spec.name.value);
     let dealt = distribute::distribute(&parts, &drafts, &wants_coarse, &deals, others, &exchange);
-    drop(deals);
-    dealt
-        .iter()
-        .zip(&mut owner)
-        .for_each(|(dealt, owner)| *owner = dealt.as_ref().map_or(*owner, |dealt| dealt.leader));
-    let drafts = drafts.into_iter().zip(supported).zip(graphs).zip(dealt).zip(totals.into_iter().zip(warnings));
-    let known = gauged.into_iter().zip(loose).zip(elasticities);
-    let (mut infos, mut offsets, mut ready) = (Vec::new(), Vec::new(), Vec::new());
-    for (index, ((part, ((((draft, supported), graph), mut dealt), of_all)), ((gauged, loose), elasticity))) in
-        parts.into_iter().zip(drafts).zip(known).enumerate()
-    {
-        let Draft { segments, rows, nodal_rows, nodal_load, .. } = draft;
-        let carried = |q: usize| {
-            let at = |motion| rows.row(q).map(|(dof, b)| b * part.dof_of(motion, dof)).sum();
-            supported.carried.as_ref().map_or(0.0, at)
-        };
-        offsets.push((0..rows.rows()).map(carried).collect::<Vec<f64>>());
-        let surface: f64 = segments.iter().map(|segment| pairs[segment.pair].weight.iter().sum::<f64>()).sum();
-        let modulus = dot(&part.known.moduli, &along_axes(&segments, &pairs));
-        let held = loose.motions.len() == loose.unfelt.len();
-        let depth = part.known.volume / surface;
-        let (mut resultant, warning) = of_all;
-        part.rigid_forces().for_each(|(_, total)| contact::add(&mut resultant, total));
-        infos.push(BodyInfo {
-            name: part.spec.name.value.clone(),
-            datum: contact::pad(part.space.datum),
-            nodes: part.space.nodes.len(),
-            points: Vec::new(),
-            cells: part.known.cells,
-            facets: Checked { nodes: Arc::default(), ..checked[index].clone() },
-            dofs: part.space.dofs(),
-            supported: part.held.supported(),
-            left_by_supports: loose.left.iter().map(|motion| motion.name.clone()).collect(),
-            left_by_all: loose.unfelt.iter().map(|(name, _)| name.clone()).collect(),
-            gauged,
-            warning,
-            stiffness: if held && surface > 0.0 { modulus / depth } else { 0.0 },
-            load: resultant,
-            rank: owner[index],
-            ranks: dealt.as_ref().map_or_else(|| vec![owner[index]], |dealt| dealt.ranks.clone()),
-            supports: part.spec.fix.iter().map(|support| support.on.value.clone()).collect(),
-            springs: part.spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
-            rigid: part.held.rigid.iter().map(|(load, _)| part.spec.load[*load].on.value.clone()).collect(),
-            post: None,
-        });
-        let unloaded = if keep { part.unloaded(mesh)? } else { Vec::new() };
-        let (mut here, mut works, mut smooth, mut elsewhere) = (None, None, Vec::new(), None);
-        if owner[index] == rank || dealt.is_some() {
-            smooth = part.smooth();
-            let mut all = Here { part, rows: [rows, nodal_rows], load: nodal_load, supported };
-            if let Some(dealt) = &mut dealt {
-                let work;
-                (all, work) = all.of(dealt, &loose.left, others);
-                works = Some(work);
-            }
-            here = Some(all);
-        } else if keep {
-            elsewhere = Some((part.space, part.held));
-        }
-        let scales = [modulus, depth];
-        ready.push(Ready {
-            segments,
-            loose,
-            scales,
-            elasticity,
-            graph: graph.filter(|_| alone),
+
+    let Fixed { gauged, mechanisms, loose, balanced } = fixed;
+    let mut drafts = drafts.into_iter();
+    let mut supported = supported.into_iter();
+    let mut graphs = graphs.into_iter();
+    let mut dealt = dealt.into_iter();
+    let mut totals = totals.into_iter();
+    let mut gauged = gauged.into_iter();
+    let mut loose = loose.into_iter();
+    let mut elasticities = elasticities.into_iter();
+    let mut unassembled = Vec::new();
+    for (body, part) in parts.into_iter().enumerate() {
+        let (OfAllRanks { load, warning }, dealt) = (next(&mut totals), next(&mut dealt));
+        unassembled.push(Unassembled {
+            owner: dealt.as_ref().map_or(owners[body], |dealt| dealt.leader),
+            part,
+            draft: next(&mut drafts),
+            supported: next(&mut supported),
+            graph: next(&mut graphs),
             dealt,
-            here,
-            works,
-            smooth,
-            elsewhere,
-            unloaded,
+            load,
+            warning,
+            gauged: next(&mut gauged),
+            loose: next(&mut loose),
+            elasticity: next(&mut elasticities),
         });
     }
+    let checked = unassembled.iter().zip(&*verified.checked);
+    let mut infos: Vec<BodyInfo> = checked.map(|(body, checked)| body.info(&pairs, checked)).collect();
+    let carried: Vec<Vec<f64>> = unassembled.iter().map(Unassembled::carried).collect();
+    let ready = unassembled.into_iter().map(|body| body.ready(&pairs, mesh, keep, others));
+    let ready = ready.collect::<Result<Vec<_>>>()?;
     let (mut slots, mut shapes, mut counts) = (Vec::new(), Vec::new(), Counts::default());
-    for ((ready, info), &owner) in ready.into_iter().zip(&mut infos).zip(&owner) {
-        let (slot, shape) = ready.make(info, mesh, owner == rank, factory, &mut counts)?;
+    for (ready, info) in ready.into_iter().zip(&mut infos) {
+        let is_owner = info.rank == exchange.rank();
+        let (slot, shape) = ready.make(info, mesh, is_owner, factory, &mut counts)?;
         slots.push(slot);
         shapes.extend(shape.filter(|_| keep));
     }
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
-    let mut carried = vec![0.0; 2 * model.points()];
-    offsets.iter().enumerate().for_each(|(body, offset)| model.put(body, offset, &mut carried));
-    model.carry(&carried);
-    let Counts { assemblies, avoided: assemblies_avoided } = counts;
-    let bodies = infos;
+    let carried = carry(&mut model, &carried);
     Ok(Discrete {
         model,
-        bodies,
+        bodies: infos,
         contacts,
         mechanisms,
         balanced,
-        meshes,
         carried,
-        assemblies,
-        assemblies_avoided,
+        meshes,
+        assemblies: counts.assemblies,
+        assemblies_avoided: counts.avoided,
         known_nodes,
     })
+}
+
+/// What pairs of surfaces come to.
+struct Paired<const D: usize> {
+    /// The arrays of the method.
+    pairs: Vec<ContactPair>,
+    /// Origin of each pair.
+    contacts: Vec<ContactInfo>,
+    /// Integration points of each, if meshes are kept.
+    fine: Vec<contact::Fine<D>>,
+}
+
+fn pair_surfaces<const D: usize>(
+    scene: &Scene,
+    verified: &Verified<D>,
+    cut: contact::pieces::Cut<D>,
+    parts: &[Part<D>],
+    keep: bool,
+) -> Result<Paired<D>> {
+    let mut paired = Paired { pairs: Vec::new(), contacts: Vec::new(), fine: Vec::new() };
+    for found in pairs::all(scene, &verified.portion.mesh, cut, parts, keep, &*verified.exchange)? {
+        paired.pairs.push(found.pair);
+        paired.fine.extend(found.fine);
+        paired.contacts.push(ContactInfo { spec: found.spec, swapped: found.swapped, surface: found.surface });
+    }
+    Ok(paired)
+}
+
+fn draft_bodies<const D: usize>(
+    parts: &[Part<D>],
+    pairs: &[ContactPair],
+    mesh: &Mesh<D>,
+    exchange: &dyn Exchange,
+) -> Result<Vec<Draft<D>>> {
+    let segments = draft::segments(parts.len(), pairs);
+    let drafts = parts.iter().zip(segments);
+    drafts.map(|(part, segments)| Draft::new(part, segments, pairs, mesh, exchange)).collect()
+}
+
+/// The rank that owns each body: bodies that are not dealt out go whole to ranks, about as many dofs to each.
+fn owners<const D: usize>(parts: &[Part<D>], deals: &[Deal], ranks: usize) -> Vec<usize> {
+    let is_dealt = |body: usize| deals.iter().any(|deal| deal.bodies.contains(&body));
+    let dofs = |body: usize| if is_dealt(body) { 0 } else { parts[body].space.dofs() };
+    crate::parallel::owners(&(0..parts.len()).map(dofs).collect::<Vec<_>>(), ranks)
+}
+
+/// The next of a list that has one entry for each body.
+fn next<T>(each: &mut std::vec::IntoIter<T>) -> T {
+    each.next().unwrap_or_else(|| unreachable!("there is one for each body"))
+}
+
+/// Gives the bodies of a model the rigid motions of their supports, with these traces on the contact rows of each; all of them, 2n.
+fn carry(model: &mut Model, each: &[Vec<f64>]) -> Vec<f64> {
+    let mut carried = vec![0.0; 2 * model.points()];
+    each.iter().enumerate().for_each(|(body, trace)| model.put(body, trace, &mut carried));
+    model.carry(&carried);
+    carried
 }
 
 impl Discrete {
@@ -316,33 +294,29 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
     Ok(Some(trace))
 }
 
-/// What all nodes of each body come to: the sum of its loads, but for those on rigid surfaces, and what the user should know of its elasticity.
-/// Collective.
-fn together<const D: usize>(
+/// What all ranks together know of the loads and the cells of a body.
+struct OfAllRanks {
+    /// Sum of its loads, but for those on rigid surfaces.
+    load: [f64; 3],
+    /// What the user should know of its elasticity.
+    warning: Option<String>,
+}
+
+/// What all nodes and cells of each body come to. Collective.
+fn totals_of<const D: usize>(
     parts: &[Part<D>],
     drafts: &[Draft<D>],
     plane: Plane,
     exchange: &dyn Exchange,
-) -> (Vec<[f64; 3]>, Vec<Option<String>>) {
+) -> Vec<OfAllRanks> {
     let sums: Vec<Total> = drafts.iter().flat_map(|draft| draft.nodal_load.sum()).collect();
     let sums = totals(exchange, &sums);
-    let sums = sums.chunks_exact(3).map(|sum| [sum[0], sum[1], sum[2]]).collect();
-    let poisson =
-        share(exchange, parts.iter().map(|part| elastic::poisson(part.spec, D, part.own(), plane)).collect::<Vec<_>>());
-    let warning = |(body, part): (usize, &Part<D>)| {
-        elastic::warning(part.spec, poisson.iter().map(|of_rank| of_rank[body]).fold(0.0, f64::max))
+    let poisson: Vec<f64> = parts.iter().map(|part| elastic::poisson(part.spec, D, part.own(), plane)).collect();
+    let poisson = share(exchange, poisson);
+    let of_body = |(body, part): (usize, &Part<D>)| {
+        let largest = poisson.iter().map(|of_rank| of_rank[body]).fold(0.0, f64::max);
+        let load = std::array::from_fn(|c| sums[3 * body + c]);
+        OfAllRanks { load, warning: elastic::warning(part.spec, largest) }
     };
-    (sums, parts.iter().enumerate().map(warning).collect())
-}
-
-/// Mean squared components of the normals on the contact surfaces of a body.
-fn along_axes(segments: &[Segment], pairs: &[ContactPair]) -> [f64; 3] {
-    let mut sum = [0.0; 3];
-    for pair in segments.iter().map(|segment| &pairs[segment.pair]) {
-        for (weight, normal) in pair.weight.iter().zip(&pair.normal) {
-            (0..3).for_each(|c| sum[c] += weight * normal[c] * normal[c]);
-        }
-    }
-    let total: f64 = sum.iter().sum();
-    if total > 0.0 { sum.map(|sum| sum / total) } else { sum }
+    parts.iter().enumerate().map(of_body).collect()
 }

@@ -83,7 +83,7 @@ fn the_default_is_fast() {
     };
     let held = plain("groove-held");
     let hard = ["--set", "contact.0.layer.power={B=1e-6, a=0.1}"];
-    for (scene, more, steps) in [(&plain("groove"), &[][..], 7), (&held, &[], 4), (&held, &hard, 3)] {
+    for (scene, more, steps) in [(&plain("groove"), &[][..], 7), (&held, &[], 5), (&held, &hard, 3)] {
         let run = solved(scene, more);
         assert_eq!((run.text("method"), run.count("iterations"), run.count("sweeps")), ("newton", steps, 0));
         // K is eliminated once a body, the joint matrix is factored once a step, and no body is solved for
@@ -128,7 +128,7 @@ fn any_power_law_takes_few_steps() {
 #[test]
 fn newton_on_condensed_bodies() {
     for (scene, sets, steps) in
-        [("groove-held", "mesh.set.n=16", 4), ("stack", "mesh.set.n1=6", 3), ("patch-3d", "mesh.set.nl=4", 1)]
+        [("groove-held", "mesh.set.n=16", 5), ("stack", "mesh.set.n1=6", 3), ("patch-3d", "mesh.set.nl=4", 1)]
     {
         let run = |solver: &str| {
             let solver = format!("solver={solver}");
@@ -350,7 +350,9 @@ fn leaves_peel_by_any_linear_step() {
         (1, &["--method", "newton", "--checkpoint", "1e-9"]),
     ];
     for (ranks, args) in others {
-        let run = solve_on(ranks, &scene.path, args).converged();
+        let run = solve_on(ranks, &scene.path, args);
+        // MUMPS leaves about as much rounding as is allowed
+        assert_eq!(run.code, 0, "{args:?}: {}", run.said());
         // inexact steps may come to the laws without the path
         let is_smoothed = run.count("smoothed_steps") > 0 || args.contains(&"solver=hypre");
         assert!(is_smoothed && run.count("iterations") <= 15, "{args:?}: {}", run.said());

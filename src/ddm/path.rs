@@ -4,8 +4,8 @@
 //! energy per area mu ([`resolve`](crate::contact::law::resolve)) have no corner, so that many points move at once, and in equilibrium with them the
 //! duality gap is at most mu times the area. As mu falls, the states follow the central path of interior-point methods to the laws themselves.
 //!
-//! mu is measured by the squared distance e^2/rho of states in equilibrium from the laws, which is an energy per area, too: its mean over a pair, D, says how
-//! far Newton's method is.
+//! mu is measured by the squared distance e^2/rho of states in equilibrium from the laws, which is an energy per area, too: its mean over all points, D, says
+//! how far Newton's method is.
 //!
 //! ```text
 //! enter    at the second step with the laws themselves that is not taken whole:  mu = 100 D
@@ -47,9 +47,9 @@ pub(super) struct Equilibrium<'a> {
 }
 
 impl Equilibrium<'_> {
-    /// Return sum omega e^2/rho for each pair: the squared distance from the laws with this smoothing, e = p - p_q. Components below the roundoff level
-    /// are ignored, so that states that differ by roundoff are as far.
-    pub fn distances(&self, model: &Model, smoothing: &[f64]) -> Vec<f64> {
+    /// Return sum omega e^2/rho: the squared distance from the laws with this smoothing, e = p - p_q. Components below the roundoff level are ignored, so
+    /// that states that differ by roundoff are as far.
+    pub fn distance(&self, model: &Model, smoothing: &[f64]) -> f64 {
         let Self { compression, roundoff, pressure, rho } = *self;
         let resolved = Layer::resolve(model, compression, pressure, rho, smoothing);
         let known = |q: usize| rho[q] * roundoff[q] + f64::EPSILON * (pressure[q].abs() + resolved.pressure[q]);
@@ -57,13 +57,7 @@ impl Equilibrium<'_> {
         let apart = |q: usize| ((pressure[q] - resolved.pressure[q]).abs() - known(q)).clamp(0.0, f64::INFINITY);
         let squared = |q: usize| model.weight[q] * apart(q).powi(2) / rho[q];
         // lines of infinite slope lead to states at c itself
-        let sloped = |pair: usize| model.range(pair).filter(|&q| rho[q] < f64::INFINITY);
-        (0..model.pairs.len()).map(|pair| sloped(pair).map(squared).sum()).collect()
-    }
-
-    /// Return the squared distance from all laws.
-    pub fn distance(&self, model: &Model, smoothing: &[f64]) -> f64 {
-        self.distances(model, smoothing).iter().sum()
+        (0..model.points()).filter(|&q| rho[q] < f64::INFINITY).map(squared).sum()
     }
 }
 
@@ -81,18 +75,11 @@ impl Path {
         if enters && self.shortened < SHORTENED {
             return Vec::new();
         }
-        let (mut next, mut total) = (vec![0.0; model.points()], 0.0);
-        for (pair, distance) in state.distances(model, smoothing).into_iter().enumerate() {
-            let area: f64 = model.range(pair).map(|q| model.weight[q]).sum();
-            for q in model.range(pair) {
-                let mean = distance / area;
-                next[q] = if enters { AHEAD * mean } else { mean.min(smoothing[q]) };
-                total += model.weight[q] * next[q];
-            }
-        }
         self.shortened = 0;
+        let (distance, area) = (state.distance(model, smoothing), model.weight.iter().sum::<f64>());
+        let mu = if enters { AHEAD * distance / area } else { smoothing[0].min(distance / area) };
         // of a distance that is no number nothing follows
-        if total > unseen && total.is_finite() { next } else { Vec::new() }
+        if mu * area > unseen && mu.is_finite() { vec![mu; model.points()] } else { Vec::new() }
     }
 }
 
@@ -113,7 +100,7 @@ mod tests {
         // the line through (0.5, 4) of slope -1/2 meets p = 4 c at c = 8.5/9... and p = 34/9
         let e = 4.0 - 4.0 * (0.5 + 8.0) / 9.0;
         let distance = 2.0 * e * e / 0.5;
-        assert!((off.distances(&model, &[])[0] - distance).abs() < 1e-14 && off.distances(&model, &[])[1] < 1e-30);
+        assert!((off.distance(&model, &[]) - distance).abs() < 1e-14);
         let mut path = Path::default();
         path.note(0.5, false);
         assert!(path.smoothing(&model, &off, &[], 0.0).is_empty());
@@ -121,7 +108,8 @@ mod tests {
         assert!(path.smoothing(&model, &off, &[], 0.0).is_empty());
         path.note(0.25, false);
         let mu = path.smoothing(&model, &off, &[], 0.0);
-        assert!((mu[0] - 100.0 * distance / 2.5).abs() < 1e-12 && mu[1] == mu[0] && mu[2] < 1e-28, "{mu:?}");
+        let area: f64 = model.weight.iter().sum();
+        assert!(mu.iter().all(|mu| (mu - 100.0 * distance / area).abs() < 1e-12), "{mu:?}");
         path.note(1.0, true);
         let far = path.smoothing(&model, &state(&[2.0, 1e4, 1.0, 1.0]), &mu, 0.0);
         assert_eq!(far, mu);

@@ -10,8 +10,9 @@
 //! and sum omega e^2/rho falls, with any weights and any rho, until a law turns a corner. Where the whole step is no nearer to the laws, a shorter
 //! one is. Smoothed laws have no corner.
 //!
-//! Any slope leads to the same solution. The best are near those with which the bodies answer, dp = -S dc between states in equilibrium: the longest waves with that
-//! of the last step, sum omega dp^2/rho = sum omega dc^2 rho over a pair, the shortest with that of single nodes. The geometric mean is the nearest to both.
+//! Any slope leads to the same solution. The bodies answer with dp = -S dc between states in equilibrium: the longest waves as stiffly as in the last
+//! step, where sum omega dp^2/rho = sum omega dc^2 rho over a pair, the shortest like single nodes. The laws themselves are best resolved with the slopes of the last step. Where
+//! they are smoothed, many points move at once, and the geometric mean is the nearest to all waves (docs/methods.md).
 
 use super::path::{Equilibrium, Path};
 use crate::model::Model;
@@ -43,16 +44,19 @@ impl Progress {
     }
 
     /// Keep how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of equilibrium.
-    fn observe(&mut self, model: &Model, unit: &[f64], dc: &[f64], dp: &[f64]) {
+    fn observe(&mut self, model: &Model, unit: &[f64], dc: &[f64], dp: &[f64], is_smoothed: bool) {
         self.answer.resize(model.pairs.len(), 1.0);
         for (pair, answer) in self.answer.iter_mut().enumerate() {
-            let finite = model.range(pair).filter(|&q| unit[q] < f64::INFINITY);
-            let squares =
-                finite.map(|q| [dp[q].powi(2) / unit[q], dc[q].powi(2) * unit[q]].map(|x| model.weight[q] * x));
-            let [p, c] = squares.fold([0.0; 2], |sum, square| [sum[0] + square[0], sum[1] + square[1]]);
-            if (p / c).is_finite() {
+            let (mut pressures, mut compressions) = (0.0, 0.0);
+            for q in model.range(pair).filter(|&q| unit[q] < f64::INFINITY) {
+                pressures += model.weight[q] * dp[q].powi(2) / unit[q];
+                compressions += model.weight[q] * dc[q].powi(2) * unit[q];
+            }
+            let stiffness = (pressures / compressions).sqrt();
+            if stiffness.is_finite() {
                 // softer are motions of whole bodies, which `fit` finds
-                *answer = (p / c).clamp(PART, PART.recip()).sqrt().sqrt();
+                let stiffness = stiffness.clamp(PART, PART.recip());
+                *answer = if is_smoothed { stiffness.sqrt() } else { stiffness };
             }
         }
     }
@@ -70,7 +74,8 @@ impl Progress {
             return 1.0;
         }
         let change = |from: &[f64], to: &[f64]| to.iter().zip(from).map(|(to, from)| to - from).collect::<Vec<f64>>();
-        self.observe(model, unit, &change(from, c), &change(&self.pressure, p));
+        let is_smoothed = !smoothing.is_empty();
+        self.observe(model, unit, &change(from, c), &change(&self.pressure, p), is_smoothed);
         let rho = &self.slopes(model, unit)[..];
         let off = |t: f64| {
             let (compression, pressure) = (&between(from, c, t)[..], &between(&self.pressure, p, t)[..]);
@@ -79,7 +84,7 @@ impl Progress {
         let here = off(0.0);
         let mut lengths = (0..HALVINGS).map(|halvings| 0.5f64.powi(halvings));
         let length = lengths.find(|&t| off(t) <= here).unwrap_or(0.5f64.powi(HALVINGS));
-        self.path.note(length, !smoothing.is_empty());
+        self.path.note(length, is_smoothed);
         length
     }
 
@@ -128,17 +133,20 @@ mod tests {
         assert_eq!(away, 0.5f64.powi(7));
     }
 
-    /// The geometric mean of what a pair's points answered together and of their own stiffness; nothing counts as a thousandth.
+    /// What a pair's points answered together, beside their own stiffness; nothing counts as a millionth. With smoothed laws, the geometric mean of both.
     #[test]
     fn lines_are_as_steep_as_the_bodies_answer() {
-        let (model, mut progress) = (two_pairs(), Progress::default());
-        let unit = [2.0, 8.0, 1.0, 1.0];
+        let (model, unit) = (two_pairs(), [2.0, 8.0, 1.0, 1.0]);
         // 3 times the stiffness of both points
-        progress.observe(&model, &unit, &[1.0, -0.5, 1.0, 0.0], &[-6.0, 12.0, 0.0, 0.0]);
+        let (dc, dp) = ([1.0, -0.5, 1.0, 0.0], [-6.0, 12.0, 0.0, 0.0]);
         let [w, v] = [model.weight[0], model.weight[1]];
         let times = ((w * 36.0 / 2.0 + v * 144.0 / 8.0) / (w * 2.0 + v * 0.25 * 8.0)).sqrt();
-        let slopes = progress.slopes(&model, &unit);
-        let expected = [2.0 * times.sqrt(), 8.0 * times.sqrt(), 1e-3f64.sqrt(), 1e-3f64.sqrt()];
-        assert!(slopes.iter().zip(expected).all(|(s, e)| (s - e).abs() < 1e-14 * e), "{slopes:?} {expected:?}");
+        let mut progress = Progress::default();
+        for (is_smoothed, answer) in [(false, [times, 1e-6]), (true, [times.sqrt(), 1e-3])] {
+            progress.observe(&model, &unit, &dc, &dp, is_smoothed);
+            let expected = [2.0 * answer[0], 8.0 * answer[0], answer[1], answer[1]];
+            let slopes = progress.slopes(&model, &unit);
+            assert!(slopes.iter().zip(expected).all(|(s, e)| (s - e).abs() < 1e-14 * e), "{slopes:?} {expected:?}");
+        }
     }
 }

@@ -142,7 +142,9 @@ impl Run<'_> {
         if let Some(period) = at.period {
             return Ok(Some(Status::Cycle { period }));
         }
-        if self.memory.floor.is_reached(at.residual) && at.missed <= rounding(self.model, at.u, at.layer) {
+        if self.memory.floor.is_reached(at.residual)
+            && (self.memory.floor.is_fixed(increment) || at.missed <= rounding(self.model, at.u, at.layer))
+        {
             return Ok(Some(Status::RoundoffLimited));
         }
         Ok((at.k >= self.stop.iterations).then_some(Status::IterationLimit))

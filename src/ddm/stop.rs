@@ -126,6 +126,12 @@ impl Floor {
         }
         self.since > 0 && self.since.is_multiple_of(self.patience) && error < self.believable
     }
+
+    /// Whether Newton's method stands still: as many steps as a cycle has at most were no progress, and the last one moved the bodies by this `increment`, no
+    /// more than half of the digits. The next step would be the same, so that only rounding is left.
+    pub fn is_fixed(&self, increment: f64) -> bool {
+        self.patience == 1 && self.since >= Cycle::LONGEST && increment <= f64::EPSILON.sqrt()
+    }
 }
 
 /// Recognises an iteration that runs in a circle: the same traces again, or the same contact sets again and again without
@@ -279,5 +285,9 @@ mod tests {
         let mut steps = Floor::of_steps();
         assert_eq!([0.9; 5].map(|error| steps.is_reached(error)), [false, true, true, true, true]);
         assert!((0..9).all(|_| !steps.is_reached(1.0)));
+        let mut fixed = Floor::of_steps();
+        let seen: Vec<bool> = (0..9).map(|_| fixed.is_reached(1e-6) && fixed.is_fixed(1e-9)).collect();
+        assert_eq!(seen.iter().position(|seen| *seen), Some(8));
+        assert!(!fixed.is_fixed(1e-7) && !fixed.is_fixed(f64::NAN));
     }
 }
