@@ -44,7 +44,7 @@ use crate::error::Result;
 use crate::exchange::{Exchange, share};
 use crate::linalg::{Total, axpy};
 use crate::mesh::Mesh;
-use crate::model::{Mechanism, Model};
+use crate::model::{BodySlot, Mechanism, Model};
 use crate::problem::{BodySpec, Plane, Start};
 use crate::scene::Scene;
 pub use balance::{Balance, Resultant};
@@ -57,12 +57,12 @@ pub use factory::{Assembled, Factory, Outline};
 pub use find::point;
 pub use info::{Balanced, BodyInfo, ContactInfo, Gauged};
 use mechanism::Fixed;
-use meshes::{Kept, Meshes};
+use meshes::{Kept, Meshes, Shape};
 use part::Part;
 use parts::parts;
 use plan::plan;
 pub use post::Post;
-use ready::Counts;
+use ready::{Counts, Ready};
 use std::rc::Rc;
 pub use surface::ContactSurface;
 use totals::totals;
@@ -162,13 +162,7 @@ pub fn discretize<const D: usize>(
     let carried: Vec<Vec<f64>> = unassembled.iter().map(Unassembled::carried).collect();
     let ready = unassembled.into_iter().map(|body| body.ready(&pairs, mesh, keep, others));
     let ready = ready.collect::<Result<Vec<_>>>()?;
-    let (mut slots, mut shapes, mut counts) = (Vec::new(), Vec::new(), Counts::default());
-    for (ready, info) in ready.into_iter().zip(&mut infos) {
-        let is_owner = info.rank == exchange.rank();
-        let (slot, shape) = ready.make(info, mesh, is_owner, factory, &mut counts)?;
-        slots.push(slot);
-        shapes.extend(shape.filter(|_| keep));
-    }
+    let (slots, shapes, counts) = assemble(ready, &mut infos, mesh, exchange.rank(), factory)?;
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
@@ -234,6 +228,24 @@ fn owners<const D: usize>(parts: &[Part<D>], deals: &[Deal], ranks: usize) -> Ve
 /// The next of a list that has one entry for each body.
 fn next<T>(each: &mut std::vec::IntoIter<T>) -> T {
     each.next().unwrap_or_else(|| unreachable!("there is one for each body"))
+}
+
+/// Assembles the bodies on this rank: what the model has of each, their shapes, and how many matrices were assembled.
+fn assemble<const D: usize>(
+    ready: Vec<Ready<D>>,
+    infos: &mut [BodyInfo],
+    mesh: &Mesh<D>,
+    rank: usize,
+    factory: &mut dyn Factory,
+) -> Result<(Vec<BodySlot>, Vec<Shape<D>>, Counts)> {
+    let (mut slots, mut shapes, mut counts) = (Vec::new(), Vec::new(), Counts::default());
+    for (ready, info) in ready.into_iter().zip(infos) {
+        let is_owner = info.rank == rank;
+        let (slot, shape) = ready.make(info, mesh, is_owner, factory, &mut counts)?;
+        slots.push(slot);
+        shapes.extend(shape);
+    }
+    Ok((slots, shapes, counts))
 }
 
 /// Gives the bodies of a model the rigid motions of their supports, with these traces on the contact rows of each; all of them, 2n.

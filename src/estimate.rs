@@ -10,7 +10,7 @@ mod layer;
 pub mod sizes;
 
 use crate::ddm::{Discretisation, linear};
-use crate::discretize::meshes::Meshes;
+use crate::discretize::meshes::{Meshes, Recovered};
 use crate::error::{Error, Kind, Result};
 use crate::model::field::residual;
 use crate::model::surface::meeting_slopes;
@@ -59,77 +59,20 @@ pub fn estimate(
     iterate: &Field,
     layer: &Layer,
 ) -> Result<Estimate> {
-    let count = model.bodies.len();
-    let mut displacements = Vec::new();
-    for (index, state) in iterate.states.iter().enumerate() {
-        let mut all = None;
-        if let Some(body) = &model.bodies[index].local {
-            let mut u = body.recover(state)?;
-            u.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
-            all = Some(u).filter(|_| body.leads());
-        }
-        displacements.push(all.map(|all| meshes.displacements(index, &all)));
-    }
-    let recovered: Vec<_> =
-        displacements.iter().enumerate().map(|(body, u)| u.as_ref().map(|u| meshes.recover(body, u))).collect();
-
-    let mut cells = vec![Vec::new(); count];
-    let mut loads = vec![Vec::new(); count];
-    for (body, recovered) in recovered.iter().enumerate() {
-        if let Some(recovered) = recovered {
-            cells[body] = recovered.energy_errors();
-            loads[body] = recovered.interpolation_residual();
-            loads[body].iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
-        }
-    }
-    let mut bodies: Vec<f64> = cells.iter().map(|cells| cells.iter().sum()).collect();
-    model.exchange.sum(&mut bodies);
-
-    let mut layers = vec![0.0; model.pairs.len()];
-    let mut beyond = Vec::new();
-    for (index, pair) in model.pairs.iter().enumerate() {
-        let points = meshes.points(index);
-        let mut compression = vec![0.0; points.weight.len()];
-        for side in 0..2 {
-            if let Some(recovered) = &recovered[pair.bodies[side]] {
-                let normal = recovered.normal_displacement(index, side);
-                compression.iter_mut().zip(normal).for_each(|(sum, u)| *sum += u);
-            }
-        }
-        model.exchange.sum(&mut compression);
-        let range = model.range(index);
-        let mut means = vec![0.0; pair.len()];
-        if let Some(recovered) = &recovered[pair.bodies[1]] {
-            means = recovered.beyond_means(index, &pair.nodal[1]);
-        }
-        model.exchange.sum(&mut means);
-        let springs: Vec<f64> =
-            range.clone().zip(&means).map(|(q, c)| model.weight[q] * layer.tangent[q] * c).collect();
-        let of_layer = LayerError::new(pair, &points, layer, range.clone(), &compression, &means);
-        layers[index] = of_layer.energy;
-        beyond.extend(means);
-        let force: Vec<f64> = of_layer.pressure.iter().zip(points.weight).map(|(p, weight)| -weight * p).collect();
-        for side in 0..2 {
-            let body = pair.bodies[side];
-            if let Some(recovered) = &recovered[body] {
-                recovered.add_forces(index, side, &force, &mut loads[body]);
-                pair.nodal[side].add_transpose(1.0, &layer.force[range.clone()], &mut loads[body]);
-                pair.nodal[side].add_transpose(-1.0, &springs, &mut loads[body]);
-            }
-        }
+    let displacements = displacements(meshes, model, iterate)?;
+    let each = displacements.iter().enumerate();
+    let recovered: Vec<_> = each.map(|(body, u)| Some(meshes.recover(body, u.as_ref()?))).collect();
+    let mut local = Local::of_bodies(meshes, &recovered);
+    for pair in 0..model.pairs.len() {
+        local.add_pair(meshes, model, layer, &recovered, pair);
     }
     drop(recovered);
+    let mut bodies: Vec<f64> = local.cells.iter().map(|cells| cells.iter().sum()).collect();
+    model.exchange.sum(&mut bodies);
     let held = Held::of(model, layer);
-    held.balance(meshes, model, &mut loads);
-    for (body, load) in loads.iter_mut().enumerate().filter(|(_, load)| !load.is_empty()) {
-        meshes.forces(body, load);
-    }
-    for (slot, load) in model.bodies.iter().zip(&mut loads) {
-        if let Some(distribution) = slot.local.as_ref().and_then(|body| body.distribution()) {
-            load.resize(distribution.dofs, 0.0);
-            model.exchange.sum(load);
-        }
-    }
+    held.balance(meshes, model, &mut local.loads);
+    let Local { cells, mut loads, layers, beyond } = local;
+    to_dofs(meshes, model, &mut loads);
 
     let response = linear::respond(model, step, layer, &loads, share(model, layer, &beyond))?;
     let (nodal, mut squared) = response.map_err(|failure| Error::new(Kind::Solver, failure.reason))?;
@@ -147,15 +90,12 @@ pub fn estimate(
         () => 0.0,
     };
     // that of the nodal values is a part of the whole
-    let error = bodies.iter().chain(&layers).sum::<f64>().max(squared);
+    let energy = relative(bodies.iter().chain(&layers).sum::<f64>().max(squared));
     let pressure_error = pressure_errors(model, layer, &closing);
-    let energy = relative(error);
     let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
-    let displacement = ratio((0..2 * model.points()).map(|i| {
-        let point = model.weight[i % model.points()];
-        (point, nodal.trace[i], trace[i])
-    }));
+    let at = |i: usize| (model.weight[i % model.points()], nodal.trace[i], trace[i]);
+    let displacement = ratio((0..2 * model.points()).map(at));
     Ok(Estimate {
         energy,
         nodal: relative(squared),
@@ -167,6 +107,98 @@ pub fn estimate(
         bodies,
         layers,
     })
+}
+
+/// Displacements of all nodes of each body, on the rank that leads it. Collective.
+fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<Vec<Option<Vec<f64>>>> {
+    let mut all = Vec::new();
+    for (index, state) in iterate.states.iter().enumerate() {
+        let Some(body) = &model.bodies[index].local else {
+            all.push(None);
+            continue;
+        };
+        let mut u = body.recover(state)?;
+        u.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
+        all.push(body.leads().then(|| meshes.displacements(index, &u)));
+    }
+    Ok(all)
+}
+
+/// What was recovered of each body, on the rank that leads it.
+type OfBodies<'a> = [Option<Box<dyn Recovered + 'a>>];
+
+/// What recovered displacements tell before any solve.
+struct Local {
+    /// Squared energy error of each cell of each body that this rank leads.
+    cells: Vec<Vec<f64>>,
+    /// The load on the discrete problem, at the nodes of each body that this rank leads.
+    loads: Vec<Vec<f64>>,
+    /// Squared energy error of each layer.
+    layers: Vec<f64>,
+    /// What the compression of each contact point lacks as a mean, n.
+    beyond: Vec<f64>,
+}
+
+impl Local {
+    /// The bodies without their layers.
+    fn of_bodies(meshes: &dyn Meshes, recovered: &OfBodies) -> Self {
+        let count = recovered.len();
+        let (cells, loads) = (vec![Vec::new(); count], vec![Vec::new(); count]);
+        let mut local = Self { cells, loads, layers: Vec::new(), beyond: Vec::new() };
+        for (body, recovered) in recovered.iter().enumerate() {
+            if let Some(recovered) = recovered {
+                local.cells[body] = recovered.energy_errors();
+                local.loads[body] = recovered.interpolation_residual();
+                local.loads[body].iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
+            }
+        }
+        local
+    }
+
+    /// Adds the layer of a pair, pairs in their order: its own error, and the forces that it lacks on both bodies. Collective.
+    fn add_pair(&mut self, meshes: &dyn Meshes, model: &Model, layer: &Layer, recovered: &OfBodies, index: usize) {
+        let (pair, points, range) = (&model.pairs[index], meshes.points(index), model.range(index));
+        let mut compression = vec![0.0; points.weight.len()];
+        for side in 0..2 {
+            if let Some(recovered) = &recovered[pair.bodies[side]] {
+                let normal = recovered.normal_displacement(index, side);
+                compression.iter_mut().zip(normal).for_each(|(sum, u)| *sum += u);
+            }
+        }
+        model.exchange.sum(&mut compression);
+        let mut means = vec![0.0; pair.len()];
+        if let Some(recovered) = &recovered[pair.bodies[1]] {
+            means = recovered.beyond_means(index, &pair.nodal[1]);
+        }
+        model.exchange.sum(&mut means);
+        let springs: Vec<f64> =
+            range.clone().zip(&means).map(|(q, c)| model.weight[q] * layer.tangent[q] * c).collect();
+        let of_layer = LayerError::new(pair, &points, layer, range.clone(), &compression, &means);
+        let force: Vec<f64> = of_layer.pressure.iter().zip(points.weight).map(|(p, weight)| -weight * p).collect();
+        for side in 0..2 {
+            let (body, nodal) = (pair.bodies[side], &pair.nodal[side]);
+            if let Some(recovered) = &recovered[body] {
+                recovered.add_forces(index, side, &force, &mut self.loads[body]);
+                nodal.add_transpose(1.0, &layer.force[range.clone()], &mut self.loads[body]);
+                nodal.add_transpose(-1.0, &springs, &mut self.loads[body]);
+            }
+        }
+        self.layers.push(of_layer.energy);
+        self.beyond.extend(means);
+    }
+}
+
+/// Turns loads at the nodes of each body into those at its dofs, on all ranks that have a part of it. Collective.
+fn to_dofs(meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {
+    for (body, load) in loads.iter_mut().enumerate().filter(|(_, load)| !load.is_empty()) {
+        meshes.forces(body, load);
+    }
+    for (slot, load) in model.bodies.iter().zip(loads) {
+        if let Some(distribution) = slot.local.as_ref().and_then(|body| body.distribution()) {
+            load.resize(distribution.dofs, 0.0);
+            model.exchange.sum(load);
+        }
+    }
 }
 
 /// Return the body with the largest error, and the centre of its worst cell in the scene, if the estimated energy error is as large as the solution. The mesh is then too

@@ -7,10 +7,11 @@ use super::write::{Writing, to_json};
 use super::{folder_of, load, said, series};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
+use crate::estimate::Estimate;
 use crate::exchange::share;
 use crate::interrupt::Interrupt;
 use crate::output::progress::Line;
-use crate::output::{Checksums, Folder, HistoryWriter, IterationTable, StepTable, Verbosity, say};
+use crate::output::{Checksums, Folder, HistoryWriter, IterationTable, Report, StepTable, Verbosity, say};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::run::asking::{is_snapshot, signal};
@@ -66,122 +67,184 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder, &scene);
     let kept = agree(session, request.restart.as_ref().map(read).transpose())?;
     let folder = agree(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
-    let path = folder.path();
     let mut plan = Plan::new(session, scene, kept, interrupt, &mut clock)?;
     // one rank has the clock
     let asking = Asking::new(interrupt, plan.scene.output.checkpoint.filter(|_| first));
-    let mut saved = request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == path.canonicalize().ok());
-    let (mut has_begun, mut unwritten) = (false, Vec::new());
-    let (done, estimate, failed) = loop {
-        let built = plan.build(session, interrupt, &mut clock)?;
+    let saved =
+        request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == folder.path().canonicalize().ok());
+    let solving = Solving { session, interrupt, asking: &asking, folder: &folder, first, json, verbosity, is_loud };
+    let mut solving = Rounds { of: solving, clock, saved, has_begun: false, unwritten: Vec::new() };
+    let last = loop {
+        let round = solving.solve(&mut plan)?;
+        if !plan.goes_on(session, &round.done, round.estimate.as_ref(), &mut solving.clock)? {
+            break round;
+        }
+        if plan.adapts() {
+            solving.keep(&plan, round);
+        }
+    };
+    solving.finish(&plan, last)
+}
+
+/// What does not change from mesh to mesh.
+#[derive(Clone, Copy)]
+struct Solving<'s> {
+    session: &'s Session,
+    interrupt: &'s Interrupt,
+    asking: &'s Asking,
+    folder: &'s Folder,
+    /// Whether this rank is the first one, which writes.
+    first: bool,
+    json: bool,
+    verbosity: Verbosity,
+    is_loud: bool,
+}
+
+/// The rounds of a run, one a mesh.
+struct Rounds<'s> {
+    of: Solving<'s>,
+    clock: Clock,
+    /// Whether the folder has a checkpoint of this run.
+    saved: bool,
+    /// Whether the folder has the tables of this run.
+    has_begun: bool,
+    /// What could not be written of earlier meshes, in words.
+    unwritten: Vec<String>,
+}
+
+/// A round that has ended.
+struct Round {
+    done: Done,
+    estimate: Option<Estimate>,
+    /// Whether its tables were written.
+    tables: Result<()>,
+}
+
+impl Rounds<'_> {
+    /// Solves on the next mesh of the plan, and estimates the error.
+    fn solve(&mut self, plan: &mut Plan) -> Result<Round> {
+        let Solving { session, interrupt, asking, folder, first, verbosity, is_loud, .. } = self.of;
+        let built = plan.build(session, interrupt, &mut self.clock)?;
         let begin = agree(session, plan.begin(&built))?;
-        let ready = run::set_up(session, built, begin, &mut clock)?;
+        let ready = run::set_up(session, built, begin, &mut self.clock)?;
         let all = session.options().all()?;
         let monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
         if verbosity == Verbosity::Verbose {
             let decided = said::decisions(session, &ready)?;
             decided.iter().filter(|_| first).for_each(|line| eprintln!("{line}"));
         }
-        // all refusals are behind: from here on the folder has this run alone
-        if first && !has_begun {
-            begin_in(&folder, saved)?;
-        }
-        let (history, steps) = match tables(&folder, &ready, first) {
-            // of a later mesh: the run goes on without
-            Err(error) if has_begun => {
-                unwritten.push(error.message().to_owned());
-                (None, None)
-            }
-            opened => opened?,
-        };
-        has_begun = true;
+        let (history, steps) = self.open_tables(&ready)?;
         let stop = &plan.scene.method.stop;
         let mut watchers = Watchers {
             table: IterationTable::new(is_loud && !monitored, &run::targets(&plan.scene), stop.residual),
             history,
             steps,
-            folder: &folder,
-            asking: &asking,
+            folder,
+            asking,
             session,
-            path,
-            plan: &plan,
-            clock: clock.clone(),
-            saved,
+            path: folder.path(),
+            plan,
+            clock: self.clock.clone(),
+            saved: self.saved,
             failed: Vec::new(),
         };
         let stage = session.stage("iterate");
-        let mut done = run::iterate(ready, interrupt, &mut watchers, &mut clock)?;
+        let mut done = run::iterate(ready, interrupt, &mut watchers, &mut self.clock)?;
         drop(stage);
         done.warnings.append(&mut watchers.failed);
-        done.warnings.extend(unwritten.drain(..).map(|what| format!("of an earlier mesh: {what}")));
-        saved = watchers.saved;
+        done.warnings.extend(self.unwritten.drain(..).map(|what| format!("of an earlier mesh: {what}")));
+        self.saved = watchers.saved;
         let stage = session.stage("estimate");
-        let mut estimate = run::estimate(&mut done, &mut clock)?;
+        let mut estimate = run::estimate(&mut done, &mut self.clock)?;
         drop(stage);
         watchers.table.finish();
-        let failed = watchers.history.map_or(Ok(()), |history| history.finish());
-        let failed = failed.and(watchers.steps.map_or(Ok(()), |steps| steps.finish()));
+        let tables = watchers.history.map_or(Ok(()), |history| history.finish());
+        let tables = tables.and(watchers.steps.map_or(Ok(()), |steps| steps.finish()));
         estimate.iter_mut().for_each(|estimate| plan.hold(&done, estimate));
-        let more = plan.goes_on(session, &done, estimate.as_ref(), &mut clock)?;
-        if !more {
-            break (done, estimate, failed);
+        Ok(Round { done, estimate, tables })
+    }
+
+    /// The tables of a round. Those of a later mesh are worth less than its results, so that the run goes on without them.
+    fn open_tables(&mut self, ready: &Ready) -> Result<(Option<HistoryWriter>, Option<StepTable>)> {
+        let Solving { folder, first, .. } = self.of;
+        // all refusals are behind: from here on the folder has this run alone
+        if first && !self.has_begun {
+            begin_in(folder, self.saved)?;
         }
-        if plan.adapts() {
-            // whatever comes of the next mesh, this one's results are there
-            let estimate = estimate.as_ref();
-            let writing = Writing { session, path, plan: &plan, done: &done, estimate, fields: false, is_last: false };
-            let ended = match plan.is_stepping() {
-                true => "ended while load steps were at work on the last mesh",
-                false => "ended while the next mesh was at work: the error asked for is not reached",
-            };
-            let (_, written) = writing.all(&mut clock, |report| {
-                (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
-            });
-            // what cannot be written now may find room at the end, and what was computed goes on
-            if let Err(error) = failed.and(written) {
-                unwritten.push(error.message().to_owned());
+        let has_begun = std::mem::replace(&mut self.has_begun, true);
+        match tables(folder, ready, first) {
+            Err(error) if has_begun => {
+                self.unwritten.push(error.message().to_owned());
+                Ok((None, None))
             }
-        }
-    };
-    let line = is_loud.then(|| Line::new("stresses and files", None));
-    let writing =
-        Writing { session, path, plan: &plan, done: &done, estimate: estimate.as_ref(), fields: true, is_last: true };
-    let (report, written) = writing.all(&mut clock, |report| {
-        if let Some(limit) = &plan.limit {
-            report.status = "mesh-limit".to_owned();
-            report.message = format!("the error asked for is not reached: {limit}");
-        }
-    });
-    let written = match plan.scene.output.report {
-        true => written.and(page(&done, path, first)),
-        false => written,
-    };
-    drop(line);
-    let code = if plan.limit.is_some() { 1 } else { report::exit_code(&done) };
-    if first {
-        let file = path.join(checkpoint::FILE);
-        if saved && code == 0 {
-            // nothing is left to go on from; one that is gone already is as well
-            let _ = std::fs::remove_file(&file);
-        }
-        if json {
-            say(to_json(&report)?.trim_end())?;
-        } else {
-            let again = if saved && code > 1 { "; --restart with this folder goes on" } else { "" };
-            let results = format!("  results in {}{again}", path.display());
-            say(match verbosity {
-                Verbosity::Quiet => said::briefly(&report, code, &results),
-                _ => {
-                    let solvers: Vec<String> = report.bodies.iter().map(|body| body.solver.clone()).collect();
-                    let (solvers, choice) = (report::solvers_in_words(&solvers), &done.built.choice);
-                    format!("{}\n  inner solver: {solvers} ({choice})\n{results}", report.summary())
-                }
-            })?;
+            opened => opened,
         }
     }
-    failed.and(written)?;
-    agree(session, if first { plan.keep_mesh(&done) } else { Ok(()) })?;
-    Ok(code)
+
+    /// Writes the results of a mesh that is not the last: whatever comes of the next one, they are there.
+    fn keep(&mut self, plan: &Plan, Round { done, estimate, tables }: Round) {
+        let (session, path) = (self.of.session, self.of.folder.path());
+        let estimate = estimate.as_ref();
+        let writing = Writing { session, path, plan, done: &done, estimate, fields: false, is_last: false };
+        let ended = match plan.is_stepping() {
+            true => "ended while load steps were at work on the last mesh",
+            false => "ended while the next mesh was at work: the error asked for is not reached",
+        };
+        let (_, written) = writing.all(&mut self.clock, |report| {
+            (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
+        });
+        // what cannot be written now may find room at the end, and what was computed goes on
+        if let Err(error) = tables.and(written) {
+            self.unwritten.push(error.message().to_owned());
+        }
+    }
+
+    /// Writes all results of the last mesh, and returns the exit code.
+    fn finish(mut self, plan: &Plan, Round { done, estimate, tables }: Round) -> Result<i32> {
+        let Solving { session, folder, first, is_loud, .. } = self.of;
+        let path = folder.path();
+        let line = is_loud.then(|| Line::new("stresses and files", None));
+        let estimate = estimate.as_ref();
+        let writing = Writing { session, path, plan, done: &done, estimate, fields: true, is_last: true };
+        let (report, written) = writing.all(&mut self.clock, |report| {
+            if let Some(limit) = &plan.limit {
+                report.status = "mesh-limit".to_owned();
+                report.message = format!("the error asked for is not reached: {limit}");
+            }
+        });
+        let written = match plan.scene.output.report {
+            true => written.and(page(&done, path, first)),
+            false => written,
+        };
+        drop(line);
+        let code = if plan.limit.is_some() { 1 } else { report::exit_code(&done) };
+        if first {
+            if self.saved && code == 0 {
+                // nothing is left to go on from; one that is gone already is as well
+                let _ = std::fs::remove_file(path.join(checkpoint::FILE));
+            }
+            self.say(&report, &done, code)?;
+        }
+        tables.and(written)?;
+        agree(session, if first { plan.keep_mesh(&done) } else { Ok(()) })?;
+        Ok(code)
+    }
+
+    /// Says how the run ended.
+    fn say(&self, report: &Report, done: &Done, code: i32) -> Result<()> {
+        let Solving { json, verbosity, folder, .. } = self.of;
+        if json {
+            return say(to_json(report)?.trim_end());
+        }
+        let again = if self.saved && code > 1 { "; --restart with this folder goes on" } else { "" };
+        let results = format!("  results in {}{again}", folder.path().display());
+        if verbosity == Verbosity::Quiet {
+            return say(said::briefly(report, code, &results));
+        }
+        let solvers: Vec<String> = report.bodies.iter().map(|body| body.solver.clone()).collect();
+        let (solvers, choice) = (report::solvers_in_words(&solvers), &done.built.choice);
+        say(format!("{}\n  inner solver: {solvers} ({choice})\n{results}", report.summary()))
+    }
 }
 
 /// Takes the folder of results for this run, on the first rank, which writes its tables.

@@ -9,13 +9,14 @@ use super::here::Here;
 use super::info::BodyInfo;
 use super::local::Local;
 use super::meshes::Shape;
+use super::part::Part;
 use super::post::{OnPart, Post};
 use super::supports::Held;
 use crate::error::Result;
 use crate::fem::{Elasticity, FreeMotion, NodeGraph, RigidMotion, Space};
-use crate::linalg::dot;
+use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
-use crate::model::{BodySlot, Loads, Segment};
+use crate::model::{Body, BodySlot, Loads, Segment};
 use std::rc::Rc;
 
 /// A body before its matrix is assembled, as one rank sees it.
@@ -53,6 +54,14 @@ pub struct Counts {
     pub avoided: usize,
 }
 
+/// What only the ranks that have a part of a body know of it, until all ranks share it.
+#[derive(Default)]
+struct Made {
+    local: Option<Box<dyn Body>>,
+    scale: f64,
+    row_stiffness: Vec<f64>,
+}
+
 impl<const D: usize> Ready<'_, D> {
     /// Assembles the body and makes it one that solves, with what is known of its mesh; `info` learns what the body says of its displacements.
     ///
@@ -69,76 +78,54 @@ impl<const D: usize> Ready<'_, D> {
         let Self { segments, loose, scales: [modulus, depth], unloaded, .. } = self;
         let Loose { left, motions, sprung, unsupported, .. } = loose;
         let name = info.name.clone();
-        // what only the owner knows, until all ranks share it
-        let (mut local, mut scale, mut row_stiffness) = (None, 0.0, Vec::new());
         let elasticity = Rc::new(self.elasticity);
+        let shape = |space: Rc<Space<D>>, held: Rc<Held<D>>, elasticity: Rc<Elasticity>| Shape {
+            space,
+            held,
+            elasticity,
+            modulus,
+            unloaded,
+            motions: unsupported,
+        };
+        let slot = |Made { local, scale, row_stiffness }: Made| BodySlot {
+            name: name.clone(),
+            local,
+            segments,
+            motions,
+            sprung,
+            scale,
+            modulus,
+            depth,
+            row_stiffness,
+        };
         let Some(here) = self.here else {
-            let of = |(space, held)| Shape {
-                space: Rc::new(space),
-                held: Rc::new(held),
-                elasticity,
-                modulus,
-                unloaded,
-                motions: unsupported,
-            };
-            let shape = self.elsewhere.map(of);
-            return Ok((
-                BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness },
-                shape,
-            ));
+            let shape = self.elsewhere.map(|(space, held)| shape(Rc::new(space), Rc::new(held), elasticity));
+            return Ok((slot(Made::default()), shape));
         };
         let Here { part, rows: [rows, nodal_rows], load, supported: Supported { carried, prescribed } } = here;
-        let (dealt, works, smooth) = (self.dealt, self.works, self.smooth);
         let force = part.load_vector(&load);
-        let carried = carried.map_or_else(Vec::new, |motion| part.dofs_of(&motion));
         let free = left.iter().enumerate().map(|(k, motion)| {
-            let work = |u: &[f64]| works.as_ref().map_or_else(|| dot(u, &force), |works| works[k]);
+            let work = |u: &[f64]| self.works.as_ref().map_or_else(|| dot(u, &force), |works| works[k]);
             FreeMotion::new(part.dofs_of(motion), &prescribed, work)
         });
-        let free: Vec<_> = free.collect();
-        let is_own = |node| dealt.as_ref().is_none_or(|dealt| dealt.is_own::<D>(part.held.frame.node(node) as usize));
-        let own: Vec<bool> = (0..part.space.nodes.len() as u32).map(is_own).collect();
-        let mut kept = factory.kept(&name).filter(|_| dealt.is_none());
-        let mut serves = false;
-        if let Some(body) = kept.as_mut().and_then(|slot| slot.local.as_mut()) {
-            let work = free.iter().map(|motion| motion.work).collect();
-            let (force, prescribed, carried) = (force.clone(), prescribed.clone(), carried.clone());
-            serves = body.reload(&Loads { work, force, prescribed, carried })?;
-        }
-        if let Some(before) = kept.filter(|_| serves) {
-            (local, scale, row_stiffness) = (before.local, before.scale, before.row_stiffness);
-            counts.avoided += 1;
-        } else {
-            let whole = || NodeGraph::with_rows(&part.space, &rows, &part.held.frame);
-            let mut graph = self.graph.unwrap_or_else(whole);
-            if let Some(dealt) = &dealt {
-                graph = graph.of(|node| dealt.is_own::<D>(node));
+        let left: Vec<FreeMotion> = free.collect();
+        let work = left.iter().map(|motion| motion.work).collect();
+        let carried = carried.map_or_else(Vec::new, |motion| part.dofs_of(&motion));
+        let loads = Loads { work, force, prescribed, carried };
+        let own = own_nodes(&part, self.dealt.as_ref());
+        let kept = factory.kept(&name).filter(|_| self.dealt.is_none());
+        let made = match reload(kept, &loads)? {
+            Some(before) => {
+                counts.avoided += 1;
+                before
             }
-            let mut body = part.assemble(mesh, &graph, &elasticity, force, prescribed, carried)?;
-            drop(graph);
-            if is_owner {
-                counts.assemblies += 1;
-                scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
+            None => {
+                counts.assemblies += usize::from(is_owner);
+                let (graph, dealt, smooth) = (self.graph, self.dealt, self.smooth);
+                let assembly = Assembly { name: &name, part: &part, rows, graph, dealt, smooth, left };
+                assembly.make(mesh, &elasticity, loads, is_owner, factory)?
             }
-            row_stiffness = rows.quadratic_diagonal(&body.stiffness);
-            if let Some(dealt) = &dealt {
-                body = dealt.own::<D>(body);
-            }
-            let interpolation = factory.wants_interpolation(&name).then(|| match &dealt {
-                Some(dealt) => dealt.interpolation::<D>(|coarse| part.interpolation(coarse)),
-                None => part.interpolation(&part.coarse_nodes()),
-            });
-            local = Some(factory.make(Assembled {
-                name: name.clone(),
-                dimension: D,
-                body,
-                distribution: dealt.map(|dealt| dealt.distribution),
-                rows,
-                motions: &|| smooth.iter().map(|motion| part.dofs_of(motion)).collect(),
-                left: free,
-                interpolation,
-            })?);
-        }
+        };
         let rigid = part.rigid_forces().map(|(node, total)| (node, std::array::from_fn(|c| total[c]))).collect();
         let (space, held) = (Rc::new(part.space), Rc::new(part.held));
         let is_whole = info.ranks.len() == 1 && !own.contains(&false);
@@ -162,7 +149,75 @@ impl<const D: usize> Ready<'_, D> {
         let mut outer = part.known.outer;
         outer.weigh(&space);
         info.post = Some(Box::new(OnPart::new(part.spec, outer, forces)?) as Box<dyn Post>);
-        let slot = BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness };
-        Ok((slot, Some(Shape { space, elasticity, modulus, held, unloaded, motions: unsupported })))
+        Ok((slot(made), Some(shape(space, held, elasticity))))
+    }
+}
+
+/// Which of the nodes that a rank knows of a body are its own.
+fn own_nodes<const D: usize>(part: &Part<D>, dealt: Option<&Dealt>) -> Vec<bool> {
+    let is_own = |node| dealt.is_none_or(|dealt| dealt.is_own::<D>(part.held.frame.node(node) as usize));
+    (0..part.space.nodes.len() as u32).map(is_own).collect()
+}
+
+/// The body of an earlier scene under other loads; none if it cannot serve again.
+fn reload(kept: Option<BodySlot>, loads: &Loads) -> Result<Option<Made>> {
+    let Some(mut before) = kept else { return Ok(None) };
+    let serves = match &mut before.local {
+        Some(body) => body.reload(loads)?,
+        None => false,
+    };
+    let made = Made { local: before.local, scale: before.scale, row_stiffness: before.row_stiffness };
+    Ok(serves.then_some(made))
+}
+
+/// A body whose matrix is to be assembled.
+struct Assembly<'p, 'a, const D: usize> {
+    name: &'p str,
+    part: &'p Part<'a, D>,
+    rows: Csr,
+    graph: Option<NodeGraph>,
+    dealt: Option<Dealt>,
+    smooth: Vec<RigidMotion<D>>,
+    left: Vec<FreeMotion>,
+}
+
+impl<const D: usize> Assembly<'_, '_, D> {
+    fn make(
+        self,
+        mesh: &Mesh<D>,
+        elasticity: &Elasticity,
+        loads: Loads,
+        is_owner: bool,
+        factory: &mut dyn Factory,
+    ) -> Result<Made> {
+        let Self { name, part, rows, dealt, smooth, left, .. } = self;
+        let mut graph = self.graph.unwrap_or_else(|| NodeGraph::with_rows(&part.space, &rows, &part.held.frame));
+        if let Some(dealt) = &dealt {
+            graph = graph.of(|node| dealt.is_own::<D>(node));
+        }
+        let Loads { force, prescribed, carried, .. } = loads;
+        let mut body = part.assemble(mesh, &graph, elasticity, force, prescribed, carried)?;
+        drop(graph);
+        let diagonal = (0..body.load.len()).map(|i| body.stiffness.diagonal(i));
+        let scale = if is_owner { diagonal.fold(0.0, f64::max) } else { 0.0 };
+        let row_stiffness = rows.quadratic_diagonal(&body.stiffness);
+        if let Some(dealt) = &dealt {
+            body = dealt.own::<D>(body);
+        }
+        let interpolation = factory.wants_interpolation(name).then(|| match &dealt {
+            Some(dealt) => dealt.interpolation::<D>(|coarse| part.interpolation(coarse)),
+            None => part.interpolation(&part.coarse_nodes()),
+        });
+        let local = factory.make(Assembled {
+            name: name.to_owned(),
+            dimension: D,
+            body,
+            distribution: dealt.map(|dealt| dealt.distribution),
+            rows,
+            motions: &|| smooth.iter().map(|motion| part.dofs_of(motion)).collect(),
+            left,
+            interpolation,
+        })?;
+        Ok(Made { local: Some(local), scale, row_stiffness })
     }
 }
