@@ -33,91 +33,116 @@ pub fn find<'a, const D: usize>(
     if rules.is_empty() {
         return Ok(Vec::new());
     }
-    let matches = rules.iter().map(|rule| Matches::new(rule, parts)).collect::<Result<Vec<_>>>()?;
-    let farthest = rules.iter().map(|rule| rule.distance).fold(0.0, f64::max);
-    let whole: Vec<Side<D>> = parts
-        .iter()
-        .map(|part| {
-            Side::new(
-                &part.spec.name.value,
-                &part.space,
-                part.known.boundary(&part.space),
-                &part.held.prescribed,
-                &part.held.frame,
-            )
-        })
-        .collect();
-    let searches: Vec<Search<D>> = whole.iter().map(Search::new).collect();
-    let bodies = Search::of_boxes(whole.iter().map(Side::extent));
-    let mut possible = Vec::new();
-    for a in 0..parts.len() {
-        let mut others: Vec<usize> = bodies.near_box(whole[a].extent(), farthest).collect();
-        others.retain(|&b| b > a && !named.contains(&[a, b]));
-        others.sort_unstable();
-        for b in others {
-            let Some((number, other)) = narrowest(&matches, a, b) else { continue };
-            let rule = &rules[number];
-            let reach = within(&whole[a], &whole[b], rule.distance, rule.contact.angle);
-            let near = candidates(&whole[a], &whole[b], &searches[b], &reach);
-            if near.iter().all(|facets| facets.count() > 0) {
-                possible.push(([a, b], near, number, other));
-            }
-        }
-    }
-    // facets of either side that share a piece, of each two bodies
-    let mut meeting: Vec<Vec<[u32; 2]>> = Vec::new();
-    let shares = shares(possible.iter().map(|(_, near, ..)| near[0].count()), exchange);
-    for (([a, b], near, number, _), mine) in possible.iter().zip(shares) {
-        let side = |body: usize, facets: &Facets<D>| {
-            let Side { name, space, prescribed, frame, .. } = whole[body];
-            Side::new(name, space, facets.clone(), prescribed, frame)
-        };
-        let (rule, side_a, side_b) = (&rules[*number], side(*a, &near[0]), side(*b, &near[1]));
-        let reach = within(&side_a, &side_b, rule.distance, rule.contact.angle);
-        let pieces = cut(&side_a, &side_b, &reach, &|facet| mine.contains(&facet)).points;
-        let mut facets: Vec<_> = pieces.iter().map(|point| [point.facet_a as u32, point.facet_b as u32]).collect();
-        facets.sort_unstable();
-        facets.dedup();
-        meeting.push(facets);
-    }
-    let of_ranks = share(exchange, meeting);
+    let of_part = |part: &'a Part<D>| {
+        let (name, facets) = (&part.spec.name.value, part.known.boundary(&part.space));
+        Side::new(name, &part.space, facets, &part.held.prescribed, &part.held.frame)
+    };
+    let whole: Vec<Side<D>> = parts.iter().map(of_part).collect();
+    let possible = possible(rules, parts, &whole, named)?;
+    let meeting = meeting(rules, cut, &whole, &possible, exchange);
     let mut found = Vec::new();
-    for (index, (bodies, near, number, other)) in possible.into_iter().enumerate() {
-        let mut used = near.each_ref().map(|facets| vec![false; facets.count()]);
-        for &facets in of_ranks.iter().flat_map(|of_rank| &of_rank[index]) {
+    for (index, possible) in possible.into_iter().enumerate() {
+        let mut used = possible.near.each_ref().map(|facets| vec![false; facets.count()]);
+        for &facets in meeting.iter().flat_map(|of_rank| &of_rank[index]) {
             used.iter_mut().zip(facets).for_each(|(used, facet)| used[facet as usize] = true);
         }
         if !used[0].contains(&true) {
             continue;
         }
-        if let Some(other) = other {
-            let [a, b] = bodies.map(|body| &parts[body].spec.name.value);
-            let [(own, _), (other, place)] = [number, other].map(|number| title(&rules[number]));
+        if let Some(other) = possible.other {
+            let [a, b] = possible.bodies.map(|body| &parts[body].spec.name.value);
+            let [(own, _), (other, place)] = [possible.rule, other].map(|number| title(&rules[number]));
             return Err(tie(&format!("{a} - {b}"), [&own, &other], place));
         }
-        let surface = |side: usize| Surface {
-            body: bodies[side],
-            name: parts[bodies[side]].spec.name.value.as_str(),
-            facets: near[side].only(&used[side]),
+        let surface = |side: usize| {
+            let body = possible.bodies[side];
+            Surface { body, name: parts[body].spec.name.value.as_str(), facets: possible.near[side].only(&used[side]) }
         };
-        found.push((number, [surface(0), surface(1)]));
+        found.push((possible.rule, [surface(0), surface(1)]));
     }
-    let mut fruitless = vec![true; rules.len()];
-    found.iter().for_each(|(number, _)| fruitless[*number] = false);
-    match rules.iter().zip(fruitless).find(|(_, fruitless)| *fruitless) {
-        None => Ok(found),
-        Some((rule, _)) => {
-            let (bodies, place) = title(rule);
-            let message = format!("no facets of {bodies} face each other within {}", rule.distance);
-            let help = match rules.len() {
-                1 => "a larger distance may find some",
-                _ => {
-                    "a larger distance may find some, unless narrower rules or contacts with names have all these pairs"
-                }
-            };
-            Err(Error::scene(place, message).help(help))
+    all_find_some(rules, &found)?;
+    Ok(found)
+}
+
+/// Two bodies that a rule is for, with facets that could have a partner.
+struct Possible<const D: usize> {
+    /// Their numbers, the smaller first.
+    bodies: [usize; 2],
+    /// These facets of either.
+    near: [Facets<D>; 2],
+    /// Number of the narrowest rule for them.
+    rule: usize,
+    /// Number of another rule that is as narrow.
+    other: Option<usize>,
+}
+
+fn possible<const D: usize>(
+    rules: &[AutoContact],
+    parts: &[Part<D>],
+    whole: &[Side<D>],
+    named: &HashSet<[usize; 2]>,
+) -> Result<Vec<Possible<D>>> {
+    let matches = rules.iter().map(|rule| Matches::new(rule, parts)).collect::<Result<Vec<_>>>()?;
+    let farthest = rules.iter().map(|rule| rule.distance).fold(0.0, f64::max);
+    let searches: Vec<Search<D>> = whole.iter().map(Search::new).collect();
+    let bodies = Search::of_boxes(whole.iter().map(Side::extent));
+    let mut all = Vec::new();
+    for a in 0..parts.len() {
+        let mut others: Vec<usize> = bodies.near_box(whole[a].extent(), farthest).collect();
+        others.retain(|&b| b > a && !named.contains(&[a, b]));
+        others.sort_unstable();
+        for b in others {
+            let Some((rule, other)) = narrowest(&matches, a, b) else { continue };
+            let reach = within(&whole[a], &whole[b], rules[rule].distance, rules[rule].contact.angle);
+            let near = candidates(&whole[a], &whole[b], &searches[b], &reach);
+            if near.iter().all(|facets| facets.count() > 0) {
+                all.push(Possible { bodies: [a, b], near, rule, other });
+            }
         }
     }
+    Ok(all)
+}
+
+/// The facets of both sides, counted among the near ones, that share a piece.
+type Meeting = Vec<[u32; 2]>;
+
+/// For each rank, what it found of each two bodies. Collective.
+fn meeting<const D: usize>(
+    rules: &[AutoContact],
+    cut: Cut<D>,
+    whole: &[Side<D>],
+    possible: &[Possible<D>],
+    exchange: &dyn Exchange,
+) -> Vec<Vec<Meeting>> {
+    let mut all = Vec::new();
+    let shares = shares(possible.iter().map(|possible| possible.near[0].count()), exchange);
+    for (possible, mine) in possible.iter().zip(shares) {
+        let side = |k: usize| {
+            let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
+            Side::new(name, space, possible.near[k].clone(), prescribed, frame)
+        };
+        let (rule, side_a, side_b) = (&rules[possible.rule], side(0), side(1));
+        let reach = within(&side_a, &side_b, rule.distance, rule.contact.angle);
+        let pieces = cut(&side_a, &side_b, &reach, &|facet| mine.contains(&facet)).points;
+        let mut facets: Meeting = pieces.iter().map(|point| [point.facet_a as u32, point.facet_b as u32]).collect();
+        facets.sort_unstable();
+        facets.dedup();
+        all.push(facets);
+    }
+    share(exchange, all)
+}
+
+/// Refuses a rule that found nothing.
+fn all_find_some<const D: usize>(rules: &[AutoContact], found: &[Found<D>]) -> Result<()> {
+    let is_fruitless = |rule: &usize| found.iter().all(|(number, _)| number != rule);
+    let Some(rule) = (0..rules.len()).find(is_fruitless) else { return Ok(()) };
+    let (bodies, place) = title(&rules[rule]);
+    let message = format!("no facets of {bodies} face each other within {}", rules[rule].distance);
+    let help = match rules.len() {
+        1 => "a larger distance may find some",
+        _ => "a larger distance may find some, unless narrower rules or contacts with names have all these pairs",
+    };
+    Err(Error::scene(place, message).help(help))
 }
 
 /// Which bodies a rule is for, as the first and as the second of a pair, and how narrow it is.

@@ -24,6 +24,7 @@ pub mod progress;
 pub mod report;
 pub mod rows;
 pub mod steps;
+mod summary;
 #[cfg(feature = "cli")]
 pub mod table;
 mod tags;
@@ -59,10 +60,11 @@ pub use look::LookReport;
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
-    PairReport, Report, RoundReport, busiest, warning_lines,
+    PairReport, Report, RoundReport, busiest,
 };
 pub use rows::RowFile;
 pub use steps::{Extent, ReactionReport, StepPairReport, StepReport, StepTable};
+pub use summary::warning_lines;
 #[cfg(feature = "cli")]
 pub use table::{IterationTable, Verbosity};
 pub use vtu::{BodyField, CellKind, Encoding, Grid};

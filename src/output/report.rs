@@ -1,6 +1,6 @@
-//! The report of a run: `report.json`, and the closing lines on the terminal.
+//! The report of a run: `report.json`.
 
-use super::format::{sci, seconds};
+use super::format::sci;
 use super::largest::largest;
 use super::look::LookReport;
 use super::steps::{Extent, StepReport};
@@ -315,132 +315,9 @@ pub struct PairReport {
 /// many as a person looks through. More stand in the report only.
 pub const LISTED: usize = 24;
 
-impl Report {
-    /// The closing lines for a terminal.
-    pub fn summary(&self) -> String {
-        let mut lines = vec![format!("{}: {}", self.title, self.message)];
-        let number = |value: Option<f64>| sci(value.unwrap_or(f64::NAN), 2);
-        lines.push(format!(
-            "  {}: {} iterations, {} sweeps, {} factorizations, residual {}, {} {}, {} dofs, {} s",
-            self.method,
-            self.iterations,
-            self.sweeps,
-            self.factorizations,
-            number(self.residual),
-            if self.error_bound.is_some() { "error at most" } else { "estimated error" },
-            number(self.error_bound.or(self.error_estimate)),
-            self.dofs,
-            seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
-        ));
-        lines.extend(self.settings["units"].as_str().map(|units| format!("  units: {units}")));
-        if !self.rounds.is_empty() {
-            lines.push(
-                "  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds".to_owned(),
-            );
-        }
-        for (index, round) in self.rounds.iter().enumerate() {
-            let [pressure, displacement, energy] =
-                [round.pressure, round.displacement, round.energy].map(|e| sci(e, 2));
-            lines.push(format!(
-                "  {index:>4} {:>10} {:>10} {pressure:>10} {displacement:>13} {energy:>10} {:>11} {:>9}",
-                round.cells,
-                round.dofs,
-                round.iterations,
-                seconds(round.seconds)
-            ));
-        }
-        if let Some(error) = &self.discretization_error {
-            let pressures: Vec<String> = error.pressure.iter().map(|&error| sci(error, 1)).collect();
-            lines.push(format!(
-                "  estimated discretisation error: pressure {}, displacement {}, energy norm {}",
-                pressures.join(" and "),
-                sci(error.displacement, 1),
-                sci(error.energy, 1)
-            ));
-        }
-        for (index, step) in self.steps.iter().enumerate().filter(|_| self.steps.len() <= LISTED) {
-            let pairs = step.pairs.iter().map(|pair| {
-                let (peak, force) = (readable(pair.peak_pressure, 6), vector(pair.force));
-                format!("force {force}, peak pressure {peak}, {} points closed", pair.closed)
-            });
-            let pairs = match step.pairs.len() {
-                ..=LISTED => pairs.collect::<Vec<_>>().join("; "),
-                count => {
-                    let peak = step.pairs.iter().map(|pair| pair.peak_pressure).fold(0.0, f64::max);
-                    let closed: usize = step.pairs.iter().map(|pair| pair.closed).sum();
-                    format!("{count} pairs, peak pressure {}, {closed} points closed", readable(peak, 6))
-                }
-            };
-            let factors = step.factors.iter().map(|(name, factor)| format!("{name} {}", readable(*factor, 4)));
-            let factors = factors.collect::<Vec<_>>().join(", ");
-            let (number, k) = (index + 1, step.iterations);
-            lines.push(format!("  step {number}, {factors}: {k} iterations, {}: {pairs}", step.status));
-        }
-        lines.extend(self.left_out.iter().map(|left_out| format!("  {left_out}")));
-        for pair in busiest(&self.pairs, LISTED).into_iter().map(|i| &self.pairs[i]) {
-            let names = format!("  {} - {}", pair.bodies[0], pair.bodies[1]);
-            lines.push(if pair.peak_pressure > 0.0 {
-                let [x, y, z] = pair.peak_at.map(|x| readable(x, 4));
-                format!(
-                    "{names}: force {}, peak pressure {} at ({x}, {y}, {z}), contact {}, open {}",
-                    vector(pair.force[0]),
-                    readable(pair.peak_pressure, 6),
-                    readable(pair.extent.contact(), 6),
-                    readable(pair.extent.open(), 6)
-                )
-            } else {
-                format!("{names}: no contact")
-            });
-        }
-        if self.bodies.len() > LISTED && self.residual.is_some() {
-            let worst = |of: fn(&BalanceReport) -> f64| {
-                let all = self.bodies.iter().map(|body| (of(&body.balance), &body.name));
-                all.max_by(|a, b| a.0.total_cmp(&b.0))
-                    .map_or(String::new(), |(most, name)| format!("{} (`{name}`)", sci(most, 1)))
-            };
-            lines.push(format!(
-                "  {} bodies: imbalance at most {} of forces, {} of moments",
-                self.bodies.len(),
-                worst(|balance| balance.force_imbalance),
-                worst(|balance| balance.moment_imbalance)
-            ));
-        }
-        for body in self.bodies.iter().filter(|_| self.residual.is_some() && self.bodies.len() <= LISTED) {
-            let BalanceReport { supports, springs, rigid, force_imbalance, moment_imbalance, .. } = &body.balance;
-            let named = |verb: &str, parts: &mut dyn Iterator<Item = &ForceReport>| {
-                let all: Vec<_> = parts.map(|part| format!("{} {}", part.on, vector(part.force))).collect();
-                if all.is_empty() { String::new() } else { format!("{verb} {}; ", all.join(", ")) }
-            };
-            let held = named("held by", &mut supports.iter().chain(springs)) + &named("rigid", &mut rigid.iter());
-            lines.push(format!(
-                "  {}: {held}imbalance {} of forces, {} of moments",
-                body.name,
-                sci(*force_imbalance, 1),
-                sci(*moment_imbalance, 1)
-            ));
-        }
-        lines.extend(warning_lines(&self.warnings, "report.json"));
-        lines.join("\n")
-    }
-}
-
-/// A line each for the first warnings, and one that says where the others stand.
-pub fn warning_lines(warnings: &[String], others: &str) -> Vec<String> {
-    let mut lines: Vec<String> = warnings.iter().take(LISTED).map(|warning| format!("  warning: {warning}")).collect();
-    if warnings.len() > LISTED {
-        lines.push(format!("  and {} more warnings: {others} has all", warnings.len() - LISTED));
-    }
-    lines
-}
-
 /// Numbers of the pairs with the largest forces, at most `most`, in the order of the scene.
 pub fn busiest(pairs: &[PairReport], most: usize) -> Vec<usize> {
     largest(pairs.iter().map(|pair| pair.force[0].iter().map(|f| f * f).sum()), most)
-}
-
-/// A vector as text.
-fn vector(v: [f64; 3]) -> String {
-    format!("({})", v.map(|v| readable(v, 6)).join(", "))
 }
 
 /// A number with `digits` after the point, or with an exponent where that would not show it.

@@ -1,0 +1,158 @@
+//! The closing lines of a run on the terminal.
+
+use super::format::{sci, seconds};
+use super::report::{BalanceReport, BodyReport, ForceReport, LISTED, PairReport, Report, busiest, readable};
+use super::steps::StepReport;
+
+impl Report {
+    /// The closing lines for a terminal.
+    pub fn summary(&self) -> String {
+        let mut lines = vec![format!("{}: {}", self.title, self.message), self.counts()];
+        lines.extend(self.settings["units"].as_str().map(|units| format!("  units: {units}")));
+        lines.extend(self.mesh_lines());
+        lines.extend(self.discretization_line());
+        if self.steps.len() <= LISTED {
+            lines.extend(self.steps.iter().enumerate().map(|(index, step)| step_line(index + 1, step)));
+        }
+        lines.extend(self.left_out.iter().map(|left_out| format!("  {left_out}")));
+        lines.extend(busiest(&self.pairs, LISTED).into_iter().map(|i| pair_line(&self.pairs[i])));
+        lines.extend(self.balance_lines());
+        lines.extend(warning_lines(&self.warnings, "report.json"));
+        lines.join("\n")
+    }
+
+    fn counts(&self) -> String {
+        let number = |value: Option<f64>| sci(value.unwrap_or(f64::NAN), 2);
+        format!(
+            "  {}: {} iterations, {} sweeps, {} factorizations, residual {}, {} {}, {} dofs, {} s",
+            self.method,
+            self.iterations,
+            self.sweeps,
+            self.factorizations,
+            number(self.residual),
+            if self.error_bound.is_some() { "error at most" } else { "estimated error" },
+            number(self.error_bound.or(self.error_estimate)),
+            self.dofs,
+            seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
+        )
+    }
+
+    /// A table of the adapted meshes.
+    fn mesh_lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if !self.rounds.is_empty() {
+            lines.push(
+                "  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds".to_owned(),
+            );
+        }
+        for (index, round) in self.rounds.iter().enumerate() {
+            let [pressure, displacement, energy] =
+                [round.pressure, round.displacement, round.energy].map(|e| sci(e, 2));
+            lines.push(format!(
+                "  {index:>4} {:>10} {:>10} {pressure:>10} {displacement:>13} {energy:>10} {:>11} {:>9}",
+                round.cells,
+                round.dofs,
+                round.iterations,
+                seconds(round.seconds)
+            ));
+        }
+        lines
+    }
+
+    fn discretization_line(&self) -> Option<String> {
+        let error = self.discretization_error.as_ref()?;
+        let pressures: Vec<String> = error.pressure.iter().map(|&error| sci(error, 1)).collect();
+        Some(format!(
+            "  estimated discretisation error: pressure {}, displacement {}, energy norm {}",
+            pressures.join(" and "),
+            sci(error.displacement, 1),
+            sci(error.energy, 1)
+        ))
+    }
+
+    /// A line a body on its balance, or one for all of many; none before the first iterate.
+    fn balance_lines(&self) -> Vec<String> {
+        if self.residual.is_none() {
+            return Vec::new();
+        }
+        if self.bodies.len() <= LISTED {
+            return self.bodies.iter().map(balance_line).collect();
+        }
+        let worst = |of: fn(&BalanceReport) -> f64| {
+            let all = self.bodies.iter().map(|body| (of(&body.balance), &body.name));
+            all.max_by(|a, b| a.0.total_cmp(&b.0))
+                .map_or(String::new(), |(most, name)| format!("{} (`{name}`)", sci(most, 1)))
+        };
+        vec![format!(
+            "  {} bodies: imbalance at most {} of forces, {} of moments",
+            self.bodies.len(),
+            worst(|balance| balance.force_imbalance),
+            worst(|balance| balance.moment_imbalance)
+        )]
+    }
+}
+
+/// A load step, which has this number.
+fn step_line(number: usize, step: &StepReport) -> String {
+    let pairs = match step.pairs.len() {
+        ..=LISTED => {
+            let pairs = step.pairs.iter().map(|pair| {
+                let (peak, force) = (readable(pair.peak_pressure, 6), vector(pair.force));
+                format!("force {force}, peak pressure {peak}, {} points closed", pair.closed)
+            });
+            pairs.collect::<Vec<_>>().join("; ")
+        }
+        count => {
+            let peak = step.pairs.iter().map(|pair| pair.peak_pressure).fold(0.0, f64::max);
+            let closed: usize = step.pairs.iter().map(|pair| pair.closed).sum();
+            format!("{count} pairs, peak pressure {}, {closed} points closed", readable(peak, 6))
+        }
+    };
+    let factors = step.factors.iter().map(|(name, factor)| format!("{name} {}", readable(*factor, 4)));
+    let factors = factors.collect::<Vec<_>>().join(", ");
+    format!("  step {number}, {factors}: {} iterations, {}: {pairs}", step.iterations, step.status)
+}
+
+fn pair_line(pair: &PairReport) -> String {
+    let names = format!("  {} - {}", pair.bodies[0], pair.bodies[1]);
+    if pair.peak_pressure <= 0.0 || pair.peak_pressure.is_nan() {
+        return format!("{names}: no contact");
+    }
+    let [x, y, z] = pair.peak_at.map(|x| readable(x, 4));
+    format!(
+        "{names}: force {}, peak pressure {} at ({x}, {y}, {z}), contact {}, open {}",
+        vector(pair.force[0]),
+        readable(pair.peak_pressure, 6),
+        readable(pair.extent.contact(), 6),
+        readable(pair.extent.open(), 6)
+    )
+}
+
+fn balance_line(body: &BodyReport) -> String {
+    let BalanceReport { supports, springs, rigid, force_imbalance, moment_imbalance, .. } = &body.balance;
+    let named = |verb: &str, parts: &mut dyn Iterator<Item = &ForceReport>| {
+        let all: Vec<_> = parts.map(|part| format!("{} {}", part.on, vector(part.force))).collect();
+        if all.is_empty() { String::new() } else { format!("{verb} {}; ", all.join(", ")) }
+    };
+    let held = named("held by", &mut supports.iter().chain(springs)) + &named("rigid", &mut rigid.iter());
+    format!(
+        "  {}: {held}imbalance {} of forces, {} of moments",
+        body.name,
+        sci(*force_imbalance, 1),
+        sci(*moment_imbalance, 1)
+    )
+}
+
+/// A line each for the first warnings, and one that says where the others stand.
+pub fn warning_lines(warnings: &[String], others: &str) -> Vec<String> {
+    let mut lines: Vec<String> = warnings.iter().take(LISTED).map(|warning| format!("  warning: {warning}")).collect();
+    if warnings.len() > LISTED {
+        lines.push(format!("  and {} more warnings: {others} has all", warnings.len() - LISTED));
+    }
+    lines
+}
+
+/// A vector as text.
+fn vector(v: [f64; 3]) -> String {
+    format!("({})", v.map(|v| readable(v, 6)).join(", "))
+}
