@@ -237,32 +237,10 @@ pub fn assemble<const D: usize>(
         let node = pair.nodes[q];
         let sum = &points[&node];
         let normal = a.normals[&node];
-        for (side, sign, of) in [(0, 1.0, a), (1, -1.0, b)] {
-            let (mut nodal, mut entries) = (Vec::new(), BTreeMap::new());
-            let (mut resultant, mut moment) = ([0.0; 3], [0.0; 3]);
+        for (side, of) in [a, b].into_iter().enumerate() {
             let shares = shares(&sum.sides[side], sum.weight);
             pair.surface[side].push(OwnSurface::mean(of, &shares, &spread[side]));
-            for (n, share) in shares {
-                let entry = normal.map(|normal| sign * share * normal);
-                nodal.extend((0..D).map(|c| (D * n as usize + c, entry[c])));
-                add(&mut resultant, of.space.net_force(entry));
-                add(&mut moment, of.space.net_moment(n, entry));
-                let (node, dofs) = of.frame.force(n, entry);
-                for (c, value) in dofs.into_iter().enumerate() {
-                    *entries.entry(D * node as usize + c).or_insert(0.0) += value;
-                }
-            }
-            let mut known = 0.0;
-            entries.retain(|dof, entry| {
-                let prescribed = of.prescribed.get(dof);
-                known += prescribed.map_or(0.0, |u| *entry * u);
-                prescribed.is_none()
-            });
-            pair.rows[side].push_row(entries);
-            pair.nodal[side].push_row(nodal);
-            pair.resultant[side].push(resultant);
-            pair.moment[side].push(moment_in_scene(&of.space.datum, resultant, moment));
-            pair.prescribed[side].push(known);
+            push_rows(&mut pair, side, of, shares, normal);
         }
         let distance = sum.gap / sum.weight;
         let distance = if distance.abs() < rounding { 0.0 } else { distance };
@@ -275,6 +253,40 @@ pub fn assemble<const D: usize>(
         pair.gap.push(distance + own);
     }
     Ok(pair)
+}
+
+/// Adds what a contact point has of one side: `shares` are those of the side's nodes, `normal` points out of side a.
+fn push_rows<const D: usize>(
+    pair: &mut ContactPair,
+    side: usize,
+    of: &Side<D>,
+    shares: impl IntoIterator<Item = (u32, f64)>,
+    normal: [f64; D],
+) {
+    let sign = [1.0, -1.0][side];
+    let (mut nodal, mut entries) = (Vec::new(), BTreeMap::new());
+    let (mut resultant, mut moment) = ([0.0; 3], [0.0; 3]);
+    for (n, share) in shares {
+        let entry = normal.map(|normal| sign * share * normal);
+        nodal.extend((0..D).map(|c| (D * n as usize + c, entry[c])));
+        add(&mut resultant, of.space.net_force(entry));
+        add(&mut moment, of.space.net_moment(n, entry));
+        let (node, dofs) = of.frame.force(n, entry);
+        for (c, value) in dofs.into_iter().enumerate() {
+            *entries.entry(D * node as usize + c).or_insert(0.0) += value;
+        }
+    }
+    let mut known = 0.0;
+    entries.retain(|dof, entry| {
+        let prescribed = of.prescribed.get(dof);
+        known += prescribed.map_or(0.0, |u| *entry * u);
+        prescribed.is_none()
+    });
+    pair.rows[side].push_row(entries);
+    pair.nodal[side].push_row(nodal);
+    pair.resultant[side].push(resultant);
+    pair.moment[side].push(moment_in_scene(&of.space.datum, resultant, moment));
+    pair.prescribed[side].push(known);
 }
 
 /// Return the moment about the origin of the scene of a force whose moment about `datum` is given.

@@ -31,48 +31,26 @@ pub fn read<const D: usize>(
     let (mut common_order, mut in_parts) = (None, 0);
     let (mut heads, mut again) = (HashSet::new(), None);
     for _ in 0..blocks {
-        cursor.begin();
-        let head = cursor.position();
-        let (dimension, tag, number) = (cursor.int()?, cursor.int()?, cursor.int()?);
-        let Some(dimension) = usize::try_from(dimension).ok().filter(|dimension| *dimension <= 3) else {
-            return Err(cursor.error_at(head, format!("a block of elements of dimension {dimension}")));
-        };
-        let Some((shape, stride)) = simplex::type_name(number) else {
-            return Err(cursor
-                .error_at(head, format!("elements of Gmsh's type {number} cannot be used"))
-                .help(SIMPLICES));
-        };
-        // also where nobody needs them: the block may be one of another dimension whose head is damaged
-        if simplex::dimension(shape) != dimension {
-            let thing = THINGS[dimension].to_lowercase();
-            let error = cursor.error_at(head, format!("{shape} elements cannot be those of {thing} {tag}"));
-            return Err(error.help("the file is damaged: save the mesh again with Gmsh"));
-        }
-        let count = cursor.count(1 + stride, 8 * (1 + stride))?;
-        cursor.end()?;
+        let head = Head::read(cursor)?;
+        let Head { position, dimension, tag, number, stride, count, .. } = head;
         seen = seen.saturating_add(count);
         let Some(members) = physical.members(dimension, tag) else {
-            let thing = THINGS[dimension].to_lowercase();
-            let message = format!("elements of {thing} {tag}, which $Entities does not list");
-            return Err(cursor.error_at(head, message).help("save the mesh again with Gmsh"));
+            let message = format!("elements of {} {tag}, which $Entities does not list", thing(dimension));
+            return Err(cursor.error_at(position, message).help("save the mesh again with Gmsh"));
         };
         if !heads.insert((dimension, tag, number)) {
-            again = Some((head, dimension, tag));
+            again = Some((position, dimension, tag));
         }
         let Some(first) = members.first() else {
             cursor.skip_records(count, 8 * (1 + stride))?;
             continue;
         };
         let name = physical.groups[*first].name.clone();
-        let split = Split::of_type(number).filter(|split| split.dimension == dimension);
-        let whole = Kind::of_type(number).filter(|kind| kind.dimension == dimension);
-        let Some(kind) = whole.or(split.map(|split| Kind::linear(split.dimension))) else {
-            let message = format!("group `{name}` has {shape} elements of {stride} nodes (Gmsh's type {number})");
-            return Err(cursor.error_at(head, message).help(SIMPLICES));
-        };
+        let (kind, split) = head.kind(cursor, &name)?;
         if kind.order.is_some_and(|order| *common_order.get_or_insert(order) != order) {
             let message = format!("group `{name}` is of another order than the elements before it");
-            return Err(cursor.error_at(head, message).help("save all elements with one order: gmsh -order 1 or 2"));
+            let help = "save all elements with one order: gmsh -order 1 or 2";
+            return Err(cursor.error_at(position, message).help(help));
         }
         let dealt = dimension == D && physical.begin::<D>(kind.order, &nodes.points);
         let mut rest = count;
@@ -93,11 +71,67 @@ pub fn read<const D: usize>(
     if let Some((head, dimension, tag)) = again
         && let Some(without) = physical.without(dimension, |entity| with.contains(&entity))
     {
-        let thing = THINGS[dimension].to_lowercase();
+        let thing = thing(dimension);
         let message = format!("elements of {thing} {tag} stand in two blocks, and those of {thing} {without} in none");
         return Err(cursor.error_at(head, message).help("the file is damaged: save the mesh again with Gmsh"));
     }
     Ok((common_order, in_parts))
+}
+
+/// The head of a block of elements.
+struct Head {
+    position: usize,
+    dimension: usize,
+    /// Number of the entity.
+    tag: i32,
+    /// Gmsh's number of the type of element.
+    number: i32,
+    shape: &'static str,
+    /// Nodes of an element.
+    stride: usize,
+    /// Elements.
+    count: usize,
+}
+
+impl Head {
+    fn read(cursor: &mut Cursor) -> Result<Self> {
+        cursor.begin();
+        let position = cursor.position();
+        let (dimension, tag, number) = (cursor.int()?, cursor.int()?, cursor.int()?);
+        let Some(dimension) = usize::try_from(dimension).ok().filter(|dimension| *dimension <= 3) else {
+            return Err(cursor.error_at(position, format!("a block of elements of dimension {dimension}")));
+        };
+        let Some((shape, stride)) = simplex::type_name(number) else {
+            let message = format!("elements of Gmsh's type {number} cannot be used");
+            return Err(cursor.error_at(position, message).help(SIMPLICES));
+        };
+        // also where nobody needs them: the block may be one of another dimension whose head is damaged
+        if simplex::dimension(shape) != dimension {
+            let message = format!("{shape} elements cannot be those of {} {tag}", thing(dimension));
+            let help = "the file is damaged: save the mesh again with Gmsh";
+            return Err(cursor.error_at(position, message).help(help));
+        }
+        let count = cursor.count(1 + stride, 8 * (1 + stride))?;
+        cursor.end()?;
+        Ok(Self { position, dimension, tag, number, shape, stride, count })
+    }
+
+    /// What its elements are read as, and how they are split, if they are; `name` is that of a group with them.
+    fn kind(&self, cursor: &Cursor, name: &str) -> Result<(Kind, Option<Split>)> {
+        let split = Split::of_type(self.number).filter(|split| split.dimension == self.dimension);
+        let whole = Kind::of_type(self.number).filter(|kind| kind.dimension == self.dimension);
+        let Some(kind) = whole.or(split.map(|split| Kind::linear(split.dimension))) else {
+            let Self { shape, stride, number, .. } = self;
+            let message = format!("group `{name}` has {shape} elements of {stride} nodes (Gmsh's type {number})");
+            return Err(cursor.error_at(self.position, message).help(SIMPLICES));
+        };
+        Ok((kind, split))
+    }
+}
+
+/// What Gmsh calls an entity of this dimension.
+fn thing(dimension: usize) -> String {
+    THINGS[dimension].to_lowercase()
 }
 
 /// What to do about elements that are not simplices of order 1 or 2.

@@ -83,14 +83,7 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
         ..headline(session, &done.built, &shared.solvers, clock)
     };
     if let Some(look) = &done.look {
-        let found = look_report(look, discrete, model);
-        // what the iteration did not see is no bound, and no less than what was found
-        let error = [report.error_bound, report.error_estimate].into_iter().flatten().next();
-        let is_more = |found: f64| error.map_or(matches!(outcome.status, Status::Inaccurate(_)), |error| found > error);
-        if found.error.is_some_and(is_more) {
-            (report.error_bound, report.error_estimate) = (None, found.error);
-        }
-        report.last_look = Some(found);
+        add_look(&mut report, look_report(look, discrete, model), &outcome.status);
     }
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::of_steps(&done.steps)));
     let too_large = results::fill(discrete, recovered, &mut report.bodies);
@@ -100,17 +93,32 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     let balances = balance::gather(done, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
     if let Some(message) = lost(done) {
-        match outcome.status {
-            Status::Converged | Status::RoundoffLimited => {
-                (report.status, report.message) = (status_name(&Status::RoundoffLimited).to_owned(), message);
-            }
-            Status::IterationLimit | Status::Cycle { .. } => {
-                report.message = format!("not converged in {} iterations: {message}", outcome.iterations);
-            }
-            _ => {}
-        }
+        tell_lost(&mut report, message, &outcome.status);
     }
     report
+}
+
+/// Adds the last look at a result. What the iteration did not see is no bound, and no less than what was found.
+fn add_look(report: &mut Report, found: LookReport, status: &Status) {
+    let error = [report.error_bound, report.error_estimate].into_iter().flatten().next();
+    let is_more = |found: f64| error.map_or(matches!(status, Status::Inaccurate(_)), |error| found > error);
+    if found.error.is_some_and(is_more) {
+        (report.error_bound, report.error_estimate) = (None, found.error);
+    }
+    report.last_look = Some(found);
+}
+
+/// Tells that displacements leave few digits for the pressures.
+fn tell_lost(report: &mut Report, message: String, status: &Status) {
+    match status {
+        Status::Converged | Status::RoundoffLimited => {
+            (report.status, report.message) = (status_name(&Status::RoundoffLimited).to_owned(), message);
+        }
+        Status::IterationLimit | Status::Cycle { .. } => {
+            report.message = format!("not converged in {} iterations: {message}", report.iterations);
+        }
+        _ => {}
+    }
 }
 
 /// The last look for the report.
