@@ -13,7 +13,7 @@ use super::part::Part;
 use super::post::{OnPart, Post};
 use super::supports::Held;
 use crate::error::Result;
-use crate::fem::{Elasticity, FreeMotion, NodeGraph, RigidMotion, Space};
+use crate::fem::{Elasticity, FreeMotion, NodalForces, NodeGraph, RigidMotion, Space};
 use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
 use crate::model::{Body, BodySlot, Loads, Segment};
@@ -126,31 +126,45 @@ impl<const D: usize> Ready<'_, D> {
                 assembly.make(mesh, &elasticity, loads, is_owner, factory)?
             }
         };
-        let rigid = part.rigid_forces().map(|(node, total)| (node, std::array::from_fn(|c| total[c]))).collect();
-        let (space, held) = (Rc::new(part.space), Rc::new(part.held));
-        let is_whole = info.ranks.len() == 1 && !own.contains(&false);
-        let here = Local { space: space.clone(), own };
-        info.points = match is_whole {
-            true => part.known.points.iter().map(|&(_, point)| point).collect(),
-            false => space.part(here.told()).1.iter().filter_map(|&node| part.known.point(node)).collect(),
-        };
-        let forces = Forces {
-            rows: nodal_rows,
-            springs: part.springs,
-            supports: part.spec.fix.len(),
-            load: load.all(space.nodes.len()),
-            rigid,
-            extent: part.known.extent,
-            nodes: info.nodes,
-            held: held.clone(),
-            elasticity: elasticity.clone(),
-            part: here,
-        };
-        let mut outer = part.known.outer;
-        outer.weigh(&space);
-        info.post = Some(Box::new(OnPart::new(part.spec, outer, forces)?) as Box<dyn Post>);
+        let (space, held) = tell_displacements(info, part, nodal_rows, &load, own, &elasticity)?;
         Ok((slot(made), Some(shape(space, held, elasticity))))
     }
+}
+
+/// Lets `info` tell of displacements and forces of a body on the nodes that are here, of which some are this rank's `own`; returns its space and
+/// supports.
+fn tell_displacements<const D: usize>(
+    info: &mut BodyInfo,
+    part: Part<D>,
+    rows: Csr,
+    load: &NodalForces<D>,
+    own: Vec<bool>,
+    elasticity: &Rc<Elasticity>,
+) -> Result<(Rc<Space<D>>, Rc<Held<D>>)> {
+    let rigid = part.rigid_forces().map(|(node, total)| (node, std::array::from_fn(|c| total[c]))).collect();
+    let (space, held) = (Rc::new(part.space), Rc::new(part.held));
+    let is_whole = info.ranks.len() == 1 && !own.contains(&false);
+    let here = Local { space: space.clone(), own };
+    info.points = match is_whole {
+        true => part.known.points.iter().map(|&(_, point)| point).collect(),
+        false => space.part(here.told()).1.iter().filter_map(|&node| part.known.point(node)).collect(),
+    };
+    let forces = Forces {
+        rows,
+        springs: part.springs,
+        supports: part.spec.fix.len(),
+        load: load.all(space.nodes.len()),
+        rigid,
+        extent: part.known.extent,
+        nodes: info.nodes,
+        held: held.clone(),
+        elasticity: elasticity.clone(),
+        part: here,
+    };
+    let mut outer = part.known.outer;
+    outer.weigh(&space);
+    info.post = Some(Box::new(OnPart::new(part.spec, outer, forces)?) as Box<dyn Post>);
+    Ok((space, held))
 }
 
 /// Which of the nodes that a rank knows of a body are its own.
