@@ -218,7 +218,7 @@ fn draft_bodies<const D: usize>(
     drafts.map(|(part, segments)| Draft::new(part, segments, pairs, mesh, exchange)).collect()
 }
 
-/// The rank that owns each body: bodies that are not dealt out go whole to ranks, about as many dofs to each.
+/// Return the rank that owns each body. Bodies that are not dealt out stay whole, and each rank gets about as many of their dofs as the others.
 fn owners<const D: usize>(parts: &[Part<D>], deals: &[Deal], ranks: usize) -> Vec<usize> {
     let is_dealt = |body: usize| deals.iter().any(|deal| deal.bodies.contains(&body));
     let dofs = |body: usize| if is_dealt(body) { 0 } else { parts[body].space.dofs() };

@@ -1,4 +1,4 @@
-//! The plan of all bodies: what the factory may ask of each before it decides on solvers, and how nodes are dealt out then.
+//! The factory's plan of all bodies. It asks for facts about each body, decides on solvers, and says which bodies share a matrix.
 
 use super::carried::Supported;
 use super::couplings::Coupled;
@@ -12,7 +12,8 @@ use crate::error::Result;
 use crate::exchange::Exchange;
 use crate::fem::rigid::AtDofs;
 
-/// Has the factory plan the solvers of all bodies, and returns how the nodes of those that share a matrix are dealt out. Collective.
+/// Let the factory plan the solvers of all bodies. Bodies that share a matrix are split over the ranks; return which rank gets which of their nodes.
+/// Collective.
 ///
 /// # Errors
 /// Those of [`Factory::plan`].

@@ -31,7 +31,7 @@ pub struct Ready<'a, const D: usize> {
     pub elasticity: Elasticity,
     /// Which nodes K couples, if that is known here.
     pub graph: Option<NodeGraph>,
-    /// How its nodes are dealt out, if they are.
+    /// The part of this rank, if the body is split over the ranks.
     pub dealt: Option<Dealt>,
     /// What this rank has of it; none of a body of another rank.
     pub here: Option<Here<'a, D>>,
@@ -131,8 +131,8 @@ impl<const D: usize> Ready<'_, D> {
     }
 }
 
-/// Lets `info` tell of displacements and forces of a body on the nodes that are here, of which some are this rank's `own`; returns its space and
-/// supports.
+/// Give `info` the means to evaluate displacements and forces of a body at the nodes that this rank knows. `own` marks the nodes that belong to this
+/// rank. Return the space and the supports of the body.
 fn tell_displacements<const D: usize>(
     info: &mut BodyInfo,
     part: Part<D>,

@@ -25,7 +25,7 @@ pub struct Unassembled<'a, const D: usize> {
     pub supported: Supported<D>,
     /// Which nodes K couples, if that is known here.
     pub graph: Option<NodeGraph>,
-    /// How its nodes are dealt out, if they are.
+    /// The part of this rank, if the body is split over the ranks.
     pub dealt: Option<Dealt>,
     /// Rank that owns the body, or most of it.
     pub owner: usize,
