@@ -28,6 +28,23 @@ pub trait Exchange {
     fn messages(&self) -> usize;
 }
 
+/// Data that can go from rank to rank.
+pub trait Plain: Serialize + DeserializeOwned {}
+
+impl<T: Serialize + DeserializeOwned> Plain for T {}
+
+/// Give each rank what the first rank has for it: `part` is called there alone, for each other rank and then for itself. Collective.
+///
+/// # Errors
+/// A message that cannot be read.
+pub fn scatter<T: Plain>(exchange: &dyn Exchange, mut part: impl FnMut(usize) -> T) -> Result<T> {
+    if exchange.rank() > 0 {
+        return unpack(&exchange.receive(0));
+    }
+    (1..exchange.ranks()).for_each(|rank| exchange.send(rank, &pack(&part(rank))));
+    Ok(part(0))
+}
+
 /// What each rank knows, in their order; collective.
 pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
     if exchange.ranks() == 1 {

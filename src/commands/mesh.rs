@@ -7,7 +7,7 @@ use crate::exchange::Serial;
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
 use crate::linalg::bounds;
-use crate::mesh::{Loaded, Origin, Portion};
+use crate::mesh::{Loaded, Origin};
 use crate::output::progress::Line;
 use crate::output::report::readable;
 use crate::output::{CellKind, Encoding, Grid, say, write_whole};
@@ -16,7 +16,6 @@ use crate::run::{in_parts, made_straight};
 use crate::scene::Scene;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 use std::time::Instant;
 
 /// What the user typed.
@@ -116,8 +115,8 @@ fn show<const D: usize>(
 /// All that is said about a mesh.
 fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Result<Value> {
     let Loaded { mesh, origin, file, unkept, .. } = loaded;
-    let verified = crate::discretize::verify(scene, Portion::whole(mesh), Rc::new(Serial))?;
-    let mesh = &verified.portion.mesh;
+    let verified = crate::discretize::verify(scene, &Serial, || Ok(mesh))?;
+    let mesh = &verified.mesh;
     let mut checked = verified.checked.iter();
     let mut bodies = Vec::new();
     for body in &verified.bodies {

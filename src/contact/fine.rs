@@ -1,6 +1,8 @@
 //! The integration points of a pair one by one, for an estimate of the error: there the compression of the layer and the gap
 //! are those of the points themselves, not means around the nodes.
 
+use serde::{Deserialize, Serialize};
+use crate::exchange::Plain;
 use super::basis::{Carriers, PressureBasis};
 use super::near::Near;
 use super::pair::ContactPair;
@@ -11,6 +13,8 @@ use crate::linalg::Csr;
 use std::collections::HashMap;
 
 /// The shared integration points of a pair.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
 pub struct Fine<const D: usize> {
     /// Numbers of the two bodies.
     pub bodies: [usize; 2],
@@ -38,6 +42,8 @@ pub struct Fine<const D: usize> {
 }
 
 /// Where the points lie on a surface.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
 pub struct FineSide<const D: usize> {
     /// The facets.
     pub facets: Facets<D>,

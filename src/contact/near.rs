@@ -1,5 +1,7 @@
 //! Contact points seen from the other side: by how much a mean over its facets differs from the value at the point itself.
 
+use serde::{Deserialize, Serialize};
+use crate::exchange::Plain;
 use super::pair::ContactPair;
 use super::pieces::Common;
 use super::side::{Side, length};
@@ -10,6 +12,8 @@ use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
 
 /// Where the contact points of a pair lie on side b.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
 pub struct Near<const D: usize> {
     /// Facet nearest to each.
     pub facet: Vec<usize>,

@@ -2,14 +2,14 @@
 
 use super::basis::{Carriers, PressureBasis};
 use super::cover::{Cover, Left};
-use super::law::LayerLaw;
+use super::law::{LayerLaw, Linear};
 use super::pieces::Common;
 use super::side::{Side, length};
 use crate::error::{Error, Result};
 use crate::fem::assemble::interpolate;
 use crate::fem::{cross, element, pad};
 use crate::linalg::Csr;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
@@ -18,7 +18,7 @@ use std::rc::Rc;
 /// Point q stands for a function mu_q of a pressure space on side a, with sum_q mu_q = 1 on the covered surface and
 /// omega_q = int mu_q. With `<v>_q = (1/omega_q) int mu_q v` over the common pieces, the compression of the layer is
 /// `c = B_a u_a + B_b u_b - d`. One set of points serves both sides, so action equals reaction to rounding.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct ContactPair {
     /// Names of the two surfaces; the first carries the points.
     pub surfaces: [String; 2],
@@ -51,8 +51,10 @@ pub struct ContactPair {
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
     /// What the weights are: `"length"`, or in space and for bodies of revolution `"area"`.
-    pub measure: &'static str,
-    /// Law of the layer.
+    #[serde(deserialize_with = "measure")]
+    pub measure: Measure,
+    /// Law of the layer. It does not go from rank to rank: whoever receives a pair makes its law anew.
+    #[serde(skip, default = "no_law")]
     pub law: Rc<dyn LayerLaw>,
     /// What the pair takes of each facet of side a.
     pub cover: Vec<Cover>,
@@ -60,8 +62,21 @@ pub struct ContactPair {
     pub lost: Option<LostPieces>,
 }
 
+/// What the weights of contact points are: `"length"` or `"area"`.
+pub type Measure = &'static str;
+
+/// Return what the weights of a pair from another rank are.
+fn measure<'de, R: Deserializer<'de>>(from: R) -> Result<Measure, R::Error> {
+    String::deserialize(from).map(|name| if name == "length" { "length" } else { "area" })
+}
+
+/// Return what stands for the law of a pair from another rank until it is made.
+fn no_law() -> Rc<dyn LayerLaw> {
+    Rc::new(Linear { stiffness: 0.0 })
+}
+
 /// What the surface of one side itself is like around a point: means over its nodes with the shares that they have in the point.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct OwnSurface {
     /// Where it is, measured from the datum of the mesh.
     pub at: [f64; 3],
@@ -85,7 +100,7 @@ impl OwnSurface {
 }
 
 /// Pieces of a pair that are lost because the search for their points failed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LostPieces {
     /// How many, points of pieces included.
     pub pieces: usize,

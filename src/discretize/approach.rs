@@ -1,9 +1,9 @@
 //! How a body moves as seen from its contact: the mean displacement of where it is loaded or held.
 
-use super::find::{find_group, nodes_on};
+use serde::{Deserialize, Serialize};
+use super::find::find_group;
 use crate::contact::{add, pad};
 use crate::error::Result;
-use crate::exchange::Exchange;
 use crate::fem::{Facets, NodalForces, Parts, Space, assemble, place, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
@@ -14,7 +14,7 @@ use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
 const ALONG: f64 = 0.5;
 
 /// What nodes count in a mean.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 struct Weights {
     /// Those of some nodes.
     of_nodes: Vec<(u32, f64)>,
@@ -36,7 +36,7 @@ impl Weights {
 }
 
 /// A surface or a set of nodes on which the body is loaded or held.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Place {
     /// Unit vectors: the force, or the directions that are held.
     directions: Vec<[f64; 3]>,
@@ -52,12 +52,11 @@ impl Place {
         space: &Space<D>,
         group: &crate::mesh::Group,
         directions: Vec<[f64; 3]>,
-        exchange: &dyn Exchange,
     ) -> Self {
         let facets = if group.dimension + 1 == D { Some(space.facets(group)) } else { None };
         let areas = facets.map_or(Vec::new(), |facets| areas(space, &facets));
         let has_area = !areas.is_empty();
-        let nodes = || nodes_on(space, group, exchange).into_iter().map(|node| (node, 1.0)).collect();
+        let nodes = || space.nodes_on(group).into_iter().map(|node| (node, 1.0)).collect();
         Self { directions, weights: Weights::new(if has_area { areas } else { nodes() }), has_area }
     }
 
@@ -71,19 +70,18 @@ impl Place {
 }
 
 /// Where a body is loaded, and where it is held.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Outer {
     loaded: Vec<Place>,
     held: Vec<Place>,
-    /// Integrals of the shape functions over a body that nothing loads or holds: the sum at first, each once all cells at own nodes are here.
+    /// Integrals of the shape functions over a body that nothing loads or holds.
     whole: Weights,
     /// Number of nodes of the body.
     nodes: usize,
 }
 
 impl Outer {
-    /// Of a body whose cells behind surfaces are here; `resultant` sums a load, `volume` is the sum of all
-    /// [integrals](volumes) of the shape functions where nothing loads or holds it. Collective.
+    /// Look where a body is loaded and held; `resultant` sums a load. The body counts as a whole where nothing loads or holds it.
     ///
     /// # Errors
     /// Groups that are not there.
@@ -92,8 +90,6 @@ impl Outer {
         space: &Space<D>,
         mesh: &Mesh<D>,
         resultant: &dyn Fn(&Load) -> Result<[f64; 3]>,
-        volume: f64,
-        exchange: &dyn Exchange,
     ) -> Result<Self> {
         let mut outer = Self { nodes: space.nodes.len(), ..Self::default() };
         for load in &spec.load {
@@ -102,14 +98,14 @@ impl Outer {
                 LoadKind::Force { total, .. } => total,
                 _ => resultant(load)?,
             };
-            outer.loaded.push(Place::new(space, group, unit(force).into_iter().collect(), exchange));
+            outer.loaded.push(Place::new(space, group, unit(force).into_iter().collect()));
         }
         let axes = |c: usize| std::array::from_fn(|k| if k == c { 1.0 } else { 0.0 });
         for fix in &spec.fix {
             let group = find_group(mesh, &fix.on, &(0..=D).rev().collect::<Vec<_>>(), "support")?;
             let components = (0..D).filter(|&c| fix.value[c].is_some()).map(axes);
             let normal = fix.normal.as_ref().and_then(|_| normal(space, group));
-            outer.held.push(Place::new(space, group, components.chain(normal).collect(), exchange));
+            outer.held.push(Place::new(space, group, components.chain(normal).collect()));
         }
         for spring in &spec.spring {
             let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
@@ -117,17 +113,12 @@ impl Outer {
                 SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axes).collect(),
                 SpringKind::Normal(_) => normal(space, group).into_iter().collect(),
             };
-            outer.held.push(Place::new(space, group, directions, exchange));
+            outer.held.push(Place::new(space, group, directions));
         }
-        outer.whole.total = volume;
+        if spec.load.is_empty() && spec.fix.is_empty() && spec.spring.is_empty() {
+            outer.whole = Weights::new(volumes(space));
+        }
         Ok(outer)
-    }
-
-    /// Integrates the shape functions where nothing loads or holds the body; all cells at own nodes are here.
-    pub fn weigh<const D: usize>(&mut self, space: &Space<D>) {
-        if self.whole.total > 0.0 {
-            self.whole.of_nodes = volumes(space);
-        }
     }
 
     /// The same of some nodes, sorted, by their places among these.
@@ -174,8 +165,8 @@ fn areas<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> Vec<(u32, f64)
     first_components(&surface::surface_load(space, facets, Parts::Whole, &|_, _| along_first()))
 }
 
-/// Integrals of the shape functions over the cells that are here.
-pub fn volumes<const D: usize>(space: &Space<D>) -> Vec<(u32, f64)> {
+/// Integrals of the shape functions over the body.
+fn volumes<const D: usize>(space: &Space<D>) -> Vec<(u32, f64)> {
     first_components(&assemble::body_force(space, Parts::Whole, &|_| along_first()))
 }
 

@@ -6,7 +6,6 @@ use super::surface::Surface;
 use crate::contact::pieces::{Cut, Reach, Search};
 use crate::contact::{Side, unit};
 use crate::error::{Error, Place, Result, few};
-use crate::exchange::{Exchange, share, shares};
 use crate::fem::Facets;
 use crate::problem::contact::AutoContact;
 use crate::problem::pattern::Rank;
@@ -19,7 +18,7 @@ pub type Found<'a, const D: usize> = (usize, [Surface<'a, D>; 2]);
 /// rule for two bodies decides alone whether they are a pair.
 ///
 /// First all facets that could have a partner are gathered, so that the nodal normals are those of smooth surfaces;
-/// of these the ones stay that share a piece, for which every rank looks at an equal share of the facets. Collective.
+/// of these the ones stay that share a piece.
 ///
 /// # Errors
 /// A rule that finds nothing, patterns that match no body, and two rules equally near to a pair.
@@ -28,22 +27,21 @@ pub fn find<'a, const D: usize>(
     cut: Cut<D>,
     parts: &'a [Part<D>],
     named: &HashSet<[usize; 2]>,
-    exchange: &dyn Exchange,
 ) -> Result<Vec<Found<'a, D>>> {
     if rules.is_empty() {
         return Ok(Vec::new());
     }
     let of_part = |part: &'a Part<D>| {
-        let (name, facets) = (&part.spec.name.value, part.known.boundary(&part.space));
+        let (name, facets) = (&part.spec.name.value, part.space.boundary());
         Side::new(name, &part.space, facets, &part.held.prescribed, &part.held.frame)
     };
     let whole: Vec<Side<D>> = parts.iter().map(of_part).collect();
     let possible = possible(rules, parts, &whole, named)?;
-    let meeting = meeting(rules, cut, &whole, &possible, exchange);
+    let meeting = meeting(rules, cut, &whole, &possible);
     let mut found = Vec::new();
     for (index, possible) in possible.into_iter().enumerate() {
         let mut used = possible.near.each_ref().map(|facets| vec![false; facets.count()]);
-        for &facets in meeting.iter().flat_map(|of_rank| &of_rank[index]) {
+        for &facets in &meeting[index] {
             used.iter_mut().zip(facets).for_each(|(used, facet)| used[facet as usize] = true);
         }
         if !used[0].contains(&true) {
@@ -106,30 +104,28 @@ fn possible<const D: usize>(
 /// The facets of both sides, counted among the near ones, that share a piece.
 type Meeting = Vec<[u32; 2]>;
 
-/// For each rank, what it found of each two bodies. Collective.
+/// Return the facets of each two bodies that meet.
 fn meeting<const D: usize>(
     rules: &[AutoContact],
     cut: Cut<D>,
     whole: &[Side<D>],
     possible: &[Possible<D>],
-    exchange: &dyn Exchange,
-) -> Vec<Vec<Meeting>> {
+) -> Vec<Meeting> {
     let mut all = Vec::new();
-    let shares = shares(possible.iter().map(|possible| possible.near[0].count()), exchange);
-    for (possible, mine) in possible.iter().zip(shares) {
+    for possible in possible {
         let side = |k: usize| {
             let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
             Side::new(name, space, possible.near[k].clone(), prescribed, frame)
         };
         let (rule, side_a, side_b) = (&rules[possible.rule], side(0), side(1));
         let reach = within(&side_a, &side_b, rule.distance, rule.contact.angle);
-        let pieces = cut(&side_a, &side_b, &reach, &|facet| mine.contains(&facet)).points;
+        let pieces = cut(&side_a, &side_b, &reach, &|_| true).points;
         let mut facets: Meeting = pieces.iter().map(|point| [point.facet_a as u32, point.facet_b as u32]).collect();
         facets.sort_unstable();
         facets.dedup();
         all.push(facets);
     }
-    share(exchange, all)
+    all
 }
 
 /// Refuses a rule that found nothing.

@@ -1,10 +1,14 @@
 //! Supports that move a body as one: that motion is taken out before anything is rounded.
 
+use serde::{Deserialize, Serialize};
+use crate::exchange::Plain;
 use super::part::Part;
 use crate::fem::rigid::{self, RigidMotion};
 use nalgebra::{DMatrix, DVector};
 
 /// What supports prescribe.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
 pub struct Supported<const D: usize> {
     /// The rigid motion by which they move the body as one.
     pub carried: Option<RigidMotion<D>>,

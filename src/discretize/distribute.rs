@@ -1,60 +1,207 @@
-//! The dofs of all bodies over the ranks: a partition of their nodes, and what each rank knows of it.
+//! The nodes of bodies over the ranks: each node of bodies in one matrix has one owner, and a number in that matrix.
 
 use super::draft::Draft;
 use super::part::Part;
-use crate::exchange::{Exchange, share, trade};
-use crate::fem::{Couplings, ElasticBody, Interpolation, Space, place};
+use crate::exchange::Serial;
+use crate::fem::{Couplings, ElasticBody, Interpolation, Space};
 use crate::linalg::Csr;
 use crate::mesh::Cuts;
 use crate::model::Distribution;
 use nalgebra::DMatrix;
-use std::collections::HashMap;
+use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
-/// Bodies whose rows of K are in one matrix of all ranks.
-pub struct Deal {
+/// Bodies whose rows of K are in one matrix, with the owner of each of their nodes. Known on the first rank.
+pub struct Partition {
     /// Their numbers in the scene, in increasing order.
     pub bodies: Vec<usize>,
-    /// The number of the first node of each among those of all, and the end.
-    starts: Vec<u32>,
-    /// What says which rank has a node.
-    cuts: Cuts,
+    ranks: usize,
+    /// The rank that owns each node of each body.
+    owner: Vec<Vec<u32>>,
+    /// All nodes of each body.
+    nodes: Numbers,
+    /// The nodes of each body from which displacements are interpolated, where that is wanted.
+    coarse: Numbers,
 }
 
-impl Deal {
-    /// Of `bodies`, each own node of which, one body after the other, is coupled with so many nodes of all. Collective.
+/// Numbers of nodes of the bodies in one matrix: rank by rank, there body by body, there in the order of the nodes.
+struct Numbers {
+    /// The number of each node of each body; [`NONE`] for nodes that are not counted.
+    of_node: Vec<Vec<u32>>,
+    /// How many nodes of each body each rank owns: `counts[rank][body]`.
+    counts: Vec<Vec<usize>>,
+}
+
+/// A node that is not counted.
+const NONE: u32 = u32::MAX;
+
+impl Numbers {
+    /// Number the nodes for which `is_counted(body, node)` holds.
+    fn new(owner: &[Vec<u32>], ranks: usize, is_counted: impl Fn(usize, u32) -> bool) -> Self {
+        let is_counted = &is_counted;
+        let counted = |body: usize| {
+            let nodes = (0..).zip(&owner[body]).map(|(node, &rank)| (node, rank as usize));
+            nodes.filter(move |(node, _)| is_counted(body, *node))
+        };
+        let mut counts = vec![vec![0; owner.len()]; ranks];
+        for body in 0..owner.len() {
+            counted(body).for_each(|(_, rank)| counts[rank][body] += 1);
+        }
+        let mut first = 0;
+        let mut next: Vec<Vec<u32>> = vec![vec![0; owner.len()]; ranks];
+        for (next, count) in next.iter_mut().flatten().zip(counts.iter().flatten()) {
+            *next = first;
+            first += *count as u32;
+        }
+        let mut of_node: Vec<Vec<u32>> = owner.iter().map(|owner| vec![NONE; owner.len()]).collect();
+        for (body, of_node) in of_node.iter_mut().enumerate() {
+            for (node, rank) in counted(body) {
+                of_node[node as usize] = next[rank][body];
+                next[rank][body] += 1;
+            }
+        }
+        Self { of_node, counts }
+    }
+
+    /// Return how many nodes these ranks own.
+    fn sum(&self, ranks: std::ops::Range<usize>) -> usize {
+        self.counts[ranks].iter().flatten().sum()
+    }
+}
+
+impl Partition {
+    /// Distribute the nodes of `bodies` by recursive bisection. Each node, one body after the other, weighs as much as the number of nodes with which
+    /// it is coupled in the matrix. `wants_coarse(body)` tells whether a body is interpolated from its coarse nodes.
     pub fn new<const D: usize>(
         bodies: Vec<usize>,
         parts: &[Part<D>],
         couplings: &[u32],
-        exchange: &dyn Exchange,
+        ranks: usize,
+        wants_coarse: &dyn Fn(usize) -> bool,
     ) -> Self {
-        let (mut starts, mut own) = (vec![0], Vec::with_capacity(couplings.len()));
-        for &body in &bodies {
-            let (start, Part { space, known, .. }) = (starts[starts.len() - 1], &parts[body]);
-            own.extend(known.own.iter().map(|&node| (space.nodes[node as usize], start + node)));
-            starts.push(start + space.nodes.len() as u32);
-        }
+        let places: Vec<[f64; D]> = bodies.iter().flat_map(|&body| parts[body].space.nodes.iter().copied()).collect();
         let weight = |at: u32| u64::from(couplings[at as usize]);
-        let cuts = Cuts::new(own.len(), &|at| own[at as usize], &weight, exchange.ranks(), exchange);
-        Self { bodies, starts, cuts }
+        let cuts = Cuts::new(places.len(), &|at| (places[at as usize], at), &weight, ranks, &Serial);
+        let mut all = places.iter().zip(0..).map(|(x, number)| cuts.part(x, number) as u32);
+        let of_body = |&body: &usize| all.by_ref().take(parts[body].space.nodes.len()).collect();
+        let owner: Vec<Vec<u32>> = bodies.iter().map(of_body).collect();
+        let coarse_nodes = |&body: &usize| if wants_coarse(body) { parts[body].coarse_nodes() } else { Vec::new() };
+        let coarse: Vec<Vec<u32>> = bodies.iter().map(coarse_nodes).collect();
+        let nodes = Numbers::new(&owner, ranks, |_, _| true);
+        let coarse = Numbers::new(&owner, ranks, |body, node| coarse[body].binary_search(&node).is_ok());
+        Self { bodies, ranks, owner, nodes, coarse }
     }
 
-    /// The rank of a node whose place is known, of the body with this number among those of the matrix.
-    pub fn owner<const D: usize>(&self, number: usize, part: &Part<D>, node: u32) -> usize {
-        self.cuts.part(&part.space.nodes[node as usize], self.starts[number] + node)
+    /// Return the rank that owns a node of the body with this number among those of the matrix.
+    pub fn owner(&self, number: usize, node: u32) -> usize {
+        self.owner[number][node as usize] as usize
+    }
+
+    /// Return the rank that owns most nodes of a body, the first of equal ones.
+    pub fn leader(&self, number: usize) -> usize {
+        (0..self.ranks).rev().max_by_key(|&rank| self.nodes.counts[rank][number]).unwrap_or(0)
+    }
+
+    /// Return the ranks that own nodes of a body.
+    pub fn ranks(&self, number: usize) -> Vec<usize> {
+        (0..self.ranks).filter(|&rank| self.nodes.counts[rank][number] > 0).collect()
+    }
+
+    /// Return the numbers of the cells of a body that a rank needs: those at its own nodes, and those that touch one of these, so that the rank knows all
+    /// that meets at the nodes of the former. Tied nodes are assembled where their master is.
+    pub fn cells<const D: usize>(&self, number: usize, part: &Part<D>, rank: usize) -> Vec<usize> {
+        let Part { space, held, .. } = part;
+        let is_own = |node: &u32| self.owner(number, held.frame.node(*node)) == rank;
+        let cells = || space.cells.chunks_exact(space.stride);
+        let mut is_near = vec![false; space.nodes.len()];
+        for cell in cells().filter(|cell| cell.iter().any(is_own)) {
+            cell.iter().for_each(|&node| is_near[node as usize] = true);
+        }
+        let is_wanted = |cell: &[u32]| cell.iter().any(|&node| is_near[node as usize]);
+        cells().enumerate().filter(|(_, cell)| is_wanted(cell)).map(|(cell, _)| cell).collect()
+    }
+
+    /// Return the nodes of a body that a rank with these cells must know, sorted: its own ones, those of its cells and of contact rows, and masters of
+    /// tied nodes.
+    pub fn nodes<const D: usize>(
+        &self,
+        number: usize,
+        part: &Part<D>,
+        draft: &Draft<D>,
+        cells: &[usize],
+        rank: usize,
+    ) -> Vec<u32> {
+        let Part { space, held, .. } = part;
+        let own = (0..space.nodes.len() as u32).filter(|&node| self.owner(number, node) == rank);
+        let of_cells = space.corners(cells).into_iter();
+        let of_rows = [&draft.rows, &draft.nodal_rows].into_iter().flat_map(|rows| &rows.col);
+        let of_rows = of_rows.map(|&dof| dof as u32 / D as u32);
+        let masters = held.frame.master.values().copied();
+        Space::<D>::among(own.chain(of_cells).chain(of_rows).chain(masters))
+    }
+
+    /// Return how the dofs of a body are distributed, as a rank sees it that knows these `nodes`; `rows` are the contact rows of the body.
+    pub fn share<const D: usize>(
+        &self,
+        number: usize,
+        nodes: Vec<u32>,
+        rows: &Csr,
+        products: DMatrix<f64>,
+        rank: usize,
+    ) -> Share {
+        let numbers = &self.nodes.of_node[number];
+        let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
+        let mut others = vec![(Vec::new(), Vec::new()); self.ranks];
+        let (mut own, mut places) = (Vec::new(), Vec::new());
+        for (place, &node) in (0..).zip(&nodes) {
+            let owner = self.owner(number, node);
+            if owner == rank {
+                own.extend(dofs(node));
+                places.extend(dofs(place));
+            } else {
+                others[owner].0.extend(dofs(place));
+                others[owner].1.extend(dofs(numbers[node as usize]));
+            }
+        }
+        let start = self.nodes.sum(0..rank);
+        let before: usize = self.nodes.counts[rank][..number].iter().sum();
+        let total = D * self.nodes.sum(0..self.ranks);
+        let column = |dof: usize| Some(D * numbers[dof / D] as usize + dof % D);
+        let distribution = Distribution {
+            dofs: D * numbers.len(),
+            first: D * (start + before),
+            start: D * start,
+            own,
+            places,
+            near: others,
+            products,
+            total,
+            rows: rows.of_columns(total, column),
+            leads: self.leader(number) == rank,
+            exchange: Rc::new(Serial),
+        };
+        let coarse = (0..).zip(&nodes).map(|(place, &node)| (place, self.coarse.of_node[number][node as usize]));
+        let (of_coarse, coarse) = coarse.filter(|(_, coarse)| *coarse != NONE).unzip();
+        Share {
+            distribution,
+            coarse: Coarse {
+                nodes: of_coarse,
+                number: coarse,
+                all: self.coarse.sum(0..self.ranks),
+                own: self.coarse.counts[rank][number],
+            },
+            number: nodes.iter().map(|&node| numbers[node as usize]).collect(),
+            nodes,
+        }
     }
 }
 
-/// A body that is dealt out, as one rank sees it.
-pub struct Dealt {
+/// What one rank has of the dofs of a body that is distributed.
+#[derive(Serialize, Deserialize)]
+pub struct Share {
     /// The dofs of this rank.
     pub distribution: Distribution,
-    /// The rank that speaks for the body.
-    pub leader: usize,
-    /// The ranks that have nodes of it.
-    pub ranks: Vec<usize>,
-    /// The nodes that this rank must know, sorted: own ones, those of its cells and of contact rows, and masters of tied ones.
+    /// The nodes that this rank knows, sorted; numbers are those of the body.
     pub nodes: Vec<u32>,
     /// Number of each of these in the matrix that has its rows.
     number: Vec<u32>,
@@ -62,171 +209,23 @@ pub struct Dealt {
     coarse: Coarse,
 }
 
-/// The coarse nodes of a body that is dealt out.
-#[derive(Default)]
+/// The coarse nodes of a body on one rank.
+#[derive(Serialize, Deserialize)]
 struct Coarse {
     /// Which of the nodes that are known here these are: their places.
     nodes: Vec<u32>,
     /// Their numbers among the coarse nodes of the bodies in one matrix.
     number: Vec<u32>,
-    /// How many all of these have, and this one on this rank.
-    counts: [usize; 2],
+    /// How many coarse nodes these bodies have on all ranks.
+    all: usize,
+    /// How many coarse nodes of this body this rank owns.
+    own: usize,
 }
 
-/// What this rank knows of each body, once it has its cells; none for those that are not dealt out. `wants_coarse` tells whether the coarse nodes of a
-/// body are wanted. `told` numbers nodes; iterations go by `exchange`. Collective.
-pub fn distribute<const D: usize>(
-    parts: &[Part<D>],
-    drafts: &[Draft<D>],
-    wants_coarse: &dyn Fn(usize) -> bool,
-    deals: &[Deal],
-    told: &dyn Exchange,
-    exchange: &Rc<dyn Exchange>,
-) -> Vec<Option<Dealt>> {
-    let mut all: Vec<Option<Dealt>> = drafts.iter().map(|_| None).collect();
-    for deal in deals {
-        let near = |(number, &body): (usize, &usize)| {
-            Near::new(deal, number, &parts[body], &drafts[body], wants_coarse(body), told.rank())
-        };
-        let near: Vec<Near> = deal.bodies.iter().enumerate().map(near).collect();
-        let drafts = deal.bodies.iter().map(|&body| &drafts[body]);
-        deal.bodies.iter().zip(of_deal::<D>(drafts, near, told, exchange)).for_each(|(&body, of)| all[body] = Some(of));
-    }
-    all
-}
-
-/// What a rank knows of a body that is dealt out before nodes have numbers in the matrix.
-struct Near {
-    /// The nodes that it must know, sorted.
-    nodes: Vec<u32>,
-    /// The rank of each.
-    owner: Vec<u32>,
-    /// Whether each is a coarse one.
-    is_coarse: Vec<bool>,
-    /// Nodes of the body.
-    count: usize,
-}
-
-impl Near {
-    fn new<const D: usize>(
-        deal: &Deal,
-        number: usize,
-        part: &Part<D>,
-        draft: &Draft<D>,
-        wants_coarse: bool,
-        rank: usize,
-    ) -> Self {
-        let owner = |node: u32| deal.owner(number, part, node) as u32;
-        let own: Vec<u32> = part.space.nodes.known().filter(|&node| owner(node) as usize == rank).collect();
-        let of_rows = [&draft.rows, &draft.nodal_rows].into_iter().flat_map(|rows| &rows.col);
-        let of_rows = of_rows.map(|&dof| dof as u32 / D as u32);
-        let masters = part.held.frame.master.values().copied();
-        let all = own.iter().copied().chain(part.space.cells.iter().copied()).chain(of_rows).chain(masters);
-        let nodes = Space::<D>::among(all);
-        let coarse = if wants_coarse { part.coarse_nodes() } else { Vec::new() };
-        Self {
-            owner: nodes.iter().map(|&node| owner(node)).collect(),
-            is_coarse: nodes.iter().map(|node| coarse.binary_search(node).is_ok()).collect(),
-            nodes,
-            count: part.space.nodes.len(),
-        }
-    }
-
-    /// Places of the nodes of a rank.
-    fn of_rank(&self, rank: usize) -> impl Iterator<Item = usize> + Clone {
-        (0..self.nodes.len()).filter(move |&place| self.owner[place] as usize == rank)
-    }
-}
-
-/// Number in the matrix of a node, and among the coarse nodes.
-type Numbers = (u32, Option<u32>);
-
-/// The same of the bodies of one matrix. Collective.
-fn of_deal<'a, const D: usize>(
-    drafts: impl Iterator<Item = &'a Draft<D>>,
-    near: Vec<Near>,
-    told: &dyn Exchange,
-    exchange: &Rc<dyn Exchange>,
-) -> Vec<Dealt> {
-    let (rank, ranks) = (told.rank(), told.ranks());
-    // rank by rank, there body by body, there in the order of the nodes
-    let count = |near: &Near| {
-        let coarse = near.of_rank(rank).filter(|&place| near.is_coarse[place]).count();
-        [near.of_rank(rank).count(), coarse]
-    };
-    let counts: Vec<Vec<[usize; 2]>> = share(told, near.iter().map(count).collect());
-    let sum = |of_ranks: &[Vec<[usize; 2]>], which: usize| {
-        of_ranks.iter().flatten().map(|counts| counts[which]).sum::<usize>()
-    };
-    let [start, first_coarse] = [0, 1].map(|which| sum(&counts[..rank], which) as u32);
-    let (mut next, mut next_coarse) = (start, first_coarse);
-    let mut own: Vec<HashMap<u32, Numbers>> = Vec::new();
-    for near in &near {
-        let number = |place: usize| {
-            let coarse = near.is_coarse[place].then_some(next_coarse);
-            next_coarse += u32::from(coarse.is_some());
-            next += 1;
-            (near.nodes[place], (next - 1, coarse))
-        };
-        own.push(near.of_rank(rank).map(number).collect());
-    }
-    // each node is asked for at its rank, which may be this one
-    let mut asked: Vec<Vec<(u32, u32)>> = vec![Vec::new(); ranks];
-    for (body, near) in (0..).zip(&near) {
-        near.nodes.iter().zip(&near.owner).for_each(|(&node, &owner)| asked[owner as usize].push((body, node)));
-    }
-    let answer = |(body, node): (u32, u32)| own[body as usize].get(&node).copied().unwrap_or_default();
-    let answers = trade(told, asked).into_iter().map(|asked| asked.into_iter().map(answer).collect::<Vec<Numbers>>());
-    let mut answers: Vec<_> = trade(told, answers.collect()).into_iter().map(Vec::into_iter).collect();
-    let (total, all_coarse) = (D * sum(&counts, 0), sum(&counts, 1));
-    let of_body = |((body, draft), near): ((usize, &Draft<D>), Near)| {
-        let numbers: Vec<Numbers> =
-            near.owner.iter().map(|&owner| answers[owner as usize].next().unwrap_or_default()).collect();
-        let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
-        let mut others = vec![(Vec::new(), Vec::new()); ranks];
-        for place in (0..near.nodes.len()).filter(|&place| near.owner[place] as usize != rank) {
-            let (places, of_matrix) = &mut others[near.owner[place] as usize];
-            places.extend(dofs(place as u32));
-            of_matrix.extend(dofs(numbers[place].0));
-        }
-        let of_ranks = || counts.iter().map(|of_rank| of_rank[body][0]);
-        // of equal ones the first
-        let leader = (0..ranks).rev().max_by_key(|&rank| counts[rank][body][0]).unwrap_or(0);
-        let number = |dof: usize| {
-            let place = place(&near.nodes, (dof / D) as u32)? as usize;
-            Some(D * numbers[place].0 as usize + dof % D)
-        };
-        let distribution = Distribution {
-            dofs: D * near.count,
-            first: D * near.of_rank(rank).next().map_or(start, |place| numbers[place].0) as usize,
-            start: D * start as usize,
-            own: near.of_rank(rank).flat_map(|place| dofs(near.nodes[place])).collect(),
-            places: near.of_rank(rank).flat_map(|place| dofs(place as u32)).collect(),
-            near: others,
-            products: DMatrix::zeros(0, 0),
-            total,
-            rows: draft.rows.of_columns(total, number),
-            leads: leader == rank,
-            exchange: exchange.clone(),
-        };
-        let coarse = (0..).zip(&numbers).filter_map(|(place, (_, coarse))| Some((place, (*coarse)?)));
-        let (nodes, number) = coarse.unzip();
-        Dealt {
-            distribution,
-            leader,
-            ranks: (0..ranks).zip(of_ranks()).filter(|(_, count)| *count > 0).map(|(rank, _)| rank).collect(),
-            coarse: Coarse { nodes, number, counts: [all_coarse, counts[rank][body][1]] },
-            number: numbers.into_iter().map(|(number, _)| number).collect(),
-            nodes: near.nodes,
-        }
-    };
-    drafts.enumerate().zip(near).map(of_body).collect()
-}
-
-impl Dealt {
-    /// The rows of own dofs of the interpolation that `whole` makes from coarse nodes; columns are counted through the bodies in one matrix.
+impl Share {
+    /// Return the rows of own dofs of the interpolation that `whole` makes from coarse nodes; columns are counted through the bodies in one matrix.
     pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Interpolation) -> Interpolation {
-        let Coarse { nodes, number, counts: [all, own] } = &self.coarse;
+        let Coarse { nodes, number, all, own } = &self.coarse;
         let whole = whole(nodes);
         let mut rows = Csr::new(D * all);
         for &dof in &self.distribution.places {
@@ -236,13 +235,13 @@ impl Dealt {
         Interpolation { rows, own: D * own }
     }
 
-    /// Whether a node is an own one.
+    /// Whether this rank owns a node, by its place among those that it knows.
     pub fn is_own<const D: usize>(&self, node: usize) -> bool {
         let Distribution { first, own, .. } = &self.distribution;
         (*first..first + own.len()).contains(&(D * self.number[node] as usize))
     }
 
-    /// A body that was assembled for own nodes alone, in its own dofs; columns of K are those of the matrix that has its rows.
+    /// Return a body that was assembled for own nodes alone in its own dofs; columns of K are those of the matrix that has its rows.
     pub fn own<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
         let own = &self.distribution.places;
         let Csr { ptr, mut col, mut values, .. } = body.stiffness;

@@ -1,12 +1,12 @@
 //! A body before it is assembled: its contact rows, its loads, and the rigid motions that supports leave it.
 
+use serde::{Deserialize, Serialize};
+use crate::exchange::Plain;
 use super::part::{Candidate, Part};
-use super::totals::totals;
 use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::exchange::Exchange;
 use crate::fem::{NodalForces, RigidMotion, rigid};
-use crate::linalg::{Blocks, Csr, TOLERANCE, Total, dot};
+use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, rigid as joint};
 use nalgebra::{DMatrix, DVector};
@@ -16,6 +16,7 @@ use std::collections::HashSet;
 pub const NO_WORK: f64 = 1e-9;
 
 /// A body before it is assembled.
+#[derive(Clone)]
 pub struct Draft<const D: usize> {
     /// Its contact rows, pair by pair.
     pub segments: Vec<Segment>,
@@ -32,6 +33,8 @@ pub struct Draft<const D: usize> {
 }
 
 /// The rigid motions that supports and springs leave to a body.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
 pub struct Loose<const D: usize> {
     /// Combinations of those of the free body.
     pub left: Vec<RigidMotion<D>>,
@@ -55,7 +58,7 @@ pub fn segments(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<Segment>> {
 }
 
 impl<const D: usize> Draft<D> {
-    /// A body with its contact rows and loads. Collective.
+    /// A body with its contact rows and loads.
     ///
     /// # Errors
     /// Those of [`Part::load`].
@@ -64,7 +67,6 @@ impl<const D: usize> Draft<D> {
         segments: Vec<Segment>,
         pairs: &[ContactPair],
         mesh: &Mesh<D>,
-        exchange: &dyn Exchange,
     ) -> Result<Self> {
         let all = |rows: fn(&ContactPair) -> &[Csr; 2]| {
             let mut all = Csr::new(part.space.dofs());
@@ -74,26 +76,25 @@ impl<const D: usize> Draft<D> {
             all
         };
         let (rows, nodal_rows) = (all(|pair| &pair.rows), all(|pair| &pair.nodal));
-        let nodal_load = part.load(mesh, exchange)?;
+        let nodal_load = part.load(mesh)?;
         let load = part.load_on_dofs(&nodal_load);
         Ok(Self { segments, rows, nodal_rows, free: part.free(), nodal_load, load })
     }
 
-    /// Motions as contact and loads see them: at the dofs of contact rows and at loaded ones. Collective.
-    pub fn motions(&self, part: &Part<D>, all: &[RigidMotion<D>], exchange: &dyn Exchange) -> Vec<Motion> {
+    /// Motions as contact and loads see them: at the dofs of contact rows and at loaded ones.
+    pub fn motions(&self, part: &Part<D>, all: &[RigidMotion<D>]) -> Vec<Motion> {
         let of = |(motion, work): (&RigidMotion<D>, f64)| {
             let row = |q: usize| self.rows.row(q).map(|(dof, b)| b * part.dof_of(motion, dof)).sum();
             Motion { name: motion.name.clone(), trace: (0..self.rows.rows()).map(row).collect(), work }
         };
-        all.iter().zip(self.works(part, all, exchange)).map(of).collect()
+        all.iter().zip(self.works(part, all)).map(of).collect()
     }
 
-    /// The work of the loads on motions; exactly zero if it is rounding. Collective.
-    pub fn works(&self, part: &Part<D>, all: &[RigidMotion<D>], exchange: &dyn Exchange) -> Vec<f64> {
+    /// The work of the loads on motions; exactly zero if it is rounding.
+    pub fn works(&self, part: &Part<D>, all: &[RigidMotion<D>]) -> Vec<f64> {
         let of = |motion: &RigidMotion<D>| self.load.works(|node| part.at_dofs(motion, node));
-        let works: Vec<Total> = all.iter().flat_map(of).collect();
-        let work = |of: &[f64]| if of[0].abs() <= NO_WORK * of[1] { 0.0 } else { of[0] };
-        totals(exchange, &works).chunks_exact(2).map(work).collect()
+        let work = |[work, largest]: [f64; 2]| if work.abs() <= NO_WORK * largest { 0.0 } else { work };
+        all.iter().map(of).map(work).collect()
     }
 
     /// Change each nodal force f by -|f| u, with the vector u of its place.
@@ -106,27 +107,27 @@ impl<const D: usize> Draft<D> {
         self.load = part.load_on_dofs(&self.nodal_load);
     }
 
-    /// What supports and springs leave to the body now. Collective.
-    pub fn loose(&self, part: &Part<D>, exchange: &dyn Exchange) -> Loose<D> {
+    /// What supports and springs leave to the body now.
+    pub fn loose(&self, part: &Part<D>) -> Loose<D> {
         let at = |k: usize, node: u32| self.free[k].at(&part.space.nodes[node as usize]);
         let left = part.left(self.free.len(), &at);
         let left: Vec<_> = left.iter().map(|weights| rigid::combine(&self.free, weights)).collect();
-        let motions = self.motions(part, &left, exchange);
+        let motions = self.motions(part, &left);
         let unfelt = felt_by_none(&motions);
         let sprung = part.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
         let unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
-        let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions(part, &all, exchange), stiffness });
+        let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions(part, &all), stiffness });
         Loose { left, motions, sprung, unsupported, unfelt }
     }
 
-    /// The dof outside the contact rows, so that these stay as they are, that a motion moves most, unless that is little. Collective.
-    pub fn candidate(&self, part: &Part<D>, motion: &RigidMotion<D>, exchange: &dyn Exchange) -> Option<Candidate<D>> {
+    /// The dof outside the contact rows, so that these stay as they are, that a motion moves most, unless that is little.
+    pub fn candidate(&self, part: &Part<D>, motion: &RigidMotion<D>) -> Option<Candidate> {
         let in_rows: HashSet<usize> = self.rows.col.iter().map(|&dof| dof as usize).collect();
         let size = |dof: usize| {
             let is_free = !in_rows.contains(&dof) && !part.held.prescribed.contains_key(&dof);
             is_free.then(|| part.dof_of(motion, dof).abs())
         };
-        part.largest(&size, exchange).filter(|found| found.size > 1e-3)
+        part.largest(size).filter(|found| found.size > 1e-3)
     }
 }
 

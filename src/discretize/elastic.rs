@@ -2,13 +2,12 @@
 
 use super::find::{find_group, not_on_body, of_body, point};
 use crate::error::{Error, Result, shown};
-use crate::exchange::{Exchange, first};
 use crate::fem::Space;
 use crate::fem::elasticity::{Elasticity, Flaw};
-use crate::mesh::{Key, Mesh};
+use crate::mesh::Mesh;
 use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
 
-/// The elasticity of the cells of a body that are here; `key` puts those of all ranks into an order. Collective.
+/// The elasticity of the cells of a body.
 ///
 /// # Errors
 /// Regions that are not there, lie elsewhere or overlap, and constants that make no material.
@@ -17,28 +16,22 @@ pub fn of<const D: usize>(
     space: &Space<D>,
     mesh: &Mesh<D>,
     plane: Plane,
-    (key, exchange): (&dyn Fn(usize) -> Key, &dyn Exchange),
 ) -> Result<Elasticity> {
     let mut of_cell = vec![0; if spec.regions.is_empty() { 0 } else { space.cell_count() }];
     for (number, region) in spec.regions.iter().enumerate() {
         let cells = space.cells_in(find_group(mesh, &region.on, &[D], "region")?);
-        let mut count = [cells.len() as f64];
-        exchange.sum(&mut count);
-        if count == [0.0] {
+        if cells.is_empty() {
             return Err(not_on_body(&region.on, &spec.name.value));
         }
-        let mut found = Ok(());
         for cell in cells {
-            if of_cell[cell] != 0 && found.is_ok() {
+            if of_cell[cell] != 0 {
                 let (first, second) = (&spec.regions[of_cell[cell] - 1].on.value, &region.on.value);
                 let at = point(space.in_scene(space.centroid(cell)));
                 let message = format!("the regions `{first}` and `{second}` share the cell at {at}");
-                let error = Error::scene(&region.on.place, message).help("let each cell be in one region at most");
-                found = Err((key(cell), error));
+                return Err(Error::scene(&region.on.place, message).help("let each cell be in one region at most"));
             }
             of_cell[cell] = number + 1;
         }
-        first(exchange, found)?;
     }
     of_regions(spec, of_cell, D, plane)
 }

@@ -1,13 +1,14 @@
 //! What bodies need to become solvers, and who makes them.
 
 use crate::error::Result;
+use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
 use crate::fem::{ElasticBody, FreeMotion, Interpolation, NodeGraph};
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot, Distribution};
 use crate::problem::order::Order;
 
-/// What every rank knows of a body before its owner assembles it.
+/// What the first rank knows of a body before it is assembled.
 pub struct Outline<'a> {
     /// Name in the scene.
     pub name: &'a str,
@@ -21,24 +22,30 @@ pub struct Outline<'a> {
     pub prescribed: &'a [(usize, f64)],
     /// Rigid motions of the free body.
     pub motions: AtDofs<'a>,
-    /// How many of its nodes each is coupled with, itself included, summed over them: entries of K by blocks. Collective.
-    pub couplings: &'a dyn Fn() -> usize,
-    /// Which of its nodes K couples, made when it is first asked for; of several ranks the first has the graph, and all cells meanwhile. Collective.
+    /// Which of its nodes K couples, made when it is first asked for.
     pub graph: &'a dyn Fn() -> &'a NodeGraph,
 }
 
 /// Gives bodies their inner solvers.
 pub trait Factory {
-    /// Decides on the solvers of all bodies, in the order of the scene. Collective, once; where there are several ranks, graphs are asked for on all,
-    /// and the first has them.
+    /// The choice of solvers of all bodies.
+    type Plan: Plain;
+
+    /// Choose the solvers of all bodies, in the order of the scene, on the first rank.
     ///
     /// # Errors
     /// Failures of PETSc's options.
-    fn plan(&mut self, outlines: &[Outline]) -> Result<()>;
+    fn plan(&mut self, outlines: &[Outline]) -> Result<Self::Plan>;
 
-    /// Numbers, in increasing order, of bodies whose nodes are to be dealt out over the ranks, after the plan: those that share a matrix together;
-    /// none for bodies that stay whole.
-    fn dealt_out(&self) -> Vec<Vec<usize>>;
+    /// Follow the plan of the first rank on another one.
+    ///
+    /// # Errors
+    /// Failures of PETSc's options.
+    fn adopt(&mut self, plan: Self::Plan) -> Result<()>;
+
+    /// Return the numbers, in increasing order, of bodies whose nodes are to be distributed over the ranks, after the plan: those that share a matrix
+    /// together; none for bodies that stay whole.
+    fn distributed(&self) -> Vec<Vec<usize>>;
 
     /// Whether the interpolation of a body from linear displacements is wanted, after the plan.
     fn wants_interpolation(&self, name: &str) -> bool;

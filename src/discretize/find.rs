@@ -1,9 +1,7 @@
 //! Mesh groups by name, and refusals that point into the scene.
 
 use crate::error::{Error, Located, Result, few};
-use crate::exchange::{Exchange, gather};
 use crate::expression::Field;
-use crate::fem::Space;
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::BodySpec;
 use std::cell::RefCell;
@@ -41,16 +39,6 @@ pub fn find_group<'m, const D: usize>(
             names => format!("it has: {}", names.join(", ")),
         }),
     })
-}
-
-/// All nodes of a body on a group, sorted; every rank has some of a group of cells. Collective.
-pub fn nodes_on<const D: usize>(space: &Space<D>, group: &Group, exchange: &dyn Exchange) -> Vec<u32> {
-    let mut nodes = space.nodes_on(group);
-    if group.dimension == D && exchange.ranks() > 1 {
-        nodes = gather(exchange, &nodes);
-        nodes.dedup();
-    }
-    nodes
 }
 
 /// The refusal of a support or load on another body's group.

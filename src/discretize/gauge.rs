@@ -5,15 +5,13 @@
 
 use super::draft::{Draft, Loose};
 use super::part::Part;
-use crate::exchange::Exchange;
 use crate::fem::rigid;
 
-/// Fixes the motions of a body that nothing feels and no load works on, and names them; `loose` becomes what is left. Collective.
+/// Fixes the motions of a body that nothing feels and no load works on, and names them; `loose` becomes what is left.
 pub fn fix<const D: usize>(
     part: &mut Part<D>,
     draft: &Draft<D>,
     loose: &mut Loose<D>,
-    exchange: &dyn Exchange,
 ) -> Vec<String> {
     let mut fixed = Vec::new();
     if loose.unfelt.is_empty() {
@@ -22,12 +20,12 @@ pub fn fix<const D: usize>(
     loop {
         let idle = loose.unfelt.iter().find_map(|(_, weights)| {
             let motion = rigid::combine(&loose.left, weights);
-            (draft.works(part, std::slice::from_ref(&motion), exchange) == [0.0]).then_some(motion)
+            (draft.works(part, std::slice::from_ref(&motion)) == [0.0]).then_some(motion)
         });
         let Some(motion) = idle else { return fixed };
-        let Some(found) = draft.candidate(part, &motion, exchange) else { return fixed };
+        let Some(found) = draft.candidate(part, &motion) else { return fixed };
         part.fix(&found);
-        *loose = draft.loose(part, exchange);
+        *loose = draft.loose(part);
         fixed.push(motion.name);
     }
 }

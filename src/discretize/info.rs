@@ -1,12 +1,13 @@
 //! What is known of bodies and pairs besides their matrices.
 
+use serde::{Deserialize, Serialize};
 use super::post::Post;
 use super::surface::ContactSurface;
 use crate::mesh::Checked;
 use crate::problem::ContactSpec;
 
 /// Names of the rigid motions of a body that neither supports nor smooth surfaces resist.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Gauged {
     /// Those without work of the loads, fixed at one node each.
     pub fixed: Vec<String>,
@@ -15,7 +16,7 @@ pub struct Gauged {
 }
 
 /// Loads that lacked balance on motions by no more than the mesh may miss of them, and were balanced.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Balanced {
     /// The bodies that the motions move.
     pub bodies: Vec<usize>,
@@ -26,6 +27,7 @@ pub struct Balanced {
 }
 
 /// What is known of a body besides its matrices.
+#[derive(Serialize, Deserialize)]
 pub struct BodyInfo {
     /// Name in the scene.
     pub name: String,
@@ -67,6 +69,7 @@ pub struct BodyInfo {
     /// Names of its rigid surfaces.
     pub rigid: Vec<String>,
     /// What it says of its displacements.
+    #[serde(skip)]
     pub(super) post: Option<Box<dyn Post>>,
 }
 

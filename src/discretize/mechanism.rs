@@ -10,12 +10,10 @@ use super::missed;
 use super::moving::{self, Moving};
 use super::part::{Candidate, Part};
 use super::round::Points;
-use super::totals::totals;
 use crate::contact::ContactPair;
 use crate::error::few;
-use crate::exchange::Exchange;
 use crate::fem::{Extent, RigidMotion, rigid};
-use crate::linalg::{Blocks, PART, TOLERANCE, Total, axpy, dot, fit};
+use crate::linalg::{Blocks, PART, TOLERANCE, axpy, dot, fit};
 use crate::mesh::{Joined, Mesh};
 use crate::model::{Mechanism, Motion, Motions, Segment};
 use nalgebra::{DMatrix, DVector};
@@ -38,17 +36,16 @@ pub struct Fixed<const D: usize> {
     pub balanced: Vec<Balanced>,
 }
 
-/// Fixes the motions that nothing feels and no load works on: of whole groups of bodies, of each body alone, then what is left. Collective.
+/// Fixes the motions that nothing feels and no load works on: of whole groups of bodies, of each body alone, then what is left.
 pub fn fix<const D: usize>(
     parts: &mut [Part<D>],
     drafts: &mut [Draft<D>],
     pairs: &[ContactPair],
     mesh: &Mesh<D>,
-    exchange: &dyn Exchange,
 ) -> Fixed<D> {
-    let loose = parts.iter().zip(&*drafts).map(|(part, draft)| draft.loose(part, exchange)).collect();
+    let loose = parts.iter().zip(&*drafts).map(|(part, draft)| draft.loose(part)).collect();
     let (found, balanced) = (Vec::new(), Vec::new());
-    let mut search = Search { parts, drafts, pairs, mesh, exchange, loose, found, balanced };
+    let mut search = Search { parts, drafts, pairs, mesh, loose, found, balanced };
     for group in groups(search.drafts.len(), pairs) {
         if group.iter().all(|&body| !search.loose[body].left.is_empty()) {
             let all = search.of_group(&group);
@@ -60,7 +57,7 @@ pub fn fix<const D: usize>(
     }
     (0..search.parts.len()).for_each(|body| search.balance(&search.of_one(body)));
     let bodies = search.parts.iter_mut().zip(&*search.drafts).zip(&mut search.loose);
-    let fixed: Vec<_> = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose, exchange)).collect();
+    let fixed: Vec<_> = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose)).collect();
     let gauged = fixed.into_iter().enumerate().map(|(body, fixed)| search.fix_round(body, fixed)).collect();
     if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
         search.fix_some();
@@ -120,7 +117,6 @@ struct Search<'p, 's, const D: usize> {
     drafts: &'p mut [Draft<D>],
     pairs: &'p [ContactPair],
     mesh: &'p Mesh<D>,
-    exchange: &'p dyn Exchange,
     /// The motions that supports and springs leave to each body now.
     loose: Vec<Loose<D>>,
     found: Vec<Mechanism>,
@@ -153,7 +149,7 @@ impl<const D: usize> Search<'_, '_, D> {
             held += DMatrix::from_fn(count, count, |i, j| dot(&off[i], &off[j]) / off[i].len() as f64);
         }
         let traces: Vec<Vec<Motion>> =
-            group.iter().map(|&body| self.drafts[body].motions(&self.parts[body], &all, self.exchange)).collect();
+            group.iter().map(|&body| self.drafts[body].motions(&self.parts[body], &all)).collect();
         let rows = self.rows(group);
         let felt = rows.feel(traces.iter().map(Vec::as_slice));
         let moving = |weights: DVector<f64>| {
@@ -305,14 +301,14 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// Work of the loads on a motion, as a share of the largest possible; zero if it is rounding or an error of the mesh.
     fn work(&self, moving: &Moving<D>) -> f64 {
-        let [work, largest] = moving.works(self.parts, self.drafts, self.exchange);
+        let [work, largest] = moving.works(self.parts, self.drafts);
         if work.abs() <= largest * moving.error.max(NO_WORK) { 0.0 } else { work / largest }
     }
 
     /// Balance the loads on motions that nothing holds, if what they lack on each is no more than what the mesh may miss of them.
     fn balance(&mut self, all: &[Moving<D>]) {
         // bodies without loads have nothing to balance
-        let works_on = |moving: &Moving<D>| moving.works(self.parts, self.drafts, self.exchange);
+        let works_on = |moving: &Moving<D>| moving.works(self.parts, self.drafts);
         let (all, works): (Vec<&Moving<D>>, Vec<[f64; 2]>) =
             all.iter().map(|moving| (moving, works_on(moving))).filter(|(_, [_, largest])| *largest > 0.0).unzip();
         let shares = || works.iter().map(|[work, largest]| work.abs() / largest.max(f64::MIN_POSITIVE));
@@ -323,12 +319,12 @@ impl<const D: usize> Search<'_, '_, D> {
             return;
         }
         let lacking: Vec<f64> = works.iter().map(|[work, _]| *work).collect();
-        if moving::balance(&all, &lacking, self.parts, self.drafts, self.exchange) {
+        if moving::balance(&all, &lacking, self.parts, self.drafts) {
             for (moving, share) in all.iter().zip(shares()).filter(|(_, share)| *share > NO_WORK) {
                 self.note_balanced(moving, share);
             }
             for body in all.iter().flat_map(|moving| &moving.bodies) {
-                self.loose[*body] = self.drafts[*body].loose(&self.parts[*body], self.exchange);
+                self.loose[*body] = self.drafts[*body].loose(&self.parts[*body]);
             }
         }
     }
@@ -349,13 +345,13 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// The work of the loads on a motion that the mesh may miss, where they could do the `largest`.
     fn missed(&self, moving: &Moving<D>, largest: f64) -> f64 {
-        let (mut share, mut quadrature) = (moving.error, Total::default());
+        let (mut share, mut quadrature) = (moving.error, 0.0);
         for (&body, motion) in moving.bodies.iter().zip(&moving.motions) {
             let part = &self.parts[body];
             share = share.max(missed::by_facets(part, &self.drafts[body], self.pairs, self.mesh));
-            quadrature.join(&missed::by_quadrature(part, motion, self.mesh));
+            quadrature += missed::by_quadrature(part, motion, self.mesh);
         }
-        share * largest + totals(self.exchange, &[quadrature])[0]
+        share * largest + quadrature
     }
 
     /// The motions of a body that no contact feels.
@@ -371,16 +367,16 @@ impl<const D: usize> Search<'_, '_, D> {
     /// Fixes a motion at one node of the largest body that has one where the motion is not small; returns the body.
     fn pin(&mut self, moving: &Moving<D>) -> Option<usize> {
         let candidate = |(&body, motion): (&usize, &RigidMotion<D>)| {
-            Some((body, self.drafts[body].candidate(&self.parts[body], motion, self.exchange)?))
+            Some((body, self.drafts[body].candidate(&self.parts[body], motion)?))
         };
-        let mut all: Vec<(usize, Candidate<D>)> =
+        let mut all: Vec<(usize, Candidate)> =
             moving.bodies.iter().zip(&moving.motions).filter_map(candidate).collect();
         let most = all.iter().map(|(_, found)| found.size).fold(0.0, f64::max);
         all.retain(|(_, found)| found.size > NEAR * most);
         let size = |body: usize| self.parts[body].known.extent.size();
         let (body, found) = all.into_iter().rev().max_by(|a, b| size(a.0).total_cmp(&size(b.0)))?;
         self.parts[body].fix(&found);
-        self.loose[body] = self.drafts[body].loose(&self.parts[body], self.exchange);
+        self.loose[body] = self.drafts[body].loose(&self.parts[body]);
         Some(body)
     }
 }

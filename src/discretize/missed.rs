@@ -5,7 +5,6 @@ use super::find::find_group;
 use super::part::Part;
 use crate::contact::ContactPair;
 use crate::fem::{RigidMotion, turn};
-use crate::linalg::Total;
 use crate::mesh::Mesh;
 
 /// Ratio of the error of a quadrature to the difference between it and the same rule on halves of the elements. Where a load jumps within an element, the error on
@@ -25,9 +24,9 @@ pub fn by_facets<const D: usize>(part: &Part<D>, draft: &Draft<D>, pairs: &[Cont
     points.map(|point| turn::by_chords(2.0 * point.spread)).fold(on_groups, f64::max)
 }
 
-/// The largest work on a motion that the nodal forces of loads on surfaces can do by which their quadrature misses them, at own nodes.
-pub fn by_quadrature<const D: usize>(part: &Part<D>, motion: &RigidMotion<D>, mesh: &Mesh<D>) -> Total {
+/// The largest work on a motion that the nodal forces of loads on surfaces can do by which their quadrature misses them.
+pub fn by_quadrature<const D: usize>(part: &Part<D>, motion: &RigidMotion<D>, mesh: &Mesh<D>) -> f64 {
     let missed = part.missed_load(mesh).unwrap_or_default();
     let [_, largest] = missed.works(|node| motion.at(&part.space.nodes[node as usize]));
-    [HALVES * largest.value()].into_iter().collect()
+    HALVES * largest
 }

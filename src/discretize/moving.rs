@@ -2,10 +2,8 @@
 
 use super::draft::Draft;
 use super::part::Part;
-use super::totals::totals;
-use crate::exchange::Exchange;
 use crate::fem::RigidMotion;
-use crate::linalg::{Total, dot};
+use crate::linalg::dot;
 use nalgebra::{DMatrix, DVector};
 
 /// A motion of some bodies, each of which is rigid.
@@ -21,15 +19,14 @@ pub struct Moving<const D: usize> {
 }
 
 impl<const D: usize> Moving<D> {
-    /// Return the work of the loads on the motion, and the largest that forces of their sizes could do. Collective.
-    pub fn works(&self, parts: &[Part<D>], drafts: &[Draft<D>], exchange: &dyn Exchange) -> [f64; 2] {
-        let mut sums = [Total::default(); 2];
+    /// Return the work of the loads on the motion, and the largest that forces of their sizes could do.
+    pub fn works(&self, parts: &[Part<D>], drafts: &[Draft<D>]) -> [f64; 2] {
+        let mut sums = [0.0; 2];
         for (&body, motion) in self.bodies.iter().zip(&self.motions) {
             let works = drafts[body].load.works(|node| parts[body].at_dofs(motion, node));
-            sums.iter_mut().zip(&works).for_each(|(sum, more)| sum.join(more));
+            (0..2).for_each(|k| sums[k] += works[k]);
         }
-        let works = totals(exchange, &sums);
-        [works[0], works[1]]
+        sums
     }
 
     /// What the motion does to a body, if it moves it.
@@ -40,7 +37,7 @@ impl<const D: usize> Moving<D> {
 }
 
 /// Change the loads so that they do no work on any of these motions m_j, on which they do the `works` w_j. Return whether that was possible: rigid
-/// surfaces keep their forces. Collective.
+/// surfaces keep their forces.
 ///
 /// Each nodal force f changes along the motions in proportion to its size, by -|f| sum_j b_j m_j at its node, with
 ///
@@ -54,10 +51,9 @@ pub fn balance<const D: usize>(
     works: &[f64],
     parts: &[Part<D>],
     drafts: &mut [Draft<D>],
-    exchange: &dyn Exchange,
 ) -> bool {
     let count = all.len();
-    let mut products = vec![Total::default(); count * count];
+    let mut products = DMatrix::zeros(count, count);
     for (body, (part, draft)) in parts.iter().zip(&*drafts).enumerate() {
         let motions: Vec<(usize, &RigidMotion<D>)> =
             all.iter().enumerate().filter_map(|(j, moving)| Some((j, moving.of(body)?))).collect();
@@ -66,11 +62,10 @@ pub fn balance<const D: usize>(
             let at = motions.iter().map(|(j, motion)| (*j, motion.at(&part.space.nodes[node as usize])));
             let at: Vec<(usize, [f64; D])> = at.collect();
             for (j, u) in &at {
-                at.iter().for_each(|(k, v)| products[count * j + k].add(size * dot(u, v)));
+                at.iter().for_each(|(k, v)| products[(*j, *k)] += size * dot(u, v));
             }
         }
     }
-    let products = DMatrix::from_row_slice(count, count, &totals(exchange, &products));
     let Some(factor) = products.cholesky() else { return false };
     let amounts = factor.solve(&DVector::from_column_slice(works));
     for (body, (part, draft)) in parts.iter().zip(drafts).enumerate() {

@@ -5,44 +5,68 @@ use super::find::{find_group, point};
 use super::part::Part;
 use super::surface::{ContactSurface, Surface};
 use crate::contact::law::{self, OwnLaws};
-use crate::contact::pieces::{Common, Cut, Reach};
-use crate::contact::{self, ContactPair, Fault, Fine, Integrals, Side};
+use crate::contact::pieces::{Cut, Reach};
+use crate::contact::{self, ContactPair, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
-use crate::exchange::{Exchange, Serial, share, shares};
 use crate::fem::Facets;
 use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{ContactSpec, Overlap};
 use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashSet};
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {
-    /// What the scene says; `between` names the bodies if the pair was found.
-    pub spec: ContactSpec,
+    /// Where the scene speaks of it.
+    pub origin: Origin,
     /// The arrays of the method.
     pub pair: ContactPair,
     /// Its integration points, if they were asked for.
     pub fine: Option<Fine<D>>,
-    /// Whether side a (which carries the points) is the second of `spec.between`.
+    /// Whether side a (which carries the points) is the second of the two that the scene names.
     pub swapped: bool,
     /// Its mesh, for output.
     pub surface: ContactSurface,
 }
 
-/// All pairs of the scene: those with names in the order of the file, then those that are found. `fine` asks for integration
-/// points. Every rank looks for the pieces at an equal share of the nodes, and all get all integrals. Collective.
+/// Where a scene speaks of a pair.
+#[derive(Clone, Serialize, Deserialize)]
+pub enum Origin {
+    /// The contact of this number, with the names of its surfaces.
+    Named(usize),
+    /// The rule of this number, by which the pair was found between two bodies.
+    Found(usize, [String; 2]),
+}
+
+impl Origin {
+    /// Return what the scene says of the pair; `between` names the bodies if it was found.
+    pub fn spec(&self, scene: &Scene) -> ContactSpec {
+        match self {
+            Self::Named(number) => scene.contacts[*number].clone(),
+            Self::Found(rule, names) => {
+                let mut spec = scene.auto[*rule].contact.clone();
+                spec.between.iter_mut().zip(names).for_each(|(name, own)| name.value.clone_from(own));
+                spec
+            }
+        }
+    }
+}
+
+/// Return all pairs of the scene: those with names in the order of the file, then those that are found. `fine` asks for integration points.
+///
+/// # Errors
+/// Surfaces that are not there, bound no body or several, or do not face each other; laws and gaps that are none somewhere.
 pub fn all<const D: usize>(
     scene: &Scene,
     mesh: &Mesh<D>,
     cut: Cut<D>,
     parts: &[Part<D>],
     fine: bool,
-    exchange: &dyn Exchange,
 ) -> Result<Vec<Contact<D>>> {
     let mut opposite = Vec::new();
     let mut named = HashSet::new();
     let owners = if scene.contacts.is_empty() { Owners::default() } else { Owners::new(parts) };
-    for spec in &scene.contacts {
+    for (number, spec) in scene.contacts.iter().enumerate() {
         let surface = |k: usize| {
             let name = &spec.between[k];
             let group = find_group(mesh, name, &[D - 1], "contact surface")?;
@@ -59,44 +83,19 @@ pub fn all<const D: usize>(
             .help("contact of a body with itself is out of scope; make two bodies of it"));
         }
         named.insert([a.min(b), a.max(b)]);
-        opposite.push(Opposite::new(spec.clone(), None, parts, surfaces));
+        opposite.push(Opposite::new(Origin::Named(number), spec.clone(), None, parts, surfaces));
     }
-    for (rule, surfaces) in auto::find(&scene.auto, cut, parts, &named, exchange)? {
-        let rule = &scene.auto[rule];
-        let mut spec = rule.contact.clone();
-        for (name, surface) in spec.between.iter_mut().zip(&surfaces) {
-            surface.name.clone_into(&mut name.value);
-        }
-        opposite.push(Opposite::new(spec, Some(rule.distance), parts, surfaces));
+    for (rule, surfaces) in auto::find(&scene.auto, cut, parts, &named)? {
+        let origin = Origin::Found(rule, surfaces.each_ref().map(|surface| surface.name.to_owned()));
+        let spec = origin.spec(scene);
+        opposite.push(Opposite::new(origin, spec, Some(scene.auto[rule].distance), parts, surfaces));
     }
-    let nodes: Vec<Vec<u32>> = opposite.iter().map(|pair| pair.a.facets.distinct_nodes()).collect();
-    // integration points need all pieces
-    let shares = shares(nodes.iter().map(Vec::len), if fine { &Serial } else { exchange });
-    let (mut own, mut pieces) = (Vec::new(), Vec::new());
-    for ((pair, nodes), share) in opposite.iter().zip(&nodes).zip(shares) {
-        let (is_all, nodes) = (share.len() == nodes.len(), &nodes[share]);
-        let asked = |node: &u32| is_all || nodes.binary_search(node).is_ok();
-        let common = pair.common(cut, &|facet| pair.a.facets.facet(facet).iter().any(asked));
-        own.push(contact::integrate(&pair.a, &pair.b, &common, &asked));
-        pieces.push(Some(common).filter(|_| fine));
-    }
-    let integrals = if fine { own } else { joined(own, exchange) };
-    let pairs = opposite.into_iter().zip(integrals).zip(pieces);
-    pairs.map(|((pair, integrals), common)| pair.assemble(&scene.laws, integrals, common)).collect()
-}
-
-/// The integrals of all ranks. Collective.
-fn joined(own: Vec<Integrals>, exchange: &dyn Exchange) -> Vec<Integrals> {
-    let mut of_ranks = share(exchange, own).into_iter();
-    let mut all = of_ranks.next().unwrap_or_default();
-    for of_rank in of_ranks {
-        all.iter_mut().zip(of_rank).for_each(|(all, more)| all.add(more));
-    }
-    all
+    opposite.into_iter().map(|pair| pair.assemble(&scene.laws, cut, fine)).collect()
 }
 
 /// Two surfaces that are to be a pair.
 struct Opposite<'a, const D: usize> {
+    origin: Origin,
     spec: ContactSpec,
     bodies: [usize; 2],
     a: Side<'a, D>,
@@ -108,7 +107,13 @@ struct Opposite<'a, const D: usize> {
 
 impl<'a, const D: usize> Opposite<'a, D> {
     /// Of two surfaces; with a `distance` they may be no farther apart.
-    fn new(spec: ContactSpec, distance: Option<f64>, parts: &'a [Part<D>], surfaces: [Surface<'a, D>; 2]) -> Self {
+    fn new(
+        origin: Origin,
+        spec: ContactSpec,
+        distance: Option<f64>,
+        parts: &'a [Part<D>],
+        surfaces: [Surface<'a, D>; 2],
+    ) -> Self {
         let [first, second] = surfaces.map(|Surface { body, name, facets }| {
             let held = &parts[body].held;
             (body, Side::new(name, &parts[body].space, facets, &held.prescribed, &held.frame))
@@ -120,23 +125,19 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let ((body_a, a), (body_b, b)) = if swapped { (second, first) } else { (first, second) };
         let reach = distance
             .map_or_else(|| Reach::between(&a, &b, spec.angle), |distance| auto::within(&a, &b, distance, spec.angle));
-        Self { spec, bodies: [body_a, body_b], a, b, swapped, reach }
+        Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, reach }
     }
 
-    /// The common pieces on those facets of side a that are asked for.
-    fn common(&self, cut: Cut<D>, asked: &dyn Fn(usize) -> bool) -> Common<D> {
-        let mut common = cut(&self.a, &self.b, &self.reach, asked);
+    /// Make the pair; also its integration points, if they are asked for (`fine`).
+    fn assemble(self, laws: &OwnLaws, cut: Cut<D>, fine: bool) -> Result<Contact<D>> {
+        let mut common = cut(&self.a, &self.b, &self.reach, &|_| true);
         if self.spec.touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
-        common
-    }
-
-    /// The pair, from the integrals over all pieces; with these also its integration points.
-    fn assemble(self, laws: &OwnLaws, integrals: Integrals, common: Option<Common<D>>) -> Result<Contact<D>> {
-        let Self { spec, bodies, a, b, swapped, .. } = self;
+        let Self { origin, spec, bodies, a, b, swapped, .. } = self;
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
+        let integrals = contact::integrate(&a, &b, &common, &|_| true);
         let pair = contact::assemble(&a, &b, bodies, integrals, &gap, &law).map_err(|fault| refuse(&spec, fault))?;
         let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
         if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
@@ -150,8 +151,8 @@ impl<'a, const D: usize> Opposite<'a, D> {
             pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(&spec)))?;
         }
         let surface = ContactSurface::new(&a, &pair);
-        let fine = common.map(|common| Fine::new(&a, &b, &common, &pair, &gap, spec.touching));
-        Ok(Contact { spec, pair, fine, swapped, surface })
+        let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching));
+        Ok(Contact { origin, pair, fine, swapped, surface })
     }
 }
 
@@ -238,50 +239,5 @@ impl Owners {
                     .help("the bodies share mesh nodes there: give each its own curve or surface in the geometry"))
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::contact::{LayerLaw, pieces};
-    use crate::exchange::crowd;
-    use crate::fem::{Frame, sample::block};
-    use crate::problem::order::Order;
-    use std::collections::HashMap;
-    use std::rc::Rc;
-
-    /// Ranks that look at a part of the nodes each, and at the facets there alone, come to the pair of one rank, to the last digit.
-    #[test]
-    fn ranks_share_the_search_for_pieces() {
-        let pair = |exchange: &dyn Exchange| {
-            let (below, mut above) = (block::<3>(3, Order::P1), block::<3>(4, Order::P1));
-            above.nodes.iter_mut().for_each(|x| x[2] += 1.1 + 0.01 * x[0]);
-            let (free, frame) = (HashMap::new(), Frame::default());
-            let side = |space, name, faces: &dyn Fn([f64; 3]) -> bool| {
-                let all: Facets<3> = crate::fem::Space::boundary(space);
-                let keep: Vec<bool> = all.normals(space).chunks(3).map(|normals| faces(normals[0])).collect();
-                Side::new(name, space, all.only(&keep), &free, &frame)
-            };
-            let (a, b) = (side(&below, "a", &|n| n[2] > 0.9), side(&above, "b", &|n| n[2] < -0.9));
-            let nodes = a.facets.distinct_nodes();
-            let mine = &nodes[shares([nodes.len()].into_iter(), exchange).swap_remove(0)];
-            let asked = |node: &u32| mine.contains(node);
-            let is_near = |facet: usize| a.facets.facet(facet).iter().any(asked);
-            let common = pieces::space(&a, &b, &Reach::between(&a, &b, 60.0), &is_near);
-            let looked_at = (0..a.facets.count()).filter(|&facet| is_near(facet)).count();
-            assert!(common.points.iter().all(|point| is_near(point.facet_a)));
-            let own = vec![contact::integrate(&a, &b, &common, &asked)];
-            let integrals = joined(own, exchange).swap_remove(0);
-            let law = |_: &[[f64; 3]]| Ok(Rc::new(law::Linear { stiffness: 1.0 }) as Rc<dyn LayerLaw>);
-            let pair = contact::assemble(&a, &b, [0, 1], integrals, &|_| 0.0, &law).expect("a pair");
-            let rows = pair.rows.map(|rows| (rows.col, rows.values));
-            (looked_at, (pair.nodes, pair.weight, pair.gap, rows, pair.cover))
-        };
-        let [(all, one)] = &crowd::on(1, pair)[..] else { panic!("one rank") };
-        assert_eq!((*all, one.0.len()), (18, 16));
-        let many = crowd::on(5, pair);
-        assert!(many.iter().all(|(_, of_rank)| of_rank == one));
-        assert!(many.iter().all(|(looked_at, _)| (1..12).contains(looked_at)), "{many:?}");
     }
 }

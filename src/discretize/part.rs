@@ -6,19 +6,20 @@ use super::supports::Held;
 use super::{elastic, springs};
 use crate::contact;
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, first, share};
 use crate::expression::Field;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{
     ElasticBody, Elasticity, Interpolation, NodalBlock, NodalForces, NodeGraph, Parts, RigidMotion, Space, assemble,
-    place, rigid, support, surface,
+    rigid, support, surface,
 };
 use crate::linalg::{axpy, countable, dot};
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind};
 use nalgebra::{DMatrix, DVector};
+use std::rc::Rc;
 
 /// A body of the scene with its space, supports and springs.
+#[derive(Clone)]
 pub struct Part<'a, const D: usize> {
     /// What the scene says.
     pub spec: &'a BodySpec,
@@ -28,22 +29,22 @@ pub struct Part<'a, const D: usize> {
     pub held: Held<D>,
     /// Springs to the ground: for each of the scene, its stiffnesses between nodes.
     pub springs: Vec<Vec<NodalBlock<D>>>,
-    /// What of its cells is known on all ranks.
-    pub known: Known<D>,
+    /// Elasticity of its cells.
+    pub elasticity: Rc<Elasticity>,
+    /// Facts of the whole body.
+    pub known: Known,
 }
 
 /// A dof that can be fixed against a motion.
-pub struct Candidate<const D: usize> {
+pub struct Candidate {
     /// Which one.
     pub dof: usize,
     /// The size of the motion there.
     pub size: f64,
-    /// Where its node is.
-    pub at: [f64; D],
 }
 
 impl<'a, const D: usize> Part<'a, D> {
-    /// Applies the supports and springs of a body. Collective.
+    /// Applies the supports and springs of a body.
     ///
     /// # Errors
     /// Refusals of the scene against its mesh.
@@ -51,30 +52,13 @@ impl<'a, const D: usize> Part<'a, D> {
         spec: &'a BodySpec,
         mesh: &Mesh<D>,
         space: Space<D>,
-        known: Known<D>,
-        exchange: &dyn Exchange,
+        elasticity: Rc<Elasticity>,
+        known: Known,
     ) -> Result<Self> {
-        let held = Held::new(spec, &space, mesh, exchange)?;
+        let held = Held::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| springs::blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
-        Ok(Self { spec, space, held, springs, known })
-    }
-
-    /// The part of the body that its cells are, on some of its nodes, sorted: those of the cells at least.
-    pub fn on(&self, nodes: &[u32]) -> Self {
-        let here = |blocks: &Vec<NodalBlock<D>>| {
-            let here = |NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
-                Some(NodalBlock { nodes: [place(nodes, *a)?, place(nodes, *b)?], block: *block })
-            };
-            blocks.iter().filter_map(here).collect()
-        };
-        Self {
-            spec: self.spec,
-            space: self.space.on(&self.space.cells, nodes),
-            held: self.held.on(nodes),
-            springs: self.springs.iter().map(here).collect(),
-            known: self.known.on(nodes),
-        }
+        Ok(Self { spec, space, held, springs, elasticity, known })
     }
 
     /// Displacements of all dofs in a rigid motion.
@@ -97,37 +81,26 @@ impl<'a, const D: usize> Part<'a, D> {
         self.held.frame.dof(dof, |node| self.at(motion, node))
     }
 
-    /// Motions with hardly any strain, which multigrid must know: the rigid ones of the body. Far from the axis a
-    /// ring is nearly as soft against radial displacements and turns of its section as a plane body.
-    pub fn smooth(&self) -> Vec<RigidMotion<D>> {
-        rigid::modes(&self.known.extent)
-    }
-
-    /// Products of rigid motions over all dofs but the `prescribed` ones, and the work that the load vector does on each. Every rank has the
-    /// dofs of the nodes for which `is_own` holds. Collective.
+    /// Return the products of rigid motions over all dofs but the `prescribed` ones, and the work that the load vector does on each.
     pub fn products(
         &self,
         motions: &[RigidMotion<D>],
         prescribed: &[(usize, f64)],
-        (load, is_own): (&[f64], &dyn Fn(usize) -> bool),
-        exchange: &dyn Exchange,
+        load: &[f64],
     ) -> (DMatrix<f64>, Vec<f64>) {
         let (count, mut held) = (motions.len(), prescribed.iter().map(|entry| entry.0).peekable());
-        let mut sums = vec![0.0; count * (count + 1)];
-        let (products, work) = sums.split_at_mut(count * count);
-        for node in (0..self.space.nodes.len()).filter(|&node| is_own(node)) {
+        let (mut products, mut work) = (DMatrix::zeros(count, count), vec![0.0; count]);
+        for node in 0..self.space.nodes.len() {
             let mut at: Vec<[f64; D]> = motions.iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
             while let Some(dof) = held.next_if(|dof| dof / D <= node) {
                 at.iter_mut().filter(|_| dof / D == node).for_each(|u| u[dof % D] = 0.0);
             }
             for (i, u) in at.iter().enumerate() {
-                at.iter().enumerate().for_each(|(j, v)| products[count * i + j] += dot(u, v));
+                at.iter().enumerate().for_each(|(j, v)| products[(i, j)] += dot(u, v));
                 work[i] += dot(u, &load[D * node..][..D]);
             }
         }
-        exchange.sum(&mut sums);
-        let (products, work) = sums.split_at(count * count);
-        (DMatrix::from_row_slice(count, count, products), work.to_vec())
+        (products, work)
     }
 
     /// What a rigid motion does at a node.
@@ -135,27 +108,20 @@ impl<'a, const D: usize> Part<'a, D> {
         motion.at(&self.space.nodes[node as usize])
     }
 
-    /// Places of own nodes in the scene.
-    pub fn own(&self) -> impl Iterator<Item = [f64; 3]> + Clone {
-        self.known.own.iter().map(|&node| self.space.in_scene(self.space.nodes[node as usize]))
+    /// Return the places of all nodes in the scene.
+    pub fn places(&self) -> impl Iterator<Item = [f64; 3]> + Clone {
+        self.space.nodes.iter().map(|&x| self.space.in_scene(x))
     }
 
-    /// The dof of the body at which a value is largest; `size` has none for dofs that do not count, and is asked for at own nodes. Collective.
-    pub fn largest(&self, size: &dyn Fn(usize) -> Option<f64>, exchange: &dyn Exchange) -> Option<Candidate<D>> {
-        // of equal ones the last
-        let later = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0));
-        let dofs = self.known.own.iter().flat_map(|&node| D * node as usize..D * (node as usize + 1));
-        let mine = dofs.filter_map(|dof| Some((dof, size(dof)?))).max_by(later);
-        let mine = mine.map(|found| (found, contact::pad(self.space.nodes[found.0 / D])));
-        let all = share(exchange, mine).into_iter().flatten();
-        let ((dof, size), x) = all.max_by(|a, b| later(&a.0, &b.0))?;
-        Some(Candidate { dof, size, at: std::array::from_fn(|c| x[c]) })
+    /// Return the dof at which a value is largest, of equal ones the last; `size` has none for dofs that do not count.
+    pub fn largest(&self, size: impl Fn(usize) -> Option<f64>) -> Option<Candidate> {
+        let all = (0..self.space.dofs()).filter_map(|dof| Some(Candidate { dof, size: size(dof)? }));
+        all.max_by(|a, b| a.size.total_cmp(&b.size))
     }
 
-    /// Fixes a dof.
-    pub fn fix(&mut self, found: &Candidate<D>) {
+    /// Fix a dof.
+    pub fn fix(&mut self, found: &Candidate) {
         self.held.prescribed.insert(found.dof, 0.0);
-        self.space.nodes.learn([((found.dof / D) as u32, found.at)].into_iter());
     }
 
     /// Prescribed (dof, value), sorted by dof.
@@ -190,18 +156,16 @@ impl<'a, const D: usize> Part<'a, D> {
         Some((left, stiffness))
     }
 
-    /// Forces of the loads at own nodes, but for those on rigid surfaces. Supports are not regarded. Collective.
+    /// Return the nodal forces of the loads, but for those on rigid surfaces. Supports are not regarded.
     ///
     /// # Errors
     /// Loads that are not finite somewhere, and surfaces that are not of the body or have no area.
-    pub fn load(&self, mesh: &Mesh<D>, exchange: &dyn Exchange) -> Result<NodalForces<D>> {
-        let surfaces = self.on_surfaces(mesh, Parts::Whole)?.only(|node| self.known.is_own(node));
-        let load = self.known.force.clone().and(surfaces);
-        let found = if load.is_finite() { Ok(load) } else { Err((exchange.rank(), too_large(self.spec))) };
-        first(exchange, found)
+    pub fn load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
+        let load = body_force(self.spec, &self.space, Parts::Whole)?.and(self.on_surfaces(mesh, Parts::Whole)?);
+        if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) }
     }
 
-    /// What the quadrature of the nodal forces of all loads misses, of a body of which all cells are here; empty where all loads are constant.
+    /// Return what the quadrature of the nodal forces of all loads misses; empty where all loads are constant.
     ///
     /// # Errors
     /// Those of [`Part::load`].
@@ -224,14 +188,14 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(missed)
     }
 
-    /// What the quadrature of the nodal forces of loads on surfaces misses at own nodes.
+    /// Return what the quadrature of the nodal forces of loads on surfaces misses.
     ///
     /// # Errors
     /// Those of [`Part::load`].
     pub fn missed_load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
         let whole: NodalForces<D> =
             self.on_surfaces(mesh, Parts::Whole)?.iter().map(|(node, force)| (node, force.map(|f| -f))).collect();
-        Ok(self.on_surfaces(mesh, Parts::Halves)?.and(whole).only(|node| self.known.is_own(node)))
+        Ok(self.on_surfaces(mesh, Parts::Halves)?.and(whole))
     }
 
     /// Nodal forces of all loads on surfaces that are not rigid.
@@ -299,11 +263,9 @@ impl<'a, const D: usize> Part<'a, D> {
         })
     }
 
-    /// Nodal forces of [`Part::load`] and those on rigid surfaces as forces at dofs: all of a body together, on each rank those that its own
-    /// nodes add.
+    /// Return the nodal forces of [`Part::load`] and those on rigid surfaces as forces at dofs.
     pub fn load_on_dofs(&self, load: &NodalForces<D>) -> NodalForces<D> {
-        let rigid = self.rigid_forces().filter(|(node, _)| self.known.is_own(*node));
-        let rigid = rigid.map(|(node, total)| (node, std::array::from_fn(|c| total[c])));
+        let rigid = self.rigid_forces().map(|(node, total)| (node, std::array::from_fn(|c| total[c])));
         load.iter().chain(rigid).map(|(node, force)| self.held.frame.force(node, force)).collect()
     }
 
@@ -333,14 +295,13 @@ impl<'a, const D: usize> Part<'a, D> {
         &self,
         mesh: &Mesh<D>,
         graph: &NodeGraph,
-        elasticity: &Elasticity,
         mut load: Vec<f64>,
         prescribed: Vec<(usize, f64)>,
         carried: Vec<f64>,
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
-        let mut stiffness = assemble::stiffness(&self.space, graph, elasticity).map_err(|defect| match defect {
+        let mut stiffness = assemble::stiffness(&self.space, graph, &self.elasticity).map_err(|defect| match defect {
             assemble::Defect::Inverted(cell) => {
                 let corner = self.space.in_scene(self.space.cell_nodes(cell)[0]);
                 let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
@@ -360,11 +321,11 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 }
 
-/// Forces of the body force at the nodes of the cells that are here.
+/// Return the nodal forces of the body force.
 ///
 /// # Errors
 /// A force that is not finite somewhere, or beyond the range of numbers.
-pub fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Parts) -> Result<NodalForces<D>> {
+fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Parts) -> Result<NodalForces<D>> {
     let (name, Some(fields)) = (&spec.name, &spec.force) else { return Ok(NodalForces::default()) };
     let values = Values::of("this body force", &name.value);
     let density = |x: [f64; D]| {

@@ -2,49 +2,53 @@
 
 use super::carried::Supported;
 use super::couplings::Coupled;
-use super::distribute::Deal;
+use super::distribute::Partition;
 use super::draft::Draft;
 use super::factory::{Factory, Outline};
-use super::free::Free;
 use super::part::Part;
 use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::exchange::Exchange;
 use crate::fem::rigid::AtDofs;
 
-/// Let the factory plan the solvers of all bodies. Bodies that share a matrix are split over the ranks; return which rank gets which of their nodes.
-/// Collective.
+/// Let the factory plan the solvers of all bodies.
 ///
 /// # Errors
 /// Those of [`Factory::plan`].
-pub fn plan<const D: usize>(
-    (parts, drafts, supported): (&[Part<D>], &[Draft<D>], &[Supported<D>]),
+pub fn plan<const D: usize, F: Factory>(
+    parts: &[Part<D>],
+    drafts: &[Draft<D>],
+    supported: &[Supported<D>],
     coupled: &Coupled<D>,
-    pairs: &[ContactPair],
-    factory: &mut dyn Factory,
-    exchange: &dyn Exchange,
-) -> Result<Vec<Deal>> {
-    let motions = parts.iter().zip(drafts).map(|(part, draft)| Free::new(part, draft, exchange));
-    let motions: Vec<Free<D>> = motions.collect();
+    factory: &mut F,
+) -> Result<F::Plan> {
     // what is asked of a body is found then
     let graphs: Vec<_> = (0..parts.len()).map(|body| move || coupled.graph(body)).collect();
-    let couplings: Vec<_> = (0..parts.len()).map(|body| move || coupled.count(body)).collect();
-    let at: Vec<_> = motions.iter().map(|free| |k: usize, dof: usize| free.at(k, dof)).collect();
-    let largest: Vec<_> = motions.iter().map(|free| |size: &dyn Fn(usize) -> Option<f64>| free.largest(size)).collect();
+    let at = |body: usize| move |k: usize, dof: usize| parts[body].dof_of(&drafts[body].free[k], dof);
+    let at: Vec<_> = (0..parts.len()).map(at).collect();
     let outline = |body: usize| Outline {
         name: &parts[body].spec.name.value,
         dimension: D,
         order: parts[body].space.order,
         rows: &drafts[body].rows,
         prescribed: &supported[body].prescribed,
-        motions: AtDofs { count: drafts[body].free.len(), at: &at[body], largest: &largest[body] },
-        couplings: &couplings[body],
+        motions: AtDofs { count: drafts[body].free.len(), at: &at[body] },
         graph: &graphs[body],
     };
-    factory.plan(&(0..parts.len()).map(outline).collect::<Vec<_>>())?;
-    let deal = |bodies: Vec<usize>| {
-        let couplings = coupled.of(&bodies, pairs);
-        Deal::new(bodies, parts, &couplings, exchange)
+    factory.plan(&(0..parts.len()).map(outline).collect::<Vec<_>>())
+}
+
+/// Distribute the nodes of the bodies that share a matrix over the ranks, by the factory's plan.
+pub fn partitions<const D: usize>(
+    parts: &[Part<D>],
+    coupled: &Coupled<D>,
+    pairs: &[ContactPair],
+    factory: &impl Factory,
+    ranks: usize,
+) -> Vec<Partition> {
+    let wants_coarse = |body: usize| factory.wants_interpolation(&parts[body].spec.name.value);
+    let partition = |bodies: Vec<usize>| {
+        let couplings = coupled.of_nodes(&bodies, pairs);
+        Partition::new(bodies, parts, &couplings, ranks, &wants_coarse)
     };
-    Ok(factory.dealt_out().into_iter().map(deal).collect())
+    factory.distributed().into_iter().map(partition).collect()
 }

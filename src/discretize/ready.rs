@@ -1,48 +1,38 @@
-//! A body of which all is known but its matrix: on the nodes that this rank needs, once no rank knows all nodes any more.
+//! From what one rank has of a body to its matrix and the solver of it.
 
 use super::balance::Forces;
 use super::carried::Supported;
-use super::distribute::Dealt;
+use super::distribute::Share;
 use super::draft::Loose;
+use super::elastic;
 use super::factory::{Assembled, Factory};
-use super::here::Here;
 use super::info::BodyInfo;
 use super::local::Local;
 use super::meshes::Shape;
 use super::part::Part;
 use super::post::{OnPart, Post};
 use super::supports::Held;
+use super::unassembled::{LocalBody, SharedBody};
 use crate::error::Result;
-use crate::fem::{Elasticity, FreeMotion, NodalForces, NodeGraph, RigidMotion, Space};
+use crate::fem::{FreeMotion, NodalForces, NodeGraph, RigidMotion, Space, rigid};
 use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
-use crate::model::{Body, BodySlot, Loads, Segment};
+use crate::model::{Body, BodySlot, Loads};
+use crate::problem::{BodySpec, Plane};
 use std::rc::Rc;
 
 /// A body before its matrix is assembled, as one rank sees it.
 pub struct Ready<'a, const D: usize> {
-    /// Its contact rows, pair by pair.
-    pub segments: Vec<Segment>,
-    /// The rigid motions that supports and springs leave it.
-    pub loose: Loose<D>,
-    /// Modulus, and depth behind its contact surfaces.
-    pub scales: [f64; 2],
-    /// Elasticity of the cells that are here.
-    pub elasticity: Elasticity,
+    /// What the scene says.
+    pub spec: &'a BodySpec,
+    /// Kind of a plane problem.
+    pub plane: Plane,
+    /// What all ranks know of it.
+    pub shared: SharedBody<D>,
+    /// What this rank has of it, if anything.
+    pub local: Option<LocalBody<D>>,
     /// Which nodes K couples, if that is known here.
     pub graph: Option<NodeGraph>,
-    /// The part of this rank, if the body is split over the ranks.
-    pub dealt: Option<Dealt>,
-    /// What this rank has of it; none of a body of another rank.
-    pub here: Option<Here<'a, D>>,
-    /// The work of all loads on each motion that is left, where only some of the loads are here.
-    pub works: Option<Vec<f64>>,
-    /// Motions with hardly any strain.
-    pub smooth: Vec<RigidMotion<D>>,
-    /// All of the body, of which this rank has nothing, and its supports, if estimates ask for them.
-    pub elsewhere: Option<(Space<D>, Held<D>)>,
-    /// Nodal forces that the quadrature of its loads misses.
-    pub unloaded: Vec<f64>,
 }
 
 /// How many matrices were assembled on a rank, and how many of an earlier scene served again.
@@ -63,72 +53,84 @@ struct Made {
 }
 
 impl<const D: usize> Ready<'_, D> {
-    /// Assembles the body and makes it one that solves, with what is known of its mesh; `info` learns what the body says of its displacements.
+    /// Assemble the body and make it one that solves, with its mesh if this rank has it; its report learns how to evaluate displacements.
     ///
     /// # Errors
     /// Refusals of the scene against its mesh that show when K is assembled, and failures of `factory`.
     pub fn make(
         self,
-        info: &mut BodyInfo,
         mesh: &Mesh<D>,
-        is_owner: bool,
-        factory: &mut dyn Factory,
+        rank: usize,
+        factory: &mut impl Factory,
         counts: &mut Counts,
-    ) -> Result<(BodySlot, Option<Shape<D>>)> {
-        let Self { segments, loose, scales: [modulus, depth], unloaded, .. } = self;
+    ) -> Result<Finished<D>> {
+        let Self { spec, plane, shared, local, graph } = self;
+        let SharedBody { mut info, segments, loose, modulus, depth, .. } = shared;
         let Loose { left, motions, sprung, unsupported, .. } = loose;
+        let (mut made, mut shape) = (Made::default(), None);
+        if let Some(local) = local {
+            let elasticity = Rc::new(elastic::of_regions(spec, local.regions, D, plane)?);
+            let LocalBody { space, held, springs, known, .. } = local;
+            let part = Part { spec, space, held, springs, elasticity: elasticity.clone(), known };
+            let (unloaded, motions) = (local.unloaded, unsupported);
+            let (space, held) = match local.is_owned {
+                false => (Rc::new(part.space), Rc::new(part.held)),
+                true => {
+                    let own = own_nodes(&part, local.share.as_ref());
+                    let (loads, free) = loads(&part, &local.load, local.supported, left, local.works);
+                    let kept = factory.kept(&info.name).filter(|_| local.share.is_none());
+                    made = match reload(kept, &loads)? {
+                        Some(before) => {
+                            counts.avoided += 1;
+                            before
+                        }
+                        None => {
+                            let is_first = info.rank == rank;
+                            counts.assemblies += usize::from(is_first);
+                            let (part, rows, share) = (&part, local.rows, local.share);
+                            Assembly { name: &info.name, part, rows, graph, share, left: free, is_first }
+                                .make(mesh, loads, factory)?
+                        }
+                    };
+                    tell_displacements(&mut info, part, local.nodal_rows, &local.load, own)?
+                }
+            };
+            shape = Some(Shape { space, held, elasticity, modulus, unloaded, motions });
+        }
+        let Made { local, scale, row_stiffness } = made;
         let name = info.name.clone();
-        let elasticity = Rc::new(self.elasticity);
-        let shape = |space: Rc<Space<D>>, held: Rc<Held<D>>, elasticity: Rc<Elasticity>| Shape {
-            space,
-            held,
-            elasticity,
-            modulus,
-            unloaded,
-            motions: unsupported,
-        };
-        let slot = |Made { local, scale, row_stiffness }: Made| BodySlot {
-            name: name.clone(),
-            local,
-            segments,
-            motions,
-            sprung,
-            scale,
-            modulus,
-            depth,
-            row_stiffness,
-        };
-        let Some(here) = self.here else {
-            let shape = self.elsewhere.map(|(space, held)| shape(Rc::new(space), Rc::new(held), elasticity));
-            return Ok((slot(Made::default()), shape));
-        };
-        let Here { part, rows: [rows, nodal_rows], load, supported: Supported { carried, prescribed } } = here;
-        let force = part.load_vector(&load);
-        let free = left.iter().enumerate().map(|(k, motion)| {
-            let work = |u: &[f64]| self.works.as_ref().map_or_else(|| dot(u, &force), |works| works[k]);
-            FreeMotion::new(part.dofs_of(motion), &prescribed, work)
-        });
-        let left: Vec<FreeMotion> = free.collect();
-        let work = left.iter().map(|motion| motion.work).collect();
-        let carried = carried.map_or_else(Vec::new, |motion| part.dofs_of(&motion));
-        let loads = Loads { work, force, prescribed, carried };
-        let own = own_nodes(&part, self.dealt.as_ref());
-        let kept = factory.kept(&name).filter(|_| self.dealt.is_none());
-        let made = match reload(kept, &loads)? {
-            Some(before) => {
-                counts.avoided += 1;
-                before
-            }
-            None => {
-                counts.assemblies += usize::from(is_owner);
-                let (graph, dealt, smooth) = (self.graph, self.dealt, self.smooth);
-                let assembly = Assembly { name: &name, part: &part, rows, graph, dealt, smooth, left };
-                assembly.make(mesh, &elasticity, loads, is_owner, factory)?
-            }
-        };
-        let (space, held) = tell_displacements(info, part, nodal_rows, &load, own, &elasticity)?;
-        Ok((slot(made), Some(shape(space, held, elasticity))))
+        let slot = BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness };
+        Ok(Finished { slot, info, shape })
     }
+}
+
+/// A body that solves.
+pub struct Finished<const D: usize> {
+    /// What the method sees of it.
+    pub slot: BodySlot,
+    /// What reports say of it.
+    pub info: BodyInfo,
+    /// Its mesh, if this rank has it.
+    pub shape: Option<Shape<D>>,
+}
+
+/// Return the loads of a body on the dofs that are here, and the motions that supports leave; `works` of all loads on these where only some loads are here.
+fn loads<const D: usize>(
+    part: &Part<D>,
+    load: &NodalForces<D>,
+    Supported { carried, prescribed }: Supported<D>,
+    left: Vec<RigidMotion<D>>,
+    works: Option<Vec<f64>>,
+) -> (Loads, Vec<FreeMotion>) {
+    let force = part.load_vector(load);
+    let free = left.iter().enumerate().map(|(k, motion)| {
+        let work = |u: &[f64]| works.as_ref().map_or_else(|| dot(u, &force), |works| works[k]);
+        FreeMotion::new(part.dofs_of(motion), &prescribed, work)
+    });
+    let free: Vec<FreeMotion> = free.collect();
+    let work = free.iter().map(|motion| motion.work).collect();
+    let carried = carried.map_or_else(Vec::new, |motion| part.dofs_of(&motion));
+    (Loads { work, force, prescribed, carried }, free)
 }
 
 /// Give `info` the means to evaluate displacements and forces of a body at the nodes that this rank knows. `own` marks the nodes that belong to this
@@ -139,15 +141,14 @@ fn tell_displacements<const D: usize>(
     rows: Csr,
     load: &NodalForces<D>,
     own: Vec<bool>,
-    elasticity: &Rc<Elasticity>,
 ) -> Result<(Rc<Space<D>>, Rc<Held<D>>)> {
     let rigid = part.rigid_forces().map(|(node, total)| (node, std::array::from_fn(|c| total[c]))).collect();
     let (space, held) = (Rc::new(part.space), Rc::new(part.held));
     let is_whole = info.ranks.len() == 1 && !own.contains(&false);
     let here = Local { space: space.clone(), own };
     info.points = match is_whole {
-        true => part.known.points.iter().map(|&(_, point)| point).collect(),
-        false => space.part(here.told()).1.iter().filter_map(|&node| part.known.point(node)).collect(),
+        true => part.known.points,
+        false => space.part(here.told()).1.iter().map(|&node| part.known.points[node as usize]).collect(),
     };
     let forces = Forces {
         rows,
@@ -158,18 +159,16 @@ fn tell_displacements<const D: usize>(
         extent: part.known.extent,
         nodes: info.nodes,
         held: held.clone(),
-        elasticity: elasticity.clone(),
+        elasticity: part.elasticity,
         part: here,
     };
-    let mut outer = part.known.outer;
-    outer.weigh(&space);
-    info.post = Some(Box::new(OnPart::new(part.spec, outer, forces)?) as Box<dyn Post>);
+    info.post = Some(Box::new(OnPart::new(part.spec, part.known.outer, forces)?) as Box<dyn Post>);
     Ok((space, held))
 }
 
 /// Which of the nodes that a rank knows of a body are its own.
-fn own_nodes<const D: usize>(part: &Part<D>, dealt: Option<&Dealt>) -> Vec<bool> {
-    let is_own = |node| dealt.is_none_or(|dealt| dealt.is_own::<D>(part.held.frame.node(node) as usize));
+fn own_nodes<const D: usize>(part: &Part<D>, share: Option<&Share>) -> Vec<bool> {
+    let is_own = |node| share.is_none_or(|share| share.is_own::<D>(part.held.frame.node(node) as usize));
     (0..part.space.nodes.len() as u32).map(is_own).collect()
 }
 
@@ -190,45 +189,47 @@ struct Assembly<'p, 'a, const D: usize> {
     part: &'p Part<'a, D>,
     rows: Csr,
     graph: Option<NodeGraph>,
-    dealt: Option<Dealt>,
-    smooth: Vec<RigidMotion<D>>,
+    share: Option<Share>,
     left: Vec<FreeMotion>,
+    /// Whether this rank owns most of the body.
+    is_first: bool,
 }
 
 impl<const D: usize> Assembly<'_, '_, D> {
     fn make(
         self,
         mesh: &Mesh<D>,
-        elasticity: &Elasticity,
         loads: Loads,
-        is_owner: bool,
-        factory: &mut dyn Factory,
+        factory: &mut impl Factory,
     ) -> Result<Made> {
-        let Self { name, part, rows, dealt, smooth, left, .. } = self;
+        let Self { name, part, rows, share, left, is_first, .. } = self;
         let mut graph = self.graph.unwrap_or_else(|| NodeGraph::with_rows(&part.space, &rows, &part.held.frame));
-        if let Some(dealt) = &dealt {
-            graph = graph.of(|node| dealt.is_own::<D>(node));
+        if let Some(share) = &share {
+            graph = graph.of(|node| share.is_own::<D>(node));
         }
         let Loads { force, prescribed, carried, .. } = loads;
-        let mut body = part.assemble(mesh, &graph, elasticity, force, prescribed, carried)?;
+        let mut body = part.assemble(mesh, &graph, force, prescribed, carried)?;
         drop(graph);
         let diagonal = (0..body.load.len()).map(|i| body.stiffness.diagonal(i));
-        let scale = if is_owner { diagonal.fold(0.0, f64::max) } else { 0.0 };
+        let scale = if is_first { diagonal.fold(0.0, f64::max) } else { 0.0 };
         let row_stiffness = rows.quadratic_diagonal(&body.stiffness);
-        if let Some(dealt) = &dealt {
-            body = dealt.own::<D>(body);
+        if let Some(share) = &share {
+            body = share.own::<D>(body);
         }
-        let interpolation = factory.wants_interpolation(name).then(|| match &dealt {
-            Some(dealt) => dealt.interpolation::<D>(|coarse| part.interpolation(coarse)),
+        let interpolation = factory.wants_interpolation(name).then(|| match &share {
+            Some(share) => share.interpolation::<D>(|coarse| part.interpolation(coarse)),
             None => part.interpolation(&part.coarse_nodes()),
         });
+        // multigrid must know motions with hardly any strain: far from the axis a ring is nearly as soft against radial displacements and turns of its
+        // section as a plane body
+        let smooth = || rigid::modes(&part.known.extent).iter().map(|motion| part.dofs_of(motion)).collect();
         let local = factory.make(Assembled {
             name: name.to_owned(),
             dimension: D,
             body,
-            distribution: dealt.map(|dealt| dealt.distribution),
+            distribution: share.map(|share| share.distribution),
             rows,
-            motions: &|| smooth.iter().map(|motion| part.dofs_of(motion)).collect(),
+            motions: &smooth,
             left,
             interpolation,
         })?;

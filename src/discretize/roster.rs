@@ -2,8 +2,7 @@
 
 use super::find::find_group;
 use crate::error::{Error, Located, Place, Result, few};
-use crate::exchange::{Exchange, share};
-use crate::mesh::{Group, Mesh, Portion};
+use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, LoadKind, fault};
 use crate::problem::pattern::{BODY, Pattern, Rank, is_pattern};
 use crate::scene::Scene;
@@ -125,15 +124,14 @@ pub fn tie(what: &str, [first, second]: [&str; 2], place: &Place) -> Error {
 /// Numbers of the groups that lie on each body, body by body of each table; none where no table or line stands for many.
 pub type Lying = Vec<Vec<u32>>;
 
-/// The groups that lie on each body: its own cells, and those of which it has all corners of an element. Collective.
+/// Return the groups that lie on each body: its own cells, and those of which it has all corners of an element.
 ///
 /// # Errors
 /// Patterns of bodies that match nothing or too much.
-pub fn lying<const D: usize>(scene: &Scene, portion: &Portion<D>, exchange: &dyn Exchange) -> Result<Lying> {
+pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Lying> {
     if !scene.bodies.iter().any(is_plural) {
         return Ok(Vec::new());
     }
-    let mesh = &portion.mesh;
     let names = members(scene, mesh)?.concat();
     let number: HashMap<&str, usize> = names.iter().copied().zip(0..).collect();
     let mut last = vec![usize::MAX; mesh.points.len()];
@@ -144,16 +142,6 @@ pub fn lying<const D: usize>(scene: &Scene, portion: &Portion<D>, exchange: &dyn
                 owners.push((point, body));
             }
         }
-    }
-    if exchange.ranks() > 1 {
-        // the rank of a point knows all its bodies: others ask where surfaces, edges and corners lie
-        let mut is_asked = vec![false; mesh.points.len()];
-        let asked = mesh.groups.iter().filter(|group| group.dimension < D).flat_map(|group| &group.connectivity);
-        asked.for_each(|&point| is_asked[point as usize] = true);
-        let mine = owners.iter().filter(|(point, _)| is_asked[*point as usize]);
-        let mine: Vec<_> = mine.map(|&(point, body)| (portion.number(point), body)).collect();
-        let all = share(exchange, mine).into_iter().flatten();
-        owners.extend(all.filter_map(|(point, body)| Some((portion.find(point)?, body))));
     }
     owners.sort_unstable();
     owners.dedup();
@@ -175,10 +163,7 @@ pub fn lying<const D: usize>(scene: &Scene, portion: &Portion<D>, exchange: &dyn
         let bodies: BTreeSet<usize> = group.simplices().flat_map(on).collect();
         bodies.into_iter().for_each(|body| lying[body].push(place));
     }
-    // groups of cells lie where some rank has seen them
-    let all = share(exchange, lying);
-    let of_body = |body: usize| all.iter().flat_map(|lying| &lying[body]).copied().collect::<BTreeSet<u32>>();
-    Ok((0..names.len()).map(|body| of_body(body).into_iter().collect()).collect())
+    Ok(lying)
 }
 
 /// What a table says of groups, and the groups on each of its bodies.

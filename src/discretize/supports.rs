@@ -1,9 +1,10 @@
 //! Supports of a body: conditions on its nodes, the axes in which they are prescribed dofs, and rigid surfaces.
 
-use super::find::{earlier, find_group, nodes_on, not_on_body, of_body, point};
+use serde::{Deserialize, Serialize};
+use crate::exchange::Plain;
+use super::find::{earlier, find_group, not_on_body, of_body, point};
 use crate::contact::pad;
 use crate::error::{Error, Place, Result};
-use crate::exchange::Exchange;
 use crate::fem::{Facets, Frame, Space, place};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
@@ -24,7 +25,8 @@ struct Condition<const D: usize> {
 type Direction<const D: usize> = ([f64; D], Option<usize>);
 
 /// What the supports and rigid surfaces of a body come to.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
 pub struct Held<const D: usize> {
     /// Coordinates in which conditions are prescribed dofs.
     pub frame: Frame<D>,
@@ -40,19 +42,19 @@ pub struct Held<const D: usize> {
 const PARALLEL: f64 = 1e-8;
 
 impl<const D: usize> Held<D> {
-    /// Collects the conditions of a body's supports on its nodes. Collective.
+    /// Collects the conditions of a body's supports on its nodes.
     ///
     /// # Errors
     /// Groups that are missing or not on the body, values that are not finite, surfaces that are no planes, and supports or
     /// rigid loads that contradict each other.
-    pub fn new(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, exchange: &dyn Exchange) -> Result<Self> {
+    pub fn new(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<Self> {
         let mut held = Held::default();
         held.tie(spec, space, mesh)?;
         let mut conditions = held.symmetry(space);
         for (support, fix) in spec.fix.iter().enumerate() {
             let dimensions: Vec<usize> = if fix.normal.is_some() { vec![D - 1] } else { (0..=D).rev().collect() };
             let group = find_group(mesh, &fix.on, &dimensions, "support")?;
-            let nodes = nodes_on(space, group, exchange);
+            let nodes = space.nodes_on(group);
             if nodes.is_empty() {
                 return Err(not_on_body(&fix.on, &spec.name.value));
             }
@@ -96,7 +98,7 @@ impl<const D: usize> Held<D> {
     /// In a body of revolution nodes on the axis and rigid surfaces have no radial displacement.
     fn symmetry(&self, space: &Space<D>) -> BTreeMap<u32, Vec<Condition<D>>> {
         let radial = Condition { direction: unit(0), value: 0.0, support: None };
-        let on_axis = space.nodes.known().filter(|&node| space.on_axis(node));
+        let on_axis = (0..space.nodes.len() as u32).filter(|&node| space.on_axis(node));
         let masters = self.rigid.iter().flat_map(|(_, nodes)| nodes.first().copied());
         let held = on_axis.chain(masters).filter(|_| space.axisymmetric);
         held.map(|node| (self.frame.node(node), vec![radial])).collect()

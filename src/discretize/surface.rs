@@ -1,5 +1,6 @@
 //! A contact surface of a pair; its mesh for output: the facets of side a, and where their values come from.
 
+use serde::{Deserialize, Serialize};
 use crate::contact::{Carriers, ContactPair, Side};
 use crate::fem::{Facets, element};
 use crate::output::vtu::{CellKind, Grid};
@@ -17,6 +18,7 @@ pub struct Surface<'a, const D: usize> {
 }
 
 /// The facets of the side that carries the points.
+#[derive(Serialize, Deserialize)]
 pub struct ContactSurface {
     points: Vec<[f64; 3]>,
     cell: CellKind,

@@ -1,21 +1,24 @@
-//! A body of which all is known but its matrix, with what all ranks agreed on, and the cells and nodes that this rank needs of it.
+//! A body of which all is known but its matrix: as a whole on the first rank, what all ranks know of it, and what one rank has of it.
 
 use super::carried::Supported;
-use super::distribute::Dealt;
+use super::distribute::{Partition, Share};
 use super::draft::{Draft, Loose};
-use super::here::Here;
 use super::info::{BodyInfo, Gauged};
+use super::known::Known;
 use super::part::Part;
-use super::ready::Ready;
+use super::supports::Held;
 use crate::contact::{self, ContactPair};
-use crate::error::Result;
-use crate::exchange::Exchange;
-use crate::fem::{Elasticity, NodeGraph};
-use crate::linalg::dot;
-use crate::mesh::{Checked, Mesh};
+use crate::exchange::Plain;
+use crate::fem::{NodalBlock, NodalForces, NodeGraph, Space, place};
+use crate::linalg::{Csr, dot};
+use crate::mesh::Checked;
+use crate::model::Segment;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// A body before its matrix is assembled.
+/// A whole body before its matrix is assembled, on the first rank.
+#[derive(Clone)]
 pub struct Unassembled<'a, const D: usize> {
     /// Its space, supports and springs.
     pub part: Part<'a, D>,
@@ -23,12 +26,12 @@ pub struct Unassembled<'a, const D: usize> {
     pub draft: Draft<D>,
     /// What its supports prescribe.
     pub supported: Supported<D>,
-    /// Which nodes K couples, if that is known here.
+    /// Which nodes K couples, if the choice of solvers has asked for it.
     pub graph: Option<NodeGraph>,
-    /// The part of this rank, if the body is split over the ranks.
-    pub dealt: Option<Dealt>,
     /// Rank that owns the body, or most of it.
     pub owner: usize,
+    /// Ranks that own nodes of it.
+    pub ranks: Vec<usize>,
     /// Sum of its loads, but for those on rigid surfaces.
     pub load: [f64; 3],
     /// What the user should know of its elasticity.
@@ -37,8 +40,147 @@ pub struct Unassembled<'a, const D: usize> {
     pub gauged: Gauged,
     /// The rigid motions that supports and springs leave it.
     pub loose: Loose<D>,
-    /// Elasticity of the cells that are here.
-    pub elasticity: Elasticity,
+    /// Nodal forces that the quadrature of its loads misses, if estimates ask for them.
+    pub unloaded: Vec<f64>,
+    /// The same motions on all dofs, if these are distributed.
+    pub on_dofs: Option<OnDofs>,
+}
+
+/// Rigid motions that supports and springs leave a body, on all of its dofs.
+#[derive(Clone)]
+pub struct OnDofs {
+    /// Their products over all dofs but prescribed ones.
+    pub products: DMatrix<f64>,
+    /// Work of all loads on each.
+    pub works: Vec<f64>,
+}
+
+impl OnDofs {
+    /// Look at a body under its loads; `loose` has the motions.
+    pub fn new<const D: usize>(part: &Part<D>, draft: &Draft<D>, supported: &Supported<D>, loose: &Loose<D>) -> Self {
+        let load = part.load_vector(&draft.nodal_load);
+        let (products, works) = part.products(&loose.left, &supported.prescribed, &load);
+        Self { products, works }
+    }
+}
+
+/// What all ranks know of a body.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
+pub struct SharedBody<const D: usize> {
+    /// What reports say of it.
+    pub info: BodyInfo,
+    /// Its contact rows, pair by pair.
+    pub segments: Vec<Segment>,
+    /// The rigid motions that supports and springs leave it.
+    pub loose: Loose<D>,
+    /// Its modulus along the normals of its contact surfaces.
+    pub modulus: f64,
+    /// Its depth behind them.
+    pub depth: f64,
+    /// Traces on its contact rows of the rigid motion that supports give it.
+    pub carried: Vec<f64>,
+}
+
+/// What one rank has of a body: all of it, or a part on the nodes that this rank needs, with its own numbers.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
+pub struct LocalBody<const D: usize> {
+    /// Its nodes and cells.
+    pub space: Space<D>,
+    /// Number of the constants of each cell; empty if the body has no regions.
+    pub regions: Vec<usize>,
+    /// Its supports and rigid surfaces.
+    pub held: Held<D>,
+    /// Its springs.
+    pub springs: Vec<Vec<NodalBlock<D>>>,
+    /// Facts of the whole body, and where these nodes come from.
+    pub known: Known,
+    /// Its contact rows for dofs.
+    pub rows: Csr,
+    /// The same for displacements of nodes.
+    pub nodal_rows: Csr,
+    /// Nodal forces of its loads at own nodes, and at nodes tied to these.
+    pub load: NodalForces<D>,
+    /// What its supports prescribe.
+    pub supported: Supported<D>,
+    /// Work of all loads on each rigid motion that supports and springs leave; none where all loads are here.
+    pub works: Option<Vec<f64>>,
+    /// Its dofs of this rank, if those of the body are distributed.
+    pub share: Option<Share>,
+    /// Whether this rank owns the body or nodes of it; others have it for estimates of the error.
+    pub is_owned: bool,
+    /// See [`Unassembled::unloaded`].
+    pub unloaded: Vec<f64>,
+}
+
+impl<const D: usize> LocalBody<D> {
+    /// Take all of a body.
+    pub fn whole(body: Unassembled<D>, is_owned: bool) -> Self {
+        let Unassembled { part, draft, supported, unloaded, .. } = body;
+        let cells = if part.spec.regions.is_empty() { 0 } else { part.space.cell_count() };
+        Self {
+            regions: (0..cells).map(|cell| part.elasticity.region(cell)).collect(),
+            space: part.space,
+            held: part.held,
+            springs: part.springs,
+            known: part.known,
+            rows: draft.rows,
+            nodal_rows: draft.nodal_rows,
+            load: draft.nodal_load,
+            supported,
+            works: None,
+            share: None,
+            is_owned,
+            unloaded,
+        }
+    }
+
+    /// Restrict a body, the one with this number in its matrix, to the nodes that a rank needs; all of them if `wants_all`.
+    pub fn restrict(
+        body: &Unassembled<D>,
+        partition: &Partition,
+        number: usize,
+        rank: usize,
+        wants_all: bool,
+    ) -> Self {
+        let Unassembled { part, draft, supported, .. } = body;
+        let cells = match wants_all {
+            true => (0..part.space.cell_count()).collect(),
+            false => partition.cells(number, part, rank),
+        };
+        let nodes = partition.nodes(number, part, draft, &cells, rank);
+        let here = |node: u32| place(&nodes, node);
+        let dof_here = |dof: usize| Some(D * here((dof / D) as u32)? as usize + dof % D);
+        let prescribed_here = |&(dof, u): &(usize, f64)| Some((dof_here(dof)?, u));
+        let rows_here = |rows: &Csr| rows.of_columns(D * nodes.len(), dof_here);
+        let spring_here = |&NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
+            Some(NodalBlock { nodes: [here(a)?, here(b)?], block })
+        };
+        let springs = part.springs.iter().map(|blocks| blocks.iter().filter_map(spring_here).collect());
+        let regions = cells.iter().filter(|_| !part.spec.regions.is_empty()).map(|&cell| part.elasticity.region(cell));
+        let is_assembled = |node: u32| partition.owner(number, part.held.frame.node(node)) == rank;
+        let on_dofs = body.on_dofs.as_ref();
+        let products = on_dofs.map_or_else(|| DMatrix::zeros(0, 0), |on| on.products.clone());
+        Self {
+            space: part.space.on(&part.space.corners(&cells), &nodes),
+            regions: regions.collect(),
+            held: part.held.on(&nodes),
+            springs: springs.collect(),
+            known: part.known.on(&nodes),
+            rows: rows_here(&draft.rows),
+            nodal_rows: rows_here(&draft.nodal_rows),
+            load: draft.nodal_load.only(is_assembled).on(&nodes),
+            supported: Supported {
+                carried: supported.carried.clone(),
+                prescribed: supported.prescribed.iter().filter_map(prescribed_here).collect(),
+            },
+            works: on_dofs.map(|on| on.works.clone()),
+            is_owned: true,
+            unloaded: body.unloaded.clone(),
+            share: Some(partition.share::<D>(number, nodes, &draft.rows, products, rank)),
+        }
+    }
 }
 
 /// What a body is like behind its contact surfaces.
@@ -49,7 +191,7 @@ struct Scales {
     depth: f64,
 }
 
-impl<'a, const D: usize> Unassembled<'a, D> {
+impl<const D: usize> Unassembled<'_, D> {
     fn scales(&self, pairs: &[ContactPair]) -> Scales {
         let of_body = || self.draft.segments.iter().map(|segment| &pairs[segment.pair]);
         let surface: f64 = of_body().map(|pair| pair.weight.iter().sum::<f64>()).sum();
@@ -59,19 +201,30 @@ impl<'a, const D: usize> Unassembled<'a, D> {
         }
     }
 
+    /// Return what all ranks know of it; its mesh was `checked`.
+    pub fn shared(&self, pairs: &[ContactPair], checked: &Checked) -> SharedBody<D> {
+        let Scales { modulus, depth } = self.scales(pairs);
+        SharedBody {
+            info: self.info(checked, modulus, depth),
+            segments: self.draft.segments.clone(),
+            loose: self.loose.clone(),
+            modulus,
+            depth,
+            carried: self.carried(),
+        }
+    }
+
     /// Return the traces on its contact rows of the rigid motion that supports give it.
-    pub fn carried(&self) -> Vec<f64> {
+    fn carried(&self) -> Vec<f64> {
         let rows = &self.draft.rows;
         let Some(motion) = &self.supported.carried else { return vec![0.0; rows.rows()] };
         let at = |q: usize| rows.row(q).map(|(dof, b)| b * self.part.dof_of(motion, dof)).sum();
         (0..rows.rows()).map(at).collect()
     }
 
-    /// Return what reports tell of it; its mesh was `checked`.
-    pub fn info(&self, pairs: &[ContactPair], checked: &Checked) -> BodyInfo {
-        let Self { part, loose, owner, .. } = self;
+    fn info(&self, checked: &Checked, modulus: f64, depth: f64) -> BodyInfo {
+        let Self { part, loose, .. } = self;
         let spec = part.spec;
-        let Scales { modulus, depth } = self.scales(pairs);
         let is_held = loose.motions.len() == loose.unfelt.len() && depth.is_finite();
         let mut load = self.load;
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut load, total));
@@ -90,57 +243,13 @@ impl<'a, const D: usize> Unassembled<'a, D> {
             warning: self.warning.clone(),
             stiffness: if is_held { modulus / depth } else { 0.0 },
             load,
-            rank: *owner,
-            ranks: self.dealt.as_ref().map_or_else(|| vec![*owner], |dealt| dealt.ranks.clone()),
+            rank: self.owner,
+            ranks: self.ranks.clone(),
             supports: spec.fix.iter().map(|support| support.on.value.clone()).collect(),
             springs: spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
             rigid: part.held.rigid.iter().map(|(load, _)| spec.load[*load].on.value.clone()).collect(),
             post: None,
         }
-    }
-
-    /// Return what its assembly needs on this rank; with what estimates of the error need, if they are wanted (`keep`). Collective.
-    ///
-    /// # Errors
-    /// Those of [`Part::unloaded`].
-    pub fn ready(
-        mut self,
-        pairs: &[ContactPair],
-        mesh: &Mesh<D>,
-        keep: bool,
-        exchange: &dyn Exchange,
-    ) -> Result<Ready<'a, D>> {
-        let Scales { modulus, depth } = self.scales(pairs);
-        let unloaded = if keep { self.part.unloaded(mesh)? } else { Vec::new() };
-        let Draft { segments, rows, nodal_rows, nodal_load, .. } = self.draft;
-        let (mut here, mut works, mut smooth, mut elsewhere) = (None, None, Vec::new(), None);
-        if self.owner == exchange.rank() || self.dealt.is_some() {
-            smooth = self.part.smooth();
-            let whole = Here { part: self.part, rows: [rows, nodal_rows], load: nodal_load, supported: self.supported };
-            here = Some(match &mut self.dealt {
-                None => whole,
-                Some(dealt) => {
-                    let (known, work) = whole.of(dealt, &self.loose.left, exchange);
-                    works = Some(work);
-                    known
-                }
-            });
-        } else if keep {
-            elsewhere = Some((self.part.space, self.part.held));
-        }
-        Ok(Ready {
-            segments,
-            loose: self.loose,
-            scales: [modulus, depth],
-            elasticity: self.elasticity,
-            graph: self.graph.filter(|_| exchange.ranks() == 1),
-            dealt: self.dealt,
-            here,
-            works,
-            smooth,
-            elsewhere,
-            unloaded,
-        })
     }
 }
 

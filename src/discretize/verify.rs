@@ -2,42 +2,102 @@
 
 use super::find::point;
 use super::part::Part;
-use super::roster;
+use super::roster::{self, Lying};
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, first, share};
+use crate::exchange::{Exchange, Serial, tell};
 use crate::fem::{Extent, RigidMotion, rigid};
-use crate::mesh::{Asked, Checked, Duty, LENGTHS, Mesh, Parts, Portion};
-use crate::problem::Plane;
+use crate::mesh::{Asked, Checked, Duty, Group, LENGTHS, Mesh, Parts, Portion};
+use crate::problem::{Order, Plane};
 use crate::problem::body::BodySpec;
 use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 use std::rc::Rc;
 
-/// A mesh that holds what bodies must be.
+/// A mesh that is what the bodies of a scene must be, and these bodies.
 pub struct Verified<const D: usize> {
-    /// What this rank has of the mesh.
-    pub portion: Portion<D>,
+    /// The mesh; on other ranks than the first its groups have no elements, and there are no points.
+    pub mesh: Mesh<D>,
+    /// Number of points of the mesh.
+    pub points: usize,
     /// The bodies of the scene, each with a name of its own.
     pub bodies: Vec<BodySpec>,
-    /// What was found of each body, in the same order; bodies that the mesh does not have are missing.
+    /// What was found of each body, in the same order, on the first rank; bodies that the mesh does not have are missing.
     pub checked: Rc<[Checked]>,
-    /// By which ranks tell each other of cells; a run does not count these messages.
-    pub exchange: Rc<dyn Exchange>,
 }
 
-/// Finds the bodies of a scene and checks its mesh once: see `roster::bodies` and [`Portion::check`]. Collective.
+/// What all ranks know of a mesh.
+#[derive(Serialize, Deserialize)]
+struct Head {
+    path: PathBuf,
+    order: Order,
+    /// Groups without elements.
+    groups: Vec<Group>,
+    split: usize,
+    straightened: usize,
+    points: usize,
+    lying: Lying,
+}
+
+/// Find the bodies of a scene and check its mesh once: see [`roster::bodies`] and [`Portion::check`]. The first rank reads the mesh, and looks at it.
+/// Collective.
 ///
 /// # Errors
-/// Patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.
-pub fn verify<const D: usize>(scene: &Scene, portion: Portion<D>, exchange: Rc<dyn Exchange>) -> Result<Verified<D>> {
-    first(&*exchange, size(&portion.mesh).map_err(|error| (0, error)))?;
+/// That of `read`; patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.
+pub fn verify<const D: usize>(
+    scene: &Scene,
+    exchange: &dyn Exchange,
+    read: impl FnOnce() -> Result<Mesh<D>>,
+) -> Result<Verified<D>> {
+    let mut verified = None;
+    let head = tell(exchange, || {
+        let (found, lying) = check(scene, read()?)?;
+        let head = Head::of(&found, lying);
+        verified = Some(found);
+        Ok(head)
+    })?;
+    match verified {
+        Some(verified) => Ok(verified),
+        None => head.into_verified(scene),
+    }
+}
+
+/// Check the mesh of a scene; return also which groups lie on which bodies.
+fn check<const D: usize>(scene: &Scene, mesh: Mesh<D>) -> Result<(Verified<D>, Lying)> {
+    size(&mesh)?;
     // the radius of a body of revolution is measured from its axis
-    let portion = portion.near(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
-    let lying = roster::lying(scene, &portion, &*exchange)?;
+    let portion = Portion::whole(mesh).near(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
+    let lying = roster::lying(scene, &portion.mesh)?;
     let bodies = roster::bodies(scene, &portion.mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
-    let checked = portion.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty(), &*exchange)?;
-    Ok(Verified { portion, bodies, checked: checked.into(), exchange })
+    let checked = portion.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty(), &Serial)?;
+    let Portion { mesh, points, .. } = portion;
+    Ok((Verified { mesh, points, bodies, checked: checked.into() }, lying))
+}
+
+impl Head {
+    fn of<const D: usize>(verified: &Verified<D>, lying: Lying) -> Self {
+        let Mesh { path, order, groups, split, straightened, .. } = &verified.mesh;
+        let empty = |group: &Group| Group { connectivity: Vec::new(), tags: Vec::new(), ..group.clone() };
+        Self {
+            path: path.clone(),
+            order: *order,
+            groups: groups.iter().map(empty).collect(),
+            split: *split,
+            straightened: *straightened,
+            points: verified.points,
+            lying,
+        }
+    }
+
+    /// Return what a rank that has not read the mesh knows of it.
+    fn into_verified<const D: usize>(self, scene: &Scene) -> Result<Verified<D>> {
+        let Self { path, order, groups, split, straightened, points, lying } = self;
+        let mesh = Mesh { split, straightened, ..Mesh::new(path, Vec::new(), order, groups.into()) };
+        let bodies = roster::bodies(scene, &mesh, &lying)?;
+        Ok(Verified { mesh, points, bodies, checked: Rc::new([]) })
+    }
 }
 
 /// Refuses a mesh whose size no run computes with.
@@ -61,34 +121,29 @@ fn asked(body: &BodySpec) -> Asked<'_> {
     Asked { name: &body.name.value, order: body.order, groups: loads.chain(springs).chain(supports).collect() }
 }
 
-/// Refuses a body in parts of which supports and springs leave more free than of a body in one: contact and loads see its rigid
-/// motions as those of one body. Collective.
+/// Refuse a body in parts to which supports and springs leave more than to a body in one: contact and loads see its rigid motions as those of one body.
 ///
 /// # Errors
 /// Such a body, with the place of a part that is free.
-pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>, exchange: &dyn Exchange) -> Result<()> {
+pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Result<()> {
     if parts.count == 1 {
         return Ok(());
     }
     let space = &part.space;
-    let part_of = &parts.of_node;
-    // of each part: where its nodes are, and the first of them
-    let mut mine = vec![(Extent::default(), None); parts.count];
-    for &node in &part.known.own {
-        let (extent, first) = &mut mine[part_of[node as usize] as usize];
-        let x = space.nodes[node as usize];
-        extent.add(x);
-        first.get_or_insert((node, space.in_scene(x)));
+    let part_of = |node: u32| parts.of_node[node as usize] as usize;
+    let mut extents = vec![Extent::default(); parts.count];
+    let mut first: Vec<Option<[f64; D]>> = vec![None; parts.count];
+    for (node, x) in (0..).zip(&space.nodes) {
+        extents[part_of(node)].add(*x);
+        first[part_of(node)].get_or_insert(*x);
     }
-    let of_ranks = share(exchange, mine);
-    let extent = |number: usize| of_ranks.iter().fold(Extent::default(), |all, of_rank| all.join(&of_rank[number].0));
     let motions: Vec<Vec<RigidMotion<D>>> =
-        (0..parts.count).map(|number| rigid::of(&extent(number), space.axisymmetric)).collect();
+        extents.iter().map(|extent| rigid::of(extent, space.axisymmetric)).collect();
     // a part moves, the others stay at rest
     let each: Vec<(usize, &RigidMotion<D>)> =
         motions.iter().enumerate().flat_map(|(number, own)| own.iter().map(move |motion| (number, motion))).collect();
     let left = |moving: &[(usize, &RigidMotion<D>)]| {
-        let at = |k: usize, node: u32| match moving[k].0 == part_of[node as usize] as usize {
+        let at = |k: usize, node: u32| match moving[k].0 == part_of(node) {
             true => moving[k].1.at(&space.nodes[node as usize]),
             false => [0.0; D],
         };
@@ -102,8 +157,7 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>, excha
     // contact may hold a part that supports leave free in part: the one most free is the one that is meant
     let alone = |number: usize| left(&each.iter().filter(|moving| moving.0 == number).copied().collect::<Vec<_>>());
     let most = (0..parts.count).min_by_key(|&number| std::cmp::Reverse(alone(number))).unwrap_or(0);
-    let first = of_ranks.iter().filter_map(|of_rank| of_rank[most].1).min_by_key(|(node, _)| *node);
-    let at = first.map_or([0.0; 3], |(_, x)| x);
+    let at = first[most].map_or([0.0; 3], |x| space.in_scene(x));
     let (name, count) = (&part.spec.name.value, parts.count);
     let message =
         format!("body `{name}` is in {count} parts that share no facet, and the one at {} is not held", point(at));

@@ -3,6 +3,8 @@
 //! The pattern is built once from the node graph (cells, and couplings through contact rows); entry positions
 //! follow from the graph by arithmetic, so that assembly writes each value straight to its place.
 
+use serde::{Deserialize, Serialize};
+use crate::exchange::Plain;
 use super::elasticity::{Elasticity, Flaw};
 use super::element;
 use super::forces::NodalForces;
@@ -141,7 +143,8 @@ impl NodeGraph {
 }
 
 /// A stiffness between two nodes of one cell or facet, as springs to the ground give it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(bound = "[[f64; D]; D]: Plain")]
 pub struct NodalBlock<const D: usize> {
     /// The two nodes.
     pub nodes: [u32; 2],

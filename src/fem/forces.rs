@@ -1,10 +1,13 @@
 //! Forces at nodes of a body.
 
+use serde::{Deserialize, Serialize};
+use crate::exchange::Plain;
 use super::{pad, place};
 use crate::linalg::{Total, dot};
 
 /// Forces at nodes, without those that are zero: most loads are on surfaces.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
 pub struct NodalForces<const D: usize> {
     /// Their nodes, sorted, each once.
     nodes: Vec<u32>,
@@ -42,12 +45,12 @@ impl<const D: usize> NodalForces<D> {
     }
 
     /// Their sum.
-    pub fn sum(&self) -> [Total; 3] {
-        std::array::from_fn(|c| self.forces.iter().map(|&force| pad(force)[c]).collect())
+    pub fn sum(&self) -> [f64; 3] {
+        std::array::from_fn(|c| self.forces.iter().map(|&force| pad(force)[c]).collect::<Total>().value())
     }
 
     /// Their work on a displacement, and the largest that forces and displacements of these sizes can do, node by node.
-    pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [Total; 2] {
+    pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [f64; 2] {
         let size = |v: &[f64]| dot(v, v).sqrt();
         let [mut work, mut largest] = [Total::default(); 2];
         for (node, force) in self.iter() {
@@ -55,7 +58,7 @@ impl<const D: usize> NodalForces<D> {
             work.add(dot(&u, &force));
             largest.add(size(&u) * size(&force));
         }
-        [work, largest]
+        [work.value(), largest.value()]
     }
 
     /// Forces at all dofs of a body with so many nodes.

@@ -4,12 +4,15 @@
 //! surface ties its nodes to one of them, the master, which stands for all. In v every support is a prescribed dof, and blocks
 //! of K keep their size.
 
+use serde::{Deserialize, Serialize};
+use crate::exchange::Plain;
 use crate::linalg::Csr;
 use std::collections::BTreeMap;
 
 /// The map from dofs v to nodal displacements u, and the transposed one for forces. Everything that is not named is the same
 /// in both.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(bound = "[[f64; D]; D]: Plain")]
 pub struct Frame<const D: usize> {
     /// Orthonormal axes of turned nodes: v_i = axis_i . u.
     pub axes: BTreeMap<u32, [[f64; D]; D]>,

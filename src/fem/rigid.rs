@@ -1,12 +1,15 @@
 //! Rigid motions of a body and what its supports leave of them.
 
+use serde::{Deserialize, Serialize};
+use crate::exchange::Plain;
 use super::assemble::NodalBlock;
 use super::extent::Extent;
 use crate::linalg::{Blocks, PART, TOLERANCE, dot};
 use nalgebra::{DMatrix, DVector};
 
 /// A rigid motion, as a sum of translations and rotations about a centre: a few numbers, however many nodes the body has.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
 pub struct RigidMotion<const D: usize> {
     /// "translation along y", "rotation", or a mixture of them.
     pub name: String,
@@ -38,24 +41,18 @@ impl<const D: usize> RigidMotion<D> {
     }
 }
 
-/// What is largest of a value at the dofs of a body, a dof and its size, where `size` has none for dofs that do not count; what rigid motions are there
-/// is known on all ranks afterwards. Collective.
-pub type Largest<'a> = dyn Fn(&dyn Fn(usize) -> Option<f64>) -> Option<(usize, f64)> + 'a;
-
 /// Rigid motions of a free body at its dofs.
 #[derive(Clone, Copy)]
 pub struct AtDofs<'a> {
     /// How many there are.
     pub count: usize,
-    /// What one of them does at a dof of the contact, of supports, or one that was the largest before.
+    /// What one of them does at a dof.
     pub at: &'a dyn Fn(usize, usize) -> f64,
-    /// Looks at all dofs.
-    pub largest: &'a Largest<'a>,
 }
 
 impl AtDofs<'_> {
     /// No motions.
-    pub const NONE: AtDofs<'static> = AtDofs { count: 0, at: &|_, _| 0.0, largest: &|_| None };
+    pub const NONE: AtDofs<'static> = AtDofs { count: 0, at: &|_, _| 0.0 };
 }
 
 /// A rigid motion that supports leave free.

@@ -1,7 +1,9 @@
 //! The finite element space of one body: its nodes, cells and boundary facets, numbered within the body.
 
-use super::{Places, Slope, cross, element, pad};
-use crate::mesh::{Group, Mesh, Nodes, Numbering, datum};
+use serde::{Deserialize, Serialize};
+use crate::exchange::Plain;
+use super::{Slope, cross, element, pad};
+use crate::mesh::{Group, Mesh, Numbering, datum};
 use crate::problem::order::Order;
 use std::cell::OnceCell;
 use std::collections::{HashMap, HashSet};
@@ -11,12 +13,13 @@ pub const ON_AXIS: f64 = 1e-10;
 
 /// Nodes and cells of one body. Nodes are numbered as the cells meet them, so that neighbours in the mesh file
 /// stay neighbours in memory.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
 pub struct Space<const D: usize> {
     /// Polynomial order.
     pub order: Order,
     /// Where the nodes are, measured from `datum`.
-    pub nodes: Places<D>,
+    pub nodes: Vec<[f64; D]>,
     /// The point of the scene from which coordinates are measured; see [`Mesh::datum`].
     pub datum: [f64; D],
     /// Nodes per cell.
@@ -25,14 +28,16 @@ pub struct Space<const D: usize> {
     pub cells: Vec<u32>,
     /// Whether the body is one of revolution, of which this is the meridian: x is the radius, y runs along the axis.
     pub axisymmetric: bool,
-    /// Body node of each mesh point.
+    /// Body node of each mesh point; unknown in parts of a body.
+    #[serde(skip)]
     from_mesh: Numbering,
     /// Area (volume) of all cells, once it was asked for.
+    #[serde(skip)]
     measure: OnceCell<f64>,
 }
 
 /// Facets of a body's boundary, oriented so that [`Facets::normals`] points out of the body.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Facets<const D: usize> {
     /// Polynomial order.
     pub order: Order,
@@ -47,10 +52,9 @@ impl<const D: usize> Space<D> {
     pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
         let stride = element::node_count(D + 1, order);
         let corners = group.connectivity.chunks_exact(group.stride).flat_map(|cell| &cell[..stride]).copied();
-        let mut nodes = Vec::new();
         let mut space = Space {
             order,
-            nodes: Places::default(),
+            nodes: Vec::new(),
             datum: mesh.datum,
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
@@ -59,43 +63,13 @@ impl<const D: usize> Space<D> {
             measure: OnceCell::new(),
         };
         for point in corners {
-            let (node, is_new) = space.from_mesh.number(point, nodes.len() as u32);
+            let (node, is_new) = space.from_mesh.number(point, space.nodes.len() as u32);
             if is_new {
-                nodes.push(mesh.points[point as usize]);
+                space.nodes.push(mesh.points[point as usize]);
             }
             space.cells.push(node);
         }
-        space.nodes = nodes.into();
         space
-    }
-
-    /// The space on all nodes of a body, of which those that are points of the mesh here are `known`, and some of the cells, in `group`. The measure
-    /// of all of them is known [later](Self::of_cells).
-    pub fn of_nodes(mesh: &Mesh<D>, known: &Nodes, group: &Group, order: Order) -> Self {
-        let places = known.points.iter().map(|&point| mesh.points[point as usize]);
-        let nodes = Places::some(known.count, known.numbers.iter().copied().zip(places));
-        let mut from_mesh = Numbering::new(known.points.iter().copied());
-        for (&node, &point) in known.numbers.iter().zip(&known.points) {
-            from_mesh.number(point, node);
-        }
-        let stride = element::node_count(D + 1, order);
-        let corners = group.simplices().flat_map(|cell| &cell[..stride]);
-        Space {
-            order,
-            nodes,
-            datum: mesh.datum,
-            stride,
-            cells: corners.filter_map(|&point| from_mesh.get(point)).collect(),
-            axisymmetric: false,
-            from_mesh,
-            measure: OnceCell::new(),
-        }
-    }
-
-    /// The space with other cells of the body, the measure of all of which is known; and the cells that it had.
-    pub fn of_cells(self, cells: Vec<u32>, measure: f64) -> (Self, Vec<u32>) {
-        let before = self.cells;
-        (Self { cells, measure: OnceCell::from(measure), ..self }, before)
     }
 
     /// Some of the cells, in this order, with their nodes alone in the order that they have here; and which nodes these are, sorted. Surfaces
@@ -107,6 +81,11 @@ impl<const D: usize> Space<D> {
         (self.on(&cells, &nodes), nodes)
     }
 
+    /// Return the nodes of some cells, one after the other.
+    pub fn corners(&self, cells: &[usize]) -> Vec<u32> {
+        cells.iter().flat_map(|&cell| &self.cells[cell * self.stride..][..self.stride]).copied().collect()
+    }
+
     /// These nodes, sorted, each once.
     pub fn among(nodes: impl Iterator<Item = u32> + Clone) -> Vec<u32> {
         Numbering::in_order(nodes).points().collect()
@@ -116,7 +95,7 @@ impl<const D: usize> Space<D> {
     pub fn on(&self, cells: &[u32], nodes: &[u32]) -> Self {
         let number = Numbering::in_order(nodes.iter().copied());
         Space {
-            nodes: nodes.iter().map(|&node| self.nodes[node as usize]).collect::<Vec<_>>().into(),
+            nodes: nodes.iter().map(|&node| self.nodes[node as usize]).collect(),
             cells: cells.iter().filter_map(|&node| number.get(node)).collect(),
             from_mesh: Numbering::default(),
             measure: OnceCell::new(),
@@ -124,13 +103,9 @@ impl<const D: usize> Space<D> {
         }
     }
 
-    /// The largest radius of the nodes that are known here.
-    pub fn largest_radius(&self) -> f64 {
-        self.nodes.iter().fold(0.0, |max: f64, x| max.max(x[0].abs()))
-    }
-
-    /// The meridian of a body of revolution. Nodes whose radius is rounding of the `largest` one get the radius zero.
-    pub fn revolved(mut self, largest: f64) -> Self {
+    /// The meridian of a body of revolution. Nodes whose radius is rounding of the largest one get the radius zero.
+    pub fn revolved(mut self) -> Self {
+        let largest = self.nodes.iter().fold(0.0, |max: f64, x| max.max(x[0].abs()));
         self.nodes.iter_mut().filter(|x| x[0].abs() <= ON_AXIS * largest).for_each(|x| x[0] = 0.0);
         self.axisymmetric = true;
         self

@@ -3,13 +3,15 @@
 //! A state is (v, a): v has the dofs of this rank alone, the rigid motion a is the same on all. Of forces every rank has a part, also
 //! of those on the rigid motion, so that work is a sum over ranks.
 
-use crate::exchange::{Exchange, trade};
+use serde::{Deserialize, Serialize};
+use crate::exchange::{Exchange, Serial, trade};
 use crate::linalg::Csr;
 use nalgebra::DMatrix;
 use std::rc::Rc;
 
 /// The dofs of a body that one rank owns, and where they are in the matrix of all ranks that has their rows of K: that of all bodies, or
 /// one of the body's own.
+#[derive(Serialize, Deserialize)]
 pub struct Distribution {
     /// Number of dofs of the body.
     pub dofs: usize,
@@ -31,8 +33,13 @@ pub struct Distribution {
     pub rows: Csr,
     /// Whether this rank speaks for the body: one of those that own most of it.
     pub leads: bool,
-    /// Connection to the other ranks.
+    /// Connection to the other ranks; whoever receives a distribution sets it.
+    #[serde(skip, default = "alone")]
     pub exchange: Rc<dyn Exchange>,
+}
+
+fn alone() -> Rc<dyn Exchange> {
+    Rc::new(Serial)
 }
 
 impl Distribution {

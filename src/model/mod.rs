@@ -15,6 +15,7 @@ pub mod origin;
 pub mod rigid;
 pub mod surface;
 
+use serde::{Deserialize, Serialize};
 pub use body::{Body, BodyCounts, Energy, Loads, Matrices, Solved};
 pub use distribution::Distribution;
 pub use field::Field;
@@ -32,7 +33,7 @@ use std::ops::Range;
 use std::rc::Rc;
 
 /// Which contact rows a body has: side `side` of pair `pair`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Segment {
     /// Number of the pair.
     pub pair: usize,
@@ -41,7 +42,7 @@ pub struct Segment {
 }
 
 /// A rigid motion that a body's supports leave free.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Motion {
     /// Name for messages.
     pub name: String,
@@ -52,7 +53,7 @@ pub struct Motion {
 }
 
 /// A motion of several bodies together that changes no gap and that nothing holds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mechanism {
     /// The bodies that it moves.
     pub bodies: Vec<usize>,
@@ -65,7 +66,7 @@ pub struct Mechanism {
 }
 
 /// Rigid motions that springs to the ground resist, beside those that nothing holds: a start moves bodies on soft springs, too.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Sprung {
     /// The motions that supports leave.
     pub motions: Vec<Motion>,
@@ -172,7 +173,7 @@ impl Model {
     }
 
     /// Whether the dofs of the bodies are dealt out over the ranks.
-    pub fn is_dealt_out(&self) -> bool {
+    pub fn is_distributed(&self) -> bool {
         self.bodies.iter().any(|slot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some()))
     }
 

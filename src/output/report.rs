@@ -46,8 +46,6 @@ pub struct Report {
     pub assemblies: usize,
     /// Stiffness matrices that an earlier run of a sweep has left.
     pub assemblies_avoided: usize,
-    /// The most nodes whose places a rank knew when dofs were dealt out.
-    pub known_nodes: usize,
     /// Numeric factorisations of stiffness matrices that an earlier run of a sweep has left.
     pub factorizations_avoided: usize,
     /// Solves of one body, those of the start included.

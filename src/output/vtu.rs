@@ -1,5 +1,6 @@
 //! `<body>.vtu`, for ParaView.
 
+use serde::{Deserialize, Serialize};
 use super::collection::escape;
 use super::tags::Whole;
 use std::io::{self, Write};
@@ -10,7 +11,7 @@ use vtkio::model::{
 use vtkio::xml::Compressor;
 
 /// Kind of the cells of a body; local numbering of the points is VTK's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CellKind {
     /// Two ends.
     Line,

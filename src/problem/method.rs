@@ -1,5 +1,6 @@
 //! The outer iteration: methods and their settings by name.
 
+use serde::{Deserialize, Serialize};
 use super::history::History;
 use super::robin::{RobinRule, Zone};
 use super::stop::StopRule;
@@ -86,7 +87,7 @@ impl MethodName {
 }
 
 /// How the linear steps of Newton's method are solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Linear {
     /// One dense matrix of condensed bodies.
     Dense,

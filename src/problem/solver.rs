@@ -1,5 +1,7 @@
 //! Inner solvers by name.
 
+use serde::{Deserialize, Serialize};
+
 /// Inner solver asked for in the scene; PETSc options override it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SolverSpec {
@@ -10,7 +12,7 @@ pub struct SolverSpec {
 }
 
 /// Presets of inner solvers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Preset {
     /// Sparse Cholesky factorisation by MUMPS.
     Mumps,

@@ -8,11 +8,9 @@ use super::plan::{DENSE, Plan, agree};
 use super::words::in_words;
 use crate::discretize::{Assembled, Factory, Outline};
 use crate::error::{Error, Kind, Result};
-use crate::exchange::tell;
 use crate::fem::Interpolation;
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot};
-use crate::parallel::Ranks;
 use crate::petsc::{Rows, Session};
 use crate::problem::{Linear, MethodName, Order, Preset};
 use crate::scene::Scene;
@@ -23,6 +21,7 @@ use crate::solver::speed;
 use crate::solver::{CondensedBody, Krylov, Retained, SparseBody, memory};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
 /// Prefix of the PETSc options of the matrix of all bodies.
@@ -194,9 +193,8 @@ impl<'a> Inner<'a> {
         }
     }
 
-    /// Chooses for bodies in space: for all together where Newton's method may join them. The first rank gets their graphs where the
-    /// answer depends on them. Collective.
-    fn choose_in_space(&mut self, plans: &mut [&mut Plan], outlines: &[&Outline]) -> Result<()> {
+    /// Chooses for bodies in space: for all together where Newton's method may join them.
+    fn choose_in_space(&mut self, plans: &mut [&mut Plan], outlines: &[&Outline]) {
         let joined = self.may_join();
         let size = if joined { plans.len().max(1) } else { 1 };
         for (plans, outlines) in plans.chunks_mut(size).zip(outlines.chunks(size)) {
@@ -205,30 +203,22 @@ impl<'a> Inner<'a> {
                 MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => Step::Swept,
                 MethodName::Robin | MethodName::Ncg | MethodName::Anderson => Step::Sweeps,
             };
-            let candidates = plans.iter().zip(outlines).map(|(plan, outline)| {
+            let graphs: Vec<_> = outlines.iter().map(|outline| (outline.graph)()).collect();
+            let candidates = plans.iter().zip(&graphs).map(|(plan, graph)| {
                 let retained = plan.retained.as_ref().filter(|_| plan.condensable);
-                Candidate { dofs: plan.dofs, order: plan.order, retained, couplings: (outline.couplings)() }
+                Candidate { dofs: plan.dofs, order: plan.order, retained, couplings: graph.col.len() }
             });
             let candidates: Vec<_> = candidates.collect();
             // bodies that are kept have their memory already
             let are_kept = plans.iter().all(|plan| self.kept.contains_key(&plan.name));
             let memory = if are_kept { usize::MAX } else { self.memory };
-            // decided once: powers are not the same to the last digit on all processors
-            let ranks = Ranks::new(self.session);
-            let compared = || {
-                let usual = Comparison::of_cubes(&candidates, step, speed::REFERENCE);
-                Ok(if usual.is_worth_a_look() {
-                    Comparison::of_cubes(&candidates, step, speed::products())
-                } else {
-                    usual
-                })
-            };
-            let mut comparison = tell(&ranks, compared)?;
+            let mut comparison = Comparison::of_cubes(&candidates, step, speed::REFERENCE);
+            if comparison.is_worth_a_look() {
+                comparison = Comparison::of_cubes(&candidates, step, speed::products());
+            }
             if !comparison.is_known(&candidates, memory) {
-                let graphs = outlines.iter().map(|outline| (outline.graph)());
-                let graphs: Vec<(&[u32], &[u32])> = graphs.map(|graph| (&graph.ptr[..], &graph.col[..])).collect();
-                let analysed = || Ok(comparison.analysed(&candidates, &graphs));
-                comparison = tell(&ranks, analysed)?;
+                let graphs: Vec<_> = graphs.iter().map(|graph| (&graph.ptr[..], &graph.col[..])).collect();
+                comparison = comparison.analysed(&candidates, &graphs);
             }
             let is_direct = comparison.is_direct(memory);
             let Comparison { direct, multigrid, .. } = comparison;
@@ -251,7 +241,6 @@ impl<'a> Inner<'a> {
                 plan.reason.clone_from(&reason);
             }
         }
-        Ok(())
     }
 
     /// How linear steps are solved, once bodies have their presets.
@@ -293,10 +282,69 @@ impl<'a> Inner<'a> {
             _ => Linear::Direct,
         })
     }
+
+    /// Return what the other ranks must know of the plan.
+    fn decisions(&self) -> Decisions {
+        let of_body = |plan: &Plan| Decision {
+            name: plan.name.clone(),
+            preset: plan.preset,
+            dimension: plan.dimension,
+            order: plan.order,
+            dofs: plan.dofs,
+            retained: plan.retained.clone(),
+        };
+        Decisions {
+            linear: self.linear,
+            dealt: self.dealt.clone(),
+            bodies: self.plans.iter().map(of_body).collect(),
+        }
+    }
+
+    /// Set the PETSc options of the plan.
+    fn apply(&mut self) {
+        let is_quadratic = self.is_quadratic();
+        match self.linear {
+            Linear::Dense => {}
+            Linear::Direct => preset::apply(&mut self.whole, Preset::Mumps, None),
+            Linear::Multigrid => {
+                preset::made_often(&mut self.whole);
+                let smoother = if self.session.size() > 1 { Smoother::Chebyshev } else { Smoother::GaussSeidel };
+                preset::apply(&mut self.whole, Preset::Hypre, Some(smoother).filter(|_| is_quadratic));
+            }
+            Linear::Sweeps => {
+                for (plan, dealt) in self.plans.iter_mut().zip(&self.dealt) {
+                    let smoother = if *dealt { Smoother::Chebyshev } else { Smoother::GaussSeidel };
+                    preset::apply(&mut plan.chosen, plan.preset, Some(smoother).filter(|_| plan.order == Order::P2));
+                }
+            }
+        }
+    }
+}
+
+/// The choice of solvers of all bodies, by the first rank.
+#[derive(Serialize, Deserialize)]
+pub struct Decisions {
+    linear: Linear,
+    /// Whether each body is distributed over the ranks, where sweeps solve linear steps.
+    dealt: Vec<bool>,
+    bodies: Vec<Decision>,
+}
+
+/// The choice for a body; see [`Plan`].
+#[derive(Serialize, Deserialize)]
+struct Decision {
+    name: String,
+    preset: Preset,
+    dimension: usize,
+    order: Order,
+    dofs: usize,
+    retained: Option<Retained>,
 }
 
 impl Factory for Inner<'_> {
-    fn plan(&mut self, outlines: &[Outline]) -> Result<()> {
+    type Plan = Decisions;
+
+    fn plan(&mut self, outlines: &[Outline]) -> Result<Decisions> {
         let mut plans = Vec::new();
         // bodies for which the program is to choose
         let mut open = Vec::new();
@@ -318,34 +366,36 @@ impl Factory for Inner<'_> {
             plans.iter_mut().zip(outlines).zip(open).filter_map(|(both, open)| open.then_some(both)).unzip();
         match outlines.first().map(|outline| outline.dimension) {
             Some(2) => plans_open.into_iter().for_each(|plan| self.choose_in_plane(plan)),
-            _ => self.choose_in_space(&mut plans_open, &outlines_open)?,
+            _ => self.choose_in_space(&mut plans_open, &outlines_open),
         }
         self.plans = plans;
         self.linear = self.join()?;
         for plan in &mut self.plans {
             plan.retained = plan.retained.take().filter(|_| plan.preset == Preset::Condensed);
         }
-        let is_quadratic = self.is_quadratic();
-        match self.linear {
-            Linear::Dense => {}
-            Linear::Direct => preset::apply(&mut self.whole, Preset::Mumps, None),
-            Linear::Multigrid => {
-                preset::made_often(&mut self.whole);
-                let smoother = if self.session.size() > 1 { Smoother::Chebyshev } else { Smoother::GaussSeidel };
-                preset::apply(&mut self.whole, Preset::Hypre, Some(smoother).filter(|_| is_quadratic));
-            }
-            Linear::Sweeps => {
-                self.dealt = dealt_out(&self.plans, self.session.size());
-                for (plan, dealt) in self.plans.iter_mut().zip(&self.dealt) {
-                    let smoother = if *dealt { Smoother::Chebyshev } else { Smoother::GaussSeidel };
-                    preset::apply(&mut plan.chosen, plan.preset, Some(smoother).filter(|_| plan.order == Order::P2));
-                }
-            }
+        if self.linear == Linear::Sweeps {
+            self.dealt = dealt_out(&self.plans, self.session.size());
         }
+        let decisions = self.decisions();
+        self.apply();
+        Ok(decisions)
+    }
+
+    fn adopt(&mut self, decisions: Decisions) -> Result<()> {
+        let Decisions { linear, dealt, bodies } = decisions;
+        (self.linear, self.dealt) = (linear, dealt);
+        for (index, body) in bodies.into_iter().enumerate() {
+            let Decision { name, preset, dimension, order, dofs, retained } = body;
+            let chosen = self.typed.of(&name);
+            self.places.insert(name.clone(), index);
+            let (reason, condensable) = (String::new(), retained.is_some());
+            self.plans.push(Plan { name, chosen, preset, reason, dimension, order, dofs, condensable, retained });
+        }
+        self.apply();
         Ok(())
     }
 
-    fn dealt_out(&self) -> Vec<Vec<usize>> {
+    fn distributed(&self) -> Vec<Vec<usize>> {
         let bodies = 0..self.plans.len();
         // a condensed body lives on one rank, and all of them can have what is left of it
         let is_whole = self.plans.iter().any(|plan| plan.preset == Preset::Condensed);

@@ -54,7 +54,7 @@ fn linear_step(
     }
     model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.reveal())?;
     // multigrid wants nodes, without numbers for rigid motions among them; so do rows that are dealt out
-    let nodes = linear == Linear::Multigrid || model.is_dealt_out();
+    let nodes = linear == Linear::Multigrid || model.is_distributed();
     let union = if nodes { Union::of_nodes(model)? } else { Union::of(model)? };
     let Some(union) = union else {
         return Err(Error::new(Kind::Solver, "a body has no matrices to be joined").help("choose newton-robin"));

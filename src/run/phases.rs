@@ -12,8 +12,9 @@ use crate::ddm::{self, Outcome, Start, Status};
 use crate::discretize::{self, Balanced, ContactInfo, Discrete, Verified, point};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
+use crate::exchange::Plain;
 use crate::interrupt::Interrupt;
-use crate::mesh::{self, Dealer, Loaded, Portion};
+use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, Mechanism};
 use crate::output::sci;
 use crate::parallel::{Ranks, agree};
@@ -67,13 +68,17 @@ fn build_in<const D: usize>(
     kept: Vec<BodySlot>,
     interrupt: &Interrupt,
     clock: &mut Clock,
-) -> Result<Built> {
+) -> Result<Built>
+where
+    [f64; D]: Plain,
+    [[f64; D]; D]: Plain,
+{
     let stage = session.stage("mesh");
     clock.begin();
     let (mut verified, read) = verified::<D>(session, &scene, interrupt)?;
     clock.phase("mesh");
     drop(stage);
-    verified.portion.mesh.forget_tags();
+    verified.mesh.forget_tags();
     let source = Source { session: session.clone(), scene, verified, read, cut };
     let history = &source.scene.method.steps;
     let begun = history.begun;
@@ -104,7 +109,11 @@ struct Source<const D: usize> {
     cut: Cut<D>,
 }
 
-impl<const D: usize> Source<D> {
+impl<const D: usize> Source<D>
+where
+    [f64; D]: Plain,
+    [[f64; D]; D]: Plain,
+{
     /// The problem under the loads of a step of the scene's history, or the full ones. Collective.
     fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
         let Self { session, scene, verified, read, cut } = self;
@@ -122,14 +131,14 @@ impl<const D: usize> Source<D> {
         discrete.share();
         // small fronts and several ranks lose by BLAS threads, and the short vectors of a Krylov method do; large factorisations gain
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-        let gains = D == 3 && verified.portion.points * D >= LARGE_FRONTS && inner.factors();
+        let gains = D == 3 && verified.points * D >= LARGE_FRONTS && inner.factors();
         session.set_blas_threads(if gains { cores / session.size() } else { 1 });
         clock.estimate = inner.seconds;
         clock.phase("discretize");
         drop(stage);
         let mut warnings = warnings(session, &discrete);
-        warnings.extend(in_parts(verified.portion.mesh.split));
-        warnings.extend(made_straight(verified.portion.mesh.straightened));
+        warnings.extend(in_parts(verified.mesh.split));
+        warnings.extend(made_straight(verified.mesh.straightened));
         warnings.extend(read.iter().filter_map(|read| read.unkept.clone()));
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear, inner.whole.clone());
@@ -150,7 +159,7 @@ fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()
     Ok(())
 }
 
-/// The mesh, checked: one rank lets Gmsh work and reads, and every one looks at its part. Collective.
+/// Return the bodies of a scene and their mesh, which the first rank lets Gmsh make, reads and checks. Collective.
 fn verified<const D: usize>(
     session: &Session,
     scene: &Scene,
@@ -158,16 +167,16 @@ fn verified<const D: usize>(
 ) -> Result<(Verified<D>, Option<FileRead>)> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
     interrupt.hold();
-    let ranks = Ranks::new(session);
     let mut file = None;
-    let read = |dealer: &mut Dealer| {
-        let Loaded { mesh, digest, unkept, .. } = mesh::deal::<D>(&scene.mesh, order, interrupt, dealer)?;
+    let read = || {
+        let Loaded { mesh, digest, unkept, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
         file = Some(FileRead { digest, unkept });
+        interrupt.release()?;
         Ok(mesh)
     };
-    let portion = Portion::read(&ranks, order, read).and_then(|portion| interrupt.release().map(|()| portion));
-    let verified = agree(session, discretize::verify(scene, agree(session, portion)?, Rc::new(ranks)))?;
-    Ok((verified, file))
+    let verified = discretize::verify(scene, &Ranks::new(session), read);
+    let verified = verified.and_then(|verified| interrupt.release().map(|()| verified));
+    Ok((agree(session, verified)?, file))
 }
 
 fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
@@ -183,7 +192,7 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
             "{file} of this folder is not read, since PETSc options can run programs; -options_file {file} reads it"
         )
     }));
-    if session.size() > discrete.bodies.len() && !discrete.model.is_dealt_out() {
+    if session.size() > discrete.bodies.len() && !discrete.model.is_distributed() {
         warnings.push(format!(
             "{} of {} ranks have no body to solve",
             session.size() - discrete.bodies.len(),

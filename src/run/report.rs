@@ -71,7 +71,7 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
         dense_factorizations: counts.dense_factorizations + joint.dense_factorizations,
         assemblies: shared.assemblies,
         assemblies_avoided: shared.assemblies_avoided,
-        known_nodes: shared.known_nodes,
+        
         factorizations_avoided: counts.factorizations_avoided,
         body_solves_skipped: outcome.solves_skipped,
         messages: model.exchange.messages(),
@@ -212,7 +212,6 @@ pub struct Shared {
     pub counts: BodyCounts,
     assemblies: usize,
     assemblies_avoided: usize,
-    known_nodes: usize,
     /// Inner solver of each body.
     pub solvers: Vec<String>,
 }
@@ -235,8 +234,8 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
 impl Shared {
     /// Collects it on every rank; collective.
     pub fn gather(discrete: &Discrete) -> Self {
-        let &Discrete { assemblies, assemblies_avoided, known_nodes, .. } = discrete;
-        let mut mine = Self { assemblies, assemblies_avoided, known_nodes, ..Self::default() };
+        let &Discrete { assemblies, assemblies_avoided, .. } = discrete;
+        let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
         for slot in &discrete.model.bodies {
             let leader = slot.local.as_ref().filter(|body| body.leads());
             mine.solvers.push(leader.map_or(String::new(), |body| body.describe()));
@@ -250,7 +249,6 @@ impl Shared {
         self.counts += other.counts;
         self.assemblies += other.assemblies;
         self.assemblies_avoided += other.assemblies_avoided;
-        self.known_nodes = self.known_nodes.max(other.known_nodes);
         self.solvers.iter_mut().zip(other.solvers).for_each(|(mine, other)| mine.push_str(&other));
         self
     }

@@ -4,6 +4,7 @@
 //! that touch a node, the node is turned to axes (n, t, ...), and of its dofs one is left. Dofs of a few more nodes are
 //! retained where supports and contact do not hold the interior safely.
 
+use serde::{Deserialize, Serialize};
 use crate::fem::rigid::AtDofs;
 use crate::linalg::{Blocks, Csr, dot};
 use nalgebra::{DMatrix, DVector};
@@ -18,7 +19,7 @@ const PARALLEL: f64 = 1e-12;
 const SAFE: f64 = 1e-6;
 
 /// The retained dofs of a body.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Retained {
     /// Dofs, sorted, in the turned axes.
     pub dofs: Vec<usize>,
@@ -31,7 +32,7 @@ pub struct Retained {
 
 impl Retained {
     /// Chooses the dofs for contact `rows` (columns: all dofs, `dimension` of them a node), `prescribed` (dof, value) and the
-    /// `motions` of the free body. Collective, if it has motions.
+    /// `motions` of the free body.
     pub fn new(dimension: usize, rows: &Csr, prescribed: &[(usize, f64)], motions: AtDofs) -> Self {
         let prescribed: HashSet<usize> = prescribed.iter().map(|entry| entry.0).collect();
         let mut vectors: BTreeMap<usize, Vec<Vec<f64>>> = BTreeMap::new();
@@ -51,7 +52,7 @@ impl Retained {
         let mut retained = Self { dofs: Vec::new(), rows: Csr::new(0), axes: axes.collect(), dimension };
         let turned = retained.turn_rows(rows);
         let mut kept: BTreeSet<usize> = turned.col.iter().map(|&dof| dof as usize).collect();
-        retained.hold(&mut kept, &prescribed, motions);
+        retained.hold(&mut kept, &prescribed, rows.columns, motions);
         retained.dofs = kept.into_iter().collect();
         let place = |dof: usize| retained.dofs.binary_search(&dof).ok();
         retained.rows = turned.of_columns(retained.dofs.len(), place);
@@ -59,8 +60,8 @@ impl Retained {
     }
 
     /// Adds dofs until supports and retained dofs together hold every rigid motion.
-    fn hold(&self, kept: &mut BTreeSet<usize>, prescribed: &HashSet<usize>, motions: AtDofs) {
-        let AtDofs { count: motions, at: motion, largest } = motions;
+    fn hold(&self, kept: &mut BTreeSet<usize>, prescribed: &HashSet<usize>, dofs: usize, motions: AtDofs) {
+        let AtDofs { count: motions, at: motion } = motions;
         loop {
             let mut gram = DMatrix::zeros(motions, motions);
             let held: BTreeSet<usize> = kept.iter().chain(prescribed).copied().collect();
@@ -75,7 +76,8 @@ impl Retained {
                 let sum = |dof: usize| (0..motions).map(|k| weights[k] * motion(k, dof)).sum();
                 (!held.contains(&dof)).then(|| self.turned(dof, sum).abs() / weights.amax())
             };
-            match largest(&size) {
+            let sizes = (0..dofs).filter_map(|dof| Some((dof, size(dof)?)));
+            match sizes.max_by(|a, b| a.1.total_cmp(&b.1)) {
                 Some((dof, size)) if size > 1e-3 => kept.insert(dof),
                 _ => return,
             };

@@ -40,6 +40,7 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
+use serde::{Deserialize, Serialize};
 pub use groups::Duty;
 pub use nodes::Nodes;
 pub use parts::{Joined, Parts};
@@ -70,7 +71,7 @@ pub struct Asked<'a> {
 }
 
 /// What was found of a body.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Checked {
     /// Facets between two cells.
     pub inner: usize,
@@ -79,6 +80,7 @@ pub struct Checked {
     /// What hangs together.
     pub parts: Parts,
     /// Its nodes, as the cells of all ranks meet them.
+    #[serde(skip)]
     pub nodes: Arc<Nodes>,
 }
 

@@ -1,10 +1,11 @@
 //! Nodes of bodies: numbered as the cells of all ranks meet them, known where they are needed.
 
+use serde::{Deserialize, Serialize};
 use crate::exchange::{Exchange, gather, places, trade};
 use crate::mesh::{Key, Portion};
 
 /// The nodes of a body that a rank has: those of its cells, and those on surfaces, edges and points.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Nodes {
     /// Number of nodes of the body on all ranks.
     pub count: usize,
