@@ -5,7 +5,7 @@ use super::part::Part;
 use crate::exchange::Serial;
 use crate::fem::{Couplings, ElasticBody, Interpolation, Space};
 use crate::linalg::Csr;
-use crate::mesh::Cuts;
+use crate::mesh::bisect;
 use crate::model::Distribution;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -80,9 +80,7 @@ impl Partition {
         wants_coarse: &dyn Fn(usize) -> bool,
     ) -> Self {
         let places: Vec<[f64; D]> = bodies.iter().flat_map(|&body| parts[body].space.nodes.iter().copied()).collect();
-        let weight = |at: u32| u64::from(couplings[at as usize]);
-        let cuts = Cuts::new(places.len(), &|at| (places[at as usize], at), &weight, ranks, &Serial);
-        let mut all = places.iter().zip(0..).map(|(x, number)| cuts.part(x, number) as u32);
+        let mut all = bisect(&places, couplings, ranks).into_iter();
         let of_body = |&body: &usize| all.by_ref().take(parts[body].space.nodes.len()).collect();
         let owner: Vec<Vec<u32>> = bodies.iter().map(of_body).collect();
         let coarse_nodes = |&body: &usize| if wants_coarse(body) { parts[body].coarse_nodes() } else { Vec::new() };

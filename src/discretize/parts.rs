@@ -29,7 +29,7 @@ pub fn parts<'a, const D: usize>(
         let space = space(spec, mesh, scene.plane)?;
         let checked = &checked[index];
         let elasticity = elastic::of(spec, &space, mesh, scene.plane)?;
-        let known = known(spec, &space, &elasticity, checked.nodes.points.clone());
+        let known = known(spec, &space, &elasticity, checked.points.clone());
         let mut part = Part::new(spec, mesh, space, Rc::new(elasticity), known)?;
         let resultant = |load: &_| part.resultant(load, mesh);
         part.known.outer = Outer::new(spec, &part.space, mesh, &resultant)?;

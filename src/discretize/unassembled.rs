@@ -15,7 +15,6 @@ use crate::mesh::Checked;
 use crate::model::Segment;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// A whole body before its matrix is assembled, on the first rank.
 #[derive(Clone)]
@@ -234,7 +233,7 @@ impl<const D: usize> Unassembled<'_, D> {
             nodes: part.space.nodes.len(),
             points: Vec::new(),
             cells: part.known.cells,
-            facets: Checked { nodes: Arc::default(), ..checked.clone() },
+            facets: Checked { points: Vec::new(), ..checked.clone() },
             dofs: part.space.dofs(),
             supported: part.held.supported(),
             left_by_supports: loose.left.iter().map(|motion| motion.name.clone()).collect(),

@@ -4,9 +4,9 @@ use super::find::point;
 use super::part::Part;
 use super::roster::{self, Lying};
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, Serial, tell};
+use crate::exchange::{Exchange, tell};
 use crate::fem::{Extent, RigidMotion, rigid};
-use crate::mesh::{Asked, Checked, Duty, Group, LENGTHS, Mesh, Parts, Portion};
+use crate::mesh::{Asked, Checked, Duty, Group, LENGTHS, Mesh, Parts};
 use crate::problem::{Order, Plane};
 use crate::problem::body::BodySpec;
 use crate::scene::Scene;
@@ -39,7 +39,7 @@ struct Head {
     lying: Lying,
 }
 
-/// Find the bodies of a scene and check its mesh once: see [`roster::bodies`] and [`Portion::check`]. The first rank reads the mesh, and looks at it.
+/// Find the bodies of a scene and check its mesh once: see [`roster::bodies`] and [`Mesh::check`]. The first rank reads the mesh, and looks at it.
 /// Collective.
 ///
 /// # Errors
@@ -63,17 +63,17 @@ pub fn verify<const D: usize>(
 }
 
 /// Check the mesh of a scene; return also which groups lie on which bodies.
-fn check<const D: usize>(scene: &Scene, mesh: Mesh<D>) -> Result<(Verified<D>, Lying)> {
+fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D>, Lying)> {
     size(&mesh)?;
+    mesh.sort_cells();
     // the radius of a body of revolution is measured from its axis
-    let portion = Portion::whole(mesh).near(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
-    let lying = roster::lying(scene, &portion.mesh)?;
-    let bodies = roster::bodies(scene, &portion.mesh, &lying)?;
+    mesh.measure_nearby(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
+    let lying = roster::lying(scene, &mesh)?;
+    let bodies = roster::bodies(scene, &mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
-    let checked = portion.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty(), &Serial)?;
-    let Portion { mesh, points, .. } = portion;
-    Ok((Verified { mesh, points, bodies, checked: checked.into() }, lying))
+    let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty())?;
+    Ok((Verified { points: mesh.points.len(), mesh, bodies, checked: checked.into() }, lying))
 }
 
 impl Head {

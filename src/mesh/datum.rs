@@ -4,7 +4,8 @@
 //! interpolations and sums of coordinates round relative to X, not to the body. Subtracting a datum near the mesh once, where
 //! the mesh enters, makes all of these relative to the mesh. Coordinates of the scene return in expressions and in output alone.
 
-use crate::linalg::bounds;
+use super::Mesh;
+use crate::linalg::{bounds, pad};
 
 /// A mesh whose centre is nearer than this many of its sizes to the origin keeps its coordinates: at most three bits are lost
 /// there, and scenes near the origin have the numbers that they always had.
@@ -23,6 +24,16 @@ pub fn of<const D: usize>([low, high]: [[f64; 3]; 2], along: [bool; D]) -> [f64;
         let datum = (middle / unit).round() * unit;
         if along[c] && middle.abs() > FAR * size && datum.is_finite() { datum } else { 0.0 }
     })
+}
+
+impl<const D: usize> Mesh<D> {
+    /// Measure the coordinates from a datum near the mesh if the origin is far away; see the module. `along` says along which axes the origin may move.
+    pub fn measure_nearby(&mut self, along: [bool; D]) {
+        self.datum = of(bounds(self.points.iter().copied().map(pad)), along);
+        for x in &mut self.points {
+            (0..D).for_each(|c| x[c] -= self.datum[c]);
+        }
+    }
 }
 
 /// Return the coordinates in the scene of a point that is measured from a datum.

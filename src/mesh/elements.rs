@@ -1,7 +1,6 @@
 //! The `$Elements` section: the simplices of all physical groups.
 
 use super::cursor::Cursor;
-use super::dealer::SLICE;
 use super::nodes::Nodes;
 use super::physical::Physical;
 use super::simplex::{self, Kind, THINGS};
@@ -9,6 +8,9 @@ use super::split::Split;
 use crate::error::Result;
 use crate::problem::order::Order;
 use std::collections::HashSet;
+
+/// Elements that are read before they go to their groups, so that a large block is not in memory twice.
+const SLICE: usize = 1 << 10;
 
 /// Reads the section's contents into the groups; gives the order of the elements, if there is one but points, and how many were split.
 ///
@@ -18,7 +20,7 @@ use std::collections::HashSet;
 pub fn read<const D: usize>(
     cursor: &mut Cursor,
     nodes: &Nodes,
-    physical: &mut Physical<'_, '_>,
+    physical: &mut Physical,
 ) -> Result<(Option<Order>, usize)> {
     cursor.begin();
     let start = cursor.position();
@@ -52,12 +54,11 @@ pub fn read<const D: usize>(
             let help = "save all elements with one order: gmsh -order 1 or 2";
             return Err(cursor.error_at(position, message).help(help));
         }
-        let dealt = dimension == D && physical.begin::<D>(kind.order, &nodes.points);
         let mut rest = count;
         while rest > 0 {
             let slice = Block { kind, split, count: rest.min(SLICE), name: &name };
             let (connectivity, tags) = slice.read::<D>(cursor, nodes)?;
-            physical.extend((dimension, tag), kind.stride, (&connectivity, &tags), dealt);
+            physical.extend((dimension, tag), kind.stride, &connectivity, &tags);
             rest -= slice.count;
         }
         in_parts += if split.is_some() { count } else { 0 };

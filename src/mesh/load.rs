@@ -4,9 +4,8 @@ use super::cache::{self, Workshop, file_name, folders};
 use super::gmsh::{Gmsh, Task};
 use super::msh::Maker;
 use super::script::Script;
-use super::{Dealer, Mesh, foreign, msh};
+use super::{Mesh, foreign, msh};
 use crate::error::{Error, Located, Place, Result};
-use crate::exchange::Serial;
 use crate::file::{Digested, digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
 use crate::problem::{Guard, MeshSource, Order};
@@ -50,28 +49,15 @@ pub enum Origin {
 /// of named simplices in `D` dimensions (see [`parse`](super::parse)), or of too low an order; the signal.
 /// Quadratic cells that are folded become straight ([`Mesh::straightened`]).
 pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
-    deal(source, order, interrupt, &mut Dealer::new(&Serial, order))
-}
-
-/// The same; where there are several ranks, cells of `.msh` files that are of this order are dealt out while they are read, and the mesh lacks them.
-///
-/// # Errors
-/// Those of [`load`].
-pub fn deal<const D: usize>(
-    source: &MeshSource,
-    order: Order,
-    interrupt: &Interrupt,
-    dealer: &mut Dealer,
-) -> Result<Loaded<D>> {
     let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes, guard } => {
             if let (true, Some(place)) = (foreign::is_shape(&file.value), places.first()) {
                 return Err(Error::scene(place, "numbers for a shape of another program, which has none")
                     .help("give sizes of elements by mesh = { geo = \"...\", size = 0.1 }, or a script (.geo) that merges the file"));
             }
-            meshed(file, (set, places), sizes.as_deref(), order, (guard, interrupt), (&folders(), dealer))
+            meshed(file, (set, places), sizes.as_deref(), order, (guard, interrupt), &folders())
         }
-        MeshSource::Msh { file } => from_file(file, order, interrupt, dealer),
+        MeshSource::Msh { file } => from_file(file, order, interrupt),
         MeshSource::Arrays(arrays) => {
             let mesh = super::arrays::mesh(arrays, order)?;
             Ok(Loaded { mesh, origin: Origin::File, file: PathBuf::new(), digest: String::new(), unkept: None })
@@ -88,7 +74,6 @@ fn from_file<const D: usize>(
     file: &Located<PathBuf>,
     order: Order,
     interrupt: &Interrupt,
-    dealer: &mut Dealer,
 ) -> Result<Loaded<D>> {
     let path = &file.value;
     let mut source = crate::file::open(path).map_err(|error| error.at(&file.place))?;
@@ -103,7 +88,7 @@ fn from_file<const D: usize>(
         }
         false => {
             let mut source = Digested::new(source);
-            let mesh = msh::read(path, Box::new(&mut source), Maker::User, Some(dealer))?;
+            let mesh = msh::read(path, Box::new(&mut source), Maker::User)?;
             Loaded { mesh, origin: Origin::File, file: path.clone(), digest: source.digest(), unkept: None }
         }
     };
@@ -140,7 +125,7 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     let name = file_name(("converted", gmsh.identity(), ending, digest_of_bytes(bytes)), path);
     let parse = |file: &mut Digested<File>| {
-        msh::read(path, Box::new(file), Maker::Other, None).map_err(|error| match error.advice() {
+        msh::read(path, Box::new(file), Maker::Other).map_err(|error| match error.advice() {
             // what helps a script helps nobody here
             Some(advice) if !advice.contains("Physical") => error,
             _ => error.help(format!("see what Gmsh makes of it: gmsh {}", path.display())),
@@ -229,7 +214,7 @@ pub(super) fn from_script<const D: usize>(
     guard: (&Guard, &Interrupt),
     folders: &[PathBuf],
 ) -> Result<Loaded<D>> {
-    meshed(file, numbers, sizes, order, guard, (folders, &mut Dealer::new(&Serial, order)))
+    meshed(file, numbers, sizes, order, guard, folders)
 }
 
 /// Meshes a script, with the cache in one of `folders`; `set` are the numbers set in it, and where they stand if that is not where the
@@ -240,7 +225,7 @@ fn meshed<const D: usize>(
     sizes: Option<&str>,
     order: Order,
     (guard, interrupt): (&Guard, &Interrupt),
-    (folders, dealer): (&[PathBuf], &mut Dealer),
+    folders: &[PathBuf],
 ) -> Result<Loaded<D>> {
     let path = &file.value;
     let is_shape = foreign::is_shape(path);
@@ -269,7 +254,7 @@ fn meshed<const D: usize>(
         let script = sized.as_deref().unwrap_or(&own);
         gmsh.run(&Task { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt }, made, work)
     };
-    kept(&name, unkept, folders, |file| checked(path, file, order, dealer), make)
+    kept(&name, unkept, folders, |file| checked(path, file, order), make)
 }
 
 /// For a script whose last line is not ended: one in the folder `work` that includes it.
@@ -306,15 +291,8 @@ fn final_name(purpose: &str) -> String {
 }
 
 /// The mesh in a file that Gmsh made from a script, of the order asked for.
-fn checked<const D: usize>(
-    path: &Path,
-    file: &mut Digested<File>,
-    order: Order,
-    dealer: &mut Dealer,
-) -> Result<Mesh<D>> {
-    // an earlier file may have been damaged
-    dealer.reset();
-    let mesh: Mesh<D> = msh::read(path, Box::new(file), Maker::Script, Some(dealer))?;
+fn checked<const D: usize>(path: &Path, file: &mut Digested<File>, order: Order) -> Result<Mesh<D>> {
+    let mesh: Mesh<D> = msh::read(path, Box::new(file), Maker::Script)?;
     if mesh.order == order {
         return Ok(mesh);
     }

@@ -3,33 +3,34 @@
 //! Gmsh lists tetrahedra as its Delaunay kernel found them, and nodes are numbered as cells come. A product with the stiffness
 //! matrix then jumps through memory. Along Morton's curve through the centres of the cells it does not.
 
-use super::{Group, Key, Mesh};
+use super::{Group, Mesh};
+use crate::linalg::{bounds, pad};
 
 /// Bits of a coordinate in a place on the curve: three of them fit 64.
 const BITS: u32 = 21;
 
 impl<const D: usize> Mesh<D> {
-    /// Sorts the cells of each group along Morton's curve. Structured meshes in the plane come in a good order already. Gives the
-    /// keys of cells of which `index` has the places in the file, group by group. The corners are those of the box around the points of all ranks.
-    pub(super) fn sort_cells(&mut self, [low, high]: [[f64; 3]; 2], index: &[Vec<u32>]) -> Vec<Vec<Key>> {
+    /// Sort the cells of each group along Morton's curve. Structured meshes in the plane come in a good order already.
+    pub fn sort_cells(&mut self) {
+        if D < 3 {
+            return;
+        }
+        let [low, high] = bounds(self.points.iter().copied().map(pad));
         let size = (0..D).map(|c| high[c] - low[c]).fold(f64::MIN_POSITIVE, f64::max);
         let scale = f64::from((1u32 << BITS) - 1) / size;
         let points = &self.points;
-        let sorted = |(number, group): (usize, &mut Group)| {
-            let place = |cell: &[u32]| {
+        for group in self.groups.iter_mut().filter(|group| group.dimension == D) {
+            sort(group, |cell| {
                 let centre = |c: usize| cell[..=D].iter().map(|&p| points[p as usize][c]).sum::<f64>() / (D + 1) as f64;
                 (0..D).fold(0, |place, c| place | spread(((centre(c) - low[c]) * scale) as u64) << c)
-            };
-            let order = if group.dimension == D { sort(group, place) } else { Vec::new() };
-            index.get(number).map_or(Vec::new(), |index| order.iter().map(|&(at, i)| (at, index[i as usize])).collect())
-        };
-        self.groups.iter_mut().enumerate().map(sorted).collect()
+            });
+        }
     }
 }
 
-/// Sorts the simplices of a group by a key, equal ones as they were; gives the keys with their numbers before.
-fn sort(group: &mut Group, key: impl Fn(&[u32]) -> u64) -> Vec<Key> {
-    let mut order: Vec<Key> = group.simplices().zip(0..).map(|(simplex, i)| (key(simplex), i)).collect();
+/// Sort the simplices of a group by a key, equal ones as they were.
+fn sort(group: &mut Group, key: impl Fn(&[u32]) -> u64) {
+    let mut order: Vec<(u64, u32)> = group.simplices().zip(0..).map(|(simplex, i)| (key(simplex), i)).collect();
     order.sort_unstable();
     let old = std::mem::take(&mut group.connectivity);
     group.connectivity =
@@ -37,7 +38,6 @@ fn sort(group: &mut Group, key: impl Fn(&[u32]) -> u64) -> Vec<Key> {
     if !group.tags.is_empty() {
         group.tags = order.iter().map(|&(_, i)| group.tags[i as usize]).collect();
     }
-    order
 }
 
 /// The bits of a number with two zeros before each.
@@ -79,7 +79,7 @@ mod tests {
             split: 0,
             straightened: 0,
         };
-        mesh.sort_cells([[0.0; 3], [4.0, 1.0, 1.0]], &[]);
+        mesh.sort_cells();
         let first: Vec<f64> = mesh.groups[0].simplices().map(|cell| mesh.points[cell[0] as usize][0]).collect();
         assert_eq!(first, [0.0, 1.0, 2.0, 3.0]);
         assert_eq!(mesh.groups[0].tags, [8, 10, 9, 7]);

@@ -11,7 +11,6 @@ mod cache;
 mod check;
 mod cursor;
 pub mod datum;
-mod dealer;
 mod elements;
 mod foreign;
 mod gmsh;
@@ -24,7 +23,6 @@ mod msh;
 mod nodes;
 mod numbering;
 mod physical;
-mod portion;
 mod quality;
 mod script;
 mod simplex;
@@ -37,15 +35,13 @@ mod tokens;
 mod trust;
 mod unv;
 
-pub use bisect::Cuts;
-pub use check::{Asked, Checked, Duty, Joined, Nodes, Parts};
-pub use dealer::Dealer;
+pub use bisect::bisect;
+pub use check::{Asked, Checked, Duty, Joined, Parts};
 pub use foreign::is_shape;
 pub use groups::{Group, Groups};
-pub use load::{Loaded, Origin, deal, keep_final, load, made_from, recall_final};
+pub use load::{Loaded, Origin, keep_final, load, made_from, recall_final};
 pub use msh::{Maker, parse};
 pub use numbering::Numbering;
-pub use portion::{Key, Portion};
 pub use quality::Quality;
 pub use sizes::{unstructured, view};
 pub use trust::{Breach, breach};
@@ -73,7 +69,7 @@ pub struct Mesh<const D: usize> {
     /// Coordinates of the points relative to `datum`, in the order of the file; only those that some group uses, all of arrays.
     pub points: Vec<[f64; D]>,
     /// The point of the scene from which coordinates are measured; the scene's own origin unless the mesh is far from it
-    /// ([`Portion::near`]).
+    /// ([`Mesh::measure_nearby`]).
     pub datum: [f64; D],
     /// Order of all elements (points have none).
     pub order: Order,

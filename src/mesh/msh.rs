@@ -4,7 +4,7 @@ use super::cursor::{Cursor, Source};
 use super::nodes::Nodes;
 use super::physical::Physical;
 use super::simplex::THINGS;
-use super::{Dealer, Mesh, elements, groups};
+use super::{Mesh, elements, groups};
 use crate::error::{Error, Result};
 use crate::problem::order::Order;
 use std::path::Path;
@@ -25,11 +25,10 @@ pub enum Maker {
 /// # Errors
 /// Input that is no mesh, with the file and the line.
 pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<Mesh<D>> {
-    read(path, Box::new(std::io::Cursor::new(bytes)), maker, None)
+    read(path, Box::new(std::io::Cursor::new(bytes)), maker)
 }
 
-/// Reads a `.msh` file from its start, some of it at a time; `path` stands in messages: what `maker` made the file from. The mesh lacks cells that a
-/// `dealer` has got, and keeps all points then.
+/// Reads a `.msh` file from its start, some of it at a time; `path` stands in messages: what `maker` made the file from.
 ///
 /// # Errors
 /// Everything that makes the file no mesh of named simplices in `D` dimensions is a [`Kind::Mesh`](crate::error::Kind)
@@ -38,12 +37,11 @@ pub fn read<const D: usize>(
     path: &Path,
     source: Box<dyn Source + '_>,
     maker: Maker,
-    dealer: Option<&mut Dealer>,
 ) -> Result<Mesh<D>> {
     const { assert!(D == 2 || D == 3) };
     let cursor = &mut Cursor::new(path, source, maker != Maker::User);
     read_format(cursor)?;
-    let mut physical = Physical::new(maker == Maker::Other, dealer);
+    let mut physical = Physical::new(maker == Maker::Other);
     let mut nodes: Option<Nodes> = None;
     let (mut order, mut split) = (None, 0);
     let mut seen: Vec<String> = Vec::new();
@@ -162,7 +160,6 @@ fn finish<const D: usize>(
     let fail = |message: String| Error::mesh(path, None, message);
     let (thing, cells) = (THINGS[D], THINGS[D].to_lowercase());
     let example = format!("name the bodies and their boundaries: Physical {thing}(\"lower\") = {{1}};");
-    let is_dealt = physical.is_dealt();
     let empty = physical.empty().map(|group| (group.dimension, group.name.clone()));
     let mut groups = physical.finished(D);
     if groups.is_empty() {
@@ -177,12 +174,7 @@ fn finish<const D: usize>(
         return Err(fail(format!("no physical group holds {cells}s, and dimension = {D}")).help(example));
     };
     let point = |x: [f64; 3]| std::array::from_fn(|k| x[k]);
-    let points = match is_dealt {
-        true => nodes.points.into_iter().map(point).collect(),
-        false => {
-            let used = groups::used(&groups, nodes.points.len());
-            groups::renumber(&mut groups, used).map(|old| point(nodes.points[old])).collect()
-        }
-    };
+    let used = groups::used(&groups, nodes.points.len());
+    let points = groups::renumber(&mut groups, used).map(|old| point(nodes.points[old])).collect();
     Ok(Mesh { path: path.to_owned(), points, datum: [0.0; D], order, groups: groups.into(), split, straightened: 0 })
 }

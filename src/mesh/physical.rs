@@ -2,14 +2,14 @@
 
 use super::cursor::Cursor;
 use super::simplex::THINGS;
-use super::{Dealer, Group};
+use super::Group;
 use crate::error::Result;
 use crate::problem::body::is_in_name;
-use crate::problem::order::Order;
 use std::collections::{HashMap, HashSet};
 
 /// The groups of a file, and who belongs to them.
-pub struct Physical<'a, 'b> {
+#[derive(Default)]
+pub struct Physical {
     /// The groups, empty until the elements are read.
     pub groups: Vec<Group>,
     /// From dimension and physical tag to the place in `groups`.
@@ -18,38 +18,18 @@ pub struct Physical<'a, 'b> {
     entities: HashMap<(usize, i32), Vec<usize>>,
     /// Whether groups without a name are called by their kind and number, and where a dimension has none each entity is one.
     named_by_number: bool,
-    /// Who gets cells, and the order in which they are dealt out while they are read.
-    dealer: Option<&'a mut Dealer<'b>>,
 }
 
-impl<'a, 'b> Physical<'a, 'b> {
+impl Physical {
     /// No groups yet; `named_by_number` if groups without a name are called by their kind and number.
-    pub fn new(named_by_number: bool, dealer: Option<&'a mut Dealer<'b>>) -> Self {
-        Self { groups: Vec::new(), group_of: HashMap::new(), entities: HashMap::new(), named_by_number, dealer }
+    pub fn new(named_by_number: bool) -> Self {
+        Self { named_by_number, ..Self::default() }
     }
 
     /// The first group without elements.
     pub fn empty(&self) -> Option<&Group> {
-        let dealt = |place: usize| self.dealer.as_ref().map_or(0, |dealer| dealer.count(place));
         // those of other programs are left out
-        let groups = self.groups.iter().enumerate().filter(|_| !self.named_by_number);
-        groups.into_iter().find(|(place, group)| group.is_empty() && dealt(*place) == 0).map(|(_, group)| group)
-    }
-
-    /// Whether cells are dealt out.
-    pub fn is_dealt(&self) -> bool {
-        self.dealer.as_ref().is_some_and(|dealer| dealer.has_begun())
-    }
-
-    /// Deals cells of an order out from here on, if somebody wants them; whether it is so.
-    pub fn begin<const D: usize>(&mut self, order: Option<Order>, points: &[[f64; 3]]) -> bool {
-        let Some(dealer) = self.dealer.as_mut().filter(|dealer| order.is_some_and(|order| dealer.wants(order))) else {
-            return false;
-        };
-        if !dealer.has_begun() {
-            dealer.begin::<D, 3>(points);
-        }
-        true
+        self.groups.iter().filter(|_| !self.named_by_number).find(|group| group.is_empty())
     }
 
     /// Places in `groups` of those that an entity belongs to; `None` if the file does not list the entity.
@@ -63,23 +43,11 @@ impl<'a, 'b> Physical<'a, 'b> {
         of.map(|(entity, _)| *entity).filter(|entity| !has(*entity)).map(|(_, tag)| tag).min()
     }
 
-    /// Adds simplices of `stride` points each, with their tags, to all groups of an entity, or deals them out.
-    pub fn extend(
-        &mut self,
-        (dimension, tag): (usize, i32),
-        stride: usize,
-        (connectivity, tags): (&[u32], &[u64]),
-        dealt: bool,
-    ) {
-        for member in self.entities.get(&(dimension, tag)).into_iter().flatten() {
+    /// Add simplices of `stride` points each, with their tags, to all groups of an entity.
+    pub fn extend(&mut self, entity: (usize, i32), stride: usize, connectivity: &[u32], tags: &[u64]) {
+        for member in self.entities.get(&entity).into_iter().flatten() {
             let group = &mut self.groups[*member];
             group.stride = stride;
-            if let Some(dealer) = self.dealer.as_mut().filter(|_| dealt) {
-                for (simplex, &tag) in connectivity.chunks_exact(stride).zip(tags) {
-                    dealer.put(*member, Some(tag), simplex);
-                }
-                continue;
-            }
             group.connectivity.extend_from_slice(connectivity);
             group.tags.extend_from_slice(tags);
         }

@@ -5,13 +5,10 @@ mod damage;
 mod loading;
 
 use super::load::from_script;
-use super::{Dealer, Group, Loaded, Maker, Mesh, Portion, msh, simplex};
+use super::{Group, Loaded, Maker, Mesh, msh, simplex};
 use crate::error::{Located, Place, Result, Source};
-use crate::exchange::crowd;
 use crate::interrupt::Interrupt;
 use crate::problem::{Guard, Order};
-use std::collections::BTreeMap;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -181,57 +178,6 @@ fn inverted_cells_are_turned_and_order_two_with_them() {
         if order == "2" {
             assert_mid_edges(&mesh);
             assert_mid_edges(&cube);
-        }
-    }
-}
-
-/// While the first rank reads, every cell goes to the ranks of its points: each has all around its own points, none has all there are. Points that
-/// no group uses are left out.
-#[test]
-fn cells_are_dealt_out_while_they_are_read() {
-    for arguments in [&["-3"][..], &["-3", "-order", "2", "-bin"], &["-3", "-save_all"]] {
-        let script = format!("{CUBE}Point(99) = {{7, 8, 9}};\n").replace("= 1/2;", "= 1/4;");
-        let bytes = gmsh(&script, arguments);
-        let whole: Mesh<3> = parse(&bytes).unwrap();
-        for ranks in [2, 5] {
-            let portions: Vec<(Vec<u32>, _, usize)> = crowd::on(ranks, |exchange| {
-                let read = |dealer: &mut Dealer| {
-                    let mesh = msh::read(Path::new("a.msh"), Box::new(Cursor::new(&bytes)), Maker::User, Some(dealer))?;
-                    assert!(mesh.groups.iter().all(|group: &Group| group.dimension < 3 || group.is_empty()));
-                    Ok(mesh)
-                };
-                let portion = Portion::<3>::read(exchange, whole.order, read).unwrap();
-                let points = 0..portion.mesh.points.len() as u32;
-                let at = |point: u32| portion.mesh.points[point as usize];
-                assert!(points.clone().all(|point| at(point) == whole.points[portion.number(point) as usize]));
-                assert!(points.clone().all(|point| portion.find(portion.number(point)) == Some(point)));
-                assert_eq!((portion.points, portion.find(u32::MAX)), (whole.points.len(), None));
-                let own = points.filter(|&point| portion.is_own(point)).map(|point| portion.number(point)).collect();
-                let mut groups = portion.mesh.groups.clone();
-                for point in groups.iter_mut().flat_map(|group| &mut group.connectivity) {
-                    *point = portion.number(*point);
-                }
-                (own, groups, portion.mesh.points.len())
-            });
-            assert_eq!(portions.iter().map(|(own, ..)| own.len()).sum::<usize>(), whole.points.len());
-            let count =
-                |groups: &[Group]| groups.iter().filter(|group| group.dimension == 3).map(Group::len).sum::<usize>();
-            for (rank, (own, groups, points)) in portions.iter().enumerate() {
-                assert!(*points < whole.points.len(), "rank {rank} of {ranks} has all points");
-                assert!(count(groups) < count(&whole.groups), "rank {rank} of {ranks} has all");
-                for (group, all) in groups.iter().zip(whole.groups.iter()) {
-                    let cells = |group: &Group| -> BTreeMap<u64, Vec<u32>> {
-                        group.tags.iter().copied().zip(group.simplices().map(<[u32]>::to_vec)).collect()
-                    };
-                    let (found, mut all) = (cells(group), cells(all));
-                    if group.dimension == 3 {
-                        all.retain(|_, cell| cell.iter().any(|point| own.binary_search(point).is_ok()));
-                    } else if rank > 0 {
-                        continue;
-                    }
-                    assert_eq!(found, all, "{} on rank {rank} of {ranks}", group.name);
-                }
-            }
         }
     }
 }

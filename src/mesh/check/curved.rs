@@ -1,6 +1,7 @@
 //! Quadratic cells: each mid-edge node serves one edge, and no curved cell is folded.
 
-use super::cells::{Cells, Found};
+use super::cells::Cells;
+use crate::error::Result;
 
 /// Share of the largest coefficient of a Jacobian below which it is rounding: a cell that is flat at a corner, as at the end of
 /// two edges that touch each other, has zero there.
@@ -9,34 +10,31 @@ const ROUNDING: f64 = 1e-9;
 /// Halvings of a cell until a Jacobian that was not found negative counts as positive.
 const DEPTH: usize = 12;
 
-/// Checks the mid-edge nodes of a body and the Jacobians of its curved cells. A rank looks at its own nodes, and at all cells that it has.
+/// Checks the mid-edge nodes of a body and the Jacobians of its curved cells.
 ///
 /// # Errors
 /// A mid-edge node on two edges or at a corner; a cell whose Jacobian is negative somewhere; each with the cell and the place in it.
-pub fn check<const D: usize>(cells: &Cells<D>) -> Found {
+pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
     if !cells.is_quadratic() {
         return Ok(());
     }
     let mut ends = vec![None; cells.node_count()];
     for cell in 0..cells.count() {
         let nodes = cells.cell(cell);
-        let at = |place: u32| (1, cells.key(cell).0, cells.key(cell).1, place);
-        let mut place = 0;
         for j in 0..=D {
             for i in 0..=j {
-                place += 1;
                 let node = if i == j { nodes[i] } else { cells.middle(cell, [i, j]) };
                 let own = [nodes[i].min(nodes[j]), nodes[i].max(nodes[j])];
-                if cells.is_own(node) && *ends[node as usize].get_or_insert(own) != own {
+                if *ends[node as usize].get_or_insert(own) != own {
                     let error = cells.refuse("a node lies on two edges", &[cell], cells.at(node));
-                    return Err((at(place), error.help("mesh the geometry again")));
+                    return Err(error.help("mesh the geometry again"));
                 }
             }
         }
         let x = control_points(&cells.cell(cell).iter().map(|&node| cells.at(node)).collect::<Vec<_>>(), D);
         if folded(&x, D, DEPTH) {
             let error = cells.refuse("a curved cell is folded", &[cell], cells.at(nodes[0]));
-            return Err((at(place + 1), error.help("refine the mesh there, use order = 1, or let one process solve it, which makes such cells straight")));
+            return Err(error.help("refine the mesh there, or use order = 1"));
         }
     }
     Ok(())

@@ -1,13 +1,13 @@
 //! The faces of all cells of a body, each found by its corners.
 
-use super::cells::{Cells, Found};
-use serde::{Deserialize, Serialize};
+use super::cells::Cells;
+use crate::error::Result;
 
 /// Corners of a cell on the face opposite each of its corners, in an order that turns the normal outwards.
 const OUTWARD: [&[[usize; 3]]; 2] = [&[[1, 2, 0], [2, 0, 0], [0, 1, 0]], &[[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]];
 
 /// A face of a cell, in twelve bytes: there are two a cell and more, most of the memory of a check.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Face<const D: usize> {
     /// Corners but the least, sorted; in the plane there is one.
     rest: [u32; 2],
@@ -16,11 +16,6 @@ pub struct Face<const D: usize> {
 }
 
 impl<const D: usize> Face<D> {
-    /// The same face of the cell with this number.
-    pub fn of_cell(self, cell: usize) -> Self {
-        Self { place: (4 * cell) as u32 + self.place % 4, ..self }
-    }
-
     /// The cell.
     pub fn cell(&self) -> usize {
         (self.place / 4) as usize
@@ -61,7 +56,7 @@ impl<const D: usize> Face<D> {
     }
 }
 
-/// All faces with own corners, so that all cells of each are here; those with the same corners one after the other.
+/// All faces of the cells of a body, those with the same corners one after the other.
 pub struct Faces<const D: usize> {
     /// Sorted within those of one least corner.
     list: Vec<Face<D>>,
@@ -79,12 +74,7 @@ impl<const D: usize> Faces<D> {
             face.rest[..D - 1].copy_from_slice(&key[1..]);
             (key[0] as usize, face)
         };
-        let is_own = |cell: usize, opposite: usize| {
-            let others = cells.cell(cell)[..=D].iter().enumerate().filter(|(corner, _)| *corner != opposite);
-            others.into_iter().any(|(_, &node)| cells.is_own(node))
-        };
-        let of_cell =
-            |cell| (0..=D).filter(move |&opposite| is_own(cell, opposite)).map(move |opposite| face(cell, opposite));
+        let of_cell = |cell| (0..=D).map(move |opposite| face(cell, opposite));
         let all = || (0..cells.count()).flat_map(of_cell);
         let mut first = vec![0; cells.node_count() + 1];
         all().for_each(|(least, _)| first[least + 1] += 1);
@@ -99,29 +89,20 @@ impl<const D: usize> Faces<D> {
         Self { list, first }
     }
 
-    /// Faces with the same corners, with the least of these.
-    fn alike(&self) -> impl Iterator<Item = (u32, &[Face<D>])> {
-        let of_least =
-            (0..).zip(self.first.windows(2)).map(|(least, ends)| (least, ends[0] as usize..ends[1] as usize));
-        of_least.flat_map(|(least, ends)| {
-            self.list[ends].chunk_by(|a, b| a.rest == b.rest).map(move |faces| (least, faces))
-        })
+    /// Faces with the same corners.
+    fn alike(&self) -> impl Iterator<Item = &[Face<D>]> {
+        let of_least = self.first.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
+        of_least.flat_map(|ends| self.list[ends].chunk_by(|a, b| a.rest == b.rest))
     }
 
     /// Faces between two cells, with both.
     pub fn inner(&self) -> impl Iterator<Item = [&Face<D>; 2]> {
-        self.alike().filter_map(|(_, alike)| if let [a, b] = alike { Some([a, b]) } else { None })
+        self.alike().filter_map(|alike| if let [a, b] = alike { Some([a, b]) } else { None })
     }
 
-    /// The number of faces between two cells whose least corner is an own one: each is one of one rank.
-    pub fn count(&self, cells: &Cells<D>) -> usize {
-        self.alike().filter(|(least, alike)| alike.len() == 2 && cells.is_own(*least)).count()
-    }
-
-    /// Faces of one cell alone, of those whose least corner is an own one, with this corner: in their order.
-    pub fn outer(&self, cells: &Cells<D>) -> impl Iterator<Item = (u32, Face<D>)> {
-        let lone = self.alike().filter(|(least, alike)| alike.len() == 1 && cells.is_own(*least));
-        lone.map(|(least, alike)| (least, alike[0]))
+    /// Faces of one cell alone.
+    pub fn outer(&self) -> impl Iterator<Item = Face<D>> {
+        self.alike().filter_map(|alike| if let [one] = alike { Some(*one) } else { None })
     }
 
     /// How many cells have a facet with these nodes: corners, then mid-edge nodes if there are any.
@@ -139,13 +120,11 @@ impl<const D: usize> Faces<D> {
     ///
     /// # Errors
     /// A face where it is not so, with its corners.
-    pub fn check(&self, cells: &Cells<D>) -> Found {
-        for (least, alike) in self.alike() {
+    pub fn check(&self, cells: &Cells<D>) -> Result<()> {
+        for alike in self.alike() {
             let refuse = |what: &str| {
                 let cells_of = alike.iter().map(Face::cell).collect::<Vec<_>>();
-                let [middle, last] = alike[0].rest;
-                let [least, middle, last] = [least, middle, last].map(|node| cells.number(node));
-                ((2, u64::from(least), middle, last), cells.refuse(what, &cells_of, alike[0].centre(cells)).help(AGAIN))
+                cells.refuse(what, &cells_of, alike[0].centre(cells)).help(AGAIN)
             };
             let [a, b] = alike else {
                 if alike.len() > 2 {

@@ -3,7 +3,6 @@
 use super::cells::{Cells, NONE};
 use super::faces::Faces;
 use crate::error::{Error, Result};
-use crate::exchange::Exchange;
 use crate::mesh::{Group, Mesh};
 use std::collections::HashSet;
 
@@ -16,7 +15,7 @@ pub enum Duty {
     Holds,
 }
 
-/// A group of facets, edges or points in use, which all ranks have, and what is known of its simplices so far.
+/// A group of facets, edges or points in use, and what is known of its simplices so far.
 pub struct InUse<'a> {
     group: &'a Group,
     duty: Duty,
@@ -64,18 +63,6 @@ impl<'a> InUse<'a> {
                 (_, Duty::Holds) => faces.cells_at(cells, own) > 0,
             };
         }
-    }
-
-    /// Adds what other ranks have found. Collective.
-    pub fn agree(&mut self, exchange: &dyn Exchange) {
-        let mut found: Vec<f64> = self
-            .found
-            .iter()
-            .flat_map(|found| [found.serves, found.touches])
-            .map(|is| f64::from(u8::from(is)))
-            .collect();
-        exchange.sum(&mut found);
-        self.found = found.chunks_exact(2).map(|of| Found { serves: of[0] > 0.0, touches: of[1] > 0.0 }).collect();
     }
 
     /// Those edges of the body between nodes of the group, for groups of edges in space.

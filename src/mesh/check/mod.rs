@@ -21,12 +21,6 @@
 //! boundary is where the user wants it nobody can tell: a mesh with a node moved a little is another mesh. A body may be pinched at a
 //! point, if its cells join through facets elsewhere. All costs are linear in the number of cells, but for the search tree of the
 //! boundary.
-//!
-//! On several ranks each looks at what it has ([`Portion`]) and is complete there, without others: 1 at its cells; 2 at facets whose least corner
-//! is its own; 6 at facets with an own corner, and whether bodies share an own node. Of others it needs: the numbers of nodes, which all sort by the
-//! cells in which they are met first ([`nodes`]); for 3 and 4 on the first rank the facets of the whole boundary, with the cells behind
-//! them; for 5 which of its parts hang together by cells of other ranks. Errors have the place at which one rank would meet them, and the first
-//! one counts.
 
 mod cells;
 mod curved;
@@ -34,29 +28,25 @@ mod distance;
 mod faces;
 mod groups;
 mod nesting;
-mod nodes;
 mod parts;
 mod surface;
 #[cfg(test)]
 mod tests;
 
-use serde::{Deserialize, Serialize};
 pub use groups::Duty;
-pub use nodes::Nodes;
 pub use parts::{Joined, Parts};
 
 pub(super) use cells::EDGES;
 pub(super) use curved::is_folded;
 
-use super::Portion;
+use super::Mesh;
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, first, trade};
 use crate::problem::order::Order;
-use cells::{Cells, Found, NONE, Sent};
-use faces::{Face, Faces};
+use cells::{Cells, NONE};
+use faces::Faces;
 use groups::InUse;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use surface::Surface;
 
 /// A body and the groups that serve it.
@@ -79,123 +69,67 @@ pub struct Checked {
     pub outer: usize,
     /// What hangs together.
     pub parts: Parts,
-    /// Its nodes, as the cells of all ranks meet them.
+    /// The point of the mesh that each of its nodes is.
     #[serde(skip)]
-    pub nodes: Arc<Nodes>,
+    pub points: Vec<u32>,
 }
 
-impl<const D: usize> Portion<D> {
-    /// Checks the bodies that are asked for, with the groups that serve them; `contacts` serve any body, and with `shared` bodies
-    /// may have nodes in common. Names that are no groups of the mesh are left to others, which know where they stand. Collective.
+impl<const D: usize> Mesh<D> {
+    /// Check the bodies that are asked for, with the groups that serve them; `contacts` serve any body, and with `shared` bodies may have nodes in
+    /// common. Names that are no groups of the mesh are left to others, which know where they stand.
     ///
     /// # Errors
-    /// What is no mesh of a body, with body, place and elements; on one rank of several.
-    pub fn check(
-        &self,
-        bodies: &[Asked],
-        contacts: &[&str],
-        shared: bool,
-        exchange: &dyn Exchange,
-    ) -> Result<Vec<Checked>> {
-        let mesh = &self.mesh;
+    /// What is no mesh of a body, with body, place and elements.
+    pub fn check(&self, bodies: &[Asked], contacts: &[&str], shared: bool) -> Result<Vec<Checked>> {
         let mut in_use: BTreeMap<(&str, Duty), InUse> = BTreeMap::new();
         let contacts = || contacts.iter().map(|&name| (name, Duty::Acts));
         for (name, duty) in bodies.iter().flat_map(|body| body.groups.iter().copied()).chain(contacts()) {
-            // every cell of a group is one of a body, or of none; and ranks have different ones
-            if let Some(group) = mesh.group(name).filter(|group| group.dimension < D) {
+            // every cell of a group is one of a body, or of none
+            if let Some(group) = self.group(name).filter(|group| group.dimension < D) {
                 in_use.entry((name, duty)).or_insert_with(|| InUse::new(group, duty));
             }
         }
-        let mut node = vec![NONE; mesh.points.len()];
-        let mut owner = vec![NONE; if shared { 0 } else { mesh.points.len() }];
-        let place = |body: &Asked| mesh.groups.place(body.name).filter(|&place| mesh.groups[place].dimension == D);
-        let stride =
-            |body: &Asked, place: usize| if body.order == Order::P1 { D + 1 } else { mesh.groups[place].stride };
-        let found = bodies.iter().filter_map(|body| place(body).map(|place| (place, stride(body, place))));
-        let mut nodes = nodes::number(self, &found.collect::<Vec<_>>(), exchange).into_iter();
+        let mut node = vec![NONE; self.points.len()];
+        // the last body of each point
+        let mut owner = vec![NONE; if shared { 0 } else { self.points.len() }];
         let mut checked = Vec::new();
         for (index, body) in bodies.iter().enumerate() {
-            let Some((place, known)) = place(body).and_then(|place| Some((place, Arc::new(nodes.next()?)))) else {
-                continue;
-            };
-            let cells = Cells::new(self, place, stride(body, place), known, &mut node);
-            let mut twice = None;
-            if !shared {
-                for (number, &point) in (0..).zip(&cells.known.points) {
-                    let other = std::mem::replace(&mut owner[point as usize], index as u32);
-                    if other != NONE && twice.is_none() {
-                        twice = Some((number, bodies[other as usize].name));
-                    }
+            let Some(group) = self.group(body.name).filter(|group| group.dimension == D) else { continue };
+            let stride = if body.order == Order::P1 { D + 1 } else { group.stride };
+            let cells = Cells::new(self, group, stride, &mut node);
+            for (number, &point) in (0..).zip(&cells.points).filter(|_| !shared) {
+                let other = std::mem::replace(&mut owner[point as usize], index as u32);
+                if other != NONE {
+                    return Err(two(&cells, number, bodies[other as usize].name));
                 }
             }
-            let alone = twice
-                .filter(|(node, _)| cells.is_own(*node))
-                .map_or(Ok(()), |(node, other)| Err(two(&cells, node, other)));
-            let local = alone.and_then(|()| curved::check(&cells)).and_then(|()| {
-                let faces = Faces::new(&cells);
-                faces.check(&cells).map(|()| faces)
-            });
-            let faces = first(exchange, local)?;
-            let outer: Vec<_> = faces.outer(&cells).collect();
-            let mut counts = [faces.count(&cells), outer.len()].map(|count| count as f64);
-            exchange.sum(&mut counts);
-            let bounded = boundary(&cells, outer, exchange);
-            let parts = parts::parts(&cells, &faces, bounded, exchange)?;
+            curved::check(&cells)?;
+            let faces = Faces::new(&cells);
+            faces.check(&cells)?;
+            let surface = Surface::new(&cells, faces.outer().collect());
+            surface.check()?;
+            nesting::check(&cells, &surface)?;
+            let (inner, outer) = (faces.inner().count(), surface.faces.len());
+            let parts = parts::parts(&cells, &faces)?;
             for ((name, duty), group) in &mut in_use {
                 let served =
                     body.groups.contains(&(*name, *duty)) || contacts().any(|contact| contact == (*name, *duty));
                 group.compare(&cells, &faces, &node, !served);
             }
-            let [inner, outer] = counts.map(|count| count as usize);
-            cells.known.points.iter().for_each(|&point| node[point as usize] = NONE);
-            checked.push(Checked { inner, outer, parts, nodes: cells.known });
+            cells.points.iter().for_each(|&point| node[point as usize] = NONE);
+            checked.push(Checked { inner, outer, parts, points: cells.points });
         }
-        in_use.values_mut().for_each(|group| group.agree(exchange));
-        let judged = in_use.values().try_for_each(|group| group.judge(mesh));
-        // all have found the same; the first rank has the numbers of elements
-        first(exchange, judged.map_err(|error| (exchange.rank(), error)))?;
+        in_use.values().try_for_each(|group| group.judge(self))?;
         Ok(checked)
     }
 }
 
 /// The refusal of a body that shares a node with another one.
-fn two<const D: usize>(cells: &Cells<D>, node: u32, other: &str) -> ((u8, u64, u32, u32), Error) {
+fn two<const D: usize>(cells: &Cells<D>, node: u32, other: &str) -> Error {
     let what = format!("it shares a node with body `{other}`");
     let cell = (0..cells.count()).find(|&cell| cells.cell(cell).contains(&node));
-    let error = cells.refuse(&what, &Vec::from_iter(cell), cells.at(node)).help(
+    cells.refuse(&what, &Vec::from_iter(cell), cells.at(node)).help(
         "shared nodes join nothing: give each body its own points, curves and surfaces, \
          or let contacts be found: between = \"auto\"",
-    );
-    ((0, u64::from(cells.number(node)), 0, 0), error)
-}
-
-/// Checks the boundary, of which each rank has some facets with their least corners: the first rank gets all, with the cells behind them. Collective.
-fn boundary<const D: usize>(cells: &Cells<D>, outer: Vec<(u32, Face<D>)>, exchange: &dyn Exchange) -> Found {
-    let look = |cells: &Cells<D>, faces: Vec<(u32, Face<D>)>| {
-        let surface = Surface::new(cells, faces.into_iter().map(|(_, face)| face).collect());
-        let found = surface.check().and_then(|()| nesting::check(cells, &surface));
-        found.map_err(|error| ((3, 0, 0, 0), error))
-    };
-    if exchange.ranks() == 1 {
-        return look(cells, outer);
-    }
-    let mut behind: Vec<usize> = outer.iter().map(|(_, face)| face.cell()).collect();
-    behind.sort_unstable();
-    behind.dedup();
-    let here = |face: Face<D>| behind.binary_search(&face.cell()).map_or(face, |place| face.of_cell(place));
-    // those of one least corner are of one rank, in the order that all would have
-    let faces: Vec<_> = outer.into_iter().map(|(least, face)| (cells.number(least), here(face))).collect();
-    let mut mine = vec![Default::default(); exchange.ranks()];
-    mine[0] = (cells.some(behind.iter().copied()), faces);
-    let (mut all, mut rim, mut before) = (Vec::new(), Vec::new(), 0);
-    for (sent, faces) in trade::<(Sent, Vec<(u32, Face<D>)>)>(exchange, mine) {
-        all.extend(faces.into_iter().map(|(least, face)| (least, face.of_cell(before + face.cell()))));
-        before += sent.keys.len();
-        rim.push(sent);
-    }
-    if exchange.rank() > 0 {
-        return Ok(());
-    }
-    all.sort_unstable();
-    look(&cells.of(rim.into_iter()), all)
+    )
 }

@@ -1,12 +1,9 @@
 //! Parts of a body: cells that hang together by faces.
 
-use super::cells::{Cells, Found, NONE};
+use super::cells::{Cells, NONE};
 use super::faces::Faces;
 use crate::error::Result;
-use crate::exchange::{Exchange, first, gather, share, trade};
-use crate::mesh::Key;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 
 /// What hangs together, numbered 0, 1, ... in the order of their first cells.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,91 +14,38 @@ pub struct Parts {
     pub of_node: Vec<u32>,
 }
 
-/// The parts of a body, unless some rank has found an error `before`. Collective.
+/// Return the parts of a body.
 ///
 /// # Errors
 /// Parts that share nodes: an edge or a corner alone does not join elastic bodies.
-pub fn parts<const D: usize>(
-    cells: &Cells<D>,
-    faces: &Faces<D>,
-    before: Found,
-    exchange: &dyn Exchange,
-) -> Result<Parts> {
+pub fn parts<const D: usize>(cells: &Cells<D>, faces: &Faces<D>) -> Result<Parts> {
     let mut joined = Joined::new(cells.count());
     faces.inner().for_each(|[a, b]| joined.join(a.cell() as u32, b.cell() as u32));
-    let (mut count, mut of_cell) = joined.classes();
-    if exchange.ranks() > 1 {
-        count = of_all(cells, count, &mut of_cell, exchange);
-    }
-    if count == 1 {
-        return first(exchange, before).map(|()| Parts { count, of_node: Vec::new() });
-    }
-    let of_own = first(exchange, before.and_then(|()| apart(cells, &of_cell)))?;
-    let of_node = gather(exchange, &of_own).into_iter().map(|(_, part)| part).collect();
+    let (count, of_cell) = joined.classes();
+    let of_node = if count == 1 { Vec::new() } else { of_nodes(cells, &of_cell)? };
     Ok(Parts { count, of_node })
 }
 
-/// Numbers of own nodes, and the parts of their cells, which are the same.
-fn apart<const D: usize>(cells: &Cells<D>, of_cell: &[u32]) -> Found<Vec<(u32, u32)>> {
+/// Return the part of each node, that of all of its cells.
+fn of_nodes<const D: usize>(cells: &Cells<D>, of_cell: &[u32]) -> Result<Vec<u32>> {
+    // the first cell of each node
     let mut first = vec![NONE; cells.node_count()];
-    let mut of_own = Vec::new();
     for cell in 0..cells.count() {
-        for (corner, &node) in (0..).zip(cells.cell(cell)).filter(|(_, node)| cells.is_own(**node)) {
+        for &node in cells.cell(cell) {
             let first = &mut first[node as usize];
             if *first == NONE {
                 *first = cell as u32;
-                of_own.push((cells.number(node), of_cell[cell]));
             }
             let other = *first as usize;
             if of_cell[cell] != of_cell[other] {
                 let what = "cells hang together by an edge or a corner alone";
-                let error = cells.refuse(what, &[other, cell], cells.at(node)).help(
+                return Err(cells.refuse(what, &[other, cell], cells.at(node)).help(
                     "cells of a body join through whole facets: let them overlap in the geometry, or make bodies of them",
-                );
-                return Err(((4, cells.key(cell).0, cells.key(cell).1, corner), error));
+                ));
             }
         }
     }
-    Ok(of_own)
-}
-
-/// From what hangs together on this rank, so many parts, to what does on all: a cell of several ranks joins their parts. Collective.
-fn of_all<const D: usize>(cells: &Cells<D>, count: usize, of_cell: &mut [u32], exchange: &dyn Exchange) -> usize {
-    let (rank, ranks) = (exchange.rank(), exchange.ranks());
-    // the one that speaks for a cell hears from others to which of their parts it belongs
-    let mut away: Vec<Vec<(Key, u32)>> = vec![Vec::new(); ranks];
-    let mut firsts: Vec<Key> = Vec::with_capacity(count);
-    for (cell, &part) in of_cell.iter().enumerate() {
-        if cells.home(cell) != rank {
-            away[cells.home(cell)].push((cells.key(cell), part));
-        }
-        if part as usize == firsts.len() {
-            firsts.push(cells.key(cell));
-        }
-    }
-    let mut links: BTreeSet<(u32, u32, u32)> = BTreeSet::new();
-    for (from, theirs) in (0..).zip(trade(exchange, away)) {
-        let here = theirs.into_iter().filter_map(|(key, part)| Some((from, part, of_cell[cells.find(key)?])));
-        links.extend(here);
-    }
-    let all = share(exchange, (firsts, links));
-    let mut starts = vec![0];
-    all.iter().for_each(|(firsts, _)| starts.push(starts[starts.len() - 1] + firsts.len() as u32));
-    let mut joined = Joined::new(starts[ranks] as usize);
-    for (rank, (_, links)) in all.iter().enumerate() {
-        links.iter().for_each(|&(from, theirs, ours)| joined.join(starts[from as usize] + theirs, starts[rank] + ours));
-    }
-    let (count, of_part) = joined.classes();
-    let mut order: Vec<(Key, u32)> = (0..count as u32).map(|part| ((u64::MAX, u32::MAX), part)).collect();
-    for (&part, &first) in of_part.iter().zip(all.iter().flat_map(|(firsts, _)| firsts)) {
-        let least = &mut order[part as usize].0;
-        *least = first.min(*least);
-    }
-    order.sort_unstable();
-    let mut number = vec![0; count];
-    (0..).zip(&order).for_each(|(new, &(_, part))| number[part as usize] = new);
-    of_cell.iter_mut().for_each(|part| *part = number[of_part[(starts[rank] + *part) as usize] as usize]);
-    count
+    Ok(first.into_iter().map(|cell| of_cell[cell as usize]).collect())
 }
 
 /// Things that are joined, directly or by others.

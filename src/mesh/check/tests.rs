@@ -1,10 +1,8 @@
 //! Meshes with one mistake each, and meshes without.
 
-use super::{Asked, Checked, Duty, Nodes};
-use crate::exchange::{Exchange, Serial, crowd};
-use crate::mesh::{Group, Mesh, Portion};
+use super::{Asked, Checked, Duty};
+use crate::mesh::{Group, Mesh};
 use crate::problem::order::Order;
-use std::collections::{BTreeMap, BTreeSet};
 
 /// A body of simplices on points.
 fn mesh<const D: usize>(points: Vec<[f64; D]>, cells: &[u32]) -> Mesh<D> {
@@ -21,46 +19,13 @@ fn with_group<const D: usize>(mesh: Mesh<D>, name: &str, dimension: usize, conne
     Mesh { groups: groups.into(), ..mesh }
 }
 
-/// What is found on one rank, which is what several find.
 fn check<const D: usize>(mesh: &Mesh<D>, groups: &[(&str, Duty)]) -> Result<Checked, String> {
     let asked = Asked { name: "body", order: mesh.order, groups: groups.to_vec() };
     all(mesh, &[asked], false).map(|mut found| found.remove(0))
 }
 
 fn all<const D: usize>(mesh: &Mesh<D>, asked: &[Asked], shared: bool) -> Result<Vec<Checked>, String> {
-    let on = |exchange: &dyn Exchange| {
-        let portion = Portion::read(exchange, mesh.order, |_| Ok(mesh.clone())).expect("a portion");
-        let found = portion.check(asked, &[], shared, exchange);
-        let mut found = found.map_err(|error| if error.is_silent() { String::new() } else { error.to_string() });
-        // the point of each node that this rank has; the rest is the same on all ranks
-        let points = |checked: &mut Checked| {
-            let Nodes { count, numbers, points } = &*std::mem::take(&mut checked.nodes);
-            checked.nodes = Nodes { count: *count, ..Nodes::default() }.into();
-            numbers.iter().copied().zip(points.iter().map(|&point| portion.number(point))).collect()
-        };
-        let nodes: Vec<BTreeMap<u32, u32>> = found.iter_mut().flatten().map(points).collect();
-        (found, nodes)
-    };
-    let (found, all_nodes) = on(&Serial);
-    for ranks in [2, 3, 5] {
-        let (mut others, nodes): (Vec<_>, Vec<_>) = crowd::on(ranks, on).into_iter().unzip();
-        for (body, all) in all_nodes.iter().enumerate() {
-            let of_ranks = nodes.iter().flat_map(|of_rank| &of_rank[body]);
-            assert!(of_ranks.clone().all(|(node, point)| all.get(node) == Some(point)), "{ranks} ranks");
-            assert_eq!(of_ranks.map(|(node, _)| node).collect::<BTreeSet<_>>().len(), all.len(), "{ranks} ranks");
-            // those on surfaces are known everywhere
-            let low = mesh.groups.iter().filter(|group| group.dimension < D).flat_map(|group| &group.connectivity);
-            let on_surface: BTreeSet<u32> = low.copied().collect();
-            let mut on_surface = all.iter().filter(|(_, point)| on_surface.contains(point));
-            assert!(on_surface.all(|(node, _)| nodes.iter().all(|of_rank| of_rank[body].contains_key(node))));
-        }
-        // one rank has the words
-        others.sort_by_key(|other| other.as_ref().map_or_else(|words| usize::MAX - words.len(), |_| 0));
-        assert_eq!(others[0], found, "{ranks} ranks");
-        let rest = if found.is_ok() { found.clone() } else { Err(String::new()) };
-        assert!(others[1..].iter().all(|other| *other == rest), "{ranks} ranks: {others:?}");
-    }
-    found
+    mesh.check(asked, &[], shared).map_err(|error| error.to_string())
 }
 
 fn refused<const D: usize>(mesh: &Mesh<D>, words: &[&str]) {
