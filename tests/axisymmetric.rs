@@ -389,8 +389,7 @@ fn normals_on_the_axis() {
     for degree in [Order::P1, Order::P2] {
         let mesh = load::<2>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
         let space = Space::new(&mesh, mesh.group("inner").expect("a body"), degree);
-        let largest = space.largest_radius();
-        let space = space.revolved(largest);
+        let space = space.revolved();
         let facets = space.facets(mesh.group("inner_contact").expect("a surface"));
         let (free, frame) = (HashMap::new(), Frame::default());
         let side = Side::new("inner_contact", &space, facets, &free, &frame);
@@ -413,8 +412,7 @@ fn stress_along_the_circles() {
     for degree in [Order::P1, Order::P2] {
         let mesh = load::<2>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
         let space = Space::new(&mesh, mesh.group("inner").expect("a body"), degree);
-        let largest = space.largest_radius();
-        let space = space.revolved(largest);
+        let space = space.revolved();
         assert!(space.nodes.iter().any(|x| x[0] == 0.0), "the shell meets the axis");
         let u: Vec<f64> = space.nodes.iter().flat_map(|x| [a * x[0], b * x[1]]).collect();
         for (s, x) in stress::nodal(&space, &elasticity, &u).iter().zip(&space.nodes) {

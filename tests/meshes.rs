@@ -7,8 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use winkler::exchange::Serial;
-use winkler::mesh::{Asked, Duty, Maker, Mesh, Portion, parse};
+use winkler::mesh::{Asked, Duty, Maker, Mesh, parse};
 use winkler::problem::order::Order;
 
 /// The mesh of a script as Gmsh writes it.
@@ -279,8 +278,7 @@ fn kind(bytes: &[u8], good: &Mesh<2>, known: &Used) -> Kind {
         body("lower", &[("lower_face", Duty::Holds), ("lower_sides", Duty::Holds), ("lower_pin", Duty::Holds)]),
         body("upper", &[("upper_face", Duty::Acts), ("upper_sides", Duty::Acts), ("upper_pin", Duty::Holds)]),
     ];
-    let portion = Portion::whole(mesh.clone());
-    if portion.check(&bodies, &["lower_top", "upper_bottom"], false, &Serial).is_err() {
+    if mesh.check(&bodies, &["lower_top", "upper_bottom"], false).is_err() {
         return Kind::Refused;
     }
     let found = used(&mesh);

@@ -49,7 +49,6 @@ fn two_ranks_report_what_one_reports() {
         "bodies",
         "command",
         "directory",
-        "known_nodes",
         "last_look",
     ];
     let (ours, theirs) = (serial.report.as_object(), parallel.report.as_object());

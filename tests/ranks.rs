@@ -133,18 +133,6 @@ fn rows_are_dealt_out() {
     }
 }
 
-/// To deal out the dofs a rank knows the places of nodes near its own ones and of surfaces: on eight ranks
-/// less than two fifths of those of a cube of 24 cells a side.
-#[test]
-fn no_rank_knows_all_nodes() {
-    let sets = ["--set", "mesh.set={nl=24,nu=2}", "--set", "solver=hypre", "--set", "method={}"];
-    let known = |run: Run| run.converged().count("known_nodes");
-    let all = known(solve(case("patch-3d"), &sets));
-    assert_eq!(all, 25usize.pow(3) + 27);
-    let few = known(solve_on(8, case("patch-3d"), &sets));
-    assert!(few > all / 8 && few < 2 * all / 5, "{few} of {all}");
-}
-
 /// What the user should know is that of one rank, although most of five ranks have no cell of the body with linear elements at its least Poisson's
 /// ratio, none of another, and parts of bodies are smaller than these.
 #[test]
