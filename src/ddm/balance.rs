@@ -1,4 +1,5 @@
-//! Stopping where the error of the iteration is small beside that of the discretisation: more would change nothing.
+//! The stop rule that ends a run when the error of the iteration is small relative to the error of the discretisation: further iterations would
+//! change nothing.
 
 use crate::error::Result;
 use crate::model::Model;
@@ -6,32 +7,32 @@ use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
 
-/// Knows how far the discrete problem is from the continuous one.
+/// An estimator of the error of the discrete solution relative to the continuous one.
 pub trait Discretisation {
-    /// Relative error of the discrete solution near an iterate, in the norm of [`Row::error`](super::Row): the part of it that
-    /// iterates share a space with, so that it bounds what the nodal values are worth.
+    /// Estimate the relative error of the discrete solution near an iterate, in the norm of [`Row::error`](super::Row). It is the part of the error
+    /// that lies in the space of the iterates, so that it bounds the accuracy of nodal values.
     ///
     /// # Errors
     /// Failures of the solver library.
     fn error(&mut self, model: &mut Model, linear: &mut dyn LinearStep, iterate: &Field, layer: &Layer) -> Result<f64>;
 }
 
-/// Share of the discretisation's error that the iteration's may have.
+/// Largest error of the iteration, as a share of the error of the discretisation.
 pub const SHARE: f64 = 0.1;
 
-/// Asks seldom: an estimate costs about as much as a Newton step.
+/// The stop rule. It asks for few estimates, because one costs about as much as a Newton step.
 pub(super) struct Balance {
-    rule: Box<dyn Discretisation>,
-    /// The last answer; before the first all of the solution, of which the discretisation misses a part.
+    estimator: Box<dyn Discretisation>,
+    /// The last estimate; before the first one, a relative error of one.
     last: f64,
 }
 
 impl Balance {
-    pub fn new(rule: Box<dyn Discretisation>) -> Self {
-        Self { rule, last: 1.0 }
+    pub fn new(estimator: Box<dyn Discretisation>) -> Self {
+        Self { estimator, last: 1.0 }
     }
 
-    /// Whether an iterate with this estimated error is good enough. A good last answer is confirmed at this iterate.
+    /// Whether an iterate with this estimated error is good enough. If it is by the last estimate, a new estimate at this iterate has to confirm it.
     ///
     /// # Errors
     /// Failures of the solver library.
@@ -46,9 +47,8 @@ impl Balance {
         if error.is_nan() || error > SHARE * self.last {
             return Ok(false);
         }
-        let now = self.rule.error(model, linear, iterate, layer)?;
-        self.last = now;
-        Ok(error <= SHARE * now)
+        self.last = self.estimator.error(model, linear, iterate, layer)?;
+        Ok(error <= SHARE * self.last)
     }
 }
 

@@ -1,14 +1,15 @@
 //! How far an iterate in equilibrium is from the solution: a bound by duality.
 //!
-//! After a linear step, displacements u and pressures p are in equilibrium: K u + B' omega p = f. Convex duality (Fenchel; engineers
-//! know it as the error in the constitutive relation) gives, with the energy P of the law and its complementary energy P*,
+//! After a linear step, displacements u and pressures p are in equilibrium: K u + B' omega p = f. Let P be the energy of the law and P* its
+//! complementary energy. Then convex duality (Fenchel; engineers know it as the error in the constitutive relation) gives
 //!
 //! ```text
 //! |u - u_exact|_K^2 / 2  <=  F1(u) - min F1  <=  gap = sum omega ( P(c) + P*(p) - c p ),      c = B u - d,
 //! ```
 //!
-//! each term of which is zero on the graph of the law and positive beside it. No spectrum, no history, no constants.
+//! Each term of the gap is zero on the graph of the law and positive beside it. The bound needs no spectrum, no history and no constants.
 
+use super::path::Equilibrium;
 use super::scale::Scale;
 use crate::contact::LayerLaw;
 use crate::model::Model;
@@ -17,31 +18,32 @@ use crate::model::linear::Solution;
 use crate::model::rigid::PART;
 use crate::model::surface::{meeting_slopes, surface_slopes};
 
-/// How far places are from what the laws have at the compressions of the bodies.
+/// The distance of layer states from the laws at the compressions of the bodies.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct OffLaws {
-    /// Gap of duality, an energy.
+    /// The duality gap, an energy.
     gap: f64,
-    /// Largest difference of a pressure, and its pair.
+    /// Largest difference of a pressure.
     mismatch: f64,
+    /// The pair with that difference.
     pair: usize,
 }
 
 impl OffLaws {
-    /// Measure layer states where the bodies have these compressions, known to their `digits`, n each.
-    pub(super) fn new(model: &Model, places: &Layer, compression: &[f64], digits: &[f64]) -> Self {
+    /// Measure the distance of `places` where the bodies have these compressions, n, which are known but for their `roundoff`, n.
+    pub(super) fn new(model: &Model, places: &Layer, compression: &[f64], roundoff: &[f64]) -> Self {
         let mut off = Self::default();
-        // bodies and layer answer an error of a compression like springs in a row: a steep law alone would make any pressure of it
+        // bodies and layer answer an error of a compression like springs in series; a steep law alone would make any pressure of it
         let rho = meeting_slopes(model);
         let resolved = Layer::resolve(model, compression, &places.pressure, &rho, &[]);
         for (i, pair) in model.pairs.iter().enumerate() {
             for q in model.range(i) {
                 let (point, p) = (q - model.offset[i], places.pressure[q]);
-                let c = nearest(&*pair.law, point, (compression[q], digits[q]), p);
+                let c = nearest(&*pair.law, point, compression[q], roundoff[q], p);
                 let mismatch = if rho[q] < f64::INFINITY {
-                    let roundoff = rho[q] * digits[q] + f64::EPSILON * (p.abs() + resolved.pressure[q].abs());
-                    // a difference that is no number stays none
-                    ((p - resolved.pressure[q]).abs() - roundoff).clamp(0.0, f64::INFINITY)
+                    let known = rho[q] * roundoff[q] + f64::EPSILON * (p.abs() + resolved.pressure[q].abs());
+                    // `clamp` keeps NaN
+                    ((p - resolved.pressure[q]).abs() - known).clamp(0.0, f64::INFINITY)
                 } else {
                     (p - pair.law.pressure(point, c)).abs()
                 };
@@ -55,58 +57,61 @@ impl OffLaws {
     }
 }
 
-/// The relative errors by which a run of Newton's method ends.
+/// The relative errors that end a run of Newton's method.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Reached {
-    /// Error in the energy norm: of the layers by the gap, of the linear step by its solver.
+    /// Error in the energy norm: that of the layers from the duality gap, that of the linear step from its solver.
     pub error: f64,
-    /// Whether that is a bound: no pressure is negative, and the linear step is exact to rounding.
+    /// Whether `error` is a bound: no pressure is negative, and the linear step is exact to rounding.
     pub is_bound: bool,
-    /// Error of the pressures: the largest difference from the law, relative to the largest pressure, or what an inexact linear step
-    /// misses, relative to the energy of the contact alone.
+    /// Error of the pressures. It is the largest difference from the law, relative to the largest pressure, or the error of an inexact linear
+    /// step, relative to the energy of the contact alone.
     pub pressure: f64,
-    /// Share of its contact forces that a body lacks in balance, the most over all.
+    /// Forces out of balance on a body, as a share of its contact forces: the largest over all bodies.
     pub imbalance: f64,
 }
 
-/// Energy that the pressures give the layers and the surfaces under them, sum omega p^2 (1/kappa + 1/rho0): that of the bodies as a
-/// whole may be much larger, and an error that is small beside it large for the pressures.
+/// Return the energy that the pressures give the layers and the surfaces under them, sum omega p^2 (1/kappa + 1/rho0). The energy of the whole
+/// bodies may be much larger, and an error that is small relative to that one may be large for the pressures.
 pub(super) fn contact_energy(model: &Model, places: &Layer) -> f64 {
     let slopes = surface_slopes(model);
     let at = |q: usize| places.force[q] * places.pressure[q] * (places.tangent[q].recip() + slopes[q].recip());
     (0..slopes.len()).filter(|&q| places.force[q] > 0.0).map(at).sum()
 }
 
-/// The share of it that the surfaces have.
+/// Return the part of [`contact_energy`] that is in the surfaces, sum omega p^2 / rho0.
 pub(super) fn surface_energy(model: &Model, places: &Layer) -> f64 {
     let slopes = surface_slopes(model);
     (0..slopes.len()).map(|q| places.force[q] * places.pressure[q] / slopes[q]).sum()
 }
 
-/// The compression within c -+ `digits` at which the pressure of a law is nearest to p.
-fn nearest(law: &dyn LayerLaw, point: usize, (c, digits): (f64, f64), p: f64) -> f64 {
-    let apart = if p > 0.0 { law.compression(point, p) - c } else { c.min(0.0) - c };
-    if apart.is_finite() { c + apart.clamp(-digits, digits) } else { c }
+/// Return the compression within c -+ `roundoff` at which the pressure of a law is nearest to p.
+fn nearest(law: &dyn LayerLaw, point: usize, c: f64, roundoff: f64, p: f64) -> f64 {
+    let difference = if p > 0.0 { law.compression(point, p) - c } else { c.min(0.0) - c };
+    if difference.is_finite() { c + difference.clamp(-roundoff, roundoff) } else { c }
 }
 
 impl Reached {
-    /// Of an iterate with u'Ku = `strain` after the linear step `step`: compressions c, known to their `digits`, and equilibrium pressures p, n
-    /// each, and the places that lines of slope `rho` lead to. Of all compressions that have these digits the one nearest to the law counts: the
-    /// others' distance would be rounding, which a stiff law answers with any pressure. At points of negative pressure, whose gap is infinite, the work of what the new
-    /// places change there stands for it.
+    /// Measure an iterate with u'Ku = `strain` after the linear step `step`. `state` is its equilibrium, `places` are the resolved states on the
+    /// laws.
+    ///
+    /// A compression is known only to its roundoff. Of the admissible values, the one that is closest to the law is used: a stiff law would answer
+    /// roundoff with any pressure. Where a pressure is negative, the gap is infinite, and the work of its change to the resolved state
+    /// replaces the gap.
     pub(super) fn new(
-        (model, scale): (&Model, &Scale),
+        model: &Model,
+        scale: &Scale,
         strain: f64,
         step: &Solution,
-        (compression, digits, pressure): (&[f64], &[f64], &[f64]),
+        state: &Equilibrium,
         places: &Layer,
-        rho: &[f64],
     ) -> Self {
+        let Equilibrium { compression, roundoff, pressure, rho } = *state;
         let (mut gap, mut mismatch, mut is_bound) = (0.0, 0.0f64, step.is_exact);
         for (i, pair) in model.pairs.iter().enumerate() {
             for q in model.range(i) {
                 let (point, weight, p) = (q - model.offset[i], model.weight[q], pressure[q]);
-                let c = nearest(&*pair.law, point, (compression[q], digits[q]), p);
+                let c = nearest(&*pair.law, point, compression[q], roundoff[q], p);
                 let changed = (p - places.pressure[q]).powi(2) / rho[q];
                 mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
                 gap += weight * if p < 0.0 { changed } else { pair.law.duality_gap(point, c, p) };
@@ -126,11 +131,12 @@ impl Reached {
         }
     }
 
-    /// Return the errors of a result with u'Ku = `strain` whose places are so far off the laws, and whose forces lack a balance that is worth `unbalanced` in the
-    /// energy norm; pressures miss that, too, in results `of_steps`, as in [`Reached::new`]. With the pair whose distance from its law is the largest of them,
-    /// if it is.
+    /// Return the errors of a result with u'Ku = `strain`. Its layer states `places` have the distance `off` from the laws, and the forces out of
+    /// balance have the energy norm `unbalanced`; in results `of_steps` of Newton's method this is an error of the pressures, too, as in
+    /// [`Reached::new`]. The second value is the pair whose distance from its law is the largest of all errors, if one is.
     pub(super) fn of_result(
-        (model, scale): (&Model, &Scale),
+        model: &Model,
+        scale: &Scale,
         strain: f64,
         unbalanced: f64,
         off: &OffLaws,
@@ -138,7 +144,7 @@ impl Reached {
         of_steps: bool,
     ) -> (Self, Option<usize>) {
         let (energy, absolute) = (strain + places.work, (2.0 * off.gap).sqrt() + unbalanced);
-        // as pressures, the contact is measured by PART of what all is at least
+        // pressures are measured by at least PART of what the bodies carry, and energies by its square
         let contact = contact_energy(model, places).max(PART * PART * energy);
         let missed = if of_steps { scale.relative(unbalanced * unbalanced, contact) } else { 0.0 };
         let mismatch = if off.mismatch == 0.0 { 0.0 } else { off.mismatch / scale.peak(&places.pressure, strain) };
@@ -152,8 +158,9 @@ impl Reached {
         (reached, is_worst.then_some(off.pair))
     }
 
-    /// Adds what rounding left of the equilibrium of an exact step from `before` to `places`: one `more` step with its matrix. That step is rounded, too,
-    /// and may miss as much again; an inexact one knows its own error. Returns the larger of what was added.
+    /// Add what rounding left of the equilibrium of a step from the states `before` to `places`. A further step `more` with the same matrix shows
+    /// it. If that one is exact, it is rounded, too, and may miss as much again; an inexact one knows its own error. Return the larger error
+    /// that was added.
     pub(super) fn add_rounding(
         &mut self,
         (scale, strain): (&Scale, f64),
@@ -164,14 +171,14 @@ impl Reached {
         let times = if more.is_exact { 2.0 } else { 1.0 };
         let missed = scale.relative(more.energy + more.error * more.error, strain + places.work);
         let closing = more.field.closing();
-        let off = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
-        let off = if off == 0.0 { 0.0 } else { off / scale.peak(&places.pressure, strain) };
+        let change = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
+        let change = if change == 0.0 { 0.0 } else { change / scale.peak(&places.pressure, strain) };
         self.error += times * missed;
-        self.pressure += times * off;
-        times * missed.max(off)
+        self.pressure += times * change;
+        times * missed.max(change)
     }
 
-    /// The largest of the errors.
+    /// Return the largest of the errors, NaN if one of them is.
     pub fn worst(&self) -> f64 {
         let all = [self.error, self.pressure, self.imbalance];
         all.into_iter().fold(0.0, |worst, error| if error.is_nan() || error > worst { error } else { worst })
@@ -192,6 +199,10 @@ mod tests {
         Solution { field: Field { states: Vec::new(), trace }, energy, error, is_exact: error == 0.0 }
     }
 
+    fn state<'a>(compression: &'a [f64], pressure: &'a [f64], rho: &'a [f64]) -> Equilibrium<'a> {
+        Equilibrium { compression, roundoff: &[0.0; 4], pressure, rho }
+    }
+
     /// Points beside the laws p = 4 c and p = c^2 by known gaps: (4 c - p)^2/8, and c^3/3 + 2 p^1.5/3 - c p.
     #[test]
     fn a_gap_in_closed_form() {
@@ -200,7 +211,7 @@ mod tests {
         let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
         let (c, rho, scale) = ([0.5, 1.0, 2.0, 3.0], [2.0, 0.5, 0.25, 3.0], Scale::default());
         let exact = step(vec![0.0; 8], 0.0, 0.0);
-        let of = |p: [f64; 4]| Reached::new((&model, &scale), 5.0, &exact, (&c, &[0.0; 4], &p), &places, &rho);
+        let of = |p: [f64; 4]| Reached::new(&model, &scale, 5.0, &exact, &state(&c, &p, &rho), &places);
         let energy = |reached: &Reached| reached.error.powi(2) * (5.0 + places.work) / 2.0;
         let beside = of([2.0, 5.0, 1.0, 9.0]);
         close(energy(&beside), 2.0 / 8.0 + 3.0 * (8.0 / 3.0 + 2.0 / 3.0 - 2.0));
@@ -220,12 +231,12 @@ mod tests {
         let at = |q: usize| WEIGHT[q] * places.pressure[q].powi(2) * (1.0 / places.tangent[q] + 1.0 / slopes[q]);
         let contact = contact_energy(&model, &places);
         close(contact, at(0) + at(2) + at(3));
-        // of the first point the law has 4 c - 0.4
+        // the first pressure is 4 c - 0.4
         let (scale, p, rho) = (Scale::default(), [1.6, 0.0, 4.0, 1.0], [1.0; 4]);
         let (gap, all): (f64, f64) = (0.5 * 0.4f64.powi(2) / 8.0, 5.0 + 0.5 * 1.0 + 3.0 * 8.0 + 0.25);
         let of = |error| {
             let step = step(vec![0.0; 8], 0.0, error);
-            Reached::new((&model, &scale), 5.0, &step, (&places.compression, &[0.0; 4], &p), &places, &rho)
+            Reached::new(&model, &scale, 5.0, &step, &state(&places.compression, &p, &rho), &places)
         };
         let inexact = of(0.3);
         close(inexact.error, ((2.0 * gap).sqrt() + 0.3) / all.sqrt());
@@ -242,13 +253,13 @@ mod tests {
         close(exact.pressure, 0.1 + 0.04 / 4.0);
     }
 
-    /// Of p = 4 c, and of an open point, whose law has nothing at any c < 0.
+    /// The law p = 4 c, and an open point, whose law has zero pressure at any c < 0.
     #[test]
-    fn compressions_are_known_to_their_digits() {
+    fn compressions_are_known_to_their_roundoff() {
         let law = &*two_pairs().pairs[0].law;
-        let all = [((1.0, 0.1), 4.2), ((1.0, 0.1), 5.0), ((1.0, 0.1), -1.0), ((0.05, 0.1), 0.0), ((-1.0, 0.1), 0.0)];
-        assert_eq!(all.map(|(c, p)| nearest(law, 0, c, p)), [1.05, 1.1, 0.9, 0.0, -1.0]);
-        assert!(nearest(law, 0, (f64::NAN, 0.1), 1.0).is_nan());
+        let all = [(1.0, 4.2), (1.0, 5.0), (1.0, -1.0), (0.05, 0.0), (-1.0, 0.0)];
+        assert_eq!(all.map(|(c, p)| nearest(law, 0, c, 0.1, p)), [1.05, 1.1, 0.9, 0.0, -1.0]);
+        assert!(nearest(law, 0, f64::NAN, 0.1, 1.0).is_nan());
     }
 
     #[test]

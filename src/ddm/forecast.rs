@@ -1,22 +1,22 @@
-//! What a run that ends now would still need: iterations left, from the spectrum of G^-1 F1'' and the method's own rate.
+//! Estimates of the iterations that a run would still need, from the spectrum of G^-1 F1'' and the method's own rate.
 
 use super::history::Row;
 use crate::linalg::portable::{log, pow};
 
-/// What bounds of the spectrum tell of the iterations to come.
+/// An estimate of the iterations to come.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forecast {
     /// Factor by which an iteration reduces the residual in the long run; 1 or more where it does not.
     pub factor: f64,
-    /// Iterations from the last iterate to the residual that was asked for; infinite where it is never reached.
+    /// Iterations from the last iterate to the residual that was asked for; infinite if it is never reached.
     pub iterations: f64,
 }
 
-/// Iterations whose mean factor stands for that of a method without a rate of its own.
+/// Iterations whose mean factor is used for a method without a rate of its own.
 const RECENT: usize = 10;
 
 impl Forecast {
-    /// From the history of a run, the residual it asks for, and the method's own factor where it has one.
+    /// Estimate from the history of a run, the residual that was asked for, and the method's own factor if it has one.
     pub fn new(rows: &[Row], target: f64, factor: Option<f64>) -> Option<Self> {
         let last = rows.last()?.residual;
         let seen = || {
@@ -24,7 +24,7 @@ impl Forecast {
             Some(pow(last / rows[before].residual, 1.0 / RECENT as f64))
         };
         let factor = match (factor, seen()) {
-            // a mode that grows from little is seen before the spectrum knows it
+            // a mode that grows from a small amplitude appears in the history before it appears in the spectrum
             (Some(own), Some(seen)) if seen >= 1.0 => own.max(seen),
             (own, seen) => own.or(seen)?,
         };
@@ -35,29 +35,29 @@ impl Forecast {
         let iterations = match factor {
             _ if gain >= 1.0 => 0.0,
             factor if factor >= 1.0 => f64::INFINITY,
-            // less than a thousandth of an iteration is rounding
+            // a thousandth of an iteration counts as rounding
             factor => (log(gain) / log(factor) - 1e-3).ceil(),
         };
         (!iterations.is_nan()).then_some(Self { factor, iterations })
     }
 }
 
-/// Factor of a relaxed iteration with this gamma: the slowest of |1 - gamma lambda|.
+/// Return the factor of a relaxed iteration with this gamma: the largest |1 - gamma lambda| over the spectrum (low, high).
 pub fn relaxed_factor(gamma: f64, (low, high): (f64, f64)) -> f64 {
     (1.0 - gamma * low).abs().max((1.0 - gamma * high).abs())
 }
 
-/// The gamma with the least such factor.
+/// Return the gamma with the least such factor.
 pub fn best_gamma((low, high): (f64, f64)) -> f64 {
     2.0 / (low + high)
 }
 
-/// That factor, (kappa - 1)/(kappa + 1) with the condition kappa. An exact line search has the same in the worst case.
+/// Return that factor, (kappa - 1)/(kappa + 1) with the condition number kappa. An exact line search has the same factor in the worst case.
 pub fn best_factor(spectrum: (f64, f64)) -> f64 {
     relaxed_factor(best_gamma(spectrum), spectrum)
 }
 
-/// Factor of conjugate gradients, (sqrt kappa - 1)/(sqrt kappa + 1).
+/// Return the factor of conjugate gradients, (sqrt kappa - 1)/(sqrt kappa + 1).
 pub fn gradients_factor((low, high): (f64, f64)) -> f64 {
     let root = (high / low).sqrt();
     (root - 1.0) / (root + 1.0)

@@ -1,4 +1,4 @@
-//! The history of a run: one row per iteration, shown to an observer while it runs.
+//! The history of a run: one row per iterate, shown to an observer during the run.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,27 +9,26 @@ pub struct Row {
     pub step: usize,
     /// k: updates made so far.
     pub iteration: usize,
-    /// The number by which the run ends (docs/theory.md): of sweeps the relative residual of the iterate, of Newton's method its
-    /// relative error.
+    /// The number that ends the run (docs/theory.md): for sweeps the relative residual of the iterate, for Newton's method its relative error.
     pub residual: f64,
     /// Largest of `increments`; NaN in row 0, before the first update.
     pub increment: f64,
-    /// Relative error of the iterate in the energy norm; NaN while nothing is known of it.
+    /// Relative error of the iterate in the energy norm; NaN while it is not known.
     pub error: f64,
-    /// Whether `error` is a bound; else it is an estimate.
+    /// Whether `error` is a bound; otherwise it is an estimate.
     pub is_bound: bool,
-    /// The paper's rho of each body, in the order of the scene: relative increment of the normal displacements
-    /// that led to this iterate.
+    /// The paper's rho of each body, in the order of the scene: relative increment of the normal displacements in the step that led to this
+    /// iterate.
     pub increments: Vec<f64>,
-    /// Relaxation that led to this iterate; NaN in row 0.
+    /// Relaxation, or length of the step, that led to this iterate; NaN in row 0.
     pub gamma: f64,
     /// Functional F1 (25).
     pub energy: f64,
-    /// Contact points with c > 0, and all.
+    /// Contact points with c > 0.
     pub closed: usize,
     /// All contact points.
     pub points: usize,
-    /// Sweeps done so far: times that every body was solved.
+    /// Sweeps so far; each solves in every body once.
     pub sweeps: usize,
     /// Numeric factorisations (or preconditioner set-ups) so far, all bodies.
     pub factorizations: usize,
@@ -41,19 +40,18 @@ pub struct Row {
     pub seconds: f64,
 }
 
-/// Who watches an iteration: the table on the terminal, a progress line, nobody.
+/// An observer of an iteration, such as the table on the terminal or a progress line.
 pub trait Observer {
-    /// A row is complete.
+    /// Take a complete row.
     fn row(&mut self, row: &Row);
-    /// What is asked of the run meanwhile, as bits whose meaning is the caller's own, [`ASKS`](crate::exchange::ASKS) of them; called once an
-    /// iterate. What one rank asks all ranks learn of, and the run ends with [`Status::Paused`](super::Status::Paused), from where
-    /// it can go on.
+    /// Return the requests from outside, as [`ASKS`](crate::exchange::ASKS) bits whose meaning is the caller's own; called once an iterate. The
+    /// requests of one rank reach all ranks, and the run ends with [`Status::Paused`](super::Status::Paused), from where it can go on.
     fn asked(&self) -> u8 {
         0
     }
 }
 
-/// Nobody watches.
+/// An observer that does nothing.
 pub struct Silent;
 
 impl Observer for Silent {

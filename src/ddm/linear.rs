@@ -1,4 +1,4 @@
-//! Linear steps of the method: their springs, and the response to small loads.
+//! Linear steps: their springs, and the response of bodies and layers to small loads.
 
 use crate::error::Result;
 use crate::model::linear::{Failure, LinearStep, System, Trial};
@@ -6,8 +6,8 @@ use crate::model::rigid::{Motions, TOLERANCE};
 use crate::model::surface::surface_slopes;
 use crate::model::{Field, Layer, Model};
 
-/// The response w of the bodies and their layers to small loads: (K + B' diag(omega kappa) B) w = r, with its squared energy norm,
-/// whose error may be this `share` of it. `loads` is r, one entry a dof of each body that lives here.
+/// Return the response w of the bodies and their layers to small loads r, (K + B' diag(omega kappa) B) w = r, and its squared energy norm. The
+/// layers are in the states `places`. `loads` is r, one entry per dof of each body that lives on this rank. The relative error of w may be `share`.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -31,17 +31,19 @@ pub fn respond(
     Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy)))
 }
 
-/// Share of the springs of whole surfaces that resists motions which no closed contact resists: they then go far, but not without end.
+/// Stiffness, as a share of the springs of whole surfaces, that resists motions which no closed contact resists: such motions then go far, but not
+/// without end.
 const PROXIMAL: f64 = 1e-3;
 
-/// The springs omega kappa of a linear step, n, with one more for every rigid motion of the bodies together that would else meet no
-/// resistance: a contact that is open now may be what stops it.
+/// Return the springs omega kappa of a linear step, n, with one more for every rigid motion of the bodies together that is otherwise unresisted: a
+/// contact that is still open may stop it.
 ///
-/// It is at the point that the motion closes most, and nowhere else. If forces are in balance on the motion, as where bodies rest
-/// and could turn about the points that are closed, a single spring carries nothing, and the step is exact; several would.
+/// The additional spring is at the point that the motion closes most, and nowhere else. Forces may be in balance on the motion, for example where
+/// bodies rest and could turn about the closed points. Then a single spring carries nothing, and the step is exact; several springs would carry
+/// forces.
 pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
     let motions = Motions::of(model);
-    // beside new springs, softer ones may be nothing but rounding
+    // compared with a new spring, softer ones may be rounding, so that another motion is unresisted
     for _ in 0..motions.count() {
         let mut free = motions.springs(&springs).factor(TOLERANCE).kernel();
         if free.is_empty() {
@@ -56,7 +58,7 @@ pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
             };
             let shares = closing.iter().map(|s| (s / closing[most]).powi(2));
             springs[most] += PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
-            // what the others close at that point is this one's
+            // take this motion out of the others, so that they close nothing at that point
             for other in &mut free {
                 let share = motions.closing(other)[most] / closing[most];
                 other.axpy(-share, &motion, 1.0);

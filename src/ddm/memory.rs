@@ -1,22 +1,22 @@
-//! What a run remembers of its iterates beside the last one: how far and how fast it came. It decides when a run ends and how exact
-//! inner solvers are, not what the solution is, so a run that goes on from a file begins without it.
+//! What a run remembers of its iterates besides the last one. This memory decides when the run ends and how its next steps are taken, not what the
+//! solution is. So a run that goes on from a file begins without it.
 
 use super::progress::Progress;
 use super::steady::Steady;
-use super::stop::{Cycle, Floor};
+use super::stop::{Cycle, Stagnation};
 use crate::model::layer::Layer;
 use crate::robin::{Sweep, Sweeper};
 
-/// The step of a sweep that led to an iterate.
+/// The step that led to an iterate of sweeps.
 #[derive(Debug, Clone)]
 pub(super) struct Last {
-    /// The sweep before it.
+    /// The sweep before the step.
     pub sweep: Sweep,
-    /// gamma, if it went along the sweep's correction.
+    /// gamma, if the step was taken along the sweep's correction.
     pub relaxed: Option<f64>,
-    /// How far it went along its direction.
+    /// Length of the step along its direction.
     pub length: f64,
-    /// Change of the traces.
+    /// Change of the traces, 2n.
     pub moved: Vec<f64>,
 }
 
@@ -24,28 +24,31 @@ pub(super) struct Last {
 #[derive(Debug, Clone)]
 pub struct Memory {
     pub(super) cycle: Cycle,
-    pub(super) floor: Floor,
+    pub(super) stagnation: Stagnation,
     /// Pressures of earlier sweeps.
     pub(super) steady: Steady,
-    /// Of Newton's method.
+    /// Steps of Newton's method.
     pub(super) progress: Progress,
-    /// Layer states of the next step where a run paused.
+    /// Layer states of the next step of Newton's method, if the run paused.
     pub(super) states: Option<Layer>,
-    /// Of sweeps: what was done, the last step, and the sweep at the iterate where a run paused.
+    /// Counters of sweeps.
     pub(super) sweeper: Sweeper,
+    /// The last step of sweeps.
     pub(super) last: Option<Last>,
+    /// The sweep at the last iterate, if the run paused.
     pub(super) sweep: Option<Sweep>,
-    /// Sweeps of this run that another process made, and those that the solver of linear steps had made before it began.
+    /// Sweeps of this run that another process made.
     pub(super) earlier: usize,
+    /// Sweeps that the solver of linear steps had made before this run began.
     pub(super) foreign: usize,
 }
 
 impl Memory {
-    /// Of a run with this floor of rounding, by a solver that had made so many sweeps before.
-    pub(super) fn new(floor: Floor, foreign: usize) -> Self {
+    /// Return the memory of a run that begins with this watch for stagnation, by a solver that had made `foreign` sweeps before.
+    pub(super) fn new(stagnation: Stagnation, foreign: usize) -> Self {
         Self {
             cycle: Cycle::default(),
-            floor,
+            stagnation,
             steady: Steady::default(),
             progress: Progress::default(),
             states: None,

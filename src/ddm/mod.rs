@@ -1,13 +1,12 @@
 //! The method: Robin-Robin domain decomposition for the nonlinear variational equation (26).
 //!
-//! Start with the two loops: [`robin`](self), the paper's, and Newton's, each one screen. They work on point arrays (compression,
-//! pressure, tangent, weight) and on bodies that answer the verbs of [`Body`](crate::model::Body); they know no dimension, no element, no mesh and no
-//! PETSc.
+//! There are two loops, each one screen: that of the paper ([`robin`](self)), and Newton's method. They work on arrays over the contact points
+//! (compression, pressure, tangent, weight) and on bodies through the trait [`Body`](crate::model::Body). They know no dimension, no element,
+//! no mesh and no PETSc.
 
 pub mod acceleration;
 mod balance;
 mod bound;
-mod digits;
 mod fit;
 mod forcing;
 pub mod forecast;
@@ -19,6 +18,7 @@ mod newton;
 mod path;
 mod progress;
 mod robin;
+mod roundoff;
 mod run;
 mod scale;
 pub mod solve;

@@ -4,22 +4,21 @@
 //!
 //! ```text
 //! linear step    K u + B' omega (p_q + kappa_q (B u - d - c_q)) = f           all bodies together
-//! step length    c = B u - d,   p = p_q + kappa_q (c - c_q)                   in equilibrium, also on the way to it
-//! layer states   where the law meets c_q + p_q/rho = c + p/rho                (Minty)
+//! step length    c = B u - d,   p = p_q + kappa_q (c - c_q)                   in equilibrium, also on the way
+//! layer states   the point of the law with c_q + p_q/rho = c + p/rho          (resolvent, Minty)
 //! ```
 //!
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u. Where steps have to be
 //! shortened, the laws are smoothed for a while ([`path`](super::path)).
 
 use super::bound::Reached;
-use super::digits::of_compressions;
 use super::fit;
 use super::forcing::Forcing;
-use super::history::Row;
 use super::linear::resisting;
 use super::path::Equilibrium;
-use super::run::{End, Measured, Run};
-use super::stop::{Floor, Status};
+use super::roundoff::of_compressions;
+use super::run::{Candidate, End, Measured, Run};
+use super::stop::{Stagnation, Status};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
@@ -27,7 +26,7 @@ use crate::model::layer::Layer;
 use crate::model::linear::{LinearStep, Solution, Solved, System, Trial};
 use crate::model::surface::meeting_slopes;
 
-/// Error of a correction as a share of it.
+/// Relative error of a correction.
 const HALF: f64 = 0.5;
 
 /// Share of the tolerance below which an error in the energy norm changes nothing in the digits that are asked for.
@@ -45,15 +44,14 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, u: Field, stat
             Ok(step) => step,
             Err(failure) => return Ok(newton.end(Status::InnerSolver(failure), None)),
         };
-        let iterate = newton.advance(step);
+        let part = newton.step_length(&step);
+        let iterate = newton.advance(step, part);
         let measures = newton.measure(&iterate)?;
         if let Some(status) = newton.check_termination(&iterate, &measures)? {
             return Ok(newton.end(status, Some(iterate.resolved)));
         }
         newton.update_states(&iterate);
-        if measures.measured.asked != 0 {
-            newton.run.memory.states = Some(newton.states.clone());
-            let status = Status::Paused { asked: measures.measured.asked };
+        if let Some(status) = newton.check_pause(&measures) {
             return Ok(newton.end(status, Some(iterate.resolved)));
         }
     }
@@ -63,45 +61,63 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, u: Field, stat
 struct Newton<'n, 'r> {
     run: &'n mut Run<'r>,
     linear: &'n mut dyn LinearStep,
-    /// Meeting slopes, n.
+    /// Slopes rho as long as no step has shown how the bodies answer, n.
     unit: Vec<f64>,
     tolerance: f64,
     u: Field,
     /// States of the layers from which the next linear step is taken.
     states: Layer,
-    /// Watches what corrections gain, while roundoff leaves too much of a step: a correction takes the same states once more.
-    correction: Option<Floor>,
-    /// The best iterate so far of those whose errors tell what roundoff left of equilibrium: what roundoff spoils at the end is taken back.
-    best: Option<(Row, Field, Layer)>,
+    /// Present while roundoff leaves too large an error of the linear step, so that the next step is a correction: it takes the same states once
+    /// more. It watches what corrections gain.
+    correction: Option<Stagnation>,
+    /// The best iterate whose errors include those of its equilibrium. If roundoff ends the run, this one is the result.
+    best: Option<Candidate>,
 }
 
-/// What a step has led to: a state in equilibrium with the displacements.
-struct Iterate {
-    step: Solution,
-    /// The part of the linear step that was taken.
+/// The part of a linear step that is taken.
+struct Part {
+    /// 1 for a whole step.
     length: f64,
-    /// c, n, and what roundoff leaves unknown of it.
+    /// Pressures at the end of the whole step, n.
+    whole_pressure: Vec<f64>,
+}
+
+/// The result of a step: displacements and pressures in equilibrium, and the states on the laws that belong to them.
+struct Iterate {
+    /// The part of the linear step that was taken.
+    step: Solution,
+    length: f64,
+    /// c, n.
     compression: Vec<f64>,
+    /// Error of c by roundoff, n.
     roundoff: Vec<f64>,
     /// p, n.
     pressure: Vec<f64>,
-    /// Slopes of the lines on which layer states are found, n.
+    /// Slopes of the lines on which the laws are resolved, n.
     rho: Vec<f64>,
     /// States on the laws themselves.
     resolved: Layer,
 }
 
-/// How good an iterate is.
+impl Iterate {
+    fn equilibrium(&self) -> Equilibrium<'_> {
+        let Self { compression, roundoff, pressure, rho, .. } = self;
+        Equilibrium { compression, roundoff, pressure, rho }
+    }
+}
+
+/// The errors of an iterate.
 struct Measures {
     measured: Measured,
     reached: Reached,
-    /// Whether the errors tell what roundoff left of equilibrium.
+    /// Whether the errors include what roundoff or an iterative solver left of equilibrium.
     is_complete: bool,
+    /// Whether corrections gain nothing any more.
     is_roundoff: bool,
 }
 
 impl Newton<'_, '_> {
-    /// Solve the linear step from the states; a correction to half of what is left, as only the size of roundoff is wanted.
+    /// Solve the linear step from the states. A correction is solved to half of its size only.
     fn linear_step(&mut self) -> Result<Solved> {
         let (model, states) = (&mut *self.run.model, &self.states);
         let springs = resisting(model, states.springs(model));
@@ -118,28 +134,32 @@ impl Newton<'_, '_> {
         self.linear.solve(System { model, places: states, springs: &springs, residual: &residual, enough: &mut enough })
     }
 
-    /// Take the step as far as it comes nearer to the laws, and resolve the laws there.
-    fn advance(&mut self, mut step: Solution) -> Iterate {
-        let (model, progress) = (&mut *self.run.model, &mut self.run.memory.progress);
+    /// Return the part of a step that does not lead away from the laws; all of a correction.
+    fn step_length(&mut self, step: &Solution) -> Part {
+        let (model, progress) = (&*self.run.model, &mut self.run.memory.progress);
         let before = model.compression(&self.u.trace);
         let whole: Vec<f64> = before.iter().zip(step.field.closing()).map(|(c, closing)| c + closing).collect();
         let whole_pressure = self.states.linear(&whole);
-        let length = match self.correction {
-            None => {
-                let roundoff = of_compressions(model, &self.u.trace);
-                let states = [[&before[..], &roundoff], [&whole, &whole_pressure]];
-                progress.step_length(model, &self.unit, &self.states.smoothing, states)
-            }
-            Some(_) => 1.0,
-        };
+        if self.correction.is_some() {
+            return Part { length: 1.0, whole_pressure };
+        }
+        let roundoff = of_compressions(model, &self.u.trace);
+        let ends = [[&before[..], &roundoff], [&whole, &whole_pressure]];
+        let length = progress.step_length(model, &self.unit, &self.states.smoothing, ends);
+        Part { length, whole_pressure }
+    }
+
+    /// Take this part of a step, and resolve the laws at its end.
+    fn advance(&mut self, mut step: Solution, Part { length, whole_pressure }: Part) -> Iterate {
+        let (model, progress) = (&*self.run.model, &mut self.run.memory.progress);
         step.field.scale(length);
         self.u.add(1.0, &step.field);
         self.u.retrace(model);
-        // pressures of the step, not of the compressions at its end: roundoff of displacements, which a stiff layer makes large, stays out
+        // pressures of the linear step, not of the compressions at its end: a stiff layer would magnify the roundoff of displacements
         let pressure = progress.go(length, whole_pressure);
         let rho = progress.slopes(model, &self.unit);
         if self.states.closed > 0 && self.states.smoothing.is_empty() {
-            fit::fit(model, [&mut self.u, &mut step.field], &pressure, &rho, self.tolerance);
+            fit::rigid_correction(model, [&mut self.u, &mut step.field], &pressure, &rho, self.tolerance);
         }
         let compression = model.compression(&self.u.trace);
         let roundoff = of_compressions(model, &self.u.trace);
@@ -147,52 +167,68 @@ impl Newton<'_, '_> {
         Iterate { step, length, compression, roundoff, pressure, rho, resolved }
     }
 
-    /// Measure the errors of an iterate. One that seems good enough, or at the roundoff level, is asked what roundoff, or an iterative solver, has left of its
-    /// equilibrium: a further step with the same matrix tells how large that is.
+    /// Measure the errors of an iterate. If it seems good enough or at the roundoff level, measure its equilibrium, too; if that is what makes it
+    /// too inexact, the next step is a correction.
     fn measure(&mut self, iterate: &Iterate) -> Result<Measures> {
-        let Iterate { step, compression, roundoff, pressure, rho, resolved, .. } = iterate;
+        let Iterate { step, resolved, .. } = iterate;
         let run = &mut *self.run;
-        let (rest, energy) = residual(run.model, &self.u, &run.model.forces(pressure));
-        let mut measured = run.measure(energy, &Layer::new(run.model, compression.clone()), self.linear);
-        let state = (&compression[..], &roundoff[..], &pressure[..]);
-        let mut reached = Reached::new((run.model, &run.scale), measured.strain, step, state, resolved, rho);
-        let (mut is_roundoff, corrected) = (false, self.correction.take());
+        let (rest, energy) = residual(run.model, &self.u, &run.model.forces(&iterate.pressure));
+        let measured = run.measure(energy, &Layer::new(run.model, iterate.compression.clone()), self.linear);
+        let strain = measured.strain;
+        let reached = Reached::new(run.model, &run.scale, strain, step, &iterate.equilibrium(), resolved);
         let is_enough = run.is_enough(&reached);
-        let is_complete = is_enough || run.is_at_floor(&reached, &self.u, resolved, measured.strain);
-        if is_complete {
-            let springs = resisting(run.model, self.states.springs(run.model));
-            let mut enough = |_: &Model, trial: &Trial| trial.is_within(HALF);
-            let (places, before) = (&self.states, self.linear.counts());
-            let system = System { model: run.model, places, springs: &springs, residual: &rest, enough: &mut enough };
-            let more = self.linear.solve(system)?;
-            measured.inner_iterations += self.linear.counts().inner_iterations - before.inner_iterations;
-            measured.factorizations += self.linear.counts().factorizations - before.factorizations;
-            if let Ok(more) = more {
-                let lost = reached.add_rounding((&run.scale, measured.strain), &more, &self.states, resolved);
-                if is_enough && !run.is_enough(&reached) {
-                    // a correction gains a digit, unless roundoff gives as much again
-                    let mut floor = corrected.unwrap_or_else(Floor::of_steps);
-                    is_roundoff = floor.is_reached(lost);
-                    self.correction = Some(floor);
-                }
-            }
+        let is_complete = is_enough || run.is_at_roundoff(&reached, &self.u, resolved, strain);
+        let mut measures = Measures { measured, reached, is_complete, is_roundoff: false };
+        let corrected = self.correction.take();
+        if is_complete
+            && let Some(missed) = self.measure_equilibrium(&rest, resolved, &mut measures)?
+            && is_enough
+            && !self.run.is_enough(&measures.reached)
+        {
+            // a correction gains a digit, unless roundoff adds as much again
+            let mut stagnation = corrected.unwrap_or_else(Stagnation::of_steps);
+            measures.is_roundoff = stagnation.is_reached(missed);
+            self.correction = Some(stagnation);
         }
-        Ok(Measures { measured, reached, is_complete, is_roundoff })
+        Ok(measures)
     }
 
-    /// Show and keep the row of an iterate; the status if the run ends with it.
+    /// Add to the errors what roundoff, or an iterative solver, left of equilibrium. A further step with the same matrix for the residual `rest`
+    /// shows how large that is. Return the larger error that was added, none if the step fails.
+    fn measure_equilibrium(
+        &mut self,
+        rest: &[Vec<f64>],
+        resolved: &Layer,
+        measures: &mut Measures,
+    ) -> Result<Option<f64>> {
+        let (run, places) = (&mut *self.run, &self.states);
+        let springs = resisting(run.model, places.springs(run.model));
+        let mut enough = |_: &Model, trial: &Trial| trial.is_within(HALF);
+        let before = self.linear.counts();
+        let system = System { model: run.model, places, springs: &springs, residual: rest, enough: &mut enough };
+        let more = self.linear.solve(system)?;
+        let (counts, measured) = (self.linear.counts(), &mut measures.measured);
+        measured.inner_iterations += counts.inner_iterations - before.inner_iterations;
+        measured.factorizations += counts.factorizations - before.factorizations;
+        let add = |more| measures.reached.add_rounding((&run.scale, measured.strain), &more, places, resolved);
+        Ok(more.ok().map(add))
+    }
+
+    /// Show the row of an iterate and keep it. Return the status if the run ends with this iterate.
     fn check_termination(&mut self, iterate: &Iterate, measures: &Measures) -> Result<Option<Status>> {
         let (run, resolved) = (&mut *self.run, &iterate.resolved);
         let step = (&self.u, &iterate.step.field, iterate.length);
         let at = run.after_step(step, measures.measured, &measures.reached, resolved, self.linear);
-        // errors of states on smoothed laws fall with mu, and tell nothing of roundoff
-        let is_smoothed = !self.states.smoothing.is_empty();
-        let ended = run.end_at(&at, self.linear)?.filter(|status| !(is_smoothed && *status == Status::RoundoffLimited));
-        let is_best = |row: &Row| self.best.as_ref().is_none_or(|(best, ..)| row.residual <= best.residual);
-        if let Some(row) = run.rows.last().filter(|row| measures.is_complete && is_best(row)) {
-            self.best = Some((row.clone(), self.u.clone(), resolved.clone()));
+        let status = run.check_termination(&at, self.linear)?;
+        if let Some(row) = run.rows.last().filter(|_| measures.is_complete)
+            && self.best.as_ref().is_none_or(|best| row.residual <= best.row.residual)
+        {
+            self.best = Some(Candidate { row: row.clone(), u: self.u.clone(), layer: resolved.clone() });
         }
-        Ok(ended.or(measures.is_roundoff.then_some(Status::RoundoffLimited)))
+        // errors of states on smoothed laws fall with mu, and show no roundoff
+        let is_smoothed = !self.states.smoothing.is_empty();
+        let status = status.filter(|status| !(is_smoothed && *status == Status::RoundoffLimited));
+        Ok(status.or(measures.is_roundoff.then_some(Status::RoundoffLimited)))
     }
 
     /// Set the states of the next step, unless that is a correction of this one.
@@ -201,17 +237,25 @@ impl Newton<'_, '_> {
             return;
         }
         let run = &mut *self.run;
-        let Iterate { compression, roundoff, pressure, rho, .. } = iterate;
-        let state = Equilibrium { compression, roundoff, pressure, rho };
         let unseen = (UNSEEN * self.tolerance).powi(2) * run.scale.energy(run.energy);
-        let smoothing = run.memory.progress.path.smoothing(run.model, &state, &self.states.smoothing, unseen);
+        let path = &mut run.memory.progress.path;
+        let smoothing = path.smoothing(run.model, &iterate.equilibrium(), &self.states.smoothing, unseen);
         self.states = match smoothing.is_empty() {
             true => iterate.resolved.clone(),
-            false => Layer::resolve(run.model, compression, pressure, rho, &smoothing),
+            false => Layer::resolve(run.model, &iterate.compression, &iterate.pressure, &iterate.rho, &smoothing),
         };
     }
 
-    /// End the run at the last iterate, or at the best one where roundoff ends it.
+    /// Return the status of a run that is requested to pause, and keep the states from which it can go on.
+    fn check_pause(&mut self, measures: &Measures) -> Option<Status> {
+        let asked = measures.measured.asked;
+        (asked != 0).then(|| {
+            self.run.memory.states = Some(self.states.clone());
+            Status::Paused { asked }
+        })
+    }
+
+    /// End the run at the last iterate, or at the best one if roundoff ends it.
     fn end(&mut self, status: Status, resolved: Option<Layer>) -> End {
         let (mut u, mut states) = (std::mem::take(&mut self.u), resolved.unwrap_or_else(|| self.states.clone()));
         if let (Status::RoundoffLimited, Some(best)) = (&status, self.best.take()) {

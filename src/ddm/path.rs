@@ -1,16 +1,17 @@
-//! The way out of slow convergence: a path of smoothed laws.
+//! The remedy for slow convergence: a path of smoothed laws.
 //!
 //! Where slender bodies peel off each other, the contact moves by about one point a step, however Newton's method begins. Laws smoothed by an
-//! energy per area mu ([`resolve`](crate::contact::law::resolve)) have no corner, so that many points move at once, and in equilibrium with them the
-//! duality gap is at most mu times the area. As mu falls, the states follow the central path of interior-point methods to the laws themselves.
+//! energy per area mu ([`resolve`](crate::contact::law::resolve)) have no corner, so that many points move at once. In equilibrium with smoothed
+//! laws, the duality gap is at most mu times the area. As mu falls, the states follow the central path of interior-point methods to the laws
+//! themselves.
 //!
-//! mu is measured by the squared distance e^2/rho of states in equilibrium from the laws, which is an energy per area, too: its mean over all points, D, says
-//! how far Newton's method is.
+//! mu is measured by the squared distance e^2/rho of states in equilibrium from the laws, which is an energy per area, too. D, its mean over all
+//! points, shows how far Newton's method has come.
 //!
 //! ```text
 //! enter    at the second step with the laws themselves that is not taken whole:  mu = 100 D
-//! step     mu <- min(mu, D),  D from the smoothed laws: it stays while the states are far, and falls as fast as Newton's method converges
-//! leave    when mu times the area is below all that the run can see
+//! step     mu <- min(mu, D),  D from the smoothed laws: mu stays while the states are far, and falls as fast as Newton's method converges
+//! leave    when mu times the area is below what the tolerance of the run can detect
 //! ```
 
 use crate::model::Model;
@@ -20,14 +21,15 @@ use crate::model::layer::Layer;
 /// earlier rule for the fall of mu.
 const SHORTENED: usize = 2;
 
-/// mu at the beginning over the mean squared distance D of the states. D counts the mismatch of few points, while the contact is far from its place: from 30
-/// to 300 beams with linear layers that peel took the same number of steps within one, with 1 nine times as many (docs/methods.md).
+/// Ratio of mu at the beginning to the mean squared distance D of the states. D counts the mismatch of few points, while the contact is far from
+/// its final place. With ratios from 30 to 300, peeling beams with linear layers took the same number of steps within one; with 1 they took nine
+/// times as many (docs/methods.md).
 const AHEAD: f64 = 100.0;
 
-/// What is remembered of a run's paths.
+/// The state of a run's paths.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Path {
-    /// Steps since the last path that were not taken whole.
+    /// Steps with the laws themselves that were not taken whole, since the last path.
     shortened: usize,
     /// Steps taken with smoothed laws.
     pub steps: usize,
@@ -38,7 +40,7 @@ pub(super) struct Path {
 pub(super) struct Equilibrium<'a> {
     /// c.
     pub compression: &'a [f64],
-    /// What roundoff leaves unknown of c.
+    /// Error of c by roundoff.
     pub roundoff: &'a [f64],
     /// p.
     pub pressure: &'a [f64],
@@ -47,16 +49,16 @@ pub(super) struct Equilibrium<'a> {
 }
 
 impl Equilibrium<'_> {
-    /// Return sum omega e^2/rho: the squared distance from the laws with this smoothing, e = p - p_q. Components below the roundoff level are ignored, so
-    /// that states that differ by roundoff are as far.
+    /// Return sum omega e^2/rho with e = p - p_q: the squared distance from the laws with this smoothing. Components of e below the roundoff level
+    /// are ignored, so that states that differ by roundoff have the same distance.
     pub fn distance(&self, model: &Model, smoothing: &[f64]) -> f64 {
         let Self { compression, roundoff, pressure, rho } = *self;
         let resolved = Layer::resolve(model, compression, pressure, rho, smoothing);
         let known = |q: usize| rho[q] * roundoff[q] + f64::EPSILON * (pressure[q].abs() + resolved.pressure[q]);
-        // a distance that is no number stays none: it is not nearer
-        let apart = |q: usize| ((pressure[q] - resolved.pressure[q]).abs() - known(q)).clamp(0.0, f64::INFINITY);
-        let squared = |q: usize| model.weight[q] * apart(q).powi(2) / rho[q];
-        // lines of infinite slope lead to states at c itself
+        // `clamp` keeps NaN, which is not nearer than any distance
+        let difference = |q: usize| ((pressure[q] - resolved.pressure[q]).abs() - known(q)).clamp(0.0, f64::INFINITY);
+        let squared = |q: usize| model.weight[q] * difference(q).powi(2) / rho[q];
+        // on a line of infinite slope the state is that at c itself
         (0..model.points()).filter(|&q| rho[q] < f64::INFINITY).map(squared).sum()
     }
 }
@@ -68,8 +70,8 @@ impl Path {
         self.shortened += usize::from(length < 1.0 && !is_smoothed);
     }
 
-    /// Return mu of the next step at each point, n, after a step to `state` with `smoothing`; empty for the laws themselves. What is below the energy
-    /// `unseen` changes nothing any more.
+    /// Return mu of the next step at each point, n, after a step to `state` with `smoothing`; empty for the laws themselves. Smoothing below the energy
+    /// `unseen` does not change the result any more.
     pub fn smoothing(&mut self, model: &Model, state: &Equilibrium, smoothing: &[f64], unseen: f64) -> Vec<f64> {
         let enters = smoothing.is_empty();
         if enters && self.shortened < SHORTENED {
@@ -78,7 +80,7 @@ impl Path {
         self.shortened = 0;
         let (distance, area) = (state.distance(model, smoothing), model.weight.iter().sum::<f64>());
         let mu = if enters { AHEAD * distance / area } else { smoothing[0].min(distance / area) };
-        // of a distance that is no number nothing follows
+        // without a finite distance there is no smoothing
         if mu * area > unseen && mu.is_finite() { vec![mu; model.points()] } else { Vec::new() }
     }
 }

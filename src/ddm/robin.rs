@@ -1,4 +1,4 @@
-//! The paper's loop (41)-(42), and faster ones over the same sweep.
+//! The paper's loop (41)-(42), and faster variants over the same sweep.
 //!
 //! ```text
 //! layers      c = B u - d,   p = p(c)
@@ -18,8 +18,8 @@ use crate::model::linear::LinearStep;
 use crate::robin::coefficient::{Coefficient, underconstrained};
 use crate::robin::sweep::Sweeper;
 
-/// Iterates from a displacement until a rule ends it; `linear` serves estimates of the mesh's error. A run that goes on has the row of
-/// the displacement already.
+/// Iterate from a displacement until a rule ends the run. `linear` serves estimates of the mesh's error. A run that goes on already has the row
+/// of the displacement in its history.
 ///
 /// # Errors
 /// Failures of the solver library. Not converging is a status.
@@ -51,11 +51,11 @@ pub(super) fn iterate(
             }
         };
         if k == run.rows.len() {
-            let reached = last.as_ref().map_or((None, f64::NAN), |last| (Some(&last.moved[..]), last.length));
-            let at = run.after_sweep(&u, &layer, &sweep, reached, acceleration.amplification().sqrt());
+            let step = last.as_ref().map_or((None, f64::NAN), |last| (Some(&last.moved[..]), last.length));
+            let at = run.after_sweep(&u, &layer, &sweep, step, acceleration.amplification().sqrt());
             let paused = (at.measured.asked != 0).then_some(Status::Paused { asked: at.measured.asked });
             let failed = sweep.failed.clone().map(Status::InnerSolver);
-            let ended = run.end_at(&at, linear)?;
+            let ended = run.check_termination(&at, linear)?;
             if let Some(status) = failed.or(ended).or(paused) {
                 run.memory.sweep = Some(sweep);
                 return end(status, u, layer, weight, run);

@@ -1,11 +1,11 @@
-//! What both loops share: the history of a run, its scales, when it ends, and who is told of it.
+//! What both loops share: the history of a run, its scales, the checks that end it, and its observer.
 
 use super::balance::Balance;
 use super::bound::Reached;
-use super::digits;
 use super::history::{Observer, Row};
 use super::memory::Memory;
 use super::origin::Origin;
+use super::roundoff;
 use super::scale::Scale;
 use super::stop::{Status, relative_increment};
 use crate::error::Result;
@@ -26,20 +26,20 @@ pub(super) struct Run<'a> {
     pub balance: Option<Balance>,
     pub observer: &'a mut dyn Observer,
     pub began: Instant,
-    /// Seconds that it had taken before.
+    /// Seconds that the run took before a pause.
     pub earlier: f64,
     pub origin: Option<Origin>,
     pub scale: Scale,
-    /// That of bodies and layers at the last iterate, u'Ku + sum omega p c.
+    /// Energy of bodies and layers at the last iterate, u'Ku + sum omega p c.
     pub energy: f64,
-    /// That of the bodies alone, u'Ku.
+    /// Energy of the bodies alone, u'Ku.
     pub strain: f64,
     pub memory: Memory,
-    /// From its first iterate on, also where it goes on.
+    /// History from the first iterate on, also that before a pause.
     pub rows: Vec<Row>,
 }
 
-/// Numbers in the message of a step, beside what is asked.
+/// Numbers in the message of a step, besides requests from outside.
 const SUMS: usize = 4;
 
 /// How a loop ended.
@@ -49,14 +49,21 @@ pub(super) struct End {
     pub iterate: Field,
     /// Its layers.
     pub layer: Layer,
-    /// The Robin term that the model carries, for each contact row; empty for none.
+    /// The Robin term that the model carries, omega psi kappa of each contact row (2n); empty for none.
     pub weight: Vec<f64>,
     pub sweeps: usize,
     /// Solves of a body that were not needed.
     pub skipped: usize,
 }
 
-/// What every rank knows of an iterate.
+/// An iterate of Newton's method that a run can go back to.
+pub(super) struct Candidate {
+    pub row: Row,
+    pub u: Field,
+    pub layer: Layer,
+}
+
+/// Sums over all ranks at an iterate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Measured {
     /// u'Ku over all bodies.
@@ -65,13 +72,13 @@ pub(super) struct Measured {
     pub f1: f64,
     pub factorizations: usize,
     pub inner_iterations: usize,
-    /// What ranks were asked for.
+    /// Requests from outside, of all ranks.
     pub asked: u8,
 }
 
 impl Run<'_> {
-    /// Sums over the ranks what bodies know of an iterate; `energy` is that of the bodies that live here, `layer` the layers at
-    /// their compressions.
+    /// Sum the numbers of an iterate over the ranks. `energy` is that of the bodies that live on this rank, `layer` has the layers at the
+    /// compressions of the bodies. Collective.
     pub fn measure(&self, energy: Energy, layer: &Layer, linear: &dyn LinearStep) -> Measured {
         let mut sums = [0.0; SUMS + ASKS];
         (sums[0], sums[1]) = (energy.strain, energy.potential);
@@ -92,42 +99,42 @@ impl Run<'_> {
         }
     }
 
-    /// The end of Newton's method at an iterate with its layers.
+    /// Return the end of Newton's method at an iterate with its layers.
     pub fn end(&self, status: Status, iterate: Field, layer: Layer, linear: &dyn LinearStep) -> End {
         End { status, iterate, layer, weight: Vec::new(), sweeps: self.sweeps(linear), skipped: 0 }
     }
 
-    /// Sweeps that the linear steps of this run have made.
+    /// Count the sweeps that the linear steps of this run have made.
     fn sweeps(&self, linear: &dyn LinearStep) -> usize {
         self.memory.earlier + linear.sweeps() - self.memory.foreign
     }
 
-    /// Whether these errors are as small as was asked for.
+    /// Whether these errors are within the tolerance.
     pub fn is_enough(&self, reached: &Reached) -> bool {
         self.stop.residual.is_some_and(|tolerance| reached.worst() <= tolerance)
     }
 
-    /// Whether the error of an iterate of Newton's method, in bodies with u'Ku = `strain`, may be nothing beside rounding: it has three quarters of all
-    /// digits, or it is no progress and misses no more than rounding makes of it.
-    pub fn is_at_floor(&self, reached: &Reached, u: &Field, places: &Layer, strain: f64) -> bool {
+    /// Whether the error of an iterate of Newton's method, in bodies with u'Ku = `strain`, may be at the roundoff level: the iterate has three
+    /// quarters of all digits, or it is no progress and misses no more than rounding explains.
+    pub fn is_at_roundoff(&self, reached: &Reached, u: &Field, places: &Layer, strain: f64) -> bool {
         if reached.worst() <= f64::EPSILON.powf(0.75) {
             return true;
         }
         let missed = reached.error.powi(2) * self.scale.energy(strain + places.work);
-        self.memory.floor.is_stuck(reached.worst()) && missed <= rounding(self.model, u, places)
+        self.memory.stagnation.is_stuck(reached.worst()) && missed <= rounding(self.model, u, places)
     }
 
-    /// Shows and keeps the row of an iterate; the status if the run ends there.
+    /// Show the row of an iterate and keep it. Return the status if the run ends there.
     ///
     /// # Errors
     /// Failures of the solver library.
-    pub fn end_at(&mut self, at: &Iterate, linear: &mut dyn LinearStep) -> Result<Option<Status>> {
+    pub fn check_termination(&mut self, at: &Iterate, linear: &mut dyn LinearStep) -> Result<Option<Status>> {
         let row = self.row(at);
         let increment = row.increment;
         self.observer.row(&row);
         self.rows.push(row);
-        let broken = |body: &usize| self.model.trace_ranges(*body).flatten().any(|i| !at.step.trace[i].is_finite());
-        let broken = (0..self.model.bodies.len()).find(broken);
+        let is_broken = |body: &usize| self.model.trace_ranges(*body).flatten().any(|i| !at.step.trace[i].is_finite());
+        let broken = (0..self.model.bodies.len()).find(is_broken);
         if let Some(body) = broken.or((!at.is_finite).then_some(0)) {
             return Ok(Some(Status::NotFinite { body }));
         }
@@ -142,16 +149,16 @@ impl Run<'_> {
         if let Some(period) = at.period {
             return Ok(Some(Status::Cycle { period }));
         }
-        if self.memory.floor.is_reached(at.residual)
-            && (self.memory.floor.is_fixed(increment) || at.missed <= rounding(self.model, at.u, at.layer))
+        if self.memory.stagnation.is_reached(at.residual)
+            && (self.memory.stagnation.is_fixed(increment) || at.missed <= rounding(self.model, at.u, at.layer))
         {
             return Ok(Some(Status::RoundoffLimited));
         }
         Ok((at.k >= self.stop.iterations).then_some(Status::IterationLimit))
     }
 
-    /// Goes back to an iterate, unless it is the last one: one more row, of no update.
-    pub fn go_back(&mut self, (row, u, layer): (Row, Field, Layer)) -> (Field, Layer) {
+    /// Go back to an iterate. Unless it is the last one, the history gets one more row, of a step of length zero.
+    pub fn go_back(&mut self, Candidate { row, u, layer }: Candidate) -> (Field, Layer) {
         if let Some(last) = self.rows.last().filter(|last| last.iteration != row.iteration) {
             let Row { iteration, factorizations, inner_iterations, sweeps, seconds, .. } = *last;
             let row = Row { iteration, gamma: 0.0, factorizations, inner_iterations, sweeps, seconds, ..row };
@@ -161,6 +168,7 @@ impl Run<'_> {
         (u, layer)
     }
 
+    /// Return the row of an iterate. Traces and energies in it refer to the undeformed bodies, not to the origin.
     fn row(&self, at: &Iterate) -> Row {
         let mut trace = at.u.trace.clone();
         if let Some(origin) = &self.origin {
@@ -191,10 +199,10 @@ impl Run<'_> {
         }
     }
 
-    /// What is known of an iterate of Newton's method after a step x, a share of a whole one, to u.
+    /// Describe the iterate u of Newton's method; the step that led to it was this part, of some `length`, of a linear step.
     pub fn after_step<'a>(
         &mut self,
-        (u, x, share): (&'a Field, &'a Field, f64),
+        (u, step, length): (&'a Field, &'a Field, f64),
         measured: Measured,
         reached: &Reached,
         places: &'a Layer,
@@ -203,30 +211,30 @@ impl Run<'_> {
         let residual = reached.worst();
         (self.energy, self.strain) = (measured.strain + places.work, measured.strain);
         let closed = places.compression.iter().map(|&c| c > 0.0);
-        // F1 of iterates of Newton's method goes up and down
+        // no F1: it goes up and down in Newton's method
         let period = self.memory.cycle.period(&u.trace, closed, residual, 0.0);
         Iterate {
             k: self.rows.len() + 1,
             u,
             layer: places,
-            step: x,
-            moved: Some(&x.trace),
-            length: share,
+            step,
+            moved: Some(&step.trace),
+            length,
             measured,
             residual,
             error: reached.error,
             is_bound: reached.is_bound,
             missed: reached.error.powi(2) * self.scale.energy(self.energy),
             sweeps: self.sweeps(linear),
-            // pressures of compressions that are far away may be beyond the range of numbers: the places are not
+            // pressures of far compressions may be beyond the range of numbers; those of the layer states are not
             is_finite: !residual.is_nan(),
             is_still: true,
             period,
         }
     }
 
-    /// What is known of an iterate u at which the bodies were swept, reached by moving its traces by `moved` in a step of some length; the error
-    /// is the residual times `amplification`, as far as that is known.
+    /// Describe the iterate u of a sweep. The step that led to it moved the traces by `moved` and had some `length`. The error is estimated as the
+    /// residual times `amplification`, which is NaN while it is not known.
     pub fn after_sweep<'a>(
         &mut self,
         u: &'a Field,
@@ -238,17 +246,10 @@ impl Run<'_> {
         let strain: f64 = sweep.energy.iter().map(|energy| energy.strain).sum();
         let potential: f64 = sweep.energy.iter().map(|energy| energy.potential).sum();
         let missed = sweep.decrement.iter().sum();
-        let (factorizations, inner_iterations, asked) = (sweep.factorizations, sweep.inner_iterations, sweep.asked);
         let f1 = potential + layer.energy.iter().sum::<f64>();
-        let all = strain + layer.work;
-        (self.energy, self.strain) = (all, strain);
-        let residual = self.scale.relative(missed, all);
-        // a small residual of a slow mode is no small error: the pressures stand still, too
-        let is_balanced = |tolerance: f64| self.scale.imbalance(self.model, &layer.force, strain) <= tolerance;
-        let peak = self.scale.peak(&layer.pressure, strain);
-        let missing = self.memory.steady.missing(residual, &layer.pressure, peak);
-        let is_still = |tolerance| missing <= tolerance * peak && is_balanced(tolerance);
-        let is_still = self.stop.residual.is_none_or(is_still) && self.stop.increment.is_none_or(is_balanced);
+        (self.energy, self.strain) = (strain + layer.work, strain);
+        let residual = self.scale.relative(missed, self.energy);
+        let is_still = self.is_still(layer, residual);
         self.memory.steady.note(residual, &layer.pressure);
         let closed = layer.compression.iter().map(|&c| c > 0.0);
         Iterate {
@@ -258,7 +259,13 @@ impl Run<'_> {
             step: &sweep.correction,
             moved,
             length,
-            measured: Measured { strain, f1, factorizations, inner_iterations, asked },
+            measured: Measured {
+                strain,
+                f1,
+                factorizations: sweep.factorizations,
+                inner_iterations: sweep.inner_iterations,
+                asked: sweep.asked,
+            },
             residual,
             error: residual * amplification,
             is_bound: false,
@@ -269,48 +276,61 @@ impl Run<'_> {
             period: self.memory.cycle.period(&u.trace, closed, residual, f1),
         }
     }
+
+    /// Whether the pressures of a sweep's iterate have settled and its forces balance, to the tolerance that is asked for. The residual alone
+    /// is not enough: a slow mode has a small residual and a large error.
+    fn is_still(&self, layer: &Layer, residual: f64) -> bool {
+        let peak = self.scale.peak(&layer.pressure, self.strain);
+        let missing = self.memory.steady.missing(residual, &layer.pressure, peak);
+        let is_balanced = |tolerance: f64| self.scale.imbalance(self.model, &layer.force, self.strain) <= tolerance;
+        self.stop.residual.is_none_or(|tolerance| missing <= tolerance * peak && is_balanced(tolerance))
+            && self.stop.increment.is_none_or(is_balanced)
+    }
 }
 
-/// An iterate, and what a loop knows of it.
+/// An iterate of either loop.
 pub(super) struct Iterate<'a> {
     /// Its number.
     pub k: usize,
     pub u: &'a Field,
     pub layer: &'a Layer,
-    /// Where a number that is not finite shows: the last step, or the correction of the sweep.
+    /// The last step, or the correction of the sweep: where a number that is not finite appears.
     pub step: &'a Field,
-    /// Change of the traces that led to it, none for a start, and the length of the step.
+    /// Change of the traces that led to this iterate; none for a start.
     pub moved: Option<&'a [f64]>,
+    /// Length of that step.
     pub length: f64,
     pub measured: Measured,
-    /// See [`Row::residual`], [`Row::error`], [`Row::is_bound`].
+    /// See [`Row::residual`].
     pub residual: f64,
+    /// See [`Row::error`].
     pub error: f64,
+    /// See [`Row::is_bound`].
     pub is_bound: bool,
-    /// What it misses, a squared energy norm, to be compared with rounding.
+    /// Error as a squared energy norm, to be compared with rounding.
     pub missed: f64,
     /// Sweeps so far.
     pub sweeps: usize,
     pub is_finite: bool,
     /// Whether a small residual is a small error.
     pub is_still: bool,
-    /// That of a cycle.
+    /// Period of a cycle, if there is one.
     pub period: Option<usize>,
 }
 
-/// What rounding alone can make of an iterate, squared energy norm: of K u, of forces, and of compressions, which a stiff layer
-/// answers with forces of its own.
+/// Return what rounding alone can make of an iterate, a squared energy norm: rounding of K u, of forces, and of compressions, to which a stiff
+/// layer answers with forces of its own. Collective.
 pub(super) fn rounding(model: &Model, u: &Field, layer: &Layer) -> f64 {
-    let mut floor = [0.0];
+    let mut sum = [0.0];
     for (index, slot) in model.bodies.iter().enumerate() {
         if let Some(body) = &slot.local {
-            floor[0] += body.rounding(&u.states[index], &model.at_rows(index, &layer.force));
+            sum[0] += body.rounding(&u.states[index], &model.at_rows(index, &layer.force));
         }
     }
-    model.exchange.sum(&mut floor);
-    // a force omega kappa e at a point is resisted by springs omega kappa at least
-    for (q, digits) in digits::of_compressions(model, &u.trace).into_iter().enumerate() {
-        floor[0] += model.weight[q] * layer.tangent[q] * digits.powi(2);
+    model.exchange.sum(&mut sum);
+    // an error e of a compression makes the force omega kappa e, which springs omega kappa at least resist
+    for (q, error) in roundoff::of_compressions(model, &u.trace).into_iter().enumerate() {
+        sum[0] += model.weight[q] * layer.tangent[q] * error.powi(2);
     }
-    digits::ROUNDING * floor[0]
+    roundoff::ROUNDING * sum[0]
 }

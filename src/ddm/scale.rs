@@ -1,13 +1,12 @@
-//! What counts as nothing: energies, pressures and forces of rest, of the automatic start and of the bodies, by which a contact that vanishes is
-//! measured.
+//! Least scales of a run: energies, pressures and forces by which a contact that vanishes is measured.
 //!
-//! Bodies that nothing presses together but an initial overlap, and that nothing holds, move apart until no pressure is left: all
-//! that a relative tolerance could refer to vanishes with the error. What remains then is rest, or the start. Its layers may answer
-//! an overlap with any pressure, so the surfaces give way first ([`start::at`]). A contact may vanish while bodies are loaded otherwise. Then what remains
-//! is the energy of their strains: that of a pressure on all surfaces. A solution below [`PART`] of these is measured by that share: with a tolerance of
-//! 1e-8 that is 1e-14 of what the bodies carry, which rounding of their forces leaves unknown.
+//! Unconstrained bodies that only an initial overlap presses together move apart until no pressure is left. Then everything that a relative
+//! tolerance could refer to vanishes with the error, and rest or the automatic start is the reference. Its layers may answer an overlap with any
+//! pressure, so the surfaces deflect first ([`start::at`]). A contact may also vanish while bodies carry other loads. Then the reference is the energy
+//! of their strains, as a pressure on all surfaces.
 //!
-//! A start that the scene gives is no measure: it may be any.
+//! A solution below [`PART`] of a reference is measured by that share of it. With a tolerance of 1e-8 this is 1e-14 of what the bodies carry, which
+//! is lost in the rounding of their forces. A start that the scene gives is no reference, because it may be any displacement.
 
 use super::start;
 use crate::linalg::dot;
@@ -15,7 +14,7 @@ use crate::model::Model;
 use crate::model::rigid::PART;
 use crate::model::surface::surface_slopes;
 
-/// Least scales of a run.
+/// The least scales of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Scale {
     /// Energy: u'Ku + sum omega p c.
@@ -24,13 +23,14 @@ pub struct Scale {
     pressure: f64,
     /// Sum of contact forces.
     force: f64,
-    /// All contact surfaces, sum omega, and what they give way under a unit of pressure times its force, sum omega/rho0.
+    /// Area of all contact surfaces, sum omega.
     area: f64,
+    /// Energy that a unit pressure gives all surfaces, sum omega/rho0.
     compliance: f64,
 }
 
 impl Scale {
-    /// From traces that a run may begin with.
+    /// Return the scales of a model, from traces (2n each) that a run may begin with.
     pub fn new(model: &Model, traces: &[&[f64]]) -> Self {
         let slopes = surface_slopes(model);
         let compliance = slopes.iter().zip(&model.weight).map(|(slope, weight)| weight / slope).sum();
@@ -45,12 +45,13 @@ impl Scale {
         scale
     }
 
-    /// The energy by which one of this size is measured.
+    /// Return the energy by which an error is measured where the iterate has this `energy`.
     pub fn energy(&self, energy: f64) -> f64 {
         energy.max(self.energy)
     }
 
-    /// Whether energies of this size cannot be told from zero or infinity to their rounding, eps^2 of them, where layers carry pressures up to `peak`.
+    /// Whether an energy is infinite, or so small that its rounding, eps^2 of it, is below the range of numbers. A zero energy is out of range if the
+    /// layers carry pressures, up to `peak`.
     pub fn is_out_of_range(&self, energy: f64, peak: f64) -> bool {
         const LEAST: f64 = f64::MIN_POSITIVE / (f64::EPSILON * f64::EPSILON);
         let energy = self.energy(energy);
@@ -67,21 +68,21 @@ impl Scale {
         if numerator <= 0.0 { 0.0 } else { (numerator / self.energy(reference)).sqrt() }
     }
 
-    /// [`PART`] of the pressure that gives all contact surfaces the energy u'Ku of the bodies. That of soft layers between stiff bodies is no measure of
-    /// what the bodies carry.
+    /// Return [`PART`] of the pressure that gives all contact surfaces the energy u'Ku of the bodies. The pressure of soft layers between stiff bodies
+    /// is no measure of what the bodies carry.
     fn stress(&self, strain: f64) -> f64 {
         if self.compliance > 0.0 { PART * (strain.max(0.0) / self.compliance).sqrt() } else { 0.0 }
     }
 
-    /// The largest pressure, by which errors of pressures are measured, in bodies with u'Ku = `strain`.
+    /// Return the pressure by which errors of pressures are measured in bodies with u'Ku = `strain`: the largest one (n), or the least scale.
     pub fn peak(&self, pressure: &[f64], strain: f64) -> f64 {
         pressure.iter().copied().fold(self.pressure.max(self.stress(strain)), f64::max)
     }
 
-    /// What the forces on a body lack in balance under the contact forces `force` (n), with u'Ku = `strain` over all bodies, as a share of them, the
-    /// most over all rigid motions that supports leave free. For such a motion m, K m = 0: only loads and contact forces work on it.
+    /// Return the forces out of balance on a body under the contact forces `force` (n), relative to these forces: the largest over all rigid motions
+    /// that supports leave free. `strain` is u'Ku over all bodies. For such a motion m, K m = 0, so that only loads and contact forces work on it.
     ///
-    /// The residual sees too little of this where a Robin term much stiffer than the layer holds the body.
+    /// The residual shows too little of an imbalance where the Robin term that holds the body is much stiffer than the layer.
     pub fn imbalance(&self, model: &Model, force: &[f64], strain: f64) -> f64 {
         let mut most = 0.0f64;
         let least = self.force.max(self.area * self.stress(strain));

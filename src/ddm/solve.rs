@@ -1,22 +1,22 @@
-//! A run from its start to its end, by either loop.
+//! A run from its start to its result, by either loop.
 
 use super::acceleration::Acceleration;
 use super::balance::{Balance, Discretisation};
 use super::bound::{OffLaws, Reached};
-use super::digits::ROUNDING;
 use super::forecast::Forecast;
 use super::history::{Observer, Row};
 use super::linear::resisting;
 use super::memory::Memory;
 use super::origin::Origin;
+use super::roundoff::{self, ROUNDING};
 use super::run::{End, Run, rounding};
 use super::scale::Scale;
 use super::start::{self, RigidStart};
-use super::stop::{Floor, Status};
-use super::{digits, newton, robin};
+use super::stop::{Stagnation, Status};
+use super::{newton, robin};
 use crate::error::Result;
 use crate::model::Model;
-use crate::model::body::BodyCounts;
+use crate::model::body::{Body, BodyCounts};
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
@@ -27,23 +27,23 @@ use crate::robin::extend::extend;
 use crate::robin::interval::{Interval, interval};
 use std::time::Instant;
 
-/// How iterates are made.
+/// The method of a run.
 pub enum Method {
-    /// Newton's method, with a way to solve its linear steps.
+    /// Newton's method, with the solver of its linear steps.
     Newton(Box<dyn LinearStep>),
-    /// Sweeps: the paper's iteration, or a faster one over the same sweep.
+    /// Sweeps: the iteration of the paper, or a faster one over the same sweep.
     Sweeps {
-        /// How the next iterate is made from a sweep.
+        /// The rule that makes the next iterate from a sweep.
         acceleration: Box<dyn Acceleration>,
         /// The Robin term.
         coefficient: Coefficient,
-        /// Solves for the response of the bodies, for estimates of the mesh's error.
+        /// The solver for the response of the bodies, which estimates of the mesh's error need.
         linear: Box<dyn LinearStep>,
     },
 }
 
 impl Method {
-    /// Name, as in the scene and the table.
+    /// Return the name, as in the scene and the table.
     pub fn name(&self) -> &'static str {
         match self {
             Method::Newton(linear) => linear.name(),
@@ -51,70 +51,74 @@ impl Method {
         }
     }
 
-    /// What solves linear steps.
+    /// Return the solver of linear steps.
     pub fn linear(&mut self) -> &mut dyn LinearStep {
         match self {
             Method::Newton(linear) | Method::Sweeps { linear, .. } => &mut **linear,
         }
     }
+
+    fn is_sweeps(&self) -> bool {
+        matches!(self, Method::Sweeps { .. })
+    }
 }
 
-/// Where a run begins.
+/// The start of a run.
 #[derive(Debug, Clone, Default)]
 pub enum Start {
     /// Rigid bodies on their own surfaces.
     #[default]
     Automatic,
-    /// The same, already found for these loads.
+    /// The automatic start, already found for these loads.
     Found(Box<RigidStart>),
     /// Outer normal displacement of all contact rows (2n, layout of a trace vector).
     Trace(Vec<f64>),
-    /// Contact pressures (n), from another mesh say, for Newton's method; sweeps begin automatically.
+    /// Contact pressures (n) for Newton's method, for example from another mesh; sweeps begin automatically.
     Pressure(Vec<f64>),
-    /// A displacement as it is.
+    /// A displacement, used as it is.
     Resume(Field),
-    /// Where another run paused.
+    /// The state in which another run paused.
     Continue(Box<State>),
 }
 
-/// What a run goes on from.
+/// The state from which a run goes on.
 #[derive(Debug, Clone)]
 pub struct State {
-    /// Displacements. If the states of a body are not those that its solver works with, its traces count.
+    /// Displacements. If the states are not those that the solvers of the bodies work with, only the traces are used.
     pub field: Field,
     /// Compressions of the layers' states, n.
     pub compression: Vec<f64>,
-    /// Energy per area by which their laws are smoothed, n; empty for the laws themselves.
+    /// Energy per area by which the laws are smoothed, n; empty for the laws themselves.
     pub smoothing: Vec<f64>,
-    /// History up to there.
+    /// History so far.
     pub rows: Vec<Row>,
-    /// What the run remembers; none if it comes from a file.
+    /// Memory of the run; none if the state comes from a file.
     pub memory: Option<Memory>,
 }
 
 impl From<Option<Vec<f64>>> for Start {
-    /// A trace, or none.
+    /// Start from a trace, or automatically.
     fn from(trace: Option<Vec<f64>>) -> Self {
         trace.map_or(Start::Automatic, Start::Trace)
     }
 }
 
-/// What a run needs to know besides the model and the method.
+/// Settings of a run besides the model and the method.
 pub struct Settings {
-    /// When to stop.
+    /// The rule that ends the run.
     pub stop: StopRule,
     /// Whether to find the interval (33) of gamma at the end, which takes some sweeps.
     pub interval: bool,
-    /// Who knows the error of the discretisation, if the run is to stop where more would change nothing.
+    /// The estimator of the discretisation error, if the run is to stop where more iterations would change nothing.
     pub balance: Option<Box<dyn Discretisation>>,
-    /// Where to begin.
+    /// The start.
     pub start: Start,
 }
 
-/// Result of a run: the last iterate that made sense, and how it came about.
+/// The result of a run: its last valid iterate, with its errors and history.
 #[derive(Clone)]
 pub struct Outcome {
-    /// How it ended.
+    /// How the run ended.
     pub status: Status,
     /// Updates made.
     pub iterations: usize,
@@ -126,32 +130,32 @@ pub struct Outcome {
     pub iterate: Field,
     /// The layers at that iterate.
     pub layer: Layer,
-    /// How far these are from the laws at its compressions.
+    /// Distance of these layers from the laws at the compressions of the iterate.
     off: OffLaws,
     scale: Scale,
-    /// What rounding can make of it, a squared energy norm.
-    floor: f64,
-    /// History, one row an iterate.
+    /// Roundoff of the iterate, a squared energy norm; zero unless roundoff ended the run.
+    roundoff_level: f64,
+    /// History, one row per iterate.
     pub rows: Vec<Row>,
-    /// What it remembers besides.
+    /// Memory of the run.
     pub memory: Option<Memory>,
     /// Name of the method.
     pub method: &'static str,
-    /// What was done with all bodies together, besides what bodies count themselves.
+    /// Counters of what was done for all bodies together, besides the counters of the bodies.
     pub joint: BodyCounts,
-    /// What solved it for all bodies together; empty if each had its own solver.
+    /// The solver of all bodies together; empty if each body had its own.
     pub linear_step: String,
     /// Estimated bounds of the spectrum of G^-1 F1'', if the method saw enough.
     pub spectrum: Option<(f64, f64)>,
-    /// What rounding of gaps and displacements can make of a pressure, as a share of what errors of pressures are measured by.
+    /// Largest error of a pressure by rounding of gaps and displacements, relative to the scale of errors of pressures.
     pub rounding: f64,
-    /// What it would still need to the residual that is asked for, where that can be told.
+    /// Iterations still needed for the residual that is asked for, where they can be estimated.
     pub forecast: Option<Forecast>,
-    /// The interval (33) of gamma, if it was asked for and can be told.
+    /// The interval (33) of gamma, if it was asked for and can be found.
     pub interval: Option<Interval>,
 }
 
-/// Runs a method on a model from its start until a rule ends it.
+/// Run a method on a model from its start until a rule ends it.
 ///
 /// # Errors
 /// Failures of the solver library. Not converging is a [`Status`].
@@ -164,10 +168,10 @@ pub fn solve(
     let began = Instant::now();
     let found = match &settings.start {
         Start::Found(rigid) => Ok((**rigid).clone()),
-        _ => infeasible(model),
+        _ => find_start(model),
     };
     let (begin, balance) = (std::mem::take(&mut settings.start), settings.balance.take());
-    let floor = if let Method::Newton(_) = method { Floor::of_steps() } else { Floor::of_sweeps() };
+    let stagnation = if method.is_sweeps() { Stagnation::of_sweeps() } else { Stagnation::of_steps() };
     let foreign = method.linear().sweeps();
     let mut run = Run {
         model,
@@ -180,11 +184,11 @@ pub fn solve(
         scale: Scale::default(),
         energy: 0.0,
         strain: 0.0,
-        memory: Memory::new(floor, foreign),
+        memory: Memory::new(stagnation, foreign),
         rows: Vec::new(),
     };
     let end = match found {
-        Ok(rigid) => run.begin(method, begin, rigid)?,
+        Ok(rigid) => run.iterate(method, begin, rigid)?,
         Err(status) => {
             let rest = Field::rest(run.model);
             let layer = Layer::at(run.model, &rest.trace);
@@ -195,46 +199,26 @@ pub fn solve(
 }
 
 impl Run<'_> {
-    /// Runs from a start.
-    fn begin(&mut self, method: &mut Method, begin: Start, rigid: RigidStart) -> Result<End> {
+    /// Iterate from a start.
+    fn iterate(&mut self, method: &mut Method, begin: Start, rigid: RigidStart) -> Result<End> {
         let mut trace = match &begin {
             Start::Trace(given) => given.clone(),
+            Start::Continue(state) => state.field.trace.clone(),
             _ => rigid.trace.clone(),
         };
         self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &rigid.trace]);
-        let places = places(self.model, &begin, &rigid);
-        let floats = self.model.bodies.iter().any(|slot| !slot.motions.is_empty());
-        // an estimate of the discretisation's error needs the iterates whole
-        if floats && self.balance.is_none() {
+        let states = first_states(self.model, &begin, &rigid);
+        let is_free = self.model.bodies.iter().any(|slot| !slot.motions.is_empty());
+        // an estimate of the discretisation's error needs whole displacements, not their difference from an origin
+        if is_free && self.balance.is_none() {
             self.origin = Origin::take(self.model, &rigid.amounts);
         }
-        let resumed = match begin {
-            Start::Resume(field) => Some(field),
-            Start::Continue(state) => {
-                self.earlier = state.rows.last().map_or(0.0, |row| row.seconds);
-                trace.clone_from(&state.field.trace);
-                let whole = state.memory.is_some() || fits(self.model, &state.field);
-                match state.memory {
-                    Some(memory) => self.memory = Memory { states: None, ..memory },
-                    None => {
-                        self.memory.earlier = state.rows.last().map_or(0, |row| row.sweeps);
-                        self.memory.sweeper.sweeps = self.memory.earlier;
-                    }
-                }
-                self.rows = state.rows;
-                whole.then_some(state.field)
-            }
-            _ => None,
-        };
-        let resumed = resumed.map(|mut field| {
-            self.origin.iter().for_each(|origin| origin.take_from(self.model, &mut field));
-            field
-        });
+        let resumed = self.resume(begin);
         match method {
             Method::Newton(linear) => {
                 let start = |origin: &mut Origin| std::mem::take(&mut origin.rest);
                 let u = resumed.or_else(|| self.origin.as_mut().map(start)).unwrap_or_else(|| Field::rest(self.model));
-                newton::iterate(self, &mut **linear, u, places)
+                newton::iterate(self, &mut **linear, u, states)
             }
             Method::Sweeps { acceleration, coefficient, linear } => {
                 if let Some(origin) = &self.origin {
@@ -243,42 +227,70 @@ impl Run<'_> {
                 match resumed.map_or_else(|| extend(self.model, &trace), |field| Ok(Ok(field)))? {
                     Ok(u) => robin::iterate(self, &mut **acceleration, coefficient, &mut **linear, u),
                     Err(failure) => {
-                        Ok(self.end(Status::InnerSolver(failure), Field::rest(self.model), places, &**linear))
+                        Ok(self.end(Status::InnerSolver(failure), Field::rest(self.model), states, &**linear))
                     }
                 }
             }
         }
     }
+
+    /// Take over what a run left that is to go on: its history, its memory, and its displacements, which are returned relative to the origin.
+    /// Return none if the start has no displacements, or others than those that the bodies work with.
+    fn resume(&mut self, begin: Start) -> Option<Field> {
+        let mut field = match begin {
+            Start::Resume(field) => field,
+            Start::Continue(state) => {
+                let State { field, rows, memory, .. } = *state;
+                let is_whole = memory.is_some() || fits(self.model, &field);
+                let (seconds, sweeps) = rows.last().map_or((0.0, 0), |row| (row.seconds, row.sweeps));
+                self.earlier = seconds;
+                self.rows = rows;
+                match memory {
+                    Some(memory) => self.memory = Memory { states: None, ..memory },
+                    None => (self.memory.earlier, self.memory.sweeper.sweeps) = (sweeps, sweeps),
+                }
+                is_whole.then_some(field)?
+            }
+            _ => return None,
+        };
+        if let Some(origin) = &self.origin {
+            origin.take_from(self.model, &mut field);
+        }
+        Some(field)
+    }
 }
 
-/// Whether a field has the states that the bodies work with: as long, and with its traces to half the digits. Collective.
+/// Whether a field has the states that the bodies work with: vectors of the same length, whose traces agree with those of the field to half the
+/// digits. Collective.
 fn fits(model: &Model, field: &Field) -> bool {
-    let local =
-        || model.bodies.iter().zip(&field.states).filter_map(|(slot, state)| Some((slot.local.as_ref()?, state)));
-    let mut odd = [local().filter(|(body, state)| body.len() != state.len()).count() as f64];
+    let bodies = model.bodies.iter().map(|slot| slot.local.as_ref());
+    let is_odd =
+        |(body, state): (Option<&Box<dyn Body>>, &Vec<f64>)| body.is_some_and(|body| body.len() != state.len());
+    let mut odd = [bodies.zip(&field.states).filter(|pair| is_odd(*pair)).count() as f64];
     model.exchange.sum(&mut odd);
     if odd[0] > 0.0 {
         return false;
     }
     let mut traced = field.clone();
     traced.retrace(model);
-    let apart = traced.trace.iter().zip(&field.trace).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-    apart <= f64::EPSILON * crate::linalg::dot(&field.trace, &field.trace)
+    let difference = traced.trace.iter().zip(&field.trace).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    difference <= f64::EPSILON * crate::linalg::dot(&field.trace, &field.trace)
 }
 
-/// Springs omega kappa of the first linear step of Newton's method; none if there is no solution. An automatic start becomes the one
-/// found.
+/// Return the springs omega kappa (n) of the first linear step of Newton's method; none if there is no solution. An automatic start is replaced by
+/// the one that is found.
 pub fn first_springs(model: &Model, begin: &mut Start) -> Option<Vec<f64>> {
-    let rigid = infeasible(model).ok()?;
-    let springs = resisting(model, places(model, begin, &rigid).springs(model));
+    let rigid = find_start(model).ok()?;
+    let springs = resisting(model, first_states(model, begin, &rigid).springs(model));
     if let Start::Automatic = begin {
         *begin = Start::Found(Box::new(rigid));
     }
     Some(springs)
 }
 
-/// Why no method can find a solution: a motion that nothing can hold, or loads that push a body off for ever; else the start.
-fn infeasible(model: &Model) -> std::result::Result<RigidStart, Status> {
+/// Return the automatic start. If no method can find a solution, return the reason: a motion that nothing resists, or loads that push a body off
+/// for ever.
+fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
     if let Some(moved) = underconstrained(model, &model.row_stiffness()) {
         return Err(Status::Underconstrained(moved));
     }
@@ -288,8 +300,8 @@ fn infeasible(model: &Model) -> std::result::Result<RigidStart, Status> {
     start::find(model, None).map_err(|moving| Status::Unbounded { moving })
 }
 
-/// The places from which Newton's method begins.
-fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
+/// Return the layer states from which Newton's method begins.
+fn first_states(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
     match begin {
         Start::Automatic | Start::Found(_) => rigid.places.clone(),
         Start::Trace(trace) => match start::find(model, Some(trace)) {
@@ -311,108 +323,141 @@ fn places(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
     }
 }
 
-/// What rounding can make of a solution, a squared energy norm: as of any iterate, and what contact forces that change by the `digits` of the compressions, n,
-/// make of the bodies. Where both bodies of a stiff layer move together, they alone resist.
-fn floor(model: &Model, u: &Field, layer: &Layer, digits: &[f64]) -> f64 {
+/// Return what roundoff can make of a solution, a squared energy norm. It is that of any iterate, and the response of the bodies to contact forces
+/// that change with the `roundoff` of the compressions, n. Where both bodies of a stiff layer move together, the bodies alone resist.
+fn roundoff_level(model: &Model, u: &Field, layer: &Layer, roundoff: &[f64]) -> f64 {
     let (rows, springs) = (model.row_stiffness(), layer.springs(model));
-    let forces = rows.iter().enumerate().filter(|(_, stiffness)| **stiffness > 0.0);
-    let made = |(row, stiffness): (usize, &f64)| {
-        let q = row % digits.len();
-        (springs[q] * digits[q]).powi(2) / stiffness
+    let resisted = rows.iter().enumerate().filter(|(_, stiffness)| **stiffness > 0.0);
+    let response = |(row, stiffness): (usize, &f64)| {
+        let q = row % roundoff.len();
+        (springs[q] * roundoff[q]).powi(2) / stiffness
     };
-    rounding(model, u, layer) + ROUNDING * forces.map(made).sum::<f64>()
+    rounding(model, u, layer) + ROUNDING * resisted.map(response).sum::<f64>()
 }
 
 impl Outcome {
-    /// Whether rounding can make a lack of balance that is worth `unbalanced` in the energy norm, if that is what ended the run.
+    /// Whether roundoff explains forces out of balance of this energy norm. Only a run that roundoff ended can have such forces.
     pub fn is_rounding(&self, unbalanced: f64) -> bool {
-        self.status != Status::RoundoffLimited || unbalanced * unbalanced <= self.floor
+        self.status != Status::RoundoffLimited || unbalanced * unbalanced <= self.roundoff_level
     }
 
-    /// Return the relative errors of the result, with u'Ku = `strain`, if its forces lack a balance that is worth `unbalanced` in the energy norm,
-    /// and the pair whose pressures are off their law by the largest of them, if they are. The model is that of the run.
+    /// Return the relative errors of the result, with u'Ku = `strain`, if its forces out of balance have the energy norm `unbalanced`. The second
+    /// value is the pair whose pressures differ from their law by the largest of the errors, if one does. The model is that of the run.
     pub fn reached(&self, model: &Model, strain: f64, unbalanced: f64) -> (Reached, Option<usize>) {
         let of_steps = self.method.starts_with("newton");
-        Reached::of_result((model, &self.scale), strain, unbalanced, &self.off, &self.layer, of_steps)
+        Reached::of_result(model, &self.scale, strain, unbalanced, &self.off, &self.layer, of_steps)
     }
 
-    /// What a run can go on from.
+    /// Return the state from which a run can go on.
     pub fn into_state(self) -> Box<State> {
         let Layer { compression, smoothing, .. } = self.next_states().clone();
         let Self { iterate: field, rows, memory, .. } = self;
         Box::new(State { field, compression, smoothing, rows, memory })
     }
 
-    /// Return the layer states that a further step would be taken from.
+    /// Return the layer states from which a further step would be taken.
     pub fn next_states(&self) -> &Layer {
         self.memory.as_ref().and_then(|memory| memory.states.as_ref()).unwrap_or(&self.layer)
     }
 }
 
+/// What a method knows at the end of a run.
+struct Findings {
+    /// Updates of the iterate.
+    updates: usize,
+    /// Estimated bounds of the spectrum of G^-1 F1''.
+    spectrum: Option<(f64, f64)>,
+    /// The method's own factor by which an iteration reduces the residual.
+    factor: Option<f64>,
+    interval: Option<Interval>,
+}
+
 impl Run<'_> {
-    /// The result of a loop's end.
-    fn conclude(self, end: End, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
-        let Run { model, stop, rows, origin, memory, scale, energy, strain, .. } = self;
-        let End { mut status, mut iterate, layer, weight, sweeps, skipped } = end;
-        if status.is_solved() && scale.is_out_of_range(energy, layer.peak()) {
-            status = Status::OutOfRange { energy };
+    /// Return the result of a run whose loop has ended.
+    fn conclude(mut self, mut end: End, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
+        if end.status.is_solved() && self.scale.is_out_of_range(self.energy, end.layer.peak()) {
+            end.status = Status::OutOfRange { energy: self.energy };
         }
-        let mut found = None;
-        let (spectrum, factor, updates) = match method {
-            Method::Newton(linear) => (linear.spectrum(), None, rows.last().map_or(0, |row| row.iteration)),
-            Method::Sweeps { acceleration, .. } => {
-                acceleration.conclude(model, &layer, &weight);
-                if let ([first, .., last], true) = (&rows[..], wants_interval && status.is_solved()) {
-                    found = interval(model, &layer, first.energy - last.energy)?;
-                }
-                (acceleration.spectrum(), acceleration.factor(), rows.len().saturating_sub(1))
+        let findings = self.findings(&end, method, wants_interval)?;
+        let mut traced = end.iterate.clone();
+        // sweeps update states and traces separately
+        if method.is_sweeps() {
+            traced.retrace(self.model);
+        }
+        let compression = self.model.compression(&traced.trace);
+        let roundoff_level = match end.status {
+            Status::RoundoffLimited => {
+                let roundoff = roundoff::of_compressions(self.model, &traced.trace);
+                roundoff_level(self.model, &end.iterate, &end.layer, &roundoff)
             }
+            _ => 0.0,
         };
-        let mut traced = iterate.clone();
-        // sweeps add to states and traces on their own
-        if matches!(method, Method::Sweeps { .. }) {
-            traced.retrace(model);
+        if let Some(origin) = self.origin.take() {
+            origin.give(self.model, &mut end.iterate);
         }
-        let (compression, digits) = (model.compression(&traced.trace), digits::of_compressions(model, &traced.trace));
-        let floor = if status == Status::RoundoffLimited { floor(model, &iterate, &layer, &digits) } else { 0.0 };
-        if let Some(origin) = origin {
-            origin.give(model, &mut iterate);
-        }
-        // displacements are given with the digits that they have as a whole
-        let off = OffLaws::new(model, &layer, &compression, &digits::of_compressions(model, &iterate.trace));
-        let answer: Vec<f64> = match method {
-            Method::Newton(_) => {
-                let lines = memory.progress.slopes(model, &meeting_slopes(model));
-                lines.iter().zip(surface_slopes(model)).map(|(line, surface)| surface.max(*line)).collect()
-            }
-            Method::Sweeps { .. } => vec![f64::INFINITY; model.points()],
-        };
-        let times = digits::lacking(matches!(method, Method::Sweeps { .. }), &status);
-        let peak = scale.peak(&layer.pressure, strain);
-        let mut rounding = times * digits::lost(model, &iterate.trace, &layer, &answer, peak);
-        if let (Method::Sweeps { .. }, Status::RoundoffLimited) = (&*method, &status) {
-            // pressures of compressions are not in balance to more than their digits
-            rounding = rounding.max(scale.imbalance(model, &layer.force, strain));
-        }
+        // the displacements of the result have the digits of whole ones, not of those relative to the origin
+        let roundoff = roundoff::of_compressions(self.model, &end.iterate.trace);
+        let off = OffLaws::new(self.model, &end.layer, &compression, &roundoff);
         Ok(Outcome {
-            status,
-            iterations: updates,
-            sweeps,
-            solves_skipped: skipped,
-            iterate,
+            iterations: findings.updates,
+            sweeps: end.sweeps,
+            solves_skipped: end.skipped,
             off,
-            rounding,
-            forecast: stop.residual.and_then(|target| Forecast::new(&rows, target, factor)),
-            layer,
-            scale,
-            floor,
-            rows,
-            memory: Some(memory),
+            rounding: self.roundoff_of_pressures(&end, method.is_sweeps()),
+            forecast: self.stop.residual.and_then(|target| Forecast::new(&self.rows, target, findings.factor)),
+            status: end.status,
+            iterate: end.iterate,
+            layer: end.layer,
+            scale: self.scale,
+            roundoff_level,
+            rows: self.rows,
+            memory: Some(self.memory),
             method: method.name(),
             joint: method.linear().counts(),
             linear_step: method.linear().describe(),
-            spectrum,
-            interval: found,
+            spectrum: findings.spectrum,
+            interval: findings.interval,
         })
+    }
+
+    /// Ask the method what it knows at the end of a run. Collective.
+    fn findings(&mut self, end: &End, method: &mut Method, wants_interval: bool) -> Result<Findings> {
+        let (model, rows) = (&mut *self.model, &self.rows[..]);
+        let acceleration = match method {
+            Method::Newton(linear) => {
+                let updates = rows.last().map_or(0, |row| row.iteration);
+                return Ok(Findings { updates, spectrum: linear.spectrum(), factor: None, interval: None });
+            }
+            Method::Sweeps { acceleration, .. } => acceleration,
+        };
+        acceleration.conclude(model, &end.layer, &end.weight);
+        let interval = match rows {
+            [first, .., last] if wants_interval && end.status.is_solved() => {
+                interval(model, &end.layer, first.energy - last.energy)?
+            }
+            _ => None,
+        };
+        let (updates, spectrum) = (rows.len().saturating_sub(1), acceleration.spectrum());
+        Ok(Findings { updates, spectrum, factor: acceleration.factor(), interval })
+    }
+
+    /// Return the largest error of a pressure of the result by rounding of gaps and displacements, relative to the scale of pressures.
+    fn roundoff_of_pressures(&self, end: &End, is_sweeps: bool) -> f64 {
+        let (model, layer) = (&*self.model, &end.layer);
+        let answer = match is_sweeps {
+            true => vec![f64::INFINITY; model.points()],
+            false => {
+                let rho = self.memory.progress.slopes(model, &meeting_slopes(model));
+                rho.iter().zip(surface_slopes(model)).map(|(rho, surface)| surface.max(*rho)).collect()
+            }
+        };
+        let peak = self.scale.peak(&layer.pressure, self.strain);
+        let times = roundoff::safety(is_sweeps, &end.status);
+        let error = times * roundoff::of_pressures(model, &end.iterate.trace, layer, &answer, peak);
+        if is_sweeps && end.status == Status::RoundoffLimited {
+            // pressures that are taken from compressions balance the loads only to the digits of the compressions
+            return error.max(self.scale.imbalance(model, &layer.force, self.strain));
+        }
+        error
     }
 }

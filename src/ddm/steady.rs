@@ -1,44 +1,49 @@
-//! Do the pressures stand still? What they still miss, judged by how they moved while the residual fell.
+//! Estimates of the error of the pressures, from their change while the residual fell.
 //!
-//! A last step that moves nothing proves little: it may have been short, or have gone along modes that the contact does not
-//! feel, while others are far from their end. While the residual falls to a share s of what it was, errors in the long
-//! run fall as it does, so that the change of a pressure since then is 1 - s of its error then, and s/(1 - s) of that
-//! change is left.
+//! A last step that moves nothing proves little. It may have been short, or along modes that do not change the contact, while other modes are far
+//! from their end. In the long run, errors fall as the residual does. While the residual falls to a share s of its earlier value, a pressure
+//! changes by 1 - s of its earlier error. So s/(1 - s) of that change is left as its error.
 
-/// Share of an earlier residual below which the pressures of that iterate tell something.
+/// Share of an earlier residual below which the pressures of that iterate give an estimate.
 const FALLEN: f64 = 0.1;
 
-/// Pressures of earlier iterates, with residuals that fall from each to the next by this share or more.
+/// Earlier iterates, whose residuals fall from each to the next at least to the share [`FALLEN`].
 #[derive(Debug, Default, Clone)]
 pub struct Steady {
-    past: Vec<(f64, Vec<f64>)>,
+    past: Vec<Earlier>,
+}
+
+/// An earlier iterate.
+#[derive(Debug, Clone)]
+struct Earlier {
+    residual: f64,
+    /// n.
+    pressure: Vec<f64>,
 }
 
 impl Steady {
-    /// Largest estimated error of the pressures `now` of an iterate with this residual; zero if it is the first one. An error larger
-    /// than their `peak` is no measure of those that follow: laws are far from linear there.
+    /// Estimate the largest error of the pressures `now` (n) of an iterate with this residual; zero if it is the first one. Changes above their `peak`
+    /// count as the peak: laws are far from linear there, so that larger errors say nothing about those that follow.
     pub fn missing(&self, residual: f64, now: &[f64], peak: f64) -> f64 {
-        let left = |(then, before): &(f64, Vec<f64>)| {
-            let moved = most_apart(before, now).min(peak);
-            // a residual that has not fallen tells that nothing is known
-            if residual < *then { moved * residual / (then - residual) } else { moved }
-        };
-        // from a good start it may never have fallen so far
-        let told = self.past.iter().rfind(|(then, _)| residual <= FALLEN * then).or(self.past.first());
-        told.map_or(0.0, left)
+        // from a good start the residual may never have fallen so far
+        let earlier = self.past.iter().rfind(|earlier| residual <= FALLEN * earlier.residual).or(self.past.first());
+        earlier.map_or(0.0, |earlier| {
+            let change = largest_difference(&earlier.pressure, now).min(peak);
+            // without a fall of the residual, no smaller error is known
+            if residual < earlier.residual { change * residual / (earlier.residual - residual) } else { change }
+        })
     }
 
-    /// Takes an iterate into the past.
+    /// Note an iterate.
     pub fn note(&mut self, residual: f64, pressure: &[f64]) {
-        self.past.retain(|(then, _)| *then > residual);
-        if self.past.last().is_none_or(|(then, _)| residual <= FALLEN * then) {
-            self.past.push((residual, pressure.to_vec()));
+        self.past.retain(|earlier| earlier.residual > residual);
+        if self.past.last().is_none_or(|earlier| residual <= FALLEN * earlier.residual) {
+            self.past.push(Earlier { residual, pressure: pressure.to_vec() });
         }
     }
 }
 
-/// Largest difference of two sets of pressures.
-fn most_apart(before: &[f64], now: &[f64]) -> f64 {
+fn largest_difference(before: &[f64], now: &[f64]) -> f64 {
     before.iter().zip(now).fold(0.0, |most, (before, now)| most.max((now - before).abs()))
 }
 

@@ -1,4 +1,4 @@
-//! When a run ends, and what that is called.
+//! The status with which a run ends, and the watches for roundoff and cycles.
 
 use crate::model::Mechanism;
 use crate::model::linear::Failure;
@@ -11,64 +11,64 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 pub enum Status {
     /// A stopping rule was met.
     Converged,
-    /// The error cannot fall further in this arithmetic.
+    /// The error cannot fall further in double precision.
     RoundoffLimited,
     /// The limit of iterations was reached.
     IterationLimit,
-    /// A number that is not finite came up in a body.
+    /// A number that is not finite appeared in a body.
     NotFinite {
         /// The first such body.
         body: usize,
     },
-    /// Energies are too large or too small for double numbers, so that no error can be told.
+    /// Energies are too large or too small for double numbers, so that no error can be computed.
     OutOfRange {
         /// Energy of bodies and layers.
         energy: f64,
     },
     /// The iterates repeat.
     Cycle {
-        /// Updates after which they come back; 1 where the contact stays and nothing falls.
+        /// Updates after which they repeat; 1 if the contact stays the same and nothing falls.
         period: usize,
     },
-    /// Neither supports nor the Robin term hold a body.
+    /// Neither supports nor the Robin term constrain a body.
     Underconstrained(Moved),
-    /// Loads move several bodies together in a way that changes no gap and that nothing holds.
+    /// Loads move several bodies together in a way that changes no gap and that nothing resists.
     Mechanism(Mechanism),
-    /// F1 falls for ever: loads push bodies where neither a support nor a contact stops them.
+    /// F1 has no minimum: loads push bodies where neither a support nor a contact stops them.
     Unbounded {
         /// The bodies and their motions, where they are known.
         moving: Vec<Moved>,
     },
     /// An inner solver failed.
     InnerSolver(Failure),
-    /// The run thought to be at its end, and the forces of its displacements say that it is not.
+    /// The run ended as solved, but the forces of its displacements show a larger error.
     Inaccurate(Inaccuracy),
-    /// Somebody outside asked for it; the run can go on from its outcome.
+    /// A request from outside paused the run; it can go on from its outcome.
     Paused {
         /// The bits of [`Observer::asked`](super::Observer::asked) of all ranks.
         asked: u8,
     },
 }
 
-/// What a solution was thought to miss, and what it misses: relative errors.
+/// The error with which a run ended, and the larger one that was found afterwards, both relative.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inaccuracy {
     /// The error that the run would have ended with.
     pub told: f64,
-    /// The largest of those found.
+    /// The largest error that was found.
     pub found: f64,
-    /// Where that is.
+    /// Where that error is.
     pub whose: Whose,
 }
 
-/// Where an error is.
+/// The place of an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Whose {
     /// In the forces on a body.
     Body(usize),
     /// In the pressures of a pair.
     Pair(usize),
-    /// In what rounding leaves of all pressures.
+    /// In the roundoff of all pressures.
     Rounding,
 }
 
@@ -79,44 +79,47 @@ impl Status {
     }
 }
 
-/// The paper's rho: norm of the increment of normal displacements over the norm of the displacements. Zero over zero
-/// is zero.
+/// Return the paper's rho: the norm of the increment of normal displacements over the norm of the displacements. Zero over zero is zero.
 pub fn relative_increment(step: &[f64], now: &[f64]) -> f64 {
     let norm = |v: &[f64]| crate::linalg::dot(v, v).sqrt();
     if norm(step) == 0.0 { 0.0 } else { norm(step) / norm(now) }
 }
 
-/// Watches for progress: at the rounding floor the error stays where it is.
+/// A watch for stagnation: at the roundoff level the error stops falling.
 #[derive(Debug, Clone)]
-pub struct Floor {
+pub struct Stagnation {
+    /// The least error so far.
     best: f64,
+    /// Iterates since the last progress.
     since: usize,
+    /// Iterates without progress after which the roundoff level is suspected.
     patience: usize,
+    /// Errors from here on are not explained by roundoff.
     believable: f64,
 }
 
-impl Floor {
+impl Stagnation {
     /// Share of the best error that an iterate must reach to be progress.
     const FALLS: f64 = 0.9;
 
-    /// Of Newton's method, whose iterates are in equilibrium: one without progress may be there. An error of all of the solution or more leaves
-    /// nothing of it that is known.
+    /// Return the watch for Newton's method. Its iterates are in equilibrium, so one iteration without progress suggests that the roundoff level
+    /// is reached. A relative error of one or more leaves no digit of the solution.
     pub fn of_steps() -> Self {
         Self { best: f64::INFINITY, since: 0, patience: 1, believable: 1.0 }
     }
 
-    /// Of sweeps: twenty without progress, as each may gain half a per cent, and an error of 1e-4 at most. Those far from any solution can have large
-    /// rounding errors, too.
+    /// Return the watch for sweeps. It waits for twenty iterates without progress, as each may gain half a per cent. The error must be below 1e-4,
+    /// because iterates far from any solution can have large rounding errors, too.
     pub fn of_sweeps() -> Self {
         Self { patience: 20, believable: 1e-4, ..Self::of_steps() }
     }
 
-    /// Whether an iterate of this error would be no progress, and one that can be a solution.
+    /// Whether an iterate with this error would be no progress, and can be a solution.
     pub fn is_stuck(&self, error: f64) -> bool {
         error >= Self::FALLS * self.best && error < self.believable
     }
 
-    /// Notes an error; true when it is time to compare it with the rounding errors.
+    /// Note an error. Return whether it is time to compare it with the rounding errors.
     pub fn is_reached(&mut self, error: f64) -> bool {
         if error < Self::FALLS * self.best {
             self.best = error;
@@ -127,30 +130,42 @@ impl Floor {
         self.since > 0 && self.since.is_multiple_of(self.patience) && error < self.believable
     }
 
-    /// Whether Newton's method stands still: as many steps as a cycle has at most were no progress, and the last one moved the bodies by this `increment`, no
-    /// more than half of the digits. The next step would be the same, so that only rounding is left.
+    /// Whether Newton's method stands still. As many steps as the longest cycle has were no progress, and the relative `increment` of the last one
+    /// is in the second half of the digits. The next step would be the same, so that only roundoff is left.
     pub fn is_fixed(&self, increment: f64) -> bool {
         self.patience == 1 && self.since >= Cycle::LONGEST && increment <= f64::EPSILON.sqrt()
     }
 }
 
-/// Recognises an iteration that runs in a circle: the same traces again, or the same contact sets again and again without
-/// progress.
+/// A watch for cycles: traces that come back, or contact sets that repeat without progress.
 #[derive(Debug, Default, Clone)]
 pub struct Cycle {
+    /// Traces of the last iterates.
     recent: VecDeque<Vec<f64>>,
-    /// Contact sets of the last iterates, as hashes, and the least residual and F1 up to each.
-    sets: VecDeque<(u64, (f64, f64))>,
-    best: (f64, f64),
+    /// Contact sets of the last iterates.
+    sets: VecDeque<ContactSet>,
+}
+
+/// The contact set of an iterate.
+#[derive(Debug, Clone, Copy)]
+struct ContactSet {
+    /// Hash of the set of closed points.
+    hash: u64,
+    /// Least residual of the run up to this iterate.
+    residual: f64,
+    /// Least F1 of the run up to this iterate.
+    energy: f64,
 }
 
 impl Cycle {
     /// Longest period looked for. Contact sets must repeat for so many of the longest periods.
     const LONGEST: usize = 8;
 
-    /// The period, if the last update moved `trace` by more than half of its digits and it is that of 2 to 8 updates ago to half of the
-    /// digits of this step, or if the contact sets `closed` of the last 64 iterates repeat with that period, or are all the same (1), and neither the
-    /// residual nor F1 has fallen meanwhile.
+    /// Note an iterate, and return the period of a cycle, if there is one:
+    /// - from 2 to 8, if the traces are those of so many updates ago to half of the digits of the last update, which is itself not below half of
+    ///   the digits of `trace`;
+    /// - from 1 to 8, if the contact sets `closed` of the last 64 iterates repeat with this period, and neither the residual nor F1 (`energy`) has
+    ///   fallen meanwhile. With the period 1 the contact sets are all the same.
     pub fn period(
         &mut self,
         trace: &[f64],
@@ -163,11 +178,11 @@ impl Cycle {
 
     fn period_of_traces(&mut self, trace: &[f64]) -> Option<usize> {
         let half = f64::EPSILON.sqrt();
-        let apart = |other: &[f64]| trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt();
-        let step = self.recent.back().map_or(0.0, |last| apart(last));
-        let moved = step > half * crate::linalg::dot(trace, trace).sqrt();
+        let distance = |other: &[f64]| trace.iter().zip(other).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt();
+        let step = self.recent.back().map_or(0.0, |last| distance(last));
+        let has_moved = step > half * crate::linalg::dot(trace, trace).sqrt();
         let found = (2..=self.recent.len())
-            .find(|&period| moved && apart(&self.recent[self.recent.len() - period]) < half * step);
+            .find(|&period| has_moved && distance(&self.recent[self.recent.len() - period]) < half * step);
         if self.recent.len() == Self::LONGEST {
             self.recent.pop_front();
         }
@@ -178,18 +193,20 @@ impl Cycle {
     fn period_of_sets(&mut self, closed: impl Iterator<Item = bool>, residual: f64, energy: f64) -> Option<usize> {
         let mut hash = DefaultHasher::new();
         closed.for_each(|closed| closed.hash(&mut hash));
-        let start = self.sets.is_empty();
-        self.best = if start { (residual, energy) } else { (self.best.0.min(residual), self.best.1.min(energy)) };
-        self.sets.push_back((hash.finish(), self.best));
+        let mut now = ContactSet { hash: hash.finish(), residual, energy };
+        if let Some(last) = self.sets.back() {
+            (now.residual, now.energy) = (last.residual.min(residual), last.energy.min(energy));
+        }
+        self.sets.push_back(now);
         if self.sets.len() <= Self::LONGEST.pow(2) {
             return None;
         }
         self.sets.pop_front();
-        let (then, now) = (self.sets[0].1, self.best);
-        let stuck = then.0 <= now.0 && then.1 <= now.1;
-        let sets: Vec<u64> = self.sets.iter().map(|set| set.0).collect();
-        let repeats = |period: &usize| sets.windows(period + 1).all(|window| window[0] == window[*period]);
-        (1..=Self::LONGEST).find(|period| stuck && repeats(period))
+        let then = self.sets[0];
+        let is_stuck = then.residual <= now.residual && then.energy <= now.energy;
+        let hashes: Vec<u64> = self.sets.iter().map(|set| set.hash).collect();
+        let repeats = |period: &usize| hashes.windows(period + 1).all(|window| window[0] == window[*period]);
+        (1..=Self::LONGEST).find(|period| is_stuck && repeats(period))
     }
 }
 
@@ -271,21 +288,21 @@ mod tests {
 
     #[test]
     fn stalling_is_suspected_only_after_a_while() {
-        let mut floor = Floor::of_sweeps();
+        let mut floor = Stagnation::of_sweeps();
         assert!((0..200).all(|k| !floor.is_reached(0.89f64.powi(k))));
         // at the 20th iterate without progress, and at every 20th from there on
         let reached: Vec<usize> = (1..=60).filter(|_| floor.is_reached(1e-5)).collect();
         assert_eq!(reached, [20, 40, 60]);
         assert!((1..20).all(|_| !floor.is_reached(1e-5)) && !floor.is_reached(1e-11));
         // nine tenths of the best are no progress, less is
-        let mut near = Floor { patience: 1, ..Floor::of_sweeps() };
+        let mut near = Stagnation { patience: 1, ..Stagnation::of_sweeps() };
         assert_eq!([1e-5, 0.9 * 1e-5, 0.89e-5].map(|error| near.is_reached(error)), [false, true, false]);
-        let mut far = Floor::of_sweeps();
+        let mut far = Stagnation::of_sweeps();
         assert!((0..99).all(|_| !far.is_reached(1.1e-4)));
-        let mut steps = Floor::of_steps();
+        let mut steps = Stagnation::of_steps();
         assert_eq!([0.9; 5].map(|error| steps.is_reached(error)), [false, true, true, true, true]);
         assert!((0..9).all(|_| !steps.is_reached(1.0)));
-        let mut fixed = Floor::of_steps();
+        let mut fixed = Stagnation::of_steps();
         let seen: Vec<bool> = (0..9).map(|_| fixed.is_reached(1e-6) && fixed.is_fixed(1e-9)).collect();
         assert_eq!(seen.iter().position(|seen| *seen), Some(8));
         assert!(!fixed.is_fixed(1e-7) && !fixed.is_fixed(f64::NAN));

@@ -1,7 +1,7 @@
 //! The Robin coefficient: what stands in diag(omega psi kappa) of G.
 //!
-//! Any symmetric positive definite G leads to the same solution; it decides how fast. Weights are kept for each contact row,
-//! in the layout of a trace vector, because the two bodies of a pair may need different ones.
+//! Any symmetric positive definite G leads to the same solution; G decides how fast. There is one weight for each contact row, in the layout
+//! of a trace vector, because the two bodies of a pair may need different weights.
 
 use crate::error::{Error, Result};
 use crate::linalg::Blocks;
@@ -11,23 +11,24 @@ use crate::model::rigid::{Moved, TOLERANCE, combined};
 use crate::problem::robin::{RobinRule, Zone};
 use nalgebra::DMatrix;
 
-/// Zone and rule with what the rule remembers.
+/// The zone and the rule of the Robin term, with the weights that a frozen rule keeps.
 pub struct Coefficient {
     zone: Zone,
     rule: RobinRule,
+    /// Weights of the first call under the rule `frozen`.
     frozen: Option<Vec<f64>>,
 }
 
 impl Coefficient {
-    /// Starts with nothing remembered.
+    /// Return a coefficient that has kept no weights yet.
     pub fn new(zone: Zone, rule: RobinRule) -> Self {
         Self { zone, rule, frozen: None }
     }
 
-    /// omega psi kappa of every contact row (2n, layout of a trace vector) for layers at these places in iteration `k`.
+    /// Return omega psi kappa of every contact row (2n, layout of a trace vector) for layers in these states in iteration `k`.
     ///
     /// # Errors
-    /// A condition of the zone that has no value at a contact point; all ranks find it.
+    /// A condition of the zone has no value at a contact point; all ranks find this.
     pub fn weight(&mut self, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f64>> {
         if let Some(frozen) = &self.frozen {
             return Ok(frozen.clone());
@@ -46,7 +47,7 @@ impl Coefficient {
     }
 }
 
-/// omega psi kappa at every point in iteration `k`.
+/// Return omega psi kappa at every point, n, in iteration `k`.
 fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f64>> {
     let mut weight = vec![0.0; model.points()];
     for (pair, contact) in model.pairs.iter().enumerate() {
@@ -59,7 +60,7 @@ fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f
                 Zone::Subset(holds) => holds.is_true_at("psi", contact.position[point], k)?,
             };
             if inside {
-                // a smoothed law has a tangent of its own
+                // a smoothed law has a tangent where the law itself has none
                 let tangent = match layer.tangent[q] {
                     0.0 => contact.law.robin_tangent(point, layer.compression[q]),
                     tangent => tangent,
@@ -71,8 +72,8 @@ fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f
     Ok(weight)
 }
 
-/// The first body that nothing holds under the Robin term `weight` (omega psi kappa of the contact rows), and its motion: springs
-/// below [`TOLERANCE`] of the largest stiffness in the body drown in its rounding.
+/// Return the first body that is unconstrained under the Robin term `weight` (omega psi kappa of the contact rows, 2n), and its motion. Springs
+/// below [`TOLERANCE`] of the largest stiffness in the body are lost in its rounding.
 pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<Moved> {
     (0..model.bodies.len()).find_map(|body| {
         let slot = &model.bodies[body];
@@ -83,32 +84,32 @@ pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<Moved> {
     })
 }
 
-/// A motion held by less than this share of the stiffness of the body's own surface is not held safely: the sweep would move the body
-/// by as many times what its surface gives way.
+/// Share of the stiffness of the body's own surface below which a motion is not held safely. At this share, a sweep would move the body by a
+/// thousand times what its surface gives way.
 const WEAK: f64 = 1e-3;
 
-/// The weights, with at least the stiffness of the body's own surface as a whole for every body that they do not hold safely.
+/// Return the weights (2n). Every body that they do not hold safely gets at least the stiffness of its own surface as a whole.
 fn constrained(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
     for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()) {
-        // the stiffness under each point, spread over all of them
+        // the stiffness under each row, spread over all rows
         let rows = slot.row_stiffness.len().max(1) as f64;
-        let own: Vec<f64> = slot.row_stiffness.iter().map(|stiffness| stiffness / rows).collect();
-        let natural = springs(model, body, &own);
+        let surface: Vec<f64> = slot.row_stiffness.iter().map(|stiffness| stiffness / rows).collect();
+        let natural = springs(model, body, &surface);
         let mut safe = springs(model, body, &model.of_body(body, &weight)) - WEAK * &natural;
-        // of a motion that is felt nowhere nothing is asked
-        let felt = natural.diagonal().max();
-        (0..safe.nrows()).for_each(|i| safe[(i, i)] += TOLERANCE * felt);
+        // a motion that no contact row resists is not required to be held
+        let largest = natural.diagonal().max();
+        (0..safe.nrows()).for_each(|i| safe[(i, i)] += TOLERANCE * largest);
         if safe.cholesky().is_some() {
             continue;
         }
         let now = model.of_body(body, &weight);
-        let more: Vec<f64> = now.iter().zip(&own).map(|(now, own)| now.max(*own)).collect();
+        let more: Vec<f64> = now.iter().zip(&surface).map(|(now, surface)| now.max(*surface)).collect();
         model.put(body, &more, &mut weight);
     }
     weight
 }
 
-/// Stiffness of springs at a body's contact rows in terms of its free motions.
+/// Return the stiffness of springs at a body's contact rows in terms of its free motions, a square matrix.
 fn springs(model: &Model, body: usize, weight: &[f64]) -> DMatrix<f64> {
     let motions = &model.bodies[body].motions;
     DMatrix::from_fn(motions.len(), motions.len(), |i, j| {

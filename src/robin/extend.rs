@@ -1,23 +1,25 @@
 //! The start of sweeps: a trace, extended into every body with the interior in equilibrium.
 //!
-//! The sweep (41) depends on the iterate through its traces only, so a start is a trace. Its extension minimises the energy
-//! of the body among the displacements with that trace: the augmented Lagrangian method with springs much stiffer than
-//! the body, whose error shrinks by their ratio in every step.
+//! The sweep (41) depends on the iterate through its traces only, so a start is a trace. The extension minimises the energy of the body among
+//! all displacements with that trace. It is found by the augmented Lagrangian method with springs much stiffer than the body: in every step
+//! the error shrinks by the ratio of the two stiffnesses.
 
 use crate::error::Result;
+use crate::exchange::Exchange;
 use crate::linalg::axpy;
-use crate::model::body::Solved;
+use crate::model::body::Body;
 use crate::model::field::Field;
 use crate::model::linear::Failure;
 use crate::model::{BodySlot, Model};
 
 /// Springs of the constraint B u = t over the stiffness of the nodes under them: half the digits of a number are left to the body.
 const STIFF: f64 = 1e4;
-/// Steps; each gains a factor of about `STIFF` over the surface's compliance.
+
+/// Steps of the augmented Lagrangian method; each gains a factor of about `STIFF` over the surface's compliance.
 const STEPS: usize = 4;
 
-/// Gives every body that lives here the Robin term of its extension and sets its solver up, so that a refusal of the solver or of an
-/// option comes before the first sweep, and the start finds its factorisation made.
+/// Give every body that lives on this rank the Robin term of its extension, and set its solver up. A refusal of the solver or of an option
+/// then comes before the first sweep, and the extension needs no other factorisation.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -36,7 +38,7 @@ fn springs(slot: &BodySlot) -> Vec<f64> {
     slot.row_stiffness.iter().map(|k| STIFF * k).collect()
 }
 
-/// The iterate with the given trace (values where a support prescribes the row are not taken: the support wins).
+/// Return the iterate with the given trace (2n). Values at rows that a support prescribes are ignored. Collective.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -52,43 +54,13 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
             iterate.states.push(Vec::new());
             continue;
         };
-        body.robin(&springs)?;
-        let mut u = body.rest();
-        let [mut r, mut z, mut product] = [(); 3].map(|()| vec![0.0; u.len()]);
-        let mut rows = vec![0.0; springs.len()];
-        let (mut multiplier, mut force) = (vec![0.0; springs.len()], vec![0.0; springs.len()]);
-        let mut first = None;
-        for step in 0..STEPS {
-            body.trace(&u, &mut rows);
-            if body.distribution().is_some() {
-                model.exchange.sum(&mut rows);
-            }
-            let mut violation = 0.0f64;
-            for q in 0..rows.len() {
-                let apart = if springs[q] > 0.0 { rows[q] - target[q] } else { 0.0 };
-                violation = violation.max(apart.abs());
-                if step > 0 {
-                    multiplier[q] += springs[q] * apart;
-                }
-                force[q] = multiplier[q] + springs[q] * apart;
-            }
-            // the interior is in equilibrium from the first solve on
-            if first.is_some_and(|first: f64| violation <= 1e-9 * first) {
-                break;
-            }
-            first.get_or_insert(violation.max(f64::MIN_POSITIVE));
-            body.apply_stiffness(&u, &mut product);
-            body.residual(&u, &product, &force, &mut r);
-            let Solved { failure, .. } = body.solve(&r, &mut z)?;
-            if let Some(reason) = failure {
-                failed[index] = 1.0;
-                reasons[index] = reason;
-            }
-            axpy(1.0, &z, &mut u);
-        }
-        body.trace(&u, &mut rows);
+        let Extension { state, rows, failure } = extend_body(&mut **body, &*model.exchange, &springs, &target)?;
         model.put(index, &rows, &mut iterate.trace);
-        iterate.states.push(u);
+        iterate.states.push(state);
+        if let Some(reason) = failure {
+            failed[index] = 1.0;
+            reasons[index] = reason;
+        }
     }
     // one message: traces, then which inner solvers failed
     let mut message = [&iterate.trace[..], &failed[..]].concat();
@@ -99,4 +71,51 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
         Some(body) => Err(Failure { body: Some(body), reason: std::mem::take(&mut reasons[body]) }),
         None => Ok(iterate),
     })
+}
+
+/// The extension of a trace into one body.
+struct Extension {
+    state: Vec<f64>,
+    /// B u of the state.
+    rows: Vec<f64>,
+    /// Why the inner solver failed last, if it did.
+    failure: Option<String>,
+}
+
+/// Extend the trace `target` of a body, with springs of this stiffness at its contact rows. Collective for a distributed body.
+///
+/// # Errors
+/// Failures of the solver library.
+fn extend_body(body: &mut dyn Body, exchange: &dyn Exchange, springs: &[f64], target: &[f64]) -> Result<Extension> {
+    body.robin(springs)?;
+    let mut u = body.rest();
+    let [mut r, mut z, mut product] = [(); 3].map(|()| vec![0.0; u.len()]);
+    let [mut rows, mut multiplier, mut force] = [(); 3].map(|()| vec![0.0; springs.len()]);
+    let (mut first, mut failure) = (None, None);
+    for step in 0..STEPS {
+        body.trace(&u, &mut rows);
+        if body.distribution().is_some() {
+            exchange.sum(&mut rows);
+        }
+        let mut violation = 0.0f64;
+        for q in 0..rows.len() {
+            let difference = if springs[q] > 0.0 { rows[q] - target[q] } else { 0.0 };
+            violation = violation.max(difference.abs());
+            if step > 0 {
+                multiplier[q] += springs[q] * difference;
+            }
+            force[q] = multiplier[q] + springs[q] * difference;
+        }
+        // the interior is in equilibrium from the first solve on
+        if first.is_some_and(|first: f64| violation <= 1e-9 * first) {
+            break;
+        }
+        first.get_or_insert(violation.max(f64::MIN_POSITIVE));
+        body.apply_stiffness(&u, &mut product);
+        body.residual(&u, &product, &force, &mut r);
+        failure = body.solve(&r, &mut z)?.failure.or(failure);
+        axpy(1.0, &z, &mut u);
+    }
+    body.trace(&u, &mut rows);
+    Ok(Extension { state: u, rows, failure })
 }

@@ -1,7 +1,7 @@
-//! The interval (33) of gamma, in which Theorem 3 promises convergence, for the forms that a run ended with.
+//! The interval (33) of gamma in which Theorem 3 promises convergence, for the Robin form that a run ended with.
 //!
-//! The theorem asks for constants of F1' over all displacements. A layer has them on bounded ranges only, so they are taken over
-//! the level set {F1 <= F1(u0)} of the start, which an iteration that descends never leaves.
+//! The theorem asks for constants of F1' over all displacements. A layer has such constants on bounded ranges only. So they are taken over
+//! the level set {F1 <= F1(u0)} of the start u0, which an iteration that descends never leaves.
 
 use super::sweep::Sweeper;
 use super::sweeps::gradients;
@@ -23,24 +23,25 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// 2 gamma* = 2 B_Phi B_G / D_Phi^2 of (33), the end of the interval that begins at zero. In the norm of G, B_G is one.
+    /// Return 2 gamma* = 2 B_Phi B_G / D_Phi^2 of (33), the end of the interval that begins at zero. In the norm of G, B_G is one.
     pub fn theorem(&self) -> f64 {
         2.0 * self.lower / (self.upper * self.upper)
     }
 
-    /// 2 / D_Phi: below it F1 falls in every step, as F1' is a gradient, which the theorem does not ask for.
+    /// Return 2 / D_Phi. With a smaller gamma, F1 falls in every step. This uses that F1' is a gradient, which the theorem does not.
     pub fn descent(&self) -> f64 {
         2.0 / self.upper
     }
 }
 
-/// Steps of the Lanczos iterations at most.
+/// Most steps of a Lanczos iteration.
 const MOST: usize = 300;
 
-/// Places between the ends of a range where a tangent is looked at, for laws that neither stiffen nor soften all the way.
-const BETWEEN: usize = 32;
+/// Parts of a range of compressions at whose ends the tangent is evaluated, for laws that neither stiffen nor soften all the way.
+const PARTS: usize = 32;
 
-/// The interval at a solution with this `layer`, for the Robin term that the model carries; `excess` is F1(u0) - F1 of the solution. None if the eigenvalues cannot be found. Collective: solves with G.
+/// Return the interval at a solution with this `layer`, for the Robin term that the model carries; none if the eigenvalues cannot be found.
+/// `excess` is F1(u0) - F1 of the solution. Collective: solves with G.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -49,8 +50,8 @@ pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<
     for (i, pair) in model.pairs.iter().enumerate() {
         for q in model.range(i) {
             let point = q - model.offset[i];
-            let range = range(&*pair.law, point, layer.compression[q], excess.max(0.0) / model.weight[q]);
-            (least[q], most[q]) = tangents(&*pair.law, point, range);
+            let (low, high) = range(&*pair.law, point, layer.compression[q], excess.max(0.0) / model.weight[q]);
+            (least[q], most[q]) = tangents(&*pair.law, point, low, high);
         }
     }
     let start = loads(model);
@@ -61,15 +62,15 @@ pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<
         true => 0.0,
         false => spectrum(model, &least, &start)?.map_or(0.0, |(low, _)| low),
     };
-    // modes without a trace have the eigenvalue one
+    // displacements without a trace have the eigenvalue one
     Ok(Some(Interval { lower: lower.min(1.0), upper: upper.max(1.0) }))
 }
 
-/// Fall of the error after which extreme eigenvalues have settled.
+/// Relative error of the solution of a system after which the extreme eigenvalues have settled.
 const SETTLED: f64 = 1e-9;
 
-/// Extreme eigenvalues of G^-1 (K + B' diag(omega slope) B) among the displacements that loads on the contact rows cause, with the
-/// Robin term that the model carries.
+/// Return the extreme eigenvalues of G^-1 (K + B' diag(omega slope) B) among the displacements that loads on the contact rows cause, with the
+/// Robin term that the model carries. `slope` has one entry a point, n; `load` is a state of each body.
 fn spectrum(model: &mut Model, slope: &[f64], load: &[Vec<f64>]) -> Result<Option<(f64, f64)>> {
     let springs = model.forces(slope);
     let mut enough = |_: &Model, trial: &Trial| trial.is_within(SETTLED);
@@ -77,43 +78,47 @@ fn spectrum(model: &mut Model, slope: &[f64], load: &[Vec<f64>]) -> Result<Optio
     Ok(found.ok().and_then(|found| found.spectrum))
 }
 
-/// Forces on the contact rows in which every mode has a part.
+/// Return forces on the contact rows in which every mode has a part, as a state of each body that lives on this rank.
 fn loads(model: &Model) -> Vec<Vec<f64>> {
     let points = model.points();
-    let share = |i: usize| 0.1 + (0.618_033_988_749_895 * (i + 1) as f64).fract();
-    let rows: Vec<f64> = (0..2 * points).map(|i| model.weight[i % points] * share(i)).collect();
-    let load = |(index, slot): (usize, &crate::model::BodySlot)| {
-        slot.local.as_ref().map_or(Vec::new(), |body| {
-            let mut load = vec![0.0; body.len()];
+    // multiples of the golden ratio spread evenly over (0, 1) without a period
+    let pressure = |i: usize| 0.1 + (0.618_033_988_749_895 * (i + 1) as f64).fract();
+    let rows: Vec<f64> = (0..2 * points).map(|i| model.weight[i % points] * pressure(i)).collect();
+    let mut loads: Vec<Vec<f64>> = Vec::new();
+    for (index, slot) in model.bodies.iter().enumerate() {
+        let mut load = vec![0.0; slot.local.as_ref().map_or(0, |body| body.len())];
+        if let Some(body) = &slot.local {
             body.add_rows(&model.of_body(index, &rows), &mut load);
-            load
-        })
-    };
-    model.bodies.iter().enumerate().map(load).collect()
+        }
+        loads.push(load);
+    }
+    loads
 }
 
-/// Accuracy of the ends of a range, as a share of the excess, which is a difference of energies of sixteen digits; a range ends outside.
+/// Accuracy of the ends of a range, relative to the excess, which is a difference of energies with sixteen digits. The range is taken larger
+/// by this, so that it ends outside of the level set.
 const DIGITS: f64 = 1e-13;
 
-/// Compressions that a point can have in the level set. F1 is convex, and what it exceeds its minimum by is at least what any
-/// one point does by itself: P(c) - P(c0) - p(c0) (c - c0) <= `excess`, the same per area.
+/// Return the least and the largest compression that a point can have in the level set, if it has c at the solution. F1 is convex, and its
+/// excess over the minimum is at least that of any one point alone: with the law's energy P and pressure p per area,
+/// P(c) - P(c0) - p(c0) (c - c0) <= `excess`, also per area.
 fn range(law: &dyn LayerLaw, point: usize, c: f64, excess: f64) -> (f64, f64) {
     let (here, excess) = (law.response(point, c), excess * (1.0 + DIGITS));
     let rise = |other: f64| law.response(point, other).energy - here.energy - here.pressure * (other - c);
-    // nothing changes below zero: an open point is open
-    let (first, open) = (c.max(0.0), c <= 0.0 || rise(0.0) <= excess);
+    // below zero, a compression has no energy: all open states are the same
+    let (first, can_open) = (c.max(0.0), c <= 0.0 || rise(0.0) <= excess);
     let way = |side: f64| {
         let beyond = |way: f64| rise(first + side * way) - excess;
         zero(beyond, beyond(0.0), DIGITS).unwrap_or(f64::INFINITY)
     };
-    let low = if open { 0.0 } else { c - way(-1.0) };
+    let low = if can_open { 0.0 } else { c - way(-1.0) };
     (low, first + way(1.0))
 }
 
-/// Least and largest p' over a range of compressions.
-fn tangents(law: &dyn LayerLaw, point: usize, (low, high): (f64, f64)) -> (f64, f64) {
-    let places = (0..=BETWEEN).map(|i| low + (high - low) * i as f64 / BETWEEN as f64);
-    let all = places.map(|c| law.response(point, c).tangent);
+/// Return the least and the largest p' over the compressions from `low` to `high`.
+fn tangents(law: &dyn LayerLaw, point: usize, low: f64, high: f64) -> (f64, f64) {
+    let compressions = (0..=PARTS).map(|i| low + (high - low) * i as f64 / PARTS as f64);
+    let all = compressions.map(|c| law.response(point, c).tangent);
     all.fold((f64::INFINITY, 0.0), |(least, most), k| (least.min(k), f64::max(most, k)))
 }
 
@@ -122,17 +127,17 @@ mod tests {
     use super::*;
     use crate::contact::law::{Linear, Power};
 
-    /// The energy of a linear layer exceeds by k (c - c0)^2/2.
+    /// The energy of a linear layer exceeds its minimum by k (c - c0)^2/2.
     #[test]
     fn ranges_of_a_linear_layer() {
         let law = Linear { stiffness: 4.0 };
         let (low, high) = range(&law, 0, 3.0, 8.0);
         assert!((low - 1.0).abs() < 1e-12 && (high - 5.0).abs() < 1e-12, "{low} {high}");
-        assert_eq!(tangents(&law, 0, (low, high)), (4.0, 4.0));
+        assert_eq!(tangents(&law, 0, low, high), (4.0, 4.0));
         // with 18 it may open: k 3^2/2
         let (low, high) = range(&law, 0, 3.0, 18.1);
         assert!(low == 0.0 && high > 6.0);
-        assert_eq!(tangents(&law, 0, (low, high)), (0.0, 4.0));
+        assert_eq!(tangents(&law, 0, low, high), (0.0, 4.0));
         // an open point closes by k c^2/2
         let (low, high) = range(&law, 0, -7.0, 8.0);
         assert!(low == 0.0 && (high - 2.0).abs() < 1e-12);
@@ -142,9 +147,9 @@ mod tests {
     #[test]
     fn a_layer_that_stiffens() {
         let law = Power::new(0.5, 0.5);
-        let range = range(&law, 0, 0.0, 36.0);
-        assert!((range.1 - 3.0).abs() < 1e-12);
-        let (least, most) = tangents(&law, 0, range);
+        let (low, high) = range(&law, 0, 0.0, 36.0);
+        assert!((high - 3.0).abs() < 1e-12);
+        let (least, most) = tangents(&law, 0, low, high);
         assert!(least == 0.0 && (most - 24.0).abs() < 1e-10);
     }
 }

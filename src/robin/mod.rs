@@ -1,5 +1,5 @@
-//! The Robin form G_s = K_s + B_s' omega psi kappa B_s of every body: its coefficient, the sweep that solves with it, and what is made of sweeps
-//! alone: starts from a trace, linear steps, bounds of the spectrum of G^-1 F1''.
+//! The Robin form G_s = K_s + B_s' omega psi kappa B_s of every body s: its coefficient psi kappa, and the sweep, which solves with G_s in every
+//! body. Starts from a trace, linear steps, and bounds of the spectrum of G^-1 F1'' are made of sweeps alone.
 
 pub mod coefficient;
 pub mod extend;

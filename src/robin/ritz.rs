@@ -1,33 +1,34 @@
-//! Bounds of the spectrum of G^-1 F1'' from the directions that a method went along.
+//! Bounds of the spectrum of G^-1 F1'' from the directions that a method has taken.
 
 use crate::model::Model;
 use crate::model::field::{Field, apply_stiffness, local_dot};
 use crate::model::layer::Layer;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Directions kept: the oldest ones, which hold the modes that die first, and the newest, which hold the slow ones.
+/// Directions kept: the oldest ones, which contain the modes that decay first, and the newest, which contain the slow ones.
 const MOST: usize = 12;
 
 /// How many of them are the oldest.
 const OLDEST: usize = 4;
 
-/// Share of a direction that must be new; what is less is rounding.
+/// Share of a direction that must be linearly independent of the others; less is rounding.
 const NEW: f64 = 1e-8;
 
-/// Rayleigh-Ritz values on the span of some directions.
+/// Rayleigh-Ritz values on the span of some directions. They lie inside the spectrum.
 ///
-/// Only their products with K are kept: F1'' and G differ from it by springs at the contact points, so their values are those
-/// of the iterate that is asked for, whatever the contact was when a direction came. They lie inside the spectrum.
+/// Only products of the directions with K are kept, because F1'' and G differ from K by springs at the contact points. So the values can be
+/// computed for any iterate, whatever the contact was when a direction was taken.
 #[derive(Debug, Default)]
 pub struct Ritz {
     fields: Vec<Field>,
-    /// v_i'K v_j of the bodies that live here, i <= j.
+    /// v_i'K v_j of the bodies that live on this rank: row j has the entries i <= j.
     stiffness: Vec<Vec<f64>>,
+    /// Values that were computed last.
     bounds: Option<(f64, f64)>,
 }
 
 impl Ritz {
-    /// Takes a direction in. No message.
+    /// Add a direction. No message.
     pub fn observe(&mut self, model: &mut Model, v: &Field) {
         if self.fields.len() == MOST {
             self.fields.remove(OLDEST);
@@ -41,19 +42,19 @@ impl Ritz {
         self.stiffness.push(self.fields.iter().map(|field| local_dot(&field.states, &image)).collect());
     }
 
-    /// Smallest and largest value for an iterate with this `layer` and Robin term `weight` = omega psi kappa. One message.
+    /// Compute the smallest and the largest value for an iterate with this `layer` and Robin term `weight` = omega psi kappa (2n). One message.
     pub fn bounds(&mut self, model: &Model, layer: &Layer, weight: &[f64]) -> Option<(f64, f64)> {
         let tangent: Vec<f64> = model.weight.iter().zip(&layer.tangent).map(|(w, k)| w * k).collect();
         self.bounds = self.extremes(model, &tangent, weight);
         self.bounds
     }
 
-    /// What [`Ritz::bounds`] gave last.
+    /// Return the last result of [`Ritz::bounds`].
     pub fn known(&self) -> Option<(f64, f64)> {
         self.bounds
     }
 
-    /// Extreme Ritz values of G^-1 (K + B' diag(`spring`) B).
+    /// Return the extreme Ritz values of G^-1 (K + B' diag(`spring`) B) with `spring` = omega kappa (n).
     fn extremes(&self, model: &Model, spring: &[f64], weight: &[f64]) -> Option<(f64, f64)> {
         let n = self.fields.len();
         if n < 2 {
@@ -76,10 +77,10 @@ impl Ritz {
     }
 }
 
-/// Extreme eigenvalues of A x = lambda B x for symmetric A and positive semidefinite B, in the directions that B knows; none if
-/// they are not positive and finite.
+/// Return the extreme eigenvalues of A x = lambda B x for symmetric A and positive semidefinite B, in the range of B; none if they are not
+/// positive and finite.
 fn pencil(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<(f64, f64)> {
-    // directions shrink as a method converges: they are compared at length one
+    // directions shrink as a method converges: scale them to length one
     let kept: Vec<usize> = (0..b.nrows()).filter(|&i| b[(i, i)] > 0.0 && b[(i, i)].is_finite()).collect();
     let scaled = |m: &DMatrix<f64>| {
         DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
@@ -100,7 +101,7 @@ fn pencil(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<(f64, f64)> {
     let basis = DMatrix::from_fn(kept.len(), new.len(), |i, j| {
         eigen.eigenvectors[(i, new[j])] / eigen.eigenvalues[new[j]].sqrt()
     });
-    // a is symmetric; sums of products are the same on all processors, which `*` of large matrices is not
+    // a is symmetric, so a' = a; sums of products are the same on all processors, while `*` of large matrices is not
     let values = SymmetricEigen::new(basis.tr_mul(&a.tr_mul(&basis))).eigenvalues;
     let (low, high) = (values.min(), values.max());
     (low > 0.0 && high.is_finite()).then_some((low, high))

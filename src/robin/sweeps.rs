@@ -1,11 +1,11 @@
-//! The linear step by conjugate gradients over the Robin sweep: every iteration solves each body once, independently.
+//! The linear step by conjugate gradients preconditioned by the Robin sweep: every iteration solves each body once, independently.
 //!
-//! One iteration tells a body of its neighbours alone, so the rigid motions Z that supports leave free are deflated ([`Coarse`]): with the
-//! matrix H of (35), a correction z = G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z, what is left of it when whole bodies have moved so that
-//! they are in balance again. Every rank knows the contact points: no message, no solve.
+//! One iteration carries information from a body to its neighbours only, so the rigid motions Z that supports leave free are deflated
+//! ([`Coarse`]). With the matrix H of (35), a correction z = G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z: what is left of z after whole bodies have
+//! moved until they are in balance again. Every rank has all contact points, so this needs no message and no solve.
 
 use super::coefficient::Coefficient;
-use super::sweep::Sweeper;
+use super::sweep::{Sweep, Sweeper};
 use crate::error::Result;
 use crate::linalg::{axpy, dot};
 use crate::model::Model;
@@ -16,36 +16,36 @@ use crate::model::rigid::Motions;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::rc::Rc;
 
-/// Iterations at most: conjugate gradients lose their directions to rounding long before.
+/// Most iterations of a linear step: long before, rounding spoils the conjugacy of the directions.
 const MOST: usize = 400;
 
-/// Error of a linear step, as a share of it, above which the step is not solved after [`MOST`] iterations. Newton's method converges with
-/// any share below one, and the worse the larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).
+/// Relative error of a linear step above which it counts as not solved after [`MOST`] iterations. Newton's method converges with
+/// any relative error below one, more slowly the larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).
 const LEAST: f64 = 0.1;
 
-/// Iterations over which the gain of energy tells the error before them (Hestenes and Stiefel).
+/// Iterations whose gain of energy estimates the error before them (Hestenes and Stiefel).
 const DELAY: usize = 4;
 
-/// Precision of iterative solves of bodies as preconditioner, and of a step.
+/// Relative accuracy of iterative solves of bodies as preconditioner, and of a step.
 const ROUGH: f64 = 1e-2;
 
-/// Solves linear steps by sweeps.
+/// A solver of linear steps by sweeps.
 pub struct Sweeps {
     coefficient: Option<Coefficient>,
     sweeper: Sweeper,
     systems: usize,
     spectrum: Option<(f64, f64)>,
-    /// Least eigenvalue that any system showed.
+    /// Least eigenvalue found in any system so far.
     least: f64,
 }
 
 impl Sweeps {
-    /// With this Robin coefficient in the bodies' matrices.
+    /// Return a solver that gives the bodies' matrices the Robin term of this coefficient.
     pub fn new(coefficient: Coefficient) -> Self {
         Self { coefficient: Some(coefficient), ..Self::carried() }
     }
 
-    /// With the Robin term that bodies carry.
+    /// Return a solver that takes the Robin term that the bodies carry.
     pub fn carried() -> Self {
         Self { coefficient: None, sweeper: Sweeper::default(), systems: 0, spectrum: None, least: f64::INFINITY }
     }
@@ -65,23 +65,22 @@ impl LinearStep for Sweeps {
         }
         self.systems += 1;
         let before = self.sweeper.sweeps;
-        let found = gradients(model, &mut self.sweeper, springs, residual, (enough, MOST), self.least)?;
-        Ok(found.and_then(|found| {
-            self.spectrum = found.spectrum.or(self.spectrum);
-            self.least = found.spectrum.map_or(self.least, |(low, _)| low.min(self.least));
-            let Solution { energy, error, .. } = found.solution;
-            match self.sweeper.sweeps - before > MOST && error * error > LEAST * LEAST * energy {
-                true => {
-                    let share = error / energy.sqrt();
-                    let reason = format!("{MOST} sweeps leave an error of {share:.0e} of the linear step");
-                    Err(Failure { body: None, reason })
-                }
-                false => Ok(found.solution),
-            }
-        }))
+        let found = match gradients(model, &mut self.sweeper, springs, residual, (enough, MOST), self.least)? {
+            Ok(found) => found,
+            Err(failure) => return Ok(Err(failure)),
+        };
+        self.spectrum = found.spectrum.or(self.spectrum);
+        self.least = found.spectrum.map_or(self.least, |(low, _)| low.min(self.least));
+        let Solution { energy, error, .. } = found.solution;
+        if self.sweeper.sweeps - before > MOST && error * error > LEAST * LEAST * energy {
+            let relative = error / energy.sqrt();
+            let reason = format!("{MOST} sweeps leave an error of {relative:.0e} of the linear step");
+            return Ok(Err(Failure { body: None, reason }));
+        }
+        Ok(Ok(found.solution))
     }
 
-    /// The error of a young iteration that stands still is larger than it seems.
+    /// In its first iterations, the estimated error of a solve that stagnates is too small.
     fn roughest(&self) -> f64 {
         ROUGH
     }
@@ -95,16 +94,16 @@ impl LinearStep for Sweeps {
     }
 }
 
-/// What conjugate gradients found.
+/// Result of conjugate gradients.
 pub(super) struct Found {
     pub solution: Solution,
     /// Bounds of the spectrum of G^-1 H from the Lanczos matrix of the iteration.
     pub spectrum: Option<(f64, f64)>,
 }
 
-/// Solves (K + B' diag(springs) B) x = r with the Robin term that the model carries, until that is `enough`, or
-/// after `most` iterations. `least` is the least eigenvalue that earlier systems showed, infinite
-/// if there were none: a young iteration knows of no slow mode.
+/// Solve (K + B' diag(springs) B) x = r with the Robin term that the model carries, until `enough` says so or for `most` iterations. `springs`
+/// are omega kappa at the points (n). `least` is the least eigenvalue of earlier systems, infinite if there were none: the first iterations do
+/// not see the slow modes.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -116,94 +115,142 @@ pub(super) fn gradients(
     (enough, most): (&mut Enough, usize),
     least: f64,
 ) -> Result<std::result::Result<Found, Failure>> {
-    let coarse = Coarse::new(Rc::new(Space::of(model, None)), springs);
-    // v += s Z y
-    let add = |model: &Model, s: f64, y: &DVector<f64>, v: &mut Field| {
-        coarse.add(s, y, &mut v.states);
-        axpy(s, &Motions::of(model).trace(model, y), &mut v.trace);
-    };
-    let (mut r, mut x) = (residual.to_vec(), Field::zero(model));
-    let (y, energy) = coarse.solve(&r);
-    add(model, 1.0, &y, &mut x);
-    let push: Vec<f64> = coarse.forces(&y).iter().map(|force| -force).collect();
-    add_forces(model, &push, &mut r);
-    let mut lanczos = Lanczos { energy, least, ..Lanczos::default() };
-    let mut last: Option<(Field, f64, Vec<Vec<f64>>)> = None;
+    let mut state = Gradients::new(model, springs, residual, least);
     let squared = loop {
-        let before = last.as_ref().map_or(&r, |(_, _, r)| r);
-        let sweep = sweeper.precondition(model, r.clone(), before)?;
+        let before = state.previous.as_ref().map_or(&state.r, |previous| &previous.residual);
+        let sweep = sweeper.precondition(model, state.r.clone(), before)?;
         if let Some(failure) = sweep.failed {
             return Ok(Err(failure));
         }
         let rz: f64 = sweep.decrement.iter().sum();
+        let lanczos = &state.lanczos;
         let error = lanczos.squared_error(rz);
-        let trial = Trial { closing: &x.closing(), energy: lanczos.energy, error: error.max(0.0).sqrt() };
+        let trial = Trial { closing: &state.x.closing(), energy: lanczos.energy, error: error.max(0.0).sqrt() };
         if error == 0.0 || enough(model, &trial) || lanczos.alphas.len() == most {
             break error;
         }
-        let mut p = sweep.correction;
-        add(model, -1.0, &coarse.part(&p.closing(), false), &mut p);
-        // the flexible rule: the preconditioner may be an inexact solve
-        if let Some((mut direction, old, _)) = last.take() {
-            let beta = ((rz - sweep.product) / old).max(0.0);
-            lanczos.betas.push(beta);
-            direction.add_to(beta, &p);
-            p = direction;
-        }
-        let mut image = apply_stiffness(model, &p);
-        let closing = p.closing();
-        let spring: Vec<f64> = springs.iter().zip(&closing).map(|(w, s)| w * s).collect();
-        let mut sums = [local_dot(&image, &p.states), local_dot(&r, &p.states)];
-        model.exchange.sum(&mut sums);
-        let curvature = sums[0] + dot(&spring, &closing);
-        // r'z but for what rounding left of rigid motions in r, which p has not: the least energy along p is where r'p says
-        let slope = sums[1];
-        // p'Gp is r'z at least: a direction of which deflation leaves nothing but rounding has no curvature beside it
-        if !(slope > 0.0 && curvature > f64::EPSILON * rz) {
+        let Sweep { correction, product, residual, .. } = sweep;
+        let direction = state.direction(model, correction, rz - product);
+        if !state.advance(model, &direction, rz) {
             break if error.is_finite() { error } else { rz.max(0.0) };
         }
-        add_forces(model, &spring, &mut image);
-        let alpha = slope / curvature;
-        x.add(alpha, &p);
-        lanczos.gain(alpha, alpha * slope);
-        let old = r.clone();
-        r.iter_mut().zip(&image).for_each(|(r, y)| axpy(-alpha, y, r));
-        last = Some((p, rz, old));
+        state.previous = Some(Previous { direction, decrement: rz, residual });
     };
+    let Gradients { x, lanczos, .. } = state;
     let solution = Solution { field: x, energy: lanczos.energy, error: squared.max(0.0).sqrt(), is_exact: false };
     Ok(Ok(Found { solution, spectrum: lanczos.spectrum() }))
 }
 
-/// What the numbers of conjugate gradients tell of the spectrum and of the error.
+/// Conjugate gradients under way.
+struct Gradients<'a> {
+    /// omega kappa, n.
+    springs: &'a [f64],
+    coarse: Coarse,
+    /// The residual, a state of each body that lives on this rank.
+    r: Vec<Vec<f64>>,
+    x: Field,
+    lanczos: Lanczos,
+    previous: Option<Previous>,
+}
+
+/// The previous iteration.
+struct Previous {
+    direction: Field,
+    /// r'G^-1 r.
+    decrement: f64,
+    residual: Vec<Vec<f64>>,
+}
+
+impl<'a> Gradients<'a> {
+    /// Start with the solution in the space of rigid motions.
+    fn new(model: &Model, springs: &'a [f64], residual: &[Vec<f64>], least: f64) -> Self {
+        let coarse = Coarse::new(Rc::new(Space::of(model, None)), springs);
+        let (y, energy) = coarse.solve(residual);
+        let (x, r) = (Field::zero(model), residual.to_vec());
+        let lanczos = Lanczos { energy, least, ..Lanczos::default() };
+        let mut state = Self { springs, coarse, r, x, lanczos, previous: None };
+        add_motions(&state.coarse, model, 1.0, &y, &mut state.x);
+        let push: Vec<f64> = state.coarse.forces(&y).iter().map(|force| -force).collect();
+        add_forces(model, &push, &mut state.r);
+        state
+    }
+
+    /// Return the next direction: the deflated correction, conjugate to the previous direction. `change` is z'(r - r_previous): with this
+    /// flexible rule, the preconditioner may be an inexact solve.
+    fn direction(&mut self, model: &Model, mut correction: Field, change: f64) -> Field {
+        let y = self.coarse.part(&correction.closing(), false);
+        add_motions(&self.coarse, model, -1.0, &y, &mut correction);
+        match self.previous.take() {
+            None => correction,
+            Some(Previous { mut direction, decrement, .. }) => {
+                let beta = (change / decrement).max(0.0);
+                self.lanczos.betas.push(beta);
+                direction.add_to(beta, &correction);
+                direction
+            }
+        }
+    }
+
+    /// Go along a direction p to the least energy. Return false if only rounding is left of p; `rz` is r'G^-1 r.
+    fn advance(&mut self, model: &mut Model, p: &Field, rz: f64) -> bool {
+        let mut image = apply_stiffness(model, p);
+        let closing = p.closing();
+        let spring: Vec<f64> = self.springs.iter().zip(&closing).map(|(w, s)| w * s).collect();
+        // r'p, not r'z: rounding leaves rigid motions in r that p does not have
+        let mut sums = [local_dot(&image, &p.states), local_dot(&self.r, &p.states)];
+        model.exchange.sum(&mut sums);
+        let (curvature, slope) = (sums[0] + dot(&spring, &closing), sums[1]);
+        // p'Gp is at least r'z: a direction of which deflation leaves only rounding has no curvature beside it
+        if !(slope > 0.0 && curvature > f64::EPSILON * rz) {
+            return false;
+        }
+        add_forces(model, &spring, &mut image);
+        let alpha = slope / curvature;
+        self.x.add(alpha, p);
+        self.lanczos.gain(alpha, alpha * slope);
+        self.r.iter_mut().zip(&image).for_each(|(r, y)| axpy(-alpha, y, r));
+        true
+    }
+}
+
+/// v += s Z y, states and traces.
+fn add_motions(coarse: &Coarse, model: &Model, s: f64, y: &DVector<f64>, v: &mut Field) {
+    coarse.add(s, y, &mut v.states);
+    axpy(s, &Motions::of(model).trace(model, y), &mut v.trace);
+}
+
+/// The coefficients of conjugate gradients, from which the spectrum and the error are estimated.
 #[derive(Default)]
 struct Lanczos {
     alphas: Vec<f64>,
     betas: Vec<f64>,
-    /// Least eigenvalue that is known from elsewhere.
+    /// Least eigenvalue known from earlier systems.
     least: f64,
-    /// Squared energy norm that each iteration gained, and that of x.
+    /// Squared energy norm that each iteration gained.
     gains: Vec<f64>,
+    /// Squared energy norm of x.
     energy: f64,
 }
 
-/// Iterations after which the least eigenvalue is known as well as it will be.
+/// Iterations after which the least eigenvalue is known as well as it will be: from then on, recent gains alone estimate the error.
 const SETTLED: usize = 64;
 
 impl Lanczos {
+    /// Note an iteration of step length `alpha` that gained this squared energy norm.
     fn gain(&mut self, alpha: f64, gain: f64) {
         self.alphas.push(alpha);
         self.gains.push(gain);
         self.energy += gain;
     }
 
-    /// Estimate of the squared energy norm of the error where r'G^-1 r is `rz`: at most that over the least eigenvalue, and about what
-    /// the last iterations gained.
+    /// Estimate the squared energy norm of the error where r'G^-1 r is `rz`. It is at most `rz` over the least eigenvalue, and about what the
+    /// last iterations gained.
     fn squared_error(&self, rz: f64) -> f64 {
         let lately = match self.gains.len() {
             0 => return if rz > 0.0 { f64::INFINITY } else { 0.0 },
             n => self.gains[n - n.min(DELAY)..].iter().sum(),
         };
-        // either is too small as long as a slow mode has not come up; a run that ends early has gained all of it lately
+        // both estimates are too small as long as a slow mode has not appeared; if the solve ends early, the recent gains are all there are
         let low = if self.alphas.len() <= SETTLED {
             self.spectrum().map_or(0.0, |(low, _)| low.min(self.least))
         } else {
@@ -217,7 +264,7 @@ impl Lanczos {
         }
     }
 
-    /// Extreme eigenvalues of the Lanczos matrix.
+    /// Return the extreme eigenvalues of the Lanczos matrix; none before the first iteration, or if they are not positive and finite.
     fn spectrum(&self) -> Option<(f64, f64)> {
         let (n, alphas, betas) = (self.alphas.len(), &self.alphas, &self.betas);
         let mut t = DMatrix::zeros(n, n);

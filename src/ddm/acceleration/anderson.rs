@@ -8,38 +8,53 @@ use crate::robin::Ritz;
 use nalgebra::{DMatrix, DVector};
 use std::collections::VecDeque;
 
-/// Mixes the last corrections so that the traces' residual is least, then searches along the mixture; restarted when the
-/// contact set changes.
+/// Anderson acceleration. It mixes the last corrections such that the change of the traces is least, and searches along the mixture. It restarts
+/// when the contact set changes.
 pub struct Anderson {
     depth: usize,
-    /// (step that was taken, change of the correction that it made), oldest first.
-    history: VecDeque<(Field, Field)>,
-    /// Correction at the last iterate and the step from it.
-    last: Option<(Field, Field)>,
+    /// Earlier steps, oldest first.
+    history: VecDeque<Earlier>,
+    last: Option<Last>,
+    /// Whether each point was closed at the last iterate.
     closed: Vec<bool>,
     ritz: Ritz,
 }
 
+/// An earlier step.
+struct Earlier {
+    step: Field,
+    /// Change of the correction by the step.
+    change: Field,
+}
+
+/// The last iterate.
+struct Last {
+    correction: Field,
+    /// The step that was taken from it.
+    step: Field,
+}
+
 impl Anderson {
-    /// Mixes up to `depth` earlier steps.
+    /// Return an acceleration that mixes up to `depth` earlier steps.
     pub fn new(depth: usize) -> Self {
         Self { depth, history: VecDeque::new(), last: None, closed: Vec::new(), ritz: Ritz::default() }
     }
 
-    /// z - sum gamma_j (s_j + dz_j) with the least-squares gamma on traces: Anderson's step with mixing one.
+    /// Return z - sum_j w_j (s_j + dz_j): Anderson's step with mixing parameter one. s_j are the earlier steps, dz_j the changes of z by them, and the
+    /// weights w_j make the traces of z - sum_j w_j dz_j least.
     fn mixture(&self, z: &Field) -> Field {
         let n = self.history.len();
         let mut mixed = z.clone();
         if n == 0 {
             return mixed;
         }
-        let changes = DMatrix::from_fn(z.trace.len(), n, |i, j| self.history[j].1.trace[i]);
-        // columns of very different length are scaled before they are compared
+        let changes = DMatrix::from_fn(z.trace.len(), n, |i, j| self.history[j].change.trace[i]);
+        // the columns may have very different lengths: scale them to one
         let norms: Vec<f64> = changes.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
         let scaled = DMatrix::from_fn(z.trace.len(), n, |i, j| changes[(i, j)] / norms[j]);
         let right = DVector::from_column_slice(&z.trace);
         if let Ok(weights) = scaled.svd(true, true).solve(&right, 1e-10) {
-            for (j, (step, change)) in self.history.iter().enumerate() {
+            for (j, Earlier { step, change }) in self.history.iter().enumerate() {
                 mixed.add(-weights[j] / norms[j], step);
                 mixed.add(-weights[j] / norms[j], change);
             }
@@ -61,29 +76,29 @@ impl Acceleration for Anderson {
             self.last = None;
             self.closed = closed;
         }
-        if let Some((before, step)) = self.last.take() {
+        if let Some(Last { correction, step }) = self.last.take() {
             let mut change = z.clone();
-            change.add(-1.0, &before);
+            change.add(-1.0, &correction);
             if self.history.len() == self.depth {
                 self.history.pop_front();
             }
-            self.history.push_back((step, change));
+            self.history.push_back(Earlier { step, change });
         }
         let mut direction = self.mixture(z);
         let mut line = Line::new(here.model, here.layer, &here.sweep.residual, &direction);
         if line.derivative(0.0) >= 0.0 {
-            // the mixture does not descend: the sweep does
+            // F1 does not fall along the mixture, but it does along the correction of the sweep
             self.history.clear();
             direction = z.clone();
             line = Line::new(here.model, here.layer, &here.sweep.residual, &direction);
         }
         let Ok(length) = line.minimize(1e-4) else { return Ok(Step::Unbounded) };
-        // the step is the best guess of the error: the slow modes are in it
+        // the mixture is the best estimate of the error, so it contains the slow modes
         self.ritz.observe(here.model, &direction);
         self.ritz.bounds(here.model, here.layer, here.weight);
         let mut step = direction.clone();
         step.add(length - 1.0, &direction);
-        self.last = Some((z.clone(), step));
+        self.last = Some(Last { correction: z.clone(), step });
         Ok(Step::Along(direction, length))
     }
 

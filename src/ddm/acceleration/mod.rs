@@ -1,6 +1,6 @@
-//! Accelerations: how the next iterate is made from the sweep at this one. All minimise the same F1 over the same sweep.
+//! Accelerations: rules that make the next iterate from the sweep at the present one. All minimise the same F1 with the same sweep.
 //!
-//! A new one is a new file with the trait [`Acceleration`].
+//! A new acceleration is a new file that implements the trait [`Acceleration`].
 
 mod anderson;
 mod ncg;
@@ -16,24 +16,24 @@ use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::robin::{Ritz, Sweep};
 
-/// An iterate with everything that is known of it.
+/// The present iterate.
 pub struct Here<'a> {
-    /// The problem; its bodies carry the Robin term of this iterate.
+    /// The problem. Its bodies carry the Robin term of this iterate.
     pub model: &'a mut Model,
     /// Number of the iterate.
     pub k: usize,
     /// The layers at the iterate.
     pub layer: &'a Layer,
-    /// omega psi kappa of the Robin term.
+    /// The Robin term, omega psi kappa of each contact row (2n).
     pub weight: &'a [f64],
-    /// The sweep at the iterate: r, z = G^-1 r.
+    /// The sweep at the iterate: r and z = G^-1 r.
     pub sweep: &'a Sweep,
     /// Relative residual.
     pub residual: f64,
 }
 
 impl Here<'_> {
-    /// r'z over all bodies.
+    /// Return r'z over all bodies.
     pub fn decrement(&self) -> f64 {
         self.sweep.decrement.iter().sum()
     }
@@ -45,45 +45,44 @@ pub enum Step {
     Sweep(f64),
     /// Along another direction, by this length.
     Along(Field, f64),
-    /// F1 falls for ever along the direction found: a body is not held.
+    /// F1 falls for ever along the direction: a body is unconstrained.
     Unbounded,
 }
 
-/// A way to make the next iterate.
+/// A rule that makes the next iterate.
 pub trait Acceleration {
-    /// Name, as in the scene and the table.
+    /// Return the name, as in the scene and the table.
     fn name(&self) -> &'static str;
 
-    /// The step that leads on.
+    /// Return the next step.
     ///
     /// # Errors
     /// Failures of the solver library.
     fn step(&mut self, here: &mut Here) -> Result<Step>;
 
-    /// What its directions tell of the spectrum of G^-1 F1''.
+    /// Return the Ritz values on the span of its directions, which estimate the spectrum of G^-1 F1''.
     fn ritz(&mut self) -> &mut Ritz;
 
-    /// Estimate of 1/(smallest eigenvalue of G^-1 F1''): the squared energy error is at most about this times r'G^-1 r.
-    /// NaN while nothing is known.
+    /// Estimate 1/(smallest eigenvalue of G^-1 F1''); NaN while nothing is known. The squared energy error is at most about this times r'G^-1 r.
     fn amplification(&mut self) -> f64 {
         self.ritz().known().map_or(f64::NAN, |(low, _)| low.recip().max(1.0))
     }
 
-    /// Estimated bounds of the spectrum of G^-1 F1'', if it has seen enough.
+    /// Return the estimated bounds of the spectrum of G^-1 F1'', if there were enough directions.
     fn spectrum(&mut self) -> Option<(f64, f64)> {
         self.ritz().known()
     }
 
-    /// Factor by which an iteration reduces the residual in the long run, if it has one of its own.
+    /// Return the factor by which an iteration reduces the residual in the long run, if the method has one of its own.
     fn factor(&mut self) -> Option<f64> {
         None
     }
 
-    /// Last look at the iterate with which a run ends, with the Robin term `weight` that the model carries. Collective.
+    /// Update the estimates at the iterate with which a run ends. `weight` is the Robin term that the model carries (2n). Collective.
     fn conclude(&mut self, model: &Model, layer: &Layer, weight: &[f64]) {
         self.ritz().bounds(model, layer, weight);
     }
 
-    /// Forgets what earlier iterations told: the problem changes.
+    /// Forget the earlier iterations, because the problem changes.
     fn restart(&mut self);
 }

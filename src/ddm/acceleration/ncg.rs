@@ -7,17 +7,20 @@ use crate::model::field::{Field, local_dot};
 use crate::model::line::Line;
 use crate::robin::Ritz;
 
-/// Polak and Ribière's rule with exact line search on F1, restarted when the contact set changes.
+/// Conjugate gradients by the rule of Polak and Ribière with exact line search on F1. They restart when the contact set changes.
 #[derive(Default)]
 pub struct Conjugate {
     last: Option<Last>,
     ritz: Ritz,
 }
 
+/// The last iterate, and the direction taken from it.
 struct Last {
     direction: Field,
     residual: Vec<Vec<f64>>,
+    /// r'z.
     decrement: f64,
+    /// Whether each point was closed.
     closed: Vec<bool>,
 }
 
@@ -35,7 +38,7 @@ impl Acceleration for Conjugate {
                 [local_dot(&last.residual, &z.states), local_dot(&here.sweep.residual, &last.direction.states)];
             here.model.exchange.sum(&mut products);
             let beta = ((here.decrement() - products[0]) / last.decrement).max(0.0);
-            // a direction that does not descend is not conjugate any more
+            // if F1 does not fall along the new direction, it is not conjugate any more
             if here.decrement() + beta * products[1] > 0.0 {
                 direction = last.direction;
                 direction.add_to(beta, z);

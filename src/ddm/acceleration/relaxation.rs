@@ -8,14 +8,15 @@ use crate::robin::Ritz;
 /// The relaxed Robin-Robin iteration (41)-(42) with any rule for gamma.
 pub struct Relaxed {
     rule: Box<dyn GammaRule>,
-    /// Norm of the last correction and the gamma that followed it.
+    /// Norm of the last correction, and the gamma that was used with it.
     last: Option<(f64, f64)>,
+    /// Estimate from the decrease of the corrections (see [`Acceleration::amplification`]).
     amplification: f64,
     ritz: Ritz,
 }
 
 impl Relaxed {
-    /// With this rule.
+    /// Return the iteration with this rule.
     pub fn new(rule: Box<dyn GammaRule>) -> Self {
         Self { rule, last: None, amplification: f64::NAN, ritz: Ritz::default() }
     }
@@ -28,7 +29,7 @@ impl Acceleration for Relaxed {
 
     fn step(&mut self, here: &mut Here) -> Result<Step> {
         let size = here.decrement().sqrt();
-        // the slowest mode survives a fixed gamma: its factor 1 - gamma lambda_min shows in the decrease of the corrections
+        // with a fixed gamma the slowest mode remains, and the corrections decrease by its factor 1 - gamma lambda_min
         if let Some((before, gamma)) = self.last {
             let factor = size / before;
             self.amplification = if factor < 1.0 { (gamma / (1.0 - factor)).max(1.0) } else { f64::NAN };

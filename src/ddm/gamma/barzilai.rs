@@ -5,31 +5,32 @@ use crate::linalg::dot;
 use crate::model::line::Line;
 use std::collections::VecDeque;
 
-/// Iterates over whose largest F1 no step may go.
+/// Number of recent iterates whose largest F1 no step may exceed.
 const WINDOW: usize = 10;
 
-/// gamma^k = s'G s / s'y with s the last step and y the change of the residual: the inverse of a Rayleigh quotient of
-/// G^-1 F1''. The first step is an exact line search.
+/// gamma^k = s'G s / s'y, the inverse of a Rayleigh quotient of G^-1 F1''. Here s is the last step and y the change of the residual. The first step is
+/// an exact line search.
 ///
-/// The rule is not monotone. F1 may rise, but not above the largest of the last `WINDOW` iterates (the nonmonotone line search of
-/// Grippo, Lampariello and Lucidi, 1986, as Raydan uses it, 1997): a step that goes further is cut to the exact one.
+/// The rule is not monotone. F1 may rise, but not above the largest of the last `WINDOW` iterates (the nonmonotone line search of Grippo,
+/// Lampariello and Lucidi, 1986, as Raydan uses it, 1997). A step that goes further is replaced by the exact line search.
 #[derive(Debug, Default)]
 pub struct BarzilaiBorwein {
     last: Option<Last>,
-    /// F1 of the last iterates, less that of the present one.
+    /// F1 of the last iterates minus F1 of the present one.
     recent: VecDeque<f64>,
 }
 
+/// The last iterate.
 #[derive(Debug)]
 struct Last {
     gamma: f64,
-    /// r'z of the last iterate.
+    /// r'z.
     decrement: f64,
     /// z'K z.
     curvature: f64,
-    /// B_a z_a + B_b z_b at each point.
+    /// B_a z_a + B_b z_b, n.
     closing: Vec<f64>,
-    /// Force at each point.
+    /// Contact forces, n.
     force: Vec<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Relaxation rules: gamma of (42), from what the sweeps tell.
+//! Relaxation rules: gamma of (42), from the sweeps so far.
 
 mod aitken;
 mod barzilai;
@@ -16,31 +16,30 @@ use crate::model::line::Unbounded;
 use crate::problem::own::Own;
 use crate::robin::Ritz;
 
-/// Chooses gamma^k after the sweep of iteration k.
+/// A rule that chooses gamma^k after the sweep of iteration k.
 pub trait GammaRule {
-    /// The relaxation for the update along the sweep's correction; `ritz` has seen all corrections, this one included.
+    /// Return the relaxation for the update along the sweep's correction. `ritz` has observed all corrections, this one included.
     ///
     /// # Errors
-    /// [`Unbounded`] if F1 falls for ever along it.
+    /// [`Unbounded`] if F1 falls for ever along the correction.
     fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded>;
 
-    /// Factor by which an iteration reduces the slowest mode, if the spectrum of G^-1 F1'' lies in (low, high) and the rule
-    /// has one.
+    /// Return the factor by which an iteration reduces the slowest mode, if the rule has one. The spectrum of G^-1 F1'' lies in (low, high).
     fn factor(&self, _spectrum: (f64, f64)) -> Option<f64> {
         None
     }
 
-    /// Whether gamma does not depend on the iterates. Then the decrease of the corrections tells the slowest mode; else it tells
-    /// little, and the Ritz values of `ritz` are made anew before each gamma.
+    /// Whether gamma does not depend on the iterates. Then the slowest mode follows from the decrease of the corrections; otherwise the Ritz values
+    /// of `ritz` are computed anew before each gamma.
     fn is_fixed(&self) -> bool {
         false
     }
 
-    /// Forgets what earlier iterations told: the problem changes.
+    /// Forget the earlier iterations, because the problem changes.
     fn restart(&mut self) {}
 }
 
-/// Rules of a Rust program by name: each makes the rule of a run.
+/// Rules that a Rust program adds, by name. Each function makes the rule of a run.
 pub type OwnRules = Own<dyn Fn() -> Box<dyn GammaRule>>;
 
 /// gamma^k = gamma, as in the paper.

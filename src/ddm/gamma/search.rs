@@ -3,7 +3,7 @@
 use super::{GammaRule, Here, Ritz, Unbounded, best_factor};
 use crate::model::line::Line;
 
-/// gamma^k minimises F1 along the correction. F1 is convex, so every step descends.
+/// gamma^k minimises F1 along the correction. F1 is convex, so it falls in every step.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct LineSearch;
 

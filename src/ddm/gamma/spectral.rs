@@ -1,17 +1,18 @@
-//! The best stationary gamma, from bounds of the spectrum of G^-1 F1'' that are estimated during the run.
+//! The best stationary gamma, from estimates of the bounds of the spectrum of G^-1 F1'' during the run.
 
 use super::{GammaRule, Here, LineSearch, Ritz, Unbounded, best_factor};
 use crate::ddm::forecast::best_gamma;
 
-/// gamma = 2 / (lambda_min + lambda_max) of the estimated bounds; exact line searches until there are some.
+/// gamma = 2 / (lambda_min + lambda_max) with the estimated bounds; exact line search until there are estimates.
 #[derive(Debug, Default)]
 pub struct Spectral {
+    /// Residual and number of closed points of the last iterate.
     last: Option<(f64, usize)>,
 }
 
 impl GammaRule for Spectral {
     fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded> {
-        // a residual that grows, or contact that moves, makes the estimate one of the past
+        // the estimate is out of date if the residual grows or the contact changes
         let steady =
             self.last.is_some_and(|(residual, closed)| here.residual < residual && here.layer.closed == closed);
         self.last = Some((here.residual, here.layer.closed));
