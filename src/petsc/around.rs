@@ -1,64 +1,145 @@
-//! A preconditioner in Rust around one of PETSc (PCSHELL).
+//! A preconditioner in Rust around one of PETSc (PCSHELL): an exact solve in a subspace before and after the preconditioner of a solver.
 
 use super::library::petsc;
 use super::vector::{Vector, slice, slice_mut};
-use super::{Matrix, ffi};
+use super::{Ksp, Matrix, ffi};
 use crate::error::{Error, Result};
 use std::cell::{Cell, RefCell};
-use std::ffi::c_void;
+use std::ffi::{CStr, c_void};
 use std::ptr::{null, null_mut};
 
-/// A space of vectors P y on which a matrix A is solved exactly, Q = P (P'AP)^-1 P'. Around a preconditioner M, both symmetric, it makes
+/// A space of vectors P y in which a matrix A is solved exactly, by Q = P (P'AP)^-1 P'.
+///
+/// A and the preconditioner M are symmetric. Together with the space, M becomes
 ///
 /// ```text
 /// z = Q r + (I - Q A) M (I - A Q) r
 /// ```
 ///
-/// a multiplicative Schwarz step before and after M. Slices have one entry a row of this process each; calls are collective.
+/// which is a multiplicative Schwarz step before and after M. Slices have one entry for each row of this process. Calls are collective.
 pub trait Subspace {
-    /// x += Q r, r -= A Q r.
+    /// Add Q r to x and subtract A Q r from r.
     ///
     /// # Errors
     /// Failures of the solver library.
     fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()>;
 
-    /// z -= Q A z.
+    /// Subtract Q A z from z.
     ///
     /// # Errors
     /// Failures of the solver library.
     fn project(&self, z: &mut [f64]) -> Result<()>;
 }
 
-/// The preconditioner inside another.
+impl Ksp {
+    /// Put an exact solve in a subspace around the preconditioner of this solver, and around subspaces that were added before.
+    ///
+    /// `matrix` is the matrix of this solver, and `name` is what `-ksp_view` shows. Collective. New values of the matrix need a new subspace.
+    ///
+    /// ```
+    /// use std::{cell::Cell, rc::Rc};
+    /// use winkler::{error::Result, petsc::{Ksp, Matrix, Session, Subspace}};
+    /// /// The first unknown of diag(1e6, 2, 3), and how often each of its two functions was called.
+    /// struct First(Rc<[Cell<usize>; 2]>);
+    /// impl Subspace for First {
+    ///     fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
+    ///         self.0[0].set(self.0[0].get() + 1);
+    ///         (x[0], r[0]) = (x[0] + r[0] / 1e6, 0.0);
+    ///         Ok(())
+    ///     }
+    ///     fn project(&self, z: &mut [f64]) -> Result<()> {
+    ///         self.0[1].set(self.0[1].get() + 1);
+    ///         z[0] = 0.0;
+    ///         Ok(())
+    ///     }
+    /// }
+    /// let options = ["-ksp_type", "cg", "-pc_type", "none", "-ksp_rtol", "1e-12"].map(String::from);
+    /// let session = Session::start(&options)?;
+    /// let a = Matrix::from_csr(&session, 1, vec![0, 1, 2, 3], vec![0, 1, 2], vec![1e6, 2.0, 3.0])?;
+    /// let mut ksp = Ksp::new(&session, "")?;
+    /// ksp.set_operator(&a)?;
+    /// ksp.set_from_options()?;
+    /// let calls = Rc::new([Cell::new(0), Cell::new(0)]);
+    /// ksp.wrap(&a, c"first", Box::new(First(calls.clone())))?;
+    /// let mut x = [0.0; 3];
+    /// // two eigenvalues are left; the space is solved in once, and each application corrects afterwards alone
+    /// assert_eq!(ksp.solve_until(&[1e6, 2.0, 3.0], &mut x, &mut |_| false)?.iterations, 2);
+    /// assert!(x.iter().all(|x| (x - 1.0).abs() < 1e-12));
+    /// assert_eq!((calls[0].get(), calls[1].get()), (1, 3));
+    /// // one application by itself corrects before and after
+    /// ksp.precondition(&[1e6, 2.0, 3.0], &mut x)?;
+    /// assert_eq!((x, calls[0].get(), calls[1].get()), ([1.0, 2.0, 3.0], 2, 4));
+    /// # Ok::<(), winkler::error::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// PETSc's.
+    pub fn wrap(&mut self, matrix: &Matrix, name: &'static CStr, subspace: Box<dyn Subspace>) -> Result<()> {
+        let wrapper = Wrapper::new(matrix, self.outermost_pc()?, name, subspace)?;
+        // SAFETY: a preconditioner of the same matrix.
+        unsafe { petsc!(KSPSetPC(self.ksp, wrapper.pc)) }?;
+        self.wrappers.push(wrapper);
+        Ok(())
+    }
+
+    /// Go back to the preconditioner that options chose.
+    ///
+    /// # Errors
+    /// PETSc's.
+    pub fn unwrap(&mut self) -> Result<()> {
+        if let Some(innermost) = self.wrappers.first() {
+            // SAFETY: the preconditioner that this solver had.
+            unsafe { petsc!(KSPSetPC(self.ksp, innermost.inner())) }?;
+        }
+        // the outermost first
+        while self.wrappers.pop().is_some() {}
+        Ok(())
+    }
+
+    /// Solve exactly in the outermost subspace before the iteration: add Q b to `x` and replace `rest` = b by b - A Q b.
+    ///
+    /// All residuals of conjugate gradients from there have Q r = 0, and for these z = (I - Q A) M r. That saves half of the work in the
+    /// space (Tang, Nabben, Vuik, Erlangga, J. Sci. Comput. 39, 2009, "A-DEF2"). The shortened form is in use until the returned guard is
+    /// dropped. Return `None` without a subspace, or for another method than `cg`.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub(super) fn start(&self, rest: &mut [f64], x: &mut [f64]) -> Result<Option<Started<'_>>> {
+        let Some(outermost) = self.wrappers.last().filter(|_| self.ksp_type() == "cg") else { return Ok(None) };
+        outermost.start(rest, x).map(Some)
+    }
+}
+
+/// The preconditioner M inside a wrapper.
 struct Inner {
     pc: ffi::PC,
-    /// Headers of its argument and its result.
+    /// PETSc's headers of the argument and the result.
     vectors: [Vector; 2],
 }
 
 impl Inner {
-    /// z = M r.
+    /// Compute z = M r.
     fn apply(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         // SAFETY: the preconditioner reads one and writes to the other.
         self.vectors[0].map(("r", r), &self.vectors[1], ("z", z), |r, z| unsafe { petsc!(PCApply(self.pc, r, z)) })
     }
 }
 
-/// A preconditioner of a solver and the one around it.
-pub(super) struct Around {
-    /// The one around it.
-    pub outer: ffi::PC,
-    /// `outer` has this pointer.
+/// A PCSHELL around another preconditioner.
+pub(super) struct Wrapper {
+    /// PETSc's handle of the PCSHELL.
+    pc: ffi::PC,
+    /// The data of the callbacks. `pc` has the same pointer.
     context: *mut Context,
 }
 
-/// What the callbacks work with.
+/// The data of the callbacks.
 struct Context {
     inner: Inner,
     subspace: Box<dyn Subspace>,
-    /// Whether it is applied to residuals with Q r = 0 alone.
+    /// Whether all residuals have Q r = 0, because the solve was started in the space.
     is_started: Cell<bool>,
-    /// The first failure, which PETSc knows by its number alone.
+    /// The first failure. PETSc itself passes on an error number only.
     failure: RefCell<Option<Error>>,
 }
 
@@ -77,35 +158,26 @@ impl Context {
     }
 }
 
-impl Around {
-    pub fn new(
-        matrix: &Matrix,
-        inner: ffi::PC,
-        name: &'static std::ffi::CStr,
-        subspace: Box<dyn Subspace>,
-    ) -> Result<Self> {
+impl Wrapper {
+    fn new(matrix: &Matrix, inner: ffi::PC, name: &'static CStr, subspace: Box<dyn Subspace>) -> Result<Self> {
         // SAFETY: a reference of our own keeps the inner one when its solver takes another.
         unsafe { petsc!(PetscObjectReference(inner.cast())) }?;
-        let whole = || Vector::new(matrix.session(), matrix.scope(), matrix.rows(), matrix.block_size());
-        let inner = Inner { pc: inner, vectors: [whole()?, whole()?] };
-        let context = Box::into_raw(Box::new(Context {
-            inner,
-            subspace,
-            is_started: Cell::new(false),
-            failure: RefCell::default(),
-        }));
-        let mut around = Self { outer: null_mut(), context };
+        let new = || Vector::new(matrix.session(), matrix.scope(), matrix.rows(), matrix.block_size());
+        let inner = Inner { pc: inner, vectors: [new()?, new()?] };
+        let context = Context { inner, subspace, is_started: Cell::new(false), failure: RefCell::default() };
+        let context = Box::into_raw(Box::new(context));
+        let mut wrapper = Self { pc: null_mut(), context };
         // SAFETY: a new preconditioner, whose context lives as long as our reference to it.
         unsafe {
-            petsc!(PCCreate(matrix.scope().comm(matrix.session()), &mut around.outer))?;
-            petsc!(PCSetType(around.outer, c"shell".as_ptr()))?;
-            petsc!(PCShellSetContext(around.outer, context.cast()))?;
-            petsc!(PCShellSetApply(around.outer, Some(applied)))?;
-            petsc!(PCShellSetView(around.outer, Some(viewed)))?;
-            petsc!(PCShellSetName(around.outer, name.as_ptr()))?;
-            petsc!(PCSetOperators(around.outer, matrix.raw(), matrix.raw()))?;
+            petsc!(PCCreate(matrix.scope().comm(matrix.session()), &mut wrapper.pc))?;
+            petsc!(PCSetType(wrapper.pc, c"shell".as_ptr()))?;
+            petsc!(PCShellSetContext(wrapper.pc, context.cast()))?;
+            petsc!(PCShellSetApply(wrapper.pc, Some(apply)))?;
+            petsc!(PCShellSetView(wrapper.pc, Some(view)))?;
+            petsc!(PCShellSetName(wrapper.pc, name.as_ptr()))?;
+            petsc!(PCSetOperators(wrapper.pc, matrix.raw(), matrix.raw()))?;
         }
-        Ok(around)
+        Ok(wrapper)
     }
 
     fn context(&self) -> &Context {
@@ -113,40 +185,37 @@ impl Around {
         unsafe { &*self.context }
     }
 
-    /// The preconditioner inside.
+    /// Return the preconditioner inside.
     pub fn inner(&self) -> ffi::PC {
         self.context().inner.pc
     }
 
-    /// x += Q r and r -= A Q r. From then on, until what is returned is dropped, it takes residuals to have Q r = 0.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    pub fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<Started<'_>> {
+    /// Add Q r to x, subtract A Q r from r, and take all residuals to have Q r = 0 until the guard is dropped.
+    fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<Started<'_>> {
         let context = self.context();
         context.subspace.start(r, x)?;
         context.is_started.set(true);
         Ok(Started(&context.is_started))
     }
 
-    /// What it failed with, once.
+    /// Take out the error of the last application, if it failed.
     pub fn failure(&self) -> Option<Error> {
         self.context().failure.take()
     }
 }
 
-impl Drop for Around {
+impl Drop for Wrapper {
     fn drop(&mut self) {
         // SAFETY: the references of this type; the solver has another preconditioner by now, or is gone, so that PETSc calls back no more.
         unsafe {
-            let _ = petsc!(PCDestroy(&mut self.outer));
+            let _ = petsc!(PCDestroy(&mut self.pc));
             let mut context = Box::from_raw(self.context);
             let _ = petsc!(PCDestroy(&mut context.inner.pc));
         }
     }
 }
 
-/// While it lives, residuals are those of a solve that was started in the space.
+/// The guard of a solve that was started in the subspace.
 pub(super) struct Started<'a>(&'a Cell<bool>);
 
 impl Drop for Started<'_> {
@@ -155,8 +224,8 @@ impl Drop for Started<'_> {
     }
 }
 
-/// PCApply.
-unsafe extern "C" fn applied(pc: ffi::PC, r: ffi::Vec, z: ffi::Vec) -> ffi::PetscErrorCode {
+/// The callback for PCApply.
+unsafe extern "C" fn apply(pc: ffi::PC, r: ffi::Vec, z: ffi::Vec) -> ffi::PetscErrorCode {
     let (mut context, mut rows, mut from, mut to) = (null_mut::<c_void>(), 0, null(), null_mut());
     // SAFETY: PETSc passes its own preconditioner with our context, and two vectors, whose arrays have that many entries here and belong to
     // nobody else until they are given back.
@@ -166,8 +235,7 @@ unsafe extern "C" fn applied(pc: ffi::PC, r: ffi::Vec, z: ffi::Vec) -> ffi::Pets
         petsc!(VecGetLocalSize(r, &mut rows))?;
         petsc!(VecGetArrayRead(r, &mut from))?;
         petsc!(VecGetArray(z, &mut to))?;
-        let (r_here, z_here) = (slice(from, rows as usize), slice_mut(to, rows as usize));
-        let applied = context.apply(r_here, z_here);
+        let applied = context.apply(slice(from, rows as usize), slice_mut(to, rows as usize));
         petsc!(VecRestoreArrayRead(r, &mut from))?;
         petsc!(VecRestoreArray(z, &mut to))?;
         Ok(match applied {
@@ -181,10 +249,10 @@ unsafe extern "C" fn applied(pc: ffi::PC, r: ffi::Vec, z: ffi::Vec) -> ffi::Pets
     done.unwrap_or(ERROR)
 }
 
-/// PCView: the inner one.
-unsafe extern "C" fn viewed(pc: ffi::PC, viewer: ffi::PetscViewer) -> ffi::PetscErrorCode {
+/// The callback for PCView, which shows the inner preconditioner.
+unsafe extern "C" fn view(pc: ffi::PC, viewer: ffi::PetscViewer) -> ffi::PetscErrorCode {
     let mut context = null_mut::<c_void>();
-    // SAFETY: as in `applied`.
+    // SAFETY: as in `apply`.
     let done: Result<_> = (|| unsafe {
         petsc!(PCShellGetContext(pc, (&raw mut context).cast()))?;
         petsc!(PCView((*context.cast::<Context>()).inner.pc, viewer))

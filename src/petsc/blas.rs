@@ -1,25 +1,31 @@
-//! The BLAS and LAPACK that MUMPS and PETSc run on: which it is, its threads, and its dense Cholesky factorisation. The reference BLAS is
-//! up to 11 times slower in factorisations, so a run says it.
+//! The BLAS and LAPACK that MUMPS and PETSc use: its name, its threads, and its dense Cholesky factorisation.
+//!
+//! Factorisations with the reference BLAS are up to 11 times slower, so a run reports its name. Functions are looked up by name when they are
+//! needed: the library that has them depends on the installation, and only OpenBLAS has those with `openblas_`, which are public.
+//!
+//! OpenBLAS chooses its kernels by the model number of the processor. For a model newer than itself it may choose those for the first
+//! processors with SSE3. @@KERNELS@@ So a run warns, with the variable to set.
 
 use crate::error::{Error, Kind, Result};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::path::PathBuf;
 
-/// Address of a function of the BLAS and LAPACK in use, null if there is none.
+/// Return the address of a function of the BLAS or LAPACK in use, or null if it does not exist.
 ///
-/// MUMPS is linked and brings them; PETSc, opened later, gets the same ones. The linker leaves MUMPS out of a program that does not
-/// name it.
-pub(super) fn address(name: &CStr) -> *mut c_void {
+/// MUMPS is linked and brings them. PETSc, which is opened later, uses the same ones. The linker omits MUMPS from a program that does not
+/// refer to it, hence the reference here.
+fn address(name: &CStr) -> *mut c_void {
     std::hint::black_box(super::ffi::mumps::dmumps_c as *const c_void);
     // SAFETY: the name ends with a zero byte.
     unsafe { libc::dlsym(libc::RTLD_DEFAULT, name.as_ptr()) }
 }
 
-/// File of the library that the name `dgemm_` leads to in this process, with links resolved: of several BLAS in the
-/// memory map it is the one in use.
+/// Return the file of the library that has the function `dgemm_` of this process, with links resolved.
+///
+/// Several BLAS may be loaded; this is the one in use.
 fn file() -> Option<PathBuf> {
     let address = address(c"dgemm_");
-    // SAFETY: plain C data, which dladdr fills with texts that live as long as the library is loaded.
+    // SAFETY: plain C data, which dladdr fills with pointers to texts that live as long as the library is loaded.
     let file = unsafe {
         let mut found: libc::Dl_info = std::mem::zeroed();
         if address.is_null() || libc::dladdr(address, &mut found) == 0 || found.dli_fname.is_null() {
@@ -31,8 +37,7 @@ fn file() -> Option<PathBuf> {
     Some(path.canonicalize().unwrap_or(path))
 }
 
-/// Name of the BLAS in use: `OpenBLAS`, `MKL`, `BLIS`, `ATLAS`, `Accelerate`, `reference BLAS`, or the file of another
-/// one.
+/// Return the name of the BLAS in use: `OpenBLAS`, `MKL`, `BLIS`, `ATLAS`, `Accelerate`, `reference BLAS`, or the file of an unknown one.
 pub(super) fn name() -> String {
     match file() {
         Some(path) => name_of(&path.to_string_lossy()),
@@ -40,7 +45,7 @@ pub(super) fn name() -> String {
     }
 }
 
-// Fortran passes the length of a text behind all arguments.
+// Fortran passes the length of a text after all arguments.
 type Factor = unsafe extern "C" fn(*const c_char, *const c_int, *mut f64, *const c_int, *mut c_int, usize);
 type Solve = unsafe extern "C" fn(
     *const c_char,
@@ -54,7 +59,7 @@ type Solve = unsafe extern "C" fn(
     usize,
 );
 
-/// A function of the LAPACK that PETSc runs on.
+/// Return the address of a function of LAPACK.
 fn lapack(name: &CStr) -> Result<*mut c_void> {
     let address = address(name);
     if address.is_null() {
@@ -65,7 +70,7 @@ fn lapack(name: &CStr) -> Result<*mut c_void> {
     Ok(address)
 }
 
-/// Checks the size of a dense matrix.
+/// Return the number of rows of a dense matrix for LAPACK, after a check of its size.
 fn order(matrix: &[f64], n: usize) -> Result<c_int> {
     match c_int::try_from(n) {
         Ok(order) if matrix.len() == n * n => Ok(order),
@@ -73,8 +78,9 @@ fn order(matrix: &[f64], n: usize) -> Result<c_int> {
     }
 }
 
-/// Cholesky factorisation of a dense symmetric matrix of `n` rows in place (LAPACK's dpotrf; the other triangle is left as it
-/// is). False if the matrix is not positive definite.
+/// Factor a dense symmetric matrix of `n` rows in place by Cholesky's method (LAPACK's dpotrf), and return whether it is positive definite.
+///
+/// The other triangle is not changed.
 ///
 /// ```
 /// use winkler::petsc::{cholesky, cholesky_solve};
@@ -89,7 +95,7 @@ fn order(matrix: &[f64], n: usize) -> Result<c_int> {
 /// ```
 ///
 /// # Errors
-/// When no LAPACK is loaded, or the slice has not n^2 entries.
+/// When no LAPACK is loaded, or the slice does not have n^2 entries.
 pub fn cholesky(matrix: &mut [f64], n: usize) -> Result<bool> {
     let (n, mut info) = (order(matrix, n)?, 0);
     if n == 0 {
@@ -104,7 +110,7 @@ pub fn cholesky(matrix: &mut [f64], n: usize) -> Result<bool> {
     Ok(info == 0)
 }
 
-/// Solves with a factor of [`cholesky`], in place.
+/// Solve with a factor of [`cholesky`] in place: `x` is the right-hand side and becomes the solution, `n` entries.
 ///
 /// # Errors
 /// When no LAPACK is loaded, or a slice has the wrong length.
@@ -125,10 +131,12 @@ pub fn cholesky_solve(factor: &[f64], n: usize, x: &mut [f64]) -> Result<()> {
     Ok(())
 }
 
-/// The triangle in use.
+/// The triangle that holds the factor.
 const UPPER: &CStr = c"U";
 
-/// Asks OpenBLAS for a number of threads; false if another BLAS is in use, which keeps its own number.
+/// Set the number of threads of OpenBLAS. Return false if another BLAS is in use, which keeps its own number.
+///
+/// @@THREADS@@
 pub(super) fn set_threads(count: usize) -> bool {
     let address = address(c"openblas_set_num_threads");
     if address.is_null() {
@@ -142,7 +150,51 @@ pub(super) fn set_threads(count: usize) -> bool {
     true
 }
 
-/// The BLAS that lives in a file, told by its path: Debian's alternatives all end in `libblas.so.3`.
+/// Return the name of OpenBLAS' kernels in use, if it can choose among several.
+pub(super) fn kernels() -> Option<String> {
+    let address = address(c"openblas_get_corename");
+    if address.is_null() {
+        return None;
+    }
+    // SAFETY: OpenBLAS declares it as char *(void), and the text is a constant of its own.
+    unsafe {
+        let name: extern "C" fn() -> *const c_char = std::mem::transmute(address);
+        Some(CStr::from_ptr(name()).to_string_lossy().into_owned())
+    }
+}
+
+/// Return the kernels that this processor could use instead of those in use, unless the user chose the kernels.
+#[cfg(target_arch = "x86_64")]
+pub(super) fn faster_kernels() -> Option<&'static str> {
+    let is_wide = is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512vl");
+    let is_avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+    let typed = std::env::var_os("OPENBLAS_CORETYPE").is_some();
+    kernels().filter(|_| !typed).and_then(|kernels| faster_than(&kernels, is_avx2, is_wide))
+}
+
+/// Return `None`: other processors have one set of kernels, or OpenBLAS knows them.
+#[cfg(not(target_arch = "x86_64"))]
+pub(super) fn faster_kernels() -> Option<&'static str> {
+    None
+}
+
+/// Return kernels that use the instruction sets of the processor, if the `chosen` ones do not.
+#[cfg(any(target_arch = "x86_64", test))]
+fn faster_than(chosen: &str, has_avx2: bool, has_avx512: bool) -> Option<&'static str> {
+    // all kernels with 256-bit registers; those for Zen are chosen by the maker of the processor
+    const AVX2: [&str; 5] = ["Haswell", "Zen", "SkylakeX", "Cooperlake", "SapphireRapids"];
+    let is_one_of = |known: &[&str]| known.iter().any(|name| name.eq_ignore_ascii_case(chosen));
+    match (has_avx512, has_avx2) {
+        (true, _) if !is_one_of(&AVX2[1..]) => Some("SkylakeX"),
+        (false, true) if !is_one_of(&AVX2) => Some("Haswell"),
+        _ => None,
+    }
+}
+
+/// Return the name of the BLAS in a file by its path: Debian's alternatives all end in `libblas.so.3`.
 fn name_of(path: &str) -> String {
     let lower = path.to_lowercase();
     let known = [
@@ -160,7 +212,7 @@ fn name_of(path: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::name_of;
+    use super::{faster_than, name_of};
 
     #[test]
     fn the_path_tells_the_blas() {
@@ -174,5 +226,22 @@ mod tests {
             assert_eq!(name_of(&format!("{lib}/{path}")), name);
         }
         assert_eq!(name_of("/opt/libsci.so"), "/opt/libsci.so");
+    }
+
+    #[test]
+    fn kernels_are_those_of_the_instruction_sets() {
+        for (chosen, has_avx2, has_avx512, faster) in [
+            ("Prescott", true, true, Some("SkylakeX")),
+            ("Haswell", true, true, Some("SkylakeX")),
+            ("Prescott", true, false, Some("Haswell")),
+            ("Sandybridge", true, false, Some("Haswell")),
+            ("Zen", true, true, None),
+            ("SkylakeX", true, true, None),
+            ("Cooperlake", true, true, None),
+            ("Haswell", true, false, None),
+            ("Prescott", false, false, None),
+        ] {
+            assert_eq!(faster_than(chosen, has_avx2, has_avx512), faster, "{chosen}");
+        }
     }
 }

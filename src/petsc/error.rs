@@ -1,14 +1,14 @@
-//! PETSc's return codes as [`Error`], with PETSc's own message.
+//! PETSc's error codes as [`Error`], with PETSc's own message.
 //!
-//! PETSc reports an error frame by frame, innermost first, through a handler. Ours records the frames and prints
-//! nothing; [`check_in`] picks them up when the code has come back to Rust.
+//! PETSc reports an error frame by frame, innermost first, to a handler. The handler of this module records the frames and prints nothing.
+//! [`check_in`] reads them when the code has come back to Rust.
 
 use super::ffi;
 use crate::error::{Error, Kind, Result};
 use std::cell::RefCell;
 use std::ffi::{CStr, c_char, c_int, c_void};
 
-/// What PETSc said about the error that is on its way up.
+/// PETSc's report of an error that is being passed up.
 #[derive(Default)]
 struct Trace {
     message: String,
@@ -20,7 +20,7 @@ thread_local! {
     static TRACE: RefCell<Trace> = RefCell::default();
 }
 
-/// Runs `call` and turns a nonzero code into an error that says what PETSc said.
+/// Run `call`, and turn a nonzero code into an error with PETSc's message.
 pub(super) fn check_in(
     library: &ffi::Library,
     function: &str,
@@ -28,11 +28,11 @@ pub(super) fn check_in(
 ) -> Result<()> {
     TRACE.take();
     let code = call(library);
-    // PETSc 3.18 has an int here, newer ones an enum; both fit.
+    // the code is an int in PETSc 3.18 and an enum in newer ones
     if code as i64 == 0 { Ok(()) } else { Err(failure(library, function, code)) }
 }
 
-/// The error of a failed call.
+/// Return the error of a failed call.
 fn failure(library: &ffi::Library, function: &str, code: ffi::PetscErrorCode) -> Error {
     let trace = TRACE.take();
     let mut error = Error::new(Kind::Solver, format!("PETSc failed in {function}"));
@@ -49,10 +49,10 @@ fn failure(library: &ffi::Library, function: &str, code: ffi::PetscErrorCode) ->
     error
 }
 
-/// PETSc's general text for an error code.
+/// Return PETSc's general text for an error code.
 fn meaning(library: &ffi::Library, code: ffi::PetscErrorCode) -> Option<String> {
     let mut text: *const c_char = std::ptr::null();
-    // SAFETY: PETSc sets the pointer to a static text or to null; no message of the error itself is asked for.
+    // SAFETY: PETSc sets the pointer to a static text or to null; the message of the error itself is not requested.
     unsafe {
         library.PetscErrorMessage(code as _, &mut text, std::ptr::null_mut());
         (!text.is_null()).then(|| string(text))
@@ -60,7 +60,7 @@ fn meaning(library: &ffi::Library, code: ffi::PetscErrorCode) -> Option<String> 
     .filter(|text| !text.is_empty())
 }
 
-/// A copy of a C text; empty for null.
+/// Return a copy of a C text; empty for null.
 ///
 /// # Safety
 /// `text` is null or ends with a zero byte.
@@ -72,21 +72,21 @@ pub(super) unsafe fn string(text: *const c_char) -> String {
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
-/// A copy of the text that a call gives; none if it fails or gives none.
+/// Return a copy of the text that a call returns through a pointer; `None` if the call fails or the pointer is null.
 ///
 /// # Safety
 /// The call sets the pointer to null or to a text that ends with a zero byte.
-pub(super) unsafe fn told(call: impl FnOnce(&mut *const c_char) -> Result<()>) -> Option<String> {
+pub(super) unsafe fn text_from(call: impl FnOnce(&mut *const c_char) -> Result<()>) -> Option<String> {
     let mut text = std::ptr::null();
     call(&mut text).ok()?;
     // SAFETY: the caller's promise.
     (!text.is_null()).then(|| unsafe { string(text) })
 }
 
-/// The handler given to `PetscPushErrorHandler`.
+/// The handler for `PetscPushErrorHandler`: record a frame.
 ///
 /// # Safety
-/// Called by PETSc alone, with texts that end with a zero byte.
+/// PETSc alone calls it, with texts that end with a zero byte.
 pub(super) unsafe extern "C" fn record(
     _comm: mpi::ffi::MPI_Comm,
     line: c_int,
@@ -103,7 +103,7 @@ pub(super) unsafe extern "C" fn record(
         if kind == ffi::PetscErrorType_PETSC_ERROR_INITIAL {
             *trace = Trace::default();
         }
-        // Frames on the way up carry a blank message.
+        // outer frames have a blank message
         if trace.message.is_empty() {
             trace.message = message.trim().to_owned();
         }

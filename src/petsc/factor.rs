@@ -1,4 +1,4 @@
-//! A factor of some rows and columns of a matrix, on the processes that have them.
+//! A factorisation of a principal submatrix P'AP, distributed over the processes of A.
 
 use super::indices::Indices;
 use super::library::petsc;
@@ -6,28 +6,29 @@ use super::substructures::Substructures;
 use super::{Ksp, Matrix, ffi};
 use crate::error::Result;
 
-/// P'AP, factored: of a matrix A and some of its dofs P. A run has one or two.
+/// The factor of P'AP, where P are some dofs of a matrix A. A run has one or two of them.
 #[allow(clippy::large_enum_variant)]
 pub(super) enum Factor {
-    /// In two halves.
+    /// Two halves, each eliminated by one process.
     Halves(Substructures),
-    /// By MUMPS on all.
+    /// One factorisation by MUMPS on all processes.
     Parallel(Ksp),
 }
 
 impl Factor {
-    /// Of dofs in increasing order, whole nodes, the same on all processes, and of which `here` has so many of this process; collective. `None` if
-    /// it is not positive definite to rounding.
+    /// Factor P'AP. Collective. Return `None` if it is not positive definite to rounding.
+    ///
+    /// `dofs` are all dofs P, the same on all processes: whole nodes in increasing order. `owned` are the `count` dofs that this process owns.
     ///
     /// # Errors
-    /// Memory, and what else stops MUMPS.
-    pub fn new(matrix: &Matrix, dofs: &[usize], (here, count): (&Indices, usize)) -> Result<Option<Self>> {
+    /// Lack of memory, and other failures of MUMPS.
+    pub fn new(matrix: &Matrix, dofs: &[usize], owned: &Indices, count: usize) -> Result<Option<Self>> {
         let (session, scope) = (matrix.session(), matrix.scope());
         // a half is to be no larger than what a process has of the matrix anyway
         if dofs.len() * scope.processes(session) <= 2 * matrix.total() {
             return Ok(Substructures::new(matrix, dofs)?.map(Self::Halves));
         }
-        let mut block = here.submatrix(matrix, here)?;
+        let mut block = owned.submatrix(matrix, owned)?;
         // SAFETY: a matrix of rows and columns of one that is positive definite.
         unsafe {
             petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, ffi::PetscBool_PETSC_TRUE))?;
@@ -40,7 +41,7 @@ impl Factor {
         Ok(solver.failure().is_none().then_some(Self::Parallel(solver)))
     }
 
-    /// `x = (P'AP)^-1 b` for the dofs of this process; collective.
+    /// Compute x = (P'AP)^-1 b; the slices have one entry for each dof P that this process owns. Collective.
     ///
     /// # Errors
     /// Failures of MUMPS.

@@ -1,4 +1,4 @@
-//! Preconditioners and factorisations that fail, and getting over it.
+//! Preconditioners and factorisations that fail, and how a solver recovers.
 
 use super::library::petsc;
 use super::{Int, Ksp, ffi};
@@ -6,7 +6,7 @@ use crate::error::Result;
 use std::ptr::null_mut;
 
 impl Ksp {
-    /// What went wrong in making the preconditioner, such as a zero pivot; `None` if nothing did.
+    /// Return why the set-up of the preconditioner failed, such as a zero pivot, or `None` if it did not.
     pub fn failure(&self) -> Option<String> {
         let pc = self.pc().ok()?;
         let text = match self.failed_reason().ok()? {
@@ -26,8 +26,7 @@ impl Ksp {
         })
     }
 
-    /// Forgets a preconditioner that failed if the matrix has changed since: PETSc's interface to MUMPS never factors
-    /// again after a failure.
+    /// Reset a preconditioner that failed if the matrix has changed since. PETSc's interface to MUMPS never factors again after a failure.
     pub(super) fn recover(&self) -> Result<()> {
         let Some(before) = self.failed_at.get() else {
             return Ok(());
@@ -36,14 +35,14 @@ impl Ksp {
             return Ok(());
         }
         self.failed_at.set(None);
-        self.forget()
+        self.reset()
     }
 
-    /// Forgets the preconditioner, and nothing else.
-    pub(super) fn forget(&self) -> Result<()> {
+    /// Reset the preconditioner, and keep the matrix and everything else.
+    pub(super) fn reset(&self) -> Result<()> {
         let pc = self.pc()?;
         let (mut matrix, mut same) = (null_mut(), null_mut());
-        // SAFETY: the reset lets the matrix go; our reference keeps it till it is set again.
+        // SAFETY: the reset drops the matrix; our reference keeps it until it is set again.
         unsafe {
             petsc!(PCGetOperators(pc, &mut matrix, &mut same))?;
             petsc!(PetscObjectReference(matrix.cast()))?;
@@ -53,15 +52,16 @@ impl Ksp {
         }
     }
 
-    /// Whether MUMPS' factorisation ran out of the space, or of the buffers for messages, that its analysis foresaw: what it takes on
-    /// several ranks depends on when they answer.
-    pub(super) fn lacks_room(&self) -> bool {
+    /// Return whether MUMPS' factorisation needed more space or message buffers than its analysis foresaw.
+    ///
+    /// The need of several ranks depends on the order of their messages.
+    pub(super) fn lacks_space(&self) -> bool {
         let info = || self.mumps_info(self.pc().ok()?);
         self.failure().is_some() && info().is_some_and(|(first, _)| matches!(first, -8 | -9 | -17 | -20))
     }
 
-    /// Gives the next factorisation, which is not begun, `percent` more space than MUMPS' analysis foresees.
-    pub(super) fn set_room(&self, percent: Int) -> Result<()> {
+    /// Allow the next factorisation `percent` more space than MUMPS' analysis foresees. To be called before its set-up.
+    pub(super) fn set_extra_space(&self, percent: Int) -> Result<()> {
         let (pc, mut factor) = (self.pc()?, null_mut());
         // SAFETY: the matrix of the factors belongs to the preconditioner; PETSc refuses one that is not of MUMPS.
         unsafe {
@@ -71,14 +71,14 @@ impl Ksp {
         }
     }
 
-    /// Remembers with which matrix the preconditioner failed, if it did.
+    /// Note with which values of the matrix the preconditioner failed, if it did.
     pub(super) fn note_failure(&self) -> Result<()> {
         let failed = self.failed_reason()? != ffi::PCFailedReason_PC_NOERROR;
         self.failed_at.set(failed.then(|| self.updates.get()));
         Ok(())
     }
 
-    /// PETSc's number for a failure of the preconditioner.
+    /// Return PETSc's reason for a failure of the preconditioner.
     fn failed_reason(&self) -> Result<ffi::PCFailedReason> {
         let mut reason = ffi::PCFailedReason_PC_NOERROR;
         let pc = self.pc()?;
@@ -87,7 +87,7 @@ impl Ksp {
         Ok(reason)
     }
 
-    /// MUMPS' INFOG(1) and INFOG(2), where MUMPS factors.
+    /// Return MUMPS' INFOG(1) and INFOG(2), if MUMPS factors.
     fn mumps_info(&self, pc: ffi::PC) -> Option<(Int, Int)> {
         if self.factor_package()? != "mumps" {
             return None;

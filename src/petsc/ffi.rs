@@ -1,4 +1,4 @@
-//! PETSc's own declarations, made by `build.rs` with bindgen, and some that bindgen cannot make portably.
+//! PETSc's declarations, which `build.rs` generates with bindgen, and some that bindgen cannot generate portably.
 #![allow(
     missing_docs,
     non_upper_case_globals,
@@ -13,7 +13,7 @@ include!(concat!(env!("OUT_DIR"), "/petsc.rs"));
 
 use std::ffi::{c_char, c_int, c_void};
 
-/// PETSc's integer, of rows and columns.
+/// PETSc's integer for rows and columns.
 pub type Int = PetscInt;
 
 /// MUMPS, which is linked.
@@ -21,19 +21,21 @@ pub mod mumps {
     include!(concat!(env!("OUT_DIR"), "/mumps.rs"));
 }
 
-/// The hook through which PETSc prints everything. On the platforms of PETSc a `va_list` argument has the shape of
-/// one pointer: a decayed array (x86-64), a reference to a copy (AArch64) or a plain pointer (Apple, Windows).
+/// The type of `PetscVFPrintf`, the hook through which PETSc prints everything.
+///
+/// On the platforms of PETSc a `va_list` argument is passed as one pointer: a decayed array (x86-64), a reference to a copy (AArch64) or a
+/// plain pointer (Apple, Windows).
 pub type Printf = unsafe extern "C" fn(file: *mut c_void, format: *const c_char, list: *mut c_void) -> PetscErrorCode;
 
-/// `PetscVSNPrintf(text, size, format, length, list)`.
+/// The type of `PetscVSNPrintf(text, size, format, length, list)`.
 pub type Format =
     unsafe extern "C" fn(*mut c_char, usize, *const c_char, *mut usize, list: *mut c_void) -> PetscErrorCode;
 
-/// `PetscTrFree`, which frees what PETSc made.
+/// The type of `PetscTrFree`, which frees memory that PETSc has allocated.
 pub type Free = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char) -> PetscErrorCode;
 
 impl Library {
-    /// Address of a variable or function of PETSc by its name; `T` is a pointer.
+    /// Return the address of a variable or function of PETSc by its name; `T` is a pointer.
     ///
     /// # Errors
     /// When this PETSc has no such name.
@@ -48,6 +50,6 @@ impl Library {
 }
 
 unsafe extern "C" {
-    /// The C library's; MPI_Abort and PETSc write past Rust's own buffers.
+    /// Flush files of the C library, which PETSc and MPI_Abort write to.
     pub fn fflush(file: *mut c_void) -> i32;
 }

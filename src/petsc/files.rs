@@ -1,8 +1,8 @@
-//! Files of options: which of them PETSc reads, and a look at them before it does.
+//! Files of PETSc options: which of them PETSc is to read, and a check of them before it does.
 //!
-//! PETSc reads `.petscrc` of the home folder, and `.petscrc` and `petscrc` of the current one. Options can load libraries and start
-//! programs, and a current folder may be anybody's. So those of the current folder are left out unless `-options_file` names them. PETSc follows
-//! files that name each other until its stack ends, and waits for ever at a pipe.
+//! By itself PETSc reads `.petscrc` of the home folder, and `.petscrc` and `petscrc` of the current folder. Options can load libraries and
+//! start programs, and the current folder may belong to anybody. So its files are skipped unless `-options_file` names them. The check is
+//! needed because PETSc follows files that name each other until its stack overflows, and waits for ever at a pipe.
 
 use crate::error::{Error, Kind, Result};
 use std::collections::BTreeSet;
@@ -10,69 +10,69 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Files of options that PETSc looks for in the current folder by itself.
+/// The files of options that PETSc looks for in the current folder by itself.
 const OF_FOLDER: [&str; 2] = [".petscrc", "petscrc"];
 
-/// Most bytes of a file. PETSc's table has 512 options, so this is 2 kB for each.
+/// The largest size of a file in bytes. PETSc's table has 512 options, so this is 2 kB for each.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// Most files that lead to each other. PETSc's stack takes some 15 kB for each, of which there are 8 MB.
+/// The largest number of files that lead to each other. Each takes some 15 kB of PETSc's stack of 8 MB.
 const MOST_FILES: usize = 100;
 
-/// What PETSc reads, and what it does not.
+/// The files that PETSc is to read by itself, and those it is not.
 #[derive(Debug, Default)]
 pub(super) struct Files {
-    /// The file of the home folder, if there is one that is read.
+    /// The file of the home folder, if it exists and is to be read.
     pub home: Option<PathBuf>,
-    /// Files of the current folder that are not read.
+    /// The files of the current folder that are not read.
     pub left_out: Vec<String>,
 }
 
 impl Files {
-    /// Look at all files of options that PETSc would read with these `words` of the command line.
+    /// Check all files of options that PETSc reads with these `words` of the command line.
     ///
     /// # Errors
-    /// One that is no file or no text, that is too large, or that leads back to itself.
-    pub fn look(words: &[String]) -> Result<Self> {
+    /// When one is not a regular text file, is too large, or leads back to itself.
+    pub fn check(words: &[String]) -> Result<Self> {
         let skips = is_on(words, "-skip_petscrc");
         let home =
             std::env::var_os("HOME").filter(|home| !home.is_empty()).map(|home| Path::new(&home).join(".petscrc"));
         let home = home.filter(|path| !skips && path.is_file() && File::open(path).is_ok());
-        let mut look = Look::default();
+        let mut check = Check::default();
         if let Some(path) = &home {
-            look.file(&path.to_string_lossy())?;
+            check.file(&path.to_string_lossy())?;
         }
-        look.words(tokens(&std::env::var("PETSC_OPTIONS").unwrap_or_default()))?;
-        look.words(words.iter().map(String::as_str))?;
+        check.words(tokens(&std::env::var("PETSC_OPTIONS").unwrap_or_default()))?;
+        check.words(words.iter().map(String::as_str))?;
         let is_left_out = |name: &str| {
             let path = Path::new(name);
-            !skips && path.is_file() && path.canonicalize().is_ok_and(|path| !look.seen.contains(&path))
+            !skips && path.is_file() && path.canonicalize().is_ok_and(|path| !check.seen.contains(&path))
         };
         let left_out = OF_FOLDER.into_iter().filter(|name| is_left_out(name)).map(str::to_owned).collect();
         Ok(Self { home, left_out })
     }
 }
 
-/// Whether a switch of the command line is on; the last one counts.
+/// Return whether a switch of the command line is on. The last occurrence counts.
 fn is_on(words: &[String], name: &str) -> bool {
     let Some(at) = words.iter().rposition(|word| word.eq_ignore_ascii_case(name)) else { return false };
     let value = words.get(at + 1).map(|value| value.to_lowercase()).unwrap_or_default();
     !["0", "no", "off", "false"].contains(&value.as_str())
 }
 
-/// A look at files that lead to each other.
+/// A check of files that lead to each other.
 #[derive(Default)]
-struct Look {
-    /// The files from the first one to this one.
+struct Check {
+    /// The files from the first one to the current one, each named in the one before.
     chain: Vec<PathBuf>,
     /// All files so far.
     seen: BTreeSet<PathBuf>,
-    /// How often one was read.
+    /// The number of files read so far, repetitions included.
     count: usize,
 }
 
-impl Look {
-    /// Looks at the files that options name.
+impl Check {
+    /// Check the files that options name.
     fn words<'a>(&mut self, words: impl IntoIterator<Item = &'a str>) -> Result<()> {
         let mut words = words.into_iter();
         while let Some(word) = words.next() {
@@ -85,13 +85,13 @@ impl Look {
         Ok(())
     }
 
-    /// Looks at a file. One that is missing is left to PETSc, which says so.
+    /// Check a file. A missing one is left to PETSc, which reports it.
     fn file(&mut self, name: &str) -> Result<()> {
         if name.contains("${") {
             return Err(wrong(format!("the name of the options file `{name}` is not written out"), &self.chain)
                 .help("write the name of the file itself: winkler looks at it before PETSc does"));
         }
-        // as PETSc does
+        // PETSc replaces them, too
         let name = name.replace('\\', "/");
         let path = Path::new(name.strip_suffix(":yaml").unwrap_or(&name));
         let Ok(place) = path.canonicalize() else { return Ok(()) };
@@ -111,7 +111,7 @@ impl Look {
             || [".yaml", ".yml", ".json"].iter().any(|end| name.ends_with(end))
             || ["%YAML ", "---"].iter().any(|start| text.starts_with(start));
         if !is_yaml {
-            // PETSc makes one string of the file
+            // PETSc joins the lines of the file into one string
             let lines: String = text.lines().map(joined).collect();
             self.words(tokens(&lines))?;
         }
@@ -120,7 +120,7 @@ impl Look {
     }
 }
 
-/// An error about an option of the command line, or of the last of these files.
+/// Return an error about an option of the command line, or of the last file of `chain`.
 fn wrong(message: String, chain: &[PathBuf]) -> Error {
     chain
         .iter()
@@ -128,10 +128,10 @@ fn wrong(message: String, chain: &[PathBuf]) -> Error {
         .fold(Error::new(Kind::Solver, message), |error, file| error.because(format!("named in {}", file.display())))
 }
 
-/// The text of a file of options.
+/// Return the text of a file of options.
 fn text(path: &Path) -> Result<String> {
     let failed = |cause| Error::file(path, "read", &cause);
-    // the opening of a pipe waits for its other end
+    // opening a pipe would wait for its other end
     let kind = path.metadata().map_err(failed)?;
     if !kind.is_file() {
         let odd = if kind.is_dir() { "a folder" } else { "a pipe or a device" };
@@ -140,17 +140,17 @@ fn text(path: &Path) -> Result<String> {
     }
     let (file, mut bytes) = (File::open(path).map_err(failed)?, Vec::new());
     file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
-    let is_sign = |byte: &u8| !byte.is_ascii_control() || b"\t\n\r\x0c".contains(byte);
+    let is_text = |byte: &u8| !byte.is_ascii_control() || b"\t\n\r\x0c".contains(byte);
     let wrong = match () {
         _ if bytes.len() as u64 > MOST_BYTES => format!("has more than {} kB", MOST_BYTES >> 10),
-        _ if !bytes.iter().all(is_sign) => "is no text".to_owned(),
+        _ if !bytes.iter().all(is_text) => "is no text".to_owned(),
         _ => return Ok(String::from_utf8_lossy(&bytes).into_owned()),
     };
     Err(Error::new(Kind::File, format!("the options file {} {wrong}", path.display()))
         .help("-options_file names a text file with one PETSc option a line"))
 }
 
-/// The option of a line as PETSc puts it into one string with those of other lines.
+/// Return the option of a line as PETSc joins it with those of other lines.
 fn joined(line: &str) -> String {
     let line = line.split('#').next().unwrap_or_default().replace(['\t', '\r'], " ");
     let words: Vec<&str> = tokens(line.trim_start_matches(' ')).collect();
@@ -161,7 +161,7 @@ fn joined(line: &str) -> String {
     }
 }
 
-/// The words of a string as PETSc finds them: between blanks, or from a double quote to the next one.
+/// Return the words of a string as PETSc finds them: between blanks, or from a double quote to the next one.
 fn tokens(text: &str) -> impl Iterator<Item = &str> {
     let mut rest = text;
     std::iter::from_fn(move || {
@@ -180,8 +180,8 @@ mod tests {
     use super::*;
     use std::fs;
 
-    fn looked(text: &str) -> Result<()> {
-        Look::default().words(tokens(text))
+    fn checked(text: &str) -> Result<()> {
+        Check::default().words(tokens(text))
     }
 
     #[test]
@@ -209,7 +209,7 @@ mod tests {
         write("huge", &"# \n".repeat(400_000));
         write("ring.yaml", &format!("options_file: {}\n", path("ring.yaml")));
         for name in ["good", "twice", "missing", "ring.yaml"] {
-            assert!(looked(&format!("-options_file {}", path(name))).is_ok(), "{name}");
+            assert!(checked(&format!("-options_file {}", path(name))).is_ok(), "{name}");
         }
         for (name, words) in [
             ("self", "leads back to itself"),
@@ -220,15 +220,15 @@ mod tests {
             ("huge", "has more than 1024 kB"),
             ("", "is a folder"),
         ] {
-            let error = looked(&format!("-ksp_rtol 1 -options_file {}", path(name))).unwrap_err();
+            let error = checked(&format!("-ksp_rtol 1 -options_file {}", path(name))).unwrap_err();
             assert!(error.message().contains(words), "{name}: {}", error.message());
         }
-        assert!(looked("-options_file").is_err() && looked("-options_file -ksp_view").is_err());
+        assert!(checked("-options_file").is_err() && checked("-options_file -ksp_view").is_err());
         for k in 0..200 {
             write(&format!("chain{k}"), &format!("-options_file {}\n", path(&format!("chain{}", k + 1))));
         }
-        assert!(looked(&format!("-options_file {}", path("chain150"))).is_ok());
-        assert!(looked(&format!("-options_file {}", path("chain0"))).is_err());
+        assert!(checked(&format!("-options_file {}", path("chain150"))).is_ok());
+        assert!(checked(&format!("-options_file {}", path("chain0"))).is_err());
     }
 
     #[test]

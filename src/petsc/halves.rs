@@ -1,4 +1,4 @@
-//! Some nodes of a matrix, cut into two halves that are not coupled.
+//! Bisection of some nodes of a matrix into two halves without coupling, and a separator between them.
 
 use super::indices::row;
 use super::{Int, Matrix, Session, metis};
@@ -7,25 +7,37 @@ use mpi::Count;
 use mpi::datatype::PartitionMut;
 use mpi::traits::{Communicator, CommunicatorCollectives, Root};
 
-/// A node between the halves.
-pub(super) const BETWEEN: Int = -1;
+/// The label of a node of the separator. The nodes of the halves have the labels 0 and 1.
+pub(super) const SEPARATOR: Int = -1;
 
-/// The half, 0 or 1, of each node of the `dofs`, whole nodes in increasing order, or [`BETWEEN`]: halves are of about the same size and are
-/// coupled by the nodes between them alone, of which there are few. One process has no use for a second half. Collective; the same on all
-/// processes.
+/// Return the label of each node of the `dofs`: 0 or 1 for its half, or [`SEPARATOR`]. Collective, with the same result on all processes.
+///
+/// `dofs` are whole nodes in increasing order, the same on all processes. The halves have about the same size, and the separator has few
+/// nodes. One process puts all nodes into half 0.
 ///
 /// # Errors
 /// Those of METIS.
 pub(super) fn halves(matrix: &Matrix, dofs: &[usize]) -> Result<Vec<Int>> {
-    let (session, scope, own, size) = (matrix.session(), matrix.scope(), matrix.own(), matrix.block_size());
+    let (session, size) = (matrix.session(), matrix.block_size());
     let nodes: Vec<usize> = dofs.iter().step_by(size).map(|dof| dof / size).collect();
     let mut half = vec![0; nodes.len()];
-    if scope.processes(session) == 1 {
+    if matrix.scope().processes(session) == 1 {
         return Ok(half);
     }
-    // of each node here: how many neighbours, and which
+    let graph = collect(session, &owned_graph(matrix, &nodes)?);
+    if session.rank() == 0 {
+        let (mut ptr, mut col) = compressed(&graph);
+        half = of_graph(&mut ptr, &mut col)?;
+    }
+    session.world().process_at_rank(0).broadcast_into(&mut half[..]);
+    Ok(half)
+}
+
+/// Return the neighbours of those `nodes` that this process owns, among `nodes`: for each node their number, then their positions.
+fn owned_graph(matrix: &Matrix, nodes: &[usize]) -> Result<Vec<Int>> {
+    let (owned, size) = (matrix.own(), matrix.block_size());
     let (mut graph, mut around) = (Vec::<Int>::new(), Vec::new());
-    for (number, node) in nodes.iter().enumerate().filter(|(_, node)| own.contains(&(*node * size))) {
+    for (number, node) in nodes.iter().enumerate().filter(|(_, node)| owned.contains(&(*node * size))) {
         around.clear();
         for dof in node * size..(node + 1) * size {
             row(matrix.raw(), dof, |columns, _| around.extend(columns.iter().map(|column| *column as usize / size)))?;
@@ -38,22 +50,22 @@ pub(super) fn halves(matrix: &Matrix, dofs: &[usize]) -> Result<Vec<Int>> {
         graph.extend(others.filter(|other| *other != number).map(|other| other as Int));
         graph[at] = (graph.len() - at - 1) as Int;
     }
-    let graph = collect(session, &graph);
-    if session.rank() == 0 {
-        let (mut ptr, mut col, mut rest) = (vec![0], Vec::with_capacity(graph.len()), &graph[..]);
-        while let [count, others @ ..] = rest {
-            let (these, next) = others.split_at(*count as usize);
-            col.extend_from_slice(these);
-            ptr.push(col.len() as Int);
-            rest = next;
-        }
-        half = of_graph(&mut ptr, &mut col)?;
-    }
-    session.world().process_at_rank(0).broadcast_into(&mut half[..]);
-    Ok(half)
+    Ok(graph)
 }
 
-/// What all processes have, one after the other, on the first; nothing on others.
+/// Return a graph of [`owned_graph`] in compressed rows: row pointers and columns.
+fn compressed(graph: &[Int]) -> (Vec<Int>, Vec<Int>) {
+    let (mut ptr, mut col, mut rest) = (vec![0], Vec::with_capacity(graph.len()), graph);
+    while let [count, others @ ..] = rest {
+        let (neighbours, next) = others.split_at(*count as usize);
+        col.extend_from_slice(neighbours);
+        ptr.push(col.len() as Int);
+        rest = next;
+    }
+    (ptr, col)
+}
+
+/// Return the concatenated slices of all processes on rank 0, and an empty vector on other ranks. Collective.
 fn collect(session: &Session, mine: &[Int]) -> Vec<Int> {
     let mut lengths: Vec<Count> = vec![0; session.size()];
     session.world().all_gather_into(&(mine.len() as Count), &mut lengths[..]);
@@ -69,14 +81,16 @@ fn collect(session: &Session, mine: &[Int]) -> Vec<Int> {
     all
 }
 
-/// The halves of a graph: the neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`.
+/// Return the labels of the nodes of a graph; the neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`.
 fn of_graph(ptr: &mut [Int], col: &mut [Int]) -> Result<Vec<Int>> {
     let mut half = metis::partition(ptr, col, 2)?;
     separate(ptr, col, &mut half);
     Ok(half)
 }
 
-/// Takes nodes out of the halves until no edge joins these: nodes with the most such edges first, so that they are few and of both halves.
+/// Move nodes into the separator until no edge joins the halves.
+///
+/// Nodes with the most such edges come first, so that the separator is small and taken from both halves.
 fn separate(ptr: &[Int], col: &[Int], half: &mut [Int]) {
     let around = |node: usize| col[ptr[node] as usize..ptr[node + 1] as usize].iter().map(|other| *other as usize);
     let edges = |node: usize, half: &[Int]| around(node).filter(|&other| half[other] == 1 - half[node]).count();
@@ -85,16 +99,16 @@ fn separate(ptr: &[Int], col: &[Int], half: &mut [Int]) {
     cut.sort_unstable_by(|a, b| b.cmp(a));
     for (_, node) in cut {
         if edges(node, half) > 0 {
-            half[node] = BETWEEN;
+            half[node] = SEPARATOR;
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{BETWEEN, of_graph, separate};
+    use super::{SEPARATOR, of_graph, separate};
 
-    /// A strip of 60 by 10 nodes: about one row of ten lies between halves of the same size, none of whose nodes is next to one of the other.
+    /// A strip of 60 by 10 nodes is cut by about one row of ten into halves of the same size, which are not coupled.
     #[test]
     fn a_strip_is_cut_across() {
         let (mut ptr, mut col) = (vec![0], Vec::new());
@@ -105,21 +119,21 @@ mod tests {
         }
         let half = of_graph(&mut ptr, &mut col).expect("METIS");
         let count = |of| half.iter().filter(|half| **half == of).count();
-        assert!(count(BETWEEN) <= 12 && count(0).abs_diff(count(1)) <= 24, "{} {}", count(0), count(1));
-        let apart = |i: usize, j: i32| half[i] == BETWEEN || half[j as usize] != 1 - half[i];
+        assert!(count(SEPARATOR) <= 12 && count(0).abs_diff(count(1)) <= 24, "{} {}", count(0), count(1));
+        let apart = |i: usize, j: i32| half[i] == SEPARATOR || half[j as usize] != 1 - half[i];
         assert!((0..600).all(|i| col[ptr[i] as usize..ptr[i + 1] as usize].iter().all(|&j| apart(i, j))));
     }
 
-    /// Two stars whose centres are coupled: one centre is enough between them. A leaf in the half of the other star needs its own centre.
+    /// Two stars have coupled centres. One centre separates them; if a leaf is in the other half, its own centre does.
     #[test]
-    fn few_nodes_lie_between_halves() {
+    fn a_separator_is_small() {
         // 0 with 1, 2, 3, and 1 with 4, 5
         let (ptr, col) = ([0, 3, 6, 7, 8, 9, 10], [1, 2, 3, 0, 4, 5, 0, 0, 1, 1]);
         let mut half = [0, 1, 0, 0, 1, 1];
         separate(&ptr, &col, &mut half);
-        assert_eq!(half, [0, BETWEEN, 0, 0, 1, 1]);
+        assert_eq!(half, [0, SEPARATOR, 0, 0, 1, 1]);
         let mut half = [0, 1, 0, 1, 1, 1];
         separate(&ptr, &col, &mut half);
-        assert_eq!(half, [BETWEEN, 1, 0, 1, 1, 1]);
+        assert_eq!(half, [SEPARATOR, 1, 0, 1, 1, 1]);
     }
 }

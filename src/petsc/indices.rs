@@ -1,4 +1,4 @@
-//! Sets of rows (IS), and rows.
+//! Index sets (IS), and access to rows and submatrices.
 
 use super::library::petsc;
 use super::vector::slice;
@@ -7,11 +7,11 @@ use crate::error::Result;
 use mpi::ffi::{MPI_Comm, RSMPI_COMM_SELF};
 use std::ptr::{null, null_mut};
 
-/// Numbers of rows, in increasing order.
+/// An index set: global row numbers in increasing order.
 pub(super) struct Indices(pub(super) ffi::IS);
 
 impl Indices {
-    /// What each process of a communicator has of them.
+    /// Create an index set over a communicator; `numbers` are those of this process.
     pub(super) fn new(comm: MPI_Comm, numbers: &[usize]) -> Result<Self> {
         let numbers: Vec<Int> = numbers.iter().map(|&i| i as Int).collect();
         let (count, copy, mut is) = (numbers.len() as Int, ffi::PetscCopyMode_PETSC_COPY_VALUES, null_mut());
@@ -20,20 +20,20 @@ impl Indices {
         Ok(Self(is))
     }
 
-    /// What this process alone has of them.
+    /// Create an index set of this process alone.
     pub(super) fn alone(numbers: &[usize]) -> Result<Self> {
         // SAFETY: the constant of MPI itself.
         Self::new(unsafe { RSMPI_COMM_SELF }, numbers)
     }
 
-    /// These `rows` of a matrix and those within `layers` of its graph around them. Collective.
+    /// Return the `rows` of a matrix with the rows within `layers` of its graph around them, sorted. Collective.
     pub(super) fn around(matrix: &Matrix, rows: &[usize], layers: usize) -> Result<Vec<usize>> {
         let mut rows = rows.to_vec();
         rows.sort_unstable();
         rows.dedup();
         let mut indices = Self::alone(&rows)?;
         let (mut count, mut numbers) = (0, null());
-        // SAFETY: one set, in the place of which PETSc puts a new one, and its array, read before it is given back.
+        // SAFETY: one set, which PETSc replaces by a new one, and its array, which is read before it is given back.
         unsafe {
             petsc!(MatIncreaseOverlap(matrix.raw(), 1, &mut indices.0, layers as Int))?;
             petsc!(ISSort(indices.0))?;
@@ -45,26 +45,27 @@ impl Indices {
         }
     }
 
-    /// These rows and those columns of a matrix, of its processes.
+    /// Return the submatrix of these rows and the given `columns`, distributed like the matrix. Collective.
     pub(super) fn submatrix(&self, matrix: &Matrix, columns: &Indices) -> Result<ffi::Mat> {
-        let (scall, mut part) = (ffi::MatReuse_MAT_INITIAL_MATRIX, null_mut());
+        let (reuse, mut part) = (ffi::MatReuse_MAT_INITIAL_MATRIX, null_mut());
         // SAFETY: sets of the matrix's processes.
-        unsafe { petsc!(MatCreateSubMatrix(matrix.raw(), self.0, columns.0, scall, &mut part)) }?;
+        unsafe { petsc!(MatCreateSubMatrix(matrix.raw(), self.0, columns.0, reuse, &mut part)) }?;
         Ok(part)
     }
 
-    /// Reads these rows of a matrix, which may belong to other processes, in those columns: rows and columns as numbers in the sets. Collective;
-    /// each process has sets of its own.
-    pub(super) fn of_others(
+    /// Fetch the submatrix of these rows and the given `columns`, which other processes may own, and hand it to `read`.
+    ///
+    /// Each process has its own index sets. Rows and columns of the submatrix are numbered by their positions in the sets. Collective.
+    pub(super) fn fetch(
         &self,
         matrix: &Matrix,
         columns: &Indices,
         read: impl FnOnce(ffi::Mat) -> Result<()>,
     ) -> Result<()> {
-        let (scall, mut parts) = (ffi::MatReuse_MAT_INITIAL_MATRIX, null_mut());
+        let (reuse, mut parts) = (ffi::MatReuse_MAT_INITIAL_MATRIX, null_mut());
         // SAFETY: one matrix, of this process, which lives until `read` is done.
         unsafe {
-            petsc!(MatCreateSubMatrices(matrix.raw(), 1, &self.0, &columns.0, scall, &mut parts))?;
+            petsc!(MatCreateSubMatrices(matrix.raw(), 1, &self.0, &columns.0, reuse, &mut parts))?;
             let done = read(*parts);
             petsc!(MatDestroySubMatrices(1, &mut parts))?;
             done
@@ -79,7 +80,7 @@ impl Drop for Indices {
     }
 }
 
-/// What `read` makes of a row of this process, number `i` of all: of its columns, counted through all processes, and values.
+/// Return what `read` makes of the row with the global number `i`, which this process owns: of its global columns and its values.
 pub(super) fn row<T>(matrix: ffi::Mat, i: usize, read: impl FnOnce(&[Int], &[f64]) -> T) -> Result<T> {
     let (i, mut count, mut columns, mut values) = (i as Int, 0, null(), null());
     // SAFETY: the row, of as many columns as values, is read before it is given back.

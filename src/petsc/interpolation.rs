@@ -1,4 +1,4 @@
-//! Two levels of multigrid: the interpolation from the coarse one.
+//! Multigrid of two levels (PCMG) with a given interpolation.
 
 use super::library::petsc;
 use super::rows::check;
@@ -10,11 +10,13 @@ use mpi::traits::CommunicatorCollectives;
 use std::ptr::null_mut;
 
 impl Ksp {
-    /// Makes the preconditioner multigrid of two levels (PCMG): an interpolation P, its transpose as restriction, and P'AP as the matrix
-    /// of the coarse level, made anew when the `matrix` A of this solver changes. Before the options are read.
+    /// Choose multigrid of two levels (PCMG) as preconditioner. To be called before the options are read.
     ///
-    /// P has one row a row of A on this process: row `i` has the columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in increasing order and
-    /// counted through all processes, and the values at the same places; `own` columns belong to this process.
+    /// P interpolates from the coarse level, P' restricts, and the matrix of the coarse level is P'AP. It is computed anew when the
+    /// `matrix` A of this solver changes.
+    ///
+    /// P has one row for each row of A on this process. Row `i` has the global columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in
+    /// increasing order, and the values at the same positions. This process owns `own` columns.
     ///
     /// ```
     /// use winkler::petsc::{Ksp, Matrix, Session};
@@ -33,7 +35,7 @@ impl Ksp {
     /// ```
     ///
     /// # Errors
-    /// When the arrays are not those of such rows.
+    /// When the arrays do not describe such rows.
     pub fn set_interpolation(
         &mut self,
         matrix: &Matrix,
@@ -55,12 +57,12 @@ impl Ksp {
         let (comm, mut mat, pc) = (matrix.scope().comm(matrix.session()), null_mut(), self.pc()?);
         // SAFETY: the new matrix.
         unsafe { petsc!(MatCreate(comm, &mut mat)) }?;
-        // SAFETY: the three arrays are rows of this width, as was checked; PETSc copies them.
+        // SAFETY: the three arrays were checked to be rows of this width; PETSc copies them.
         let made = (|| unsafe {
             petsc!(MatSetSizes(mat, rows as Int, own as Int, DETERMINE, DETERMINE))?;
             petsc!(MatSetType(mat, c"aij".as_ptr()))?;
             petsc!(MatSetBlockSizes(mat, block, block))?;
-            // each is for one of the two kinds, of one process and of several, and does nothing to the other; both copy
+            // one call is for matrices of one process and one for several; each ignores the other kind
             petsc!(MatSeqAIJSetPreallocationCSR(mat, i, j, v))?;
             petsc!(MatMPIAIJSetPreallocationCSR(mat, i, j, v))?;
             petsc!(PCSetType(pc, c"mg".as_ptr()))?;
@@ -73,14 +75,15 @@ impl Ksp {
         made
     }
 
-    /// Has the smoother of these two levels see the values that the `matrix` of this solver has now, where the preconditioner is kept:
-    /// Chebyshev's method estimates its bounds anew. The coarse level stays as it is.
+    /// Set up the smoother again with the current values of the `matrix`, where the preconditioner is otherwise kept.
+    ///
+    /// Chebyshev's method estimates its bounds anew. The matrix of the coarse level stays as it is.
     ///
     /// ```
     /// use winkler::petsc::{Ksp, Matrix, Session};
     /// let words = "-ksp_type cg -ksp_rtol 1e-10 -mg_levels_ksp_type chebyshev -mg_levels_pc_type jacobi -mg_coarse_pc_type cholesky";
     /// let session = Session::start(&words.split(' ').map(String::from).collect::<Vec<_>>())?;
-    /// // sixty springs to the ground; then one against the last thirty moving up and down in turn, which the coarse level cannot
+    /// // sixty springs to the ground; then a stiff alternating motion of the last thirty, which the coarse level cannot represent
     /// let (n, row) = (60, |spring: f64, i: usize| {
     ///     let spring = move |j: usize| if i.min(j) < 30 { 0.0 } else { spring * [1.0, -1.0][(i + j) % 2] };
     ///     (0..60).map(move |j| f64::from(u8::from(i == j)) + spring(j))
@@ -104,10 +107,10 @@ impl Ksp {
     /// ```
     ///
     /// # Errors
-    /// PETSc's; when there are no two levels.
+    /// PETSc's, also when the preconditioner has no two levels.
     pub fn renew_smoother(&self, matrix: &Matrix) -> Result<()> {
         let (pc, mut smoother) = (self.pc()?, null_mut());
-        // SAFETY: the smoother belongs to the preconditioner, and takes references to the matrix it has already.
+        // SAFETY: the smoother belongs to the preconditioner, and refers to this matrix already.
         unsafe {
             petsc!(PCMGGetSmoother(pc, 1, &mut smoother))?;
             petsc!(KSPSetOperators(smoother, matrix.raw(), matrix.raw()))?;

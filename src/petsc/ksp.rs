@@ -1,9 +1,9 @@
-//! Linear solvers.
+//! Linear solvers (KSP with a preconditioner PC).
 
-use super::around::Around;
-use super::error::told;
+use super::around::Wrapper;
+use super::error::text_from;
 use super::library::petsc;
-use super::mumps::ROOM;
+use super::mumps::EXTRA_SPACE;
 use super::table::text;
 use super::vector::Vector;
 use super::{ConvergedReason, Int, Matrix, Scope, Session, ffi, is_of_family};
@@ -12,19 +12,18 @@ use std::cell::Cell;
 use std::ptr::null_mut;
 use std::rc::Rc;
 
-/// What a linear solve reached.
+/// The outcome of a linear solve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solved {
-    /// Number of iterations; 1 for a direct solve.
+    /// The number of iterations; 1 for a direct solve.
     pub iterations: usize,
     /// Why the solver stopped.
     pub reason: ConvergedReason,
-    /// Norm of the last residual as the solver measures it (its `-ksp_norm_type`); 0 for a solver that measures none,
-    /// such as `preonly`.
+    /// The norm of the last residual as the solver measures it (its `-ksp_norm_type`); 0 for a solver without a norm, such as `preonly`.
     pub residual: f64,
 }
 
-/// A linear solver, any KSP with any PC of PETSc, chosen by options.
+/// A linear solver: any KSP with any PC of PETSc, chosen by options.
 ///
 /// Not converging is an outcome, not an error (unless the user typed `-ksp_error_if_not_converged`).
 ///
@@ -58,23 +57,23 @@ pub struct Solved {
 /// ```
 pub struct Ksp {
     pub(super) ksp: ffi::KSP,
-    /// Right-hand side and solution, made with the operator.
+    /// PETSc's headers of right-hand side and solution, created with the operator.
     vectors: Option<[Vector; 2]>,
-    /// Number of updates of the matrix.
+    /// The number of updates of the matrix.
     pub(super) updates: Rc<Cell<u64>>,
-    /// That number when the preconditioner failed, if it did.
+    /// The number of updates of the matrix with which the preconditioner failed, if it did.
     pub(super) failed_at: Cell<Option<u64>>,
     /// Whether a solve writes to its right-hand side.
     writes_to_b: bool,
-    /// What stands around the preconditioner, the innermost first.
-    pub(super) around: Vec<Around>,
+    /// The subspaces around the preconditioner, the innermost first.
+    pub(super) wrappers: Vec<Wrapper>,
     prefix: String,
     scope: Scope,
     session: Session,
 }
 
 impl Ksp {
-    /// A solver that reads its options under a prefix, such as `upper_`.
+    /// Create a solver of this process that reads its options under a prefix, such as `upper_`.
     ///
     /// # Errors
     /// When PETSc does not accept the prefix.
@@ -82,13 +81,13 @@ impl Ksp {
         Self::of(session, Scope::Process, prefix)
     }
 
-    /// The same for matrices of this [`Scope`]; all calls are collective over it.
+    /// Create a solver for matrices of this [`Scope`]. All calls are collective over its processes.
     ///
     /// # Errors
     /// When PETSc does not accept the prefix.
     pub fn of(session: &Session, scope: Scope, prefix: &str) -> Result<Ksp> {
         let (comm, mut ksp) = (scope.comm(session), null_mut());
-        // SAFETY: the processes of the scope all make it.
+        // SAFETY: all processes of the scope create it.
         unsafe { petsc!(KSPCreate(comm, &mut ksp)) }?;
         let solver = Ksp {
             ksp,
@@ -96,7 +95,7 @@ impl Ksp {
             updates: Rc::default(),
             failed_at: Cell::new(None),
             writes_to_b: false,
-            around: Vec::new(),
+            wrappers: Vec::new(),
             prefix: prefix.to_owned(),
             scope,
             session: session.clone(),
@@ -110,8 +109,9 @@ impl Ksp {
         Ok(solver)
     }
 
-    /// A factorisation by MUMPS of a symmetric positive definite matrix with so many `rows` on this process, whatever options say. What it
-    /// comes to is told by [`failure`](Self::failure).
+    /// Factor a symmetric positive definite matrix with `rows` rows on this process by MUMPS, whatever options say.
+    ///
+    /// [`failure`](Self::failure) reports whether the factorisation succeeded.
     ///
     /// # Errors
     /// PETSc's.
@@ -131,7 +131,7 @@ impl Ksp {
         Ok(solver)
     }
 
-    /// Sets the matrix, of the system and of the preconditioner. The solver keeps it alive and sees its updates.
+    /// Set the matrix of the system and of the preconditioner. The solver keeps it alive and sees its updates.
     ///
     /// # Errors
     /// When the solver had a matrix of another size, or belongs to other processes.
@@ -151,13 +151,12 @@ impl Ksp {
         Ok(())
     }
 
-    /// Reads the options of the solver. `preonly` never keeps a preconditioner of an older matrix, whatever is typed:
-    /// its answer would be wrong.
+    /// Read the options of the solver. `preonly` never keeps a preconditioner of an older matrix, whatever is typed: its answer would be
+    /// wrong.
     ///
     /// # Errors
-    /// When PETSc refuses an option; for the options that change the matrix itself, `-ksp_diagonal_scale` and
-    /// `-pc_factor_in_place`; for `-ksp_max_it 0` and a `-ksp_rtol` that is not below 1; and for `preonly` over a nested
-    /// solver that keeps a preconditioner.
+    /// When PETSc refuses an option; for the options that change the matrix itself, `-ksp_diagonal_scale` and `-pc_factor_in_place`; for
+    /// `-ksp_max_it 0` and a `-ksp_rtol` that is not below 1; and for `preonly` over a nested solver that keeps a preconditioner.
     pub fn set_from_options(&mut self) -> Result<()> {
         // SAFETY: the solver of this wrapper.
         unsafe { petsc!(KSPSetFromOptions(self.ksp)) }.map_err(|error| {
@@ -167,6 +166,16 @@ impl Ksp {
             };
             error.help(format!("{own}-help lists all options and types"))
         })?;
+        self.check_typed_options()?;
+        if self.applies_only() {
+            // SAFETY: the solver of this wrapper.
+            return unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, ffi::PetscBool_PETSC_FALSE)) };
+        }
+        self.check_tolerances()
+    }
+
+    /// Refuse options that this program cannot honour, and note whether the right-hand side is written to.
+    fn check_typed_options(&mut self) -> Result<()> {
         let typed = self.session.options().all()?;
         let start = self.own_options();
         let own = typed.iter().filter_map(|(name, value)| {
@@ -191,17 +200,19 @@ impl Ksp {
                     .help(format!("take an iterative method, e.g. `{start}ksp_type cg`")));
             }
         }
-        if self.applies_only() {
-            // SAFETY: the solver of this wrapper.
-            return unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, ffi::PetscBool_PETSC_FALSE)) };
-        }
-        let ([rtol, ..], limit) = self.tolerances()?;
-        // conjugate gradients make room for an eigenvalue an iteration, and go through one all the same
+        Ok(())
+    }
+
+    /// Refuse tolerances with which the solver would do nothing.
+    fn check_tolerances(&self) -> Result<()> {
+        let start = self.own_options();
+        let Tolerances { rtol, limit, .. } = self.tolerances()?;
+        // with a limit of 0, conjugate gradients allocate no eigenvalues and do one iteration all the same
         if limit < 1 {
             return Err(Error::new(Kind::Solver, format!("{start}ksp_max_it is {limit}: the solver would do nothing"))
                 .help("give 1 or more; `-ksp_type preonly` applies the preconditioner once"));
         }
-        // with 1 the zero guess would do
+        // with 1, the zero guess would be accepted
         if !(0.0..1.0).contains(&rtol) {
             return Err(Error::new(Kind::Solver, format!("{start}ksp_rtol is {rtol}, which is no tolerance"))
                 .help("give a number from 0 on, below 1"));
@@ -209,7 +220,7 @@ impl Ksp {
         Ok(())
     }
 
-    /// Whether the preconditioner is kept when the matrix changes.
+    /// Return whether the preconditioner is kept when the matrix changes.
     pub fn reuses_preconditioner(&self) -> bool {
         let mut reuse = ffi::PetscBool_PETSC_FALSE;
         // SAFETY: the solver of this wrapper.
@@ -217,11 +228,12 @@ impl Ksp {
         asked.is_ok() && reuse != ffi::PetscBool_PETSC_FALSE
     }
 
-    /// Makes the preconditioner or factorisation of the current matrix, if it is not there yet; every solve does it too.
-    /// A factorisation that fails is told by [`failure`](Self::failure) and by the next solve.
+    /// Set up the preconditioner or factorisation of the current matrix, if that has not been done. Every solve does so, too.
+    ///
+    /// [`failure`](Self::failure) and the next solve report a factorisation that failed.
     ///
     /// # Errors
-    /// When PETSc cannot use the matrix with the types chosen.
+    /// When PETSc cannot use the matrix with the chosen types.
     pub fn set_up(&self) -> Result<()> {
         let own = self.own_options();
         let advise = |error: Error| {
@@ -238,32 +250,32 @@ impl Ksp {
         // SAFETY: solver and preconditioner of this wrapper; without a matrix PETSc refuses.
         let make = || unsafe {
             petsc!(KSPSetUp(self.ksp))?;
-            // KSPSetUp leaves new values of a matrix it has seen before to the first application
+            // KSPSetUp itself leaves new values of a known matrix to the first application
             petsc!(PCSetUp(pc))?;
             petsc!(KSPSetUpOnBlocks(self.ksp))
         };
         make().map_err(advise)?;
-        // the first is MUMPS' own
-        for &room in &ROOM[1..] {
-            if !self.lacks_room() {
+        // the first value is MUMPS' own default
+        for &percent in &EXTRA_SPACE[1..] {
+            if !self.lacks_space() {
                 break;
             }
-            self.forget()?;
-            self.set_room(Int::from(room))?;
+            self.reset()?;
+            self.set_extra_space(Int::from(percent))?;
             make().map_err(advise)?;
         }
         self.note_failure()
     }
 
-    /// Solves `A x = b` from a zero guess, without copies.
+    /// Solve `A x = b` from a zero guess, without copies. [`Solved::reason`] reports divergence.
     ///
     /// # Errors
-    /// When a slice has not one entry a row, or no matrix was set. Divergence is told in [`Solved::reason`].
+    /// When a slice does not have one entry for each row, or no matrix was set.
     pub fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<Solved> {
         let Some([right, left]) = &self.vectors else {
             return Err(Error::new(Kind::Solver, "a linear solver was called before it had a matrix"));
         };
-        // Nothing in PETSc writes to the right-hand side but this preconditioner, which restores it.
+        // the preconditioner `eisenstat` alone writes to the right-hand side, and restores it
         let copy = self.writes_to_b.then(|| b.to_vec());
         let b = copy.as_deref().unwrap_or(b);
         let mut guess = ffi::PetscBool_PETSC_FALSE;
@@ -277,7 +289,7 @@ impl Ksp {
         let solve = |b, x| unsafe { petsc!(KSPSolve(self.ksp, b, x)) };
         right
             .map(("b", b), left, ("x", x), solve)
-            .map_err(|error| self.around.iter().find_map(Around::failure).unwrap_or(error))?;
+            .map_err(|error| self.wrappers.iter().find_map(Wrapper::failure).unwrap_or(error))?;
         self.note_failure()?;
         let (mut iterations, mut reason, mut residual) = (0, 0, 0.0);
         // SAFETY: the solver of this wrapper.
@@ -292,67 +304,65 @@ impl Ksp {
         Ok(Solved { iterations: iterations as usize, reason, residual })
     }
 
-    /// Applies the preconditioner once, `z = M^-1 r`; it is made first if that has not been done.
+    /// Apply the preconditioner once, `z = M^-1 r`, and set it up before if that has not been done.
     ///
     /// # Errors
-    /// When a slice has not one entry a row, or no matrix was set.
+    /// When a slice does not have one entry for each row, or no matrix was set.
     pub fn precondition(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         let Some([right, left]) = &self.vectors else {
             return Err(Error::new(Kind::Solver, "a preconditioner was applied before it had a matrix"));
         };
         self.set_up()?;
         let copy = self.writes_to_b.then(|| r.to_vec());
-        let pc = self.whole_pc()?;
+        let pc = self.outermost_pc()?;
         // SAFETY: as in `solve`.
         right.map(("r", copy.as_deref().unwrap_or(r)), left, ("z", z), |r, z| unsafe { petsc!(PCApply(pc, r, z)) })
     }
 
-    /// Sets the relative tolerance.
+    /// Set the relative tolerance.
     ///
     /// # Errors
     /// When it is not between 0 and 1.
     pub fn set_tolerance(&self, rtol: f64) -> Result<()> {
-        let ([_, atol, dtol], limit) = self.tolerances()?;
-        // SAFETY: the solver of this wrapper; PETSc refuses numbers that are none.
+        let Tolerances { atol, dtol, limit, .. } = self.tolerances()?;
+        // SAFETY: the solver of this wrapper; PETSc refuses values that are not numbers.
         unsafe { petsc!(KSPSetTolerances(self.ksp, rtol, atol, dtol, limit)) }
     }
 
-    /// The relative tolerance in force.
+    /// Return the relative tolerance in force.
     pub fn tolerance(&self) -> f64 {
-        self.tolerances().map_or(f64::NAN, |(tolerances, _)| tolerances[0])
+        self.tolerances().map_or(f64::NAN, |tolerances| tolerances.rtol)
     }
 
-    /// Relative, absolute and divergence tolerance; iteration limit.
-    fn tolerances(&self) -> Result<([f64; 3], Int)> {
-        let ([mut rtol, mut atol, mut dtol], mut limit) = ([0.0; 3], 0);
+    fn tolerances(&self) -> Result<Tolerances> {
+        let mut set = Tolerances { rtol: 0.0, atol: 0.0, dtol: 0.0, limit: 0 };
         // SAFETY: the solver of this wrapper.
-        unsafe { petsc!(KSPGetTolerances(self.ksp, &mut rtol, &mut atol, &mut dtol, &mut limit)) }?;
-        Ok(([rtol, atol, dtol], limit))
+        unsafe { petsc!(KSPGetTolerances(self.ksp, &mut set.rtol, &mut set.atol, &mut set.dtol, &mut set.limit)) }?;
+        Ok(set)
     }
 
-    /// Type of the solver, such as `cg`; empty before it is known (after the options or the set-up).
+    /// Return the type of the solver, such as `cg`. It is empty until options were read or the solver was set up.
     pub fn ksp_type(&self) -> String {
         // SAFETY: null, or PETSc's text.
-        unsafe { told(|name| petsc!(KSPGetType(self.ksp, name))) }.unwrap_or_default()
+        unsafe { text_from(|name| petsc!(KSPGetType(self.ksp, name))) }.unwrap_or_default()
     }
 
-    /// Type of the preconditioner, such as `gamg`; empty before it is known (after the options or the set-up).
+    /// Return the type of the preconditioner, such as `gamg`. It is empty until options were read or the solver was set up.
     pub fn pc_type(&self) -> String {
         // SAFETY: as above.
-        unsafe { told(|name| self.pc().and_then(|pc| petsc!(PCGetType(pc, name)))) }.unwrap_or_default()
+        unsafe { text_from(|name| self.pc().and_then(|pc| petsc!(PCGetType(pc, name)))) }.unwrap_or_default()
     }
 
-    /// Package that factors, such as `mumps`; `None` for a preconditioner that is no factorisation, or before the
-    /// set-up.
+    /// Return the package that factors, such as `mumps`. It is `None` before the set-up and for preconditioners that do not factor.
     pub fn factor_package(&self) -> Option<String> {
         // SAFETY: as above.
-        unsafe { told(|name| self.pc().and_then(|pc| petsc!(PCFactorGetMatSolverType(pc, name)))) }
+        unsafe { text_from(|name| self.pc().and_then(|pc| petsc!(PCFactorGetMatSolverType(pc, name)))) }
     }
 
-    /// Keeps the preconditioner as it is while the matrix changes, or not.
+    /// Set whether the preconditioner is kept when the matrix changes.
     ///
     /// # Errors
-    /// For `preonly`, whose answer would be that of an older matrix.
+    /// When `preonly` is to keep it: its answer would be that of an older matrix.
     pub fn set_reuse_preconditioner(&self, reuse: bool) -> Result<()> {
         if reuse && self.applies_only() {
             let name = self.ksp_type();
@@ -364,34 +374,44 @@ impl Ksp {
         unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, reuse as ffi::PetscBool)) }
     }
 
-    /// Whether the solver applies its preconditioner once and calls that the solution.
+    /// Return whether the solver applies its preconditioner once and takes that for the solution.
     fn applies_only(&self) -> bool {
         matches!(self.ksp_type().as_str(), "preonly" | "none")
     }
 
-    /// How its options begin, for messages.
+    /// Return the beginning of the options of this solver, for messages.
     fn own_options(&self) -> String {
         format!("-{}", self.prefix)
     }
 
-    /// PETSc's preconditioner that options chose, which belongs to the solver.
+    /// Return the preconditioner that options chose, without the subspaces around it.
     pub(super) fn pc(&self) -> Result<ffi::PC> {
-        match self.around.first() {
-            Some(around) => Ok(around.inner()),
-            None => self.whole_pc(),
+        match self.wrappers.first() {
+            Some(innermost) => Ok(innermost.inner()),
+            None => self.outermost_pc(),
         }
     }
 
-    /// The same with what stands around it.
-    pub(super) fn whole_pc(&self) -> Result<ffi::PC> {
+    /// Return the preconditioner with all subspaces around it.
+    pub(super) fn outermost_pc(&self) -> Result<ffi::PC> {
         let mut pc = null_mut();
-        // SAFETY: the solver of this wrapper, which owns what it gives.
+        // SAFETY: the solver of this wrapper, which owns its preconditioner.
         unsafe { petsc!(KSPGetPC(self.ksp, &mut pc)) }?;
         Ok(pc)
     }
 }
 
-/// Ends of the options that change the matrix of the system itself.
+/// The limits of the iteration.
+struct Tolerances {
+    rtol: f64,
+    atol: f64,
+    /// The growth of the residual that counts as divergence.
+    dtol: f64,
+    /// The largest number of iterations.
+    limit: Int,
+}
+
+/// The ends of options that change the matrix of the system itself.
 const CHANGING: [&str; 3] = ["ksp_diagonal_scale", "ksp_diagonal_scale_fix", "pc_factor_in_place"];
 
 impl Drop for Ksp {

@@ -1,58 +1,52 @@
-//! Quick start of Open MPI where no network is needed.
+//! Launchers of MPI, and a quick start of Open MPI where no network is needed.
 //!
-//! Alone, Open MPI spends 0.3 s on starting a daemon and searching networks, and 0.2 s on networks where `mpiexec` starts all ranks on
-//! one machine. Some settings spare that; they may hold only while MPI starts, since a child process under `mpiexec` would inherit them
-//! and break.
+//! @@FIGURES@@
+//!
+//! The settings are environment variables, which hold only while MPI starts: a child process under `mpiexec` would inherit them and break.
 
 use std::env;
 
-/// One of these is set by whatever starts several ranks.
+/// The variables of which each launcher of several ranks sets at least one.
 const LAUNCHERS: &str = "OMPI_COMM_WORLD_SIZE PMIX_RANK PMI_RANK PMI_SIZE SLURM_PROCID PALS_RANKID ALPS_APP_PE FLUX_TASK_RANK \
     MPI_LOCALRANKID";
 
-/// What Open MPI is told when it runs alone.
-///
-/// Lone processes all take the same name for their session folder in /tmp; without one they cannot collide when several
-/// start at once. The other names keep it from loading components that it would not choose. It also asks hwloc for the cores
-/// and caches that ranks are bound to; hwloc looks for graphics cards then, on X servers, too. A lone process is not bound.
-const ALONE: [(&str, &str); 13] = [
+/// The settings of a lone process.
+const ALONE: [(&str, &str); 7] = [
+    // no daemon (Open MPI 4; version 5 has none)
     ("OMPI_MCA_ess_singleton_isolated", "1"),
-    ("OMPI_MCA_ess", "singleton"),
-    ("OMPI_MCA_pmix", "isolated"),
+    // no session folder: all lone processes would take the same one, and 102 of 400 that started 40 at a time failed (Open MPI 4)
+    ("OMPI_MCA_orte_create_session_dirs", "0"),
+    // no networks
     ("OMPI_MCA_pml", "ob1"),
     ("OMPI_MCA_btl", "self"),
+    // no collective operations for machines and networks that are not there
     ("OMPI_MCA_coll", "self,basic,libnbc"),
-    ("OMPI_MCA_orte_create_session_dirs", "0"),
-    ("OMPI_MCA_shmem", "posix"),
-    ("OMPI_MCA_reachable", "weighted"),
-    ("OMPI_MCA_state", "app"),
-    ("OMPI_MCA_errmgr", "default_app"),
+    // no plugins of hwloc, and no search for cores, caches and graphics cards: a lone process is not bound to cores
     ("HWLOC_PLUGINS_PATH", "/nonexistent"),
     ("HWLOC_COMPONENTS", "no_os,stop"),
 ];
 
-/// What it is told when all ranks are on one machine: to talk through shared memory.
+/// The settings of ranks on one machine: messages through shared memory. In Open MPI 5 `vader` is another name of `sm`.
 const TOGETHER: [(&str, &str); 2] = [("OMPI_MCA_pml", "ob1"), ("OMPI_MCA_btl", "self,vader")];
 
-/// Whether `mpiexec` of Open MPI started all ranks on this machine.
+/// Return whether `mpiexec` of Open MPI started all ranks on this machine.
 fn are_together() -> bool {
-    let of = |name: &str| env::var(name).ok();
-    let size = of("OMPI_COMM_WORLD_SIZE");
-    size.is_some() && size == of("OMPI_COMM_WORLD_LOCAL_SIZE")
+    let size = env::var("OMPI_COMM_WORLD_SIZE");
+    size.is_ok() && size == env::var("OMPI_COMM_WORLD_LOCAL_SIZE")
 }
 
-/// Whether a launcher such as `mpiexec` started this process.
+/// Return whether a launcher such as `mpiexec` started this process.
 pub(super) fn seen() -> bool {
     LAUNCHERS.split_whitespace().any(|name| env::var_os(name).is_some())
 }
 
-/// Variables in which launchers say how many ranks they started. `SLURM_NTASKS` is not among them: it is set in a batch script, too.
+/// The variables with the number of ranks that a launcher started. `SLURM_NTASKS` is not among them, since batch scripts have it, too.
 const SIZES: &str = "OMPI_COMM_WORLD_SIZE PMI_SIZE MPI_LOCALNRANKS SLURM_STEP_NUM_TASKS FLUX_JOB_SIZE";
 
-/// Set by launchers that say the number of a rank, and perhaps nowhere how many there are.
+/// The variables with the number of a rank. Some launchers set one of them and none of [`SIZES`].
 const NUMBERS: &str = "PMIX_RANK PMI_RANK PALS_RANKID ALPS_APP_PE";
 
-/// Whether a launcher started this process as one of several ranks, or may have done so.
+/// Return whether a launcher started this process as one of several ranks, or may have done so.
 pub(super) fn several() -> bool {
     is_several(|name| env::var(name).ok())
 }
@@ -65,8 +59,8 @@ fn is_several(variable: impl Fn(&str) -> Option<String>) -> bool {
     }
 }
 
-/// Runs `start` with the settings of a lone process, or of one among others on its machine, if the user set none of them.
-pub(super) fn quick<T>(start: impl FnOnce() -> T) -> T {
+/// Run `start` with the settings for a lone process or for ranks on one machine, unless the user set one of them.
+pub(super) fn with_quick_start<T>(start: impl FnOnce() -> T) -> T {
     let settings = match seen() {
         false => &ALONE[..],
         true if are_together() => &TOGETHER,
@@ -76,8 +70,8 @@ pub(super) fn quick<T>(start: impl FnOnce() -> T) -> T {
         return start();
     }
     for (name, value) in settings {
-        // SAFETY: Rust's own readers and writers of the environment share a lock. A session is started by the thread that
-        // runs the program, before the libraries below it have threads that might read the environment.
+        // SAFETY: Rust's own readers and writers of the environment share a lock. The thread that runs the program starts the session, before
+        // the libraries below have threads that might read the environment.
         unsafe { env::set_var(name, value) };
     }
     let result = start();

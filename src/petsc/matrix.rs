@@ -1,16 +1,17 @@
-//! Sparse matrices.
+//! Sparse matrices (MATAIJ).
 
 use super::library::petsc;
 use super::rows::{Rows, attach, free};
-use super::vector::{Vector, same};
+use super::vector::{Vector, check_length};
 use super::{Int, Scope, Session, ffi};
 use crate::error::{Error, Kind, Result};
+use mpi::ffi::MPI_Comm;
 use std::cell::Cell;
 use std::ops::Range;
 use std::ptr::null_mut;
 use std::rc::Rc;
 
-/// A square sparse matrix (PETSc's AIJ, rows compressed) of this process, or of all with rows on each.
+/// A square sparse matrix in compressed rows (AIJ), of this process or distributed by rows over all processes.
 ///
 /// ```
 /// use winkler::petsc::{Matrix, Session};
@@ -32,13 +33,13 @@ use std::rc::Rc;
 pub struct Matrix {
     mat: ffi::Mat,
     scope: Scope,
-    /// Numbers of the rows here among all.
+    /// The global numbers of the rows of this process.
     own: Range<usize>,
     total: usize,
     nonzeros: usize,
     block_size: usize,
     values: *mut f64,
-    /// Number of updates, for the solvers of this matrix.
+    /// The number of updates, which the solvers of this matrix read.
     updates: Rc<Cell<u64>>,
     x: Vector,
     y: Vector,
@@ -46,10 +47,10 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// A matrix of this process from its compressed rows ([`Rows::all`]).
+    /// Create a matrix of this process from compressed rows ([`Rows::all`]).
     ///
     /// # Errors
-    /// When the arrays are not those of a square matrix with sorted columns, or the block size does not divide it.
+    /// When the arrays do not describe a square matrix with sorted columns, or the block size does not divide it.
     pub fn from_csr(
         session: &Session,
         block_size: usize,
@@ -60,57 +61,30 @@ impl Matrix {
         Self::new(session, block_size, Rows::all(row_ptr, columns, values)?)
     }
 
-    /// Takes rows over; collective over those who have the others. `block_size` dofs belong to one node (1 if unsure).
+    /// Create a matrix from rows, without copies. `block_size` dofs belong to one node (1 if unsure). Collective for distributed rows.
     ///
     /// # Errors
     /// When the block size does not divide the number of rows.
     pub fn new(session: &Session, block_size: usize, rows: Rows) -> Result<Matrix> {
-        let (scope, all, nonzeros) = (rows.scope, rows.own(), rows.values.len());
-        let own = all.len();
-        if block_size == 0 || own % block_size != 0 {
-            return Err(Error::new(Kind::Solver, format!("blocks of {block_size} do not divide {own} rows")));
+        let (scope, own, total, nonzeros) = (rows.scope, rows.own(), rows.total, rows.values.len());
+        let count = own.len();
+        if block_size == 0 || count % block_size != 0 {
+            return Err(Error::new(Kind::Solver, format!("blocks of {block_size} do not divide {count} rows")));
         }
-        let [x, y] = [Vector::new(session, scope, own, block_size)?, Vector::new(session, scope, own, block_size)?];
-        let (comm, n, total, inside) = (scope.comm(session), own as Int, rows.total as Int, rows.columns.len());
+        let header = || Vector::new(session, scope, count, block_size);
+        let (x, y, session) = (header()?, header()?, session.clone());
         let rows = Box::into_raw(Box::new(rows));
-        // SAFETY: the box was just made. Only raw pointers to its vectors are kept, so PETSc and we may both use them; the values in
-        // other columns begin behind those in own ones, of which there are as many as of these.
-        let (i, j, other_i, other_j, values, other_values) = unsafe {
-            let rows = &mut *rows;
-            let ([i, j], values) = ([&mut rows.row_ptr, &mut rows.columns], rows.values.as_mut_ptr());
-            let [other_i, other_j] = [&mut rows.other_row_ptr, &mut rows.other_columns];
-            let pointers = [i, j, other_i, other_j].map(|array| array.as_mut_ptr());
-            (pointers[0], pointers[1], pointers[2], pointers[3], values, values.add(inside))
-        };
-        let mut mat = null_mut();
-        // SAFETY: `Rows` has checked that the arrays fit each other; they live as long as PETSc's matrix, which frees them at its end.
-        let made = unsafe {
-            match scope {
-                Scope::Process => petsc!(MatCreateSeqAIJWithArrays(comm, n, n, i, j, values, &mut mat)),
-                Scope::World => petsc!(MatCreateMPIAIJWithSplitArrays(
-                    comm,
-                    n,
-                    n,
-                    total,
-                    total,
-                    i,
-                    j,
-                    values,
-                    other_i,
-                    other_j,
-                    other_values,
-                    &mut mat
-                )),
+        // SAFETY: the box was just made, and nobody else has it.
+        let (mat, values) = match unsafe { create(scope.comm(&session), rows) } {
+            Ok(made) => made,
+            Err(error) => {
+                // SAFETY: PETSc did not take the arrays.
+                unsafe { free(rows.cast()) };
+                return Err(error);
             }
         };
-        if let Err(error) = made {
-            // SAFETY: PETSc did not take the arrays.
-            unsafe { free(rows.cast()) };
-            return Err(error);
-        }
-        let (updates, session) = (Rc::default(), session.clone());
-        let total = total as usize;
-        let matrix = Matrix { mat, scope, own: all, total, nonzeros, block_size, values, updates, x, y, session };
+        let matrix =
+            Matrix { mat, scope, own, total, nonzeros, block_size, values, updates: Rc::default(), x, y, session };
         // SAFETY: the matrix was just made over the rows, whose box nobody else has.
         unsafe {
             attach(mat, rows)?;
@@ -119,49 +93,49 @@ impl Matrix {
         Ok(matrix)
     }
 
-    /// The processes that own it.
+    /// Return the processes that own the matrix.
     pub fn scope(&self) -> Scope {
         self.scope
     }
 
-    /// Number of rows of this process, which is that of its entries in a vector.
+    /// Return the number of rows of this process, which is the number of its entries in a vector.
     pub fn rows(&self) -> usize {
         self.own.len()
     }
 
-    /// Their numbers among those of all its processes.
+    /// Return the global numbers of the rows of this process.
     pub fn own(&self) -> Range<usize> {
         self.own.clone()
     }
 
-    /// Number of rows of all its processes.
+    /// Return the number of rows of all processes.
     pub fn total(&self) -> usize {
         self.total
     }
 
-    /// Number of values stored on this process.
+    /// Return the number of values that this process stores.
     pub fn nonzeros(&self) -> usize {
         self.nonzeros
     }
 
-    /// Number of dofs of a node.
+    /// Return the number of dofs of a node.
     pub fn block_size(&self) -> usize {
         self.block_size
     }
 
-    /// The session.
+    /// Return the session.
     pub fn session(&self) -> &Session {
         &self.session
     }
 
-    /// The stored values, in the order of [`Rows`].
+    /// Return the stored values, in the order of [`Rows`].
     pub fn values(&self) -> &[f64] {
-        // SAFETY: PETSc keeps the array while `self.mat` lives, and writes to it in no call that is made with `&self`
-        // (the solver refuses -ksp_diagonal_scale, which would).
+        // SAFETY: PETSc keeps the array while `self.mat` lives, and no call with `&self` writes to it: the solver refuses
+        // -ksp_diagonal_scale, which would.
         unsafe { std::slice::from_raw_parts(self.values, self.nonzeros) }
     }
 
-    /// Changes values in place; the pattern stays. Solvers refactor at their next use.
+    /// Change values in place and return what `change` returns. The pattern stays, and solvers factor again at their next use.
     ///
     /// # Errors
     /// When PETSc refuses, which it does not for a matrix of this type.
@@ -173,7 +147,7 @@ impl Matrix {
             Scope::World => {
                 let (mut own, mut others) = (null_mut(), null_mut());
                 let mut state = 0;
-                // SAFETY: a matrix of this type was made for this scope; its two parts belong to it.
+                // SAFETY: a distributed matrix, to which its two parts belong.
                 unsafe {
                     petsc!(MatMPIAIJGetSeqAIJ(self.mat, &mut own, &mut others, null_mut()))?;
                     petsc!(PetscObjectStateGet(self.mat.cast(), &mut state))?;
@@ -184,7 +158,7 @@ impl Matrix {
         };
         for part in parts.into_iter().filter(|part| !part.is_null()) {
             let mut values = null_mut();
-            // SAFETY: nothing is written between the two, which raise the state of the matrix and forget its inverted diagonal.
+            // SAFETY: nothing is written between the calls, which raise the state of the matrix and invalidate its inverted diagonal.
             unsafe {
                 petsc!(MatSeqAIJGetArray(part, &mut values))?;
                 petsc!(MatSeqAIJRestoreArray(part, &mut values))?;
@@ -194,7 +168,7 @@ impl Matrix {
         Ok(result)
     }
 
-    /// Declares the matrix symmetric and positive definite, now and after every update.
+    /// Declare the matrix symmetric and positive definite, now and after every update.
     ///
     /// # Errors
     /// When PETSc refuses, which it does not for a matrix of this type.
@@ -211,14 +185,15 @@ impl Matrix {
         Ok(())
     }
 
-    /// Tells multigrid what the matrix nearly annihilates: for elasticity the rigid motions, each one vector over the
-    /// rows of this process. They need not be orthonormal; dependent ones are left out.
+    /// Give multigrid the modes that the matrix nearly annihilates: for elasticity, the rigid motions.
+    ///
+    /// Each mode has one entry for each row of this process. Modes need not be orthonormal; dependent ones are left out.
     ///
     /// # Errors
-    /// When a mode has not one entry a row.
+    /// When a mode does not have one entry for each row.
     pub fn set_near_null_space(&mut self, modes: &[Vec<f64>]) -> Result<()> {
         for mode in modes {
-            same("a near-null mode", mode.len(), self.rows())?;
+            check_length("a near-null mode", mode.len(), self.rows())?;
         }
         let (scope, session) = (self.scope, &self.session);
         let comm = scope.comm(session);
@@ -237,16 +212,18 @@ impl Matrix {
         }
     }
 
-    /// `y = A x`.
+    /// Compute `y = A x`.
     ///
     /// # Errors
-    /// When `x` or `y` has not one entry a row.
+    /// When `x` or `y` does not have one entry for each row.
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) -> Result<()> {
         // SAFETY: the product reads one and writes to the other.
         self.x.map(("x", x), &self.y, ("y", y), |x, y| unsafe { petsc!(MatMult(self.mat, x, y)) })
     }
 
-    /// `y = A x` for the values that `change` makes, which `restore` takes back to the bit: solvers of the matrix do not see it.
+    /// Compute `y = A x` with the values that `change` writes.
+    ///
+    /// `restore` has to undo the change to the last bit, since solvers of the matrix do not notice it.
     ///
     /// ```
     /// # use winkler::petsc::{Matrix, Session};
@@ -259,7 +236,7 @@ impl Matrix {
     /// ```
     ///
     /// # Errors
-    /// When `x` or `y` has not one entry a row.
+    /// When `x` or `y` does not have one entry for each row.
     pub fn multiply_changed(
         &mut self,
         change: impl FnOnce(&mut [f64]),
@@ -275,12 +252,12 @@ impl Matrix {
         product
     }
 
-    /// Number of updates so far, which goes on counting.
+    /// Return the counter of updates, which goes on counting.
     pub(super) fn updates(&self) -> Rc<Cell<u64>> {
         self.updates.clone()
     }
 
-    /// PETSc's matrix.
+    /// Return PETSc's handle.
     pub(super) fn raw(&self) -> ffi::Mat {
         self.mat
     }
@@ -293,8 +270,46 @@ impl Drop for Matrix {
     }
 }
 
-/// An orthonormal basis of the span of vectors; those that depend on others up to rounding are left out. `sum` adds up what
-/// processes have.
+/// Create PETSc's matrix over the arrays of `rows`, and return it with the pointer to the values.
+///
+/// # Safety
+/// The rows come from a box that nobody else uses. It has to live as long as the matrix.
+unsafe fn create(comm: MPI_Comm, rows: *mut Rows) -> Result<(ffi::Mat, *mut f64)> {
+    // SAFETY: the caller's promise. Only raw pointers to the vectors are kept, so PETSc and we may both use them.
+    let rows = unsafe { &mut *rows };
+    let (n, total, values) = (rows.own().len() as Int, rows.total as Int, rows.values.as_mut_ptr());
+    let (i, j) = (rows.row_ptr.as_mut_ptr(), rows.columns.as_mut_ptr());
+    let mut mat = null_mut();
+    match rows.scope {
+        // SAFETY: `Rows` has checked that the arrays fit each other; they live as long as PETSc's matrix, by the caller's promise.
+        Scope::Process => unsafe { petsc!(MatCreateSeqAIJWithArrays(comm, n, n, i, j, values, &mut mat)) },
+        Scope::World => {
+            let (other_i, other_j) = (rows.other_row_ptr.as_mut_ptr(), rows.other_columns.as_mut_ptr());
+            // SAFETY: as above; the values in other columns follow those in own columns, of which there are as many as column numbers.
+            unsafe {
+                let other_values = values.add(rows.columns.len());
+                petsc!(MatCreateMPIAIJWithSplitArrays(
+                    comm,
+                    n,
+                    n,
+                    total,
+                    total,
+                    i,
+                    j,
+                    values,
+                    other_i,
+                    other_j,
+                    other_values,
+                    &mut mat
+                ))
+            }
+        }
+    }?;
+    Ok((mat, values))
+}
+
+/// Return an orthonormal basis of the span of the vectors. Vectors that depend on others to rounding are left out. `sum` sums over
+/// processes.
 fn orthonormal(vectors: &[Vec<f64>], sum: &dyn Fn(&mut [f64])) -> Vec<Vec<f64>> {
     let dot = |a: &[f64], b: &[f64]| -> f64 {
         let mut product = [a.iter().zip(b).map(|(a, b)| a * b).sum()];

@@ -1,7 +1,7 @@
-//! Nested dissection and partition of graphs by METIS: Debian's MUMPS is built without it.
+//! Nested dissection and partition of graphs by METIS, without which Debian's MUMPS is built.
 //!
-//! The library is loaded when it is first needed: its header belongs to another package, and libraries of SCOTCH, which
-//! PETSc loads, have functions of the same names with other arguments.
+//! The library is loaded when it is first needed and not linked. Its header belongs to another package, and the libraries of SCOTCH that
+//! PETSc loads have functions of the same names with other arguments.
 
 use crate::error::{Error, Kind, Result};
 use libloading::Library;
@@ -9,7 +9,7 @@ use std::ffi::{CStr, c_int};
 use std::ptr::null_mut;
 use std::sync::OnceLock;
 
-/// The library whose version has the arguments of [`NodeNd`]; other libraries do not see its symbols.
+/// The library whose functions have the arguments below. Other libraries do not see its symbols.
 const LIBRARY: &str = "libmetis.so.5";
 
 type NodeNd = unsafe extern "C" fn(*mut i32, *mut i32, *mut i32, *mut i32, *mut i32, *mut i32, *mut i32) -> c_int;
@@ -30,13 +30,13 @@ type PartGraph = unsafe extern "C" fn(
     *mut i32,
 ) -> c_int;
 
-/// A function of METIS.
+/// Return a function of METIS by its name.
 ///
 /// # Safety
 /// `T` is the type of the function of this name.
 unsafe fn function<T: Copy>(name: &CStr) -> Result<T> {
     static METIS: OnceLock<Option<Library>> = OnceLock::new();
-    // SAFETY: the initialisers are those of any program that links it; it stays loaded.
+    // SAFETY: its initialisers run as in any program that links it; it stays loaded.
     let library = METIS.get_or_init(|| unsafe { Library::new(LIBRARY) }.ok());
     // SAFETY: the caller's promise.
     let function = library.as_ref().and_then(|library| unsafe { library.get::<T>(name.to_bytes_with_nul()) }.ok());
@@ -47,9 +47,9 @@ unsafe fn function<T: Copy>(name: &CStr) -> Result<T> {
     })
 }
 
-/// Elimination order of a graph's nodes by nested dissection: position of each node, from 0.
+/// Return the position of each node of a graph, from 0, in an elimination order by nested dissection.
 ///
-/// The neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`, without `i` itself; the graph is symmetric.
+/// The neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`, without `i` itself. The graph is symmetric.
 ///
 /// # Errors
 /// When METIS is not installed, or does not return an order.
@@ -62,7 +62,7 @@ pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
     // SAFETY: METIS 5 has these arguments.
     let node_nd = unsafe { function::<NodeNd>(c"METIS_NodeND") }?;
     let (mut count, mut order, mut position) = (nodes as i32, vec![-1; nodes], vec![-1; nodes]);
-    // SAFETY: it reads the graph and writes one number a node to each of the last two.
+    // SAFETY: it reads the graph and writes one number for each node to each of the last two arrays.
     let code = unsafe {
         node_nd(
             &mut count,
@@ -74,7 +74,7 @@ pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
             position.as_mut_ptr(),
         )
     };
-    // a METIS with 64-bit numbers would not return this
+    // a METIS with 64-bit numbers would not return a permutation
     let mut seen = vec![false; nodes];
     let valid = position.iter().all(|&at| {
         let slot = usize::try_from(at).ok().and_then(|at| seen.get_mut(at));
@@ -88,8 +88,9 @@ pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
     Ok(position)
 }
 
-/// The part of each of a graph's nodes, of `parts` with about as many nodes each and few edges between them; the graph as in
-/// [`nested_dissection`].
+/// Return the part of each node of a graph. The `parts` parts have about the same size and few edges between them.
+///
+/// The arrays are those of [`nested_dissection`].
 ///
 /// # Errors
 /// When METIS is not installed, or does not return parts.
@@ -102,7 +103,7 @@ pub fn partition(ptr: &mut [i32], col: &mut [i32], parts: usize) -> Result<Vec<i
     let part_graph = unsafe { function::<PartGraph>(c"METIS_PartGraphRecursive") }?;
     let (mut count, mut constraints, mut asked, mut cut) = (nodes as i32, 1, parts as i32, 0);
     let mut part = vec![-1; nodes];
-    // SAFETY: it reads the graph, writes one number a node to the last and one to the last but one; null stands for what is usual.
+    // SAFETY: it reads the graph, writes one number for each node to the last array and one number to the last but one; null means a default.
     let code = unsafe {
         part_graph(
             &mut count,
@@ -132,7 +133,7 @@ pub fn partition(ptr: &mut [i32], col: &mut [i32], parts: usize) -> Result<Vec<i
 mod tests {
     use super::{nested_dissection, partition};
 
-    /// A chain of nodes: the separator in its middle comes last.
+    /// The separator in the middle of a chain of nodes comes last.
     #[test]
     fn a_chain_is_cut_in_its_middle() {
         let (mut ptr, mut col) = (vec![0], Vec::new());
@@ -144,7 +145,7 @@ mod tests {
         let last = position.iter().position(|&at| at == 400).expect("a permutation");
         assert!((100..300).contains(&last), "{last}");
         assert_eq!(nested_dissection(&mut [0, 0, 0], &mut []).expect("no edges"), [0, 1]);
-        // two ends and a middle, all as long
+        // two ends and a middle of the same length
         let thirds = partition(&mut ptr, &mut col, 3).expect("METIS");
         let changes = thirds.windows(2).filter(|pair| pair[0] != pair[1]).count();
         let most = (0..3).map(|part| thirds.iter().filter(|of| **of == part).count()).max();

@@ -1,8 +1,8 @@
 //! A safe binding of the part of PETSc that solves linear systems, useful alone.
 //!
-//! Objects hold a counted token of the [`Session`] and no lifetimes; PETSc ends with the last of them. They are neither
-//! `Send` nor `Sync`. Every call is checked, and PETSc's own message is in the [`Error`](crate::error::Error); PETSc
-//! prints only what the user asks of it (`-ksp_monitor`, `-ksp_view`, `-log_view`, `-help`, ...).
+//! Objects hold a counted token of the [`Session`] and have no lifetimes. PETSc ends with the last token. Objects are neither `Send` nor
+//! `Sync`. Every call is checked, and PETSc's own message is in the [`Error`](crate::error::Error). PETSc itself prints only what options
+//! request (`-ksp_monitor`, `-ksp_view`, `-log_view`, `-help`, ...).
 //!
 //! ```
 //! use winkler::petsc::{Ksp, Matrix, Session};
@@ -34,7 +34,6 @@ mod halves;
 mod heap;
 mod indices;
 mod interpolation;
-mod kernels;
 mod ksp;
 mod launcher;
 mod library;
@@ -58,7 +57,6 @@ mod until;
 mod vector;
 mod waiting;
 mod words;
-mod wrap;
 
 pub use around::Subspace;
 pub use blas::{cholesky, cholesky_solve};
@@ -78,7 +76,7 @@ pub use until::{Enough, Iterate};
 pub use waiting::Entry;
 pub use words::{begins_options, is_family, is_global, is_of_family};
 
-/// Runs `action` and returns its result and all that PETSc printed meanwhile, which is not shown.
+/// Run `action`, and return its result and PETSc's output meanwhile, which is not shown.
 ///
 /// ```
 /// use winkler::petsc::{Ksp, Session, printed};

@@ -1,23 +1,27 @@
-//! Schur complements by MUMPS itself: PETSc forces a poor ordering on it and hands the complement on in part only.
+//! Schur complements by MUMPS itself.
+//!
+//! Through PETSc, MUMPS would take a poor ordering and return the complement in part only.
 
 use super::{Int, Session, ffi, metis};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::{MPI_Comm_c2f, RSMPI_COMM_SELF};
 use std::ptr::null_mut;
 
-/// Space beyond what the analysis expects, in per cent, tried one after the other.
-pub(super) const ROOM: [i32; 4] = [20, 60, 200, 1000];
+/// Space beyond the estimate of the analysis, in per cent; the values are tried one after the other.
+pub(super) const EXTRA_SPACE: [i32; 4] = [20, 60, 200, 1000];
 
-/// Elimination orders, values of ICNTL(7): approximate minimum degree by MUMPS, and one that is given.
+/// Values of ICNTL(7): the elimination order by MUMPS' approximate minimum degree, and a given one.
 const MINIMUM_DEGREE: Int = 0;
 const GIVEN: Int = 1;
 
-/// Bodies of up to this many dofs, at most two a node, are ordered by minimum degree. Nested dissection takes a third to half as
-/// long as all the rest there and saves hardly any fill: at most 8 %, but 18 % at 50 000 dofs. In space it saves a quarter at 12 000.
+/// Largest number of dofs of a plane body that is ordered by minimum degree.
+///
+/// Up to this size nested dissection takes a third to half of the time of everything else, and saves at most 8 % of the fill. It saves 18 %
+/// at 50 000 dofs, and in space a quarter at 12 000.
 const SMALL: usize = 20_000;
 
-/// Controls that belong to this binding.
-const OWN: [(usize, &str); 8] = [
+/// Controls ICNTL that this module sets itself.
+const RESERVED: [(usize, &str); 8] = [
     (5, "format of the matrix"),
     (10, "iterative refinement, which has no matrix any more"),
     (11, "error analysis, which has no matrix any more"),
@@ -28,10 +32,10 @@ const OWN: [(usize, &str); 8] = [
     (26, "condensation"),
 ];
 
-/// A sparse symmetric positive definite matrix whose interior dofs were eliminated.
+/// A sparse symmetric positive definite matrix K whose interior dofs are eliminated.
 ///
-/// With the retained dofs R and the others I: S = K_RR - K_RI K_II^-1 K_IR. One symbolic and one numeric factorisation of
-/// K_II give S, condensed right-hand sides, and the interior back.
+/// R are the retained dofs and I the interior dofs, which are all others. The Schur complement is S = K_RR - K_RI K_II^-1 K_IR. One symbolic
+/// and one numeric factorisation of K_II give S, condensed right-hand sides, and the solution in the interior.
 ///
 /// ```
 /// use winkler::petsc::{Schur, Session};
@@ -48,7 +52,7 @@ const OWN: [(usize, &str); 8] = [
 /// # Ok::<(), winkler::error::Error>(())
 /// ```
 pub struct Schur {
-    /// MUMPS' own struct; it keeps pointers into the arrays below.
+    /// The struct of MUMPS, which keeps pointers into the arrays below.
     mumps: Box<ffi::mumps::DMUMPS_STRUC_C>,
     rows: Vec<Int>,
     columns: Vec<Int>,
@@ -56,20 +60,22 @@ pub struct Schur {
     positions: Vec<Int>,
     retained: Vec<Int>,
     complement: Vec<f64>,
-    /// Powers of two, one a dof, that give the matrix in MUMPS diagonal entries near one.
+    /// Powers of two D, one for each dof, with which D K D has diagonal entries near one.
     scale: Vec<f64>,
     _session: Session,
 }
 
 impl Schur {
-    /// Plans to eliminate all but the `retained` dofs, if there are any. `lower` holds (row, column, value) of the lower triangle, row by row, each place once;
-    /// `block_size` dofs belong to one node. Options `-<body>_mat_mumps_icntl_<i>` and `_cntl_<i>` are honoured.
+    /// Analyse the elimination of all dofs but the `retained` ones, which may be none.
     ///
-    /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1), in small bodies of the plane MUMPS' own approximate
-    /// minimum degree (0).
+    /// `lower` holds (row, column, value) of the lower triangle, row by row, each entry once. `block_size` dofs belong to one node. Options
+    /// `-<body>_mat_mumps_icntl_<i>` and `_cntl_<i>` are honoured.
     ///
-    /// MUMPS treats pivots below an absolute size as zeros (about 1e-20), and scales no matrix itself of which it makes a Schur complement. So it
-    /// gets D K D with powers of two D, by which nothing is rounded: what counts as small does not depend on units or on other regions.
+    /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1). Small plane bodies take MUMPS' own approximate minimum
+    /// degree (ICNTL(7) = 0).
+    ///
+    /// MUMPS treats pivots below an absolute size (about 1e-20) as zeros, and does not scale a matrix with a Schur complement. It gets D K D
+    /// with powers of two D, which round nothing. What counts as small then depends neither on units nor on other regions.
     ///
     /// # Errors
     /// When METIS is needed and missing, an option cannot be used, or MUMPS refuses the pattern.
@@ -88,7 +94,7 @@ impl Schur {
         }
         let scale = scales(rows, lower);
         let mut schur = Schur {
-            // SAFETY: MUMPS' struct is plain C data; zeros are null pointers and empty sizes.
+            // SAFETY: MUMPS' struct is plain C data; zeros are null pointers and sizes of nothing.
             mumps: Box::new(unsafe { std::mem::zeroed() }),
             rows: lower.iter().map(|entry| one(entry.0)).collect(),
             columns: lower.iter().map(|entry| one(entry.1)).collect(),
@@ -119,46 +125,46 @@ impl Schur {
         Ok(schur)
     }
 
-    /// The order of elimination that MUMPS took: INFOG(7), with the numbers of ICNTL(7).
+    /// Return the order of elimination that MUMPS took: INFOG(7), with the numbers of ICNTL(7).
     pub fn ordering(&self) -> Int {
         self.mumps.infog[6]
     }
 
-    /// Memory in megabytes that the factorisation will take, S not counted.
+    /// Return the memory in megabytes that the factorisation will take, without S.
     pub fn expected_megabytes(&self) -> usize {
         self.mumps.infog[15].max(0) as usize
     }
 
-    /// Whether the last factorisation met a pivot of zero.
+    /// Return whether the last factorisation met a zero pivot.
     pub(super) fn is_singular(&self) -> bool {
         self.mumps.infog[0] == -10
     }
 
-    /// Eliminates; what follows needs it.
+    /// Eliminate the interior. The functions below need that.
     ///
     /// # Errors
     /// When the interior is singular, or memory does not suffice.
     pub fn factor(&mut self) -> Result<()> {
-        let asked = self.mumps.icntl[13];
-        for room in ROOM {
-            self.mumps.icntl[13] = asked.max(room);
+        let requested = self.mumps.icntl[13];
+        for percent in EXTRA_SPACE {
+            self.mumps.icntl[13] = requested.max(percent);
             match self.call(2) {
-                // the space that the analysis foresaw was too small
-                Err(_) if matches!(self.mumps.infog[0], -8 | -9) && room < ROOM[ROOM.len() - 1] => {}
+                // the analysis underestimated the space
+                Err(_) if matches!(self.mumps.infog[0], -8 | -9) && percent < EXTRA_SPACE[EXTRA_SPACE.len() - 1] => {}
                 done => {
                     done?;
                     break;
                 }
             }
         }
-        // MUMPS has its own copy by now
+        // MUMPS has a copy of its own by now
         (self.rows, self.columns, self.values) = Default::default();
         (self.mumps.irn, self.mumps.jcn, self.mumps.a) = (null_mut(), null_mut(), null_mut());
         self.complete();
         Ok(())
     }
 
-    /// Complete S and take the scales out. MUMPS writes one triangle of it, row by row.
+    /// Undo the scaling of S and fill its upper triangle. MUMPS writes the lower triangle, row by row.
     fn complete(&mut self) {
         let (n, scale) = (self.retained.len(), &self.scale);
         let of = |i: usize| scale[self.retained[i] as usize - 1];
@@ -171,12 +177,12 @@ impl Schur {
         }
     }
 
-    /// Takes S out, all of it, row by row, in the order of the retained dofs; nothing here needs it any more.
+    /// Take S out, both triangles, row by row, in the order of the retained dofs. No function of this type needs it.
     pub fn take_complement(&mut self) -> Vec<f64> {
         std::mem::take(&mut self.complement)
     }
 
-    /// b_R - K_RI K_II^-1 b_I.
+    /// Return the condensed right-hand side b_R - K_RI K_II^-1 b_I.
     ///
     /// # Errors
     /// Failures of MUMPS.
@@ -190,7 +196,7 @@ impl Schur {
         Ok(reduced)
     }
 
-    /// x with x_R as given and K_II x_I = b_I - K_IR x_R.
+    /// Return x with the given x_R = `x_retained` and K_II x_I = b_I - K_IR x_R.
     ///
     /// # Errors
     /// Failures of MUMPS.
@@ -199,7 +205,7 @@ impl Schur {
         self.expand_condensed(b, x_retained)
     }
 
-    /// The same for the right-hand side that was condensed last: goes on from what that has left in MUMPS.
+    /// Return the same x for the right-hand side of the last [`condense`](Self::condense), whose intermediate result MUMPS has kept.
     ///
     /// # Errors
     /// Failures of MUMPS.
@@ -215,12 +221,12 @@ impl Schur {
         Ok(x)
     }
 
-    /// D b.
+    /// Return D b.
     fn scaled(&self, b: &[f64]) -> Vec<f64> {
         b.iter().zip(&self.scale).map(|(b, scale)| b * scale).collect()
     }
 
-    /// One phase of the solution (ICNTL(26)): 1 condenses `b` into `reduced`, 2 expands `reduced` into `b`.
+    /// Do one phase of the solution (ICNTL(26)): phase 1 condenses `b` into `reduced`, phase 2 expands `reduced` into `b`.
     fn solve(&mut self, phase: Int, b: &mut [f64], reduced: &mut [f64]) -> Result<()> {
         let mumps = &mut self.mumps;
         if b.len() != mumps.n as usize || reduced.len() != self.retained.len() {
@@ -234,7 +240,7 @@ impl Schur {
         called
     }
 
-    /// Starts MUMPS on this process alone, silent, for a symmetric positive definite matrix.
+    /// Start MUMPS on this process alone, without output, for a symmetric positive definite matrix.
     fn start(&mut self) -> Result<()> {
         let mumps = &mut self.mumps;
         (mumps.sym, mumps.par) = (1, 1);
@@ -247,6 +253,7 @@ impl Schur {
         Ok(())
     }
 
+    /// Read the options of this body for MUMPS.
     fn read_options(&mut self, session: &Session, body: &str) -> Result<()> {
         let options = session.options();
         for (name, value) in options.all()? {
@@ -262,7 +269,7 @@ impl Schur {
                     .help("leave it out, or choose -ksp_type and -pc_type for a solver of PETSc")
             };
             if let Some(number) = number("icntl_", 60) {
-                if let Some((_, what)) = OWN.iter().find(|own| own.0 == number) {
+                if let Some((_, what)) = RESERVED.iter().find(|reserved| reserved.0 == number) {
                     return Err(refuse(format!("the program itself sets ICNTL({number}), the {what}")));
                 }
                 self.mumps.icntl[number - 1] = value.parse().map_err(|_| refuse("not a whole number".to_owned()))?;
@@ -276,7 +283,7 @@ impl Schur {
         Ok(())
     }
 
-    /// Lets MUMPS do a job.
+    /// Run a job of MUMPS.
     fn call(&mut self, job: Int) -> Result<()> {
         self.mumps.job = job;
         // SAFETY: every pointer in the struct is null or leads to an array of ours that has the length set beside it.
@@ -288,12 +295,12 @@ impl Schur {
 
 impl Drop for Schur {
     fn drop(&mut self) {
-        // Nobody is left to tell an error.
+        // an error can no longer be returned
         let _ = self.call(-2);
     }
 }
 
-/// The powers of two nearest to 1/sqrt(K_ii), one a row of a lower triangle; 1 where the diagonal is not positive.
+/// Return the powers of two nearest to 1/sqrt(K_ii), one for each row; 1 where the diagonal is not positive.
 fn scales(rows: usize, lower: &[(usize, usize, f64)]) -> Vec<f64> {
     let mut scale = vec![1.0; rows];
     for &(i, _, diagonal) in lower.iter().filter(|&&(i, j, value)| i == j && value > 0.0 && value.is_finite()) {
@@ -302,11 +309,10 @@ fn scales(rows: usize, lower: &[(usize, usize, f64)]) -> Vec<f64> {
     scale
 }
 
-/// Position of each dof in the order of elimination, from 1: nested dissection of the nodes, and the retained dofs last, in
-/// their order.
+/// Return the position of each dof in the order of elimination, from 1: nested dissection of the nodes, then the retained dofs in their order.
 fn positions(block_size: usize, rows: usize, lower: &[(usize, usize, f64)], retained: &[usize]) -> Result<Vec<Int>> {
     let nodes = rows / block_size;
-    // each edge once: rows of a node follow each other
+    // the rows of a node follow each other, so that each edge is found once
     let mut seen = vec![usize::MAX; nodes];
     let mut edges: Vec<(usize, usize)> = Vec::new();
     for (node, other) in lower.iter().map(|&(i, j, _)| (i / block_size, j / block_size)) {
@@ -343,7 +349,7 @@ fn positions(block_size: usize, rows: usize, lower: &[(usize, usize, f64)], reta
     Ok(position)
 }
 
-/// The error of a job of MUMPS, by INFOG(1) and INFOG(2).
+/// Return the error of a job of MUMPS by INFOG(1) and INFOG(2).
 fn failure(job: Int, first: Int, second: Int) -> Error {
     let phase = match job {
         1 => "analysis",

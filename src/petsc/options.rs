@@ -1,4 +1,4 @@
-//! PETSc's options: one table in a process.
+//! PETSc's options, of which a process has one table.
 
 use super::error::string;
 use super::library::petsc;
@@ -11,8 +11,8 @@ use std::ptr::null_mut;
 
 /// PETSc's table of options, filled from the command line, `PETSC_OPTIONS`, `.petscrc` of the home folder and `-options_file`.
 ///
-/// Names may be given with or without their dash and come back with it; PETSc does not tell capital from small letters
-/// in them. Looking at an option here does not count as reading it.
+/// Names may be given with or without their dash and are returned with it. PETSc ignores the case of their letters. Queries of this type do
+/// not mark an option as read.
 ///
 /// ```
 /// use winkler::petsc::Session;
@@ -40,14 +40,14 @@ pub struct Options {
 }
 
 impl Session {
-    /// The options of this process.
+    /// Return the options of this process.
     pub fn options(&self) -> Options {
         Options { _session: self.clone() }
     }
 }
 
 impl Options {
-    /// Sets an option, replacing its value.
+    /// Set an option or replace its value.
     ///
     /// # Errors
     /// When the name does not begin with a letter after its dash or has a blank, or a text has a zero byte.
@@ -61,36 +61,36 @@ impl Options {
         Ok(())
     }
 
-    /// Value of an option; empty for one without a value, `None` for one that is not set.
+    /// Return the value of an option. It is empty for an option without a value, and `None` for an option that is not set.
     pub fn get(&self, name: &str) -> Option<String> {
         let name = dashed(name);
         let all = self.all().ok()?;
         all.into_iter().find(|(known, _)| known.eq_ignore_ascii_case(&name)).map(|(_, value)| value.unwrap_or_default())
     }
 
-    /// Whether an option is set.
+    /// Return whether an option is set.
     pub fn has(&self, name: &str) -> bool {
         self.get(name).is_some()
     }
 
-    /// Removes an option, if it is set.
+    /// Remove an option, if it is set.
     ///
     /// # Errors
-    /// When the name is not one of an option.
+    /// When the name is not a valid name of an option.
     pub fn clear(&self, name: &str) -> Result<()> {
         let known = key(name)?;
         if !library::runs() {
             waiting::clear(&dashed(name));
             return Ok(());
         }
-        // SAFETY: the text lives till the end of the call; null is PETSc's one table.
+        // SAFETY: the text lives until the end of the call; null means PETSc's one table.
         unsafe { petsc!(PetscOptionsClearValue(null_mut(), known.as_ptr())) }
     }
 
-    /// All options that are set, by name.
+    /// Return all options that are set, sorted by name.
     ///
-    /// PETSc's own list is one text in which a value may look like a name. So its words are only proposals: a word is a
-    /// name if it is among those [`left`](Self::left), or if PETSc says that such an option was read.
+    /// PETSc's own list is one text, in which a value may look like a name. A word of it counts as a name if it is among those
+    /// [`left`](Self::left), or if PETSc says that such an option was read.
     ///
     /// # Errors
     /// When PETSc is out of memory.
@@ -100,7 +100,7 @@ impl Options {
         }
         let mut entries: BTreeMap<String, Option<String>> = self.left()?.into_iter().collect();
         let mut whole: *mut c_char = null_mut();
-        // SAFETY: PETSc makes the text and ends it with a zero byte; its own function frees it, once.
+        // SAFETY: PETSc allocates the text and ends it with a zero byte; its own function frees it, once.
         let words = unsafe {
             petsc!(PetscOptionsGetAll(null_mut(), &mut whole))?;
             let words = string(whole);
@@ -117,24 +117,24 @@ impl Options {
         Ok(entries.into_iter().collect())
     }
 
-    /// Whether PETSc, or [`mark_used`](Self::mark_used), has read an option that is set.
+    /// Return whether an option is set and was read by PETSc or [`mark_used`](Self::mark_used).
     pub fn used(&self, name: &str) -> bool {
         if !library::runs() {
             return waiting::used(&dashed(name));
         }
         let Ok(name) = key(name) else { return false };
         let mut used = ffi::PetscBool_PETSC_FALSE;
-        // This one PETSc function wants the name without its dash.
+        // this function of PETSc expects the name without its dash
         let bare = &name.as_c_str().to_bytes_with_nul()[1..];
-        // SAFETY: the rest of a text that ends with a zero byte and lives till the end of the call.
-        let asked = unsafe { petsc!(PetscOptionsUsed(null_mut(), bare.as_ptr().cast(), &mut used)) };
-        asked.is_ok() && used == ffi::PetscBool_PETSC_TRUE
+        // SAFETY: the rest of a text that ends with a zero byte and lives until the end of the call.
+        let queried = unsafe { petsc!(PetscOptionsUsed(null_mut(), bare.as_ptr().cast(), &mut used)) };
+        queried.is_ok() && used == ffi::PetscBool_PETSC_TRUE
     }
 
-    /// Marks an option as read, so that PETSc does not warn about it at its end.
+    /// Mark an option as read, so that PETSc does not warn about it at its end.
     ///
     /// # Errors
-    /// When the name is not one of an option.
+    /// When the name is not a valid name of an option.
     pub fn mark_used(&self, name: &str) -> Result<()> {
         if library::runs() {
             return table::read(library::running()?, name).map(drop);
@@ -144,7 +144,7 @@ impl Options {
         Ok(())
     }
 
-    /// The options that nobody has read so far, by name.
+    /// Return the options that nobody has read so far, sorted by name.
     ///
     /// # Errors
     /// When PETSc is out of memory.
@@ -154,8 +154,8 @@ impl Options {
         }
         let mut count = 0;
         let (mut names, mut values) = (null_mut(), null_mut());
-        // SAFETY: PETSc gives `count` names and as many values; a value is null where there is none. They are copied
-        // before PETSc takes its two lists back.
+        // SAFETY: PETSc returns `count` names and as many values; a value may be null. They are copied before PETSc takes its two lists
+        // back.
         let mut entries: Vec<Entry> = unsafe {
             petsc!(PetscOptionsLeftGet(null_mut(), &mut count, &mut names, &mut values))?;
             let entry = |i: usize| {

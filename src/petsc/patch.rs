@@ -1,13 +1,12 @@
-//! An exact solve on a few dofs around the preconditioner of a solver.
+//! A local correction: an exact solve on a few dofs before and after the preconditioner of a solver.
 //!
-//! A preconditioner M of a matrix that was near A everywhere but on some dofs P becomes one of A by a multiplicative Schwarz step, made
-//! symmetric:
+//! A preconditioner M may belong to a matrix that differs from A on some dofs P. A symmetric multiplicative Schwarz step makes it one of A:
 //!
 //! ```text
 //! y = S r_P,   z = P y + M (r - A P y),   z += P S (r - A z)_P       S = (P'AP)^-1
 //! ```
 //!
-//! Both products are with columns P alone. Each process has its rows of them.
+//! r is the residual and z the result. Both products need the columns P of A only; each process has its rows of these columns.
 
 use super::around::Subspace;
 use super::factor::Factor;
@@ -17,23 +16,28 @@ use super::vector::Vector;
 use super::{Ksp, Matrix, ffi};
 use crate::error::Result;
 
-/// What the preconditioner around another needs.
+/// The space of the dofs P, with the columns P of A and the factor of P'AP.
 struct Patch {
-    /// The dofs P of this process, as entries of its vectors.
+    /// Local indices of the dofs P that this process owns.
     inside: Vec<usize>,
-    /// The rows of this process that have entries in columns P, likewise.
+    /// Local indices of the owned rows that have entries in the columns P.
     touched: Vec<usize>,
-    /// A in these rows and the columns P.
+    /// The rows `touched` and the columns P of A.
     columns: ffi::Mat,
-    /// Vectors over the rows, and over P.
-    parts: [Vector; 2],
+    /// PETSc's header of a vector over the rows `touched`.
+    over_touched: Vector,
+    /// PETSc's header of a vector over P.
+    over_inside: Vector,
     factor: Factor,
 }
 
 impl Ksp {
-    /// Solves exactly on some `dofs` of the `matrix` of this solver, and on those within `layers` of its graph around them, before and after
-    /// the preconditioner, which stays that of an older matrix. Collective, with the same dofs, counted through all processes, on each. New
-    /// values of the matrix need a new patch.
+    /// Add a local correction to the preconditioner of this solver, which stays that of an older matrix.
+    ///
+    /// The correction solves exactly on the `dofs` of the `matrix` of this solver and on those within `layers` of its graph around them.
+    /// `dofs` are global indices, the same on all processes. Collective. New values of the matrix need a new correction.
+    ///
+    /// Return false, and add nothing, if P'AP is not positive definite to rounding.
     ///
     /// ```
     /// use winkler::petsc::{Ksp, Matrix, Session};
@@ -66,8 +70,6 @@ impl Ksp {
     /// # Ok::<(), winkler::error::Error>(())
     /// ```
     ///
-    /// False, without a patch, if P'AP is not positive definite to rounding.
-    ///
     /// # Errors
     /// PETSc's.
     pub fn patch(&mut self, matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<bool> {
@@ -81,23 +83,23 @@ impl Ksp {
 
 impl Patch {
     fn new(matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
-        let (session, scope, own) = (matrix.session(), matrix.scope(), matrix.own());
-        let new = |rows: &[usize]| Vector::new(session, scope, rows.len(), 1);
-        let dofs = whole(Indices::around(matrix, dofs, layers)?, matrix.block_size());
+        let (session, scope, owned) = (matrix.session(), matrix.scope(), matrix.own());
+        let header = |rows: &[usize]| Vector::new(session, scope, rows.len(), 1);
+        let dofs = of_whole_nodes(Indices::around(matrix, dofs, layers)?, matrix.block_size());
         let mut touched = Indices::around(matrix, &dofs, 1)?;
-        touched.retain(|i| own.contains(i));
-        let mut inside: Vec<usize> = dofs.iter().copied().filter(|i| own.contains(i)).collect();
-        let patch = Indices::new(scope.comm(session), &inside)?;
-        let Some(factor) = Factor::new(matrix, &dofs, (&patch, inside.len()))? else { return Ok(None) };
-        let parts = [new(&touched)?, new(&inside)?];
-        let columns = Indices::new(scope.comm(session), &touched)?.submatrix(matrix, &patch)?;
-        inside.iter_mut().chain(&mut touched).for_each(|i| *i -= own.start);
-        Ok(Some(Self { inside, touched, columns, parts, factor }))
+        touched.retain(|i| owned.contains(i));
+        let mut inside: Vec<usize> = dofs.iter().copied().filter(|i| owned.contains(i)).collect();
+        let inside_set = Indices::new(scope.comm(session), &inside)?;
+        let Some(factor) = Factor::new(matrix, &dofs, &inside_set, inside.len())? else { return Ok(None) };
+        let (over_touched, over_inside) = (header(&touched)?, header(&inside)?);
+        let columns = Indices::new(scope.comm(session), &touched)?.submatrix(matrix, &inside_set)?;
+        inside.iter_mut().chain(&mut touched).for_each(|i| *i -= owned.start);
+        Ok(Some(Self { inside, touched, columns, over_touched, over_inside, factor }))
     }
 }
 
-/// All dofs of the nodes that some of them belong to.
-fn whole(mut dofs: Vec<usize>, block_size: usize) -> Vec<usize> {
+/// Return all dofs of the nodes that the sorted `dofs` belong to.
+fn of_whole_nodes(mut dofs: Vec<usize>, block_size: usize) -> Vec<usize> {
     dofs.iter_mut().for_each(|dof| *dof /= block_size);
     dofs.dedup();
     dofs.into_iter().flat_map(|node| node * block_size..(node + 1) * block_size).collect()
@@ -110,7 +112,7 @@ impl Subspace for Patch {
         self.factor.solve(&residual, &mut y)?;
         // SAFETY: the product reads one and writes to the other.
         let product = |y, ay| unsafe { petsc!(MatMult(self.columns, y, ay)) };
-        self.parts[1].map(("y", &y), &self.parts[0], ("A y", &mut ay), product)?;
+        self.over_inside.map(("y", &y), &self.over_touched, ("A y", &mut ay), product)?;
         self.touched.iter().zip(&ay).for_each(|(&i, ay)| r[i] -= ay);
         self.inside.iter().zip(&y).for_each(|(&i, y)| x[i] += y);
         Ok(())
@@ -121,7 +123,7 @@ impl Subspace for Patch {
         let (mut az, mut y) = (vec![0.0; self.inside.len()], vec![0.0; self.inside.len()]);
         // SAFETY: as above.
         let product = |part, az| unsafe { petsc!(MatMultTranspose(self.columns, part, az)) };
-        self.parts[0].map(("z", &part), &self.parts[1], ("A z", &mut az), product)?;
+        self.over_touched.map(("z", &part), &self.over_inside, ("A z", &mut az), product)?;
         self.factor.solve(&az, &mut y)?;
         self.inside.iter().zip(&y).for_each(|(&i, y)| z[i] -= y);
         Ok(())

@@ -1,4 +1,4 @@
-//! Catching what PETSc prints, to have a view of an object or a help text as a string.
+//! Capture of PETSc's output, such as the view of an object or a help text, as a string.
 
 use super::{ffi, library};
 use std::cell::RefCell;
@@ -8,23 +8,23 @@ thread_local! {
     static CAUGHT: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Longest text of one print statement; PETSc prints line by line.
+/// The longest text of one print statement in bytes. PETSc prints line by line.
 const LONGEST: usize = 1 << 16;
 
-/// Runs `action` and returns its result and all that PETSc printed meanwhile, which is not shown.
+/// Run `action`, and return its result and PETSc's output meanwhile, which is not shown.
 pub(super) fn caught<T>(action: impl FnOnce() -> T) -> (T, String) {
-    /// Puts PETSc's own printer back, also when `action` panics.
+    /// A guard that restores PETSc's own printer, also when `action` panics.
     struct Restore(*mut ffi::Printf, ffi::Printf);
     impl Drop for Restore {
         fn drop(&mut self) {
-            // SAFETY: see below.
+            // SAFETY: as below.
             unsafe { *self.0 = self.1 };
         }
     }
     CAUGHT.take();
-    // SAFETY: the variable has this type; PETSc is used by one thread, that of the session, so nobody reads the hook meanwhile.
+    // SAFETY: the variable has this type; the thread of the session alone uses PETSc, so nobody reads the hook meanwhile.
     let hook = library::running().and_then(|petsc| unsafe { petsc.address::<*mut ffi::Printf>("PetscVFPrintf") });
-    // SAFETY: as above; without PETSc the action itself ends with the error
+    // SAFETY: as above; without PETSc the action itself returns the error
     let restore = hook.ok().map(|hook| unsafe {
         let before = Restore(hook, *hook);
         *hook = append;
@@ -35,11 +35,11 @@ pub(super) fn caught<T>(action: impl FnOnce() -> T) -> (T, String) {
     (result, String::from_utf8_lossy(&CAUGHT.take()).into_owned())
 }
 
-/// The printer in force while [`caught`] runs.
+/// The printer of PETSc while [`caught`] runs.
 unsafe extern "C" fn append(_file: *mut c_void, format: *const c_char, list: *mut c_void) -> ffi::PetscErrorCode {
     let mut text = vec![0_u8; LONGEST];
     let mut length = 0;
-    // SAFETY: PETSc writes at most `LONGEST` bytes with the final zero; format and list come from PETSc as they are.
+    // SAFETY: PETSc writes at most `LONGEST` bytes with the final zero byte; format and list are passed on from PETSc.
     let code = unsafe {
         let Ok(print) = library::open().and_then(|petsc| petsc.address::<ffi::Format>("PetscVSNPrintf")) else {
             return Default::default();

@@ -3,21 +3,21 @@
 use super::ffi;
 use std::fmt;
 
-/// Why a linear solver stopped; shown as a sentence.
+/// The reason why a linear solver stopped; it is displayed as a sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConvergedReason {
-    /// PETSc's number of it, positive for a good ending.
+    /// PETSc's number of the reason, positive for convergence.
     pub number: ffi::KSPConvergedReason,
     text: String,
 }
 
 impl ConvergedReason {
-    /// Reads PETSc's number; `failure` tells more about a failed preconditioner.
+    /// Translate PETSc's number. `failure` returns the reason of a failed preconditioner.
     pub(super) fn from_raw(raw: ffi::KSPConvergedReason, failure: impl FnOnce() -> String) -> Self {
         let text = match raw {
             ffi::KSPConvergedReason_KSP_CONVERGED_RTOL => "the relative tolerance was reached",
             ffi::KSPConvergedReason_KSP_CONVERGED_ATOL => "the absolute tolerance was reached",
-            // also the end of a direct solve
+            // a direct solve ends with this reason, too
             ffi::KSPConvergedReason_KSP_CONVERGED_ITS => "the asked number of iterations was done",
             ffi::KSPConvergedReason_KSP_DIVERGED_ITS => "the iteration limit was reached (-ksp_max_it)",
             ffi::KSPConvergedReason_KSP_DIVERGED_DTOL => {
@@ -41,7 +41,7 @@ impl ConvergedReason {
         Self { number: raw, text: text.to_owned() }
     }
 
-    /// Whether the solution is to the tolerance asked for. An iteration that has not ended is no good ending.
+    /// Return whether the solver converged. An iteration that has not ended did not.
     pub fn converged(&self) -> bool {
         self.number > 0
     }

@@ -1,16 +1,16 @@
-//! What winkler asks of the installed PETSc, as pure functions of the texts of its headers.
+//! Requirements on the installed PETSc, checked by the texts of its headers.
 //!
-//! `build.rs` includes this file to refuse an unsuitable PETSc in words before anything is compiled; the crate
-//! compiles it for its unit tests.
+//! `build.rs` includes this file, so that it refuses an unsuitable PETSc with a message before anything is compiled. The crate compiles it
+//! for its unit tests.
 
-/// Oldest PETSc that has all that the binding calls: major and minor number.
+/// The major and minor number of the oldest PETSc that has all functions that the binding calls.
 pub const OLDEST: (u32, u32) = (3, 18);
 
-/// What to do about every refusal: Debian's package is real, double and has MUMPS and hypre.
+/// The advice of every refusal. Debian's package has real numbers in double precision, MUMPS and hypre.
 pub const ADVICE: &str = "install one, e.g. `apt-get install petsc-dev` (or run scripts/setup), \
                           or point PETSC_DIR and PETSC_ARCH at one";
 
-/// Whether `petscconf.h` defines `name` (to anything).
+/// Return whether `petscconf.h` defines `name`.
 fn defines(petscconf: &str, name: &str) -> bool {
     petscconf.lines().any(|line| {
         let mut words = line.split_whitespace();
@@ -18,10 +18,10 @@ fn defines(petscconf: &str, name: &str) -> bool {
     })
 }
 
-/// Checks the text of `petscconf.h`: real numbers, double precision, MUMPS, hypre.
+/// Check the text of `petscconf.h` for real numbers, double precision, MUMPS and hypre.
 ///
 /// # Errors
-/// One plain sentence that names what is wrong and what to install.
+/// A sentence that names what is wrong and what to install.
 pub fn check_config(petscconf: &str) -> Result<(), String> {
     let wrong = if defines(petscconf, "PETSC_USE_COMPLEX") {
         "this PETSc computes with complex numbers, but winkler needs one with real numbers"
@@ -37,10 +37,10 @@ pub fn check_config(petscconf: &str) -> Result<(), String> {
     Err(format!("{wrong}: {ADVICE}"))
 }
 
-/// Checks the text of `petscversion.h` against [`OLDEST`].
+/// Check the text of `petscversion.h` against [`OLDEST`].
 ///
 /// # Errors
-/// One plain sentence that names the version found and the version needed.
+/// A sentence that names the version found and the version needed.
 pub fn check_version(petscversion: &str) -> Result<(), String> {
     let number = |name: &str| {
         petscversion.lines().find_map(|line| {

@@ -1,4 +1,4 @@
-//! The rows of a sparse matrix: checked, then owned by PETSc's matrix.
+//! The rows of a sparse matrix, which are checked and then belong to PETSc's matrix.
 
 use super::library::petsc;
 use super::{Int, Scope, ffi};
@@ -7,10 +7,12 @@ use mpi::ffi::RSMPI_COMM_SELF;
 use std::ffi::c_void;
 use std::ptr::null_mut;
 
-/// Rows of a square matrix: all, or those of one of several processes. They live exactly as long as PETSc's matrix, which may outlive
-/// [`Matrix`](super::Matrix) inside a solver: PETSc calls `free` at the end.
+/// The rows of a square matrix: all, or those of one of several processes.
 ///
-/// Values are in this order: all in the columns of the rows' own numbers, row by row, then all others, row by row.
+/// They live exactly as long as PETSc's matrix, which may outlive [`Matrix`](super::Matrix) inside a solver. PETSc calls `free` at the end.
+///
+/// A column is an own column if this process has the row of the same number. All values in own columns come first, row by row. All other
+/// values follow, row by row.
 ///
 /// ```
 /// use winkler::petsc::Rows;
@@ -26,20 +28,22 @@ pub struct Rows {
     pub(super) scope: Scope,
     pub(super) first: usize,
     pub(super) total: usize,
-    /// Compressed rows in own columns, counted from `first`.
+    /// The compressed rows of the own columns, which are counted from `first`.
     pub(super) row_ptr: Vec<Int>,
     pub(super) columns: Vec<Int>,
-    /// The same in the columns of other processes, counted through all.
+    /// The compressed rows of the other columns, in global numbers.
     pub(super) other_row_ptr: Vec<Int>,
     pub(super) other_columns: Vec<Int>,
     pub(super) values: Vec<f64>,
 }
 
 impl Rows {
-    /// All rows: row `i` has the columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in increasing order, and the values at the same places.
+    /// Take all rows of a matrix.
+    ///
+    /// Row `i` has the columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in increasing order, and the values at the same positions.
     ///
     /// # Errors
-    /// When the arrays are not those of a square matrix with sorted columns.
+    /// When the arrays do not describe a square matrix with sorted columns.
     pub fn all(row_ptr: Vec<Int>, columns: Vec<Int>, values: Vec<f64>) -> Result<Rows> {
         let total = row_ptr.len().saturating_sub(1);
         check(&row_ptr, &columns, &values, total)?;
@@ -47,11 +51,12 @@ impl Rows {
         Ok(Rows { scope: Scope::Process, first: 0, total, row_ptr, columns, other_row_ptr, other_columns, values })
     }
 
-    /// The rows of this process, from number `first` on among `total`; columns are counted through all. Rows follow each other in the order
-    /// of the processes, any of which may have none. Takes no second copy.
+    /// Take the rows of this process, from the global number `first` on among `total`, with global columns. No second copy is made.
+    ///
+    /// Rows are numbered in the order of the processes, any of which may have none.
     ///
     /// # Errors
-    /// When the arrays are not those of such rows.
+    /// When the arrays do not describe such rows.
     pub fn of_process(
         first: usize,
         total: usize,
@@ -89,22 +94,22 @@ impl Rows {
         Ok(Rows { scope: Scope::World, first, total, row_ptr, columns, other_row_ptr, other_columns, values })
     }
 
-    /// Numbers of the rows that are here.
+    /// Return the global numbers of the rows of this process.
     pub fn own(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.row_ptr.len() - 1
     }
 
-    /// The values, in their order.
+    /// Return the values, in the order of this type.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// The values alone.
+    /// Return the values alone.
     pub fn into_values(self) -> Vec<f64> {
         self.values
     }
 
-    /// Place of an entry in the values: of row `i`, counted from the first here, and column `j`, counted through all.
+    /// Return the position in the values of the entry in the local row `i` and the global column `j`.
     pub fn position(&self, i: usize, j: usize) -> Option<usize> {
         let find = |row_ptr: &[Int], columns: &[Int], j: usize| {
             let (from, to) = (row_ptr[i] as usize, row_ptr[i + 1] as usize);
@@ -117,23 +122,23 @@ impl Rows {
     }
 }
 
-/// Frees the rows of a matrix.
+/// Free the rows of a matrix.
 ///
 /// # Safety
 /// The pointer is from a box of [`Rows`] that nobody else frees.
 pub(super) unsafe extern "C" fn free(rows: *mut c_void) -> ffi::PetscErrorCode {
-    // SAFETY: the matrix made the pointer from a box and gave it to PETSc's container, which calls this once.
+    // SAFETY: `Matrix` made the pointer from a box and gave it to PETSc's container, which calls this once.
     drop(unsafe { Box::from_raw(rows.cast::<Rows>()) });
     Default::default()
 }
 
-/// Gives the rows to the matrix: they are freed when PETSc destroys it.
+/// Hand the rows to the matrix, so that they are freed when PETSc destroys it.
 ///
 /// # Safety
 /// The matrix is one of PETSc's; the rows are from a box that nobody else frees.
 pub(super) unsafe fn attach(mat: ffi::Mat, rows: *mut Rows) -> Result<()> {
     let mut container = null_mut();
-    // SAFETY: the communicator is the constant of MPI itself; the matrix takes a reference to the container, whose destructor fits its
+    // SAFETY: the communicator is the constant of MPI itself; the matrix takes a reference to the container; the destructor fits the
     // pointer by the caller's promise.
     unsafe {
         petsc!(PetscContainerCreate(RSMPI_COMM_SELF, &mut container))?;
@@ -144,7 +149,7 @@ pub(super) unsafe fn attach(mat: ffi::Mat, rows: *mut Rows) -> Result<()> {
     }
 }
 
-/// Checks that arrays are compressed rows with sorted columns, `width` of them.
+/// Check that arrays are compressed rows with sorted columns below `width`.
 pub(super) fn check(row_ptr: &[Int], columns: &[Int], values: &[f64], width: usize) -> Result<()> {
     let wrong = |what: &str| Err(Error::new(Kind::Solver, format!("not a sparse matrix in compressed rows: {what}")));
     let Some(&last) = row_ptr.last() else {

@@ -1,4 +1,4 @@
-//! Entries of a vector of several processes that one of them needs (VecScatter).
+//! Exchange of entries of a distributed vector that a process needs or contributes to (VecScatter).
 
 use super::indices::Indices;
 use super::library::petsc;
@@ -7,41 +7,42 @@ use super::{Scope, Session, ffi};
 use crate::error::Result;
 use std::ptr::null_mut;
 
-/// From a vector of a scope to some of its entries on each process, and back.
+/// A map from a distributed vector to the entries that this process needs, and back.
 pub(super) struct Scatter {
     scatter: ffi::VecScatter,
-    /// Of the vector, and of the entries.
-    vectors: [Vector; 2],
+    /// PETSc's header of the distributed vector.
+    distributed: Vector,
+    /// PETSc's header of the entries on this process.
+    entries: Vector,
 }
 
 impl Scatter {
-    /// Of a vector with so many rows on this process the entries of these numbers, counted through all processes; collective.
-    pub fn new(session: &Session, scope: Scope, rows: usize, numbers: &[usize]) -> Result<Self> {
-        let vectors = [Vector::new(session, scope, rows, 1)?, Vector::new(session, Scope::Process, numbers.len(), 1)?];
-        let from = Indices::alone(numbers)?;
+    /// Prepare the exchange of the entries with the global indices `indices`. Collective. The vector has `owned` entries on this process.
+    pub fn new(session: &Session, scope: Scope, owned: usize, indices: &[usize]) -> Result<Self> {
+        let distributed = Vector::new(session, scope, owned, 1)?;
+        let entries = Vector::new(session, Scope::Process, indices.len(), 1)?;
+        let from = Indices::alone(indices)?;
         let mut scatter = null_mut();
         // SAFETY: as many entries of the one as the other has.
-        unsafe { petsc!(VecScatterCreate(vectors[0].vec, from.0, vectors[1].vec, null_mut(), &mut scatter)) }?;
-        Ok(Self { scatter, vectors })
+        unsafe { petsc!(VecScatterCreate(distributed.vec, from.0, entries.vec, null_mut(), &mut scatter)) }?;
+        Ok(Self { scatter, distributed, entries })
     }
 
-    /// Number of the entries.
+    /// Return the number of entries on this process.
     pub fn len(&self) -> usize {
-        self.vectors[1].len()
+        self.entries.len()
     }
 
-    /// Copies the entries of a vector; collective.
-    pub fn take(&self, vector: &[f64], entries: &mut [f64]) -> Result<()> {
-        let [from, to] = &self.vectors;
-        from.map(("a vector", vector), to, ("its entries", entries), |from, to| {
+    /// Copy the entries of a distributed vector to this process. Collective.
+    pub fn gather(&self, vector: &[f64], entries: &mut [f64]) -> Result<()> {
+        self.distributed.map(("a vector", vector), &self.entries, ("its entries", entries), |from, to| {
             self.scatter(from, to, ffi::InsertMode_INSERT_VALUES, ffi::ScatterMode_SCATTER_FORWARD)
         })
     }
 
-    /// Adds to the entries of a vector what processes have for them; collective.
-    pub fn add(&self, entries: &[f64], vector: &mut [f64]) -> Result<()> {
-        let [to, from] = &self.vectors;
-        from.map(("entries", entries), to, ("their vector", vector), |from, to| {
+    /// Add the entries of all processes to a distributed vector. Collective.
+    pub fn scatter_add(&self, entries: &[f64], vector: &mut [f64]) -> Result<()> {
+        self.entries.map(("entries", entries), &self.distributed, ("their vector", vector), |from, to| {
             self.scatter(from, to, ffi::InsertMode_ADD_VALUES, ffi::ScatterMode_SCATTER_REVERSE)
         })
     }

@@ -1,4 +1,4 @@
-//! Which processes own an object together.
+//! The communicator of an object: one process or all.
 
 use super::Session;
 use mpi::collective::SystemOperation;
@@ -6,17 +6,17 @@ use mpi::ffi::{MPI_Comm, RSMPI_COMM_SELF};
 use mpi::raw::AsRaw;
 use mpi::traits::CommunicatorCollectives;
 
-/// The processes that own an object; calls on one of all processes are collective.
+/// The processes that own an object together. Calls on an object of all processes are collective.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
     /// This process alone.
     Process,
-    /// All processes of the session, each with rows of its own.
+    /// All processes of the session. Each owns some rows.
     World,
 }
 
 impl Scope {
-    /// PETSc's communicator for it.
+    /// Return the MPI communicator.
     pub(super) fn comm(self, session: &Session) -> MPI_Comm {
         match self {
             // SAFETY: the constant of MPI itself.
@@ -25,7 +25,7 @@ impl Scope {
         }
     }
 
-    /// Adds up what its processes have.
+    /// Replace `values` by their sum over the processes.
     pub(super) fn sum(self, session: &Session, values: &mut [f64]) {
         if self == Scope::World {
             let mine = values.to_vec();
@@ -33,7 +33,7 @@ impl Scope {
         }
     }
 
-    /// Number of its processes.
+    /// Return the number of processes.
     pub(super) fn processes(self, session: &Session) -> usize {
         if self == Scope::World { session.size() } else { 1 }
     }

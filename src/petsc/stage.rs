@@ -1,17 +1,17 @@
-//! Stages of PETSc's log, which `-log_view` prints one by one.
+//! Stages of PETSc's log, which `-log_view` lists separately.
 
 use super::Session;
 use super::library::{self, petsc};
 use super::table::text;
 use crate::error::Result;
 
-/// A stage, which lasts until this is dropped; the one around it goes on then.
+/// A guard: its stage lasts until it is dropped. Then the enclosing stage goes on.
 pub struct Stage {
     is_logged: bool,
 }
 
 impl Session {
-    /// Begins a stage of PETSc's log; nothing if PETSc does not run. All processes begin the same ones.
+    /// Begin a stage of PETSc's log, if PETSc runs. All processes have to begin the same stages.
     ///
     /// ```
     /// use winkler::petsc::Session;
@@ -23,14 +23,14 @@ impl Session {
     /// # Ok::<(), winkler::error::Error>(())
     /// ```
     pub fn stage(&self, name: &str) -> Stage {
-        // a log that cannot be kept is no reason to end a run
+        // a failure of the log does not end a run
         Stage { is_logged: library::runs() && begin(name).is_ok() }
     }
 }
 
 fn begin(name: &str) -> Result<()> {
     let (text, mut stage) = (text(name)?, -1);
-    // SAFETY: PETSc copies the text, and the stage is one that it has given.
+    // SAFETY: PETSc copies the text, and the number of the stage comes from PETSc.
     unsafe {
         petsc!(PetscLogStageGetId(text.as_ptr(), &mut stage))?;
         if stage < 0 {
@@ -43,7 +43,7 @@ fn begin(name: &str) -> Result<()> {
 impl Drop for Stage {
     fn drop(&mut self) {
         if self.is_logged && library::runs() {
-            // SAFETY: this stage was pushed, and those within it are gone: they were dropped before.
+            // SAFETY: this stage was pushed, and the stages within it were dropped before.
             let _ = unsafe { petsc!(PetscLogStagePop()) };
         }
     }

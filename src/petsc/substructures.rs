@@ -1,63 +1,73 @@
-//! A factor by substructures: two processes eliminate a half each, and all factor what is left, the interface.
+//! A factor by substructures: two processes eliminate one half each, and all processes factor the interface.
 //!
-//! With the interior I of each half and the interface B between them
+//! Let I be the interior dofs of each half, and B the interface dofs between the halves. The sums run over the halves:
 //!
 //! ```text
 //! S = A_BB - sum A_BI A_II^-1 A_IB,   x_B = S^-1 (b_B - sum A_BI A_II^-1 b_I),   x_I = A_II^-1 (b_I - A_IB x_B)
 //! ```
 //!
-//! S is dense, and the same on all processes: of a solve they share one sum, of a number for each dof of the interface, and what of the
-//! right-hand side and the solution is not where its half is. One process has one half and no interface.
+//! S is dense and the same on all processes. A solve needs one sum over the processes, with a number for each interface dof. It also exchanges
+//! the entries of b and x that are not owned where their half is. One process has one half and no interface.
 //!
-//! More than two parts do not pay: to eliminate n dofs in space takes c n^2, and the interface of p parts has about p^(1/3) n^(2/3) dofs and
-//! takes c' p n^2, so that the best p does not depend on n; and S grows as p^(2/3). Of the two spheres with 99 900 dofs, n = 8166, two, three and
-//! four parts on four processes take the same time, and 152, 158, and 176 MB.
+//! More than two parts do not pay. Elimination of n dofs in space takes c n^2 operations. The interface of p parts has about p^(1/3) n^(2/3)
+//! dofs and takes c' p n^2, so that the best p does not depend on n. The size of S grows as p^(2/3). For two spheres with 99 900 dofs and
+//! n = 8166, two, three and four parts on four processes take the same time, and 152, 158, and 176 MB.
 
-use super::halves::{BETWEEN, halves};
+use super::halves::{SEPARATOR, halves};
 use super::indices::{Indices, row};
 use super::scatter::Scatter;
 use super::{Int, Matrix, Schur, Scope, Session, cholesky, cholesky_solve};
 use crate::error::Result;
 use std::cell::RefCell;
+use std::ops::Range;
 
-/// P'AP, factored.
+/// The factor of P'AP, where P are some dofs of a matrix A.
 pub(super) struct Substructures {
     session: Session,
     scope: Scope,
-    /// From the dofs P of this process to those of the interior here.
+    /// The exchange between the dofs P that processes own and the interior dofs of this process.
     interior: Scatter,
-    /// The interior, if there is any, with the dofs of the interface that are coupled with it.
-    own: Option<RefCell<Schur>>,
-    /// These dofs, as numbers in the interface.
+    /// The factored interior with the interface dofs `near` retained, if this process has an interior.
+    schur: Option<RefCell<Schur>>,
+    /// The indices in the interface of the dofs that are coupled with the interior of this process.
     near: Vec<usize>,
-    /// The dofs of the interface among P of this process, and their numbers in it.
-    shared: Vec<(usize, usize)>,
-    /// The factor of S.
+    /// The interface dofs that this process owns.
+    owned: Vec<InterfaceDof>,
+    /// The Cholesky factor of S, `border` rows.
     interface: Vec<f64>,
-    /// Number of dofs of the interface.
+    /// The number of interface dofs.
     border: usize,
 }
 
+/// An interface dof that this process owns.
+struct InterfaceDof {
+    /// Its index among the dofs P that this process owns.
+    local: usize,
+    /// Its index in the interface.
+    index: usize,
+}
+
 impl Substructures {
-    /// Factors rows and columns of a matrix: dofs P in increasing order, whole nodes, the same on all processes; collective. `None` if they are
-    /// not positive definite to rounding.
+    /// Factor P'AP. Collective. Return `None` if it is not positive definite to rounding.
+    ///
+    /// `dofs` are all dofs P, the same on all processes: whole nodes in increasing order.
     ///
     /// # Errors
-    /// Memory, and what else stops MUMPS.
+    /// Lack of memory, and other failures of MUMPS.
     pub fn new(matrix: &Matrix, dofs: &[usize]) -> Result<Option<Self>> {
         let (session, scope) = (matrix.session().clone(), matrix.scope());
         let layout = Layout::new(matrix, dofs)?;
-        let (near, mut own) = layout.interior()?;
+        let Interior { near, mut schur } = layout.eliminate_interior()?;
         let mut failed = [0.0];
-        if let Some(schur) = &mut own {
+        if let Some(schur) = &mut schur {
             match schur.factor() {
                 Err(_) if schur.is_singular() => failed[0] = 1.0,
                 done => done?,
             }
         }
-        let complement = own.as_mut().map_or_else(Vec::new, Schur::take_complement);
-        let shared = layout.shared();
-        let mut interface = layout.interface(&shared, &near, &complement)?;
+        let complement = schur.as_mut().map_or_else(Vec::new, Schur::take_complement);
+        let owned = layout.owned_interface();
+        let mut interface = layout.interface_part(&owned, &near, &complement)?;
         drop(complement);
         scope.sum(&session, &mut failed);
         scope.sum(&session, &mut interface);
@@ -65,143 +75,169 @@ impl Substructures {
         if failed[0] > 0.0 || border > 0 && !cholesky(&mut interface, border)? {
             return Ok(None);
         }
-        let interior = Scatter::new(&session, scope, layout.here().len(), &layout.interior)?;
-        Ok(Some(Self { session, scope, interior, own: own.map(RefCell::new), near, shared, interface, border }))
+        let interior = Scatter::new(&session, scope, layout.owned().len(), &layout.interior)?;
+        Ok(Some(Self { session, scope, interior, schur: schur.map(RefCell::new), near, owned, interface, border }))
     }
 
-    /// `x = (P'AP)^-1 b` for the dofs P of this process; collective.
+    /// Compute x = (P'AP)^-1 b; the slices have one entry for each dof P that this process owns. Collective.
     ///
     /// # Errors
     /// Failures of MUMPS.
     pub fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<()> {
         let interior = self.interior.len();
         let mut inside = vec![0.0; interior + self.near.len()];
-        self.interior.take(b, &mut inside[..interior])?;
-        let mut own = self.own.as_ref().map(RefCell::borrow_mut);
-        let mut shared = vec![0.0; self.border];
-        if let Some(schur) = &mut own {
+        self.interior.gather(b, &mut inside[..interior])?;
+        let mut schur = self.schur.as_ref().map(RefCell::borrow_mut);
+        let mut interface = vec![0.0; self.border];
+        if let Some(schur) = &mut schur {
             let condensed = schur.condense(&inside)?;
-            self.near.iter().zip(condensed).for_each(|(&number, value)| shared[number] = value);
+            self.near.iter().zip(condensed).for_each(|(&index, value)| interface[index] = value);
         }
         if self.border > 0 {
-            self.shared.iter().for_each(|&(i, number)| shared[number] += b[i]);
-            self.scope.sum(&self.session, &mut shared);
-            cholesky_solve(&self.interface, self.border, &mut shared)?;
+            self.owned.iter().for_each(|dof| interface[dof.index] += b[dof.local]);
+            self.scope.sum(&self.session, &mut interface);
+            cholesky_solve(&self.interface, self.border, &mut interface)?;
         }
-        if let Some(schur) = &mut own {
-            let near: Vec<f64> = self.near.iter().map(|&number| shared[number]).collect();
+        if let Some(schur) = &mut schur {
+            let near: Vec<f64> = self.near.iter().map(|&index| interface[index]).collect();
             inside = schur.expand_condensed(&inside, &near)?;
         }
         x.fill(0.0);
-        self.interior.add(&inside[..interior], x)?;
-        self.shared.iter().for_each(|&(i, number)| x[i] = shared[number]);
+        self.interior.scatter_add(&inside[..interior], x)?;
+        self.owned.iter().for_each(|dof| x[dof.local] = interface[dof.index]);
         Ok(())
     }
 }
 
-/// Which dofs are where. Those of P are numbered as they come.
+/// The interior of this process, planned for elimination.
+struct Interior {
+    /// The indices in the interface of the dofs that are coupled with it, whole nodes in increasing order.
+    near: Vec<usize>,
+    /// The elimination with the dofs `near` retained, if there is an interior.
+    schur: Option<Schur>,
+}
+
+/// A coupling of an interface dof with an interior dof.
+struct Coupling {
+    /// The index of the one in the interface.
+    index: usize,
+    /// The index of the other in the interior.
+    inside: usize,
+    value: f64,
+}
+
+/// The distribution of the dofs P over halves, interface and processes. Positions are those in `dofs`.
 struct Layout<'a> {
     matrix: &'a Matrix,
     dofs: &'a [usize],
     /// The half of each node of P.
     half: Vec<Int>,
-    /// Numbers of the interior dofs of this process.
+    /// The positions of the interior dofs of this process.
     interior: Vec<usize>,
-    /// Number of dofs of the interface.
+    /// The number of interface dofs.
     border: usize,
-    /// Place of each dof in the interior here or in the interface.
-    place: Vec<usize>,
+    /// The index of each dof in the interior of this process or in the interface.
+    index: Vec<usize>,
 }
 
 impl<'a> Layout<'a> {
     fn new(matrix: &'a Matrix, dofs: &'a [usize]) -> Result<Self> {
         let half = halves(matrix, dofs)?;
-        let here = if matrix.scope() == Scope::World { matrix.session().rank() as Int } else { 0 };
-        let (mut interior, mut border, mut place) = (Vec::new(), 0, vec![0; dofs.len()]);
-        for (number, place) in place.iter_mut().enumerate() {
-            let half = half[number / matrix.block_size()];
-            if half == BETWEEN {
-                *place = border;
+        let this_half = if matrix.scope() == Scope::World { matrix.session().rank() as Int } else { 0 };
+        let (mut interior, mut border, mut index) = (Vec::new(), 0, vec![0; dofs.len()]);
+        for (position, index) in index.iter_mut().enumerate() {
+            let half = half[position / matrix.block_size()];
+            if half == SEPARATOR {
+                *index = border;
                 border += 1;
-            } else if half == here {
-                *place = interior.len();
-                interior.push(number);
+            } else if half == this_half {
+                *index = interior.len();
+                interior.push(position);
             }
         }
-        Ok(Self { matrix, dofs, half, interior, border, place })
+        Ok(Self { matrix, dofs, half, interior, border, index })
     }
 
-    /// Place in the interface of a dof.
-    fn between(&self, number: usize) -> Option<usize> {
-        (self.half[number / self.matrix.block_size()] == BETWEEN).then(|| self.place[number])
+    /// Return the index in the interface of the dof at a position, if it is an interface dof.
+    fn interface_index(&self, position: usize) -> Option<usize> {
+        (self.half[position / self.matrix.block_size()] == SEPARATOR).then(|| self.index[position])
     }
 
-    /// Numbers of the dofs whose rows this process has.
-    fn here(&self) -> std::ops::Range<usize> {
-        let own = self.matrix.own();
+    /// Return the positions of the dofs that this process owns.
+    fn owned(&self) -> Range<usize> {
+        let owned = self.matrix.own();
         let first = |end: usize| self.dofs.partition_point(|&dof| dof < end);
-        first(own.start)..first(own.end)
+        first(owned.start)..first(owned.end)
     }
 
-    /// The interior of this process, if there is any, with the nodes of the interface that are coupled with it behind: their places there, and
-    /// what is to be factored.
-    fn interior(&self) -> Result<(Vec<usize>, Option<Schur>)> {
+    /// Plan the elimination of the interior of this process. The interface nodes that are coupled with it follow its own dofs.
+    fn eliminate_interior(&self) -> Result<Interior> {
         let (size, inside) = (self.matrix.block_size(), self.interior.len());
-        let (mut lower, mut coupled) = (Vec::new(), Vec::new());
-        let rows: Vec<usize> = self.interior.iter().map(|&number| self.dofs[number]).collect();
-        let read = |rows| {
-            for i in 0..inside {
-                row(rows, i, |columns, values| {
-                    // springs of open contact are zeros of the matrix
-                    for (&column, &value) in columns.iter().zip(values).filter(|entry| *entry.1 != 0.0) {
-                        match self.between(column as usize) {
-                            Some(place) => coupled.push((place, i, value)),
-                            None if self.place[column as usize] <= i => {
-                                lower.push((i, self.place[column as usize], value));
-                            }
-                            None => {}
-                        }
-                    }
-                })?;
-            }
-            Ok(())
+        let (mut lower, mut couplings) = (Vec::new(), Vec::new());
+        let rows: Vec<usize> = self.interior.iter().map(|&position| self.dofs[position]).collect();
+        let read = |submatrix| {
+            (0..inside).try_for_each(|i| {
+                row(submatrix, i, |columns, values| self.read_row(i, columns, values, &mut lower, &mut couplings))
+            })
         };
-        Indices::alone(&rows)?.of_others(self.matrix, &Indices::alone(self.dofs)?, read)?;
-        coupled.sort_unstable_by_key(|&(place, i, _)| (place, i));
-        let mut near: Vec<usize> = coupled.iter().map(|entry| entry.0 / size).collect();
-        near.dedup();
-        let near: Vec<usize> = near.into_iter().flat_map(|node| node * size..(node + 1) * size).collect();
-        let behind = |place| inside + near.partition_point(|&near| near < place);
-        lower.extend(coupled.into_iter().map(|(place, i, value)| (behind(place), i, value)));
+        Indices::alone(&rows)?.fetch(self.matrix, &Indices::alone(self.dofs)?, read)?;
+        couplings.sort_unstable_by_key(|coupling| (coupling.index, coupling.inside));
+        let mut nodes: Vec<usize> = couplings.iter().map(|coupling| coupling.index / size).collect();
+        nodes.dedup();
+        let near: Vec<usize> = nodes.into_iter().flat_map(|node| node * size..(node + 1) * size).collect();
         if inside == 0 {
-            return Ok((near, None));
+            return Ok(Interior { near, schur: None });
         }
+        let row_of = |index| inside + near.partition_point(|&near| near < index);
+        lower.extend(couplings.into_iter().map(|coupling| (row_of(coupling.index), coupling.inside, coupling.value)));
         let retained: Vec<usize> = (inside..inside + near.len()).collect();
         let schur = Schur::analyse(self.matrix.session(), "", size, inside + near.len(), &lower, &retained)?;
-        Ok((near, Some(schur)))
+        Ok(Interior { near, schur: Some(schur) })
     }
 
-    /// The dofs of the interface whose rows this process has, counted from its first, with their places there.
-    fn shared(&self) -> Vec<(usize, usize)> {
-        self.here().enumerate().filter_map(|(i, number)| Some((i, self.between(number)?))).collect()
-    }
-
-    /// The share of this process in S: the rows that it has, and the complement of its interior on the places `near` it.
-    fn interface(&self, shared: &[(usize, usize)], near: &[usize], complement: &[f64]) -> Result<Vec<f64>> {
-        let (first, mut interface) = (self.here().start, vec![0.0; self.border * self.border]);
-        for (&i, of_row) in near.iter().zip(complement.chunks_exact(near.len().max(1))) {
-            near.iter().zip(of_row).for_each(|(j, value)| interface[i * self.border + j] = *value);
+    /// Sort the entries of the interior row `i` into the lower triangle (row, column, value) of the interior and couplings with the interface.
+    fn read_row(
+        &self,
+        i: usize,
+        columns: &[Int],
+        values: &[f64],
+        lower: &mut Vec<(usize, usize, f64)>,
+        couplings: &mut Vec<Coupling>,
+    ) {
+        // open contact leaves zeros in the pattern of the matrix
+        for (&column, &value) in columns.iter().zip(values).filter(|entry| *entry.1 != 0.0) {
+            let position = column as usize;
+            match self.interface_index(position) {
+                Some(index) => couplings.push(Coupling { index, inside: i, value }),
+                None if self.index[position] <= i => lower.push((i, self.index[position], value)),
+                None => {}
+            }
         }
-        for &(of_here, i) in shared {
-            row(self.matrix.raw(), self.dofs[first + of_here], |columns, values| {
+    }
+
+    /// Return the interface dofs that this process owns.
+    fn owned_interface(&self) -> Vec<InterfaceDof> {
+        let dof = |(local, position)| Some(InterfaceDof { local, index: self.interface_index(position)? });
+        self.owned().enumerate().filter_map(dof).collect()
+    }
+
+    /// Return what this process adds to S, `border` x `border` numbers: the rows of A_BB that it owns, and the `complement` of its
+    /// interior on the interface dofs `near` it.
+    fn interface_part(&self, owned: &[InterfaceDof], near: &[usize], complement: &[f64]) -> Result<Vec<f64>> {
+        let (first, mut part) = (self.owned().start, vec![0.0; self.border * self.border]);
+        for (&i, of_row) in near.iter().zip(complement.chunks_exact(near.len().max(1))) {
+            near.iter().zip(of_row).for_each(|(j, value)| part[i * self.border + j] = *value);
+        }
+        for dof in owned {
+            row(self.matrix.raw(), self.dofs[first + dof.local], |columns, values| {
                 for (&column, &value) in columns.iter().zip(values) {
-                    let number = self.dofs.binary_search(&(column as usize)).ok();
-                    if let Some(j) = number.and_then(|number| self.between(number)) {
-                        interface[i * self.border + j] += value;
+                    let position = self.dofs.binary_search(&(column as usize)).ok();
+                    if let Some(j) = position.and_then(|position| self.interface_index(position)) {
+                        part[dof.index * self.border + j] += value;
                     }
                 }
             })?;
         }
-        Ok(interface)
+        Ok(part)
     }
 }

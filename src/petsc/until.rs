@@ -1,4 +1,4 @@
-//! A linear solve that ends when the caller says so.
+//! A linear solve with a stopping test of the caller.
 
 use super::around::ERROR;
 use super::ksp::Solved;
@@ -9,38 +9,39 @@ use crate::error::Result;
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
 
-/// An iterate of a solver.
+/// An iterate of a linear solver.
 #[derive(Debug)]
 pub struct Iterate<'a> {
-    /// One entry a row of this process.
+    /// The solution so far; one entry for each row of this process.
     pub x: &'a [f64],
-    /// Norm of its residual, as the solver measures it (its `-ksp_norm_type`).
+    /// The norm of its residual, as the solver measures it (its `-ksp_norm_type`).
     pub residual: f64,
-    /// The same of the first guess: zero, or what a [`Subspace`](super::Subspace) has solved exactly.
+    /// The norm of the residual of the first guess, which is zero or the exact solution in a [`Subspace`](super::Subspace).
     pub first: f64,
-    /// Least eigenvalue of the preconditioned matrix that conjugate gradients have seen.
+    /// The least eigenvalue of the preconditioned matrix that conjugate gradients have found so far.
     pub least: Option<f64>,
 }
 
-/// Asked after each iteration: whether that is enough.
+/// A stopping test, called after each iteration. It returns whether the iterate is accurate enough.
 pub type Enough<'a> = dyn FnMut(&Iterate) -> bool + 'a;
 
-/// A test of PETSc.
-type Test =
+/// A convergence test of PETSc.
+type PetscTest =
     unsafe extern "C" fn(ffi::KSP, super::Int, f64, *mut ffi::KSPConvergedReason, *mut c_void) -> ffi::PetscErrorCode;
 
-/// What [`is_enough`] needs during a solve.
-struct Until<'a, 'b> {
+/// The context of [`is_enough`] during a solve.
+struct Test<'a, 'b> {
     enough: &'a mut Enough<'b>,
-    /// Norm of the first residual.
+    /// The norm of the first residual.
     first: f64,
-    /// The test that the solver had, with its data.
-    test: Option<Test>,
-    data: *mut c_void,
+    /// The test that the solver had before.
+    own: Option<PetscTest>,
+    /// The context of that test.
+    own_context: *mut c_void,
 }
 
 impl Ksp {
-    /// Has conjugate gradients estimate the spectrum of the preconditioned matrix as they go (Lanczos). Before the set-up.
+    /// Let conjugate gradients estimate the spectrum of the preconditioned matrix (Lanczos). To be called before the set-up.
     ///
     /// # Errors
     /// PETSc's.
@@ -49,8 +50,9 @@ impl Ksp {
         unsafe { petsc!(KSPSetComputeSingularValues(self.ksp, ffi::PetscBool_PETSC_TRUE)) }
     }
 
-    /// Solves `A x = b` from a zero guess until `enough` is true after an iteration, or the tolerances of the solver end it. Collective: the
-    /// answers of all processes have to be the same.
+    /// Solve `A x = b` from a zero guess until `enough` returns true, or the solver reaches its own tolerances.
+    ///
+    /// Collective: `enough` has to return the same on all processes.
     ///
     /// ```
     /// use winkler::petsc::{Ksp, Matrix, Session};
@@ -77,27 +79,28 @@ impl Ksp {
         let (mut rest, mut start) = (b.to_vec(), vec![0.0; b.len()]);
         let started = self.start(&mut rest, &mut start)?;
         let mut whole = vec![0.0; b.len()];
+        // PETSc iterates on what is left after the exact solve in the subspace
         let mut of_whole = |iterate: &Iterate| {
             whole.iter_mut().zip(&start).zip(iterate.x).for_each(|((whole, start), x)| *whole = start + x);
             enough(&Iterate { x: &whole, ..*iterate })
         };
         let enough: &mut Enough = if started.is_some() { &mut of_whole } else { enough };
-        let (mut test, mut data, mut destroy) = (None, null_mut(), None);
-        // SAFETY: the solver's own test is taken out with its data, and put back below whatever the solve came to.
-        unsafe { petsc!(KSPGetAndClearConvergenceTest(self.ksp, &mut test, &mut data, &mut destroy)) }?;
-        let mut until = Until { enough, first: f64::NAN, test, data };
-        let context: *mut Until = &mut until;
+        let (mut own, mut own_context, mut destroy) = (None, null_mut(), None);
+        // SAFETY: the solver's own test is taken out with its context, and put back below whatever the outcome of the solve.
+        unsafe { petsc!(KSPGetAndClearConvergenceTest(self.ksp, &mut own, &mut own_context, &mut destroy)) }?;
+        let mut test = Test { enough, first: f64::NAN, own, own_context };
+        let context: *mut Test = &mut test;
         // SAFETY: the test reads this context, which lives until the test is replaced below.
         unsafe { petsc!(KSPSetConvergenceTest(self.ksp, Some(is_enough), context.cast(), None)) }?;
         let solved = self.solve(&rest, x);
-        // SAFETY: what PETSc gave above.
-        unsafe { petsc!(KSPSetConvergenceTest(self.ksp, test, data, destroy)) }?;
+        // SAFETY: the test and the context that PETSc returned above.
+        unsafe { petsc!(KSPSetConvergenceTest(self.ksp, own, own_context, destroy)) }?;
         x.iter_mut().zip(&start).for_each(|(x, start)| *x += start);
         solved
     }
 }
 
-/// The solver's own test, then the caller's.
+/// The callback: apply the solver's own test, then the caller's.
 unsafe extern "C" fn is_enough(
     ksp: ffi::KSP,
     iteration: super::Int,
@@ -105,24 +108,24 @@ unsafe extern "C" fn is_enough(
     reason: *mut ffi::KSPConvergedReason,
     context: *mut c_void,
 ) -> ffi::PetscErrorCode {
-    // SAFETY: `solve_until` sets this test with its `Until`, which outlives the solve and which nothing else uses meanwhile; PETSc
-    // passes its own solver and a place for the reason.
-    let (until, reason) = unsafe { (&mut *context.cast::<Until>(), &mut *reason) };
-    if let Some(test) = until.test {
-        // SAFETY: the solver's own test with its own data.
-        let code = unsafe { test(ksp, iteration, norm, reason, until.data) };
+    // SAFETY: `solve_until` sets this callback with its `Test`, which outlives the solve and which nothing else uses meanwhile; PETSc
+    // passes its own solver and a variable for the reason.
+    let (test, reason) = unsafe { (&mut *context.cast::<Test>(), &mut *reason) };
+    if let Some(own) = test.own {
+        // SAFETY: the solver's own test with its own context.
+        let code = unsafe { own(ksp, iteration, norm, reason, test.own_context) };
         if code != 0 {
             return code;
         }
     }
     if iteration == 0 {
-        until.first = norm;
+        test.first = norm;
     }
     if iteration == 0 || *reason != 0 {
         return 0;
     }
     let (mut vector, mut array, mut rows) = (null_mut(), null(), 0);
-    // SAFETY: PETSc's solver, which is in a solve and has an iterate; its vector is its own and is only read.
+    // SAFETY: PETSc's solver, which has an iterate during a solve; its vector is only read.
     let read = (|| unsafe {
         petsc!(KSPBuildSolution(ksp, null_mut(), &mut vector))?;
         petsc!(VecGetLocalSize(vector, &mut rows))?;
@@ -131,8 +134,8 @@ unsafe extern "C" fn is_enough(
     let Ok(()) = read else { return ERROR };
     // SAFETY: PETSc's array has that many entries here, and nobody writes to it before it is given back.
     let x = unsafe { slice(array, rows as usize) };
-    let least = extreme(ksp).map(|extreme| extreme[0]).filter(|least| *least > 0.0);
-    if (until.enough)(&Iterate { x, residual: norm, first: until.first, least }) {
+    let least = least_eigenvalue(ksp).filter(|least| *least > 0.0);
+    if (test.enough)(&Iterate { x, residual: norm, first: test.first, least }) {
         *reason = ffi::KSPConvergedReason_KSP_CONVERGED_RTOL;
     }
     // SAFETY: gives back what was read above.
@@ -142,16 +145,16 @@ unsafe extern "C" fn is_enough(
     }
 }
 
-/// Extreme eigenvalues that conjugate gradients have seen, if they were to look.
-fn extreme(ksp: ffi::KSP) -> Option<[f64; 2]> {
-    let (mut least, mut most, mut looks) = (0.0, 0.0, ffi::PetscBool_PETSC_FALSE);
-    // SAFETY: PETSc's solver, which is in a solve, and places for its answers.
+/// Return the least eigenvalue that conjugate gradients have found, if they estimate the spectrum.
+fn least_eigenvalue(ksp: ffi::KSP) -> Option<f64> {
+    let (mut least, mut largest, mut estimates) = (0.0, 0.0, ffi::PetscBool_PETSC_FALSE);
+    // SAFETY: PETSc's solver during a solve, and variables for its answers.
     unsafe {
-        petsc!(KSPGetComputeSingularValues(ksp, &mut looks)).ok()?;
-        if looks == ffi::PetscBool_PETSC_FALSE {
+        petsc!(KSPGetComputeSingularValues(ksp, &mut estimates)).ok()?;
+        if estimates == ffi::PetscBool_PETSC_FALSE {
             return None;
         }
-        petsc!(KSPComputeExtremeSingularValues(ksp, &mut most, &mut least)).ok()?;
+        petsc!(KSPComputeExtremeSingularValues(ksp, &mut largest, &mut least)).ok()?;
     }
-    Some([least, most])
+    Some(least)
 }

@@ -1,14 +1,14 @@
-//! Vectors: PETSc's headers, made once, over slices that belong to Rust.
+//! Vectors: headers of PETSc, made once, over slices of Rust.
 
 use super::library::petsc;
 use super::{Int, Scope, Session, ffi};
 use crate::error::{Error, Kind, Result};
 use std::ptr::{null, null_mut};
 
-/// PETSC_DETERMINE: the sum over the processes.
+/// PETSC_DETERMINE: PETSc sums the local sizes over the processes.
 pub(super) const DETERMINE: Int = -1;
 
-/// A PETSc vector: the entries of this process.
+/// A vector of PETSc with the entries of this process.
 pub(super) struct Vector {
     pub(super) vec: ffi::Vec,
     len: usize,
@@ -16,7 +16,7 @@ pub(super) struct Vector {
 }
 
 impl Vector {
-    /// A vector without memory of its own, for [`map`](Self::map).
+    /// Create a vector without memory of its own, for [`map`](Self::map). It has `rows` entries on this process.
     pub(super) fn new(session: &Session, scope: Scope, rows: usize, block_size: usize) -> Result<Vector> {
         let (comm, mut vec) = (scope.comm(session), null_mut());
         let (block, len, rows) = (block_size as Int, rows, rows as Int);
@@ -30,10 +30,10 @@ impl Vector {
         Ok(Vector { vec, len, _session: session.clone() })
     }
 
-    /// A vector with memory of its own.
+    /// Create a vector with memory of its own and these values.
     pub(super) fn owned(session: &Session, scope: Scope, values: &[f64], block_size: usize) -> Result<Vector> {
         let (comm, mut vec) = (scope.comm(session), null_mut());
-        // SAFETY: PETSc makes the memory itself.
+        // SAFETY: PETSc allocates the memory itself.
         unsafe {
             match scope {
                 Scope::Process => petsc!(VecCreateSeq(comm, values.len() as Int, &mut vec))?,
@@ -42,8 +42,7 @@ impl Vector {
         }
         let vector = Vector { vec, len: values.len(), _session: session.clone() };
         let mut array = null_mut();
-        // SAFETY: PETSc's array has as many entries as the vector has here, which was made that long above; nobody else has it
-        // between Get and Restore.
+        // SAFETY: PETSc's array is as long as `values`, for which the vector was created; nobody else has it between Get and Restore.
         unsafe {
             petsc!(VecSetBlockSize(vec, block_size as Int))?;
             petsc!(VecGetArray(vec, &mut array))?;
@@ -53,15 +52,15 @@ impl Vector {
         Ok(vector)
     }
 
-    /// Number of entries of this process.
+    /// Return the number of entries of this process.
     pub(super) fn len(&self) -> usize {
         self.len
     }
 
-    /// Has `call` read the slice `x` as this vector and write to the slice `y` as another one; both have their names in messages.
+    /// Run `call`, which reads the slice `x` as this vector and writes to the slice `y` as the vector `to`. Messages name both slices.
     ///
     /// # Errors
-    /// A slice that is not as long as its vector; those of the call.
+    /// When a slice is not as long as its vector, and those of the call.
     pub(super) fn map(
         &self,
         (x_name, x): (&str, &[f64]),
@@ -69,8 +68,8 @@ impl Vector {
         (y_name, y): (&str, &mut [f64]),
         call: impl FnOnce(ffi::Vec, ffi::Vec) -> Result<()>,
     ) -> Result<()> {
-        same(x_name, x.len(), self.len)?;
-        same(y_name, y.len(), to.len)?;
+        check_length(x_name, x.len(), self.len)?;
+        check_length(y_name, y.len(), to.len)?;
         let _read = Placed::new(self, x.as_ptr())?;
         let _written = Placed::new(to, y.as_mut_ptr())?;
         call(self.vec, to.vec)
@@ -84,12 +83,12 @@ impl Drop for Vector {
     }
 }
 
-/// A vector over memory as long as it is, until this is dropped.
+/// A guard: the vector has the given memory until the guard is dropped.
 struct Placed<'a>(&'a Vector);
 
 impl<'a> Placed<'a> {
     fn new(vector: &'a Vector, values: *const f64) -> Result<Self> {
-        // SAFETY: nothing is read or written before a call of PETSc, which [`Vector::map`] makes while the slices live.
+        // SAFETY: [`Vector::map`] calls PETSc, which reads and writes, only while the slices live.
         unsafe { petsc!(VecPlaceArray(vector.vec, values)) }?;
         Ok(Placed(vector))
     }
@@ -97,31 +96,31 @@ impl<'a> Placed<'a> {
 
 impl Drop for Placed<'_> {
     fn drop(&mut self) {
-        // SAFETY: an array was placed, or there were no guard.
+        // SAFETY: a guard exists only after an array was placed.
         let _ = unsafe { petsc!(VecResetArray(self.0.vec)) };
     }
 }
 
-/// An array of PETSc, which has no place where it has no entries.
+/// Return an array of PETSc as a slice. The pointer may be null or dangling if `len` is 0.
 ///
 /// # Safety
-/// That many entries, which nobody writes to while the slice lives.
+/// The array has `len` entries, and nobody writes to it while the slice lives.
 pub(super) unsafe fn slice<'a, T>(first: *const T, len: usize) -> &'a [T] {
     // SAFETY: the caller's promise.
     if len == 0 { &[] } else { unsafe { std::slice::from_raw_parts(first, len) } }
 }
 
-/// The same to write to.
+/// Return an array of PETSc as a mutable slice. The pointer may be null or dangling if `len` is 0.
 ///
 /// # Safety
-/// That many entries, which belong to nobody else while the slice lives.
+/// The array has `len` entries, and nobody else uses it while the slice lives.
 pub(super) unsafe fn slice_mut<'a, T>(first: *mut T, len: usize) -> &'a mut [T] {
     // SAFETY: the caller's promise.
     if len == 0 { &mut [] } else { unsafe { std::slice::from_raw_parts_mut(first, len) } }
 }
 
-/// Checks the length of a slice.
-pub(super) fn same(what: &str, length: usize, rows: usize) -> Result<()> {
+/// Check that a slice has one entry for each row. Messages name it `what`.
+pub(super) fn check_length(what: &str, length: usize, rows: usize) -> Result<()> {
     if length == rows {
         return Ok(());
     }

@@ -1,10 +1,10 @@
-//! Words that begin options of PETSc, and options of PETSc as a whole, which belong to no solver.
+//! Lists of words: those that begin options of PETSc, and the options of PETSc as a whole, which belong to no solver.
 
-/// How the options of a solver begin after its prefix: objects, and objects nested in them.
+/// The words after the prefix with which the options of a solver begin: its objects, and objects nested in them.
 const FAMILIES: &str = "ksp pc mat sub mg fieldsplit vec esteig redundant telescope deflation hpddm lsc matmatmult matproduct \
     matptap mattransposematmult";
 
-/// Options of PETSc as a whole, some of which it reads only at its end.
+/// The options of PETSc as a whole. PETSc reads some of them only at its end.
 const GLOBAL: &str = "log log_all log_exclude log_exclude_actions log_exclude_objects log_mpe log_nvtx log_perfstubs \
     log_summary log_sync log_threshold log_trace log_view log_view_gpu_energy log_view_gpu_time log_view_memory \
     options_file options_file_yaml options_left options_monitor options_monitor_cancel options_string_yaml \
@@ -17,10 +17,10 @@ const GLOBAL: &str = "log log_all log_exclude log_exclude_actions log_exclude_ob
     skip_petscrc process_view petsc_ci petsc_ci_portable_error_output petsc_sleep use_gpu_aware_mpi saws_options \
     splitreduction_async vecscatter_view build_twosided";
 
-/// First words of options that PETSc reads when it makes a device, a window or a file.
+/// The first words of options that PETSc reads when it creates a device, a window or a file.
 const GLOBAL_WORDS: &str = "draw drawaxis viewer device cuda hip lg prefix";
 
-/// Words that begin options of PETSc, besides [`FAMILIES`] and those of PETSc as a whole.
+/// Further words that begin options of PETSc, besides [`FAMILIES`] and the options of PETSc as a whole.
 const MORE_WORDS: &str = "snes ts tao dm is da dmda dmplex petscspace petscfv petscds sf sfnode partitioner petscpartitioner \
     vecscatter ao pf ps eps svd st bv hypre mumps npc no not winklerprobe";
 
@@ -28,28 +28,28 @@ fn has(words: &str, word: &str) -> bool {
     words.split_whitespace().any(|known| known == word)
 }
 
-/// First word of an option without its dash.
+/// Return the first word of an option without its dash.
 fn first(name: &str) -> &str {
     name.split('_').next().unwrap_or(name)
 }
 
-/// Whether an option, without its dash, is one of PETSc as a whole.
+/// Return whether an option, without its dash, is one of PETSc as a whole.
 pub fn is_global(name: &str) -> bool {
     has(GLOBAL, name) || has(GLOBAL_WORDS, first(name))
 }
 
-/// Whether options of PETSc begin with this word.
+/// Return whether options of PETSc begin with this word.
 pub fn begins_options(word: &str) -> bool {
-    let of_whole = || GLOBAL.split_whitespace().any(|name| first(name) == word);
-    [FAMILIES, GLOBAL_WORDS, MORE_WORDS].iter().any(|words| has(words, word)) || of_whole()
+    [FAMILIES, GLOBAL_WORDS, MORE_WORDS].iter().any(|words| has(words, word))
+        || GLOBAL.split_whitespace().any(|name| first(name) == word)
 }
 
-/// Whether a word is that of an object family, alone or between two `_` (`-sub_ksp_type`).
+/// Return whether a word names a family of objects; such words stand alone or between two `_` (`-sub_ksp_type`).
 pub fn is_family(word: &str) -> bool {
     has(FAMILIES, word)
 }
 
-/// Whether an option, without its dash and the prefix of its solver, is one of an object family.
+/// Return whether an option, without its dash and the prefix of its solver, belongs to a family of objects.
 pub fn is_of_family(bare: &str) -> bool {
     bare.split_once('_').is_some_and(|(first, _)| is_family(first))
 }
