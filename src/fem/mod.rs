@@ -1,13 +1,13 @@
 //! Finite elements on one body: P1 and P2 simplices, linear elasticity, assembly into sparse rows.
 //!
-//! Data flow: [`Mesh`](crate::mesh::Mesh) group -> [`Space`] -> [`assemble`] ->
-//! [`ElasticBody`] {K, f, supports}; afterwards [`stress`] recovers nodal stresses from displacements.
-//! Degree of freedom `D * node + component` everywhere.
+//! Data flow: [`Mesh`](crate::mesh::Mesh) group -> [`Space`] -> [`assemble`] -> [`ElasticBody`] {K, f, supports}. Afterwards
+//! [`stress`] recovers nodal stresses from displacements. Degrees of freedom are numbered `D * node + component`.
 
 pub mod assemble;
 pub mod elasticity;
 pub mod element;
 pub mod extent;
+pub mod facets;
 pub mod forces;
 pub mod frame;
 pub mod internal;
@@ -33,6 +33,7 @@ pub use assemble::{NodalBlock, NodeGraph};
 pub use elasticity::Elasticity;
 pub use element::EDGES;
 pub use extent::Extent;
+pub use facets::{Facets, area_vector};
 pub use forces::NodalForces;
 pub use frame::{Frame, place};
 pub use interpolation::Interpolation;
@@ -42,10 +43,10 @@ pub use quadrature::Parts;
 pub use recovery::Recovery;
 pub use rigid::{FreeMotion, RigidMotion};
 pub use slope::Slope;
-pub use space::{Facets, Space, area_vector};
+pub use space::Space;
 pub use support::{Couplings, ElasticBody, support};
 
-/// Vector product.
+/// Return the vector product.
 pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3])
 }

@@ -1,54 +1,54 @@
-//! Where the nodes of a body are, as far as a rank knows it.
+//! Coordinates of the nodes of a body on a rank.
 
 use std::ops::Index;
 
-/// Places of the nodes of a body: of all, or of some.
+/// The coordinates of all nodes of a body, or of some. Nodes whose coordinates this rank has are called known.
 #[derive(Debug, Clone, Default)]
 pub struct Places<const D: usize> {
     /// Number of nodes of the body.
     count: usize,
-    /// The nodes whose places are known, sorted; empty if these are all.
+    /// Known nodes, sorted; empty if all nodes are known.
     nodes: Vec<u32>,
-    /// Where they are.
+    /// Coordinates of the known nodes.
     at: Vec<[f64; D]>,
 }
 
 impl<const D: usize> Places<D> {
-    /// Of some of so many nodes, which are sorted, each once.
+    /// Store the coordinates of the `known` nodes of a body with `count` nodes. The nodes are sorted, each once.
     pub fn some(count: usize, known: impl Iterator<Item = (u32, [f64; D])>) -> Self {
         let (nodes, at): (Vec<u32>, Vec<[f64; D]>) = known.unzip();
         let nodes = if at.len() == count { Vec::new() } else { nodes };
         Self { count, nodes, at }
     }
 
-    /// Number of nodes of the body.
+    /// Return the number of nodes of the body.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether the body has no nodes.
+    /// Return whether the body has no nodes.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Places that are known, in the order of the nodes.
+    /// Return the coordinates of the known nodes, in the order of the nodes.
     pub fn iter(&self) -> std::slice::Iter<'_, [f64; D]> {
         self.at.iter()
     }
 
-    /// The same, to move the nodes.
+    /// Return the same coordinates, to move the nodes.
     pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, [f64; D]> {
         self.at.iter_mut()
     }
 
-    /// Nodes whose places are known, in increasing order.
+    /// Return the known nodes in increasing order.
     pub fn known(&self) -> impl Iterator<Item = u32> + Clone {
         (0..self.at.len() as u32).map(|place| self.nodes.get(place as usize).copied().unwrap_or(place))
     }
 
-    /// Adds the places of nodes, some of which may be known.
+    /// Add the coordinates of nodes, some of which may be known already.
     pub fn learn(&mut self, places: impl Iterator<Item = (u32, [f64; D])>) {
-        let is_new = |&(node, _): &(u32, [f64; D])| self.place(node).is_none();
+        let is_new = |&(node, _): &(u32, [f64; D])| self.position(node).is_none();
         let mut new: Vec<(u32, [f64; D])> = places.filter(is_new).collect();
         if new.is_empty() {
             return;
@@ -59,25 +59,26 @@ impl<const D: usize> Places<D> {
         *self = Self::some(self.count, new.into_iter());
     }
 
-    fn place(&self, node: u32) -> Option<usize> {
+    /// Return the position of a node among the known ones.
+    fn position(&self, node: u32) -> Option<usize> {
         if self.at.len() == self.count { Some(node as usize) } else { self.nodes.binary_search(&node).ok() }
     }
 }
 
 impl<const D: usize> From<Vec<[f64; D]>> for Places<D> {
-    /// Of all nodes.
+    /// Store the coordinates of all nodes.
     fn from(at: Vec<[f64; D]>) -> Self {
         Self { count: at.len(), nodes: Vec::new(), at }
     }
 }
 
-/// The place of a node that is known.
+/// Access to the coordinates of a known node.
 impl<const D: usize> Index<usize> for Places<D> {
     type Output = [f64; D];
     fn index(&self, node: usize) -> &[f64; D] {
-        match self.place(node as u32) {
-            Some(place) => &self.at[place],
-            None => unreachable!("who asks for the place of a node has been told it"),
+        match self.position(node as u32) {
+            Some(position) => &self.at[position],
+            None => unreachable!("only the coordinates of known nodes are used"),
         }
     }
 }
