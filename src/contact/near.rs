@@ -4,7 +4,8 @@ use super::pair::ContactPair;
 use super::pieces::Common;
 use super::side::{Side, length};
 use crate::fem::assemble::interpolate;
-use crate::fem::element;
+use crate::fem::{element, minus};
+use crate::linalg::dot;
 use crate::problem::order::Order;
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
@@ -68,8 +69,7 @@ fn nearest_facets<const D: usize>(
         let x = a.facets.coordinates(point.facet_a, a.space);
         let from = interpolate(&x, &element::values(a.facets.order, &point.at_a));
         for q in a.facets.facet(point.facet_a).iter().filter_map(|node| point_of.get(node).copied()) {
-            let to = position(q);
-            let distance = length(std::array::from_fn::<f64, D, _>(|c| to[c] - from[c]));
+            let distance = length(minus(position(q), from));
             if distance < nearest[q].0 {
                 nearest[q] = (distance, point.facet_b);
             }
@@ -96,12 +96,12 @@ fn project<const D: usize>(b: &Side<D>, facet: usize, from: [f64; D], normal: [f
 fn distance<const D: usize>(b: &Side<D>, facet: usize, at: &[f64; D], from: [f64; D], normal: [f64; D]) -> f64 {
     let x = b.facets.coordinates(facet, b.space);
     let to: [f64; D] = interpolate(&x, &element::values(b.facets.order, at));
-    let mut distance: f64 = (0..D).map(|c| normal[c] * (to[c] - from[c])).sum();
+    let mut distance = dot(&normal, &minus(to, from));
     if b.facets.order == Order::P1 {
         let normals: Vec<[f64; D]> = b.facets.facet(facet).iter().map(|node| b.normals[node]).collect();
         for i in 0..D {
             for j in i + 1..D {
-                let bend: f64 = (0..D).map(|c| (normals[j][c] - normals[i][c]) * (x[j][c] - x[i][c])).sum();
+                let bend = dot(&minus(normals[j], normals[i]), &minus(x[j], x[i]));
                 distance -= 0.5 * at[i] * at[j] * bend;
             }
         }

@@ -1,6 +1,8 @@
 //! One contact surface of a body: facets with averaged nodal normals.
 
-use crate::fem::{Facets, Frame, Space, area_vector, element};
+pub use crate::fem::{length, unit};
+
+use crate::fem::{Facets, Frame, Space, area_vector, element, minus};
 use crate::mesh::datum;
 use std::collections::HashMap;
 
@@ -65,8 +67,7 @@ impl<'a, const D: usize> Side<'a, D> {
             let x = self.facets.coordinates(i, self.space);
             for (l, node) in places.iter().zip(self.facets.facet(i)) {
                 let (area, mean) = (area_vector(self.facets.order, &x, l), self.normals[node]);
-                let normal = unit(area);
-                let difference = length(std::array::from_fn::<f64, D, _>(|c| normal[c] - mean[c]));
+                let difference = length(minus(unit(area), mean));
                 let least = f64::EPSILON + 2.0 * rounding / length(area).powf(1.0 / (D - 1) as f64);
                 let largest = at_node.entry(*node).or_default();
                 *largest = largest.max(least).max(if difference < EDGE { difference } else { 0.0 });
@@ -122,15 +123,4 @@ impl<'a, const D: usize> Side<'a, D> {
         };
         (corner(f64::min), corner(f64::max))
     }
-}
-
-/// Return the Euclidean length of a vector.
-pub fn length<const D: usize>(v: [f64; D]) -> f64 {
-    v.iter().map(|v| v * v).sum::<f64>().sqrt()
-}
-
-/// Return the vector scaled to length one.
-pub fn unit<const D: usize>(v: [f64; D]) -> [f64; D] {
-    let norm = length(v);
-    v.map(|v| v / norm)
 }

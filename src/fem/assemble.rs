@@ -237,7 +237,7 @@ struct CellIntegrator<'a, const D: usize> {
     x: Vec<[f64; D]>,
     /// Shape functions over the radius at a point of a body of revolution; empty in other bodies.
     hoop: Vec<f64>,
-    /// Blocks of the cell's stiffness matrix, `stride` x `stride`, of which those with row <= column are set.
+    /// Blocks of the cell's stiffness matrix, `stride` x `stride`. Only those with row <= column are set.
     blocks: Vec<[[f64; D]; D]>,
 }
 
@@ -252,7 +252,7 @@ impl<'a, const D: usize> CellIntegrator<'a, D> {
     fn stiffness(&mut self, index: usize) -> Result<&[[[f64; D]; D]], Defect> {
         let Self { space, elasticity, rules, x, hoop, blocks } = self;
         let stride = space.stride;
-        for (x, &node) in x.iter_mut().zip(&space.cells[index * stride..]) {
+        for (x, &node) in x.iter_mut().zip(space.cell(index)) {
             *x = space.nodes[node as usize];
         }
         blocks.fill([[0.0; D]; D]);
@@ -329,7 +329,7 @@ pub fn body_force<const D: usize>(
     }
     for index in 0..space.cell_count() {
         let x = space.cell_nodes(index);
-        let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
+        let cell = space.cell(index);
         for (l, weight) in rule.iter() {
             let Some((_, measure)) = element::gradients(space.order, &x, l) else { continue };
             let phi = element::values(space.order, l);

@@ -1,7 +1,7 @@
 //! Elasticity of a body from the constants of the scene, which are the same everywhere, differ by region, or depend on the point.
 
-use super::cross;
 use super::material::{Material, Tensor};
+use super::{cross, length};
 use crate::linalg::dot;
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, Plane};
 
@@ -202,7 +202,7 @@ fn directions(axes: &AxesSpec, x: [f64; 3]) -> Result<[[f64; 3]; 3], Flaw> {
     };
     let along = dot(&first, &second);
     let across = std::array::from_fn(|c| second[c] - along * first[c]);
-    if norm(across) <= 1e-10 * norm(second) {
+    if length(across) <= 1e-10 * length(second) {
         return Err(Flaw::Axes("`first` and `second` have one direction"));
     }
     let second = unit(across, "`second` has no direction")?;
@@ -217,17 +217,13 @@ fn rotated(v: [f64; 3], axis: [f64; 3], angle: f64) -> [f64; 3] {
     std::array::from_fn(|c| cosine * v[c] + sine * across[c] + (1.0 - cosine) * along * axis[c])
 }
 
-fn norm(v: [f64; 3]) -> f64 {
-    dot(&v, &v).sqrt()
-}
-
 /// Return the vector scaled to length one.
 ///
 /// # Errors
 /// `otherwise` if its length is zero or not finite.
 fn unit(v: [f64; 3], otherwise: &'static str) -> Result<[f64; 3], Flaw> {
-    match norm(v) {
-        length if length > 0.0 && length.is_finite() => Ok(v.map(|v| v / length)),
+    match length(v) {
+        size if size > 0.0 && size.is_finite() => Ok(v.map(|v| v / size)),
         _ => Err(Flaw::Axes(otherwise)),
     }
 }

@@ -1,7 +1,8 @@
 //! Boundary facets of a body: their search in its cells, their orientation and their normals.
 
-use super::element;
 use super::space::Space;
+use super::{cross, element, minus, pad, unit};
+use crate::linalg::dot;
 use crate::mesh::Group;
 use crate::problem::order::Order;
 use std::collections::HashMap;
@@ -70,7 +71,7 @@ impl<const D: usize> Space<D> {
     pub fn facets_of(&self, places: impl Iterator<Item = (usize, usize)>) -> Facets<D> {
         let mut nodes = Vec::new();
         for (index, opposite) in places {
-            let cell = &self.cells[index * self.stride..(index + 1) * self.stride];
+            let cell = self.cell(index);
             let mut facet = face::<D>(cell, opposite).to_vec();
             if self.points_inwards(&facet, cell[opposite]) {
                 facet.swap(0, 1);
@@ -94,7 +95,7 @@ impl<const D: usize> Space<D> {
         let x: Vec<_> = facet[..D].iter().map(|&node| self.nodes[node as usize]).collect();
         let normal = area_vector::<D>(Order::P1, &x, &[1.0 / D as f64; D]);
         let inner = self.nodes[opposite as usize];
-        (0..D).map(|i| normal[i] * (inner[i] - x[0][i])).sum::<f64>() > 0.0
+        dot(&normal, &minus(inner, x[0])) > 0.0
     }
 }
 
@@ -138,11 +139,7 @@ impl<const D: usize> Facets<D> {
     pub fn normals(&self, space: &Space<D>) -> Vec<[f64; D]> {
         let normals = |i: usize| {
             let x = self.coordinates(i, space);
-            (0..D).map(move |at| {
-                let area = area_vector(self.order, &x, &element::place(D, at)[..D]);
-                let size = area.iter().map(|a| a * a).sum::<f64>().sqrt();
-                area.map(|a| a / size)
-            })
+            (0..D).map(move |at| unit(area_vector(self.order, &x, &element::place(D, at)[..D])))
         };
         (0..self.count()).flat_map(normals).collect()
     }
@@ -165,17 +162,7 @@ pub fn area_vector<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> [
     let d = element::derivatives(order, l);
     let tangent =
         |c: usize| -> [f64; D] { std::array::from_fn(|i| (0..x.len()).map(|n| (d[n][c] - d[n][0]) * x[n][i]).sum()) };
-    let mut vector = [0.0; D];
     let t = tangent(1);
-    if D == 2 {
-        vector[0] = t[1];
-        vector[1] = -t[0];
-    } else {
-        let s = tangent(2);
-        for (i, v) in vector.iter_mut().enumerate() {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            *v = 0.5 * (t[j] * s[k] - t[k] * s[j]);
-        }
-    }
-    vector
+    let vector = if D == 2 { [t[1], -t[0], 0.0] } else { cross(pad(t), pad(tangent(2))).map(|v| 0.5 * v) };
+    std::array::from_fn(|c| vector[c])
 }

@@ -1,6 +1,6 @@
 //! Forces at the nodes of a body.
 
-use super::{pad, place};
+use super::{length, pad, place};
 use crate::linalg::{Total, dot};
 
 /// The forces at nodes that are not zero, since most loads act on surfaces only.
@@ -49,12 +49,11 @@ impl<const D: usize> NodalForces<D> {
     /// Return the work of the forces on a displacement, and the largest work of forces and displacements of these sizes at each
     /// node. `at` gives the displacement of a node.
     pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [Total; 2] {
-        let size = |v: &[f64]| dot(v, v).sqrt();
         let [mut work, mut largest] = [Total::default(); 2];
         for (node, force) in self.iter() {
             let u = at(node);
             work.add(dot(&u, &force));
-            largest.add(size(&u) * size(&force));
+            largest.add(length(u) * length(force));
         }
         [work, largest]
     }

@@ -48,7 +48,7 @@ fn visit<const D: usize>(
     let stride = space.stride;
     let mut x = vec![[0.0; D]; stride];
     for index in cells {
-        let cell = &space.cells[index * stride..(index + 1) * stride];
+        let cell = space.cell(index);
         x.iter_mut().zip(cell).for_each(|(x, &node)| *x = space.nodes[node as usize]);
         let constant = elasticity.constant_in(index);
         for (l, weight) in rules.of(&x, constant.is_some(), space.axisymmetric).iter() {

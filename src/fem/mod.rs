@@ -28,6 +28,8 @@ mod support;
 pub mod surface;
 pub mod turn;
 
+use crate::linalg::dot;
+
 pub use crate::linalg::pad;
 pub use assemble::{NodalBlock, NodeGraph};
 pub use elasticity::Elasticity;
@@ -45,6 +47,22 @@ pub use rigid::{FreeMotion, RigidMotion};
 pub use slope::Slope;
 pub use space::Space;
 pub use support::{Couplings, ElasticBody, support};
+
+/// Return the Euclidean length of a vector.
+pub fn length<const D: usize>(v: [f64; D]) -> f64 {
+    dot(&v, &v).sqrt()
+}
+
+/// Return the vector scaled to length one.
+pub fn unit<const D: usize>(v: [f64; D]) -> [f64; D] {
+    let norm = length(v);
+    v.map(|v| v / norm)
+}
+
+/// Return the difference of two vectors.
+pub fn minus<const D: usize>(a: [f64; D], b: [f64; D]) -> [f64; D] {
+    std::array::from_fn(|c| a[c] - b[c])
+}
 
 /// Return the vector product.
 pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

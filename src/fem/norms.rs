@@ -39,7 +39,7 @@ pub fn error<const D: usize>(
     let mut squares = [Norms::default(); 2];
     for index in cells {
         let x = space.cell_nodes(index);
-        let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
+        let cell = space.cell(index);
         let nodal: Vec<[f64; D]> = cell.iter().map(|&node| std::array::from_fn(|c| u[D * node as usize + c])).collect();
         for (l, weight) in rule.iter() {
             let Some((gradient, measure)) = element::gradients(space.order, &x, l) else { continue };

@@ -1,6 +1,7 @@
 //! The finite element space of one body: its nodes and cells, numbered within the body.
 
-use super::{Places, Slope, cross, element, pad};
+use super::{Places, Slope, cross, element, minus, pad};
+use crate::linalg::dot;
 use crate::mesh::{Group, Mesh, Nodes, Numbering, datum};
 use crate::problem::order::Order;
 use std::cell::OnceCell;
@@ -90,7 +91,7 @@ impl<const D: usize> Space<D> {
     /// Return the space of some cells, in this order, and its nodes as numbered here, sorted. They are renumbered in the same order.
     /// The part has no link to points of the mesh.
     pub fn part(&self, cells: impl Iterator<Item = usize>) -> (Self, Vec<u32>) {
-        let cells = cells.flat_map(|cell| &self.cells[cell * self.stride..(cell + 1) * self.stride]);
+        let cells = cells.flat_map(|cell| self.cell(cell));
         let cells: Vec<u32> = cells.copied().collect();
         let nodes = Self::among(cells.iter().copied());
         (self.on(&cells, &nodes), nodes)
@@ -172,6 +173,11 @@ impl<const D: usize> Space<D> {
         self.cells.len() / self.stride
     }
 
+    /// Return the nodes of cell `i`, in the local order of [`element`].
+    pub fn cell(&self, i: usize) -> &[u32] {
+        &self.cells[i * self.stride..(i + 1) * self.stride]
+    }
+
     /// Return the area (volume) of all cells from their corners. In a body of revolution it is the area of the meridian.
     pub fn measure(&self) -> f64 {
         *self.measure.get_or_init(|| (0..self.cell_count()).map(|i| self.cell_measure(i)).sum())
@@ -191,14 +197,9 @@ impl<const D: usize> Space<D> {
     /// Return the area (volume) of cell `i` from its corners.
     pub fn cell_measure(&self, i: usize) -> f64 {
         let x = self.cell_nodes(i);
-        let edge = |j: usize| -> [f64; D] { std::array::from_fn(|c| x[j][c] - x[0][c]) };
-        let (a, b) = (edge(1), edge(2));
-        if D == 2 {
-            return 0.5 * (a[0] * b[1] - a[1] * b[0]).abs();
-        }
-        let c = edge(3);
-        let normal = [0, 1, 2].map(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
-        (0..3).map(|i| normal[i] * c[i]).sum::<f64>().abs() / 6.0
+        let edge = |j: usize| pad(minus(x[j], x[0]));
+        let normal = cross(edge(1), edge(2));
+        if D == 2 { 0.5 * normal[2].abs() } else { dot(&normal, &edge(3)).abs() / 6.0 }
     }
 
     /// Return the gradient of a displacement `u`, one entry a dof, in a cell with these nodes at the point `at`. The shape functions of
@@ -224,7 +225,7 @@ impl<const D: usize> Space<D> {
 
     /// Return the mean of the corners of cell `i`.
     pub fn centroid(&self, i: usize) -> [f64; D] {
-        let corners = &self.cells[i * self.stride..][..=D];
+        let corners = &self.cell(i)[..=D];
         std::array::from_fn(|c| corners.iter().map(|&node| self.nodes[node as usize][c]).sum::<f64>() / (D + 1) as f64)
     }
 
@@ -247,7 +248,7 @@ impl<const D: usize> Space<D> {
 
     /// Return the coordinates of the nodes of cell `i`.
     pub fn cell_nodes(&self, i: usize) -> Vec<[f64; D]> {
-        self.cells[i * self.stride..(i + 1) * self.stride].iter().map(|&node| self.nodes[node as usize]).collect()
+        self.cell(i).iter().map(|&node| self.nodes[node as usize]).collect()
     }
 
     /// Return the body's nodes of one simplex of a mesh group (vertices, then mid-edges for a quadratic space), or `None` if it is

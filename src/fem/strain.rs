@@ -43,7 +43,7 @@ pub fn largest<const D: usize>(space: &Space<D>, cells: impl Iterator<Item = usi
     for index in cells {
         let x = space.cell_nodes(index);
         let Some((gradient, measure)) = element::gradients(space.order, &x, l) else { continue };
-        let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
+        let cell = space.cell(index);
         let at = assemble::interpolate(&x, &phi);
         let strain = space.slope(cell, &at, &phi, &gradient, u).strain();
         let measure = measure * space.circle(&at);

@@ -18,7 +18,7 @@ pub fn nodal<const D: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64
     let mut volume = vec![0.0; space.nodes.len()];
     for index in 0..space.cell_count() {
         let x = space.cell_nodes(index);
-        let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
+        let cell = space.cell(index);
         for (place, &node) in cell.iter().enumerate() {
             let l = &element::place(D + 1, place)[..=D];
             let Some((gradient, measure)) = element::gradients(space.order, &x, l) else { continue };

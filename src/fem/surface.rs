@@ -1,12 +1,12 @@
 //! Integrals over surfaces: loads, foundations and areas.
 
 use super::assemble::{NodalBlock, interpolate};
-use super::element;
 use super::facets::{Facets, area_vector};
 use super::forces::NodalForces;
 use super::frame::place;
 use super::quadrature::{self, Parts};
 use super::space::Space;
+use super::{element, length};
 use crate::problem::order::Order;
 
 /// Return the nodal forces of a surface load. `traction(x, n)` is the force per area at a point x with outer unit normal n.
@@ -52,7 +52,7 @@ fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts, mut
         let x = facets.coordinates(index, space);
         for (l, weight) in rule.iter() {
             let area = area_vector(space.order, &x, l);
-            let measure = area.iter().map(|a| a * a).sum::<f64>().sqrt();
+            let measure = length(area);
             let normal = area.map(|a| a / measure);
             let phi = element::values(space.order, l);
             let at = interpolate(&x, &phi);

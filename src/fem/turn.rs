@@ -3,6 +3,7 @@
 use super::assemble::is_straight;
 use super::facets::{Facets, area_vector};
 use super::space::Space;
+use super::{minus, unit};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 use std::collections::HashMap;
@@ -44,8 +45,8 @@ fn turn<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
                 (&[i, j], _) => cosines.push(dot(&normals[i], &normals[j])),
                 (_, &[from, to]) => {
                     let [a, b] = [from, to].map(|node| space.nodes[node as usize]);
-                    rim_at.entry(from).or_default().push(unit(std::array::from_fn(|c| b[c] - a[c])));
-                    rim_at.entry(to).or_default().push(unit(std::array::from_fn(|c| a[c] - b[c])));
+                    rim_at.entry(from).or_default().push(unit(minus(b, a)));
+                    rim_at.entry(to).or_default().push(unit(minus(a, b)));
                 }
                 // In the plane the rim consists of single nodes.
                 _ => {}
@@ -76,11 +77,6 @@ fn facets_by_side<const D: usize>(facets: &Facets<D>) -> HashMap<Vec<u32>, Vec<u
 fn normal<const D: usize>(space: &Space<D>, facets: &Facets<D>, i: usize) -> [f64; D] {
     let x = facets.coordinates(i, space);
     unit(area_vector::<D>(Order::P1, &x[..D], &[1.0 / D as f64; D]))
-}
-
-fn unit<const D: usize>(v: [f64; D]) -> [f64; D] {
-    let size = dot(&v, &v).sqrt();
-    v.map(|v| v / size)
 }
 
 #[cfg(test)]

@@ -60,7 +60,7 @@ impl LayerLaw for Exponential {
     fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
         if c > self.end || pressure > self.at_end.pressure {
             let (law, tangent) = (|c| self.pressure(point, c), |c| self.pressure_and_tangent(point, c).1);
-            return by_quadrature((c, pressure, self.compression(point, pressure)), law, tangent);
+            return by_quadrature(c, pressure, self.compression(point, pressure), law, tangent);
         }
         // The gap is (p + p0) c0 (e^d - 1 - d), where d is the distance of c from the graph in units of c0.
         let slope = pressure + self.p0;

@@ -18,7 +18,9 @@ const STRAIGHT: f64 = 5e-4;
 /// Return the gap of a compression c and a `pressure`, which is the integral of p(.) - `pressure` from `on_graph` to c. The law has this
 /// pressure at the compression `on_graph`. `law` gives p(c) and `tangent` p'(c).
 pub(super) fn by_quadrature(
-    (c, pressure, on_graph): (f64, f64, f64),
+    c: f64,
+    pressure: f64,
+    on_graph: f64,
     law: impl Fn(f64) -> f64,
     tangent: impl Fn(f64) -> f64,
 ) -> f64 {

@@ -168,7 +168,7 @@ pub trait LayerLaw: std::fmt::Debug {
     /// Return the same as [`LayerLaw::duality_gap`] for a finite `c >= 0` and a finite `pressure > 0`.
     fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
         let (law, tangent) = (|c| self.pressure(point, c), |c| self.pressure_and_tangent(point, c).1);
-        gap::by_quadrature((c, pressure, self.compression(point, pressure)), law, tangent)
+        gap::by_quadrature(c, pressure, self.compression(point, pressure), law, tangent)
     }
 }
 

@@ -17,7 +17,6 @@ pub use search::Search;
 pub use space::space;
 
 use super::side::Side;
-use std::array::from_fn;
 
 /// An integration point that both surfaces share.
 #[derive(Debug, Clone, Copy)]
@@ -69,10 +68,6 @@ const SNAP: f64 = 1e-9;
 /// Largest distance outside of the parameters of a facet at which a ray may meet it in the plane, where pieces end exactly where facets do.
 const ON_FACET: f64 = 1e-6;
 
-fn minus<const D: usize>(a: [f64; D], b: [f64; D]) -> [f64; D] {
-    from_fn(|c| a[c] - b[c])
-}
-
 fn plus<const D: usize>(a: [f64; D], b: [f64; D]) -> [f64; D] {
-    from_fn(|c| a[c] + b[c])
+    std::array::from_fn(|c| a[c] + b[c])
 }

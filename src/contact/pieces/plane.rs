@@ -1,8 +1,8 @@
 //! Common pieces of two plane curves: intervals of the facets of side a.
 
-use super::{AWAY, Common, Lost, MOST_STEPS, ON_FACET, ROUNDING, Reach, Refused, SNAP, Search, Shared, minus, plus};
+use super::{AWAY, Common, Lost, MOST_STEPS, ON_FACET, ROUNDING, Reach, Refused, SNAP, Search, Shared, plus};
 use crate::contact::side::{Side, length, unit};
-use crate::fem::{area_vector, element, quadrature};
+use crate::fem::{area_vector, element, minus, quadrature};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 

@@ -1,6 +1,7 @@
 //! Which facets may be partners: limits of their distance and their angle.
 
 use crate::contact::side::Side;
+use crate::linalg::dot;
 
 /// The limits of distance and inclination within which two facets face each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,7 +45,7 @@ impl Reach {
 
     /// Return whether facets with these unit normals face each other.
     pub fn faces<const D: usize>(&self, normal: [f64; D], other: [f64; D]) -> bool {
-        -(0..D).map(|c| normal[c] * other[c]).sum::<f64>() > self.facing
+        -dot(&normal, &other) > self.facing
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::reach::Reach;
 use crate::contact::side::{Side, length};
+use crate::fem::minus;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
@@ -46,7 +47,7 @@ impl<const D: usize> Search<D> {
     pub fn around(&self, a: &Side<D>, i: usize, reach: &Reach) -> Vec<usize> {
         let (low, high) = a.bounds(i);
         let middle: [f64; D] = std::array::from_fn(|c| 0.5 * (low[c] + high[c]));
-        let size = length(std::array::from_fn::<f64, D, _>(|c| high[c] - low[c]));
+        let size = length(minus(high, low));
         let Some(nearest) = self.tree.nearest_neighbor(middle) else { return Vec::new() };
         let (from, to) = (nearest.geom().lower(), nearest.geom().upper());
         // The facet lies somewhere in its box, so its farthest corner counts.
@@ -69,7 +70,7 @@ impl<const D: usize> Search<D> {
                 }
             }
         }
-        let slack = 1e-9 * length(std::array::from_fn::<f64, D, _>(|c| high[c] - low[c]));
+        let slack = 1e-9 * length(minus(high, low));
         self.intersecting(low.map(|x| x - slack), high.map(|x| x + slack)).collect()
     }
 }

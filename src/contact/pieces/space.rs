@@ -8,10 +8,10 @@
 //! have no image.
 
 use super::polygon::{self, Polygon};
-use super::{AWAY, Common, Lost, MOST_STEPS, ROUNDING, Reach, Refused, SNAP, Search, Shared, minus, plus};
+use super::{AWAY, Common, Lost, MOST_STEPS, ROUNDING, Reach, Refused, SNAP, Search, Shared, plus};
 use crate::contact::cover::WHOLE;
 use crate::contact::side::{Side, length, unit};
-use crate::fem::{area_vector, assemble, cross, element, quadrature};
+use crate::fem::{area_vector, assemble, cross, element, minus, quadrature};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
