@@ -1,4 +1,4 @@
-//! The functions mu_q of one facet: which of its nodes carry a pressure, and what the mean around them is.
+//! The pressure functions mu_q on one facet: which of its nodes carry a pressure, and how means around them are weighted.
 
 use super::pieces::Shared;
 use crate::fem::element::{self, EDGES};
@@ -10,17 +10,17 @@ use std::ops::Range;
 /// The nodes of a facet that carry a pressure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Carriers {
-    /// All of them.
+    /// All nodes.
     Nodes,
-    /// The vertices, of a quadratic facet.
+    /// The vertices of a quadratic facet.
     Vertices,
-    /// The mid-edges, of a quadratic triangle.
+    /// The mid-edges of a quadratic triangle.
     MidEdges,
 }
 
 impl Carriers {
-    /// Values of the functions that interpolate what the carriers have, at barycentric point `l` of the facet, by local node;
-    /// zero for nodes that are none. In between carriers at the mid-edges the interpolation is linear on each facet.
+    /// Return the functions that interpolate values at the carriers, at barycentric point `l` of the facet, one entry a local
+    /// node. Nodes that carry nothing have zero. Between mid-edges the interpolation is linear on each facet.
     pub fn interpolation<const D: usize>(self, order: Order, l: &[f64; D]) -> [f64; element::MOST] {
         match self {
             Self::Nodes => element::values(order, l),
@@ -34,29 +34,33 @@ impl Carriers {
     }
 }
 
-/// Vertex of a triangle that edge `edge` does not touch.
+/// Return the vertex of a triangle that edge `edge` does not touch.
 fn opposite(edge: usize) -> usize {
     3 - EDGES[edge].0 - EDGES[edge].1
 }
 
 /// The functions mu_i on the covered part of one facet of side a.
 pub(super) enum PressureBasis {
-    /// mu = C phi, one for each node.
+    /// The dual basis mu = C phi of the covered part, with one function for each node and the shape functions phi.
     Dual(DMatrix<f64>),
-    /// mu_i = L_i at vertices, zero at mid-edges.
+    /// Hat functions: the barycentric coordinate mu_i = l_i at vertex i, zero at mid-edges.
     Hats,
-    /// The dual basis of the whole flat triangle, at mid-edges; zero at vertices.
+    /// The dual basis of the whole flat triangle at the mid-edges, zero at the vertices.
     MidEdges,
 }
 
-/// Largest int |mu| / int mu. A facet on which a function has more, since only a part of it is covered, takes hats, which have
-/// one. Chords of side b, whose facets are at least as long, miss a surface of curvature k by k h^2/8; a mean may make of that no
-/// more than the k h^2/2 by which the surface bends along a facet, four times as much. Whole facets have 5/3 to 2.4, beside an axis
-/// up to four as well; one more is for curved ones and for sums of |mu| over few points.
+/// Largest ratio int |mu| / int mu of a steady mean.
+///
+/// On a partially covered facet a function may exceed this limit. Such a facet takes hat functions, whose ratio is one.
+/// Chords of side b, whose facets are at least as long, miss a surface of curvature k by k h^2/8, where h is the length of a
+/// facet. A mean may amplify this error up to the k h^2/2 by which the surface bends along a facet, which is four times as
+/// much. Fully covered facets have ratios of 5/3 to 2.4, and up to four beside an axis. One more allows for curved facets and
+/// for sums of |mu| over few points.
 pub const STEADY: f64 = 5.0;
 
 impl PressureBasis {
-    /// The basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes, of which `chunk` covers what side b faces.
+    /// Choose the basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes. `chunk` holds the integration
+    /// points of the part that side b covers.
     pub fn on<const D: usize>(order: Order, count: usize, chunk: &[Shared<D>]) -> Self {
         if order == Order::P2 && D == 3 {
             return Self::MidEdges.or_hats(order, D..2 * D, chunk);
@@ -80,7 +84,7 @@ impl PressureBasis {
         Self::Dual(dual).or_hats(order, 0..count, chunk)
     }
 
-    /// This basis, if the means of the functions of these nodes are steady on the covered part; else the hats.
+    /// Return this basis if the functions of these nodes have steady means on the covered part, otherwise the hat functions.
     fn or_hats<const D: usize>(self, order: Order, nodes: Range<usize>, chunk: &[Shared<D>]) -> Self {
         let (mut integral, mut size) = ([0.0; element::MOST], [0.0; element::MOST]);
         for point in chunk {
@@ -96,7 +100,7 @@ impl PressureBasis {
         if nodes.into_iter().all(steady) { self } else { Self::Hats }
     }
 
-    /// mu of local node `i` at barycentric point `l` with shape functions `phi`.
+    /// Return mu of local node `i` at barycentric point `l`, where `phi` are the values of the shape functions.
     pub fn value<const D: usize>(&self, i: usize, phi: &[f64], l: &[f64; D]) -> f64 {
         match self {
             Self::Dual(c) => c.row(i).iter().zip(phi).map(|(c, phi)| c * phi).sum(),
@@ -105,7 +109,7 @@ impl PressureBasis {
         }
     }
 
-    /// The nodes that it belongs to.
+    /// Return the nodes whose functions this basis has.
     pub fn carriers(&self) -> Carriers {
         match self {
             Self::Dual(_) => Carriers::Nodes,
@@ -115,8 +119,9 @@ impl PressureBasis {
     }
 }
 
-/// diag(int phi) M^-1 phi of a flat quadratic triangle at mid-edge `edge`, of the shape functions `phi`. At the vertices, where
-/// int phi is zero, it vanishes, so the three at the mid-edges sum to one.
+/// Return the function diag(int phi) M^-1 phi of a flat quadratic triangle for mid-edge `edge`, from the values `phi` of the
+/// shape functions with mass matrix M. The functions of the vertices vanish, since int phi is zero there. Those of the three
+/// mid-edges therefore sum to one.
 fn at_mid_edge(edge: usize, phi: &[f64]) -> f64 {
     let vertices = -0.5 * (phi[0] + phi[1] + phi[2]) + 2.5 * phi[opposite(edge)];
     let edges = -1.125 * (phi[3] + phi[4] + phi[5]) + 4.375 * phi[3 + edge];
@@ -149,7 +154,7 @@ mod tests {
         }
     }
 
-    /// Linear functions are met by the interpolation, whatever carries them, and quadratic ones by all nodes.
+    /// All carriers interpolate linear functions exactly, and all nodes together quadratic ones.
     #[test]
     fn interpolation_between_carriers() {
         let l = [0.2, 0.7, 0.1];

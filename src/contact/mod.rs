@@ -1,7 +1,7 @@
-//! Contact of two surfaces: search, common pieces, and the arrays that the method works on.
+//! Contact of two surfaces: search, common pieces, and the arrays that the solution methods work on.
 //!
 //! Data flow: two [`Side`]s -> [`pieces`] (integration points that both sides share) -> [`ContactPair`]
-//! (weights, rows B_a and B_b, gaps), which knows no dimension. Layer laws live in [`law`].
+//! (areas, rows B_a and B_b, gaps), which does not depend on the dimension. The laws of layers are in [`law`].
 
 mod basis;
 mod cover;
@@ -15,7 +15,7 @@ pub mod side;
 
 pub use crate::fem::{cross, pad};
 pub use basis::{Carriers, STEADY};
-pub use cover::{Cover, Left};
+pub use cover::{Coverage, Left};
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
 pub use pair::{ContactPair, Fault, Integrals, LostPieces, OwnSurface, add, assemble, integrate, moment_in_scene};

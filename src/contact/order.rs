@@ -3,8 +3,8 @@
 use super::side::Side;
 use std::collections::{HashMap, HashSet};
 
-/// Sorts surface nodes: in the plane along the curve, each chain from the end with the smaller coordinates; in space
-/// by coordinates.
+/// Sort surface nodes for plots. In the plane they follow the curve, and each chain begins at the end with the smaller
+/// coordinates. In space they are sorted by coordinates.
 pub fn along<const D: usize>(side: &Side<D>, nodes: impl Iterator<Item = u32>) -> Vec<u32> {
     let mut nodes: Vec<u32> = nodes.collect();
     let at = |node: u32| side.space.nodes[node as usize];
@@ -27,19 +27,19 @@ pub fn along<const D: usize>(side: &Side<D>, nodes: impl Iterator<Item = u32>) -
     let wanted: HashSet<u32> = nodes.iter().copied().collect();
     let mut visited = HashSet::new();
     let mut order = Vec::with_capacity(nodes.len());
-    // ends of chains first, then whatever is left (closed curves)
+    // The ends of open chains come first, then the nodes of closed curves.
     let is_end = |node: &u32| neighbours.get(node).is_none_or(|n| n.len() != 2);
     let starts: Vec<u32> = nodes.iter().filter(|n| is_end(n)).chain(&nodes).copied().collect();
     for start in starts {
-        let mut here = Some(start);
-        while let Some(node) = here {
+        let mut current = Some(start);
+        while let Some(node) = current {
             if !visited.insert(node) {
                 break;
             }
             if wanted.contains(&node) {
                 order.push(node);
             }
-            here = neighbours.get(&node).and_then(|n| n.iter().find(|n| !visited.contains(n)).copied());
+            current = neighbours.get(&node).and_then(|n| n.iter().find(|n| !visited.contains(n)).copied());
         }
     }
     order

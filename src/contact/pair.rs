@@ -1,7 +1,7 @@
-//! The arrays of a contact pair: all that the method knows of two surfaces.
+//! The arrays of a contact pair, which are all that the solution methods know of two surfaces.
 
 use super::basis::{Carriers, PressureBasis};
-use super::cover::{Cover, Left};
+use super::cover::{Coverage, Left};
 use super::law::{LayerLaw, Linear};
 use super::pieces::Common;
 use super::side::{Side, length};
@@ -13,59 +13,63 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
-/// A pair of surfaces, discretised: n points with one pressure each.
+/// A discretised pair of surfaces: n contact points with one pressure each.
 ///
-/// Point q stands for a function mu_q of a pressure space on side a, with sum_q mu_q = 1 on the covered surface and
-/// omega_q = int mu_q. With `<v>_q = (1/omega_q) int mu_q v` over the common pieces, the compression of the layer is
-/// `c = B_a u_a + B_b u_b - d`. One set of points serves both sides, so action equals reaction to rounding.
+/// Contact point q stands for a function mu_q of a pressure space on side a. These functions sum to one on the covered
+/// surface, and omega_q = int mu_q is the area of the point. Let `<v>_q = (1/omega_q) int mu_q v` be the mean of v over the
+/// common pieces of both surfaces. The compression of the layer is `c = B_a u_a + B_b u_b - d`, where u_a and u_b are the
+/// displacements, B_a and B_b the rows and d the gap. One set of points serves both sides, so action equals reaction to
+/// rounding.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct ContactPair {
-    /// Names of the two surfaces; the first carries the points.
+    /// Names of the two surfaces; the first is side a, which carries the points.
     pub surfaces: [String; 2],
-    /// Numbers of the two bodies.
+    /// Indices of the two bodies.
     pub bodies: [usize; 2],
     /// Node of side a that each point belongs to, n.
     pub nodes: Vec<u32>,
     /// Positions of the points on side a in the scene, n.
     pub position: Vec<[f64; 3]>,
-    /// omega_q > 0, length or area (in bodies of revolution that of a ring), n.
+    /// omega_q > 0, a length in the plane, else an area (in bodies of revolution that of a ring), n.
     pub weight: Vec<f64>,
     /// Unit normals from side a to side b, n.
     pub normal: Vec<[f64; 3]>,
-    /// Initial gap d_q along the normal, n: geometry and the scene's own gap.
+    /// Initial gap d_q along the normal, n: the distance of the meshes plus the gap that the scene adds.
     pub gap: Vec<f64>,
-    /// What prescribed displacements contribute to the outer normal displacement of each side, n each.
+    /// Contribution of prescribed displacements to the outer normal displacement of each side, n each.
     pub prescribed: [Vec<f64>; 2],
-    /// B_a and B_b, n rows each, columns the dofs of the body: `B_a u_a = <n.u_a>`, `B_b u_b = -<n.u_b>`.
+    /// B_a and B_b, n rows each with the dofs of the body as columns: `B_a u_a = <n.u_a>`, `B_b u_b = -<n.u_b>`. Prescribed
+    /// dofs have no entries.
     pub rows: [Csr; 2],
-    /// The same rows for displacements of the nodes, supported ones included: columns `D * node + component`. Nodal forces of
-    /// the contact are `-sum_q omega_q p_q nodal[side][q]`.
+    /// The same rows for the displacements of all nodes, constrained ones included, with columns `D * node + component`. The
+    /// nodal forces of the contact are `-sum_q omega_q p_q nodal[side][q]`.
     pub nodal: [Csr; 2],
-    /// Sum of each row's entries by component, prescribed dofs included: force vectors on a side are
+    /// Sum of the entries of each row by component, prescribed dofs included. The contact force on a side is
     /// `-sum_q omega_q p_q resultant[side][q]`.
     pub resultant: [Vec<[f64; 3]>; 2],
-    /// Moments of these entries about the origin of the scene, for the moments on a side in the same way.
+    /// Moment of the entries of each row about the origin of the scene. The contact moment on a side follows as the force
+    /// does from `resultant`.
     pub moment: [Vec<[f64; 3]>; 2],
-    /// The surfaces of both sides at the points, n each.
+    /// Surface of each side at the points, n each.
     pub surface: [Vec<OwnSurface>; 2],
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
-    /// What the weights are: `"length"`, or in space and for bodies of revolution `"area"`.
+    /// What `weight` measures: `"length"`, or in space and for bodies of revolution `"area"`.
     #[serde(deserialize_with = "measure")]
     pub measure: Measure,
     /// Law of the layer. It does not go from rank to rank: whoever receives a pair makes its law anew.
     #[serde(skip, default = "no_law")]
     pub law: Rc<dyn LayerLaw>,
-    /// What the pair takes of each facet of side a.
-    pub cover: Vec<Cover>,
-    /// What the search for common points has lost, if anything.
+    /// Coverage of each facet of side a.
+    pub cover: Vec<Coverage>,
+    /// Pieces that the search for common points has lost, if any.
     pub lost: Option<LostPieces>,
 }
 
-/// What the weights of contact points are: `"length"` or `"area"`.
+/// What the areas of contact points are: `"length"` or `"area"`.
 pub type Measure = &'static str;
 
-/// Return what the weights of a pair from another rank are.
+/// Return what the areas of a pair from another rank are.
 fn measure<'de, R: Deserializer<'de>>(from: R) -> Result<Measure, R::Error> {
     String::deserialize(from).map(|name| if name == "length" { "length" } else { "area" })
 }
@@ -75,14 +79,14 @@ fn no_law() -> Rc<dyn LayerLaw> {
     Rc::new(Linear { stiffness: 0.0 })
 }
 
-/// What the surface of one side itself is like around a point: means over its nodes with the shares that they have in the point.
+/// The surface of one side around a contact point: means over the nodes of the side, weighted by their shares in the point.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct OwnSurface {
-    /// Where it is, measured from the datum of the mesh.
+    /// Mean position, measured from the datum of the mesh.
     pub at: [f64; 3],
-    /// The mean of its outer unit normals.
+    /// Mean of the outer unit normals.
     pub normal: [f64; 3],
-    /// How well that is known: [`Side::spread`].
+    /// Mean of [`Side::spread`], the uncertainty of the normals.
     pub spread: f64,
 }
 
@@ -99,88 +103,90 @@ impl OwnSurface {
     }
 }
 
-/// Pieces of a pair that are lost because the search for their points failed.
+/// The pieces of a pair that are lost because the search for their points failed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LostPieces {
-    /// How many, points of pieces included.
+    /// Number of lost pieces and lost points of pieces.
     pub pieces: usize,
-    /// The share of the area (length) of side a that lacks on their facets.
+    /// Uncovered area (length) of the facets that lost pieces, as a share of side a.
     pub share: f64,
-    /// The middle of the facet that lacks most (x, y, z).
+    /// Middle of the facet with the largest uncovered area (x, y, z).
     pub at: [f64; 3],
 }
 
 impl LostPieces {
-    /// What facets of side a with these covers have lost; none if all was found.
-    fn of<const D: usize>(a: &Side<D>, cover: &[Cover]) -> Option<Self> {
-        let lacking = |&(i, cover): &(usize, &Cover)| (1.0 - cover.share) * length(a.area(i));
-        let lost = || cover.iter().enumerate().filter(|(_, cover)| cover.left == Left::Lost);
-        let (worst, _) = lost().max_by(|p, q| lacking(p).total_cmp(&lacking(q)))?;
-        let whole = a.mean_measure() * cover.len() as f64;
+    /// Return the losses of the facets of side a with this coverage, `None` if nothing was lost.
+    fn of<const D: usize>(a: &Side<D>, coverage: &[Coverage]) -> Option<Self> {
+        let uncovered = |&(i, facet): &(usize, &Coverage)| (1.0 - facet.share) * length(a.area(i));
+        let lost = || coverage.iter().enumerate().filter(|(_, facet)| facet.left == Left::Lost);
+        let (worst, _) = lost().max_by(|p, q| uncovered(p).total_cmp(&uncovered(q)))?;
+        let whole = a.mean_measure() * coverage.len() as f64;
         let middle = interpolate(&a.facets.coordinates(worst, a.space)[..D], &[1.0 / D as f64; D]);
         Some(Self {
-            pieces: lost().map(|(_, cover)| cover.lost).sum(),
-            share: lost().map(|facet| lacking(&facet)).sum::<f64>() / whole,
+            pieces: lost().map(|(_, facet)| facet.lost).sum(),
+            share: lost().map(|facet| uncovered(&facet)).sum::<f64>() / whole,
             at: a.space.in_scene(middle),
         })
     }
 }
 
-/// Why a pair could not be made.
+/// Why a pair could not be assembled.
 #[derive(Debug)]
 pub enum Fault {
     /// The surfaces do not face each other anywhere.
     NoPartner,
-    /// The scene's gap is not finite at a point.
+    /// The scene's gap is not finite at this point.
     Gap([f64; 3]),
-    /// The scene's law is none at a point.
+    /// The scene's law is invalid at a point.
     Law(Error),
 }
 
-/// From the contact points of a pair to its law.
+/// A function from the contact points of a pair to its law.
 pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 
-/// Integrals over the common pieces of two surfaces: of some nodes of side a, and the cover of the facets of which these are the first.
+/// Integrals over the common pieces of two surfaces, for some nodes of side a. They include the coverage of those facets
+/// whose first node is among these.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Integrals {
-    /// Those of each node that carries a point.
+    /// Integrals of each node that carries a point.
     points: BTreeMap<u32, Accumulator>,
-    cover: Vec<(u32, Cover)>,
+    /// Facets of side a with their coverage.
+    cover: Vec<(u32, Coverage)>,
 }
 
 impl Integrals {
-    /// Takes those of other nodes.
+    /// Add the integrals of other nodes.
     pub fn add(&mut self, mut others: Self) {
         self.points.append(&mut others.points);
         self.cover.append(&mut others.cover);
     }
 }
 
-/// Integrates over common pieces, which hold all facets at the nodes of side a that are `asked` for.
+/// Integrate over common pieces, which must contain all facets at the `requested` nodes of side a.
 ///
-/// Points: the nodes of side a with the dual basis diag(int phi) M^-1 phi of each facet's covered part, of quadratic triangles
-/// the mid-edges with that of the whole triangle; a facet on which that gives means that are not steady (partly covered) takes
-/// the hats of its vertices.
+/// Contact points are the nodes of side a with the dual basis diag(int phi) M^-1 phi of the covered part of each facet, where
+/// phi are the shape functions and M is their mass matrix. On quadratic triangles they are the mid-edges with the dual basis
+/// of the whole triangle. A partially covered facet on which this basis has unsteady means takes the hat functions of its
+/// vertices instead.
 pub fn integrate<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
     common: &Common<D>,
-    asked: &dyn Fn(&u32) -> bool,
+    requested: &dyn Fn(&u32) -> bool,
 ) -> Integrals {
     let mut points: BTreeMap<u32, Accumulator> = BTreeMap::new();
     let mut carriers = vec![None; a.facets.count()];
-    let group = common.points.chunk_by(|p, q| p.facet_a == q.facet_a);
-    for chunk in group {
+    for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let facet = chunk[0].facet_a;
         let nodes = a.facets.facet(facet);
         let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk);
         carriers[facet] = Some(basis.carriers());
-        let asked: Vec<bool> = nodes.iter().map(asked).collect();
+        let requested: Vec<bool> = nodes.iter().map(requested).collect();
         for point in chunk {
             let phi = element::values(a.facets.order, &point.at_a);
             let psi = element::values(b.facets.order, &point.at_b);
             let others = b.facets.facet(point.facet_b);
-            for (i, &node) in nodes.iter().enumerate().filter(|(i, _)| asked[*i]) {
+            for (i, &node) in nodes.iter().enumerate().filter(|(i, _)| requested[*i]) {
                 let mu = point.weight * basis.value(i, &phi, &point.at_a);
                 if mu == 0.0 {
                     continue;
@@ -193,15 +199,16 @@ pub fn integrate<const D: usize>(
             }
         }
     }
-    Integrals { points, cover: Cover::of(a, common, &carriers, |facet| asked(&a.facets.facet(facet)[0])) }
+    Integrals { points, cover: Coverage::of(a, common, &carriers, |facet| requested(&a.facets.facet(facet)[0])) }
 }
 
-/// Makes the arrays of a pair from the integrals over the common pieces of its surfaces.
+/// Assemble the arrays of a pair from the integrals over the common pieces of its surfaces.
 ///
-/// `bodies` are the numbers of the bodies of side a and b, `gap(x)` the scene's own gap, added to the geometric one, `law` the layer at the contact points.
+/// `bodies` are the indices of the bodies of side a and b. `gap(x)` is added to the distance of the meshes. `law` makes the
+/// layer's law for the contact points.
 ///
 /// # Errors
-/// [`Fault`] if nothing is covered, the gap is not finite, or the law is none.
+/// [`Fault`] if nothing is covered, the gap is not finite, or the law is invalid.
 pub fn assemble<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
@@ -212,27 +219,23 @@ pub fn assemble<const D: usize>(
 ) -> Result<ContactPair, Fault> {
     let Integrals { points, mut cover } = integrals;
     cover.sort_unstable_by_key(|entry| entry.0);
+    let cover: Vec<Coverage> = cover.into_iter().map(|(_, coverage)| coverage).collect();
     let tiny = 1e-12 * points.values().map(|point| point.weight).fold(0.0, f64::max);
-    let order = super::order::along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&n, _)| n));
-    if order.is_empty() {
+    let nodes = super::order::along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&n, _)| n));
+    if nodes.is_empty() {
         return Err(Fault::NoPartner);
     }
-    let size = (order.len() as f64 * a.mean_measure()).powf(1.0 / (D - 1) as f64);
-    let mean = |sum: &Accumulator| {
-        let nodes = shares(&sum.sides[0], sum.weight);
-        std::array::from_fn(|c| nodes.iter().map(|&(n, share)| share * a.space.nodes[n as usize][c]).sum())
-    };
-    let position: Vec<[f64; 3]> = order.iter().map(|node| a.space.in_scene(mean(&points[node]))).collect();
+    let points: Vec<&Accumulator> = nodes.iter().map(|node| &points[node]).collect();
+    let position: Vec<[f64; 3]> = points.iter().map(|point| point.position(a)).collect();
     let law = law(&position).map_err(Fault::Law)?;
-    let cover: Vec<Cover> = cover.into_iter().map(|(_, cover)| cover).collect();
     let mut pair = ContactPair {
         surfaces: [a.name.to_owned(), b.name.to_owned()],
         bodies,
-        nodes: order,
+        weight: points.iter().map(|point| point.weight).collect(),
+        normal: nodes.iter().map(|node| pad(a.normals[node])).collect(),
+        gap: gaps(a, &points, &position, gap)?,
+        nodes,
         position,
-        weight: Vec::new(),
-        normal: Vec::new(),
-        gap: Vec::new(),
         prescribed: [Vec::new(), Vec::new()],
         rows: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
         nodal: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
@@ -245,63 +248,72 @@ pub fn assemble<const D: usize>(
         lost: LostPieces::of(a, &cover),
         cover,
     };
-    let spread = [a.spread(), b.spread()];
-    // what lies between matching surfaces is the rounding of their coordinates: that of both, along any normal
-    let rounding = (1e-12 * size).max(2.0 * (D as f64).sqrt() * a.rounding());
-    for q in 0..pair.nodes.len() {
-        let node = pair.nodes[q];
-        let sum = &points[&node];
-        let normal = a.normals[&node];
-        for (side, of) in [a, b].into_iter().enumerate() {
-            let shares = shares(&sum.sides[side], sum.weight);
-            pair.surface[side].push(OwnSurface::mean(of, &shares, &spread[side]));
-            push_rows(&mut pair, side, of, shares, normal);
+    for (index, side) in [a, b].into_iter().enumerate() {
+        let spread = side.spread();
+        for (q, point) in points.iter().enumerate() {
+            let (shares, normal) = (point.shares(index), a.normals[&pair.nodes[q]]);
+            pair.surface[index].push(OwnSurface::mean(side, &shares, &spread));
+            push_rows(&mut pair, index, side, shares, normal);
         }
-        let distance = sum.gap / sum.weight;
-        let distance = if distance.abs() < rounding { 0.0 } else { distance };
-        let own = gap(pair.position[q]);
-        if !own.is_finite() {
-            return Err(Fault::Gap(pair.position[q]));
-        }
-        pair.weight.push(sum.weight);
-        pair.normal.push(pad(normal));
-        pair.gap.push(distance + own);
     }
     Ok(pair)
 }
 
-/// Adds what a contact point has of one side: `shares` are those of the side's nodes, `normal` points out of side a.
+/// Return the initial gap at each contact point: the mean distance of the meshes plus the scene's own gap.
+///
+/// # Errors
+/// [`Fault::Gap`] if the scene's own gap is not finite at a point.
+fn gaps<const D: usize>(
+    a: &Side<D>,
+    points: &[&Accumulator],
+    position: &[[f64; 3]],
+    own: &dyn Fn([f64; 3]) -> f64,
+) -> Result<Vec<f64>, Fault> {
+    let size = (points.len() as f64 * a.mean_measure()).powf(1.0 / (D - 1) as f64);
+    // Matching surfaces differ by the rounding of the coordinates of both sides, along any normal.
+    let rounding = (1e-12 * size).max(a.rounding_along_normals());
+    let gap = |(point, &x): (&&Accumulator, &[f64; 3])| {
+        let distance = point.gap / point.weight;
+        let distance = if distance.abs() < rounding { 0.0 } else { distance };
+        let own = own(x);
+        if own.is_finite() { Ok(distance + own) } else { Err(Fault::Gap(x)) }
+    };
+    points.iter().zip(position).map(gap).collect()
+}
+
+/// Append the rows of a contact point for one side of a pair. `index` is 0 for side a and 1 for side b, `shares` holds the
+/// shares of the side's nodes in the point, and `normal` points out of side a.
 fn push_rows<const D: usize>(
     pair: &mut ContactPair,
-    side: usize,
-    of: &Side<D>,
+    index: usize,
+    side: &Side<D>,
     shares: impl IntoIterator<Item = (u32, f64)>,
     normal: [f64; D],
 ) {
-    let sign = [1.0, -1.0][side];
+    let sign = [1.0, -1.0][index];
     let (mut nodal, mut entries) = (Vec::new(), BTreeMap::new());
     let (mut resultant, mut moment) = ([0.0; 3], [0.0; 3]);
     for (n, share) in shares {
         let entry = normal.map(|normal| sign * share * normal);
         nodal.extend((0..D).map(|c| (D * n as usize + c, entry[c])));
-        add(&mut resultant, of.space.net_force(entry));
-        add(&mut moment, of.space.net_moment(n, entry));
-        let (node, dofs) = of.frame.force(n, entry);
+        add(&mut resultant, side.space.net_force(entry));
+        add(&mut moment, side.space.net_moment(n, entry));
+        let (node, dofs) = side.frame.force(n, entry);
         for (c, value) in dofs.into_iter().enumerate() {
             *entries.entry(D * node as usize + c).or_insert(0.0) += value;
         }
     }
-    let mut known = 0.0;
+    let mut prescribed = 0.0;
     entries.retain(|dof, entry| {
-        let prescribed = of.prescribed.get(dof);
-        known += prescribed.map_or(0.0, |u| *entry * u);
-        prescribed.is_none()
+        let value = side.prescribed.get(dof);
+        prescribed += value.map_or(0.0, |u| *entry * u);
+        value.is_none()
     });
-    pair.rows[side].push_row(entries);
-    pair.nodal[side].push_row(nodal);
-    pair.resultant[side].push(resultant);
-    pair.moment[side].push(moment_in_scene(&of.space.datum, resultant, moment));
-    pair.prescribed[side].push(known);
+    pair.rows[index].push_row(entries);
+    pair.nodal[index].push_row(nodal);
+    pair.resultant[index].push(resultant);
+    pair.moment[index].push(moment_in_scene(&side.space.datum, resultant, moment));
+    pair.prescribed[index].push(prescribed);
 }
 
 /// Return the moment about the origin of the scene of a force whose moment about `datum` is given.
@@ -310,57 +322,68 @@ pub fn moment_in_scene<const D: usize>(datum: &[f64; D], force: [f64; 3], moment
     std::array::from_fn(|c| moment[c] + arm[c])
 }
 
-/// sum += v.
+/// Add `v` to `sum`.
 pub fn add(sum: &mut [f64; 3], v: [f64; 3]) {
     sum.iter_mut().zip(v).for_each(|(sum, v)| *sum += v);
 }
 
-/// A side's nodal shares of a point, which sum to one. Shares that are only noise of the mesher's coordinates go to the
-/// largest one: surfaces that match to nine digits have nodal rows on both sides.
-fn shares(values: &BTreeMap<u32, f64>, weight: f64) -> Vec<(u32, f64)> {
-    let (mut kept, noise): (Vec<_>, Vec<_>) =
-        values.iter().map(|(&node, value)| (node, value / weight)).partition(|(_, share)| share.abs() > NOISE);
-    let lost: f64 = noise.iter().map(|(_, share)| share).sum();
-    if let Some(largest) = kept.iter_mut().max_by(|p, q| p.1.total_cmp(&q.1)) {
-        largest.1 += lost;
-    }
-    kept
-}
-
-/// Share of a node in a point below which it is noise.
+/// Share of a node in a point at or below which it is noise of the mesher's coordinates.
 const NOISE: f64 = 1e-9;
 
-/// Integrals of mu_q and its products with the gap and the shape functions of either side.
+/// Integrals of mu_q and of its products with the gap and with the shape functions of either side.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Accumulator {
     weight: f64,
     gap: f64,
+    /// Integrals of mu_q times the shape function of each node, for side a and side b.
     sides: [BTreeMap<u32, f64>; 2],
 }
 
+impl Accumulator {
+    /// Return the shares of the nodes of a side in the contact point, which sum to one.
+    ///
+    /// The largest share takes those that are noise, so that surfaces that match to nine digits have nodal rows on both sides.
+    fn shares(&self, side: usize) -> Vec<(u32, f64)> {
+        let shares = self.sides[side].iter().map(|(&node, value)| (node, value / self.weight));
+        let (mut kept, noise): (Vec<_>, Vec<_>) = shares.partition(|(_, share)| share.abs() > NOISE);
+        let lost: f64 = noise.iter().map(|(_, share)| share).sum();
+        if let Some(largest) = kept.iter_mut().max_by(|p, q| p.1.total_cmp(&q.1)) {
+            largest.1 += lost;
+        }
+        kept
+    }
+
+    /// Return the position of the contact point on side a in the scene.
+    fn position<const D: usize>(&self, a: &Side<D>) -> [f64; 3] {
+        let shares = self.shares(0);
+        let mean = |c: usize| shares.iter().map(|&(n, share)| share * a.space.nodes[n as usize][c]).sum();
+        a.space.in_scene(std::array::from_fn(mean))
+    }
+}
+
 impl ContactPair {
-    /// Number of points.
+    /// Return the number of contact points.
     pub fn len(&self) -> usize {
         self.weight.len()
     }
 
-    /// Facets of side a without a partner.
+    /// Return the number of facets of side a without a partner.
     pub fn uncovered(&self) -> usize {
-        self.cover.iter().filter(|cover| cover.carriers.is_none()).count()
+        self.cover.iter().filter(|facet| facet.carriers.is_none()).count()
     }
 
-    /// Facets of side a that are not paired as a whole for this reason.
+    /// Return the number of facets of side a that are not fully paired for this reason.
     pub fn left(&self, reason: Left) -> usize {
-        self.cover.iter().filter(|cover| cover.left == reason).count()
+        self.cover.iter().filter(|facet| facet.left == reason).count()
     }
 
-    /// Facets of side a that are covered in part and take the hats of their vertices.
+    /// Return the number of partially covered facets of side a that take the hat functions of their vertices.
     pub fn averaged(&self) -> usize {
-        let averaged = |cover: &&Cover| cover.carriers == Some(Carriers::Vertices) && cover.left != Left::Nothing;
+        let averaged = |facet: &&Coverage| facet.carriers == Some(Carriers::Vertices) && facet.left != Left::Nothing;
         self.cover.iter().filter(averaged).count()
     }
 
-    /// Whether the pair has no points; [`assemble`] makes none such.
+    /// Return whether the pair has no points, which no pair from [`assemble`] has.
     pub fn is_empty(&self) -> bool {
         self.weight.is_empty()
     }

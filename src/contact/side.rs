@@ -1,11 +1,14 @@
-//! One surface of a pair: facets of a body with averaged nodal normals.
+//! One contact surface of a body: facets with averaged nodal normals.
 
-use crate::fem::{Facets, Frame, Space, area_vector, element};
+pub use crate::fem::{length, unit};
+
+use crate::fem::{Facets, Frame, Space, area_vector, element, minus};
 use crate::mesh::datum;
 use std::collections::HashMap;
 
-/// The difference between unit normals of facets and their mean beyond which these form an edge: half of the angle between chords that leave their arc
-/// by 3 % of its radius, the worst that is taken for round.
+/// Difference between the unit normal of a facet and the mean normal beyond which the facets form an edge.
+///
+/// It is half of the angle between chords that leave their arc by 3 % of its radius, the worst polygon that is taken for round.
 const EDGE: f64 = 0.245;
 
 /// One contact surface of a body.
@@ -17,16 +20,16 @@ pub struct Side<'a, const D: usize> {
     pub space: &'a Space<D>,
     /// The facets, oriented outwards.
     pub facets: Facets<D>,
-    /// Prescribed dofs of the body and their values.
+    /// Values of the prescribed dofs of the body.
     pub prescribed: &'a HashMap<usize, f64>,
-    /// What its dofs are at turned and tied nodes.
+    /// Dofs of nodes with rotated axes and of tied nodes.
     pub frame: &'a Frame<D>,
-    /// Outer unit normal at each node of the surface: mean of the facets around it.
+    /// Outer unit normal at each node of the surface: the mean over the facets around it.
     pub normals: HashMap<u32, [f64; D]>,
 }
 
 impl<'a, const D: usize> Side<'a, D> {
-    /// The side with its nodal normals.
+    /// Compute the nodal normals of a surface.
     pub fn new(
         name: &'a str,
         space: &'a Space<D>,
@@ -45,7 +48,7 @@ impl<'a, const D: usize> Side<'a, D> {
             }
         }
         for (&node, normal) in &mut normals {
-            // a surface of revolution goes on beyond the axis as its mirror image
+            // A surface of revolution continues beyond the axis as its mirror image.
             if space.on_axis(node) && normal[1] != 0.0 {
                 normal[0] = 0.0;
             }
@@ -54,8 +57,9 @@ impl<'a, const D: usize> Side<'a, D> {
         Self { name, space, facets, prescribed, frame, normals }
     }
 
-    /// Return how well the normal near each node is known: the largest difference between the unit normals of facets and nodes, of all nodes
-    /// that share a facet with it. Where all is flat it is rounding, and edges do not count.
+    /// Return the uncertainty of the normal near each node: the largest difference between the unit normals of facets and
+    /// nodes, over all nodes that share a facet with it. Edges do not count. Where the surface is flat, the result is the
+    /// rounding of the normals.
     pub fn spread(&self) -> HashMap<u32, f64> {
         let (places, rounding) = (element::nodes::<D>(self.facets.order), self.rounding());
         let mut at_node: HashMap<u32, f64> = HashMap::new();
@@ -63,42 +67,47 @@ impl<'a, const D: usize> Side<'a, D> {
             let x = self.facets.coordinates(i, self.space);
             for (l, node) in places.iter().zip(self.facets.facet(i)) {
                 let (area, mean) = (area_vector(self.facets.order, &x, l), self.normals[node]);
-                let own = unit(area);
-                let off = length(std::array::from_fn::<f64, D, _>(|c| own[c] - mean[c]));
+                let difference = length(minus(unit(area), mean));
                 let least = f64::EPSILON + 2.0 * rounding / length(area).powf(1.0 / (D - 1) as f64);
-                let most = at_node.entry(*node).or_default();
-                *most = most.max(least).max(if off < EDGE { off } else { 0.0 });
+                let largest = at_node.entry(*node).or_default();
+                *largest = largest.max(least).max(if difference < EDGE { difference } else { 0.0 });
             }
         }
-        let mut near: HashMap<u32, f64> = HashMap::new();
+        let mut spread: HashMap<u32, f64> = HashMap::new();
         for nodes in (0..self.facets.count()).map(|i| self.facets.facet(i)) {
-            let most = nodes.iter().map(|node| at_node[node]).fold(0.0, f64::max);
+            let on_facet = nodes.iter().map(|node| at_node[node]).fold(0.0, f64::max);
             for node in nodes {
-                let near = near.entry(*node).or_default();
-                *near = near.max(most);
+                let largest = spread.entry(*node).or_default();
+                *largest = largest.max(on_facet);
             }
         }
-        near
+        spread
     }
 
-    /// Mean measure (length, area) of a facet.
+    /// Return the mean length (area) of a facet.
     pub fn mean_measure(&self) -> f64 {
         let total: f64 = (0..self.facets.count()).map(|i| length(self.area(i))).sum();
         total / self.facets.count().max(1) as f64
     }
 
-    /// Outer normal times measure at the middle of facet `i`.
+    /// Return the outer normal times the length (area) at the middle of facet `i`.
     pub fn area(&self, i: usize) -> [f64; D] {
         let x = self.facets.coordinates(i, self.space);
         area_vector(self.facets.order, &x, &[1.0 / D as f64; D])
     }
 
-    /// Return the largest error that rounding may have left in a coordinate of a node of the surface.
+    /// Return the largest rounding error of a coordinate of the surface's nodes.
     pub fn rounding(&self) -> f64 {
         datum::rounding(&self.space.datum, self.facets.nodes.iter().map(|&node| &self.space.nodes[node as usize]))
     }
 
-    /// Corners of the box around all facets.
+    /// Return the rounding error of a distance between this side and its partner: that of the coordinates of both sides, along
+    /// any normal.
+    pub fn rounding_along_normals(&self) -> f64 {
+        2.0 * (D as f64).sqrt() * self.rounding()
+    }
+
+    /// Return the corners of the box around all facets.
     pub fn extent(&self) -> ([f64; D], [f64; D]) {
         let join = |(low, high): ([f64; D], [f64; D]), (from, to): ([f64; D], [f64; D])| {
             (std::array::from_fn(|c| low[c].min(from[c])), std::array::from_fn(|c| high[c].max(to[c])))
@@ -106,7 +115,7 @@ impl<'a, const D: usize> Side<'a, D> {
         (0..self.facets.count()).map(|i| self.bounds(i)).fold(([f64::MAX; D], [f64::MIN; D]), join)
     }
 
-    /// Corners of the box around facet `i`.
+    /// Return the corners of the box around facet `i`.
     pub fn bounds(&self, i: usize) -> ([f64; D], [f64; D]) {
         let x = self.facets.coordinates(i, self.space);
         let corner = |pick: fn(f64, f64) -> f64| -> [f64; D] {
@@ -114,15 +123,4 @@ impl<'a, const D: usize> Side<'a, D> {
         };
         (corner(f64::min), corner(f64::max))
     }
-}
-
-/// Euclidean length.
-pub fn length<const D: usize>(v: [f64; D]) -> f64 {
-    v.iter().map(|v| v * v).sum::<f64>().sqrt()
-}
-
-/// The vector scaled to length one.
-pub fn unit<const D: usize>(v: [f64; D]) -> [f64; D] {
-    let norm = length(v);
-    v.map(|v| v / norm)
 }

@@ -1,7 +1,7 @@
 //! Assembly of stiffness matrix and loads by direct scatter into compressed rows.
 //!
-//! The pattern is built once from the node graph (cells, and couplings through contact rows); entry positions
-//! follow from the graph by arithmetic, so that assembly writes each value straight to its place.
+//! The pattern is built once from the node graph, which holds the couplings through cells and through contact rows. Positions
+//! of entries follow from the graph by arithmetic, so that assembly adds each value directly to its entry.
 
 use serde::{Deserialize, Serialize};
 use crate::exchange::Plain;
@@ -14,19 +14,19 @@ use super::space::Space;
 use crate::linalg::Csr;
 use crate::problem::order::Order;
 
-/// Which nodes of a body are coupled: compressed rows of sorted node numbers, symmetric, with diagonal.
+/// The symmetric graph of coupled nodes of a body, as compressed rows with diagonal.
 #[derive(Debug, Clone)]
 pub struct NodeGraph {
     /// Row starts.
     pub ptr: Vec<u32>,
     /// Neighbours of each node, the node itself included, sorted.
     pub col: Vec<u32>,
-    /// Node that stands for each node; empty if each stands for itself.
+    /// Master of each node, whose dofs move it; empty if no nodes are tied.
     master: Vec<u32>,
 }
 
 impl NodeGraph {
-    /// Which nodes K couples: those of a cell of a space, and those of a contact row.
+    /// Build the graph of the nodes that K couples, which share a cell of the space or a contact row.
     pub fn with_rows<const D: usize>(space: &Space<D>, rows: &Csr, frame: &Frame<D>) -> Self {
         let coupled = (0..rows.rows()).map(|q| {
             let mut nodes: Vec<u32> = rows.row(q).map(|(dof, _)| (dof / D) as u32).collect();
@@ -36,9 +36,9 @@ impl NodeGraph {
         Self::new(space, &coupled.filter(|nodes| nodes.len() > 1).collect::<Vec<_>>(), frame)
     }
 
-    /// The graph of a space's cells plus `extra` sets of nodes that are coupled among themselves (the nodes of
-    /// each contact row: pattern of B'B). The nodes that `frame` ties are one node in it, their master; alone they only
-    /// meet themselves.
+    /// Build the graph of a space's cells plus `extra` sets of nodes that are coupled among themselves. These are the nodes of
+    /// each contact row, the pattern of B'B. The nodes that `frame` ties are represented by their master. Their own rows have
+    /// the diagonal alone.
     pub fn new<const D: usize>(space: &Space<D>, extra: &[Vec<u32>], frame: &Frame<D>) -> Self {
         let n = space.nodes.len();
         let merged: Vec<u32> = match frame.master.is_empty() {
@@ -49,20 +49,7 @@ impl NodeGraph {
         let tied: Vec<[u32; 1]> = frame.master.keys().map(|&node| [node]).collect();
         let alone = tied.iter().map(|node| &node[..]);
         let sets = || cells.chunks_exact(space.stride).chain(extra.iter().map(Vec::as_slice)).chain(alone.clone());
-        // node -> sets that contain it
-        let mut start = vec![0u32; n + 1];
-        sets().flatten().for_each(|&node| start[node as usize + 1] += 1);
-        for i in 0..n {
-            start[i + 1] += start[i];
-        }
-        let mut next = start.clone();
-        let mut member = vec![0u32; start[n] as usize];
-        for (index, set) in sets().enumerate() {
-            for &node in set {
-                member[next[node as usize] as usize] = index as u32;
-                next[node as usize] += 1;
-            }
-        }
+        let (start, sets_of_nodes) = sets_by_node(n, sets);
         let cell_count = space.cell_count();
         let set = |index: u32| -> &[u32] {
             let index = index as usize;
@@ -72,15 +59,15 @@ impl NodeGraph {
                 extra.get(index - cell_count).map_or_else(|| &tied[index - cell_count - extra.len()][..], Vec::as_slice)
             }
         };
-        let mut seen = vec![u32::MAX; n];
+        let mut last_row = vec![u32::MAX; n];
         let master = if merged.is_empty() { Vec::new() } else { (0..n as u32).map(|node| frame.node(node)).collect() };
         let mut graph = NodeGraph { ptr: vec![0], col: Vec::with_capacity(8 * n), master };
         for i in 0..n {
             let first = graph.col.len();
-            for &index in &member[start[i] as usize..start[i + 1] as usize] {
+            for &index in &sets_of_nodes[start[i] as usize..start[i + 1] as usize] {
                 for &node in set(index) {
-                    if seen[node as usize] != i as u32 {
-                        seen[node as usize] = i as u32;
+                    if last_row[node as usize] != i as u32 {
+                        last_row[node as usize] = i as u32;
                         graph.col.push(node);
                     }
                 }
@@ -91,7 +78,7 @@ impl NodeGraph {
         graph
     }
 
-    /// The rows of some nodes; those of others are empty.
+    /// Return the graph with the rows of some nodes only; the rows of others are empty.
     pub fn of(&self, keep: impl Fn(usize) -> bool) -> Self {
         let mut graph = Self { ptr: vec![0], col: Vec::new(), master: self.master.clone() };
         for node in 0..self.ptr.len() - 1 {
@@ -103,18 +90,23 @@ impl NodeGraph {
         graph
     }
 
-    /// Whether the graph has the row of the node that stands for a node.
+    /// Return the master of a node, or the node itself if it is not tied.
+    fn master(&self, node: u32) -> u32 {
+        self.master.get(node as usize).copied().unwrap_or(node)
+    }
+
+    /// Return whether the graph has the row of a node, or of its master.
     fn has(&self, node: u32) -> bool {
-        let node = self.master.get(node as usize).copied().unwrap_or(node) as usize;
+        let node = self.master(node) as usize;
         self.ptr[node] < self.ptr[node + 1]
     }
 
-    /// Entries of the matrix on this graph with D x D blocks.
+    /// Return the number of entries of the matrix on this graph with D x D blocks.
     pub fn entries<const D: usize>(&self) -> usize {
         D * D * self.col.len()
     }
 
-    /// Scalar compressed rows with D x D blocks on this graph, all zero.
+    /// Return the zero matrix on this graph, as scalar compressed rows with D x D blocks.
     fn matrix<const D: usize>(&self) -> Csr {
         let n = self.ptr.len() - 1;
         let mut ptr = Vec::with_capacity(D * n + 1);
@@ -130,16 +122,38 @@ impl NodeGraph {
         Csr { columns: D * n, ptr, values: vec![0.0; col.len()], col }
     }
 
-    /// Where block (i, j) starts in the values of [`NodeGraph::matrix`], and the distance between its rows.
-    fn block<const D: usize>(&self, i: u32, j: u32) -> (usize, usize) {
-        let [i, j] = [i, j].map(|node| self.master.get(node as usize).copied().unwrap_or(node));
+    /// Add a block to a matrix on this graph, in the rows of node `i` and the columns of node `j`.
+    fn add_block<const D: usize>(&self, nodes: [u32; 2], entry: impl Fn(usize, usize) -> f64, matrix: &mut Csr) {
+        let [i, j] = nodes.map(|node| self.master(node));
         let (from, to) = (self.ptr[i as usize] as usize, self.ptr[i as usize + 1] as usize);
-        let slot = match self.col[from..to].binary_search(&j) {
-            Ok(slot) => slot,
-            Err(_) => unreachable!("the graph holds every pair of nodes of a cell"),
+        let Ok(place) = self.col[from..to].binary_search(&j) else {
+            unreachable!("the graph holds every pair of nodes of a cell")
         };
-        (D * D * from + D * slot, D * (to - from))
+        let (start, row_length) = (D * D * from + D * place, D * (to - from));
+        for i in 0..D {
+            for j in 0..D {
+                matrix.values[start + i * row_length + j] += entry(i, j);
+            }
+        }
     }
+}
+
+/// Invert a list of sets of nodes below `n`. Return row starts, n + 1 entries, and the indices of the sets that contain each node.
+fn sets_by_node<'a, I: Iterator<Item = &'a [u32]>>(n: usize, sets: impl Fn() -> I) -> (Vec<u32>, Vec<u32>) {
+    let mut start = vec![0u32; n + 1];
+    sets().flatten().for_each(|&node| start[node as usize + 1] += 1);
+    for i in 0..n {
+        start[i + 1] += start[i];
+    }
+    let mut next = start.clone();
+    let mut indices = vec![0u32; start[n] as usize];
+    for (index, set) in sets().enumerate() {
+        for &node in set {
+            indices[next[node as usize] as usize] = index as u32;
+            next[node as usize] += 1;
+        }
+    }
+    (start, indices)
 }
 
 /// A stiffness between two nodes of one cell or facet, as springs to the ground give it.
@@ -148,35 +162,33 @@ impl NodeGraph {
 pub struct NodalBlock<const D: usize> {
     /// The two nodes.
     pub nodes: [u32; 2],
-    /// Force at the first one for a displacement of the second.
+    /// Force at the first node for a displacement of the second.
     pub block: [[f64; D]; D],
 }
 
-/// Adds springs to a stiffness matrix on a graph.
+/// Add springs to a stiffness matrix on a graph.
 pub fn add_blocks<const D: usize>(graph: &NodeGraph, blocks: &[NodalBlock<D>], matrix: &mut Csr) {
-    for NodalBlock { nodes: [a, b], block } in blocks.iter().filter(|block| graph.has(block.nodes[0])) {
-        let (start, step) = graph.block::<D>(*a, *b);
-        for (i, row) in block.iter().enumerate() {
-            for (j, value) in row.iter().enumerate() {
-                matrix.values[start + i * step + j] += value;
-            }
-        }
+    for NodalBlock { nodes, block } in blocks.iter().filter(|block| graph.has(block.nodes[0])) {
+        graph.add_block::<D>(*nodes, |i, j| block[i][j], matrix);
     }
 }
 
-/// Why a body could not be assembled.
+/// The reason why a body could not be assembled.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Defect {
-    /// Cell (number within the body) with a singular or inverted map.
+    /// The cell of this index within the body has a singular or inverted map.
     Inverted(usize),
-    /// No elasticity: number of the cell's spec, place, and why.
+    /// A point has no elasticity: index of the cell's spec, point (x, y, z), and reason.
     Elasticity(usize, [f64; 3], Flaw),
 }
 
-/// Quadrature of strain energies.
+/// The quadrature rules of strain energies.
 pub struct Rules {
+    /// Rule of straight cells with constant elasticity.
     affine: Rule,
+    /// Rule of curved cells with constant elasticity.
     curved: Rule,
+    /// Rule of cells with varying elasticity, and of bodies of revolution.
     varying: Rule,
 }
 
@@ -188,7 +200,7 @@ impl Rules {
         Self { affine: of_degree(affine), curved: of_degree(5), varying: of_degree(varying) }
     }
 
-    /// Return the rule for a cell with these nodes, where Hooke's law `is_constant` or not.
+    /// Return the rule for a cell with node coordinates `x`, in which Hooke's law `is_constant` or not.
     pub fn of<const D: usize>(&self, x: &[[f64; D]], is_constant: bool, axisymmetric: bool) -> &Rule {
         match is_constant && !axisymmetric {
             false => &self.varying,
@@ -198,79 +210,106 @@ impl Rules {
     }
 }
 
-/// Stiffness matrix of a space on a graph, which may have the rows of some nodes only. Where the elasticity varies within a cell, and
-/// in bodies of revolution, it is taken at the points of a rule of degree 2 (P1) or 5 (P2); all of these lie off the axis.
+/// Assemble the stiffness matrix of a space on a graph, which may have the rows of some nodes only.
+///
+/// Where the elasticity varies within a cell, and in bodies of revolution, it is evaluated at the points of a rule of degree 2
+/// (P1) or 5 (P2). All of these points lie off the axis.
 ///
 /// # Errors
 /// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity.
 pub fn stiffness<const D: usize>(space: &Space<D>, graph: &NodeGraph, elasticity: &Elasticity) -> Result<Csr, Defect> {
     let mut matrix = graph.matrix::<D>();
-    let rules = Rules::new::<D>(space.order);
-    let mut hoop = Vec::new();
-    let stride = space.stride;
-    let mut local = vec![[[0.0; D]; D]; stride * stride];
-    let mut x = vec![[0.0; D]; stride];
-    for (index, cell) in space.cells.chunks_exact(stride).enumerate() {
-        let mut here = [false; element::MOST];
-        here.iter_mut().zip(cell).for_each(|(here, &node)| *here = graph.has(node));
-        if !here.contains(&true) {
-            continue;
-        }
-        for (x, &node) in x.iter_mut().zip(cell) {
-            *x = space.nodes[node as usize];
-        }
-        let constant = elasticity.constant_in(index);
-        let rule = rules.of(&x, constant.is_some(), space.axisymmetric);
-        local.fill([[0.0; D]; D]);
-        for (l, weight) in rule.iter() {
-            let (gradient, measure) = element::gradients(space.order, &x, l).ok_or(Defect::Inverted(index))?;
-            let gradient = &gradient[..stride];
-            let mut weight = weight * measure;
-            if space.axisymmetric {
-                let phi = element::values(space.order, l);
-                let at = interpolate(&x, &phi);
-                weight *= space.circle(&at);
-                hoop.clear();
-                hoop.extend(phi[..stride].iter().map(|&phi| space.hoop(&at, phi)));
-            }
-            match constant {
-                Some(material) => material.accumulate(gradient, &hoop, weight, &mut local),
-                None => {
-                    let at = space.in_scene(interpolate(&x, &element::values(space.order, l)));
-                    let material = elasticity
-                        .at(index, at)
-                        .map_err(|flaw| Defect::Elasticity(elasticity.region(index), at, flaw))?;
-                    material.accumulate(gradient, &hoop, weight, &mut local);
-                }
-            }
-        }
-        for a in 0..stride {
-            for b in a..stride {
-                let block = &local[a * stride + b];
-                if here[a] {
-                    let (start, step) = graph.block::<D>(cell[a], cell[b]);
-                    for i in 0..D {
-                        for j in 0..D {
-                            matrix.values[start + i * step + j] += block[i][j];
-                        }
-                    }
-                }
-                if a != b && here[b] {
-                    let (start, step) = graph.block::<D>(cell[b], cell[a]);
-                    for i in 0..D {
-                        for j in 0..D {
-                            matrix.values[start + i * step + j] += block[j][i];
-                        }
-                    }
-                }
-            }
+    let mut integrator = CellIntegrator::new(space, elasticity);
+    for (index, cell) in space.cells.chunks_exact(space.stride).enumerate() {
+        let mut has_rows = [false; element::MOST];
+        has_rows.iter_mut().zip(cell).for_each(|(has_rows, &node)| *has_rows = graph.has(node));
+        if has_rows.contains(&true) {
+            let blocks = integrator.stiffness(index)?;
+            scatter(graph, cell, &has_rows, blocks, &mut matrix);
         }
     }
     Ok(matrix)
 }
 
-/// Whether the mid-edge nodes of a simplex with `vertices` vertices lie in the middle of straight edges (to rounding of the
-/// coordinates).
+/// An integrator of cell stiffness matrices, with its work arrays.
+struct CellIntegrator<'a, const D: usize> {
+    space: &'a Space<D>,
+    elasticity: &'a Elasticity,
+    rules: Rules,
+    /// Node coordinates of the cell.
+    x: Vec<[f64; D]>,
+    /// Shape functions over the radius at a point of a body of revolution; empty in other bodies.
+    hoop: Vec<f64>,
+    /// Blocks of the cell's stiffness matrix, `stride` x `stride`. Only those with row <= column are set.
+    blocks: Vec<[[f64; D]; D]>,
+}
+
+impl<'a, const D: usize> CellIntegrator<'a, D> {
+    fn new(space: &'a Space<D>, elasticity: &'a Elasticity) -> Self {
+        let (rules, stride) = (Rules::new::<D>(space.order), space.stride);
+        let (x, blocks) = (vec![[0.0; D]; stride], vec![[[0.0; D]; D]; stride * stride]);
+        Self { space, elasticity, rules, x, hoop: Vec::new(), blocks }
+    }
+
+    /// Return the blocks of the stiffness matrix of cell `index`.
+    fn stiffness(&mut self, index: usize) -> Result<&[[[f64; D]; D]], Defect> {
+        let Self { space, elasticity, rules, x, hoop, blocks } = self;
+        let stride = space.stride;
+        for (x, &node) in x.iter_mut().zip(space.cell(index)) {
+            *x = space.nodes[node as usize];
+        }
+        blocks.fill([[0.0; D]; D]);
+        let constant = elasticity.constant_in(index);
+        for (l, weight) in rules.of(x, constant.is_some(), space.axisymmetric).iter() {
+            let (gradient, measure) = element::gradients(space.order, x, l).ok_or(Defect::Inverted(index))?;
+            let gradient = &gradient[..stride];
+            let mut weight = weight * measure;
+            if space.axisymmetric {
+                let phi = element::values(space.order, l);
+                let at = interpolate(x, &phi);
+                weight *= space.circle(&at);
+                hoop.clear();
+                hoop.extend(phi[..stride].iter().map(|&phi| space.hoop(&at, phi)));
+            }
+            match constant {
+                Some(material) => material.accumulate(gradient, hoop, weight, blocks),
+                None => {
+                    let at = space.in_scene(interpolate(x, &element::values(space.order, l)));
+                    let material = elasticity
+                        .at(index, at)
+                        .map_err(|flaw| Defect::Elasticity(elasticity.region(index), at, flaw))?;
+                    material.accumulate(gradient, hoop, weight, blocks);
+                }
+            }
+        }
+        Ok(blocks)
+    }
+}
+
+/// Add the symmetric stiffness matrix of a cell to a matrix. `has_rows` says which nodes of the cell have rows there.
+fn scatter<const D: usize>(
+    graph: &NodeGraph,
+    cell: &[u32],
+    has_rows: &[bool],
+    blocks: &[[[f64; D]; D]],
+    matrix: &mut Csr,
+) {
+    let stride = cell.len();
+    for a in 0..stride {
+        for b in a..stride {
+            let block = &blocks[a * stride + b];
+            if has_rows[a] {
+                graph.add_block::<D>([cell[a], cell[b]], |i, j| block[i][j], matrix);
+            }
+            if a != b && has_rows[b] {
+                graph.add_block::<D>([cell[b], cell[a]], |i, j| block[j][i], matrix);
+            }
+        }
+    }
+}
+
+/// Return whether the mid-edge nodes of a simplex with `vertices` vertices lie in the middle of straight edges, up to rounding of
+/// the coordinates `x`.
 pub fn is_straight<const D: usize>(x: &[[f64; D]], vertices: usize) -> bool {
     element::EDGES[..x.len() - vertices].iter().enumerate().all(|(k, &(i, j))| {
         let length: f64 = (0..D).map(|c| (x[i][c] - x[j][c]).abs()).sum();
@@ -278,7 +317,7 @@ pub fn is_straight<const D: usize>(x: &[[f64; D]], vertices: usize) -> bool {
     })
 }
 
-/// Nodal forces of a body force density (per volume) on the cells that are here.
+/// Return the nodal forces of a body force `density` (per volume) on the cells of a space.
 pub fn body_force<const D: usize>(
     space: &Space<D>,
     parts: Parts,
@@ -293,7 +332,7 @@ pub fn body_force<const D: usize>(
     }
     for index in 0..space.cell_count() {
         let x = space.cell_nodes(index);
-        let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
+        let cell = space.cell(index);
         for (l, weight) in rule.iter() {
             let Some((_, measure)) = element::gradients(space.order, &x, l) else { continue };
             let phi = element::values(space.order, l);
@@ -310,7 +349,7 @@ pub fn body_force<const D: usize>(
     NodalForces::new(nodes.into_iter(), &load)
 }
 
-/// Point of an element with node coordinates `x` and shape function values `phi`.
+/// Return the point of an element with node coordinates `x` and shape function values `phi`.
 pub fn interpolate<const D: usize>(x: &[[f64; D]], phi: &[f64]) -> [f64; D] {
     std::array::from_fn(|i| x.iter().zip(phi).map(|(x, phi)| phi * x[i]).sum())
 }

@@ -6,19 +6,18 @@
 //! 0-(2)-1       5 4              edges 4: 01, 5: 12, 6: 02, 7: 03, 8: 13, 9: 23
 //!              0 3 1
 //! ```
-//! One function serves lines, triangles and tetrahedra: phi_i = L_i, or L_i (2 L_i - 1) at vertices and
-//! 4 L_i L_j on edges.
+//! In barycentric coordinates l the shape functions of lines, triangles and tetrahedra are the same: phi_i = l_i for order one,
+//! and l_i (2 l_i - 1) at vertices and 4 l_i l_j on edges for order two.
 
 use crate::problem::order::Order;
 
-/// Edges of the simplex with four vertices in the order of the mid-edge nodes; a triangle uses 01 12 02 and a
-/// line 01.
+/// Edges of the simplex with four vertices in the order of the mid-edge nodes. A triangle uses 01 12 02 and a line 01.
 pub const EDGES: [(usize, usize); 6] = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)];
 
-/// Most nodes of an element (P2 tetrahedron).
+/// Largest number of nodes of an element (P2 tetrahedron).
 pub const MOST: usize = 10;
 
-/// Number of nodes of the simplex with `vertices` vertices.
+/// Return the number of nodes of the simplex with `vertices` vertices.
 pub fn node_count(vertices: usize, order: Order) -> usize {
     match order {
         Order::P1 => vertices,
@@ -26,7 +25,7 @@ pub fn node_count(vertices: usize, order: Order) -> usize {
     }
 }
 
-/// Values of the shape functions at barycentric point `l`; the first `node_count` entries are set.
+/// Return the values of the shape functions at barycentric point `l`; the first `node_count` entries are set.
 pub fn values(order: Order, l: &[f64]) -> [f64; MOST] {
     let vertices = l.len();
     let mut phi = [0.0; MOST];
@@ -44,8 +43,8 @@ pub fn values(order: Order, l: &[f64]) -> [f64; MOST] {
     phi
 }
 
-/// Derivatives of the shape functions with respect to the barycentric coordinates (as independent
-/// variables) at `l`: entry `[node][coordinate]`, zero beyond the coordinates of `l`.
+/// Return the derivatives of the shape functions by the barycentric coordinates (as independent variables) at `l`. Entry
+/// `[node][coordinate]` is zero beyond the coordinates of `l`.
 pub fn derivatives(order: Order, l: &[f64]) -> [[f64; 4]; MOST] {
     let vertices = l.len();
     let mut d = [[0.0; 4]; MOST];
@@ -68,25 +67,24 @@ pub fn derivatives(order: Order, l: &[f64]) -> [[f64; 4]; MOST] {
     d
 }
 
-/// Barycentric coordinates of a node of an element with so many vertices.
+/// Return the barycentric coordinates of a node of an element with so many vertices.
 pub fn place(vertices: usize, node: usize) -> [f64; 4] {
     let ends = node.checked_sub(vertices).map_or((node, node), |edge| EDGES[edge]);
     std::array::from_fn(|k| 0.5 * f64::from(u8::from(k == ends.0) + u8::from(k == ends.1)))
 }
 
-/// Barycentric coordinates of the nodes of an element.
+/// Return the barycentric coordinates of the nodes of an element with `N` vertices.
 pub fn nodes<const N: usize>(order: Order) -> Vec<[f64; N]> {
     (0..node_count(N, order)).map(|node| std::array::from_fn(|k| place(N, node)[k])).collect()
 }
 
-/// Gradients in space of the shape functions of a cell at barycentric point `l`, and the volume measure
-/// there (area or volume of the whole simplex if it were affine with this Jacobian).
+/// Return the gradients in space of the shape functions of a cell at barycentric point `l`, and the measure there. The measure is
+/// the area or volume of the affine simplex with the same Jacobian. The result is `None` if the map is singular or inverted there.
 ///
-/// `l` has D + 1 entries; `x` are the coordinates of the element's nodes (isoparametric). `None` if the map is singular
-/// or inverted there.
+/// `l` has D + 1 entries, and `x` are the coordinates of the element's nodes (isoparametric).
 pub fn gradients<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> Option<([[f64; D]; MOST], f64)> {
     let d = derivatives(order, l);
-    // columns of the Jacobian: derivative along L_{c+1} - L_0
+    // Column c of the Jacobian is the derivative along l_{c+1} - l_0.
     let mut jacobian = [[0.0; D]; D];
     for (node, x) in x.iter().enumerate() {
         for c in 0..D {
@@ -107,6 +105,7 @@ pub fn gradients<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> Opt
     (measure > 0.0).then_some((gradient, measure))
 }
 
+/// Return the inverse and the determinant of a matrix; `None` if it is singular or the determinant overflows.
 fn invert<const D: usize>(a: &[[f64; D]; D]) -> Option<([[f64; D]; D], f64)> {
     let mut inverse = [[0.0; D]; D];
     let det;

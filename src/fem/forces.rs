@@ -1,88 +1,88 @@
-//! Forces at nodes of a body.
+//! Forces at the nodes of a body.
 
 use serde::{Deserialize, Serialize};
 use crate::exchange::Plain;
-use super::{pad, place};
+use super::{length, pad, place};
 use crate::linalg::{Total, dot};
 
-/// Forces at nodes, without those that are zero: most loads are on surfaces.
+/// The forces at nodes that are not zero, since most loads act on surfaces only.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain")]
 pub struct NodalForces<const D: usize> {
-    /// Their nodes, sorted, each once.
+    /// Nodes of the forces, sorted, each once.
     nodes: Vec<u32>,
     forces: Vec<[f64; D]>,
 }
 
 impl<const D: usize> NodalForces<D> {
-    /// From the forces at `nodes`, which are sorted, `D` components each.
+    /// Collect the forces at the sorted `nodes`, with `D` components each.
     pub fn new(nodes: impl Iterator<Item = u32>, forces: &[f64]) -> Self {
         let forces = forces.chunks_exact(D).map(|force| std::array::from_fn(|c| force[c]));
         let (nodes, forces) = nodes.zip(forces).filter(|(_, force): &(u32, [f64; D])| *force != [0.0; D]).unzip();
         Self { nodes, forces }
     }
 
-    /// Nodes and their forces.
+    /// Return the nodes and their forces.
     pub fn iter(&self) -> impl Iterator<Item = (u32, [f64; D])> {
         self.nodes.iter().copied().zip(self.forces.iter().copied())
     }
 
-    /// These and other forces together.
+    /// Return the sum of these and other forces.
     #[must_use]
     pub fn and(self, others: Self) -> Self {
         if self.nodes.is_empty() || others.nodes.is_empty() {
             return if self.nodes.is_empty() { others } else { self };
         }
-        // of a node the force of `self` comes first
+        // At each node the force of `self` is added first.
         self.iter().chain(others.iter()).collect()
     }
 
-    /// Those at nodes for which `keep` holds.
+    /// Return the forces at the nodes for which `keep` holds.
     #[must_use]
     pub fn only(&self, keep: impl Fn(u32) -> bool) -> Self {
         let (nodes, forces) = self.iter().filter(|(node, _)| keep(*node)).unzip();
         Self { nodes, forces }
     }
 
-    /// Their sum.
+    /// Return the resultant of the forces.
     pub fn sum(&self) -> [f64; 3] {
         std::array::from_fn(|c| self.forces.iter().map(|&force| pad(force)[c]).collect::<Total>().value())
     }
 
-    /// Their work on a displacement, and the largest that forces and displacements of these sizes can do, node by node.
+    /// Return the work of the forces on a displacement, and the largest work of forces and displacements of these sizes at each
+    /// node. `at` gives the displacement of a node.
     pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [f64; 2] {
-        let size = |v: &[f64]| dot(v, v).sqrt();
         let [mut work, mut largest] = [Total::default(); 2];
         for (node, force) in self.iter() {
             let u = at(node);
             work.add(dot(&u, &force));
-            largest.add(size(&u) * size(&force));
+            largest.add(length(u) * length(force));
         }
         [work.value(), largest.value()]
     }
 
-    /// Forces at all dofs of a body with so many nodes.
+    /// Return the forces at all dofs of a body with so many nodes.
     pub fn all(&self, nodes: usize) -> Vec<f64> {
         let mut all = vec![0.0; D * nodes];
         self.iter().for_each(|(node, force)| all[D * node as usize..][..D].copy_from_slice(&force));
         all
     }
 
-    /// Those at some nodes, which are sorted, by their places among these.
+    /// Return the forces at the sorted `nodes`, renumbered by their positions in this slice.
     #[must_use]
     pub fn on(&self, nodes: &[u32]) -> Self {
         let (nodes, forces) = self.iter().filter_map(|(node, force)| Some((place(nodes, node)?, force))).unzip();
         Self { nodes, forces }
     }
 
-    /// Whether all of them are numbers.
+    /// Return whether all forces are finite.
     pub fn is_finite(&self) -> bool {
         self.forces.as_flattened().iter().all(|f| f.is_finite())
     }
 }
 
 impl<const D: usize> FromIterator<(u32, [f64; D])> for NodalForces<D> {
-    /// Of forces at nodes in any order: those of one node are added in their order.
+    /// Collect forces at nodes in any order. The forces at one node are added in their order.
     fn from_iter<I: IntoIterator<Item = (u32, [f64; D])>>(forces: I) -> Self {
         let mut all: Vec<(u32, [f64; D])> = forces.into_iter().collect();
         all.sort_by_key(|entry| entry.0);

@@ -1,69 +1,69 @@
-//! The coordinates in which a body is solved: u = T v.
+//! The coordinates v in which a body is solved. Nodal displacements are u = T v.
 //!
-//! A support along an inclined direction turns the axes of its nodes, so that it prescribes one component there. A rigid
-//! surface ties its nodes to one of them, the master, which stands for all. In v every support is a prescribed dof, and blocks
-//! of K keep their size.
+//! A support along an inclined direction rotates the axes of its nodes, so that it prescribes one component there. A rigid
+//! surface ties its nodes to one of them, the master, whose dofs move all of them. In v every support is a prescribed dof, and
+//! the blocks of K keep their size.
 
 use serde::{Deserialize, Serialize};
 use crate::exchange::Plain;
 use crate::linalg::Csr;
 use std::collections::BTreeMap;
 
-/// The map from dofs v to nodal displacements u, and the transposed one for forces. Everything that is not named is the same
+/// The map T from dofs v to nodal displacements u, and the transposed map for forces. Nodes without an entry have the same values
 /// in both.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(bound = "[[f64; D]; D]: Plain")]
 pub struct Frame<const D: usize> {
-    /// Orthonormal axes of turned nodes: v_i = axis_i . u.
+    /// Orthonormal axes of rotated nodes: v_i = axis_i . u.
     pub axes: BTreeMap<u32, [[f64; D]; D]>,
-    /// Master of each tied node: u = v + v_master, and v = 0 is to be prescribed.
+    /// Master of each tied node: u = v + v_master, and v = 0 must be prescribed.
     pub master: BTreeMap<u32, u32>,
 }
 
-/// The place of a node among sorted ones.
+/// Return the position of a node in a sorted slice.
 pub fn place(nodes: &[u32], node: u32) -> Option<u32> {
     nodes.binary_search(&node).ok().map(|place| place as u32)
 }
 
 impl<const D: usize> Frame<D> {
-    /// The node whose dofs move a node.
+    /// Return the node whose dofs move a node: its master, or the node itself.
     pub fn node(&self, node: u32) -> u32 {
         self.master.get(&node).copied().unwrap_or(node)
     }
 
-    /// The same of some nodes, sorted, by their places among these.
+    /// Return the map for the sorted `nodes`, renumbered by their positions in this slice.
     pub fn on(&self, nodes: &[u32]) -> Self {
-        let here = |node: &u32| place(nodes, *node);
-        let axes = self.axes.iter().filter_map(|(node, axes)| Some((here(node)?, *axes)));
-        let master = self.master.iter().filter_map(|(node, master)| Some((here(node)?, here(master)?)));
+        let number = |node: &u32| place(nodes, *node);
+        let axes = self.axes.iter().filter_map(|(node, axes)| Some((number(node)?, *axes)));
+        let master = self.master.iter().filter_map(|(node, master)| Some((number(node)?, number(master)?)));
         Self { axes: axes.collect(), master: master.collect() }
     }
 
-    /// A force at a node as a force at dofs: their node, and its components. The same for a row of B.
+    /// Return a force at a node, or the entries of a row of B, as a force at dofs: the node of these dofs and the components.
     pub fn force(&self, node: u32, force: [f64; D]) -> (u32, [f64; D]) {
         let node = self.node(node);
-        (node, self.turned(node, force))
+        (node, self.along_axes(node, force))
     }
 
-    /// Components of a vector along the axes of a node.
-    fn turned(&self, node: u32, vector: [f64; D]) -> [f64; D] {
+    /// Return the components of a vector along the axes of a node.
+    fn along_axes(&self, node: u32, vector: [f64; D]) -> [f64; D] {
         match self.axes.get(&node) {
             None => vector,
             Some(axes) => axes.map(|axis| (0..D).map(|c| axis[c] * vector[c]).sum()),
         }
     }
 
-    /// Nodal forces as forces at dofs, T'f: those of tied nodes go to their master.
+    /// Replace nodal forces f by forces at dofs, T'f. The forces of tied nodes go to their master.
     pub fn forces(&self, f: &mut [f64]) {
         for (&node, &master) in &self.master {
             for c in 0..D {
                 f[D * master as usize + c] += std::mem::take(&mut f[D * node as usize + c]);
             }
         }
-        self.turn(f);
+        self.rotate(f);
     }
 
-    /// Dofs of nodal displacements, v = T^-1 u.
+    /// Return the dofs of nodal displacements, v = T^-1 u.
     pub fn dofs(&self, u: &[f64]) -> Vec<f64> {
         let mut v = u.to_vec();
         for (&node, &master) in &self.master {
@@ -71,26 +71,26 @@ impl<const D: usize> Frame<D> {
                 v[D * node as usize + c] -= u[D * master as usize + c];
             }
         }
-        self.turn(&mut v);
+        self.rotate(&mut v);
         v
     }
 
-    /// What a displacement field is at a dof.
+    /// Return the value at a dof of a field with the nodal displacements `u`.
     pub fn dof(&self, dof: usize, u: impl Fn(u32) -> [f64; D]) -> f64 {
         self.at((dof / D) as u32, u)[dof % D]
     }
 
-    /// What it is at the dofs of a node.
+    /// Return the values at the dofs of a node of a field with the nodal displacements `u`.
     pub fn at(&self, node: u32, u: impl Fn(u32) -> [f64; D]) -> [f64; D] {
-        let mut own = u(node);
+        let mut relative = u(node);
         if let Some(&master) = self.master.get(&node) {
             let of_master = u(master);
-            own = std::array::from_fn(|c| own[c] - of_master[c]);
+            relative = std::array::from_fn(|c| relative[c] - of_master[c]);
         }
-        self.turned(node, own)
+        self.along_axes(node, relative)
     }
 
-    /// Nodal displacements of dofs, u = T v.
+    /// Return the nodal displacements of dofs, u = T v.
     pub fn displacements(&self, v: &[f64]) -> Vec<f64> {
         let mut u = v.to_vec();
         for (&node, axes) in &self.axes {
@@ -106,35 +106,36 @@ impl<const D: usize> Frame<D> {
         u
     }
 
-    fn turn(&self, values: &mut [f64]) {
+    /// Replace the vectors at rotated nodes by their components along the axes there.
+    fn rotate(&self, values: &mut [f64]) {
         for &node in self.axes.keys() {
             let at = D * node as usize;
-            let turned = self.turned(node, std::array::from_fn(|c| values[at + c]));
-            values[at..at + D].copy_from_slice(&turned);
+            let rotated = self.along_axes(node, std::array::from_fn(|c| values[at + c]));
+            values[at..at + D].copy_from_slice(&rotated);
         }
     }
 
-    /// Turns rows and columns of a symmetric matrix of D x D blocks in place, which may have the rows of some nodes only. (Ties are
-    /// a matter of its pattern.)
+    /// Rotate the rows and columns of a symmetric matrix of D x D blocks in place. The matrix may have the rows of some nodes only.
+    /// Its pattern already accounts for tied nodes.
     pub fn turn_matrix(&self, k: &mut Csr) {
         if self.axes.is_empty() {
             return;
         }
-        let mut is_turned = vec![false; k.columns / D];
+        let mut is_rotated = vec![false; k.columns / D];
         for &node in self.axes.keys() {
-            is_turned[node as usize] = true;
+            is_rotated[node as usize] = true;
             let first = D * node as usize;
             let rows: [_; D] = std::array::from_fn(|c| k.range(first + c).start);
             for entry in 0..k.range(first).len() {
-                let column = self.turned(node, rows.map(|row| k.values[row + entry]));
+                let column = self.along_axes(node, rows.map(|row| k.values[row + entry]));
                 rows.iter().zip(column).for_each(|(row, value)| k.values[row + entry] = value);
             }
         }
         for block in (0..k.values.len()).step_by(D) {
             let node = k.col[block] as usize / D;
-            if is_turned[node] {
-                let turned = self.turned(node as u32, std::array::from_fn(|c| k.values[block + c]));
-                k.values[block..block + D].copy_from_slice(&turned);
+            if is_rotated[node] {
+                let rotated = self.along_axes(node as u32, std::array::from_fn(|c| k.values[block + c]));
+                k.values[block..block + D].copy_from_slice(&rotated);
             }
         }
     }
@@ -168,7 +169,7 @@ mod tests {
     #[test]
     fn a_turned_matrix_is_the_same_form() {
         let frame = Frame::<2> { axes: BTreeMap::from([(1, [[0.8, 0.6], [-0.6, 0.8]])]), master: BTreeMap::new() };
-        // nodes 0 - 1 - 2, symmetric blocks
+        // The matrix couples the nodes 0 - 1 - 2 by symmetric blocks.
         let dense = |i: usize, j: usize| {
             let (i, j) = (i.min(j), i.max(j));
             if j / 2 - i / 2 > 1 { 0.0 } else { 1.0 + i as f64 + 0.3 * (j * j) as f64 }

@@ -1,6 +1,7 @@
 //! Internal forces and strain energies of displacements, cell by cell, without a matrix.
 //!
-//! They check what solvers have made of assembled matrices, so they share nothing with these but shape functions, quadrature and Hooke's law.
+//! They check the results of solvers that use assembled matrices. Therefore they share with assembly only shape functions, quadrature
+//! and Hooke's law.
 
 use super::elasticity::Elasticity;
 use super::material::Material;
@@ -8,7 +9,7 @@ use super::space::Space;
 use super::{assemble, element};
 use crate::linalg::dot;
 
-/// Forces of the cells of a body on its nodes, and what these forces are measured by.
+/// The internal forces of the cells of a body on its nodes, and the scales that these forces are compared with.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Internal {
     /// K u, one entry a dof.
@@ -21,21 +22,22 @@ pub struct Internal {
     pub bulk: Vec<f64>,
 }
 
-/// An integration point of a cell.
+/// An integration point of a cell, as [`visit`] presents it.
 struct Point<'a, const D: usize> {
     /// Nodes of the cell.
     cell: &'a [u32],
     at: [f64; D],
-    /// Values and gradients of the shape functions.
+    /// Values of the shape functions.
     phi: [f64; element::MOST],
+    /// Gradients of the shape functions.
     gradient: &'a [[f64; D]],
     /// Weight of the point in an integral over the body.
     weight: f64,
     material: Material,
 }
 
-/// Visits the integration points of some cells, those of [`assemble::stiffness`]. A cell that cannot be integrated has made the assembly fail, and
-/// is left out.
+/// Visit the integration points of some cells, which are those of [`assemble::stiffness`]. A cell that cannot be integrated is skipped,
+/// since assembly has already failed on it.
 fn visit<const D: usize>(
     space: &Space<D>,
     elasticity: &Elasticity,
@@ -46,7 +48,7 @@ fn visit<const D: usize>(
     let stride = space.stride;
     let mut x = vec![[0.0; D]; stride];
     for index in cells {
-        let cell = &space.cells[index * stride..(index + 1) * stride];
+        let cell = space.cell(index);
         x.iter_mut().zip(cell).for_each(|(x, &node)| *x = space.nodes[node as usize]);
         let constant = elasticity.constant_in(index);
         for (l, weight) in rules.of(&x, constant.is_some(), space.axisymmetric).iter() {
@@ -66,10 +68,12 @@ fn visit<const D: usize>(
     }
 }
 
-/// Internal forces of a displacement `u`, one entry a dof, of some cells. Right at nodes all of whose cells are among them.
+/// Return the internal forces of some cells for a displacement `u`, one entry a dof. They are complete at nodes all of whose cells are
+/// visited.
 ///
-/// A force is a sum of products of stresses, which are sums of products of strains, which are sums of products of displacements. A sum of n terms has
-/// a rounding error of at most n eps times the sum of their sizes, so that eps times the lengths of all three sums, times the sizes, is a bound.
+/// A force is a sum over stresses, each stress is a sum over strains, and each strain is a sum over displacements. A sum of n terms has a
+/// rounding error of at most n eps times the sum of their sizes. The bound is therefore eps times the lengths of all three sums times
+/// the sizes.
 pub fn forces<const D: usize>(
     space: &Space<D>,
     elasticity: &Elasticity,
@@ -78,40 +82,41 @@ pub fn forces<const D: usize>(
 ) -> Internal {
     let count = space.nodes.len();
     let zero = || vec![0.0; count];
-    let mut all = Internal { force: vec![0.0; D * count], rounding: zero(), diagonal: zero(), bulk: zero() };
+    let mut sums = Internal { force: vec![0.0; D * count], rounding: zero(), diagonal: zero(), bulk: zero() };
     let mut terms = zero();
     let size = |v: &[f64]| v.iter().map(|v| v.abs()).sum::<f64>();
     visit(space, elasticity, cells, |Point { cell, at, phi, gradient, weight, material }: Point<D>| {
         let stress = material.stress(&space.slope(cell, &at, &phi, gradient, u).strain());
         let stiffness = weight * material.norm();
         let slope = |a: usize| size(&gradient[a]) + space.hoop(&at, phi[a]).abs();
-        let moved = |(a, &node): (usize, &u32)| slope(a) * size(&u[D * node as usize..][..D]);
-        let strains: f64 = cell.iter().enumerate().map(moved).sum();
+        let size_of_strain = |(a, &node): (usize, &u32)| slope(a) * size(&u[D * node as usize..][..D]);
+        let strains: f64 = cell.iter().enumerate().map(size_of_strain).sum();
         for (a, &node) in cell.iter().enumerate() {
             let node = node as usize;
-            let force = material_force(&stress, &gradient[a], space.hoop(&at, phi[a]));
-            (0..D).for_each(|c| all.force[D * node + c] += weight * force[c]);
-            all.rounding[node] += stiffness * slope(a) * strains;
-            all.diagonal[node] += stiffness * slope(a).powi(2);
-            all.bulk[node] += stiffness / space.stride as f64;
+            let force = nodal_force(&stress, &gradient[a], space.hoop(&at, phi[a]));
+            (0..D).for_each(|c| sums.force[D * node + c] += weight * force[c]);
+            sums.rounding[node] += stiffness * slope(a) * strains;
+            sums.diagonal[node] += stiffness * slope(a).powi(2);
+            sums.bulk[node] += stiffness / space.stride as f64;
             terms[node] += 1.0;
         }
     });
-    // six strains in a stress, D stresses in a force
+    // A strain has D * stride terms, a stress has six, and a force has D for each integration point.
     let inner = (D * space.stride + 6 + D) as f64;
-    all.rounding.iter_mut().zip(terms).for_each(|(rounding, terms)| *rounding *= f64::EPSILON * (inner + terms));
-    all
+    sums.rounding.iter_mut().zip(terms).for_each(|(rounding, terms)| *rounding *= f64::EPSILON * (inner + terms));
+    sums
 }
 
-/// Force of a stress on the node of a shape function with this gradient; `hoop` is the function over r in a body of revolution, zero in others.
-fn material_force<const D: usize>(stress: &[f64; 6], gradient: &[f64; D], hoop: f64) -> [f64; D] {
-    const PLACE: [[usize; 3]; 3] = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
-    let mut force = std::array::from_fn(|c| (0..D).map(|j| stress[PLACE[c][j]] * gradient[j]).sum());
+/// Return the force of a stress on the node of a shape function with this gradient. In a body of revolution `hoop` is the function over
+/// the radius, in other bodies zero.
+fn nodal_force<const D: usize>(stress: &[f64; 6], gradient: &[f64; D], hoop: f64) -> [f64; D] {
+    const COMPONENT: [[usize; 3]; 3] = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
+    let mut force = std::array::from_fn(|c| (0..D).map(|j| stress[COMPONENT[c][j]] * gradient[j]).sum());
     force[0] += stress[2] * hoop;
     force
 }
 
-/// Products v_i'K v_j of displacements, one entry a dof each, over some cells; i-th row, j-th column, n x n.
+/// Return the products v_i'K v_j of n displacements, with one entry a dof each, over some cells: an n x n matrix by rows.
 pub fn products<const D: usize>(
     space: &Space<D>,
     elasticity: &Elasticity,
@@ -138,7 +143,7 @@ mod tests {
     use crate::fem::{Frame, NodeGraph};
     use crate::problem::{BodySpec, Order, Plane};
 
-    /// The assembled matrix says the same, and its entries lie below the bounds.
+    /// Check that the assembled matrix gives the same forces, and that its entries lie below the bounds.
     fn same_as_matrix<const D: usize>(order: Order, plane: Plane) {
         let mut space = block::<D>(2, order);
         space.axisymmetric = plane == Plane::Axisymmetric;

@@ -1,4 +1,4 @@
-//! Quadratic displacements from linear ones: what multigrid for quadratic elements has as its coarse space.
+//! Interpolation from linear to quadratic displacements. The linear ones are the coarse space of multigrid for quadratic elements.
 
 use super::element::EDGES;
 use super::frame::Frame;
@@ -6,17 +6,17 @@ use super::space::Space;
 use crate::linalg::Csr;
 use crate::problem::order::Order;
 
-/// Displacements in a large space from those in a smaller one.
+/// An interpolation from a coarse space to a fine one.
 #[derive(Debug, Clone)]
 pub struct Interpolation {
-    /// One row a dof; columns: dofs of the smaller space.
+    /// Matrix with one row a dof of the fine space and one column a dof of the coarse space.
     pub rows: Csr,
-    /// Dofs of the smaller space that this rank has.
+    /// Number of dofs of the coarse space on this rank.
     pub own: usize,
 }
 
 impl Interpolation {
-    /// Appends the rows of the next body, whose columns begin at `first`.
+    /// Append the rows of the next body, whose columns begin at `first`.
     pub fn append(&mut self, next: &Self, first: usize) {
         self.own += next.own;
         self.rows.columns = self.rows.columns.max(first + next.rows.columns);
@@ -26,7 +26,7 @@ impl Interpolation {
     }
 }
 
-/// The nodes of linear displacements, sorted: corners of the cells that are here, and nodes that stand for others.
+/// Return the nodes of linear displacements, sorted: the corners of the cells of this rank, and the masters of tied nodes.
 pub fn coarse_nodes<const D: usize>(space: &Space<D>, frame: &Frame<D>) -> Vec<u32> {
     match space.order {
         Order::P1 => (0..space.nodes.len() as u32).collect(),
@@ -37,58 +37,70 @@ pub fn coarse_nodes<const D: usize>(space: &Space<D>, frame: &Frame<D>) -> Vec<u
     }
 }
 
-/// Interpolation from the dofs at the nodes `coarse` ([`coarse_nodes`]) to all dofs of a body: a node in the middle of an edge moves as the
-/// mean of the ends. Prescribed dofs have no part in it, but for a one where they are in both spaces, so that P'KP has their diagonal. Nodes
-/// whose cells are not here have empty rows.
+/// Return the interpolation from the dofs at the nodes `coarse` ([`coarse_nodes`]) to all dofs of a body.
+///
+/// A node in the middle of an edge moves as the mean of the ends. Rows and columns of prescribed dofs are empty, except for a one
+/// where the dof is in both spaces, so that P'KP keeps its diagonal. The rows of nodes without cells on this rank are empty.
 pub fn from_vertices<const D: usize>(
     space: &Space<D>,
     frame: &Frame<D>,
     is_prescribed: impl Fn(usize) -> bool,
     coarse: &[u32],
 ) -> Interpolation {
-    let mut ends: Vec<[u32; 2]> = (0..space.nodes.len() as u32).map(|node| [node; 2]).collect();
+    let own = D * coarse.len();
+    let mut rows = Csr::new(own);
+    for (node, ends) in edge_ends(space).into_iter().enumerate() {
+        let place = coarse.binary_search(&(node as u32));
+        for c in 0..D {
+            rows.push_row(match (place, ends) {
+                (Ok(place), _) => vec![(D * place + c, 1.0)],
+                (Err(_), Some(ends)) if !is_prescribed(D * node + c) => {
+                    // v_c = axis_c . (u_a + u_b)/2, where u_a and u_b are the displacements of the ends.
+                    let unit = std::array::from_fn(|k| f64::from(u8::from(k == c)));
+                    let axis = frame.axes.get(&(node as u32)).map_or(unit, |axes| axes[c]);
+                    mean_of_ends(frame, ends, axis, &is_prescribed, coarse)
+                }
+                _ => Vec::new(),
+            });
+        }
+    }
+    Interpolation { rows, own }
+}
+
+/// Return the vertices at the ends of the edge of each node in the middle of an edge; `None` for other nodes.
+fn edge_ends<const D: usize>(space: &Space<D>) -> Vec<Option<[u32; 2]>> {
+    let mut ends = vec![None; space.nodes.len()];
     if space.order == Order::P2 {
         for cell in space.cells.chunks_exact(space.stride) {
             for (&middle, (a, b)) in cell[D + 1..].iter().zip(EDGES) {
-                ends[middle as usize] = [cell[a], cell[b]];
+                ends[middle as usize] = Some([cell[a], cell[b]]);
             }
         }
     }
-    let unit = |c: usize| std::array::from_fn::<f64, D, _>(|k| f64::from(u8::from(k == c)));
-    let own = D * coarse.len();
-    let mut rows = Csr::new(own);
-    let mut next = 0;
-    for (node, ends) in ends.iter().enumerate() {
-        let is_coarse = coarse.get(next) == Some(&(node as u32));
-        for c in 0..D {
-            if is_coarse {
-                rows.push_row([(D * next + c, 1.0)]);
-                continue;
+    ends
+}
+
+/// Return the row of the mean displacement of two vertices along an axis, without prescribed dofs. The columns are the dofs at the
+/// nodes `coarse`.
+fn mean_of_ends<const D: usize>(
+    frame: &Frame<D>,
+    ends: [u32; 2],
+    axis: [f64; D],
+    is_prescribed: &impl Fn(usize) -> bool,
+    coarse: &[u32],
+) -> Vec<(usize, f64)> {
+    let mut row: Vec<(usize, f64)> = Vec::new();
+    for end in ends {
+        let (end, shares) = frame.force(end, axis);
+        let Ok(place) = coarse.binary_search(&end) else { unreachable!("a vertex is coarse, and so is its master") };
+        for (k, share) in shares.into_iter().enumerate().filter(|(k, _)| !is_prescribed(D * end as usize + k)) {
+            match row.iter_mut().find(|entry| entry.0 == D * place + k) {
+                Some(entry) => entry.1 += 0.5 * share,
+                None => row.push((D * place + k, 0.5 * share)),
             }
-            let mut row: Vec<(usize, f64)> = Vec::new();
-            // v_c = axis_c . (u_a + u_b)/2, and u = sum_k axis_k v_k at the ends
-            let axis = frame.axes.get(&(node as u32)).map_or(unit(c), |axes| axes[c]);
-            let is_here = ends[0] as usize != node;
-            for end in ends.iter().filter(|_| is_here && !is_prescribed(D * node + c)) {
-                let (end, shares) = frame.force(*end, axis);
-                let Ok(place) = coarse.binary_search(&end) else {
-                    unreachable!("a vertex is coarse, and so is its master")
-                };
-                for (k, share) in shares.into_iter().enumerate() {
-                    if is_prescribed(D * end as usize + k) {
-                        continue;
-                    }
-                    match row.iter_mut().find(|entry| entry.0 == D * place + k) {
-                        Some(entry) => entry.1 += 0.5 * share,
-                        None => row.push((D * place + k, 0.5 * share)),
-                    }
-                }
-            }
-            rows.push_row(row);
         }
-        next += usize::from(is_coarse);
     }
-    Interpolation { rows, own }
+    row
 }
 
 #[cfg(test)]
@@ -96,7 +108,7 @@ mod tests {
     use super::*;
     use crate::fem::sample::block;
 
-    /// Values at all dofs, and those of them at coarse nodes.
+    /// Return the values at all dofs, and those at the dofs of coarse nodes.
     fn both(space: &Space<3>, frame: &Frame<3>, u: impl Fn(&[f64; 3]) -> [f64; 3]) -> (Vec<f64>, Vec<f64>) {
         let all = frame.dofs(&space.nodes.iter().flat_map(u).collect::<Vec<_>>());
         let coarse = coarse_nodes(space, frame);
@@ -108,7 +120,7 @@ mod tests {
         assert!(x.len() == y.len() && x.iter().zip(y).all(|(x, y)| (x - y).abs() < 1e-14), "{x:?} {y:?}");
     }
 
-    /// Linear displacements come out as they are, whatever the axes of single nodes.
+    /// Linear displacements are interpolated exactly, whatever the axes of single nodes.
     #[test]
     fn linear_displacements_are_interpolated_exactly() {
         let space = block::<3>(2, Order::P2);
@@ -126,7 +138,7 @@ mod tests {
         close(&values, &all);
     }
 
-    /// Nodes that are tied to one in the middle of an edge move with it, and prescribed dofs have no part but their own one.
+    /// Nodes that are tied to one in the middle of an edge move with it. Prescribed dofs have a one on the diagonal and no other entry.
     #[test]
     fn supports_have_no_part() {
         let space = block::<3>(1, Order::P2);
@@ -143,11 +155,11 @@ mod tests {
         let mut values = vec![0.0; 81];
         rows.multiply(&few, &mut values);
         close(&values, &all);
-        // the x of one vertex more
-        let held = 3 * vertices[4] as usize;
+        // One more dof is prescribed: x at a vertex.
+        let prescribed = 3 * vertices[4] as usize;
         let place = 3 * coarse.binary_search(&vertices[4]).expect("a vertex is coarse");
-        let rows = from_vertices(&space, &frame, |dof| is_tied(dof) || dof == held, &coarse).rows;
+        let rows = from_vertices(&space, &frame, |dof| is_tied(dof) || dof == prescribed, &coarse).rows;
         let users: Vec<usize> = (0..81).filter(|&i| rows.row(i).any(|entry| entry.0 == place)).collect();
-        assert_eq!(users, [held]);
+        assert_eq!(users, [prescribed]);
     }
 }

@@ -4,22 +4,23 @@ use super::slope::{PAIRS, Slope};
 use crate::problem::elasticity::Plane;
 use nalgebra::{Matrix3, Matrix6};
 
-/// Component behind each Voigt number 11 22 33 23 13 12.
+/// Index in xx yy zz xy yz xz of each component in Voigt's order 11 22 33 23 13 12.
 const VOIGT: [usize; 6] = [0, 1, 2, 4, 5, 3];
 
-/// Least eigenvalue of a matrix with ones on its diagonal: less is zero in double precision.
+/// Least eigenvalue of a coercive matrix with ones on its diagonal; a smaller one is zero in double precision.
 const SINGULAR: f64 = 1e-13;
 
-/// Entries of C below this share of the largest one are rounding of turned axes.
+/// Share of the largest entry of C below which an entry is the rounding of rotated axes.
 const TWISTLESS: f64 = 1e-12;
 
-/// Elasticity tensor C of space as a matrix: stress (xx yy zz xy yz xz) = C times strain in the same order, shear strains
-/// counted twice (2 eps_xy). Symmetric; unit of stress.
+/// The elasticity tensor C of space as a symmetric matrix with the unit of stress.
+///
+/// Stress (xx yy zz xy yz xz) is C times strain in the same order, where shear strains count twice (2 eps_xy).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tensor(pub [[f64; 6]; 6]);
 
 impl Tensor {
-    /// Isotropic, from Young's modulus > 0 and Poisson's ratio in (-1, 1/2).
+    /// Make the isotropic tensor from Young's modulus > 0 and Poisson's ratio in (-1, 1/2).
     pub fn isotropic(young: f64, poisson: f64) -> Self {
         let (lambda, mu) = lame(young, poisson);
         let mut c = [[0.0; 6]; 6];
@@ -31,8 +32,8 @@ impl Tensor {
         Self(c)
     }
 
-    /// Orthotropic with axes 1, 2, 3 along x, y, z, from E1 E2 E3, nu12 nu13 nu23 and G12 G13 G23; nu12 is the
-    /// contraction along 2 under tension along 1. `None` if these moduli have no finite stiffness.
+    /// Make the orthotropic tensor with axes 1, 2, 3 along x, y, z from E1 E2 E3, nu12 nu13 nu23 and G12 G13 G23. Here nu12 is
+    /// the contraction along 2 under tension along 1. Return `None` if the stiffness for these moduli is not finite.
     pub fn orthotropic(constants: &[f64; 9]) -> Option<Self> {
         let [e1, e2, e3, nu12, nu13, nu23, g12, g13, g23] = *constants;
         let (s12, s13, s23) = (-nu12 / e1, -nu13 / e1, -nu23 / e2);
@@ -48,7 +49,8 @@ impl Tensor {
         Some(Self(c))
     }
 
-    /// From the 21 constants C11 C12 ... C16 C22 ... C66: upper triangle by rows, in Voigt's order 11 22 33 23 13 12.
+    /// Make the tensor from the 21 constants C11 C12 ... C16 C22 ... C66, the upper triangle by rows in Voigt's order
+    /// 11 22 33 23 13 12.
     pub fn anisotropic(constants: &[f64; 21]) -> Self {
         let mut c = [[0.0; 6]; 6];
         let mut rest = constants.iter();
@@ -60,9 +62,10 @@ impl Tensor {
         Self(c)
     }
 
-    /// The tensor in x, y, z of a material whose axes 1, 2, 3 have the directions `axes[0..3]` (orthonormal rows).
+    /// Return the tensor in x, y, z of a material whose axes 1, 2, 3 have the directions `axes[0..3]` (orthonormal rows).
     pub fn rotated(&self, axes: &[[f64; 3]; 3]) -> Self {
-        // stress in x, y, z = bond times stress in the material's axes; work makes strains turn with its transpose
+        // The stress in x, y, z is `bond` times the stress in the material's axes. Since work does not depend on the axes, strains
+        // are transformed by the transpose.
         let bond = Matrix6::from_fn(|row, column| {
             let ((i, j), (a, b)) = (PAIRS[row], PAIRS[column]);
             let once = axes[a][i] * axes[b][j];
@@ -72,7 +75,7 @@ impl Tensor {
         Self(std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (turned[(i, j)] + turned[(j, i)]))))
     }
 
-    /// Whether the plane x, y is one of symmetry: its strains cause no shear out of it, beyond rounding.
+    /// Return whether the plane x, y is a plane of symmetry, whose strains cause no shear out of it beyond rounding.
     pub fn keeps_plane(&self) -> bool {
         let largest = self.0.as_flattened().iter().fold(0.0, |max: f64, c| max.max(c.abs()));
         (0..4).all(|i| [4, 5].iter().all(|&j| self.0[i][j].abs() <= TWISTLESS * largest))
@@ -82,15 +85,15 @@ impl Tensor {
         Matrix6::from_fn(|i, j| self.0[i][j])
     }
 
-    /// Whether C eps : eps > 0 for every strain (4), beyond rounding.
+    /// Return whether C eps : eps > 0 for every strain eps (4), beyond rounding.
     pub fn is_coercive(&self) -> bool {
-        // scaled to ones on the diagonal; none for NaN
+        // The matrix is scaled to ones on the diagonal. With NaN it has no Cholesky factor.
         let root: [f64; 6] = std::array::from_fn(|i| self.0[i][i].sqrt());
         let scaled = Matrix6::from_fn(|i, j| self.0[i][j] / root[i] / root[j]);
         (scaled - SINGULAR * Matrix6::identity()).cholesky().is_some()
     }
 
-    /// The least C eps : eps over strains with eps : eps = 1, in any axes the same; NaN if C is not finite.
+    /// Return the least C eps : eps over strains with eps : eps = 1, which does not depend on the axes; NaN if C is not finite.
     pub fn least_eigenvalue(&self) -> f64 {
         if self.0.as_flattened().iter().any(|c| !c.is_finite()) {
             return f64::NAN;
@@ -99,27 +102,28 @@ impl Tensor {
         Matrix6::from_fn(|i, j| unit(i) * unit(j) * self.0[i][j]).symmetric_eigenvalues().min()
     }
 
-    /// Stiffness against uniaxial stress along x, y and z of a body that is held in one direction across it, mean of both:
-    /// E/(1 - nu^2) if isotropic. In plane problems z is held (plane strain, bodies of revolution) or free (plane stress) and
-    /// the z entry is zero.
+    /// Return the stiffness against uniaxial stress along x, y and z of a body that is constrained in one direction across it, as
+    /// the mean for both directions. It is E/(1 - nu^2) if the material is isotropic.
+    ///
+    /// In plane problems z is constrained (plane strain, bodies of revolution) or free (plane stress), and the z entry is zero.
     pub fn moduli(&self, dimension: usize, plane: Plane) -> [f64; 3] {
         let Some(s) = self.matrix().try_inverse() else { return [0.0; 3] };
-        let held = |i: usize, j: usize| 1.0 / (s[(i, i)] - s[(i, j)].powi(2) / s[(j, j)]);
+        let constrained = |i: usize, j: usize| 1.0 / (s[(i, i)] - s[(i, j)].powi(2) / s[(j, j)]);
         std::array::from_fn(|i| match (dimension, plane) {
             (2, _) if i == 2 => 0.0,
-            (2, Plane::Strain | Plane::Axisymmetric) => held(i, 2),
+            (2, Plane::Strain | Plane::Axisymmetric) => constrained(i, 2),
             (2, Plane::Stress) => 1.0 / s[(i, i)],
-            _ => 0.5 * (held(i, (i + 1) % 3) + held(i, (i + 2) % 3)),
+            _ => 0.5 * (constrained(i, (i + 1) % 3) + constrained(i, (i + 2) % 3)),
         })
     }
 
-    /// What is left for the strains xx, yy, xy when the stresses zz, yz, xz vanish; zero rows and columns for these.
+    /// Return the tensor for the strains xx, yy, xy if the stresses zz, yz, xz vanish. Their rows and columns are zero.
     fn plane_stress(&self) -> Self {
         const IN: [usize; 3] = [0, 1, 3];
         const OUT: [usize; 3] = [2, 4, 5];
         let block = |rows: [usize; 3], columns: [usize; 3]| Matrix3::from_fn(|i, j| self.0[rows[i]][columns[j]]);
         let mut c = [[0.0; 6]; 6];
-        // (4) holds, so that the block can be inverted
+        // Since (4) holds, the block can be inverted.
         if let Some(inverse) = block(OUT, OUT).try_inverse() {
             let reduced = block(IN, IN) - block(IN, OUT) * inverse * block(OUT, IN);
             for (i, &row) in IN.iter().enumerate() {
@@ -132,21 +136,22 @@ impl Tensor {
     }
 }
 
+/// Return Lamé's lambda and mu from Young's modulus and Poisson's ratio.
 fn lame(young: f64, poisson: f64) -> (f64, f64) {
     (young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)), young / (2.0 * (1.0 + poisson)))
 }
 
-/// Hooke's law of a body in its dimension: C of space, of plane strain (the same, of strains in the plane), or of plane stress.
+/// Hooke's law of a body in its dimension. Its C is that of space, which also holds for plane strain, or that of plane stress.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
     /// Stress (xx yy zz xy yz xz) per strain.
     stiffness: Tensor,
-    /// Lamé's lambda (that of the plane state) and mu if the material is isotropic.
+    /// Lamé's lambda (for plane stress the reduced one) and mu if the material is isotropic.
     lame: Option<(f64, f64)>,
 }
 
 impl Material {
-    /// From Young's modulus and Poisson's ratio, in `dimension` 2 or 3 (`plane` matters in 2 only).
+    /// Make the isotropic law from Young's modulus and Poisson's ratio, in `dimension` 2 or 3 (`plane` matters in 2 only).
     pub fn isotropic(young: f64, poisson: f64, dimension: usize, plane: Plane) -> Self {
         let (lambda, mu) = lame(young, poisson);
         let reduced = match (dimension, plane) {
@@ -156,15 +161,16 @@ impl Material {
         Self { lame: Some((reduced, mu)), ..Self::new(Tensor::isotropic(young, poisson), dimension, plane) }
     }
 
-    /// From a coercive tensor of space.
+    /// Make the law from a coercive tensor of space.
     pub fn new(tensor: Tensor, dimension: usize, plane: Plane) -> Self {
         let stiffness = if dimension == 2 && plane == Plane::Stress { tensor.plane_stress() } else { tensor };
         Self { stiffness, lame: None }
     }
 
-    /// Adds `weight` times the D x D blocks B_a' C B_b of the stiffness density for all nodes a <= b to `local[a n + b]`,
-    /// where n is the number of gradients: `gradient[a]` is that of the shape function of node a. In a body of revolution
-    /// `hoop[a]` is that function over r; it is empty in others.
+    /// Add `weight` times the D x D blocks B_a' C B_b of the stiffness density for all nodes a <= b to `local[a n + b]`.
+    ///
+    /// B_a gives the strain for the displacement of node a, and n is the number of nodes. `gradient[a]` is the gradient of the
+    /// shape function of node a. In a body of revolution `hoop[a]` is this function over the radius; in others `hoop` is empty.
     pub fn accumulate<const D: usize>(
         &self,
         gradient: &[[f64; D]],
@@ -181,6 +187,7 @@ impl Material {
         }
     }
 
+    /// Do the same as [`Material::accumulate`] for any tensor C.
     fn blocks<const D: usize>(&self, gradient: &[[f64; D]], hoop: &[f64], weight: f64, local: &mut [[[f64; D]; D]]) {
         let n = gradient.len();
         for b in 0..n {
@@ -201,18 +208,18 @@ impl Material {
         }
     }
 
-    /// Largest sum of the sizes of a row of C: no less than its largest eigenvalue.
+    /// Return the largest row sum of the absolute entries of C, which is no less than its largest eigenvalue.
     pub fn norm(&self) -> f64 {
         self.stiffness.0.iter().map(|row| row.iter().map(|c| c.abs()).sum()).fold(0.0, f64::max)
     }
 
-    /// Stress (xx yy zz xy yz xz) of a strain (xx yy zz, and 2 eps of xy yz xz) (2).
+    /// Return the stress (xx yy zz xy yz xz) of a strain (xx yy zz, and 2 eps of xy yz xz) (2).
     pub fn stress(&self, strain: &[f64; 6]) -> [f64; 6] {
         std::array::from_fn(|i| (0..6).map(|j| self.stiffness.0[i][j] * strain[j]).sum())
     }
 }
 
-/// Place of the component (i, j) of a symmetric tensor among [`PAIRS`].
+/// Return the index of the component (i, j) of a symmetric tensor in [`PAIRS`].
 fn component(i: usize, j: usize) -> usize {
     match (i.min(j), i.max(j)) {
         (i, j) if i == j => i,
@@ -222,7 +229,7 @@ fn component(i: usize, j: usize) -> usize {
     }
 }
 
-/// lambda a_i b_j + mu a_j b_i + mu (a.b) delta_ij.
+/// Add the blocks lambda a_i b_j + mu a_j b_i + mu (a.b) delta_ij for all pairs a, b of gradients.
 fn isotropic_blocks<const D: usize>(lambda: f64, mu: f64, gradient: &[[f64; D]], local: &mut [[[f64; D]; D]]) {
     let n = gradient.len();
     for (i_a, a) in gradient.iter().enumerate() {
@@ -239,7 +246,8 @@ fn isotropic_blocks<const D: usize>(lambda: f64, mu: f64, gradient: &[[f64; D]],
     }
 }
 
-/// What the circles of a body of revolution add: with e = div u + u_r/r, lambda e e' + 2 mu (u_r/r) (u_r'/r).
+/// Add what the strains u_r/r of the circles in a body of revolution contribute to lambda e e' + 2 mu (u_r/r) (u_r'/r). Here
+/// e = div u + u_r/r, and primes mark the second displacement.
 fn isotropic_hoops<const D: usize>(
     lambda: f64,
     mu: f64,

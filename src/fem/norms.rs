@@ -1,33 +1,33 @@
-//! Norms of errors: a finite element displacement against a known one.
+//! Norms of the error of a finite element displacement against a known one.
 
 use super::elasticity::Elasticity;
 use super::space::Space;
 use super::{Slope, assemble, element, quadrature};
 
-/// Norms of a displacement of one body.
+/// The norms of a displacement of one body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Norms {
     /// L2 norm: root of the integral of u.u.
     pub l2: f64,
-    /// H1 seminorm: root of the integral of grad u : grad u, in bodies of revolution with (u_r/r)^2 in it.
+    /// H1 seminorm: root of the integral of grad u : grad u, plus (u_r/r)^2 in bodies of revolution.
     pub h1: f64,
-    /// Energy norm: root of the integral of eps(u) : C eps(u), twice the strain energy.
+    /// Energy norm: root of the integral of eps(u) : C eps(u), which is twice the strain energy.
     pub energy: f64,
 }
 
-/// A known displacement at a point.
+/// A known displacement u at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Known<const D: usize> {
-    /// u_i.
+    /// Components u_i.
     pub value: [f64; D],
-    /// du_i/dx_j.
+    /// Derivatives du_i/dx_j.
     pub gradient: [[f64; D]; D],
 }
 
-/// Norms of u_h - u and of u, in this order, over some cells of a space, by a rule exact to degree five.
+/// Return the norms of u_h - u and of u, in this order, over some cells of a space, by a rule exact to degree five.
 ///
-/// `u` has one entry a dof. Points where there is no elasticity count without energy; assembly refuses them. The values are
-/// NaN where `exact` is not finite.
+/// The argument `u` is the finite element displacement u_h, one entry a dof, and `exact` is the known displacement u. Points without
+/// elasticity, which assembly refuses, count without energy. The norms are NaN where `exact` is not finite.
 pub fn error<const D: usize>(
     space: &Space<D>,
     cells: impl Iterator<Item = usize>,
@@ -39,7 +39,7 @@ pub fn error<const D: usize>(
     let mut squares = [Norms::default(); 2];
     for index in cells {
         let x = space.cell_nodes(index);
-        let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
+        let cell = space.cell(index);
         let nodal: Vec<[f64; D]> = cell.iter().map(|&node| std::array::from_fn(|c| u[D * node as usize + c])).collect();
         for (l, weight) in rule.iter() {
             let Some((gradient, measure)) = element::gradients(space.order, &x, l) else { continue };
@@ -50,10 +50,10 @@ pub fn error<const D: usize>(
             let exact_slope = Slope { h: known.gradient, hoop: space.hoop(&at, known.value[0]) };
             let mut difference = space.slope(cell, &at, &phi, &gradient, u);
             difference.add(-1.0, &exact_slope);
-            let off = std::array::from_fn(|i| value[i] - known.value[i]);
+            let error = std::array::from_fn(|i| value[i] - known.value[i]);
             let material = elasticity.at(index, space.in_scene(at)).ok();
             let weight = weight * measure * space.circle(&at);
-            for (sum, (value, slope)) in squares.iter_mut().zip([(off, difference), (known.value, exact_slope)]) {
+            for (sum, (value, slope)) in squares.iter_mut().zip([(error, difference), (known.value, exact_slope)]) {
                 let strain = slope.strain();
                 let stress = material.map_or([0.0; 6], |material| material.stress(&strain));
                 sum.l2 += weight * value.iter().map(|v| v * v).sum::<f64>();

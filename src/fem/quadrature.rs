@@ -15,18 +15,19 @@ impl Rule {
         self.weights.push(weight);
     }
 
-    /// Points and their weights.
+    /// Return the points and their weights.
     pub fn iter(&self) -> impl Iterator<Item = (&[f64], f64)> {
         self.points.iter().map(Vec::as_slice).zip(self.weights.iter().copied())
     }
 
-    /// The same rule on each of the equal parts, half as wide, of which a simplex of two to four vertices is made.
+    /// Return the same rule on each of the equal parts, half as wide, into which a simplex of two to four vertices is divided.
     pub fn on_parts(&self) -> Self {
         let n = self.points[0].len();
         let middle = |&(i, j): &(usize, usize)| -> Vec<f64> {
             (0..n).map(|k| 0.5 * (f64::from(u8::from(k == i)) + f64::from(u8::from(k == j)))).collect()
         };
-        // at each vertex one; in a triangle one more, in a tetrahedron four around a diagonal of the octahedron that is left
+        // There is a part at each vertex. In a triangle one more remains, and in a tetrahedron an octahedron, which is divided into
+        // four parts around a diagonal.
         let mut parts: Vec<Vec<(usize, usize)>> = (0..n).map(|i| (0..n).map(|j| (i, j)).collect()).collect();
         match n {
             3 => parts.push(vec![(0, 1), (1, 2), (2, 0)]),
@@ -49,16 +50,16 @@ impl Rule {
     }
 }
 
-/// How finely loads are integrated.
+/// The fineness of the integration of loads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parts {
-    /// By one rule on each element.
+    /// One rule on each element.
     Whole,
-    /// By that rule on each part of an element: what this differs is nearly the whole error of the other.
+    /// The same rule on each part of an element. The difference of both results is nearly the whole error of the first.
     Halves,
 }
 
-/// Gauss-Legendre points and weights on \[0, 1\], exact to degree `2 count - 1`; `count` from 1 to 5.
+/// Return Gauss-Legendre points and weights on \[0, 1\], exact to degree `2 count - 1`, for a `count` from 1 to 5.
 pub fn gauss(count: usize) -> Vec<(f64, f64)> {
     let half: &[(f64, f64)] = match count {
         1 => &[(0.0, 2.0)],
@@ -80,11 +81,11 @@ pub fn gauss(count: usize) -> Vec<(f64, f64)> {
     rule
 }
 
-/// Rule on the simplex with so many vertices, exact for polynomials of `degree` up to 5 (lines: 9, triangles: 5,
-/// tetrahedra: 5).
+/// Return the rule on the simplex with so many vertices that is exact for polynomials of `degree`, at most 9 on lines and 5 on
+/// triangles and tetrahedra. The callers need no more, since elements have an order of at most two.
 ///
 /// # Panics
-/// For other numbers of vertices than 1 to 4; the degree is limited by the callers, which are elements of order two.
+/// If the number of vertices is not from 1 to 4.
 pub fn simplex(vertices: usize, degree: usize) -> Rule {
     let mut rule = Rule::default();
     let mut add = |point: &[f64], weight: f64| rule.add(point, weight);
@@ -113,7 +114,7 @@ fn triangle(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
         0 | 1 => add(&[1.0 / 3.0; 3], 1.0),
         2 => orbit(1.0 / 6.0, 1.0 / 3.0),
         _ => {
-            // Radon's seven points, degree 5
+            // These are Radon's seven points of degree 5.
             let root = 15f64.sqrt();
             orbit((6.0 - root) / 21.0, (155.0 - root) / 1200.0);
             orbit((6.0 + root) / 21.0, (155.0 + root) / 1200.0);
@@ -135,7 +136,7 @@ fn tetrahedron(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
         0 | 1 => add(&[0.25; 4], 1.0),
         2 => vertex_orbit((1.0 - 5f64.sqrt().recip()) / 4.0, 0.25),
         _ => {
-            // Walkington's fourteen points, degree 5
+            // These are Walkington's fourteen points of degree 5.
             vertex_orbit(0.310_885_919_263_300_6, 0.112_687_925_718_016);
             vertex_orbit(0.092_735_250_310_891_2, 0.073_493_043_116_361_95);
             let (a, w) = (0.045_503_704_125_649_65, 0.042_546_020_777_081_47);
@@ -188,19 +189,19 @@ mod tests {
         check(2, 9);
     }
 
-    /// Of the degree 4 a rule for 2 or 3 on parts half as wide misses a sixteenth.
+    /// On parts half as wide, the error of a rule of degree 2 or 3 for a polynomial of degree 4 is a sixteenth.
     #[test]
     fn parts_cover_the_simplex() {
-        let missed = |rule: Rule| -> f64 {
+        let error = |rule: Rule| -> f64 {
             let n = rule.points[0].len();
             let exact = 24.0 * factorial(n - 1) / factorial(n + 3);
             let sum: f64 = rule.iter().map(|(x, w)| w * x[0].powi(4)).sum();
             sum - exact
         };
-        let ratio = missed(simplex(2, 2)) / missed(simplex(2, 2).on_parts());
+        let ratio = error(simplex(2, 2)) / error(simplex(2, 2).on_parts());
         assert!((ratio - 16.0).abs() < 1e-9, "{ratio}");
         for vertices in [3, 4] {
-            let (whole, parts) = (missed(simplex(vertices, 2)), missed(simplex(vertices, 2).on_parts()));
+            let (whole, parts) = (error(simplex(vertices, 2)), error(simplex(vertices, 2).on_parts()));
             assert!(parts.abs() < 0.25 * whole.abs(), "{whole} {parts}");
         }
     }

@@ -1,4 +1,4 @@
-//! Rigid motions of a body and what its supports leave of them.
+//! Rigid motions of a body, and those that its supports leave unconstrained.
 
 use serde::{Deserialize, Serialize};
 use crate::exchange::Plain;
@@ -7,25 +7,25 @@ use super::extent::Extent;
 use crate::linalg::{Blocks, PART, TOLERANCE, dot};
 use nalgebra::{DMatrix, DVector};
 
-/// A rigid motion, as a sum of translations and rotations about a centre: a few numbers, however many nodes the body has.
+/// A rigid motion as a sum of translations and rotations about a centre. It is stored in a few numbers, whatever the number of nodes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain")]
 pub struct RigidMotion<const D: usize> {
-    /// "translation along y", "rotation", or a mixture of them.
+    /// Name such as "translation along y", "rotation", or a combination of them.
     pub name: String,
     centre: [f64; D],
-    /// The largest distance along an axis from the centre, by which rotations are divided.
+    /// Largest distance along an axis from the centre, by which rotations are divided.
     size: f64,
-    /// Shares of the translations along the axes, then of the rotations in [`PLANES`].
+    /// Weights of the translations along the axes, then of the rotations in [`PLANES`].
     weights: [f64; 6],
 }
 
-/// The plane that each rotation turns, from the first axis to the second, and its name in space.
+/// Plane of each rotation, from the first axis to the second, and its name in space.
 const PLANES: [(usize, usize, &str); 3] =
     [(1, 2, "rotation about x"), (2, 0, "rotation about y"), (0, 1, "rotation about z")];
 
 impl<const D: usize> RigidMotion<D> {
-    /// Displacement at a point.
+    /// Return the displacement at a point.
     pub fn at(&self, x: &[f64; D]) -> [f64; D] {
         let mut u = std::array::from_fn(|c| self.weights[c]);
         for ((i, j, _), weight) in PLANES.into_iter().zip(&self.weights[3..]).filter(|(_, weight)| **weight != 0.0) {
@@ -35,18 +35,18 @@ impl<const D: usize> RigidMotion<D> {
         u
     }
 
-    /// Displacements of points.
+    /// Return the displacements of points, `D` entries each.
     pub fn nodal(&self, points: impl Iterator<Item = [f64; D]>) -> Vec<f64> {
         points.flat_map(|x| self.at(&x)).collect()
     }
 }
 
-/// Rigid motions of a free body at its dofs.
+/// The rigid motions of a free body at its dofs.
 #[derive(Clone, Copy)]
 pub struct AtDofs<'a> {
-    /// How many there are.
+    /// Number of motions.
     pub count: usize,
-    /// What one of them does at a dof.
+    /// Value of a motion at a dof.
     pub at: &'a dyn Fn(usize, usize) -> f64,
 }
 
@@ -55,24 +55,24 @@ impl AtDofs<'_> {
     pub const NONE: AtDofs<'static> = AtDofs { count: 0, at: &|_, _| 0.0 };
 }
 
-/// A rigid motion that supports leave free.
+/// A rigid motion that supports leave unconstrained.
 #[derive(Debug, Clone)]
 pub struct FreeMotion {
-    /// Displacement, one entry a dof of the nodes that are known here, zero at supports.
+    /// Displacement, one entry a dof of the nodes that this rank has, zero at supports.
     pub displacement: Vec<f64>,
-    /// Work of all loads on it.
+    /// Work of all loads on the motion.
     pub work: f64,
 }
 
 impl FreeMotion {
-    /// The motion with these displacements of dofs, of which supports hold some, and the work of the loads on it.
+    /// Make the motion from the displacements of dofs, which are set to zero at prescribed ones. `work` gives the work of the loads.
     pub fn new(mut displacement: Vec<f64>, prescribed: &[(usize, f64)], work: impl Fn(&[f64]) -> f64) -> Self {
         prescribed.iter().for_each(|entry| displacement[entry.0] = 0.0);
         Self { work: work(&displacement), displacement }
     }
 }
 
-/// The rigid motions of a body; of one of revolution the translation along its axis alone.
+/// Return the rigid motions of a body. A body of revolution has only the translation along its axis.
 pub fn of<const D: usize>(extent: &Extent, axisymmetric: bool) -> Vec<RigidMotion<D>> {
     let mut all = modes(extent);
     if axisymmetric {
@@ -81,19 +81,20 @@ pub fn of<const D: usize>(extent: &Extent, axisymmetric: bool) -> Vec<RigidMotio
     all
 }
 
-/// The 3 (2D) or 6 (3D) rigid motions about the mean of some points: translations, then rotations, scaled to
+/// Return the 3 (2D) or 6 (3D) rigid motions about the mean of some points: translations, then rotations, scaled to
 /// displacements of about one. Gmsh and PETSc call them rigid body modes.
 pub fn modes<const D: usize>(extent: &Extent) -> Vec<RigidMotion<D>> {
     let (centre, size) = (extent.mean(), extent.farthest::<D>());
     let translations = (0..D).map(|c| (c, format!("translation along {}", ["x", "y", "z"][c])));
     let rotations = (0..3).filter(|&k| D == 3 || k == 2);
     let rotations = rotations.map(|k| (3 + k, if D == 2 { "rotation" } else { PLANES[k].2 }.to_owned()));
-    let unit = |place: usize| std::array::from_fn(|k| if k == place { 1.0 } else { 0.0 });
-    let motion = |(place, name)| RigidMotion { name, centre, size, weights: unit(place) };
+    let unit = |index: usize| std::array::from_fn(|k| if k == index { 1.0 } else { 0.0 });
+    let motion = |(index, name)| RigidMotion { name, centre, size, weights: unit(index) };
     translations.chain(rotations).map(motion).collect()
 }
 
-/// Weights of `count` motions that prescribed dofs leave free: a basis; `value` is what a motion does at a dof.
+/// Return a basis of the motions that prescribed dofs leave unconstrained, as vectors of the weights of `count` motions. `value` gives
+/// the displacement of a motion at a dof.
 pub fn left_by_supports(
     count: usize,
     value: impl Fn(usize, usize) -> f64,
@@ -103,7 +104,7 @@ pub fn left_by_supports(
     Blocks::free(&(rows.transpose() * &rows), prescribed.len().max(1) as f64, TOLERANCE)
 }
 
-/// Stiffness of springs in terms of `count` motions; `at` is the displacement of a node.
+/// Return the stiffness of springs in terms of `count` motions. `at` gives the displacement of a motion at a node.
 pub fn of_springs<const D: usize>(
     count: usize,
     at: impl Fn(usize, u32) -> [f64; D],
@@ -113,30 +114,31 @@ pub fn of_springs<const D: usize>(
     for NodalBlock { nodes, block } in springs {
         let [of_a, of_b] = nodes.map(|node| (0..count).map(|k| at(k, node)).collect::<Vec<_>>());
         for (i, a) in of_a.iter().enumerate() {
-            let pull: [f64; D] = std::array::from_fn(|d| (0..D).map(|c| a[c] * block[c][d]).sum());
-            of_b.iter().enumerate().for_each(|(j, b)| stiffness[(i, j)] += dot(&pull, b));
+            let force: [f64; D] = std::array::from_fn(|d| (0..D).map(|c| a[c] * block[c][d]).sum());
+            of_b.iter().enumerate().for_each(|(j, b)| stiffness[(i, j)] += dot(&force, b));
         }
     }
     stiffness
 }
 
-/// Of the motions with weights `left`, those that springs do not feel; their stiffness in terms of the motions of the free body sets the scale.
-pub fn left_by_springs(left: Vec<DVector<f64>>, stiffness: &DMatrix<f64>) -> Vec<DVector<f64>> {
+/// Return a basis of those combinations of the `remaining` motions that springs do not resist. The `stiffness` of the springs in terms
+/// of the motions of the free body sets the scale.
+pub fn left_by_springs(remaining: Vec<DVector<f64>>, stiffness: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let scale = stiffness.diagonal().max();
-    if scale == 0.0 || left.is_empty() {
-        return left;
+    if scale == 0.0 || remaining.is_empty() {
+        return remaining;
     }
-    let left = DMatrix::from_columns(&left);
-    let free = Blocks::free(&(left.transpose() * stiffness * &left), scale, TOLERANCE);
-    free.into_iter().map(|weights| &left * weights).collect()
+    let remaining = DMatrix::from_columns(&remaining);
+    let free = Blocks::free(&(remaining.transpose() * stiffness * &remaining), scale, TOLERANCE);
+    free.into_iter().map(|weights| &remaining * weights).collect()
 }
 
-/// Combination of motions about the same centre, its largest weight one; named after the parts that matter.
+/// Return the combination of motions about the same centre, scaled so that its largest weight is one.
 pub fn combine<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64>) -> RigidMotion<D> {
     sum(motions, &(weights / weights.amax()))
 }
 
-/// Sum of motions about the same centre, named after the parts that matter.
+/// Return the weighted sum of motions about the same centre, named after the parts whose weights are not small.
 pub fn sum<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64>) -> RigidMotion<D> {
     let largest = weights.amax();
     let matters = |(_, weight): &(&RigidMotion<D>, &f64)| weight.abs() > PART * largest;
@@ -156,24 +158,24 @@ mod tests {
         let nodes = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
         let all = modes(&Extent::of(nodes.into_iter()));
         let value = |k: usize, dof: usize| all[k].at(&nodes[dof / 2])[dof % 2];
-        let left = |dofs: &[usize]| {
+        let remaining = |dofs: &[usize]| {
             let prescribed: Vec<_> = dofs.iter().map(|&dof| (dof, 0.0)).collect();
-            let left = left_by_supports(3, value, &prescribed);
-            left.iter().map(|weights| combine(&all, weights)).collect::<Vec<_>>()
+            let remaining = left_by_supports(3, value, &prescribed);
+            remaining.iter().map(|weights| combine(&all, weights)).collect::<Vec<_>>()
         };
-        let names = |dofs: &[usize]| left(dofs).into_iter().map(|motion| motion.name).collect::<Vec<_>>();
+        let names = |dofs: &[usize]| remaining(dofs).into_iter().map(|motion| motion.name).collect::<Vec<_>>();
         assert_eq!(names(&[]).len(), 3);
-        // x held on the edge x = 2: translation along y is left, and nothing else
+        // With x prescribed on the edge x = 2, only the translation along y remains.
         assert_eq!(names(&[2, 4]), ["translation along y"]);
         assert_eq!(names(&[0, 1, 3]), Vec::<String>::new());
-        // one pinned node: a rotation about it
-        let pinned = left(&[0, 1]);
+        // With one pinned node, the rotation about it remains.
+        let pinned = remaining(&[0, 1]);
         assert_eq!(pinned.len(), 1);
         let u = pinned[0].nodal(nodes.into_iter());
         assert!(u[0].abs() < 1e-14 && u[1].abs() < 1e-14 && u[5].abs() > 0.4);
     }
 
-    /// In space a rotation about z is that of the plane, and about x it turns y to z.
+    /// In space the rotation about z is that of the plane, and the rotation about x turns y to z.
     #[test]
     fn rotations_turn_their_planes() {
         let nodes = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0]];

@@ -5,7 +5,8 @@ use super::space::Space;
 use crate::mesh::{Group, Mesh};
 use crate::problem::order::Order;
 
-/// A cube of `n` cells each way, cut into simplices that share one diagonal, in a skewed frame.
+/// Make the space of a cube with `n` cells in each direction, which are divided into simplices that share one diagonal. The
+/// coordinates are skewed.
 pub fn block<const D: usize>(n: usize, order: Order) -> Space<D> {
     let count = 2 * n + 1;
     let number = |at: [usize; D]| at.iter().rev().fold(0, |sum, &k| sum * count + k) as u32;

@@ -1,12 +1,12 @@
-//! Where a body is strained most, and whether strains are small there, as the theory takes them to be.
+//! The largest strains of a body, which must be small in linear theory.
 
 use super::space::Space;
 use super::stress::principal;
 use super::{assemble, element};
 use serde::{Deserialize, Serialize};
 
-/// Strain up to which strains count as small. The strain e of the linear theory, Green's e + e^2/2 and the logarithmic e - e^2/2 are then 1.5 per cent
-/// apart from one to the next: no more than what moduli are known to.
+/// Largest strain that counts as small. The strain e of linear theory differs there by 1.5 per cent from Green's strain e + e^2/2 and
+/// from the logarithmic strain e - e^2/2. This is no more than the uncertainty of moduli.
 pub const SMALL: f64 = 0.03;
 
 /// The largest strain in some cells of a body.
@@ -14,28 +14,27 @@ pub const SMALL: f64 = 0.03;
 pub struct Strained {
     /// Largest principal strain in absolute value, at the centres of cells.
     pub most: f64,
-    /// The centre of that cell (x, y, z) in the scene.
+    /// Centre of the cell with this strain (x, y, z) in the scene.
     pub at: [f64; 3],
-    /// Measure of the cells with more than [`SMALL`], and of all of them.
+    /// Measure (area or volume) of the cells with more than [`SMALL`], and of all cells.
     pub measure: [f64; 2],
 }
 
 impl Strained {
-    /// That of no cells.
+    /// The value for no cells.
     pub const NONE: Self = Self { most: 0.0, at: [0.0; 3], measure: [0.0; 2] };
 
-    /// Return the largest strain in the cells of both.
+    /// Return the largest strain in the cells of both values.
     pub fn with(self, other: Self) -> Self {
         let larger = if other.most > self.most { other } else { self };
         Self { measure: std::array::from_fn(|k| self.measure[k] + other.measure[k]), ..larger }
     }
 }
 
-/// Return the largest strain at the centres of some cells of a space; `u` has one entry a dof.
+/// Return the largest strain at the centres of some cells of a space for the displacement `u`, one entry a dof.
 ///
-/// The centre of a cell has the mean strain of linear elements, so that the value at a singular corner is one of its cells, not one
-/// extrapolated to the corner. The root of the sum of the squares of all strains is no less than the largest principal one: few
-/// cells need the latter.
+/// At its centre a linear element has its mean strain. The value at a singular corner is therefore that of a cell and is not
+/// extrapolated to the corner. The norm of a strain is no less than its largest principal strain, so that few cells need the latter.
 pub fn largest<const D: usize>(space: &Space<D>, cells: impl Iterator<Item = usize>, u: &[f64]) -> Strained {
     let centre = [1.0 / (D + 1) as f64; 4];
     let l = &centre[..=D];
@@ -44,7 +43,7 @@ pub fn largest<const D: usize>(space: &Space<D>, cells: impl Iterator<Item = usi
     for index in cells {
         let x = space.cell_nodes(index);
         let Some((gradient, measure)) = element::gradients(space.order, &x, l) else { continue };
-        let cell = &space.cells[index * space.stride..(index + 1) * space.stride];
+        let cell = space.cell(index);
         let at = assemble::interpolate(&x, &phi);
         let strain = space.slope(cell, &at, &phi, &gradient, u).strain();
         let measure = measure * space.circle(&at);
@@ -52,22 +51,23 @@ pub fn largest<const D: usize>(space: &Space<D>, cells: impl Iterator<Item = usi
         if norm(&strain) <= found.most.min(SMALL) {
             continue;
         }
-        let most = largest_principal(&strain);
-        found.measure[0] += if most > SMALL { measure } else { 0.0 };
-        if most > found.most {
-            (found.most, found.at) = (most, space.in_scene(at));
+        let principal = largest_principal(&strain);
+        found.measure[0] += if principal > SMALL { measure } else { 0.0 };
+        if principal > found.most {
+            (found.most, found.at) = (principal, space.in_scene(at));
         }
     }
     found
 }
 
-/// Root of the sum of the squares of the tensor's components; shear strains come doubled and stand there twice.
+/// Return the root of the sum of the squares of the tensor's nine components. `strain` holds twice each shear strain, which occurs two
+/// times in the tensor.
 fn norm(strain: &[f64; 6]) -> f64 {
     let [xx, yy, zz, xy, yz, xz] = *strain;
     (xx * xx + yy * yy + zz * zz + 0.5 * (xy * xy + yz * yz + xz * xz)).sqrt()
 }
 
-/// The largest principal strain in absolute value.
+/// Return the largest principal strain in absolute value.
 fn largest_principal(strain: &[f64; 6]) -> f64 {
     let [xx, yy, zz, xy, yz, xz] = *strain;
     let [first, _, last] = principal(&[xx, yy, zz, 0.5 * xy, 0.5 * yz, 0.5 * xz]);
@@ -80,7 +80,7 @@ mod tests {
     use crate::fem::sample::block;
     use crate::problem::order::Order;
 
-    /// A shear of 0.08 in the upper half of a cube: principal strains of 0.04 and -0.04, whatever the elements.
+    /// A shear of 0.08 in the upper half of a cube has principal strains of 0.04 and -0.04, whatever the elements.
     #[test]
     fn half_a_cube_is_sheared() {
         for order in [Order::P1, Order::P2] {

@@ -1,11 +1,11 @@
-//! Supports: prescribed dofs taken out of K and f, and other loads on what is left.
+//! Supports: elimination of prescribed dofs from K and f, and other loads on the remaining system.
 
 use crate::linalg::{Csr, dot};
 
-/// One elastic body, discretised: stiffness K, load f, and what the supports took out.
+/// A discretised elastic body: stiffness K, load f, and the terms that were eliminated with the prescribed dofs.
 ///
-/// Supported dofs stay as rows of K with one entry, `K[c][c]` = a typical diagonal, and `f[c] = K[c][c] u_c`, so that
-/// their residual vanishes at the prescribed value; their columns went to the right-hand side.
+/// A prescribed dof c with the value u_c stays as a row of K with one entry, `K[c][c]` = a typical diagonal, and
+/// `f[c] = K[c][c] u_c`. Its residual then vanishes at the prescribed value. Its column is moved to the right-hand side.
 #[derive(Debug, Clone, Default)]
 pub struct ElasticBody {
     /// Stiffness matrix K, symmetric positive semidefinite.
@@ -14,34 +14,34 @@ pub struct ElasticBody {
     pub load: Vec<f64>,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
-    /// K_fc u_c on the free dofs if some prescribed value is not zero, else empty. Strain energy needs it.
+    /// K_fc u_c on the free dofs f if some prescribed value is not zero, else empty. The strain energy needs it.
     pub lifting: Vec<f64>,
-    /// What must be added to u'Ku/2 - f'u to give the potential energy of the body.
+    /// Constant to be added to u'Ku/2 - f'u to give the potential energy of the body.
     pub energy_constant: f64,
-    /// u_c'K_cc u_c minus the u_c'K_cc u_c that the scaled diagonal gives: correction of u'Ku.
+    /// Correction of u'Ku: u_c'K_cc u_c with the original K_cc less the value with the scaled diagonal.
     pub strain_constant: f64,
-    /// Rigid displacement of all dofs that supports give the body, to be added to u; empty if there is none. All else here
-    /// is relative to it.
+    /// Rigid displacement of all dofs that supports impose on the body, to be added to u; empty if there is none. All other
+    /// displacements are relative to it.
     pub carried: Vec<f64>,
-    /// What [`ElasticBody::reload`] needs of K; empty where nobody asks for it.
+    /// Entries of K that [`ElasticBody::reload`] needs; empty where it is not used.
     pub held: Couplings,
 }
 
-/// What supports took out of K: other loads and prescribed values on the same K need it.
+/// The entries of K that were eliminated with the prescribed dofs. Other loads and prescribed values with the same K need them.
 #[derive(Debug, Clone, Default)]
 pub struct Couplings {
     /// Entries (row, column, value) of K in the columns of the prescribed dofs, row by row.
     columns: Vec<(u32, u32, f64)>,
-    /// `K[c][c]` of prescribed dofs now.
+    /// Present value of `K[c][c]` of prescribed dofs c.
     diagonal: f64,
 }
 
 impl ElasticBody {
-    /// Takes other loads f, one entry a dof, other values at the same prescribed dofs (dof, value), and another rigid displacement
-    /// `carried`, which these values are relative to.
+    /// Replace the loads f, one entry a dof, the values at the same prescribed dofs (dof, value), and the rigid displacement `carried`
+    /// that these values are relative to.
     pub fn reload(&mut self, load: Vec<f64>, mut prescribed: Vec<(usize, f64)>, carried: Vec<f64>) {
         let n = load.len();
-        let (mut value, mut is_here, scale) = (vec![None; n], vec![false; n], self.held.diagonal);
+        let (mut value, mut has_row, scale) = (vec![None; n], vec![false; n], self.held.diagonal);
         prescribed.iter().for_each(|&(dof, u)| value[dof] = Some(u));
         let is_moved = prescribed.iter().any(|&(_, u)| u != 0.0);
         self.lifting = if is_moved { vec![0.0; n] } else { Vec::new() };
@@ -49,7 +49,7 @@ impl ElasticBody {
         self.strain_constant = 0.0;
         for &(i, j, k) in &self.held.columns {
             let (i, j) = (i as usize, j as usize);
-            is_here[i] |= i == j;
+            has_row[i] |= i == j;
             let of_column = k * value[j].unwrap_or(0.0);
             match value[i] {
                 None if is_moved => self.lifting[i] += of_column,
@@ -57,7 +57,7 @@ impl ElasticBody {
                 Some(u) => self.strain_constant += u * of_column,
             }
         }
-        prescribed.retain(|entry| is_here[entry.0]);
+        prescribed.retain(|entry| has_row[entry.0]);
         self.load = load;
         self.load.iter_mut().zip(&self.lifting).for_each(|(load, lifting)| *load -= lifting);
         self.energy_constant += 0.5 * self.strain_constant;
@@ -70,10 +70,10 @@ impl ElasticBody {
     }
 }
 
-/// Takes prescribed dofs out of K and f, symmetrically, and keeps what energies need. `carried` is the rigid displacement that all is
-/// relative to, empty for none.
+/// Eliminate prescribed dofs from K and f, symmetrically, and keep the terms that energies need.
 ///
-/// `prescribed` holds (dof, value), sorted, without repetition. Rows of K that are empty live elsewhere, with their energies.
+/// `prescribed` holds (dof, value), sorted, without repetition. `carried` is the rigid displacement that all displacements are relative
+/// to, empty for none. Empty rows of K belong to other ranks, which also account for their energies.
 pub fn support(mut stiffness: Csr, load: Vec<f64>, prescribed: Vec<(usize, f64)>, carried: Vec<f64>) -> ElasticBody {
     let n = load.len();
     let mut is_free = vec![true; n];
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
     use crate::linalg::dot;
 
-    /// Two dofs joined by springs to each other and to ground: K = [[3, -1], [-1, 2]].
+    /// Return the matrix K = [[3, -1], [-1, 2]] of two dofs with springs between them and to the ground.
     fn springs() -> Csr {
         let mut k = Csr::new(2);
         k.push_row([(0, 3.0), (1, -1.0)]);
@@ -128,7 +128,7 @@ mod tests {
         assert!((energy - exact).abs() < 1e-14, "{energy} {exact}");
     }
 
-    /// Other loads and prescribed values are those of a body made with them.
+    /// A reloaded body equals a body that is made with the other loads and prescribed values.
     #[test]
     fn a_body_takes_other_loads() {
         for (u, carried) in [(0.4, vec![]), (0.0, vec![0.5, 0.5])] {

@@ -1,39 +1,49 @@
-//! Integrals over surfaces: loads, foundations, areas.
+//! Integrals over surfaces: loads, foundations and areas.
 
 use super::assemble::{NodalBlock, interpolate};
-use super::element;
+use super::facets::{Facets, area_vector};
 use super::forces::NodalForces;
 use super::frame::place;
 use super::quadrature::{self, Parts};
-use super::space::{Facets, Space, area_vector};
+use super::space::Space;
+use super::{element, length};
 use crate::problem::order::Order;
 
-/// Nodal forces of a surface load; `traction(x, n)` is force per area at a point with outer unit normal n.
+/// Return the nodal forces of a surface load. `traction(x, n)` is the force per area at a point x with outer unit normal n.
 pub fn surface_load<const D: usize>(
     space: &Space<D>,
     facets: &Facets<D>,
     parts: Parts,
     traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
 ) -> NodalForces<D> {
-    let of_surface = facets.distinct_nodes();
-    let mut load = vec![0.0; D * of_surface.len()];
-    on_facets(space, facets, parts, &mut |nodes, phi, weight, x, normal| {
+    let surface_nodes = facets.distinct_nodes();
+    let mut load = vec![0.0; D * surface_nodes.len()];
+    visit(space, facets, parts, |Point { nodes, phi, weight, x, normal }| {
         let force = traction(x, normal);
-        for (a, at) in nodes.iter().enumerate().filter_map(|(a, &node)| Some((a, place(&of_surface, node)?))) {
+        for (a, at) in nodes.iter().enumerate().filter_map(|(a, &node)| Some((a, place(&surface_nodes, node)?))) {
             for c in 0..D {
                 load[D * at as usize + c] += weight * phi[a] * force[c];
             }
         }
     });
-    NodalForces::new(of_surface.into_iter(), &load)
+    NodalForces::new(surface_nodes.into_iter(), &load)
 }
 
-/// What is done at an integration point of a surface: nodes of the facet, their shape functions, weight, place, outer unit
-/// normal.
-type Visit<'a, const D: usize> = dyn FnMut(&[u32], &[f64], f64, [f64; D], [f64; D]) + 'a;
+/// An integration point of a surface.
+struct Point<'a, const D: usize> {
+    /// Nodes of the facet.
+    nodes: &'a [u32],
+    /// Values of the shape functions.
+    phi: [f64; element::MOST],
+    /// Weight of the point in an integral over the surface.
+    weight: f64,
+    x: [f64; D],
+    /// Outer unit normal.
+    normal: [f64; D],
+}
 
-/// Visits the integration points of a surface.
-fn on_facets<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts, visit: &mut Visit<D>) {
+/// Visit the integration points of a surface.
+fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts, mut each: impl FnMut(Point<D>)) {
     let mut rule = quadrature::simplex(D, if space.order == Order::P1 { 3 } else { 5 });
     if parts == Parts::Halves {
         rule = rule.on_parts();
@@ -42,16 +52,17 @@ fn on_facets<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts,
         let x = facets.coordinates(index, space);
         for (l, weight) in rule.iter() {
             let area = area_vector(space.order, &x, l);
-            let measure = area.iter().map(|a| a * a).sum::<f64>().sqrt();
+            let measure = length(area);
             let normal = area.map(|a| a / measure);
             let phi = element::values(space.order, l);
             let at = interpolate(&x, &phi);
-            visit(facets.facet(index), &phi, weight * measure * space.circle(&at), at, normal);
+            let weight = weight * measure * space.circle(&at);
+            each(Point { nodes: facets.facet(index), phi, weight, x: at, normal });
         }
     }
 }
 
-/// Springs per area on a surface, a foundation: `stiffness(x, n)` is traction per displacement at a point with outer unit
+/// Return the springs of a foundation on a surface. `stiffness(x, n)` is the traction per displacement at a point x with outer unit
 /// normal n.
 pub fn foundation<const D: usize>(
     space: &Space<D>,
@@ -59,7 +70,7 @@ pub fn foundation<const D: usize>(
     stiffness: &dyn Fn([f64; D], [f64; D]) -> [[f64; D]; D],
 ) -> Vec<NodalBlock<D>> {
     let mut blocks = Vec::new();
-    on_facets(space, facets, Parts::Whole, &mut |nodes, phi, weight, x, normal| {
+    visit(space, facets, Parts::Whole, |Point { nodes, phi, weight, x, normal }| {
         let density = stiffness(x, normal);
         for (a, &first) in nodes.iter().enumerate() {
             for (b, &second) in nodes.iter().enumerate() {
@@ -71,9 +82,9 @@ pub fn foundation<const D: usize>(
     blocks
 }
 
-/// Length (area) of a surface, in bodies of revolution the area that the curve sweeps over.
+/// Return the length (area) of a surface, in bodies of revolution the area that the curve sweeps over.
 pub fn measure<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
     let mut sum = 0.0;
-    on_facets(space, facets, Parts::Whole, &mut |_, _, weight, _, _| sum += weight);
+    visit(space, facets, Parts::Whole, |point| sum += point.weight);
     sum
 }

@@ -1,19 +1,24 @@
-//! What a load misses on a meshed surface, by how much the surface turns from facet to facet where the true one is smooth.
+//! Error of a load on a meshed surface that approximates a smooth one, from the angles between neighbouring facets.
 
 use super::assemble::is_straight;
-use super::space::{Facets, Space, area_vector};
+use super::facets::{Facets, area_vector};
+use super::space::Space;
+use super::{minus, unit};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 use std::collections::HashMap;
 
-/// Angle from which two facets, or two edges of a rim, meet in a corner. Chords that turn by t leave their arc by 1 - cos(t/2) = t^2/8 of its radius; with this t that
-/// is 3 per cent, the worst that is taken for round. A circle of 13 chords turns by 0.483.
+/// Angle from which two facets, or two edges of a rim, meet in a corner.
+///
+/// Chords that turn by an angle t leave their arc by 1 - cos(t/2) = t^2/8 of its radius. With this angle that is 3 per cent, the worst
+/// polygon that is taken for round. A circle of 13 chords turns by 0.483.
 const CORNER: f64 = 0.49;
 
 /// Return the share of a load that may be missing on some facets, zero if they are plane with straight rims.
 ///
-/// An inscribed polygon of chords that turn by t each misses t^2/24 of the length of its circle and t^2/6 of its area, and a surface of triangles t^2/8
-/// of the area of its sphere. Parabolas through the middle of each arc miss t^4/960 of the length and t^4/480 of the area.
+/// An inscribed polygon of chords that turn by an angle t each misses t^2/24 of the length of its circle and t^2/6 of its area. A surface
+/// of triangles misses t^2/8 of the area of its sphere. Parabolas through the middle of each arc miss t^4/960 of the length and t^4/480 of
+/// the area.
 pub fn missed<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
     let is_curved = |i: usize| !is_straight(&facets.coordinates(i, space), D);
     let angle = turn(space, facets);
@@ -23,47 +28,55 @@ pub fn missed<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
     }
 }
 
-/// The share of a load that may be missing on straight facets that turn by an angle.
+/// Return the share of a load that may be missing on straight facets that turn by an angle.
 pub fn by_chords(angle: f64) -> f64 {
     angle * angle / 6.0
 }
 
-/// Return the largest angle by which some facets, or the edges of their rim, turn without a corner.
+/// Return the largest angle below [`CORNER`] between neighbouring facets, or between neighbouring edges of their rim.
 fn turn<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
-    let mut most = 0.0f64;
-    let mut note = |cosine: f64| {
-        let angle = cosine.clamp(-1.0, 1.0).acos();
-        most = most.max(if angle < CORNER { angle } else { 0.0 });
-    };
-    let mut normals: HashMap<Vec<u32>, [f64; D]> = HashMap::new();
-    for i in 0..facets.count() {
-        let corners = &facets.facet(i)[..D];
-        let x: Vec<[f64; D]> = corners.iter().map(|&node| space.nodes[node as usize]).collect();
-        let normal = unit(area_vector::<D>(Order::P1, &x, &[1.0 / D as f64; D]));
-        for opposite in 0..D {
-            let mut side: Vec<u32> = (0..D).filter(|&k| k != opposite).map(|k| corners[k]).collect();
-            side.sort_unstable();
-            // what stays belongs to one facet alone: the rim
-            match normals.remove(&side) {
-                Some(other) => note(dot(&normal, &other)),
-                None => drop(normals.insert(side, normal)),
+    let normals: Vec<[f64; D]> = (0..facets.count()).map(|i| normal(space, facets, i)).collect();
+    let mut cosines = Vec::new();
+    let mut rim_at: HashMap<u32, Vec<[f64; D]>> = HashMap::new();
+    for (side, around) in facets_by_side(facets) {
+        // Where more than two facets meet, they are taken in pairs.
+        for pair in around.chunks(2) {
+            match (pair, &side[..]) {
+                (&[i, j], _) => cosines.push(dot(&normals[i], &normals[j])),
+                (_, &[from, to]) => {
+                    let [a, b] = [from, to].map(|node| space.nodes[node as usize]);
+                    rim_at.entry(from).or_default().push(unit(minus(b, a)));
+                    rim_at.entry(to).or_default().push(unit(minus(a, b)));
+                }
+                // In the plane the rim consists of single nodes.
+                _ => {}
             }
         }
     }
-    let mut rim: HashMap<u32, Vec<[f64; D]>> = HashMap::new();
-    for side in normals.keys().filter(|side| side.len() == 2) {
-        for [from, to] in [[side[0], side[1]], [side[1], side[0]]] {
-            let [a, b] = [from, to].map(|node| space.nodes[node as usize]);
-            rim.entry(from).or_default().push(unit(std::array::from_fn(|c| b[c] - a[c])));
-        }
-    }
-    rim.values().filter(|ways| ways.len() == 2).for_each(|ways| note(-dot(&ways[0], &ways[1])));
-    most
+    cosines.extend(rim_at.values().filter(|edges| edges.len() == 2).map(|edges| -dot(&edges[0], &edges[1])));
+    let angles = cosines.into_iter().map(|cosine| cosine.clamp(-1.0, 1.0).acos());
+    angles.filter(|&angle| angle < CORNER).fold(0.0, f64::max)
 }
 
-fn unit<const D: usize>(v: [f64; D]) -> [f64; D] {
-    let size = dot(&v, &v).sqrt();
-    v.map(|v| v / size)
+/// Return the facets at each side, in their order. A side is the sorted corners of a facet without one of them: an edge of a triangle,
+/// or an end of a line.
+fn facets_by_side<const D: usize>(facets: &Facets<D>) -> HashMap<Vec<u32>, Vec<usize>> {
+    let mut around: HashMap<Vec<u32>, Vec<usize>> = HashMap::new();
+    for i in 0..facets.count() {
+        for opposite in 0..D {
+            let mut side = facets.facet(i)[..D].to_vec();
+            side.remove(opposite);
+            side.sort_unstable();
+            around.entry(side).or_default().push(i);
+        }
+    }
+    around
+}
+
+/// Return the unit normal of the plane through the corners of facet `i`.
+fn normal<const D: usize>(space: &Space<D>, facets: &Facets<D>, i: usize) -> [f64; D] {
+    let x = facets.coordinates(i, space);
+    unit(area_vector::<D>(Order::P1, &x[..D], &[1.0 / D as f64; D]))
 }
 
 #[cfg(test)]
@@ -71,11 +84,12 @@ mod tests {
     use super::*;
     use crate::fem::sample::block;
 
-    /// A cube has corners alone. Bent into a part of a ring, its cylinders turn by the angle of a cell, and so does the rim of a plane end.
+    /// A cube has only corners. If it is bent into a part of a ring, its cylinders turn by the angle of a cell, and so does the rim of a
+    /// plane end.
     #[test]
     fn a_bent_cube_turns() {
         let mut cube = block::<3>(4, Order::P1);
-        // the sample is skewed
+        // The sample is skewed, which is undone here.
         cube.nodes.iter_mut().for_each(|[x, y, z]| {
             *y -= 0.2 * *z;
             *x -= 0.2 * *y;

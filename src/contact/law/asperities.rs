@@ -1,10 +1,12 @@
-//! Layer of asperities after Greenwood and Williamson (Proc. R. Soc. A 295, 1966): summits of one radius at different heights, each in
-//! Hertz' contact with a plane, and alone.
+//! Layer of asperities after Greenwood and Williamson (Proc. R. Soc. A 295, 1966). Summits of one radius have different heights.
+//! Each is in Hertz' contact with a plane and does not interact with the others.
 //!
-//! With the depth s of a summit below the highest one, f(s) the share of summits at this depth, eta their number per area, R
-//! their radius, and E* the modulus of both bodies, a layer that is compressed by c has
+//! A layer that is compressed by c has
 //!
-//! p(c) = 4/3 E* sqrt(R) eta int_0^c (c - s)^(3/2) f(s) ds,  p'(c) = 2 E* sqrt(R) eta int_0^c (c - s)^(1/2) f(s) ds.
+//! p(c) = 4/3 E* sqrt(R) eta int_0^c (c - s)^(3/2) f(s) ds,  p'(c) = 2 E* sqrt(R) eta int_0^c (c - s)^(1/2) f(s) ds,
+//!
+//! where s is the depth of a summit below the highest one, f(s) the density of summits at this depth, eta their number per area, R their
+//! radius, and E* the modulus of both bodies.
 
 use super::Table;
 use super::quadrature::integral;
@@ -12,47 +14,50 @@ use crate::linalg::portable::exp;
 use crate::problem::layer::{AsperitySpec, Depths};
 use std::f64::consts::PI;
 
-/// Even steps of the curve from first touch to its end. A cubic piece of length h with exact slopes is off by h^4/384 of the fourth derivative.
-/// For heights up to 4 standard deviations h is a fiftieth of one; in the tail the law grows by e in a quarter of it: (4/50)^4/384 = 1e-7.
+/// Number of even steps of the curve from first touch to its end.
+///
+/// A cubic piece of length h with exact slopes has an error of h^4/384 times the fourth derivative. For heights up to 4 standard deviations
+/// h is a fiftieth of one. In the tail the law grows by e within a quarter of one, which gives (4/50)^4/384 = 1e-7.
 const STEPS: f64 = 400.0;
-/// Longest step as a share of the compression. Near first touch the law is like c^(5/2), whose fourth derivative is 0.94 of it over c^4:
-/// 0.12^4/384 of that is 5e-7.
+/// Longest step as a share of the compression. Near first touch the law is like c^(5/2), whose fourth derivative is 0.94 c^(5/2)/c^4.
+/// The relative error is then 0.12^4/384 times 0.94, which is 5e-7.
 const SHARE: f64 = 0.12;
-/// Standard deviations from the mean beyond which a normal distribution has less than 1e-16.
+/// Number of standard deviations from the mean beyond which a normal distribution has less than 1e-16.
 const BEYOND: f64 = 8.5;
-/// The first point as a share of an even step: below it, where the law is a straight line, pressures are under (1e-8)^(3/2) of that of a step.
+/// First point of the curve as a share of an even step. Below it the law is a straight line, and pressures are under (1e-8)^(3/2) of the
+/// pressure after one step.
 const LEAST: f64 = 1e-8;
 
-/// The law for the summits of a scene, as the curve of a table with exact slopes at its points.
+/// Return the law for the summits of a scene, as a table with exact slopes at its points.
 pub fn asperities(spec: &AsperitySpec) -> Table {
     let end = match &spec.depths {
         Depths::Normal { highest, .. } => 2.0 * highest,
         Depths::Measured(depths) => depths.last().copied().unwrap_or_default(),
     };
-    // a single summit, or many of one height
+    // A single summit, or many of one height, have no extent of heights.
     let end = if end > 0.0 { end } else { spec.radius };
     let step = end / STEPS;
-    // where all summits touch the law is smooth again, up to where they are flat
+    // Once all summits touch, the law is smooth again, up to the compression at which they are flat.
     let next = |c: &f64| match *c {
         c if c < end => Some(c + step.min(SHARE * c)),
         c if c < spec.radius => Some(c * (1.0 + SHARE)),
         _ => None,
     };
-    let places = std::iter::successors(Some(LEAST * step), next);
+    let compressions = std::iter::successors(Some(LEAST * step), next);
     let stiffness = spec.modulus * spec.radius.sqrt() * spec.density;
     let point = |c: f64| {
-        let [of_p, of_slope] = moments(&spec.depths, c);
-        [c, 4.0 / 3.0 * stiffness * of_p, 2.0 * stiffness * of_slope]
+        let [pressure, slope] = moments(&spec.depths, c);
+        [c, 4.0 / 3.0 * stiffness * pressure, 2.0 * stiffness * slope]
     };
-    Table::with_slopes(places.map(point))
+    Table::with_slopes(compressions.map(point))
 }
 
-/// int_0^c (c - s)^power f(s) ds for the powers 3/2 and 1/2.
+/// Return int_0^c (c - s)^power f(s) ds for the powers 3/2 and 1/2.
 fn moments(depths: &Depths, c: f64) -> [f64; 2] {
     match depths {
         Depths::Normal { deviation, highest } => {
             let density = |s: f64| exp(-0.5 * ((highest - s) / deviation).powi(2)) / (deviation * (2.0 * PI).sqrt());
-            // with s = c - t^2 the root is gone; beyond so many deviations there is nothing in double numbers
+            // The substitution s = c - t^2 removes the root. The density beyond the limits is below double precision.
             let [from, to] = [highest + BEYOND * deviation, highest - BEYOND * deviation];
             let [from, to] = [from, to].map(|s| (c - s.clamp(0.0, c)).sqrt());
             [4, 2].map(|power| integral(&|t: f64| 2.0 * t.powi(power) * density(c - t * t), from, to))
@@ -78,12 +83,12 @@ mod tests {
         AsperitySpec { density: 300.0, radius: 0.02, modulus: 1e5, depths, data: None }
     }
 
-    /// Against sums of Hertz' closed form over many summits drawn one by one from the distribution.
+    /// The curve agrees with sums of Hertz' closed form over many summits drawn one by one from the distribution.
     #[test]
     fn the_curve_is_the_sum_over_summits() {
         let (deviation, highest, many) = (1e-4, 4e-4, 400_000);
         let law = asperities(&spec(Depths::Normal { deviation, highest }));
-        // heights at equal steps of probability, by the trapezoidal rule for the distribution function
+        // Heights are at equal steps of probability, by the trapezoidal rule for the distribution function.
         let (mut depths, mut share, mut z) = (Vec::new(), 0.0, -highest);
         let h = 1e-4 * deviation;
         while z < highest && depths.len() < many {
@@ -104,7 +109,7 @@ mod tests {
         }
     }
 
-    /// Against the integrals at places between the points of the curve, from first touch on.
+    /// The curve agrees with the integrals between its points, from first touch on.
     #[test]
     fn the_curve_is_the_integral_between_its_points() {
         let depths = Depths::Normal { deviation: 1e-4, highest: 4e-4 };
@@ -118,7 +123,7 @@ mod tests {
         }
     }
 
-    /// One summit is Hertz' contact; it needs no distribution.
+    /// One summit gives Hertz' contact without any distribution.
     #[test]
     fn one_summit_is_hertz() {
         let law = asperities(&spec(Depths::Measured(Arc::new([0.0]))));

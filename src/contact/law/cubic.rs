@@ -1,21 +1,21 @@
-//! Cubic layer.
+//! Cubic law.
 
 use super::{LayerLaw, Response};
 use crate::linalg::portable::cbrt;
 
-/// p(c) = k1 c + k3 c^3: a linear layer that hardens.
+/// The law p(c) = k1 c + k3 c^3 of a layer that hardens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cubic {
     /// Pressure per unit of compression at first touch, > 0.
     pub k1: f64,
-    /// Hardening, >= 0: pressure per cube of compression.
+    /// Pressure per cube of compression, >= 0.
     pub k3: f64,
 }
 
 impl Cubic {
-    /// The c > 0 with k1 c + k3 c^3 = target > 0, for a k1 that need not be the law's.
+    /// Return the c > 0 with k1 c + k3 c^3 = target > 0, for a k1 that need not be the law's.
     fn root(self, k1: f64, target: f64) -> f64 {
-        // without one of the terms c is larger: Newton falls from there, the function is convex
+        // Without one of the terms c is larger. From there Newton's iterates decrease, since the function is convex.
         let mut c = (target / k1).min(cbrt(target / self.k3));
         for _ in 0..MOST {
             let square = c * c;
@@ -29,9 +29,9 @@ impl Cubic {
     }
 }
 
-/// Newton steps at most: 4 from the worst start, twice the target, and rounding can never hold up more.
+/// Largest number of Newton steps. The worst start, at twice the target, needs 4, and the limit also ends steps of rounding.
 const MOST: usize = 8;
-/// Relative step that leaves an error of rounding: the next would be its square.
+/// Relative step at which Newton's method stops. The next step would be its square, which is rounding.
 const SETTLED: f64 = 1e-8;
 
 impl LayerLaw for Cubic {
@@ -54,9 +54,9 @@ impl LayerLaw for Cubic {
 
     fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
         let (k1, k3, on_graph) = (self.k1, self.k3, self.root(self.k1, pressure));
-        // p(c) - p is divided by the difference of compressions, which rounding may have taken
+        // The difference of compressions follows from that of pressures, since direct subtraction may lose all digits.
         let secant = k1 + k3 * (c * c + c * on_graph + on_graph * on_graph);
-        let way = (self.pressure(point, c) - pressure) / secant;
-        way * way * (0.5 * k1 + k3 * (1.5 * on_graph * on_graph + way * (on_graph + 0.25 * way)))
+        let distance = (self.pressure(point, c) - pressure) / secant;
+        distance * distance * (0.5 * k1 + k3 * (1.5 * on_graph * on_graph + distance * (on_graph + 0.25 * distance)))
     }
 }

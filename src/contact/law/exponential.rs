@@ -1,26 +1,26 @@
-//! Exponential layer.
+//! Exponential law.
 
 use super::gap::{by_quadrature, exp_less_line};
 use super::root::meeting;
 use super::{LayerLaw, Response};
 use crate::linalg::portable::{exp, expm1, log1p};
 
-/// p(c) = p0 (e^(c/c0) - 1), continued as a straight line beyond e^60: no load gets there, but trial states do, and
-/// their numbers must stay finite.
+/// The law p(c) = p0 (e^(c/c0) - 1), continued as a straight line beyond c = 60 c0. No load compresses a layer so far, but trial
+/// states do, and their values must stay finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exponential {
     p0: f64,
     c0: f64,
-    /// Where the straight line begins, and the law there.
+    /// Compression from which the law is a straight line.
     end: f64,
     at_end: Response,
 }
 
-/// c/c0 beyond which the law is a straight line.
+/// Ratio c/c0 beyond which the law is a straight line.
 const LINE: f64 = 60.0;
 
 impl Exponential {
-    /// p0 > 0 is a pressure, c0 > 0 the compression over which the slope grows by e.
+    /// Make the law from a pressure p0 > 0 and the compression c0 > 0 over which the slope grows by e.
     pub fn new(p0: f64, c0: f64) -> Self {
         let mut law = Self { p0, c0, end: LINE * c0, at_end: Response::default() };
         law.at_end = law.compressed(0, law.end);
@@ -45,7 +45,7 @@ impl LayerLaw for Exponential {
         if beyond > 0.0 {
             return self.end + beyond;
         }
-        // the smaller of the c that p = 0 and c = 0 would give: the sum is between s and 2 s there
+        // The start is the smaller of the c that p = 0 and c = 0 would give. The sum c + p/rho is between s and 2 s there.
         let start = s.min(self.compression_loaded(point, rho * s));
         meeting(s, rho, [0.0, s.min(self.end)], start, |c| self.pressure_and_tangent(point, c))
     }
@@ -60,11 +60,11 @@ impl LayerLaw for Exponential {
     fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
         if c > self.end || pressure > self.at_end.pressure {
             let (law, tangent) = (|c| self.pressure(point, c), |c| self.pressure_and_tangent(point, c).1);
-            return by_quadrature((c, pressure, self.compression(point, pressure)), law, tangent);
+            return by_quadrature(c, pressure, self.compression(point, pressure), law, tangent);
         }
-        // with c's distance d from the graph, in c0: (p + p0) c0 (e^d - 1 - d)
+        // The gap is (p + p0) c0 (e^d - 1 - d), where d is the distance of c from the graph in units of c0.
         let slope = pressure + self.p0;
-        let way = log1p((self.pressure(point, c) - pressure) / slope);
-        slope * self.c0 * exp_less_line(way)
+        let distance = log1p((self.pressure(point, c) - pressure) / slope);
+        slope * self.c0 * exp_less_line(distance)
     }
 }

@@ -1,8 +1,8 @@
-//! Linear layer.
+//! Linear law.
 
 use super::{LayerLaw, Response};
 
-/// p(c) = stiffness * c.
+/// The law p(c) = stiffness * c.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Linear {
     /// Pressure per unit of compression, > 0.

@@ -5,15 +5,15 @@ use super::own::{self, OwnLaws};
 use super::{Cubic, Exponential, LayerLaw, Linear, PerPoint, Power, Table, Typed};
 use crate::error::{Error, Kind, Result, shown};
 use crate::expression::Field;
-use crate::problem::layer::{LawForm, LawKind, LayerSpec};
+use crate::problem::layer::{LawForm, LawKind, LayerSpec, Parameter};
 use std::rc::Rc;
 
-/// Makes the law of a layer; `laws` are those of the program by name, `position` the contact points.
+/// Make the law of a layer at the contact points `position`. `laws` are the laws that the program brings, by name.
 ///
-/// A law whose parameters are numbers is one object for all points.
+/// A law whose parameters are constant is one object for all points.
 ///
 /// # Errors
-/// Parameters out of their range at a point, expressions and own laws that are no law of a layer.
+/// Parameters out of their range at a point, and expressions or the program's own laws that are not the law of a layer.
 pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
     match spec {
         LayerSpec::Form { form, values } => match form.kind {
@@ -36,37 +36,42 @@ pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<R
     }
 }
 
-/// A law of a known form: one for all points, or one a point where a parameter varies.
+/// Make a law of a known form: one for all points, or one a point where a parameter varies.
+///
+/// # Errors
+/// A parameter that is not finite or out of its range at a point.
 fn formed<L: LayerLaw + 'static>(
     form: &LawForm,
     values: &[Field],
     position: &[[f64; 3]],
     new: fn(&[f64]) -> L,
 ) -> Result<Rc<dyn LayerLaw>> {
-    let at = |&x: &[f64; 3]| -> Result<L> {
-        let parameters = form.parameters.iter().zip(values).map(|(known, field)| {
-            let value = field.eval_finite(known.what, x)?;
-            match known.bounds.breach(value) {
-                None => Ok(value),
-                Some(breach) => {
-                    let message = format!("{} is {} at ({}, {}, {})", known.what, shown(value), x[0], x[1], x[2]);
-                    let error = Error::new(Kind::Scene, message);
-                    Err(match field.place() {
-                        Some(place) => error.at(place).label(breach),
-                        None => error.help(breach),
-                    })
-                }
-            }
-        });
-        Ok(new(&parameters.collect::<Result<Vec<f64>>>()?))
-    };
+    let at = |&x: &[f64; 3]| -> Result<L> { Ok(new(&parameters(form, values, x)?)) };
     match values.iter().all(Field::is_constant) {
         true => Ok(Rc::new(at(&[0.0; 3])?)),
         false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
     }
 }
 
-/// Diagonal of the box around all points; no layer is compressed by more.
+/// Evaluate the parameters of a form at a point.
+///
+/// # Errors
+/// A parameter that is not finite or out of its range.
+fn parameters(form: &LawForm, values: &[Field], x: [f64; 3]) -> Result<Vec<f64>> {
+    let checked = |(parameter, field): (&Parameter, &Field)| {
+        let value = field.eval_finite(parameter.what, x)?;
+        let Some(breach) = parameter.bounds.breach(value) else { return Ok(value) };
+        let message = format!("{} is {} at ({}, {}, {})", parameter.what, shown(value), x[0], x[1], x[2]);
+        let error = Error::new(Kind::Scene, message);
+        Err(match field.place() {
+            Some(place) => error.at(place).label(breach),
+            None => error.help(breach),
+        })
+    };
+    form.parameters.iter().zip(values).map(checked).collect()
+}
+
+/// Return the diagonal of the box around all points. No layer is compressed by more.
 fn extent(position: &[[f64; 3]]) -> f64 {
     let spread = |c: usize| {
         let values = position.iter().map(|x| x[c]);

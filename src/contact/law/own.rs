@@ -1,4 +1,4 @@
-//! Laws that a Rust program brings.
+//! Laws that a Rust program supplies.
 
 use super::typed::HUGE;
 use super::{LayerLaw, Response};
@@ -6,25 +6,26 @@ use crate::error::{Error, Kind, Result, shown};
 use crate::problem::own::Own;
 use std::rc::Rc;
 
-/// Laws of a Rust program by name: each makes the law of a pair from its contact points.
+/// The laws of a Rust program by name. Each entry makes the law of a pair from its contact points.
 pub type OwnLaws = Own<dyn Fn(&[[f64; 3]]) -> Box<dyn LayerLaw>>;
 
-/// Compressions to look at in a factor of ten.
+/// Number of checked compressions in a factor of ten.
 const STEPS: i32 = 8;
-/// How many factors of ten below the extent of the surfaces.
+/// Number of factors of ten that are checked below the extent of the surfaces.
 const DECADES: i32 = 9;
-/// Share of a compression over which a tangent is compared with a difference. With p ~ c^n the difference is off by n^2/6 of its square,
-/// and by 1e-16 over it of rounding.
+/// Share of a compression over which a tangent is compared with a difference of pressures. For p ~ c^n the difference has a relative error
+/// of n^2/6 times the square of this share, and a rounding error of 1e-16 divided by it.
 const CLOSE: f64 = 1e-4;
-/// What a tangent may be off: n up to 700, where e^c ends.
+/// Largest relative error of a tangent. It allows for n up to 700, where e^c overflows.
 const OFF: f64 = 1e-3;
-/// Rounding of an energy, as a share of the largest: a formula is a difference of terms, each of which may be 1e6 times the energy.
+/// Rounding of an energy, as a share of the largest one: a formula may be a difference of terms that are 1e6 times the energy.
 const ROUNDING: f64 = 1e-10;
 
-/// The law of a name at contact points, checked at the first of them for compressions up to `size`, the extent of the surfaces.
+/// Return the law of this name for the contact points `position`. It is checked at the first point for compressions up to `size`, the
+/// extent of the surfaces.
 ///
 /// # Errors
-/// A name that is not there, and what is no law.
+/// An unknown name, and a function that is not the law of a layer.
 pub(super) fn make(laws: &OwnLaws, name: &str, position: &[[f64; 3]], size: f64) -> Result<Rc<dyn LayerLaw>> {
     let law = laws.get("law of a layer", name)?(position);
     let refuse = |what| Error::new(Kind::Scene, format!("`{name}` is no law of a layer: {what}"));
@@ -32,43 +33,51 @@ pub(super) fn make(laws: &OwnLaws, name: &str, position: &[[f64; 3]], size: f64)
     Ok(law.into())
 }
 
-/// Whether p(c) increases from 0, its tangent is its derivative where the law is smooth, and the energy its integral; in words what is
-/// wrong. A law may end, by values that are not finite: there is a rigid stop.
+/// Check that p(c) increases from 0, that the tangent is its derivative where the law is smooth, and that the energy is its integral.
+/// A law may end with values that are not finite, at a rigid stop.
+///
+/// # Errors
+/// A message that says what is wrong.
 fn check(law: &dyn LayerLaw, size: f64) -> Result<(), String> {
-    let mut seen: Vec<(f64, Response)> = vec![(0.0, Response::default())];
+    let mut samples: Vec<(f64, Response)> = vec![(0.0, Response::default())];
     for step in 0..=DECADES * STEPS {
         let c = size * 10f64.powf(f64::from(step) / f64::from(STEPS) - f64::from(DECADES));
-        let here = law.compressed(0, c);
-        if step > 0 && (here.pressure.is_nan() || here.pressure >= HUGE) {
+        let response = law.compressed(0, c);
+        if step > 0 && (response.pressure.is_nan() || response.pressure >= HUGE) {
             break;
         }
-        seen.push((c, here));
+        samples.push((c, response));
     }
-    let rounding = ROUNDING * seen[seen.len() - 1].1.energy.abs();
-    let (mut kinks, mut off) = (0, String::new());
-    for two in seen.windows(2) {
-        let [(before, last), (c, here)] = [two[0], two[1]];
-        if !(here.pressure > last.pressure && here.pressure.is_finite()) {
-            return Err(format!("p is {} at c = {c:.3e} and {} before", shown(here.pressure), shown(last.pressure)));
+    let rounding = ROUNDING * samples[samples.len() - 1].1.energy.abs();
+    let (mut kinks, mut mismatch) = (0, String::new());
+    for two in samples.windows(2) {
+        let [(before, last), (c, response)] = [two[0], two[1]];
+        if !(response.pressure > last.pressure && response.pressure.is_finite()) {
+            return Err(format!(
+                "p is {} at c = {c:.3e} and {} before",
+                shown(response.pressure),
+                shown(last.pressure)
+            ));
         }
-        if !(here.tangent >= 0.0 && here.tangent.is_finite()) {
-            return Err(format!("p' is {} at c = {c:.3e}", shown(here.tangent)));
+        if !(response.tangent >= 0.0 && response.tangent.is_finite()) {
+            return Err(format!("p' is {} at c = {c:.3e}", shown(response.tangent)));
         }
-        // p increases, so that its integral lies between two rectangles
-        let (work, width) = (here.energy - last.energy, c - before);
-        if !(work >= width * last.pressure - rounding && work <= width * here.pressure + rounding) {
+        // Since p increases, its integral lies between two rectangles.
+        let (work, width) = (response.energy - last.energy, c - before);
+        if !(work >= width * last.pressure - rounding && work <= width * response.pressure + rounding) {
             return Err(format!("the energy is not the integral of p at c = {c:.3e}"));
         }
         let [low, high] = [-CLOSE, CLOSE].map(|share| law.pressure(0, c * (1.0 + share)));
         let slope = (high - low) / (2.0 * CLOSE * c);
-        let fits = (slope - here.tangent).abs() <= OFF * slope.max(here.tangent);
-        if !fits {
+        let agrees = (slope - response.tangent).abs() <= OFF * slope.max(response.tangent);
+        if !agrees {
             kinks += 1;
-            off = format!("p' is {:.3e} at c = {c:.3e}, where differences of p give {slope:.3e}", here.tangent);
+            mismatch =
+                format!("p' is {:.3e} at c = {c:.3e}, where differences of p give {slope:.3e}", response.tangent);
         }
     }
-    // a law may have kinks, but not everywhere
-    if 2 * kinks > seen.len() { Err(off) } else { Ok(()) }
+    // A law may have kinks, but not at most of its points.
+    if 2 * kinks > samples.len() { Err(mismatch) } else { Ok(()) }
 }
 
 #[cfg(test)]
@@ -76,7 +85,7 @@ mod tests {
     use super::*;
     use crate::contact::law::{Cubic, Exponential, Power, Table};
 
-    /// p = c^2 with mistakes.
+    /// The law p = c^2 with mistakes.
     #[derive(Debug, Default)]
     struct Wrong {
         pressure: f64,
@@ -119,8 +128,8 @@ mod tests {
             (Wrong { energy: 0.6, ..Wrong::default() }, "the energy is not the integral"),
             (Wrong { end: 1e-20, ..Wrong::default() }, "p is inf at c = 1.000e-9"),
         ] {
-            let said = check(&law, 1.0).expect_err(words);
-            assert!(said.contains(words), "{said}");
+            let message = check(&law, 1.0).expect_err(words);
+            assert!(message.contains(words), "{message}");
         }
         let mut laws = OwnLaws::default();
         laws.insert("film", Rc::new(|_| Box::new(Wrong::default())));

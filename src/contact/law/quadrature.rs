@@ -1,24 +1,26 @@
 //! Integrals of functions of one variable.
 
-/// Points in (0, 1] and weights of the Gauss-Lobatto rule with 7 points on [-1, 1], its positive half. It holds the ends: a
-/// kink just before one does not hide between points.
+/// Points in (0, 1] and weights of the Gauss-Lobatto rule with 7 points on [-1, 1]. The rule includes the ends of an interval, so
+/// that a kink just before an end does not hide between points.
 const LOBATTO: [(f64, f64); 3] = [
     (0.468_848_793_470_714_2, 0.431_745_381_209_862_6),
     (0.830_223_896_278_566_9, 0.276_826_047_361_565_9),
     (1.0, 1.0 / 21.0),
 ];
-/// Weight of its middle point.
+/// Weight of the middle point of this rule.
 const MIDDLE: f64 = 256.0 / 525.0;
 
-/// How often an interval is halved at most.
+/// Largest number of times that an interval is halved.
 const DEPTH: usize = 30;
 
-/// Integral of `f` from `a` to `b`, by halving until the rule and its halves agree to 1e-13 of the whole.
+/// Return the integral of `f` from `a` to `b`. Intervals are halved until the rule on each and on its halves agree to 1e-13 of the
+/// whole integral.
 pub fn integral(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
     integral_to(f, a, b, 1e-13, 0.0)
 }
 
-/// The same until they agree to a share of the whole or to `rounding`, the error that the values of `f` make of it.
+/// Return the integral of `f` from `a` to `b`. Intervals are halved until the rules agree to a `share` of the whole integral, or to
+/// `rounding`, the error of the integral from that of the values of `f`.
 pub fn integral_to(f: &dyn Fn(f64) -> f64, a: f64, b: f64, share: f64, rounding: f64) -> f64 {
     let whole = rule(f, a, b);
     halves(f, a, b, whole, rounding.max(share * whole.abs()), DEPTH)
@@ -28,7 +30,7 @@ fn halves(f: &dyn Fn(f64) -> f64, a: f64, b: f64, whole: f64, tolerance: f64, de
     let middle = 0.5 * (a + b);
     let (left, right) = (rule(f, a, middle), rule(f, middle, b));
     let sum = left + right;
-    // written so that NaN ends it
+    // A comparison with NaN is false and ends the recursion.
     if depth > 0 && (sum - whole).abs() > tolerance {
         halves(f, a, middle, left, tolerance, depth - 1) + halves(f, middle, b, right, tolerance, depth - 1)
     } else {

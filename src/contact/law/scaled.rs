@@ -1,17 +1,17 @@
-//! A layer as a smaller load sees it.
+//! The law of a layer in a problem with scaled loads.
 
 use super::{LayerLaw, Response};
 use std::rc::Rc;
 
-/// p(s c)/s for a law p and a factor s > 0.
+/// The law p(s c)/s for a law p and a factor s > 0.
 ///
-/// With displacements measured in shares s of themselves, bodies under s times their loads have the equations of the full loads,
-/// and this is the layer between them.
+/// If bodies under s times their loads have displacements that are divided by s, these satisfy the equations of the full loads.
+/// This is then the law of the layer between them.
 #[derive(Debug)]
 pub struct Scaled {
     /// The law p.
     pub law: Rc<dyn LayerLaw>,
-    /// s.
+    /// The factor s.
     pub factor: f64,
 }
 

@@ -1,12 +1,13 @@
-//! Laws smoothed by an energy per area mu, as interior-point methods have them on their central path.
+//! Laws smoothed by an energy per area mu, as on the central path of an interior-point method.
 //!
-//! With the inverse c = phi(p) of a law, the smoothed law is
+//! Let c = phi(p) be the inverse of a law. The smoothed law is
 //!
 //! ```text
 //! c = phi(p) - mu/p,   p > 0,        kappa = dp/dc = 1 / (phi'(p) + mu/p^2)
 //! ```
 //!
-//! It is strictly monotone and has no corner. At every pressure the gap s = mu/p remains, so that s p = mu: the perturbed complementarity.
+//! It is strictly monotone and has no corner. At every pressure p the gap s = mu/p remains, so that s p = mu, which is the perturbed
+//! complementarity condition.
 
 use super::root::root;
 use super::{LayerLaw, Response};
@@ -14,48 +15,51 @@ use super::{LayerLaw, Response};
 /// A state (c, p) on a law or a smoothed law, with the tangent there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LawState {
-    /// c.
+    /// Compression c.
     pub compression: f64,
-    /// p, force per area.
+    /// Pressure p, force per area.
     pub pressure: f64,
-    /// kappa = dp/dc.
+    /// Tangent kappa = dp/dc.
     pub tangent: f64,
 }
 
-/// Return the only state with c + p/rho = `sum` on the law smoothed by `mu`, an energy per area, for a stiffness per area `rho > 0`: Minty's
-/// resolvent. With `mu` = 0 it is the state on the law itself.
+/// Return Minty's resolvent: the only state with c + p/rho = `sum` on the law smoothed by `mu`.
 ///
-/// The law need not be inverted. Let P(s) be the pressure at which the law itself meets the line with the sum s. A state with the remaining gap
-/// y = mu/p has p = P(`sum` + y), so y is the root of the increasing function y P(`sum` + y) = mu. Rigid layers, P(s) = rho s, have the least
-/// root.
+/// `mu` is an energy per area and `rho > 0` a stiffness per area. With `mu` = 0 the result is the state on the law itself.
+///
+/// The law need not be inverted. Let P(s) be the pressure at which the law itself meets the line with the sum s. A state with the
+/// remaining gap y = mu/p has p = P(`sum` + y), so y is the root of y P(`sum` + y) = mu, where the left side increases with y. The root
+/// is least for a rigid layer, P(s) = rho s, whose gap has a closed form.
 pub fn resolve(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64, mu: f64) -> LawState {
-    let at = |sum: f64| {
-        let compression = law.meet(point, sum, rho);
-        let Response { pressure, tangent, .. } = match compression > 0.0 {
-            true => {
-                let (pressure, tangent) = law.pressure_and_tangent(point, compression);
-                Response { pressure, tangent, energy: 0.0 }
-            }
-            false => law.response(point, compression),
-        };
-        LawState { compression, pressure, tangent }
-    };
     if mu == 0.0 || !sum.is_finite() {
-        return at(sum);
+        return on_law(law, point, sum, rho);
     }
     let value = |gap: f64| {
-        let LawState { pressure, tangent, .. } = at(sum + gap);
+        let LawState { pressure, tangent, .. } = on_law(law, point, sum + gap, rho);
         (gap * pressure, pressure + gap * tangent / (1.0 + tangent / rho))
     };
     let diagonal = sum.hypot(2.0 * (mu / rho).sqrt());
     let rigid = if sum > 0.0 { 2.0 * mu / rho / (sum + diagonal) } else { 0.5 * (diagonal - sum) };
-    // an infinite rho leaves the gap of a closed point without a lower bound
+    // With an infinite rho the gap of a closed point has no lower bound.
     let start = if rigid > 0.0 { rigid } else { 1.0 };
     let least = rigid * (1.0 - 4.0 * f64::EPSILON);
     let (Ok(gap) | Err(gap)) = root(mu, [least, f64::MAX], start, value);
-    let LawState { compression, tangent, .. } = at(sum + gap);
+    let LawState { compression, tangent, .. } = on_law(law, point, sum + gap, rho);
     let pressure = mu / gap;
     LawState { compression: compression - gap, pressure, tangent: (tangent.recip() + gap / pressure).recip() }
+}
+
+/// Return the state on the law itself with c + p/rho = `sum`.
+fn on_law(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64) -> LawState {
+    let compression = law.meet(point, sum, rho);
+    let (pressure, tangent) = match compression > 0.0 {
+        true => law.pressure_and_tangent(point, compression),
+        false => {
+            let Response { pressure, tangent, .. } = law.response(point, compression);
+            (pressure, tangent)
+        }
+    };
+    LawState { compression, pressure, tangent }
 }
 
 #[cfg(test)]
@@ -63,7 +67,7 @@ mod tests {
     use super::*;
     use crate::contact::law::tests::all_laws;
 
-    /// The pressure at which phi(p) - mu/p + p/rho is the sum, by bisection of its logarithm: the law is inverted here.
+    /// Return the pressure at which phi(p) - mu/p + p/rho is the sum, by bisection of its logarithm. Here the law is inverted.
     fn bisected(law: &dyn LayerLaw, sum: f64, rho: f64, mu: f64) -> f64 {
         let excess = |pressure: f64| law.compression(0, pressure) - mu / pressure + pressure / rho - sum;
         let (mut low, mut high) = (f64::MIN_POSITIVE, 1e300);
@@ -74,7 +78,7 @@ mod tests {
         high
     }
 
-    /// Every law, from points far apart to points pressed hard, from a soft to an infinite slope, from much smoothing to hardly any.
+    /// All laws are checked from open to strongly compressed points, for soft to infinite slopes and for much to hardly any smoothing.
     #[test]
     fn states_are_those_of_the_inverted_law() {
         for (law, scale) in all_laws() {
@@ -90,7 +94,7 @@ mod tests {
                             error.abs() < 1e-7,
                             "{law:?} sum {sum:e} rho {rho:e} mu {mu:e}: {state:?} {expected:e}"
                         );
-                        // c is the difference of phi and the gap
+                        // The compression c is the difference of phi and the gap.
                         let size = sum.abs().max(mu / state.pressure).max(state.pressure / rho);
                         let off = state.compression + state.pressure / rho - sum;
                         assert!(off.abs() <= 1e-12 * size, "{law:?} sum {sum:e} rho {rho:e} mu {mu:e}: {off:e}");

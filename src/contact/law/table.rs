@@ -1,23 +1,23 @@
-//! Measured layer: a smooth increasing curve through given points.
+//! Law of a measured layer: a smooth increasing curve through given points.
 
 use super::root::{meeting, root};
 use super::{LayerLaw, Response};
 use crate::linalg::portable::hypot;
 
-/// Monotone piecewise cubic curve through (0, 0) and points (c, p), continued as a straight line beyond the last one.
+/// A monotone piecewise cubic curve through (0, 0) and points (c, p), continued as a straight line beyond the last one.
 ///
-/// Slopes at the points are means of the secants on both sides, cut down as in Fritsch and Carlson (SIAM J. Numer. Anal. 17,
-/// 1980) so that p' > 0 everywhere: p is continuously differentiable and keeps the order of the points.
+/// Slopes at the points are means of the secants on both sides. They are reduced as in Fritsch and Carlson (SIAM J. Numer. Anal. 17,
+/// 1980) so that p' > 0 everywhere. The pressure p is then continuously differentiable and keeps the order of the points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// Points with their slopes and the energy up to them, from (0, 0) on.
     knots: Vec<Knot>,
-    /// Compression up to which the curve is known; infinite for that of a formula.
+    /// Compression up to which the curve is known; infinite if it comes from a formula.
     end: f64,
 }
 
-/// Slopes at both ends of a piece, as shares of its secant, have at most this for the root of their squares' sum: three, less what is far above
-/// rounding. At three a piece with a slope of zero at one end has none to spare, and p falls below its end by rounding.
+/// Largest norm of the two slopes at the ends of a piece, as shares of its secant. It is three less a margin far above rounding. With
+/// exactly three, a piece with a slope of zero at one end could fall below its end by rounding.
 const STEEPEST: f64 = 3.0 - 1e-9;
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -29,14 +29,14 @@ struct Knot {
 }
 
 impl Table {
-    /// The two knots around the place where `value` of (c, p), which increases along the curve, is `target`; only the
-    /// last one beyond it.
+    /// Return the two knots around the point of the curve where `value`, which increases along the curve, is `target`. Beyond the
+    /// last knot there is only this one.
     fn around(&self, target: f64, value: impl Fn(&Knot) -> f64) -> (&Knot, Option<&Knot>) {
         let above = self.knots.partition_point(|knot| value(knot) < target).max(1);
         (&self.knots[above - 1], self.knots.get(above))
     }
 
-    /// A curve through points (c, p), both increasing from (0, 0), which is not among them; at least one point.
+    /// Make a curve through at least one point (c, p). Both coordinates increase from (0, 0), which is not among the points.
     pub fn new(points: &[[f64; 2]]) -> Self {
         let mut knots = vec![Knot::default()];
         knots.extend(points.iter().map(|&[c, pressure]| Knot { c, pressure, ..Knot::default() }));
@@ -49,11 +49,11 @@ impl Table {
         Self::through(knots, &secants, end)
     }
 
-    /// The curve of a known function with p(0) = p'(0) = 0: points (c, p, p'), c and p increasing. Its error is of fourth order in their
-    /// distance.
+    /// Make the curve of a known function with p(0) = p'(0) = 0 from points (c, p, p') with increasing c and p. Its error is of fourth
+    /// order in the distance of the points.
     pub fn with_slopes(points: impl Iterator<Item = [f64; 3]>) -> Self {
         let mut knots = vec![Knot::default()];
-        // pressures that no number tells apart are one point
+        // Points whose pressures are equal in double precision become one.
         for [c, pressure, slope] in points {
             if knots.last().is_some_and(|last| pressure > last.pressure) {
                 knots.push(Knot { c, pressure, slope, ..Knot::default() });
@@ -63,7 +63,7 @@ impl Table {
         Self::through(knots, &secants, f64::INFINITY)
     }
 
-    /// The curve through knots with slopes, which are cut down where p would fall.
+    /// Make the curve through knots with slopes, which are reduced where p would decrease.
     fn through(mut knots: Vec<Knot>, secants: &[f64], end: f64) -> Self {
         for (i, secant) in secants.iter().enumerate() {
             let size = hypot(knots[i].slope / secant, knots[i + 1].slope / secant);
@@ -89,17 +89,17 @@ impl Knot {
     }
 }
 
-/// Pressure and tangent of the curve between two knots.
-fn steepness(a: &Knot, b: &Knot, c: f64) -> (f64, f64) {
+/// Return the pressure and the tangent of the curve between two knots at compression `c`.
+fn pressure_and_tangent(a: &Knot, b: &Knot, c: f64) -> (f64, f64) {
     let Response { pressure, tangent, .. } = piece(a, b, c);
     (pressure, tangent)
 }
 
-/// The curve between two knots, at c.
+/// Return the response of the curve between two knots at compression `c`.
 fn piece(a: &Knot, b: &Knot, c: f64) -> Response {
     let h = b.c - a.c;
     let s = (c - a.c) / h;
-    // p = p_a + h s (m_a + s (f + s g)) in the local coordinate s
+    // In the local coordinate s the pressure is p = p_a + h s (m_a + s (f + s g)), where m_a is the slope at knot a.
     let secant = (b.pressure - a.pressure) / h;
     let f = 3.0 * secant - 2.0 * a.slope - b.slope;
     let g = a.slope + b.slope - 2.0 * secant;
@@ -112,7 +112,7 @@ fn piece(a: &Knot, b: &Knot, c: f64) -> Response {
 
 impl LayerLaw for Table {
     fn compressed(&self, _point: usize, c: f64) -> Response {
-        // NaN stays in the first piece
+        // NaN is evaluated in the first piece and stays NaN.
         match self.around(c, |knot| knot.c) {
             (a, Some(b)) => piece(a, b, c),
             (end, None) => end.response().straight(c - end.c),
@@ -124,7 +124,7 @@ impl LayerLaw for Table {
         match self.around(s, sum) {
             (a, Some(b)) => {
                 let start = a.c + (b.c - a.c) * ((s - sum(a)) / (sum(b) - sum(a)));
-                meeting(s, rho, [a.c, b.c], start, |c| steepness(a, b, c))
+                meeting(s, rho, [a.c, b.c], start, |c| pressure_and_tangent(a, b, c))
             }
             (end, None) => end.c + end.response().straight_meet(end.c, s, rho),
         }
@@ -134,9 +134,8 @@ impl LayerLaw for Table {
         match self.around(pressure, |knot| knot.pressure) {
             (a, Some(b)) => {
                 let start = a.c + (b.c - a.c) * ((pressure - a.pressure) / (b.pressure - a.pressure));
-                match root(pressure, [a.c, b.c], start, |c| steepness(a, b, c)) {
-                    Ok(c) | Err(c) => c,
-                }
+                let (Ok(c) | Err(c)) = root(pressure, [a.c, b.c], start, |c| pressure_and_tangent(a, b, c));
+                c
             }
             (end, None) => end.c + end.response().straight_compression(pressure),
         }

@@ -5,8 +5,8 @@ use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Every law must be its own energy's derivative, its tangent its pressure's, and increase: from far below `scale` to far
-/// beyond it.
+/// Check from far below `scale` to far beyond it that the pressure is the derivative of the energy, the tangent that of the
+/// pressure, and that the pressure increases.
 fn check(law: &dyn LayerLaw, scale: f64) {
     assert_eq!(law.response(0, 0.0), Response::default());
     assert_eq!(law.response(0, -scale), Response::default());
@@ -19,7 +19,7 @@ fn check(law: &dyn LayerLaw, scale: f64) {
         assert_eq!(law.pressure(0, c), here.pressure);
         assert_eq!(law.robin_tangent(0, -c), here.tangent);
         let slope = (plus.pressure - minus.pressure) / (2.0 * h);
-        // a difference has an error of second order, and misses more at a kink of p'
+        // A difference of pressures has an error of second order, and a larger one at a kink of p'.
         let rough = (slope / here.tangent - 1.0).abs();
         let bent = (plus.tangent / minus.tangent - 1.0).abs();
         let rounding = 4.0 * f64::EPSILON * here.pressure / (h * here.tangent);
@@ -63,13 +63,13 @@ fn laws_are_consistent() {
         check(&typed(text, None).expect(text), 3e-5);
         check(&typed(text, Some(4e-5)).expect(text), 3e-5);
     }
-    // V1: a closing of B q^a carries q
+    // In case V1 a compression of B q^a carries the pressure q.
     let (b, a, q) = (2.5e-5, 0.5, 10.0f64);
     let p = Power::new(b, a).response(0, b * q.powf(a)).pressure;
     assert!((p - q).abs() < 1e-13);
 }
 
-/// Beside a piece 10^35 times as steep the slope at zero is cut to nothing, and the pressure still does not fall below zero.
+/// Beside a piece 10^35 times as steep the slope at zero is reduced to nothing, and the pressure still does not fall below zero.
 #[test]
 fn a_table_increases_beside_a_jump() {
     let law = Table::new(&[[10659179687.5, 1e-12], [10659179687.500042, 680819702.1484375]]);
@@ -92,7 +92,7 @@ fn a_table_goes_through_its_points_and_on_with_its_last_slope() {
     let beyond = law.response(0, 3e-4);
     assert!((beyond.pressure - (41.0 + 2e-4 * end.tangent)).abs() < 1e-10);
     assert!((beyond.tangent / end.tangent - 1.0).abs() < 1e-12);
-    // data on a line give the line
+    // Data on a line give the line.
     let line = Table::new(&[[1.0, 3.0], [2.0, 6.0], [5.0, 15.0]]);
     for c in [0.3, 1.7, 4.0, 9.0] {
         let expected = Response { pressure: 3.0 * c, tangent: 3.0, energy: 1.5 * c * c };
@@ -118,14 +118,14 @@ fn expressions_that_are_no_laws() {
     refused("1e5*c*sqrt(1e-3 - c)", None, "p does not increase at c = 6");
     refused("1e5*c + asin(100*c)", None, "p is 1001.570796326795 and p' inf at c = 1.000e-2");
     refused("1e-5*c/(1e-4 - c)", None, "at c = 1");
-    // advice that can help: there is nothing to cut off where the law falls from zero on
+    // The advice fits the case: there is nothing to cut off where the law decreases from zero on.
     assert!(typed("-1e5*c", None).expect_err("no law").to_string().contains("wrong sign"));
-    // as far as they are laws, they are
+    // Up to the compression where these laws increase, they are accepted.
     assert!(typed("1e5*c - 1e7*c^3", Some(0.05)).is_ok());
     assert!(typed("1e-5*c/(1e-4 - c)", Some(9e-5)).is_ok());
 }
 
-/// Laws of every kind, each with a compression where it is curved.
+/// Return laws of every kind, each with a compression where it is curved.
 pub(super) fn all_laws() -> Vec<(Box<dyn LayerLaw>, f64)> {
     let table = [[1e-5, 2.0], [1.5e-5, 2.1], [2e-5, 40.0], [1e-4, 41.0]];
     let mut laws: Vec<(Box<dyn LayerLaw>, f64)> = vec![
@@ -169,7 +169,7 @@ fn pressures_and_tangents_are_those_of_responses() {
     }
 }
 
-/// Far from the graph, and nowhere: an open layer without pressure is on the graph, all else is not.
+/// At infinite compressions or pressures only an open layer without pressure is on the graph.
 #[test]
 fn gaps_at_the_ends_of_numbers() {
     for (law, scale) in all_laws() {
@@ -188,12 +188,12 @@ fn gaps_at_the_ends_of_numbers() {
     }
 }
 
-/// Powers of ten from 10^low to 10^high, not at round numbers.
+/// Return powers of ten from 10^low to 10^high, not at round numbers.
 fn decades(low: i32, high: i32, each: i32) -> impl Iterator<Item = f64> {
     (low * each..=high * each).map(move |i| 1.137 * 10f64.powf(f64::from(i) / f64::from(each)))
 }
 
-/// Relative rounding of p(c) by that of c.
+/// Return the relative rounding error of p(c) caused by that of c.
 fn rounding(law: &dyn LayerLaw, c: f64) -> f64 {
     let (pressure, tangent) = law.pressure_and_tangent(0, c);
     let exponent = c * (tangent / pressure);
@@ -212,7 +212,7 @@ fn a_line_meets_the_graph_once() {
                 let share = pressure / rho / s;
                 let allowed = 4.0 * f64::EPSILON + share * rounding(&*law, c);
                 assert!(error.abs() <= allowed, "{law:?}: c = {c} at s = {s}, rho = {rho}: {error:e} > {allowed:e}");
-                // neither c nor p/rho grows by more than s
+                // Neither c nor p/rho grows by more than s.
                 let (gained, spring) = (c - last, (pressure - law.pressure(0, last)) / rho);
                 let slack = allowed * s;
                 assert!(gained >= -slack && spring >= -slack, "{law:?} falls at s = {s}, rho = {rho}");
@@ -238,7 +238,7 @@ fn compression_inverts_pressure() {
             }
             let found = law.compression(0, pressure);
             let error = law.pressure(0, found) / pressure - 1.0;
-            // a^p of an exponent that is rounded
+            // The second term is the error of a power with a rounded exponent.
             let allowed = rounding(&*law, c) * 2.0 + 2e-16 * pressure.ln().abs();
             assert!(error.abs() <= allowed, "{law:?}: {found} for p({c}): {error:e} > {allowed:e}");
         }
@@ -259,7 +259,7 @@ impl LayerLaw for Saturating {
     }
 }
 
-/// A law with a rigid stop at c = 1, after which it is not a number.
+/// A law with a rigid stop at c = 1, beyond which it is NaN.
 #[derive(Debug)]
 struct Ending;
 
@@ -275,7 +275,7 @@ fn what_a_law_cannot_reach() {
     assert!((Saturating.compression(0, 0.75) - 3.0).abs() < 1e-14);
     assert_eq!(Saturating.compression(0, 1.5), f64::INFINITY);
     assert_eq!(Saturating.duality_gap(0, 1.0, 1.5), f64::INFINITY);
-    // c = 0.5 has the pressure 1/3
+    // The pressure at c = 0.5 is 1/3.
     let exact = (2.0 - 3f64.ln()) - (0.5 - 1.5f64.ln()) - 1.5 / 3.0;
     let found = Saturating.duality_gap(0, 2.0, 1.0 / 3.0);
     assert!((found / exact - 1.0).abs() < 1e-5, "{found} {exact}");
@@ -285,18 +285,18 @@ fn what_a_law_cannot_reach() {
     assert_eq!(Ending.duality_gap(0, 1.5, 0.5), f64::INFINITY);
 }
 
-/// The integral of p(.) - pressure from the graph to c > 0, far from the graph.
+/// Return the integral of p(.) - pressure from the graph to c > 0, far from the graph.
 fn brute_gap(law: &dyn LayerLaw, c: f64, pressure: f64) -> f64 {
     let (mut low, mut high) = (0u64, f64::MAX.to_bits());
     while high - low > 1 {
         let middle = u64::midpoint(low, high);
         if law.pressure(0, f64::from_bits(middle)) < pressure { low = middle } else { high = middle }
     }
-    // pieces of a tenth in c each, so that nothing is between the points of a rule
+    // In each piece c changes by a tenth, so that no feature hides between the points of a rule.
     let (mut from, mut sum) = (f64::from_bits(high), 0.0);
     while from != c {
         let to = if c > from { (from * 1.1).min(c) } else { (from / 1.1).max(c) };
-        // an open layer's share is below all digits
+        // The contribution of an open layer is below rounding.
         let to = if to < 1e-6 * f64::from_bits(high) && c < from { c } else { to };
         let noise = 4.0 * f64::EPSILON * pressure * (to - from).abs();
         sum += quadrature::integral_to(&|c| law.pressure(0, c) - pressure, from, to, 1e-9, noise);
@@ -321,7 +321,7 @@ fn the_gap_is_the_area_between_the_graph_and_a_corner() {
                 let error = found / expected - 1.0;
                 assert!(error.abs() < 2e-5, "{law:?} at {c}, {ratio} p: {found} {expected} {error:e}");
             }
-            // P*(p) by its definition, and the rectangle of an open gap
+            // The expected value takes P*(p) by its definition and adds the rectangle of an open gap.
             let conjugate = c * pressure - energy;
             assert!((gap(0.0, pressure) / conjugate - 1.0).abs() < 2e-5, "{law:?} at {c}: P* {conjugate}");
             let open = conjugate + 3.0 * scale * pressure;
@@ -343,21 +343,21 @@ fn the_gap_keeps_its_digits_near_the_graph() {
                 continue;
             }
             let mut last = 0.0;
-            // a scaled law rounds the pressure
+            // A scaled law rounds the pressure.
             let rounding = 2.0 * f64::EPSILON * pressure;
             assert!(law.duality_gap(0, c, pressure) <= rounding * (rounding / tangent));
             for away in decades(-13, -5, 2) {
                 for sign in [1.0, -1.0] {
                     let other = pressure * (1.0 + sign * away);
                     let difference = pressure - other;
-                    // where c has lost the digits of the way to the graph, that is straight
+                    // Where the distance of c from the graph has lost its digits, the law counts as straight.
                     let expected = match away > 1e-8 {
                         true => brute_gap(&*law, c, other),
                         false => 0.5 * difference * (difference / tangent),
                     };
                     let found = law.duality_gap(0, c, other);
                     let error = found / expected - 1.0;
-                    // scaling rounds the pressure on the way in and p(c) on the way out
+                    // Scaling rounds the pressure that goes in and the p(c) that comes out.
                     let scaled = if format!("{law:?}").starts_with("Scaled") { 4.0 * f64::EPSILON / away } else { 0.0 };
                     assert!(
                         error.abs() < 1e-3 + scaled,
@@ -377,7 +377,7 @@ fn at_a_kink_the_gap_is_a_bound() {
     let c = 3e-5;
     let p = law.pressure(0, c);
     for away in decades(-13, -6, 3) {
-        // the corner (c + d, p - e) has a triangle on each side of the kink
+        // The area to the corner (c + d, p - e) is a triangle on each side of the kink.
         let (d, e) = (c * away, p * away);
         let (beyond, below) = (c + d, p - e);
         let area = 0.5 * ((beyond - c).powi(2) * 1.1e6 + (p - below).powi(2) / 1e5) + (beyond - c) * (p - below);
@@ -387,7 +387,7 @@ fn at_a_kink_the_gap_is_a_bound() {
     }
 }
 
-/// A law that counts how often it is asked, and leaves everything else to the common searches.
+/// A law that counts its evaluations and leaves everything else to the common searches.
 #[derive(Debug)]
 struct Counted<L>(L, Cell<usize>);
 
@@ -425,7 +425,7 @@ fn searches_ask_a_law_a_few_times() {
     }
     let quadratic = most(typed("1e5*c + 3e9*c^2", None).expect("a law"), 1e-4);
     assert!(quadratic[0] <= 8 && quadratic[1] <= 8, "{quadratic:?}");
-    // bends and kinks that mislead Newton's method
+    // Bends and kinks mislead Newton's method.
     let bent = [
         most(Exponential::new(3.0, 2e-5), 1e-6),
         most(typed("20*sinh(c/4e-5)*exp(c/4e-5) + 1e5*c", None).expect("a law"), 1e-5),

@@ -1,4 +1,4 @@
-//! A layer's law typed in the scene.
+//! Laws that are typed as expressions in the scene.
 
 use super::quadrature::integral;
 use super::root::{meeting, root};
@@ -7,99 +7,102 @@ use crate::error::{Error, Result, shown};
 use crate::expression::Expression;
 use crate::linalg::portable::pow;
 
-/// An expression p(c) at one place, continued as a straight line beyond its end.
+/// The expression p(c) of a law at one point, continued as a straight line beyond its end.
 #[derive(Debug, Clone)]
 pub struct Typed {
     law: Expression,
-    /// Where it holds (x, y, z).
+    /// The contact point (x, y, z).
     place: [f64; 3],
-    /// Compression from which it is a straight line, and the law there; infinite if it never is.
+    /// Compression from which the law is a straight line; infinite if it never is.
     end: f64,
+    /// The law there.
     at_end: Response,
 }
 
-/// Pressures beyond this only come up in trial states, and a law is a straight line from there: 1e60 is beyond every unit of stress, and five
-/// of them multiplied are a number.
+/// Pressure beyond which a law is a straight line, since only trial states get there. It exceeds every unit of stress, and a product of five
+/// such pressures is still finite.
 pub(super) const HUGE: f64 = 1e60;
-/// Compressions to look at in a factor of ten.
+/// Number of checked compressions in a factor of ten.
 const STEPS: i32 = 24;
-/// How many factors of ten.
+/// Number of factors of ten that are checked.
 const DECADES: i32 = 9;
 
 impl Typed {
-    /// The law at a place, checked for compressions up to `end`, or else up to `size`, the extent of the surfaces: p(0) = 0,
-    /// p increasing, p' finite.
+    /// Make the law at a point, checked for compressions up to `end`, or else up to `size`, the extent of the surfaces. It must have
+    /// p(0) = 0, increasing p and finite p'.
     ///
     /// # Errors
     /// A refusal that points at the expression and names the compression.
     pub fn new(law: &Expression, place: [f64; 3], end: Option<f64>, size: f64) -> Result<Self> {
         let mut typed = Self { law: law.clone(), place, end: f64::INFINITY, at_end: Response::default() };
         let top = end.unwrap_or(size);
-        typed.refuse_outside(0.0)?;
-        let (first, first_slope) = typed.value(0.0);
-        let least = typed.value(top * 10f64.powi(-DECADES)).0;
-        let largest = typed.value(top * 1e-3).0.abs();
-        // a formula may miss zero by rounding; one that is not a number misses it, too
-        let is_zero = first == 0.0 || first.abs() <= 1e-12 * largest;
-        if !is_zero {
-            return Err(
-                typed.refuse(format!("p(0) is {}, not 0", shown(first)), "without compression there is no pressure")
-            );
-        }
-        if first_slope.is_infinite() {
-            let advice = "p' must be finite: add a linear part, or begin with a power of c of at least 1";
-            return Err(typed.refuse("the layer is infinitely stiff at first touch, p'(0) = infinity".into(), advice));
-        }
-        let mut before = (0.0, first.min(least - f64::MIN_POSITIVE));
-        for step in 0..=DECADES * STEPS {
-            let c = top * pow(10.0, f64::from(step) / f64::from(STEPS) - f64::from(DECADES));
-            let (pressure, slope) = typed.value(c);
-            if before.1 > HUGE {
-                break;
-            }
-            let advice = match (before.0 > 0.0, end) {
-                (false, _) => {
-                    "the pressure grows with the compression c from c = 0 on: look for a wrong sign".to_owned()
-                }
-                (_, Some(_)) => {
-                    format!("take a smaller up_to, such as {:.1e}: the law increases that far", 0.9 * before.0)
-                }
-                (_, None) => format!(
-                    "say how far the law goes, as in {{ pressure = \"...\", up_to = {:.1e} }}: it goes on linearly from there",
-                    0.9 * before.0
-                ),
-            };
-            if !(pressure.is_finite() && slope.is_finite()) {
-                typed.refuse_outside(c).map_err(|error| error.help(advice.clone()))?;
-                return Err(
-                    typed.refuse(format!("p is {} and p' {} at c = {c:.3e}", shown(pressure), shown(slope)), &advice)
-                );
-            }
-            if pressure <= before.1 || slope < 0.0 {
-                return Err(typed.refuse(format!("p does not increase at c = {c:.3e}"), &advice));
-            }
-            before = (c, pressure);
-        }
-        if before.0 < top || end.is_some() {
-            typed.at_end = typed.compressed(0, before.0);
-            typed.end = before.0;
+        let first = typed.check_first_touch(top)?;
+        let last = typed.check_increase(first, top, end)?;
+        if last < top || end.is_some() {
+            typed.at_end = typed.compressed(0, last);
+            typed.end = last;
         }
         Ok(typed)
     }
 
-    /// p and p'.
+    /// Check that p(0) is zero and p'(0) finite, and return p(0). `top` is the largest compression that will be checked.
+    fn check_first_touch(&self, top: f64) -> Result<f64> {
+        self.refuse_outside(0.0)?;
+        let (first, slope) = self.value(0.0);
+        let comparable = self.value(top * 1e-3).0.abs();
+        // A formula may miss zero by rounding. The comparisons are false for NaN.
+        let is_zero = first == 0.0 || first.abs() <= 1e-12 * comparable;
+        if !is_zero {
+            return Err(
+                self.refuse(format!("p(0) is {}, not 0", shown(first)), "without compression there is no pressure")
+            );
+        }
+        if slope.is_infinite() {
+            let advice = "p' must be finite: add a linear part, or begin with a power of c of at least 1";
+            return Err(self.refuse("the layer is infinitely stiff at first touch, p'(0) = infinity".into(), advice));
+        }
+        Ok(first)
+    }
+
+    /// Check that p increases from `first` = p(0) up to the compression `top`, and return the largest compression that was checked. It
+    /// is smaller than `top` if the pressure exceeds [`HUGE`] before. `end` is that of the scene, for advice.
+    fn check_increase(&self, first: f64, top: f64, end: Option<f64>) -> Result<f64> {
+        let least = self.value(top * 10f64.powi(-DECADES)).0;
+        let (mut last, mut below) = (0.0, first.min(least - f64::MIN_POSITIVE));
+        for step in 0..=DECADES * STEPS {
+            if below > HUGE {
+                break;
+            }
+            let c = top * pow(10.0, f64::from(step) / f64::from(STEPS) - f64::from(DECADES));
+            let (pressure, slope) = self.value(c);
+            if !(pressure.is_finite() && slope.is_finite()) {
+                let advice = advice(last, end);
+                self.refuse_outside(c).map_err(|error| error.help(advice.clone()))?;
+                return Err(
+                    self.refuse(format!("p is {} and p' {} at c = {c:.3e}", shown(pressure), shown(slope)), &advice)
+                );
+            }
+            if pressure <= below || slope < 0.0 {
+                return Err(self.refuse(format!("p does not increase at c = {c:.3e}"), &advice(last, end)));
+            }
+            (last, below) = (c, pressure);
+        }
+        Ok(last)
+    }
+
+    /// Return p and p' of the expression, without its continuation.
     fn value(&self, c: f64) -> (f64, f64) {
         let [x, y, z] = self.place;
         self.law.eval_by(0, &[c, x, y, z])
     }
 
-    /// p of the expression, without its continuation.
+    /// Return p of the expression, without its continuation.
     fn curve(&self, c: f64) -> f64 {
         let [x, y, z] = self.place;
         self.law.eval(&[c, x, y, z])
     }
 
-    /// Refuses a compression for which data have no value.
+    /// Refuse a compression for which data have no value.
     fn refuse_outside(&self, c: f64) -> Result<()> {
         let [x, y, z] = self.place;
         self.law.outside("the pressure of the layer", &[c, x, y, z]).map_or(Ok(()), Err)
@@ -113,6 +116,18 @@ impl Typed {
     }
 }
 
+/// Return what a user may do about a law that increases up to compression `last` only. `end` is that of the scene.
+fn advice(last: f64, end: Option<f64>) -> String {
+    match end {
+        _ if last <= 0.0 => "the pressure grows with the compression c from c = 0 on: look for a wrong sign".to_owned(),
+        Some(_) => format!("take a smaller up_to, such as {:.1e}: the law increases that far", 0.9 * last),
+        None => format!(
+            "say how far the law goes, as in {{ pressure = \"...\", up_to = {:.1e} }}: it goes on linearly from there",
+            0.9 * last
+        ),
+    }
+}
+
 impl LayerLaw for Typed {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         if c > self.end {
@@ -123,7 +138,7 @@ impl LayerLaw for Typed {
     }
 
     fn pressure(&self, point: usize, c: f64) -> f64 {
-        // the energy costs most
+        // The energy of a response costs most.
         if c > 0.0 && c <= self.end { self.curve(c) } else { self.response(point, c).pressure }
     }
 
@@ -148,7 +163,7 @@ impl LayerLaw for Typed {
         if self.end.is_finite() && pressure > self.at_end.pressure {
             return self.end + self.at_end.straight_compression(pressure);
         }
-        // expressions come in any units
+        // Without an end the unit of length is unknown, so no start is better than another.
         let (start, high) = if self.end.is_finite() { (self.end, self.end) } else { (1.0, f64::MAX) };
         root(pressure, [0.0, high], start, |c| self.value(c)).unwrap_or(f64::INFINITY)
     }

@@ -1,38 +1,29 @@
 //! Common pieces of two plane curves: intervals of the facets of side a.
 
-use super::{AWAY, Common, Lost, MOST_STEPS, ON_FACET, ROUNDING, Reach, Refused, SNAP, Search, Shared};
+use super::{AWAY, Common, Lost, MOST_STEPS, ON_FACET, ROUNDING, Reach, Refused, SNAP, Search, Shared, plus};
 use crate::contact::side::{Side, length, unit};
-use crate::fem::{area_vector, element, quadrature};
+use crate::fem::{area_vector, element, minus, quadrature};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
-/// The common pieces of two plane curves on those facets of side a that are `asked` for.
-pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach, asked: &dyn Fn(usize) -> bool) -> Common<2> {
+/// Return the common pieces of two plane curves on the `requested` facets of side a.
+pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach, requested: &dyn Fn(usize) -> bool) -> Common<2> {
     let search = Search::new(b);
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = quadrature::gauss(if quadratic { 4 } else { 3 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
-    for i in (0..a.facets.count()).filter(|&i| asked(i)) {
+    for i in (0..a.facets.count()).filter(|&i| requested(i)) {
         let facet = Curve::of(a, i);
         let refused = &mut common.refused[i];
         let near = search.around(a, i, reach).into_iter().map(|index| (index, Curve::of(b, index)));
-        let found = facing(&facet, near, reach, refused);
-        let mut free = vec![(0.0, 1.0)];
-        let mut pieces = Vec::new();
-        for piece in &found {
-            for (low, high) in take(&mut free, piece.range) {
-                pieces.push((low, high, piece));
-            }
-        }
-        pieces.sort_by(|p, q| p.0.total_cmp(&q.0));
-        for (low, high, Piece { index, other, .. }) in pieces {
+        for (low, high, Piece { index, other, .. }) in nearest(&facing(&facet, near, reach, refused)) {
             let offset = minus(facet.from, other.from);
             for &(position, weight) in &rule {
                 let s = low + (high - low) * position;
-                let (here, normal) = (facet.at(s), facet.normal(s));
-                let from = plus(here, offset);
+                let (on_a, normal) = (facet.at(s), facet.normal(s));
+                let from = plus(on_a, offset);
                 let Ok(Some(t)) = other.hit(from, normal) else {
-                    // a normal on either side has met this very facet
+                    // The normals on both sides of this point hit the facet, so this one is lost.
                     refused.lost += 1;
                     continue;
                 };
@@ -46,7 +37,7 @@ pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach, asked: &dyn Fn(usize) -> b
                     at_a: [1.0 - s, s],
                     facet_b: *index,
                     at_b: [1.0 - t, t],
-                    weight: weight * (high - low) * length(facet.tangent(s)) * a.space.circle(&plus(here, facet.from)),
+                    weight: weight * (high - low) * length(facet.tangent(s)) * a.space.circle(&plus(on_a, facet.from)),
                     gap,
                 });
             }
@@ -55,52 +46,65 @@ pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach, asked: &dyn Fn(usize) -> b
     common
 }
 
-/// Return the pieces of a facet of side a that face facets of side b, the nearest first; note in `refused` what is none.
+/// Return the pieces of a facet of side a that face facets of side b, the nearest first. Note in `refused` why others are none.
 fn facing(
     facet: &Curve,
     near: impl Iterator<Item = (usize, Curve)>,
     reach: &Reach,
     refused: &mut Refused,
 ) -> Vec<Piece> {
-    let mut found: Vec<Piece> = Vec::new();
+    let mut pieces: Vec<Piece> = Vec::new();
     for (index, other) in near {
         let direction = other.direction;
         match Piece::between(facet, other, index) {
             Ok(piece) => {
-                found.extend(piece.filter(|p| refused.admits(reach, p.gap, facet.direction, direction)));
+                pieces.extend(piece.filter(|p| refused.admits(reach, p.gap, facet.direction, direction)));
             }
             Err(Lost) => refused.lost += usize::from(reach.faces(facet.direction, direction)),
         }
     }
-    found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
-    found
+    pieces.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
+    pieces
 }
 
-/// Removes `range` from the free intervals and returns what it got of them.
-fn take(free: &mut Vec<(f64, f64)>, range: (f64, f64)) -> Vec<(f64, f64)> {
-    let (mut got, mut left) = (Vec::new(), Vec::new());
+/// Return the intervals of a facet of side a with the piece that is nearest there, ordered along the facet.
+fn nearest(pieces: &[Piece]) -> Vec<(f64, f64, &Piece)> {
+    let mut free = vec![(0.0, 1.0)];
+    let mut intervals = Vec::new();
+    for piece in pieces {
+        intervals.extend(claim(&mut free, piece.range).into_iter().map(|(low, high)| (low, high, piece)));
+    }
+    intervals.sort_by(|p, q| p.0.total_cmp(&q.0));
+    intervals
+}
+
+/// Remove `range` from the free intervals and return the parts of it that were free.
+fn claim(free: &mut Vec<(f64, f64)>, range: (f64, f64)) -> Vec<(f64, f64)> {
+    let (mut claimed, mut remaining) = (Vec::new(), Vec::new());
     for &(low, high) in free.iter() {
         let (from, to) = (low.max(range.0), high.min(range.1));
         if to - from <= SNAP {
-            left.push((low, high));
+            remaining.push((low, high));
             continue;
         }
-        got.push((from, to));
-        left.extend([(low, from), (to, high)].into_iter().filter(|(l, h)| h - l > SNAP));
+        claimed.push((from, to));
+        remaining.extend([(low, from), (to, high)].into_iter().filter(|(l, h)| h - l > SNAP));
     }
-    *free = left;
-    got
+    *free = remaining;
+    claimed
 }
 
-/// A facet of side a or b as a parametrised curve x(s), s from 0 to 1. Coordinates are measured from its first end: what is interpolated
-/// or subtracted then rounds relative to the facet, wherever it lies.
+/// A facet of side a or b as a parametrised curve x(s), s from 0 to 1.
+///
+/// Coordinates are measured from its first end, so that interpolation and subtraction round relative to the size of the facet,
+/// wherever it lies.
 struct Curve {
     order: Order,
-    /// Its first end.
+    /// First end.
     from: [f64; 2],
-    /// Its nodes, measured from there.
+    /// Nodes, measured from the first end.
     x: Vec<[f64; 2]>,
-    /// The largest distance of a node from there.
+    /// Largest distance of a node from the first end.
     size: f64,
     normals: [[f64; 2]; 2],
     /// Outer unit normal in the middle.
@@ -136,14 +140,18 @@ impl Curve {
         std::array::from_fn(|c| (1.0 - s) * self.normals[0][c] + s * self.normals[1][c])
     }
 
-    /// Return a bound of the sum of sizes of the terms that [`Curve::at`] adds.
+    /// Return a bound of the sum of the sizes of the terms that [`Curve::at`] adds.
     fn terms(&self, s: f64) -> f64 {
         let reach = 1.0 + 2.0 * s.abs();
-        // |l (2l - 1)| and |4 l m| of the three quadratic functions together are below 3 reach^2
+        // The three quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3 reach^2 in size.
         self.size * if self.order == Order::P1 { reach } else { 3.0 * reach * reach }
     }
 
-    /// Parameter at which the line through `x` along `n` meets the curve: cross(x(s) - x, n) = 0. `None` if it does not.
+    /// Return the parameter s at which the line through `x` along `n` meets the curve, cross(x(s) - x, n) = 0; `None` if it does
+    /// not meet it.
+    ///
+    /// # Errors
+    /// [`Lost`] if the search does not converge.
     fn hit(&self, x: [f64; 2], n: [f64; 2]) -> Result<Option<f64>, Lost> {
         let found = newton(|s| Equation {
             value: cross(minus(self.at(s), x), n),
@@ -153,13 +161,15 @@ impl Curve {
         Ok(found.filter(|s| (-ON_FACET..=1.0 + ON_FACET).contains(s)))
     }
 
-    /// Distance of the point at `s` from `x` along `n`, signed.
+    /// Return the signed distance of the point at `s` from `x` along `n`.
     fn distance(&self, s: f64, x: [f64; 2], n: [f64; 2]) -> f64 {
-        let here = self.at(s);
-        (0..2).map(|c| (here[c] - x[c]) * n[c]).sum::<f64>() / length(n)
+        dot(&minus(self.at(s), x), &n) / length(n)
     }
 
-    /// Parameter whose normal passes through `x`: cross(x - x(s), n(s)) = 0. `None` if there is none.
+    /// Return the parameter s whose normal n(s) passes through `x`, cross(x - x(s), n(s)) = 0; `None` if there is none.
+    ///
+    /// # Errors
+    /// [`Lost`] if the search does not converge.
     fn foot(&self, x: [f64; 2]) -> Result<Option<f64>, Lost> {
         let turn = minus(self.normals[1], self.normals[0]);
         newton(|s| {
@@ -174,19 +184,19 @@ impl Curve {
     }
 }
 
-/// An equation in the parameter of a curve at one place.
+/// The value and slope of an equation in the parameter of a curve.
 struct Equation {
     value: f64,
     slope: f64,
-    /// A bound of the sum of sizes of the terms that the value adds.
+    /// Bound of the sum of the sizes of the terms that the value adds.
     terms: f64,
 }
 
-/// Return a zero near the middle of \[0, 1\] by Newton's method; `None` if it runs away. A value is a zero once it is within the
-/// rounding of its own evaluation.
+/// Return a zero of the equation by Newton's method from the middle of \[0, 1\]; `None` if the iterates run away. A value counts as
+/// zero once it is within the rounding of its own evaluation.
 ///
 /// # Errors
-/// [`Lost`] if values stay larger.
+/// [`Lost`] if the values stay larger.
 fn newton(equation: impl Fn(f64) -> Equation) -> Result<Option<f64>, Lost> {
     let mut s = 0.5;
     for _ in 0..MOST_STEPS {
@@ -204,28 +214,23 @@ fn newton(equation: impl Fn(f64) -> Equation) -> Result<Option<f64>, Lost> {
     Err(Lost)
 }
 
-fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    std::array::from_fn(|c| a[c] - b[c])
-}
-
-fn plus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    std::array::from_fn(|c| a[c] + b[c])
-}
-
 fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// Part of a facet of side a that faces one facet of side b.
+/// The part of a facet of side a that faces one facet of side b.
 struct Piece {
+    /// Interval of the parameter on side a.
     range: (f64, f64),
+    /// Index of the facet of side b.
     index: usize,
     other: Curve,
+    /// Signed distance in the middle of the piece.
     gap: f64,
 }
 
 impl Piece {
-    /// Return the piece before one facet of b, if it has one.
+    /// Return the piece that faces one facet of b, if there is one.
     ///
     /// # Errors
     /// [`Lost`] if the search for an end of the piece fails.
@@ -233,39 +238,39 @@ impl Piece {
         if dot(&a.direction, &b.direction) >= 0.0 {
             return Ok(None);
         }
-        // between these places the normals of a either all meet b or all miss it; the foot of an end that lies behind the
-        // centre of the curve means nothing, but does no harm as a place
+        // Between two neighbouring breaks the normals of a either all hit b or all miss it. The foot of an end of b behind the
+        // centre of the curve has no meaning, but an additional break does no harm.
         let offset = minus(b.from, a.from);
-        let mut places = vec![0.0, 1.0];
+        let mut breaks = vec![0.0, 1.0];
         for &x in &b.x[..2] {
-            places.extend(a.foot(plus(x, offset))?.filter(|s| *s > SNAP && *s < 1.0 - SNAP));
+            breaks.extend(a.foot(plus(x, offset))?.filter(|s| *s > SNAP && *s < 1.0 - SNAP));
         }
-        places.sort_by(f64::total_cmp);
-        let meets = |low: f64, high: f64| -> Result<Option<f64>, Lost> {
+        breaks.sort_by(f64::total_cmp);
+        let gap_in_middle = |low: f64, high: f64| -> Result<Option<f64>, Lost> {
             let middle = 0.5 * (low + high);
             let (from, normal) = (minus(a.at(middle), offset), a.normal(middle));
             Ok(b.hit(from, normal)?.map(|t| b.distance(t, from, normal)))
         };
-        let mut met: Vec<&[f64]> = Vec::new();
-        for ends in places.windows(2).filter(|ends| ends[1] - ends[0] > SNAP) {
-            met.extend(meets(ends[0], ends[1])?.map(|_| ends));
+        let mut hits: Vec<&[f64]> = Vec::new();
+        for ends in breaks.windows(2).filter(|ends| ends[1] - ends[0] > SNAP) {
+            hits.extend(gap_in_middle(ends[0], ends[1])?.map(|_| ends));
         }
-        let (Some(first), Some(last)) = (met.first(), met.last()) else { return Ok(None) };
+        let (Some(first), Some(last)) = (hits.first(), hits.last()) else { return Ok(None) };
         let range = (first[0], last[1]);
-        Ok(meets(range.0, range.1)?.map(|gap| Self { range, index, other: b, gap }))
+        Ok(gap_in_middle(range.0, range.1)?.map(|gap| Self { range, index, other: b, gap }))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::take;
+    use super::claim;
 
     #[test]
     fn intervals_are_given_away_once() {
         let mut free = vec![(0.0, 1.0)];
-        assert_eq!(take(&mut free, (0.25, 0.5)), [(0.25, 0.5)]);
-        assert_eq!(take(&mut free, (0.0, 0.75)), [(0.0, 0.25), (0.5, 0.75)]);
+        assert_eq!(claim(&mut free, (0.25, 0.5)), [(0.25, 0.5)]);
+        assert_eq!(claim(&mut free, (0.0, 0.75)), [(0.0, 0.25), (0.5, 0.75)]);
         assert_eq!(free, [(0.75, 1.0)]);
-        assert_eq!(take(&mut free, (0.25, 0.75)), []);
+        assert_eq!(claim(&mut free, (0.25, 0.75)), []);
     }
 }

@@ -1,29 +1,29 @@
-//! Convex polygons in the parameters of a facet, counterclockwise.
+//! Convex polygons in the parameters of a facet.
 
-/// A convex polygon, its corners counterclockwise.
+/// A convex polygon with counterclockwise corners.
 pub type Polygon = Vec<[f64; 2]>;
 
-/// Twice the area of the triangle; positive if its corners go counterclockwise.
+/// Return twice the area of a triangle, which is positive if the corners are counterclockwise.
 fn turn(p: [f64; 2], q: [f64; 2], r: [f64; 2]) -> f64 {
     (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 }
 
-/// Area; positive if the corners go counterclockwise.
+/// Return the area, which is positive if the corners are counterclockwise.
 pub fn area(polygon: &[[f64; 2]]) -> f64 {
     fan(polygon).map(|[p, q, r]| 0.5 * turn(p, q, r)).sum()
 }
 
-/// Triangles from the first corner.
+/// Return the triangles of a polygon that meet in its first corner.
 pub fn fan(polygon: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 3]> + '_ {
     (2..polygon.len()).map(|i| [polygon[0], polygon[i - 1], polygon[i]])
 }
 
-/// The mean of the corners.
+/// Return the mean of the corners.
 pub fn middle(polygon: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|c| polygon.iter().map(|p| p[c]).sum::<f64>() / polygon.len() as f64)
 }
 
-/// The part of a polygon to the left of the line from `p` to `q`.
+/// Return the part of a polygon to the left of the line from `p` to `q`.
 fn left_of(polygon: &[[f64; 2]], p: [f64; 2], q: [f64; 2]) -> Polygon {
     let mut part = Polygon::with_capacity(polygon.len() + 1);
     for (i, &to) in polygon.iter().enumerate() {
@@ -44,13 +44,13 @@ fn edges(polygon: &[[f64; 2]]) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '
     (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]))
 }
 
-/// The common part of two convex polygons.
+/// Return the intersection of two convex polygons.
 pub fn intersection(polygon: &[[f64; 2]], other: &[[f64; 2]]) -> Polygon {
     edges(other).fold(polygon.to_vec(), |part, (p, q)| left_of(&part, p, q))
 }
 
-/// What is left of a convex polygon outside another, as convex polygons. Parts smaller than `tiny` are left out, and if the
-/// common part is so small, all of the polygon is left.
+/// Return the part of a convex polygon outside another, as convex polygons. Parts of an area up to `tiny` are dropped. If the
+/// intersection is no larger than that, the result is the whole polygon.
 pub fn difference(polygon: Polygon, other: &[[f64; 2]], tiny: f64) -> Vec<Polygon> {
     if area(&intersection(&polygon, other)) <= tiny {
         return vec![polygon];

@@ -1,8 +1,9 @@
-//! Which facets may be partners: how far apart, and at which angle.
+//! Which facets may be partners: limits of their distance and their angle.
 
 use crate::contact::side::Side;
+use crate::linalg::dot;
 
-/// How far apart and how inclined two facets may be and still face each other.
+/// The limits of distance and inclination within which two facets face each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
     /// Largest distance along the normal.
@@ -13,21 +14,22 @@ pub struct Reach {
     pub facing: f64,
 }
 
-/// Why facets of side b that lie before a facet of side a are no partners of it.
+/// The reasons why facets of side b that lie before a facet of side a are not its partners.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Refused {
     /// The angle between the normals is too large.
     pub steep: bool,
     /// The distance is too large.
     pub far: bool,
-    /// Pieces and points of pieces that the search has lost.
+    /// Number of pieces and of points of pieces that the search has lost.
     pub lost: usize,
 }
 
 impl Reach {
-    /// What is sensible for two surfaces whose facets may be inclined by `angle` degrees: no gap larger than the smaller
-    /// surface, and no overlap larger than a body is thick behind its surface (volume over area): beyond that one would look at
-    /// the far side of a thin body.
+    /// Return the limits for two surfaces whose facets may be inclined by `angle` degrees.
+    ///
+    /// The gap is at most the size of the smaller surface. The overlap is at most the thickness of a body behind its surface,
+    /// its volume over the area: a larger overlap would reach the far side of a thin body.
     pub fn between<const D: usize>(a: &Side<D>, b: &Side<D>, angle: f64) -> Self {
         let area = |side: &Side<D>| side.mean_measure() * side.facets.count() as f64;
         let extent = |side: &Side<D>| area(side).powf(1.0 / (D - 1) as f64);
@@ -36,19 +38,19 @@ impl Reach {
         Self { gap, overlap: gap.min(thickness(a)).min(thickness(b)), facing: angle.to_radians().cos() }
     }
 
-    /// Whether a signed distance is within reach.
+    /// Return whether a signed distance is within the limits.
     pub fn holds(&self, gap: f64) -> bool {
         gap <= self.gap && -gap <= self.overlap
     }
 
-    /// Whether facets with these unit normals face each other.
+    /// Return whether facets with these unit normals face each other.
     pub fn faces<const D: usize>(&self, normal: [f64; D], other: [f64; D]) -> bool {
-        -(0..D).map(|c| normal[c] * other[c]).sum::<f64>() > self.facing
+        -dot(&normal, &other) > self.facing
     }
 }
 
 impl Refused {
-    /// Whether `reach` admits facets with these unit normals at this distance; notes what it refuses.
+    /// Return whether `reach` admits facets with these unit normals at this distance, and note the reason if not.
     pub(super) fn admits<const D: usize>(
         &mut self,
         reach: &Reach,
@@ -67,7 +69,7 @@ impl Refused {
 mod tests {
     use super::*;
 
-    /// What a pair leaves out is told by its reason: steep where the distance would do, far where the direction would.
+    /// A refused facet is steep where the distance would do, and far where the direction would do.
     #[test]
     fn refusals_have_their_reasons() {
         let reach = Reach { gap: 2.0, overlap: 1.0, facing: 0.5 };

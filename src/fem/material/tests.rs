@@ -11,20 +11,20 @@ fn material<const D: usize>(tensor: Tensor, plane: Plane) -> Material {
     Material::new(tensor, D, plane)
 }
 
-/// C_ijkl of the constants in Voigt's order, by the definition.
+/// Return C_ijkl of the constants in Voigt's order, by the definition.
 fn full(constants: &[f64; 21], i: usize, j: usize, k: usize, l: usize) -> f64 {
     const NUMBER: [[usize; 3]; 3] = [[0, 5, 4], [5, 1, 3], [4, 3, 2]];
     let (p, q) = (NUMBER[i][j].min(NUMBER[k][l]), NUMBER[i][j].max(NUMBER[k][l]));
     constants[p * 6 - p * (p + 1) / 2 + q]
 }
 
-/// Rows: orthonormal directions, turned about two axes.
+/// Return orthonormal rows, rotated about two axes.
 fn some_axes() -> [[f64; 3]; 3] {
     let ((s, c), (t, d)) = (0.6f64.sin_cos(), 1.1f64.sin_cos());
     [[c, s, 0.0], [-s * d, c * d, t], [s * t, -c * t, d]]
 }
 
-/// sigma_ij = C_ijkl h_kl with all 81 constants, in turned axes, against the matrix of 36.
+/// The matrix of 36 constants gives the same stress in rotated axes as sigma_ij = C_ijkl h_kl with all 81 constants.
 #[test]
 fn hookes_law_in_turned_axes() {
     let axes = some_axes();
@@ -70,7 +70,7 @@ fn blocks_are_stresses_times_gradients() {
             }
         }
     }
-    // the short cut of isotropic materials and the general way agree
+    // The special formula of isotropic materials agrees with the general one.
     let general = material::<2>(Tensor::isotropic(7.0, 0.2), Plane::Stress);
     let short = Material::isotropic(7.0, 0.2, 2, Plane::Stress);
     let gradient = [[0.4, -1.2], [-0.3, 0.9], [1.0, 0.1]];
@@ -81,20 +81,20 @@ fn blocks_are_stresses_times_gradients() {
     assert!(apart.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-14);
 }
 
-/// Plane stress leaves no stress out of the plane: the strains zz, yz, xz that make it so, put into the law of space.
+/// In plane stress there is no stress out of the plane. The strains zz, yz, xz for this give the same stress by the law of space.
 #[test]
 fn plane_stress_of_a_triclinic_material() {
     let tensor = Tensor::anisotropic(&TRICLINIC).rotated(&some_axes());
     let h = [[0.3, -0.8], [0.2, 0.7]];
     let ours = material::<2>(tensor, Plane::Stress).stress(&strain(&h));
-    // strains out of the plane from the compliance: eps = S sigma
+    // Strains out of the plane follow from the compliance, eps = S sigma.
     let compliance = tensor.matrix().try_inverse().expect("a material");
     let all: Vec<f64> = (0..6).map(|i| (0..6).map(|j| compliance[(i, j)] * ours[j]).sum()).collect();
     for (i, exact) in [(0, 0.3), (1, 0.7), (3, -0.6)] {
         assert!((all[i] - exact).abs() < 1e-13, "{i}: {all:?}");
     }
     assert_eq!([ours[2], ours[4], ours[5]], [0.0; 3]);
-    // plane strain: stress out of the plane from the law of space
+    // In plane strain the stress out of the plane follows from the law of space.
     let h3 = [[0.3, -0.8, 0.0], [0.2, 0.7, 0.0], [0.0; 3]];
     assert_eq!(
         material::<2>(tensor, Plane::Strain).stress(&strain(&h)),
@@ -104,13 +104,13 @@ fn plane_stress_of_a_triclinic_material() {
 
 #[test]
 fn coerciveness() {
-    // least eigenvalue of an isotropic tensor: 2 mu or 3 K, in any axes
+    // The least eigenvalue of an isotropic tensor is 2 mu or 3 K, in any axes.
     for (nu, exact) in [(0.3, 2.0 * 10.0 / 2.6), (-0.5, 10.0 / 2.0)] {
         let tensor = Tensor::isotropic(10.0, nu);
         assert!(tensor.is_coercive() && tensor.rotated(&some_axes()).is_coercive());
         assert!((tensor.rotated(&some_axes()).least_eigenvalue() / exact - 1.0).abs() < 1e-13);
     }
-    // soft shear: 2 G, and no axes change it
+    // With soft shear it is 2 G, and no axes change it.
     let mut soft = ORTHOTROPIC;
     soft[8] = 0.2;
     let tensor = Tensor::orthotropic(&soft).expect("a matrix");
@@ -119,12 +119,12 @@ fn coerciveness() {
     }
     assert!(Tensor::isotropic(1.0, 0.499_999_99).is_coercive());
     assert!(Tensor::anisotropic(&TRICLINIC).is_coercive());
-    // 1 - nu23 nu32 < 0
+    // Here 1 - nu23 nu32 < 0.
     let mut wrong = ORTHOTROPIC;
     wrong[5] = 1.2;
     let tensor = Tensor::orthotropic(&wrong).expect("a matrix");
     assert!(!tensor.is_coercive() && tensor.least_eigenvalue() < 0.0, "{}", tensor.least_eigenvalue());
-    // singular: a strain without energy
+    // A singular tensor has a strain without energy.
     let mut c = Tensor::isotropic(1.0, 0.0);
     c.0[1][1] = 0.0;
     assert!(!c.is_coercive() && c.least_eigenvalue() == 0.0);
@@ -135,11 +135,11 @@ fn coerciveness() {
 #[test]
 fn moduli_against_pressure() {
     let near = |found: [f64; 3], exact: [f64; 3]| (0..3).all(|i| (found[i] / exact[i] - 1.0).abs() < 1e-12);
-    let held = 2.1e5 / 0.91;
-    assert!(near(Tensor::isotropic(2.1e5, 0.3).moduli(3, Plane::Strain), [held; 3]));
+    let constrained = 2.1e5 / 0.91;
+    assert!(near(Tensor::isotropic(2.1e5, 0.3).moduli(3, Plane::Strain), [constrained; 3]));
     let c = Tensor::orthotropic(&ORTHOTROPIC).expect("a material");
     let [e1, e2, e3, _, nu13, nu23, ..] = ORTHOTROPIC;
-    // eps_z = 0: sigma_z = nu_zi sigma_i
+    // Since eps_z = 0, sigma_z = nu_zi sigma_i.
     let strain = c.moduli(2, Plane::Strain);
     assert!((strain[0] * (1.0 / e1 - nu13 * nu13 * e3 / e1 / e1) - 1.0).abs() < 1e-12);
     assert!((strain[1] * (1.0 / e2 - nu23 * nu23 * e3 / e2 / e2) - 1.0).abs() < 1e-12);

@@ -1,0 +1,169 @@
+//! Boundary facets of a body: their search in its cells, their orientation and their normals.
+
+use serde::{Deserialize, Serialize};
+use super::space::Space;
+use super::{cross, element, minus, pad, unit};
+use crate::linalg::dot;
+use crate::mesh::Group;
+use crate::problem::order::Order;
+use std::collections::HashMap;
+
+/// The facets of a part of a body's boundary, oriented so that [`Facets::normals`] points out of the body.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Facets<const D: usize> {
+    /// Polynomial order.
+    pub order: Order,
+    /// Nodes per facet.
+    pub stride: usize,
+    /// Nodes of the facets, `stride` per facet, numbered within the body.
+    pub nodes: Vec<u32>,
+}
+
+impl<const D: usize> Space<D> {
+    /// Return the facets of a mesh group (of dimension `D - 1`) that bound a cell of this body, oriented outwards.
+    pub fn facets(&self, group: &Group) -> Facets<D> {
+        // This filter skips most cells. If there are few cells, several nodes share an entry, and `wanted` decides.
+        let mut on_group = vec![false; self.cells.len().next_power_of_two()];
+        let at = |node: u32| node as usize & (self.cells.len().next_power_of_two() - 1);
+        let mut wanted: HashMap<[u32; D], usize> = HashMap::new();
+        for points in group.connectivity.chunks_exact(group.stride) {
+            if let Some(nodes) = self.simplex(points, D - 1) {
+                nodes[..D].iter().for_each(|&node| on_group[at(node)] = true);
+                let next = wanted.len();
+                wanted.entry(key(&nodes)).or_insert(next);
+            }
+        }
+        // The cell next to each facet determines the outward direction.
+        let mut found = vec![None; wanted.len()];
+        for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
+            let touching = cell[..=D].iter().filter(|&&node| on_group[at(node)]).count();
+            if touching < D {
+                continue;
+            }
+            for opposite in 0..=D {
+                if let Some(facet) = wanted.remove(&key(&face::<D>(cell, opposite))) {
+                    found[facet] = Some((index, opposite));
+                }
+            }
+        }
+        self.facets_of(found.into_iter().flatten())
+    }
+
+    /// Return all facets that bound one cell only, oriented outwards.
+    pub fn boundary(&self) -> Facets<D> {
+        self.facets_of(self.lone_facets())
+    }
+
+    /// Return the same facets, each as its cell and the local vertex opposite to it.
+    pub fn lone_facets(&self) -> impl Iterator<Item = (usize, usize)> + use<D> {
+        let mut faces: Vec<([u32; D], u32)> = Vec::with_capacity(self.cell_count() * (D + 1));
+        for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
+            faces
+                .extend((0..=D).map(|opposite| (key(&face::<D>(cell, opposite)), (index * (D + 1) + opposite) as u32)));
+        }
+        faces.sort_unstable();
+        let lone = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1);
+        let mut places: Vec<u32> = lone.map(|group| group[0].1).collect();
+        places.sort_unstable();
+        places.into_iter().map(|place| (place as usize / (D + 1), place as usize % (D + 1)))
+    }
+
+    /// Return the facets that are given as a cell and the local vertex opposite to the facet, oriented out of the cell.
+    pub fn facets_of(&self, places: impl Iterator<Item = (usize, usize)>) -> Facets<D> {
+        let mut nodes = Vec::new();
+        for (index, opposite) in places {
+            let cell = self.cell(index);
+            let mut facet = face::<D>(cell, opposite).to_vec();
+            if self.points_inwards(&facet, cell[opposite]) {
+                facet.swap(0, 1);
+            }
+            if self.order == Order::P2 {
+                let local = |node: u32| cell.iter().position(|&other| other == node).unwrap_or(0);
+                let ends: Vec<usize> = facet.iter().map(|&node| local(node)).collect();
+                for &(i, j) in &element::EDGES[..D * (D - 1) / 2] {
+                    let (from, to) = (ends[i].min(ends[j]), ends[i].max(ends[j]));
+                    let edge = element::EDGES.iter().position(|&edge| edge == (from, to)).unwrap_or(0);
+                    facet.push(cell[D + 1 + edge]);
+                }
+            }
+            nodes.extend(facet);
+        }
+        Facets::new(self.order, nodes)
+    }
+
+    /// Return whether the normal of a facet points into its cell, whose vertex `opposite` is not on the facet.
+    fn points_inwards(&self, facet: &[u32], opposite: u32) -> bool {
+        let x: Vec<_> = facet[..D].iter().map(|&node| self.nodes[node as usize]).collect();
+        let normal = area_vector::<D>(Order::P1, &x, &[1.0 / D as f64; D]);
+        let inner = self.nodes[opposite as usize];
+        dot(&normal, &minus(inner, x[0])) > 0.0
+    }
+}
+
+/// Return the vertices of a cell without the local vertex `opposite`.
+fn face<const D: usize>(cell: &[u32], opposite: usize) -> [u32; D] {
+    std::array::from_fn(|i| cell[if i < opposite { i } else { i + 1 }])
+}
+
+/// Return the first `D` nodes, sorted.
+fn key<const D: usize>(nodes: &[u32]) -> [u32; D] {
+    let mut key = std::array::from_fn(|i| nodes[i]);
+    key.sort_unstable();
+    key
+}
+
+impl<const D: usize> Facets<D> {
+    /// Make facets from their nodes.
+    pub fn new(order: Order, nodes: Vec<u32>) -> Self {
+        Self { order, stride: element::node_count(D, order), nodes }
+    }
+
+    /// Return the number of facets.
+    pub fn count(&self) -> usize {
+        self.nodes.len() / self.stride
+    }
+
+    /// Return the nodes of facet `i`, numbered within the body.
+    pub fn facet(&self, i: usize) -> &[u32] {
+        &self.nodes[i * self.stride..(i + 1) * self.stride]
+    }
+
+    /// Return the nodes of all facets, sorted, each once.
+    pub fn distinct_nodes(&self) -> Vec<u32> {
+        let mut nodes = self.nodes.clone();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
+    /// Return the outer unit normals at the corners of all facets, `D` normals a facet.
+    pub fn normals(&self, space: &Space<D>) -> Vec<[f64; D]> {
+        let normals = |i: usize| {
+            let x = self.coordinates(i, space);
+            (0..D).map(move |at| unit(area_vector(self.order, &x, &element::place(D, at)[..D])))
+        };
+        (0..self.count()).flat_map(normals).collect()
+    }
+
+    /// Return the facets for which `keep` holds, in their order.
+    pub fn only(&self, keep: &[bool]) -> Self {
+        let kept = (0..self.count()).filter(|&i| keep[i]).flat_map(|i| self.facet(i)).copied();
+        Self { nodes: kept.collect(), ..*self }
+    }
+
+    /// Return the coordinates of the nodes of facet `i`.
+    pub fn coordinates(&self, i: usize, space: &Space<D>) -> Vec<[f64; D]> {
+        self.facet(i).iter().map(|&node| space.nodes[node as usize]).collect()
+    }
+}
+
+/// Return the outer normal times the length (2D) or area (3D) of a facet with node coordinates `x`, at barycentric point `l`. An
+/// integral over the facet uses weights that sum to one.
+pub fn area_vector<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> [f64; D] {
+    let d = element::derivatives(order, l);
+    let tangent =
+        |c: usize| -> [f64; D] { std::array::from_fn(|i| (0..x.len()).map(|n| (d[n][c] - d[n][0]) * x[n][i]).sum()) };
+    let t = tangent(1);
+    let vector = if D == 2 { [t[1], -t[0], 0.0] } else { cross(pad(t), pad(tangent(2))).map(|v| 0.5 * v) };
+    std::array::from_fn(|c| vector[c])
+}
