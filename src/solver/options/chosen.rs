@@ -4,10 +4,10 @@ use crate::error::Result;
 use crate::petsc::{Options, Session, is_of_family};
 use std::collections::BTreeMap;
 
-/// Words of which every PETSc option that prints or draws has one in its name, up to [`LOOKING_NAMES`].
+/// Words in the names of PETSc options that print or draw. All such options have one of them in their name, except for [`LOOKING_NAMES`].
 const LOOKING_WORDS: [&str; 6] = ["view", "monitor", "print", "printstat", "statprint", "log"];
 
-/// Options that print without such a word in their name.
+/// Options that print and have no such word in their name.
 const LOOKING_NAMES: &str = "ksp_converged_reason ksp_converged_rate ksp_compute_singularvalues ksp_compute_eigenvalues \
     ksp_compute_eigenvalues_explicitly ksp_final_residual mat_umfpack_prl";
 

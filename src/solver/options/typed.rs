@@ -49,12 +49,12 @@ pub struct Typed {
 impl Typed {
     /// Read PETSc's table. `prefixes` are those of all solvers of the run, on every rank.
     pub fn read(session: &Session, prefixes: &[&str]) -> Result<Self> {
-        let known = Prefixes::new(prefixes);
+        let prefixes = Prefixes::new(prefixes);
         let (mut plain, mut own) = (Vec::new(), BTreeMap::<String, Vec<Entry>>::new());
         for (name, value) in session.options().all()? {
-            if let Some((prefix, bare)) = known.split(&name) {
+            if let Some((prefix, bare)) = prefixes.split(&name) {
                 own.entry(prefix.to_owned()).or_default().push((bare.to_owned(), value));
-            } else if known.is_plain(&name) {
+            } else if prefixes.is_plain(&name) {
                 plain.push((without_dash(&name).to_owned(), value));
             }
         }

@@ -48,8 +48,8 @@ const LATE: &str = "ksp_converged_reason";
 ///     ksp.set_up()
 /// })?;
 /// let unread = unread(&session, &["upper"], &|_| ())?;
-/// let told: Vec<_> = unread.iter().map(|u| (u.name.as_str(), u.kind, u.nearest.as_deref())).collect();
-/// assert_eq!(told, [
+/// let found: Vec<_> = unread.iter().map(|u| (u.name.as_str(), u.kind, u.nearest.as_deref())).collect();
+/// assert_eq!(found, [
 ///     ("-ksp_tpye", UnreadKind::Unknown, Some("-ksp_type")),
 ///     ("-pc_gamg_threshold", UnreadKind::NotInUse, None),
 ///     ("-uper_pc_type", UnreadKind::Unknown, Some("-upper_pc_type")),
