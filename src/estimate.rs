@@ -75,17 +75,20 @@ pub fn estimate(
     to_dofs(meshes, model, &mut loads);
 
     let NodalErrors { field, closing, energy: nodal } = nodal_errors(model, step, layer, &loads, &mean_error)?;
-    let relative = RelativeEnergy::of(model, &held, iterate, layer);
+    let mut strain = [residual(model, iterate, &vec![0.0; model.points()]).1.strain];
+    model.exchange.sum(&mut strain);
+    let reference = strain[0] - held.energy + layer.work;
     // the error of nodal values is a part of the whole error
-    let energy = relative.norm(bodies.iter().chain(&layers).sum::<f64>().max(nodal));
+    let whole = bodies.iter().chain(&layers).sum::<f64>().max(nodal);
+    let energy = relative_norm(whole, reference, held.energy);
     let pressure_error = pressure_errors(model, layer, &closing);
     let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
-    let at = |i: usize| Sample { weight: model.weight[i % model.points()], error: field.trace[i], value: trace[i] };
+    let at = |i: usize| (model.weight[i % model.points()], field.trace[i], trace[i]);
     let displacement = relative_error((0..2 * model.points()).map(at));
     Ok(Estimate {
         energy,
-        nodal: relative.norm(nodal),
+        nodal: relative_norm(nodal, reference, held.energy),
         pressure: relative_errors(model, layer, &pressure_error),
         pressure_error,
         // the displacements at the loads lack at least this share: the work of the loads f on the error e is f'e = a(u, e) = a(e, e), since a(u_h, e) = 0
@@ -138,32 +141,16 @@ fn nodal_errors(
     Ok(NodalErrors { field, closing, energy })
 }
 
-/// The energy to which errors are relative.
-struct RelativeEnergy {
-    /// Energy of bodies and layers, without that of springs that only hold bodies in place.
-    reference: f64,
-    /// Energy of the springs that only hold bodies in place.
-    held: f64,
-}
-
-impl RelativeEnergy {
-    /// Return the energies of an iterate. Collective.
-    fn of(model: &mut Model, held: &Held, iterate: &Field, layer: &Layer) -> Self {
-        let mut strain = [residual(model, iterate, &vec![0.0; model.points()]).1.strain];
-        model.exchange.sum(&mut strain);
-        Self { reference: strain[0] - held.energy + layer.work, held: held.energy }
-    }
-
-    /// Return the relative energy norm of an error from its squared energy norm.
-    fn norm(&self, squared: f64) -> f64 {
-        if self.reference > 0.0 {
-            (squared.max(0.0) / self.reference).sqrt()
-        } else if self.held > 0.0 {
-            // besides the springs that only hold, the energy is nothing but rounding
-            f64::INFINITY
-        } else {
-            0.0
-        }
+/// Return the relative energy norm of an error from its squared energy norm. `reference` is the energy of bodies and layers, without the energy `held` of
+/// springs that only hold bodies in place.
+fn relative_norm(squared: f64, reference: f64, held: f64) -> f64 {
+    if reference > 0.0 {
+        (squared.max(0.0) / reference).sqrt()
+    } else if held > 0.0 {
+        // besides the springs that only hold, the energy is nothing but rounding
+        f64::INFINITY
+    } else {
+        0.0
     }
 }
 
@@ -295,23 +282,16 @@ fn pressure_errors(model: &Model, layer: &Layer, closing: &[f64]) -> Vec<f64> {
 
 /// Return the relative error of the pressures of each pair.
 fn relative_errors(model: &Model, layer: &Layer, error: &[f64]) -> Vec<f64> {
-    let at = |q: usize| Sample { weight: model.weight[q], error: error[q], value: layer.pressure[q] };
+    let at = |q: usize| (model.weight[q], error[q], layer.pressure[q]);
     (0..model.pairs.len()).map(|pair| SAFETY * relative_error(model.range(pair).map(at))).collect()
 }
 
-/// A value and its error at a point that stands for the area `weight`.
-struct Sample {
-    weight: f64,
-    error: f64,
-    value: f64,
-}
-
-/// Return the root mean square of errors over that of values; zero errors over zero values are zero.
-fn relative_error(samples: impl Iterator<Item = Sample>) -> f64 {
+/// Return the root mean square of errors over that of values, from (area, error, value) at each point. Zero errors over zero values are zero.
+fn relative_error(samples: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
     let (mut errors, mut values) = (0.0, 0.0);
-    for Sample { weight, error, value } in samples {
-        errors += weight * error * error;
-        values += weight * value * value;
+    for (area, error, value) in samples {
+        errors += area * error * error;
+        values += area * value * value;
     }
     if errors == 0.0 { 0.0 } else { f64::sqrt(errors / values) }
 }

@@ -78,7 +78,7 @@ impl<S: InnerSolver> Monolithic<S> {
     /// Join bodies. `make` makes a solver of their K.
     pub fn new(union: Union, make: impl FnOnce(Rows) -> Result<S>) -> Result<Self> {
         let Union { stiffness, rows, offset, start, row_stiffness, coarse, is_redundant } = union;
-        let matrix = RobinMatrix::new(super::rows(stiffness, start)?, &rows, row_stiffness, make)?.with_coarse(coarse);
+        let matrix = RobinMatrix::new(super::rows(stiffness, start)?, &rows, row_stiffness, coarse, make)?;
         Ok(Self {
             joined: Rc::new(RefCell::new(Joined { matrix, rows, offset, first: start.unwrap_or(0) })),
             is_redundant,
@@ -116,7 +116,7 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
         matrix.update(rows, springs)?;
         let mut last_error = None;
         let mut enough = |iterate: &Iterate| {
-            let Measured { closing, energy } = measure(model, rows, *first, iterate.x, &r);
+            let (closing, energy) = closing_and_energy(model, rows, *first, iterate.x, &r);
             let error = estimated_error(iterate, energy);
             last_error = Some(error);
             enough(model, &Trial { closing: &closing, energy, error })
@@ -125,12 +125,10 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
         if let (false, Some(reason)) = (self.is_redundant, &failure) {
             return Ok(Err(Failure { body: None, reason: reason.clone() }));
         }
-        let states = joined.states(model, &x);
-        let Collected { field, energy, has_failed } = collect(model, states, residual, failure.is_some());
-        if has_failed {
+        let Some((field, energy)) = collect(model, joined.states(model, &x), residual, failure.is_some()) else {
             let elsewhere = || "the matrix of all bodies cannot be factored on another rank".to_owned();
             return Ok(Err(Failure { body: None, reason: failure.unwrap_or_else(elsewhere) }));
-        }
+        };
         let accuracy = joined.matrix.solver().accuracy();
         let error = last_error.unwrap_or(accuracy * energy.max(0.0).sqrt());
         Ok(Ok(Solution { field, energy, error, is_exact: accuracy == 0.0 }))
@@ -145,22 +143,14 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
     }
 }
 
-/// What the stopping test has to know about an iterate x.
-struct Measured {
-    /// B x at the points, n.
-    closing: Vec<f64>,
-    /// x'r, the squared energy norm of x.
-    energy: f64,
-}
-
-/// Measure an iterate. `x` and `r` have the rows of this rank, from number `first` on. One message.
-fn measure(model: &Model, rows: &Csr, first: usize, x: &[f64], r: &[f64]) -> Measured {
+/// Return B x at the points, n, and x'r, the squared energy norm of an iterate x. `x` and `r` have the rows of this rank, from number `first` on. One message.
+fn closing_and_energy(model: &Model, rows: &Csr, first: usize, x: &[f64], r: &[f64]) -> (Vec<f64>, f64) {
     let owned = |q: usize| rows.row(q).filter_map(|(i, b)| Some(b * x.get(i.checked_sub(first)?)?)).sum();
     let mut closing: Vec<f64> = (0..model.points()).map(owned).collect();
     closing.push(dot(x, r));
     model.exchange.sum(&mut closing);
     let energy = closing.pop().unwrap_or_default().max(0.0);
-    Measured { closing, energy }
+    (closing, energy)
 }
 
 /// Return the estimated energy norm of the error of an iterate with this squared energy norm.
@@ -172,18 +162,9 @@ fn estimated_error(iterate: &Iterate, energy: f64) -> f64 {
     }
 }
 
-/// A solution as all ranks know it.
-struct Collected {
-    field: Field,
-    /// x'r, the squared energy norm of the solution.
-    energy: f64,
-    /// Whether the solver of some rank has failed.
-    has_failed: bool,
-}
-
-/// Collect the solution of all ranks from the `states` of the local bodies. One message, so that all ranks have the same numbers although their
-/// processors may round differently.
-fn collect(model: &Model, states: Vec<Vec<f64>>, residual: &[Vec<f64>], has_failed: bool) -> Collected {
+/// Collect a solution x of all ranks from the `states` of the local bodies. Return x with the traces of all bodies, and x'r, or `None` if the solver of some rank
+/// has failed. One message, so that all ranks have the same numbers although their processors may round differently.
+fn collect(model: &Model, states: Vec<Vec<f64>>, residual: &[Vec<f64>], has_failed: bool) -> Option<(Field, f64)> {
     let energy: f64 = states.iter().zip(residual).map(|(x, r)| dot(x, r)).sum();
     let mut field = Field { states, trace: vec![0.0; 2 * model.points()] };
     field.trace_here(model);
@@ -191,5 +172,5 @@ fn collect(model: &Model, states: Vec<Vec<f64>>, residual: &[Vec<f64>], has_fail
     model.exchange.sum(&mut field.trace);
     let failures = field.trace.pop().unwrap_or_default();
     let energy = field.trace.pop().unwrap_or_default();
-    Collected { field, energy, has_failed: failures > 0.0 }
+    (failures <= 0.0).then_some((field, energy))
 }

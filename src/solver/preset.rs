@@ -69,11 +69,6 @@ pub struct Size {
 }
 
 impl Size {
-    /// Return whether some dofs can be eliminated, and some remain.
-    pub fn can_condense(&self) -> bool {
-        (1..self.dofs).contains(&self.retained)
-    }
-
     /// Return the estimated bytes of a solver that factors, for a plane body.
     pub fn bytes(&self, preset: Preset) -> usize {
         let dense = if preset == Preset::Condensed { memory::of_condensed(self.retained) } else { 0 };
@@ -98,9 +93,11 @@ pub fn in_plane(size: &Size) -> (Preset, String) {
     let what = format!("{dofs} dofs in the plane, {retained} of them on the contact");
     let megabytes = |preset: Preset| size.bytes(preset) / 1_000_000;
     let fits = |preset: Preset| size.bytes(preset) < memory;
+    // some dofs can be eliminated, and some remain
+    let can_condense = (1..dofs).contains(&retained);
     let dense = (retained as f64).powi(3) / 3.0;
     let pays = retained <= SMALL || dense <= memory::work_in_plane(dofs);
-    if size.can_condense() && pays && fits(Preset::Condensed) {
+    if can_condense && pays && fits(Preset::Condensed) {
         (Preset::Condensed, format!("{what}, about {} MB", megabytes(Preset::Condensed)))
     } else if fits(Preset::Mumps) {
         (Preset::Mumps, format!("{what}, about {} MB", megabytes(Preset::Mumps)))

@@ -31,11 +31,12 @@ pub struct RobinMatrix<S> {
 
 impl<S: InnerSolver> RobinMatrix<S> {
     /// Start from G = K, whose pattern holds that of B'B. `make` turns K into its solver. `row_stiffness` is b diag(K) b' of each row b of B, with the parts
-    /// of all ranks.
+    /// of all ranks. With a `coarse` space, rigid motions are put around the preconditioner.
     pub fn new(
         stiffness: Rows,
         rows: &Csr,
         row_stiffness: Vec<f64>,
+        coarse: Option<RigidSpace>,
         make: impl FnOnce(Rows) -> Result<S>,
     ) -> Result<Self> {
         let weight = vec![0.0; rows.rows()];
@@ -46,16 +47,11 @@ impl<S: InnerSolver> RobinMatrix<S> {
             weight,
             soft,
             coupling: Coupling::new(&stiffness, rows),
-            coarse: None,
+            coarse: coarse.map(Rc::new),
             counts: BodyCounts::default(),
             before: [0; 3],
             solver: make(stiffness)?,
         })
-    }
-
-    /// Put rigid motions around the preconditioner.
-    pub fn with_coarse(self, coarse: Option<RigidSpace>) -> Self {
-        Self { coarse: coarse.map(Rc::new), ..self }
     }
 
     /// Set the spring stiffnesses d, one a row of B.

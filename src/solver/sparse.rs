@@ -97,7 +97,7 @@ impl<S: InnerSolver> SparseBody<S> {
             }
             let start = self.distribution.as_ref().map(|distribution| distribution.start);
             let rows = matrix_rows(&self.rows, &self.distribution);
-            let matrix = RobinMatrix::new(super::rows(stiffness, start)?, rows, row_stiffness, make)?;
+            let matrix = RobinMatrix::new(super::rows(stiffness, start)?, rows, row_stiffness, None, make)?;
             self.robin = Lazy::Now(Box::new(matrix));
         }
         match &mut self.robin {
