@@ -1,8 +1,8 @@
-//! How far the discrete solution is from the exact one: bodies, layers, pressure.
+//! The estimated difference of the discrete solution from the exact one: in bodies, layers and pressures.
 //!
-//! The displacement recovered from the discrete one tells, cell by cell, the difference of the stresses, which is the error in
-//! the energy norm, and the part of the displacement that the elements cannot represent. The second one acts like a load
-//! on the discrete problem; its response is what nodal displacements and nodal pressures lack.
+//! A smoother displacement is recovered from the discrete one. The difference of their stresses, cell by cell, is the error in
+//! the energy norm. The recovered displacement also shows the part of the displacement that the elements cannot represent, which acts like a load
+//! on the discrete problem. The response to that load is the error of nodal displacements and nodal pressures.
 
 mod field;
 mod held;
@@ -22,11 +22,11 @@ use std::rc::Rc;
 /// Estimated errors of a discrete solution.
 #[derive(Debug, Clone, Default)]
 pub struct Estimate {
-    /// Squared energy error of each cell of each body; empty where the body lives on another rank.
+    /// Squared energy error of each cell of each body; empty for a body of another rank.
     pub cells: Vec<Vec<f64>>,
     /// Squared energy error of each body.
     pub bodies: Vec<f64>,
-    /// Squared energy error of each layer between its points.
+    /// Squared energy error of each layer between its contact points.
     pub layers: Vec<f64>,
     /// Relative error in the energy norm of bodies and layers.
     pub energy: f64,
@@ -34,21 +34,21 @@ pub struct Estimate {
     pub nodal: f64,
     /// Error of the pressure at each contact point, exact minus discrete.
     pub pressure_error: Vec<f64>,
-    /// Relative error of the pressures of each pair at its points, root of mean squares over the surface, on the safe side.
+    /// Relative error of the pressures of each pair at its points: root mean square over the surface, with the factor `SAFETY`.
     pub pressure: Vec<f64>,
-    /// The same of the normal displacements of all contact surfaces; at least [`Estimate::energy`] squared.
+    /// Relative error of the normal displacements of all contact surfaces, measured likewise; at least [`Estimate::energy`] squared.
     pub displacement: f64,
 }
 
-/// Factor on the errors of nodal values: where a solution has a kink, recovery smooths it and sees too little. The same
-/// number is usual for errors extrapolated from three meshes (Roache 1994).
+/// Factor on the errors of nodal values. Where a solution has a kink, recovery smooths it and underestimates the error. The same
+/// factor is usual for errors extrapolated from three meshes (Roache 1994).
 const SAFETY: f64 = 1.25;
 
-/// Error of the response in the solve for the nodal errors. What conjugate gradients miss is orthogonal to what they have: the energy norm is
-/// then wrong by half of the square of this, and pressures changed by at most 0.3 % from those at a hundredth.
-const ROUGH: f64 = 0.1;
+/// Relative error of the response in the solve for the nodal errors. The error of conjugate gradients is orthogonal to their iterate, so the energy norm is
+/// wrong by half of the square of this. Pressures changed by at most 0.3 % from those with a tolerance of 0.01.
+const TOLERANCE: f64 = 0.1;
 
-/// Estimates the error of an iterate; `step` solves for the response of the bodies. Collective.
+/// Estimate the error of an iterate with its layer state. `step` solves for the response of the bodies. Collective.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -62,7 +62,7 @@ pub fn estimate(
     let displacements = displacements(meshes, model, iterate)?;
     let each = displacements.iter().enumerate();
     let recovered: Vec<_> = each.map(|(body, u)| Some(meshes.recover(body, u.as_ref()?))).collect();
-    let mut local = Local::of_bodies(meshes, &recovered);
+    let mut local = LocalErrors::of_bodies(meshes, &recovered);
     for pair in 0..model.pairs.len() {
         local.add_pair(meshes, model, layer, &recovered, pair);
     }
@@ -71,37 +71,27 @@ pub fn estimate(
     model.exchange.sum(&mut bodies);
     let held = Held::of(model, layer);
     held.balance(meshes, model, &mut local.loads);
-    let Local { cells, mut loads, layers, beyond } = local;
+    let LocalErrors { cells, mut loads, layers, mean_error } = local;
     to_dofs(meshes, model, &mut loads);
 
-    let response = linear::respond(model, step, layer, &loads, share(model, layer, &beyond))?;
-    let (nodal, mut squared) = response.map_err(|failure| Error::new(Kind::Solver, failure.reason))?;
-    let closing: Vec<f64> = nodal.closing().iter().zip(&beyond).map(|(w, beyond)| w + beyond).collect();
-    for (q, beyond) in beyond.iter().enumerate() {
-        squared += model.weight[q] * layer.tangent[q] * beyond * (2.0 * closing[q] - beyond);
-    }
+    let NodalErrors { field, closing, energy: nodal } = nodal_errors(model, step, layer, &loads, &mean_error)?;
     let mut strain = [residual(model, iterate, &vec![0.0; model.points()]).1.strain];
     model.exchange.sum(&mut strain);
     let reference = strain[0] - held.energy + layer.work;
-    let relative = |squared: f64| match () {
-        () if reference > 0.0 => (squared.max(0.0) / reference).sqrt(),
-        // rounding is all that is left beside springs that only hold
-        () if held.energy > 0.0 => f64::INFINITY,
-        () => 0.0,
-    };
-    // that of the nodal values is a part of the whole
-    let energy = relative(bodies.iter().chain(&layers).sum::<f64>().max(squared));
+    // the error of nodal values is a part of the whole error
+    let whole = bodies.iter().chain(&layers).sum::<f64>().max(nodal);
+    let energy = relative_norm(whole, reference, held.energy);
     let pressure_error = pressure_errors(model, layer, &closing);
     let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
-    let at = |i: usize| (model.weight[i % model.points()], nodal.trace[i], trace[i]);
-    let displacement = ratio((0..2 * model.points()).map(at));
+    let at = |i: usize| (model.weight[i % model.points()], field.trace[i], trace[i]);
+    let displacement = relative_error((0..2 * model.points()).map(at));
     Ok(Estimate {
         energy,
-        nodal: relative(squared),
+        nodal: relative_norm(nodal, reference, held.energy),
         pressure: relative_errors(model, layer, &pressure_error),
         pressure_error,
-        // the loads f work on the error e as f'e = a(u, e) = a(e, e), since a(u_h, e) = 0: so much they lack where they act
+        // the displacements at the loads lack at least this share: the work of the loads f on the error e is f'e = a(u, e) = a(e, e), since a(u_h, e) = 0
         displacement: SAFETY * displacement.max(energy * energy),
         cells,
         bodies,
@@ -109,7 +99,7 @@ pub fn estimate(
     })
 }
 
-/// Displacements of all nodes of each body, on the rank that leads it. Collective.
+/// Return the displacements of all nodes of each body, on the rank that owns it. Collective.
 fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<Vec<Option<Vec<f64>>>> {
     let mut all = Vec::new();
     for (index, state) in iterate.states.iter().enumerate() {
@@ -124,27 +114,67 @@ fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<
     Ok(all)
 }
 
-/// What was recovered of each body, on the rank that leads it.
-type OfBodies<'a> = [Option<Box<dyn Recovered + 'a>>];
+/// The errors of nodal values: the response of bodies and layers to what the elements cannot represent.
+struct NodalErrors {
+    /// Error of the displacements.
+    field: Field,
+    /// Error of the compression at each contact point, n.
+    closing: Vec<f64>,
+    /// Squared energy norm of the error.
+    energy: f64,
+}
 
-/// What recovered displacements tell before any solve.
-struct Local {
-    /// Squared energy error of each cell of each body that this rank leads.
+/// Solve for the errors of nodal values. `loads` has one entry a dof of each local body, and `mean_error` is that of [`LocalErrors`], n.
+fn nodal_errors(
+    model: &mut Model,
+    step: &mut dyn LinearStep,
+    layer: &Layer,
+    loads: &[Vec<f64>],
+    mean_error: &[f64],
+) -> Result<NodalErrors> {
+    let response = linear::respond(model, step, layer, loads, tolerance(model, layer, mean_error))?;
+    let (field, mut energy) = response.map_err(|failure| Error::new(Kind::Solver, failure.reason))?;
+    let closing: Vec<f64> = field.closing().iter().zip(mean_error).map(|(w, mean)| w + mean).collect();
+    for (q, mean) in mean_error.iter().enumerate() {
+        energy += model.weight[q] * layer.tangent[q] * mean * (2.0 * closing[q] - mean);
+    }
+    Ok(NodalErrors { field, closing, energy })
+}
+
+/// Return the relative energy norm of an error from its squared energy norm. `reference` is the energy of bodies and layers, without the energy `held` of
+/// springs that only hold bodies in place.
+fn relative_norm(squared: f64, reference: f64, held: f64) -> f64 {
+    if reference > 0.0 {
+        (squared.max(0.0) / reference).sqrt()
+    } else if held > 0.0 {
+        // besides the springs that only hold, the energy is nothing but rounding
+        f64::INFINITY
+    } else {
+        0.0
+    }
+}
+
+/// The recovered displacement of each body, on the rank that owns it.
+type RecoveredBodies<'a> = [Option<Box<dyn Recovered + 'a>>];
+
+/// The errors that recovered displacements show without a solve.
+struct LocalErrors {
+    /// Squared energy error of each cell of each body that this rank owns.
     cells: Vec<Vec<f64>>,
-    /// The load on the discrete problem, at the nodes of each body that this rank leads.
+    /// The load on the discrete problem, at the nodes of each body that this rank owns.
     loads: Vec<Vec<f64>>,
     /// Squared energy error of each layer.
     layers: Vec<f64>,
-    /// What the compression of each contact point lacks as a mean, n.
-    beyond: Vec<f64>,
+    /// Difference of the compression at each contact point, n, from its mean around the point, which the discrete problem takes in its place.
+    mean_error: Vec<f64>,
 }
 
-impl Local {
-    /// The bodies without their layers.
-    fn of_bodies(meshes: &dyn Meshes, recovered: &OfBodies) -> Self {
+impl LocalErrors {
+    /// Return the errors of the bodies, without those of the layers.
+    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies) -> Self {
         let count = recovered.len();
         let (cells, loads) = (vec![Vec::new(); count], vec![Vec::new(); count]);
-        let mut local = Self { cells, loads, layers: Vec::new(), beyond: Vec::new() };
+        let mut local = Self { cells, loads, layers: Vec::new(), mean_error: Vec::new() };
         for (body, recovered) in recovered.iter().enumerate() {
             if let Some(recovered) = recovered {
                 local.cells[body] = recovered.energy_errors();
@@ -155,8 +185,15 @@ impl Local {
         local
     }
 
-    /// Adds the layer of a pair, pairs in their order: its own error, and the forces that it lacks on both bodies. Collective.
-    fn add_pair(&mut self, meshes: &dyn Meshes, model: &Model, layer: &Layer, recovered: &OfBodies, index: usize) {
+    /// Add the error of the layer of a pair, and the error of its forces on both bodies. To be called for the pairs in their order. Collective.
+    fn add_pair(
+        &mut self,
+        meshes: &dyn Meshes,
+        model: &Model,
+        layer: &Layer,
+        recovered: &RecoveredBodies,
+        index: usize,
+    ) {
         let (pair, points, range) = (&model.pairs[index], meshes.points(index), model.range(index));
         let mut compression = vec![0.0; points.weight.len()];
         for side in 0..2 {
@@ -166,14 +203,14 @@ impl Local {
             }
         }
         model.exchange.sum(&mut compression);
-        let mut means = vec![0.0; pair.len()];
+        let mut mean_error = vec![0.0; pair.len()];
         if let Some(recovered) = &recovered[pair.bodies[1]] {
-            means = recovered.beyond_means(index, &pair.nodal[1]);
+            mean_error = recovered.beyond_means(index, &pair.nodal[1]);
         }
-        model.exchange.sum(&mut means);
+        model.exchange.sum(&mut mean_error);
         let springs: Vec<f64> =
-            range.clone().zip(&means).map(|(q, c)| model.weight[q] * layer.tangent[q] * c).collect();
-        let of_layer = LayerError::new(pair, &points, layer, range.clone(), &compression, &means);
+            range.clone().zip(&mean_error).map(|(q, c)| model.weight[q] * layer.tangent[q] * c).collect();
+        let of_layer = LayerError::new(pair, &points, layer, range.clone(), &compression, &mean_error);
         let force: Vec<f64> = of_layer.pressure.iter().zip(points.weight).map(|(p, weight)| -weight * p).collect();
         for side in 0..2 {
             let (body, nodal) = (pair.bodies[side], &pair.nodal[side]);
@@ -184,11 +221,11 @@ impl Local {
             }
         }
         self.layers.push(of_layer.energy);
-        self.beyond.extend(means);
+        self.mean_error.extend(mean_error);
     }
 }
 
-/// Turns loads at the nodes of each body into those at its dofs, on all ranks that have a part of it. Collective.
+/// Turn loads at the nodes of each body into those at its dofs, on all ranks that have a part of the body. Collective.
 fn to_dofs(meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {
     for (body, load) in loads.iter_mut().enumerate().filter(|(_, load)| !load.is_empty()) {
         meshes.forces(body, load);
@@ -201,62 +238,65 @@ fn to_dofs(meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {
     }
 }
 
-/// Return the body with the largest error, and the centre of its worst cell in the scene, if the estimated energy error is as large as the solution. The mesh is then too
-/// coarse, or its cells are too flat, for the estimate to mean anything. Collective.
+/// Return the body with the largest error, and the centre of its worst cell in the scene, if the estimated energy error is as large as the solution. The mesh
+/// is then too coarse, or its cells are too flat, for the estimate to mean anything. Collective.
 pub fn lost_at(meshes: &dyn Meshes, model: &Model, estimate: &Estimate) -> Option<(usize, [f64; 3])> {
     if estimate.energy < 1.0 {
         return None;
     }
     let body = (0..estimate.bodies.len()).max_by(|&a, &b| estimate.bodies[a].total_cmp(&estimate.bodies[b]))?;
     let of_cells = &estimate.cells[body];
-    let mut place = [0.0; 3];
-    // the rank that has the body has its errors
+    let mut centre = [0.0; 3];
+    // only the rank that owns the body has the errors of its cells
     if let Some(worst) = (0..of_cells.len()).max_by(|&a, &b| of_cells[a].total_cmp(&of_cells[b])) {
         let cells = meshes.cells(body);
         let corners = &cells.corners[cells.stride * worst..][..cells.stride];
         for &node in corners {
-            (0..3).for_each(|c| place[c] += cells.nodes[node as usize][c] / cells.stride as f64);
+            (0..3).for_each(|c| centre[c] += cells.nodes[node as usize][c] / cells.stride as f64);
         }
     }
-    model.exchange.sum(&mut place);
-    Some((body, place))
+    model.exchange.sum(&mut centre);
+    Some((body, centre))
 }
 
-/// How exact the response is to be that means `beyond` have a part in. Springs of a stiff layer resist them with an energy of which bodies that
-/// give way leave the share rho/(rho + kappa).
-fn share(model: &Model, layer: &Layer, beyond: &[f64]) -> f64 {
-    let (mut held, mut left) = (0.0, 0.0);
+/// Return the relative tolerance of the response to loads that contain those of `mean_error`, n. Springs of a stiff layer resist these means with an
+/// energy. The bodies give way to these springs, and the share rho/(rho + kappa) of the energy is left in the response.
+fn tolerance(model: &Model, layer: &Layer, mean_error: &[f64]) -> f64 {
+    let (mut full, mut left) = (0.0, 0.0);
     for (q, rho) in meeting_slopes(model).into_iter().enumerate() {
-        let energy = model.weight[q] * layer.tangent[q] * beyond[q].powi(2);
-        held += energy;
+        let energy = model.weight[q] * layer.tangent[q] * mean_error[q].powi(2);
+        full += energy;
         left += energy * rho / (rho + layer.tangent[q]);
     }
-    if held > 0.0 { ROUGH * f64::sqrt(left / held) } else { ROUGH }
+    if full > 0.0 { TOLERANCE * f64::sqrt(left / full) } else { TOLERANCE }
 }
 
-/// What the pressures lack where the compression lacks what the errors close. The response is that of springs at the points that
-/// are closed, so a point that opens or closes takes the place where its law meets the state that the response leaves it, as in a step of
-/// Newton's method: bodies give way to what a point presses, however stiff its layer.
+/// Return the errors of the pressures, n, from those of the compression. The response is that of springs at the closed points. So a point that opens
+/// or closes takes the resolvent of its law for the state in the response, as in a step of Newton's method. This allows for the bodies, which give way
+/// to the pressure of a point however stiff its layer is.
 fn pressure_errors(model: &Model, layer: &Layer, closing: &[f64]) -> Vec<f64> {
     let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
-    let met = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
-    met.pressure.iter().zip(&layer.pressure).map(|(exact, found)| exact - found).collect()
+    let resolved = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
+    resolved.pressure.iter().zip(&layer.pressure).map(|(exact, discrete)| exact - discrete).collect()
 }
 
-/// Relative errors of the pressures of each pair.
+/// Return the relative error of the pressures of each pair.
 fn relative_errors(model: &Model, layer: &Layer, error: &[f64]) -> Vec<f64> {
-    let of_pair = |index| SAFETY * ratio(model.range(index).map(|i| (model.weight[i], error[i], layer.pressure[i])));
-    (0..model.pairs.len()).map(of_pair).collect()
+    let at = |q: usize| (model.weight[q], error[q], layer.pressure[q]);
+    (0..model.pairs.len()).map(|pair| SAFETY * relative_error(model.range(pair).map(at))).collect()
 }
 
-/// Root of weighted sums of squares: errors over values; zero over zero is zero.
-fn ratio(all: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
-    let (error, size) =
-        all.fold((0.0, 0.0), |(e, s), (w, error, value)| (e + w * error * error, s + w * value * value));
-    if error == 0.0 { 0.0 } else { f64::sqrt(error / size) }
+/// Return the root mean square of errors over that of values, from (area, error, value) at each point. Zero errors over zero values are zero.
+fn relative_error(samples: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
+    let (mut errors, mut values) = (0.0, 0.0);
+    for (area, error, value) in samples {
+        errors += area * error * error;
+        values += area * value * value;
+    }
+    if errors == 0.0 { 0.0 } else { f64::sqrt(errors / values) }
 }
 
-/// The estimate as the rule of a balanced stop.
+/// The estimate as the discretisation error of a balanced stop.
 pub struct Nodal(pub Rc<dyn Meshes>);
 
 impl Discretisation for Nodal {

@@ -1,4 +1,4 @@
-//! What the method asks of a body.
+//! The interface of a body for the methods.
 
 use super::distribution::Distribution;
 use crate::error::Result;
@@ -6,7 +6,7 @@ use crate::linalg::Csr;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
-/// Quadratic terms of F1 (25) of one body.
+/// The terms of one body in the functional F1 (25).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Energy {
     /// u'Ku, twice the strain energy.
@@ -15,41 +15,41 @@ pub struct Energy {
     pub potential: f64,
 }
 
-/// How a solve G z = r ended.
+/// The outcome of a solve G z = r.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Solved {
     /// Krylov iterations; 0 for a direct solver.
     pub iterations: usize,
-    /// Why the inner solver gave up, in its own words; `None` if it reached its tolerance.
+    /// Why the inner solver gave up, in its own message; `None` if it reached its tolerance.
     pub failure: Option<String>,
 }
 
-/// What a body did so far.
+/// Counters of the work of a body so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct BodyCounts {
-    /// Numeric factorisations or preconditioner set-ups.
+    /// Number of numeric factorisations or preconditioner set-ups.
     pub factorizations: usize,
-    /// Dense factorisations of the Robin matrices of condensed bodies.
+    /// Number of dense factorisations of the Robin matrices of condensed bodies.
     pub dense_factorizations: usize,
-    /// Exact solves near the contact made instead of preconditioner set-ups.
+    /// Number of local corrections (exact solves near the contact) that were set up in place of preconditioners.
     pub patches: usize,
-    /// Symbolic factorisations (patterns analysed).
+    /// Number of symbolic factorisations.
     pub symbolic: usize,
-    /// Numeric factorisations of K that an earlier run has left.
+    /// Number of numeric factorisations of K that were reused from an earlier run.
     pub factorizations_avoided: usize,
-    /// Solves G z = r.
+    /// Number of solves G z = r.
     pub solves: usize,
-    /// Krylov iterations in them.
+    /// Number of Krylov iterations in these solves.
     pub inner_iterations: usize,
-    /// Changes of the Robin term that reached the matrix.
+    /// Number of changes of the Robin term that changed the matrix.
     pub robin_updates: usize,
-    /// Changes asked for that changed nothing and cost nothing.
+    /// Number of requested changes that left the Robin term as it was.
     pub robin_skipped: usize,
     /// Wall seconds in factorisations or preconditioner set-ups.
     pub factor_seconds: f64,
-    /// Of these, seconds in the first one, which has the symbolic factorisation in it.
+    /// Wall seconds of the first one, which contains the symbolic factorisation. They are included in `factor_seconds`.
     pub first_seconds: f64,
-    /// Wall seconds in solves, set-ups apart.
+    /// Wall seconds in solves, without set-ups.
     pub solve_seconds: f64,
 }
 
@@ -70,99 +70,99 @@ impl std::ops::AddAssign for BodyCounts {
     }
 }
 
-/// Matrices of a body whose states are (v, a): the displacement v + R a, with rigid motions R that its supports leave.
+/// The matrices of a body whose states are (v, a) for the displacement v + R a, with the rigid motions R that its supports leave free.
 #[derive(Debug, Clone, Copy)]
 pub struct Matrices<'a> {
-    /// K, of the dofs v.
+    /// K on the dofs v.
     pub stiffness: &'a Csr,
-    /// B, of the dofs v.
+    /// B on the dofs v.
     pub rows: &'a Csr,
-    /// R: one vector over the dofs v for each number in a.
+    /// R, one vector over the dofs v for each entry of a.
     pub motions: &'a [Rc<[f64]>],
-    /// B R: one vector over the contact rows each.
+    /// B R, one vector over the contact rows for each entry of a.
     pub traces: &'a [Vec<f64>],
 }
 
 impl Matrices<'_> {
-    /// Length of a state.
+    /// Return the length of a state.
     pub fn len(&self) -> usize {
         self.stiffness.rows() + self.motions.len()
     }
 
-    /// Whether states are empty; they never are.
+    /// Return whether states are empty, which they never are.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// Loads of a body whose K stays.
+/// New loads of a body whose K stays.
 #[derive(Debug)]
 pub struct Loads {
     /// f, one entry a dof.
     pub force: Vec<f64>,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
-    /// See [`Body::carried`].
+    /// The rigid motion of [`Body::carried`].
     pub carried: Vec<f64>,
-    /// Work of f on each rigid motion that supports leave.
+    /// Work of f on each rigid motion that supports leave free.
     pub work: Vec<f64>,
 }
 
-/// An elastic body with stiffness K, load f and contact rows B (one row a contact point of each of its surfaces).
+/// An elastic body with stiffness K, load f and contact rows B (one row for each contact point of each of its surfaces).
 ///
-/// A state is a vector of `len()` numbers whose meaning is the body's own: all dofs, or those that were retained.
-/// Solves need not be exact; what is exact is [`Body::residual`].
+/// A state is a vector of `len()` numbers whose meaning is the body's own: all dofs, or only the retained ones.
+/// Solves may be inexact, but [`Body::residual`] is exact.
 pub trait Body {
-    /// Length of a state.
+    /// Return the length of a state.
     fn len(&self) -> usize;
 
-    /// Whether states are empty; they never are.
+    /// Return whether states are empty, which they never are.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The undeformed state: zero on free dofs, prescribed values on supports.
+    /// Return the undeformed state: zero on free dofs, prescribed values on supports.
     fn rest(&self) -> Vec<f64>;
 
-    /// t = B u: outer normal displacement at each row, without what prescribed dofs contribute.
+    /// Compute t = B u, the outer normal displacement at each row, without what prescribed dofs contribute.
     fn trace(&self, u: &[f64], t: &mut [f64]);
 
-    /// y += B' rows: forces at the contact rows as forces at the dofs.
+    /// Add B' rows to y: forces at the contact rows as forces at the dofs.
     fn add_rows(&self, rows: &[f64], y: &mut [f64]);
 
-    /// r = f - K u - B' force, `product` = K u, `force` = omega p at each row: the equilibrium residual (26). Also returns the
+    /// Compute the equilibrium residual (26) r = f - K u - B' force, with `product` = K u and `force` = omega p at each row. Return the
     /// energies of u.
     fn residual(&self, u: &[f64], product: &[f64], force: &[f64], r: &mut [f64]) -> Energy;
 
-    /// y = K u, for a body with K of its own.
+    /// Compute y = K u, for a body that has not given its K away.
     fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]);
 
-    /// Gives K away to a matrix of all bodies ([`Joint`](super::Joint)); none if the body needs it itself.
+    /// Give K away to a matrix of all bodies ([`Joint`](super::Joint)). Return `None` if the body needs it itself.
     fn give_stiffness(&mut self) -> Option<Csr> {
         None
     }
 
-    /// Makes G = K + B' diag(weight) B (37)-(38), `weight` = omega psi kappa at each row. Nothing happens if the weights
+    /// Form the Robin matrix G = K + B' diag(weight) B (37)-(38), with `weight` = omega psi kappa at each row. Nothing happens if the weights
     /// are those of the last call.
     ///
     /// # Errors
     /// Failures of the solver library.
     fn robin(&mut self, weight: &[f64]) -> Result<()>;
 
-    /// Factors G, or sets its preconditioner up, if that has not been done since it changed.
+    /// Factor G, or set up its preconditioner, if that has not been done since G changed.
     ///
     /// # Errors
     /// Failures of the solver library.
     fn set_up(&mut self) -> Result<()>;
 
-    /// Solves G z = r (41) with zero guess.
+    /// Solve G z = r (41) with zero initial guess.
     ///
     /// # Errors
-    /// Failures of the solver library; not converging is told in [`Solved`].
+    /// Failures of the solver library. A solve that does not converge is reported in [`Solved`].
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
 
-    /// How far solves have to reduce r, unless the user says: a hint to iterative inner solvers. False if solves are what they
-    /// are.
+    /// Set the relative tolerance of iterative solves, unless the user has set one. Return false if solves do not depend on
+    /// it.
     ///
     /// # Errors
     /// Failures of the solver library.
@@ -170,12 +170,12 @@ pub trait Body {
         Ok(false)
     }
 
-    /// Share of the energy norm of z that solves may be off: zero for a direct solver.
+    /// Return the relative error of solves in the energy norm, at most: zero for a direct solver.
     fn accuracy(&self) -> f64 {
         0.0
     }
 
-    /// Makes [`Body::matrices`] known, which may take an elimination.
+    /// Make [`Body::matrices`] available, which may take an elimination.
     ///
     /// # Errors
     /// Failures of the solver library.
@@ -183,7 +183,7 @@ pub trait Body {
         Ok(())
     }
 
-    /// z = M^-1 r with a fixed symmetric M near G: what preconditions conjugate gradients over all bodies. Costs no more than
+    /// Compute z = M^-1 r with a fixed symmetric M that approximates G. This preconditions conjugate gradients over all bodies. It costs no more than
     /// a solve, and for an iterative inner solver only one application of its preconditioner.
     ///
     /// # Errors
@@ -192,23 +192,23 @@ pub trait Body {
         self.solve(r, z)
     }
 
-    /// Size of the rounding errors in [`Body::residual`], as |e|_{diag(G)^-1} squared.
+    /// Return the estimated size of the rounding errors e in [`Body::residual`], as the square of |e|_{diag(G)^-1}.
     fn rounding(&self, u: &[f64], force: &[f64]) -> f64;
 
-    /// A load on all dofs as the right-hand side r of [`Body::solve`] that has the same effect; supports take their part.
+    /// Return the right-hand side r of [`Body::solve`] that has the same effect as a load on all dofs. What acts on supports is left out.
     ///
     /// # Errors
     /// Failures of the solver library.
     fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>>;
 
-    /// What was done so far.
+    /// Return the counters of the work so far.
     fn counts(&self) -> BodyCounts;
 
-    /// Starts the counts anew for another run with the same K and f; what need not be done again counts as avoided.
+    /// Set the counters to zero for another run with the same K and f. Work that need not be repeated counts as avoided.
     fn begin_anew(&mut self);
 
-    /// Takes other loads and keeps what was made of K. False, and nothing has changed, where other dofs are prescribed or K is needed
-    /// anew.
+    /// Replace the loads and keep what was made of K. Return false, with nothing changed, if other dofs are prescribed or K is needed
+    /// again.
     ///
     /// # Errors
     /// Failures of the solver library.
@@ -216,42 +216,42 @@ pub trait Body {
         Ok(false)
     }
 
-    /// Its matrices, if they are in this process's memory: for methods that join the bodies.
+    /// Return the matrices of the body, if they are in the memory of this process. They serve methods that join the bodies.
     fn matrices(&self) -> Option<Matrices<'_>> {
         None
     }
 
-    /// How many numbers at the end of a state are rigid motion.
+    /// Return the number of entries at the end of a state that are amounts of rigid motions.
     fn rigid(&self) -> usize {
         0
     }
 
-    /// Gives a state that was made from [`Body::matrices`] the body's own shares of deformation and rigid motion.
+    /// Split a state that was computed with [`Body::matrices`] into deformation and rigid motion as the body itself does.
     fn separate(&self, _state: &mut [f64]) {}
 
-    /// The rigid motion by which supports carry the body, one entry a dof of the nodes that this rank knows; empty for none. It is no part of
-    /// states.
+    /// Return the rigid motion by which supports move the body, one entry a dof of the owned and ghost nodes of this rank; empty for none. It is not
+    /// part of states.
     fn carried(&self) -> &[f64] {
         &[]
     }
 
-    /// How its dofs are dealt out over the ranks; none for a body of this rank alone. Of a body that is dealt out, `residual`,
+    /// Return how the dofs of the body are distributed over the ranks; `None` for a body of this rank alone. For a distributed body `residual`,
     /// `separate` and `recover` are collective.
     fn distribution(&self) -> Option<&Distribution> {
         None
     }
 
-    /// Whether this rank speaks for the body.
+    /// Return whether this rank owns the body.
     fn leads(&self) -> bool {
         self.distribution().is_none_or(|distribution| distribution.leads)
     }
 
-    /// Displacements of the nodes that this rank knows for a state, without the motion of [`Body::carried`]: of all, or of those of its part.
+    /// Return the displacements of the owned and ghost nodes of this rank for a state, without the motion of [`Body::carried`].
     ///
     /// # Errors
     /// Failures of the solver library.
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>>;
 
-    /// One line about the inner solver.
+    /// Return one line about the inner solver.
     fn describe(&self) -> String;
 }

@@ -1,9 +1,10 @@
-//! Free rigid motions of the bodies as a coarse space of the matrix H = K + B'DB of all bodies together, D being springs at the points.
+//! Free rigid motions of the bodies as a coarse space of the matrix H = K + B'DB of all bodies together, where D are springs at the contact points.
 //!
-//! Many bodies on each other are a frame whose joints are layers. How it moves as a whole is seen by no smoother, and by the coarse levels of
-//! multigrid only as far as these have the rigid motions of each body; a sweep tells a body of its neighbours alone. So H is solved exactly in
-//! the space of all free rigid motions, the columns of Z (balancing: Mandel, Comm. Numer. Meth. Engng 9, 1993). As K Z = 0, HZ = B'D BZ:
-//! sums over contact points. Z'HZ has a block a body and one for two bodies in contact; motions that no spring feels are left out.
+//! Many bodies on each other are a frame whose joints are layers. No smoother reduces errors in which the frame moves as a whole, and coarse levels of
+//! multigrid do so only as far as they have the rigid motions of each body. A Robin sweep passes information only from a body to its neighbours. So H is
+//! solved exactly in the space of all free rigid motions, which are the columns of Z (balancing: Mandel, Comm. Numer. Meth. Engng 9, 1993). Since K Z = 0,
+//! HZ = B'D BZ takes only sums over contact points. Z'HZ has one block for each body and one for each two bodies in contact. Motions that no spring resists
+//! are left out.
 
 use super::rigid::{Motions, TOLERANCE};
 use super::{Exchange, Model, Motion, Segment};
@@ -11,56 +12,62 @@ use crate::linalg::{Factor, axpy, dot, fit};
 use nalgebra::DVector;
 use std::rc::Rc;
 
-/// Z, in the numbers that an iterative solver works with here.
+/// The matrix Z, in the vectors of an iterative solver on this rank.
 pub struct Space {
     /// Contact rows and motions of each body.
     bodies: Vec<(Vec<Segment>, Vec<Motion>)>,
-    /// Points of each pair.
+    /// Number of points of each pair.
     points: Vec<usize>,
+    /// The columns of Z for the local bodies.
     columns: Vec<Column>,
     exchange: Rc<dyn Exchange>,
 }
 
-/// A column of Z: numbers of one vector here.
+/// A column of Z: the entries of one rigid motion in one vector.
 struct Column {
+    /// Number of the motion among those of all bodies.
     motion: usize,
+    /// Number of the vector.
     vector: usize,
+    /// First entry in that vector.
     first: usize,
     values: Vec<f64>,
 }
 
 impl Space {
-    /// Of the bodies of a model. Vectors are the states of the bodies, whose last numbers are rigid motions; or, with an `offset` for each body
-    /// and the end, they are one, in which motions are displacements of nodes.
+    /// Return the space for the bodies of a model. Without an `offset`, there is one vector for each body: its state, whose last entries are rigid motions.
+    /// With one, there is a single vector, in which motions are displacements of nodes; `offset` is the first entry of each body, and the length.
     pub fn of(model: &Model, offset: Option<&[usize]>) -> Self {
-        let (mut columns, mut motion) = (Vec::new(), 0);
+        let (mut columns, mut first_motion) = (Vec::new(), 0);
         for (body, slot) in model.bodies.iter().enumerate() {
-            let local = slot.local.as_ref().and_then(|local| Some((local.len(), local.matrices()?)));
-            for (own, motion) in slot.motions.iter().zip(motion..) {
-                let Some((end, matrices)) = &local else { continue };
-                let amounts = fit(matrices.traces, &own.trace);
+            let numbers = first_motion..;
+            first_motion += slot.motions.len();
+            let Some(local) = &slot.local else { continue };
+            let Some(matrices) = local.matrices() else { continue };
+            for (motion, Motion { trace, .. }) in numbers.zip(&slot.motions) {
+                let amounts = fit(matrices.traces, trace);
                 columns.push(match offset {
-                    None => Column { motion, vector: body, first: end - amounts.len(), values: amounts },
+                    None => Column { motion, vector: body, first: local.len() - amounts.len(), values: amounts },
                     Some(offset) => {
                         let mut values = vec![0.0; offset[body + 1] - offset[body]];
-                        amounts.iter().zip(matrices.motions).for_each(|(a, motion)| axpy(*a, motion, &mut values));
+                        amounts.iter().zip(matrices.motions).for_each(|(a, shape)| axpy(*a, shape, &mut values));
                         Column { motion, vector: 0, first: offset[body], values }
                     }
                 });
             }
-            motion += slot.motions.len();
         }
         let bodies = model.bodies.iter().map(|slot| (slot.segments.clone(), slot.motions.clone())).collect();
         let points = (0..model.pairs.len()).map(|pair| model.range(pair).len()).collect();
         Self { bodies, points, columns, exchange: model.exchange.clone() }
     }
 
+    /// Return the rigid motions of all bodies.
     fn motions(&self) -> Motions<'_> {
         Motions::new(self.bodies.iter().map(|(segments, motions)| (&segments[..], &motions[..])), &self.points)
     }
 }
 
-/// The coarse space with springs D, one entry a contact point.
+/// The coarse space for one set of springs D.
 pub struct Coarse {
     space: Rc<Space>,
     springs: Vec<f64>,
@@ -68,13 +75,13 @@ pub struct Coarse {
 }
 
 impl Coarse {
-    /// Factors Z'HZ.
+    /// Factor Z'HZ for `springs`, the diagonal of D, one entry a contact point.
     pub fn new(space: Rc<Space>, springs: &[f64]) -> Self {
         let factor = space.motions().springs(springs).factor(TOLERANCE);
         Self { space, springs: springs.to_vec(), factor }
     }
 
-    /// The amounts y of the solution in the space, Z'HZ y = Z'r, with its squared energy norm. One message.
+    /// Return the amounts y of the solution in the space, with Z'HZ y = Z'r, and its squared energy norm. One message.
     pub fn solve(&self, r: &[impl AsRef<[f64]>]) -> (DVector<f64>, f64) {
         let motions = self.space.bodies.iter().map(|(_, motions)| motions.len()).sum();
         let mut work = DVector::zeros(motions);
@@ -87,7 +94,8 @@ impl Coarse {
         (y, energy)
     }
 
-    /// The amounts of what a vector with these closings, n, has in the space: Z'HZ y = Z'H z. A message if each rank has a share of them.
+    /// Return the amounts y of the part that a vector z has in the space, with Z'HZ y = Z'H z, from its closings B z at the points, n. If the closings are
+    /// `shared`, each rank has one term of their sum over ranks; this takes a message.
     pub fn part(&self, closing: &[f64], shared: bool) -> DVector<f64> {
         let force: Vec<f64> = self.springs.iter().zip(closing).map(|(spring, s)| spring * s).collect();
         let mut work = self.space.motions().work(&force);
@@ -97,12 +105,12 @@ impl Coarse {
         self.factor.solve(&work)
     }
 
-    /// D B Z y: forces of the springs at the points.
+    /// Return D B Z y, the forces of the springs at the points.
     pub fn forces(&self, y: &DVector<f64>) -> Vec<f64> {
         self.springs.iter().zip(self.space.motions().closing(y)).map(|(spring, s)| spring * s).collect()
     }
 
-    /// x += s Z y.
+    /// Add s Z y to x.
     pub fn add(&self, s: f64, y: &DVector<f64>, x: &mut [impl AsMut<[f64]>]) {
         for Column { motion, vector, first, values } in &self.space.columns {
             axpy(s * y[*motion], values, &mut x[*vector].as_mut()[*first..]);

@@ -1,32 +1,32 @@
-//! Vectors over all bodies: iterates, corrections, directions.
+//! Vectors over all bodies: iterates, corrections, search directions.
 
-use super::Model;
 use super::body::Energy;
+use super::{BodySlot, Model};
 use crate::linalg::{axpy, dot};
 
-/// A displacement of all bodies: states of the bodies that live here, traces of all.
+/// A displacement of all bodies: the states of the local bodies and the traces of all bodies.
 #[derive(Debug, Clone, Default)]
 pub struct Field {
-    /// State of each body; empty where the body lives on another rank.
+    /// State of each body; empty for a body of another rank.
     pub states: Vec<Vec<f64>>,
     /// B u of all contact rows (see [`model`](crate::model) for the layout).
     pub trace: Vec<f64>,
 }
 
 impl Field {
-    /// All bodies at rest, with the traces of that.
+    /// Return the field of all bodies at rest.
     pub fn rest(model: &Model) -> Field {
-        let state = |slot: &super::BodySlot| slot.local.as_ref().map_or(Vec::new(), |body| body.rest());
+        let state = |slot: &BodySlot| slot.local.as_ref().map_or(Vec::new(), |body| body.rest());
         Field { states: model.bodies.iter().map(state).collect(), trace: vec![0.0; 2 * model.points()] }
     }
 
-    /// No displacement of any body.
+    /// Return the field without displacement of any body.
     pub fn zero(model: &Model) -> Field {
-        let state = |slot: &super::BodySlot| vec![0.0; slot.local.as_ref().map_or(0, |body| body.len())];
+        let state = |slot: &BodySlot| vec![0.0; slot.local.as_ref().map_or(0, |body| body.len())];
         Field { states: model.bodies.iter().map(state).collect(), trace: vec![0.0; 2 * model.points()] }
     }
 
-    /// self += t other.
+    /// Add t `other`.
     pub fn add(&mut self, t: f64, other: &Field) {
         for (u, z) in self.states.iter_mut().zip(&other.states) {
             axpy(t, z, u);
@@ -34,32 +34,29 @@ impl Field {
         axpy(t, &other.trace, &mut self.trace);
     }
 
-    /// self = t self.
+    /// Multiply by t.
     pub fn scale(&mut self, t: f64) {
         if t != 1.0 {
             self.states.iter_mut().flatten().chain(&mut self.trace).for_each(|x| *x *= t);
         }
     }
 
-    /// self = other + t self.
+    /// Multiply by t, then add `other`.
     pub fn add_to(&mut self, t: f64, other: &Field) {
-        let update = |mine: &mut [f64], other: &[f64]| {
-            mine.iter_mut().zip(other).for_each(|(mine, other)| *mine = other + t * *mine);
-        };
-        for (u, z) in self.states.iter_mut().zip(&other.states) {
-            update(u, z);
+        let all = self.states.iter_mut().zip(&other.states).chain([(&mut self.trace, &other.trace)]);
+        for (own, other) in all {
+            own.iter_mut().zip(other).for_each(|(x, y)| *x = y + t * *x);
         }
-        update(&mut self.trace, &other.trace);
     }
 
-    /// Makes the traces anew from the states: both are added to on their own, and differ by the rounding of large steps.
+    /// Recompute the traces from the states. Steps are added to both separately, so that they come to differ by the rounding of large steps.
     /// Collective.
     pub fn retrace(&mut self, model: &Model) {
         self.trace_here(model);
         model.exchange.sum(&mut self.trace);
     }
 
-    /// The traces of the bodies that live here, zero for others.
+    /// Set the traces to those of the local bodies, and to zero for other bodies.
     pub fn trace_here(&mut self, model: &Model) {
         let mut trace = vec![0.0; self.trace.len()];
         for (index, slot) in model.bodies.iter().enumerate() {
@@ -72,24 +69,24 @@ impl Field {
         self.trace = trace;
     }
 
-    /// Change of compression at each point: B_a v_a + B_b v_b.
+    /// Return the change of compression at each point: B_a v_a + B_b v_b.
     pub fn closing(&self) -> Vec<f64> {
         let points = self.trace.len() / 2;
         (0..points).map(|q| self.trace[q] + self.trace[points + q]).collect()
     }
 }
 
-/// Sums over the bodies that live here of x_s'y_s; the caller exchanges.
+/// Return the sum of x_s'y_s over the local bodies s. The caller adds the sums of all ranks.
 pub fn local_dot(x: &[Vec<f64>], y: &[Vec<f64>]) -> f64 {
     x.iter().zip(y).map(|(x, y)| dot(x, y)).sum()
 }
 
-/// K v in every body that lives here. Collective where bodies have joined their matrices.
+/// Return K v for every local body. Collective where bodies have joined their matrices.
 pub fn apply_stiffness(model: &mut Model, v: &Field) -> Vec<Vec<f64>> {
     if let Some(joint) = &model.joint {
         return joint.borrow_mut().multiply(&v.states);
     }
-    let apply = |(slot, v): (&mut super::BodySlot, &Vec<f64>)| {
+    let apply = |(slot, v): (&mut BodySlot, &Vec<f64>)| {
         let mut y = vec![0.0; v.len()];
         if let Some(body) = &mut slot.local {
             body.apply_stiffness(v, &mut y);
@@ -99,7 +96,7 @@ pub fn apply_stiffness(model: &mut Model, v: &Field) -> Vec<Vec<f64>> {
     model.bodies.iter_mut().zip(&v.states).map(apply).collect()
 }
 
-/// r = f - K u - B' `force` (26) in every body that lives here, for forces at the points (n), with the sum of the energies of u.
+/// Return the residual r = f - K u - B' `force` (26) of every local body, for forces at the points (n), and the sum of the energies of u.
 pub fn residual(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Energy) {
     let (all, energies) = residuals(model, u, force);
     let mut sum = Energy::default();
@@ -110,20 +107,20 @@ pub fn residual(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, 
     (all, sum)
 }
 
-/// The same with the energies of each body.
+/// Return the residual r = f - K u - B' `force` (26) and the energies of u for every local body, for forces at the points (n).
 pub fn residuals(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Vec<Energy>) {
     let products = apply_stiffness(model, u);
-    let of_body = |(index, (state, product)): (usize, (&Vec<f64>, Vec<f64>))| {
-        let rows = model.at_rows(index, force);
+    let of_body = |(index, product): (usize, Vec<f64>)| {
+        let (state, rows) = (&u.states[index], model.at_rows(index, force));
         let mut r = vec![0.0; state.len()];
         let body = model.bodies[index].local.as_ref();
         let energy = body.map_or_else(Energy::default, |body| body.residual(state, &product, &rows, &mut r));
         (r, energy)
     };
-    u.states.iter().zip(products).enumerate().map(of_body).unzip()
+    products.into_iter().enumerate().map(of_body).unzip()
 }
 
-/// y += B' `force` in every body that lives here, for forces at the points (n).
+/// Add B' `force` to y for every local body, for forces at the points (n).
 pub fn add_forces(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
     for (index, y) in y.iter_mut().enumerate() {
         if let Some(body) = &model.bodies[index].local {

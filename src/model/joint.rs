@@ -1,7 +1,7 @@
-//! One matrix of all bodies in place of theirs.
+//! One matrix of all bodies in place of those of the bodies.
 
-/// K of all bodies in the one matrix that serves the linear step: the bodies have none of their own.
+/// K of all bodies, in the matrix that serves the linear step. The bodies then have no K of their own.
 pub trait Joint {
-    /// K v in every body that lives here, for their states; nothing for rigid motions, which strain nothing. Collective.
+    /// Return K v for every local body, from their states. Rigid motions contribute nothing, because they cause no strain. Collective.
     fn multiply(&mut self, states: &[Vec<f64>]) -> Vec<Vec<f64>>;
 }

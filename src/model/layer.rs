@@ -1,34 +1,35 @@
-//! The state of the layers: a place on the law of every contact point.
+//! The state of the layers: compression and pressure of every contact point, on its law.
 //!
 //! The law of a point is a curve in the plane of compression c and pressure p: p = 0 for c <= 0, p = p(c) above. Newton's method
-//! keeps a place (c_q, p_q) on it that need not be the compression of the bodies' traces; sweeps take the place that is.
+//! keeps a state (c_q, p_q) on this curve, where c_q may differ from the compression that the traces of the bodies give. Robin sweeps take the state at
+//! that compression.
 
 use super::Model;
 use crate::contact::law;
 
-/// A place on the law of every contact point, with the law's tangent there.
+/// The state of the layer of every contact point, with the tangent of its law.
 #[derive(Debug, Clone, Default)]
 pub struct Layer {
-    /// c, n.
+    /// c, n: length.
     pub compression: Vec<f64>,
     /// p(c), n: force per area.
     pub pressure: Vec<f64>,
-    /// kappa = p'(c), n.
+    /// kappa = p'(c), n: stiffness per area.
     pub tangent: Vec<f64>,
     /// omega p, n: force at each point.
     pub force: Vec<f64>,
-    /// sum omega P(c) of each pair: energy of the layer.
+    /// sum omega P(c) of each pair: energy of its layer.
     pub energy: Vec<f64>,
     /// sum omega p c over all pairs.
     pub work: f64,
-    /// Points with c > 0.
+    /// Number of points with c > 0.
     pub closed: usize,
-    /// mu, n: energy per area by which the laws are smoothed ([`law::resolve`]), which then have no `energy`; empty for the laws themselves.
+    /// mu, n: energy per area by which the laws are smoothed ([`law::resolve`]); empty for the laws themselves. With smoothed laws `energy` is zero.
     pub smoothing: Vec<f64>,
 }
 
 impl Layer {
-    /// The places at these compressions, n.
+    /// Return the states on the laws at these compressions, n.
     pub fn new(model: &Model, compression: Vec<f64>) -> Self {
         let mut layer = Layer::default();
         for (i, pair) in model.pairs.iter().enumerate() {
@@ -38,7 +39,7 @@ impl Layer {
                 let response = pair.law.response(q - model.offset[i], c);
                 let force = model.weight[q] * response.pressure;
                 energy += model.weight[q] * response.energy;
-                // nothing times a gap without end is nothing
+                // zero force does no work, even where the gap is infinite
                 layer.work += if force == 0.0 { 0.0 } else { force * c };
                 layer.closed += usize::from(c > 0.0);
                 layer.pressure.push(response.pressure);
@@ -50,14 +51,15 @@ impl Layer {
         Self { compression, ..layer }
     }
 
-    /// The places at the compressions of a trace vector: what the paper's iteration works with.
+    /// Return the states at the compressions of a trace vector, as Robin sweeps take them.
     pub fn at(model: &Model, trace: &[f64]) -> Self {
         Self::new(model, model.compression(trace))
     }
 
-    /// Return the states of the layers on lines of slope -`rho` (n, stiffness per area) through the states (c, p) that the linear model of the layers
-    /// gave, n each: c_q + p_q/rho_q = c + p/rho_q (Minty). There is one on each law, and it moves by no more than the sum does, however steep or flat
-    /// the law is. Laws are smoothed by `smoothing`, an energy per area at each point, n; empty for the laws themselves.
+    /// Return the resolvents of the laws (Minty): the states (c_q, p_q) on the laws with c_q + p_q/rho_q = c + p/rho_q. Compression c and pressure p, n each,
+    /// are those that the linear model of the layers gave, and `rho`, n, is a stiffness per area. There is one such state on each law, and it moves by no more
+    /// than the right-hand side does, however steep or flat the law is. Laws are smoothed by `smoothing`, an energy per area at each point, n; empty for the
+    /// laws themselves.
     pub fn resolve(model: &Model, compression: &[f64], pressure: &[f64], rho: &[f64], smoothing: &[f64]) -> Self {
         let sum = |q: usize| compression[q] + pressure[q] / rho[q];
         if smoothing.is_empty() {
@@ -83,19 +85,20 @@ impl Layer {
 
     /// Return the states at these compressions, n, on laws with this smoothing.
     pub fn smoothed(model: &Model, compression: Vec<f64>, smoothing: &[f64]) -> Self {
-        let points = compression.len();
-        match smoothing.is_empty() {
-            true => Self::new(model, compression),
-            false => Self::resolve(model, &compression, &vec![0.0; points], &vec![f64::INFINITY; points], smoothing),
+        if smoothing.is_empty() {
+            return Self::new(model, compression);
         }
+        // with an infinite rho the compression of the resolvent is the given one
+        let points = compression.len();
+        Self::resolve(model, &compression, &vec![0.0; points], &vec![f64::INFINITY; points], smoothing)
     }
 
-    /// omega kappa, n: springs of the linear model at the points.
+    /// Return omega kappa, n: the tangent stiffness of the layer at the points.
     pub fn springs(&self, model: &Model) -> Vec<f64> {
         model.weight.iter().zip(&self.tangent).map(|(weight, tangent)| weight * tangent).collect()
     }
 
-    /// p_q + kappa_q (c - c_q), n: pressures of the linear model at other compressions.
+    /// Return p_q + kappa_q (c - c_q), n: the pressures of the linear model at other compressions c, n.
     pub fn linear(&self, compression: &[f64]) -> Vec<f64> {
         let at = |(q, c): (usize, &f64)| match self.tangent[q] {
             0.0 => self.pressure[q],
@@ -104,7 +107,7 @@ impl Layer {
         compression.iter().enumerate().map(at).collect()
     }
 
-    /// Largest pressure.
+    /// Return the largest pressure.
     pub fn peak(&self) -> f64 {
         self.pressure.iter().copied().fold(0.0, f64::max)
     }
@@ -116,7 +119,7 @@ mod tests {
     use crate::model::sample::two_pairs;
 
     #[test]
-    fn places_have_the_laws_answers_times_the_areas_of_their_points() {
+    fn states_have_the_laws_responses_times_the_areas_of_their_points() {
         let model = two_pairs();
         let layer = Layer::new(&model, vec![-1.0, 0.5, 3.0, 0.0]);
         assert_eq!(layer.pressure, [0.0, 2.0, 9.0, 0.0]);
@@ -134,16 +137,16 @@ mod tests {
     }
 
     #[test]
-    fn places_lie_on_lines_through_the_states() {
+    fn resolvents_lie_on_lines_through_the_linear_states() {
         let model = two_pairs();
         let (c, p, rho) = ([0.3, -0.5, 2.0, -1.0], [4.0, 1.0, 0.5, -2.0], [2.0, 0.5, 0.25, 3.0]);
-        let met = Layer::resolve(&model, &c, &p, &rho, &[]);
+        let resolved = Layer::resolve(&model, &c, &p, &rho, &[]);
         for q in 0..4 {
-            let (here, there) = (met.compression[q] + met.pressure[q] / rho[q], c[q] + p[q] / rho[q]);
+            let (here, there) = (resolved.compression[q] + resolved.pressure[q] / rho[q], c[q] + p[q] / rho[q]);
             assert!((here - there).abs() < 1e-12, "{q}: {here} {there}");
         }
-        assert_eq!(met.closed, 3);
-        // the same on smoothed laws, which press everywhere, and again from their compressions
+        assert_eq!(resolved.closed, 3);
+        // the same holds on smoothed laws, which press everywhere, and again from their compressions
         let mu = [0.1, 0.2, 1e-3, 4.0];
         let smoothed = Layer::resolve(&model, &c, &p, &rho, &mu);
         let again = Layer::smoothed(&model, smoothed.compression.clone(), &mu);

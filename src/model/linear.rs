@@ -1,8 +1,8 @@
 //! The linear step: (K + B' diag(omega kappa) B) x = r over all bodies (35).
 //!
-//! How it is solved is a choice of inner solver, not a method of its own: one dense matrix of condensed bodies, one sparse
-//! factorisation, conjugate gradients with multigrid of all bodies, or with the Robin sweep (`robin::Sweeps`). A new way is a new
-//! file with the trait [`LinearStep`].
+//! How it is solved is a choice of the inner solver, not a method of its own. There may be one dense matrix of condensed bodies, one sparse
+//! factorisation, or conjugate gradients with a multigrid of all bodies or with the Robin sweep (`robin::Sweeps`). A new way is a new
+//! file with an implementation of [`LinearStep`].
 
 use super::Model;
 use super::body::BodyCounts;
@@ -10,24 +10,24 @@ use super::field::Field;
 use super::layer::Layer;
 use crate::error::Result;
 
-/// A system to be solved.
+/// A linear system to be solved.
 pub struct System<'a> {
     /// Bodies with K and B.
     pub model: &'a mut Model,
-    /// Places of the layers.
+    /// The state of the layers.
     pub places: &'a Layer,
     /// omega kappa at the points, n.
     pub springs: &'a [f64],
-    /// r, a state of each body that lives here.
+    /// r, one state for each local body.
     pub residual: &'a [Vec<f64>],
-    /// When an iterative solver may end.
+    /// The stopping test of an iterative solver.
     pub enough: &'a mut Enough<'a>,
 }
 
-/// When an iterative solver may end: asked after each iteration, with the same numbers on all ranks.
+/// A stopping test of iterative solvers: it is called after each iteration, with the same numbers on all ranks, and returns whether the solver may stop.
 pub type Enough<'a> = dyn FnMut(&Model, &Trial) -> bool + 'a;
 
-/// What an iterative solver has so far.
+/// The iterate x of an iterative solver.
 #[derive(Debug)]
 pub struct Trial<'a> {
     /// B x, the change of compression at the points, n.
@@ -39,7 +39,7 @@ pub struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// Whether the error is this share of x.
+    /// Return whether the error is at most this share of x, both in the energy norm.
     pub fn is_within(&self, share: f64) -> bool {
         self.error <= share * self.energy.max(0.0).sqrt()
     }
@@ -53,29 +53,29 @@ pub struct Solution {
     pub energy: f64,
     /// Estimated energy norm of the error of x; zero for a direct solver.
     pub error: f64,
-    /// Whether it is exact to rounding, as that of a direct solver.
+    /// Whether x is exact to rounding, as that of a direct solver.
     pub is_exact: bool,
 }
 
-/// A solver that gave up, in its own words.
+/// The failure of a solver that gave up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Failure {
-    /// The body whose solver it was; none for one of all bodies together.
+    /// The body whose solver it was; `None` for a solver of all bodies together.
     pub body: Option<usize>,
-    /// Its reason.
+    /// The solver's own message.
     pub reason: String,
 }
 
-/// What a solver made of a system.
+/// The outcome of solving a system.
 pub type Solved = std::result::Result<Solution, Failure>;
 
 /// A solver of the linear step.
 pub trait LinearStep {
-    /// Name in the table and the report.
+    /// Return the name in the table and the report.
     fn name(&self) -> &'static str;
 
-    /// Sets its solver up for the first step, with these springs omega kappa at the points, so that a refusal of the solver or of an
-    /// option comes before it.
+    /// Set up the solver for the first step with these springs omega kappa at the points, n. A refusal of the solver or of an
+    /// option then comes before that step.
     ///
     /// # Errors
     /// Failures of the solver library.
@@ -83,34 +83,34 @@ pub trait LinearStep {
         Ok(())
     }
 
-    /// Solves a system. Collective.
+    /// Solve a system. Collective.
     ///
     /// # Errors
-    /// Failures of the solver library; a solver that does not reach its tolerance is told in [`Solved`].
+    /// Failures of the solver library. A solver that does not reach its tolerance is reported in [`Solved`].
     fn solve(&mut self, system: System) -> Result<Solved>;
 
-    /// Error of a step, as a share of it, above which it is not taken. Newton's method converges with any share below one, and the worse the
+    /// Return the largest relative error with which a step is taken. Newton's method converges with any relative error below one, but more slowly the
     /// larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).
     fn roughest(&self) -> f64 {
         0.5
     }
 
-    /// What was done so far with all bodies together, besides what bodies count themselves.
+    /// Return the counters of the work with all bodies together so far, without those that bodies count themselves.
     fn counts(&self) -> BodyCounts {
         BodyCounts::default()
     }
 
-    /// Sweeps made so far.
+    /// Return the number of Robin sweeps made so far.
     fn sweeps(&self) -> usize {
         0
     }
 
-    /// One line about the solver of all bodies together; empty if each has its own.
+    /// Return one line about the solver of all bodies together; empty if each body has its own.
     fn describe(&self) -> String {
         String::new()
     }
 
-    /// Estimated bounds of the spectrum of the preconditioned matrix, if it has seen enough.
+    /// Return estimated bounds of the spectrum of the preconditioned matrix, if the solver has made enough iterations for an estimate.
     fn spectrum(&self) -> Option<(f64, f64)> {
         None
     }

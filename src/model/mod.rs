@@ -1,7 +1,8 @@
-//! The discrete problem as the method sees it: bodies that answer verbs, and arrays of contact points.
+//! The discrete problem as the methods see it: bodies behind the interface [`Body`], and arrays over contact points.
 //!
-//! Points of all pairs are numbered through: point q of pair i is `offset[i] + q`. A trace vector has two entries a
-//! point, first all of side a, then all of side b: `trace[side * points + offset[pair] + q]`.
+//! Contact points of all pairs are numbered consecutively: point q of pair i has the number `offset[i] + q`. An array with one entry for each point is marked
+//! n. A trace vector (2n) has two entries a point, first all of side a, then all of side b: `trace[side * points + offset[pair] + q]`.
+//! A body is local if it lives on this rank, wholly or in part.
 
 pub mod body;
 pub mod coarse;
@@ -32,7 +33,7 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
 
-/// Which contact rows a body has: side `side` of pair `pair`.
+/// A group of contact rows of a body: those of side `side` of pair `pair`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Segment {
     /// Number of the pair.
@@ -46,53 +47,53 @@ pub struct Segment {
 pub struct Motion {
     /// Name for messages.
     pub name: String,
-    /// Its trace on the body's contact rows; largest displacement in the body about one.
+    /// Its trace on the body's contact rows. The largest displacement in the body is about one.
     pub trace: Vec<f64>,
     /// Work of the loads on it.
     pub work: f64,
 }
 
-/// A motion of several bodies together that changes no gap and that nothing holds.
+/// A motion of several bodies together that changes no gap and that nothing constrains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mechanism {
     /// The bodies that it moves.
     pub bodies: Vec<usize>,
     /// Its name.
     pub motion: String,
-    /// Work of the loads on it, as a share of what forces of their sizes could do.
+    /// Work of the loads on it, as a share of the work that forces of their sizes could do.
     pub work: f64,
-    /// The body that was fixed at one node against it; none if loads do work, or if no node outside the contact could serve.
+    /// The body that was fixed at one node to remove the motion; `None` if loads do work on it, or if there is no suitable node outside the contact.
     pub fixed: Option<usize>,
 }
 
-/// Rigid motions that springs to the ground resist, beside those that nothing holds: a start moves bodies on soft springs, too.
+/// The rigid motions of a body on springs to the ground. The start of an iteration moves bodies on soft springs, too.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Sprung {
-    /// The motions that supports leave.
+    /// All motions that supports leave free, whether springs resist them or not.
     pub motions: Vec<Motion>,
-    /// Stiffness of the springs in terms of them.
+    /// Stiffness of the springs on these motions: one row and column a motion.
     pub stiffness: DMatrix<f64>,
 }
 
-/// A body in the model; the arrays are known on every rank, the body itself where it lives.
+/// A body in the model. Every rank has the arrays; only the ranks where the body lives have the body itself.
 pub struct BodySlot {
     /// Name in the scene.
     pub name: String,
     /// The body, on the rank that owns it, or on every rank that may own a part of it.
     pub local: Option<Box<dyn Body>>,
-    /// Its contact rows, in this order.
+    /// Its contact rows: the groups in their order.
     pub segments: Vec<Segment>,
-    /// Rigid motions that its supports leave free.
+    /// Rigid motions that neither supports nor springs constrain.
     pub motions: Vec<Motion>,
-    /// The motions that supports leave, if springs resist some of them.
+    /// The rigid motions that supports leave free, if springs resist some of them.
     pub sprung: Option<Sprung>,
     /// Largest diagonal entry of K.
     pub scale: f64,
-    /// Elastic modulus against pressure on its contact surfaces, E/(1 - nu^2) or about that.
+    /// Elastic modulus under pressure on its contact surfaces: E/(1 - nu^2), or about that.
     pub modulus: f64,
-    /// Its size across its contact surfaces.
+    /// Its size normal to its contact surfaces.
     pub depth: f64,
-    /// b diag(K) b' of each contact row b: stiffness of the nodes under a point.
+    /// b diag(K) b' of each contact row b: the stiffness of the nodes under a point.
     pub row_stiffness: Vec<f64>,
 }
 
@@ -104,20 +105,20 @@ pub struct Model {
     pub pairs: Vec<ContactPair>,
     /// First point of each pair, and the number of all points.
     pub offset: Vec<usize>,
-    /// omega of all points.
+    /// omega of all points, n: area, or length in the plane.
     pub weight: Vec<f64>,
-    /// d of all points, less what prescribed displacements close of it.
+    /// d of all points, n: the gaps, less the part that prescribed displacements close.
     pub gap: Vec<f64>,
-    /// Why there is no solution, where that is known beforehand.
+    /// The mechanism because of which there is no solution, if one is known beforehand.
     pub mechanism: Option<Mechanism>,
-    /// K of all bodies, if they have given theirs away.
+    /// K of all bodies, if they have given their own away.
     pub joint: Option<Rc<RefCell<dyn Joint>>>,
     /// Connection to the other ranks.
     pub exchange: Rc<dyn Exchange>,
 }
 
 impl Model {
-    /// Joins bodies and pairs.
+    /// Join bodies and pairs.
     pub fn new(bodies: Vec<BodySlot>, pairs: Vec<ContactPair>, exchange: Rc<dyn Exchange>) -> Self {
         let mut offset = vec![0];
         for pair in &pairs {
@@ -130,64 +131,60 @@ impl Model {
         model
     }
 
-    /// Makes all gaps 1/`factor` of what they are between the meshes: displacements are in shares `factor` of themselves.
+    /// Set all gaps to 1/`factor` of those between the meshes. Displacements are then in units of `factor`.
     pub fn scale_gaps(&mut self, factor: f64) {
-        let free_gap =
-            |pair: &ContactPair, q: usize| pair.gap[q] / factor - pair.prescribed[0][q] - pair.prescribed[1][q];
-        self.gap = self.pairs.iter().flat_map(|pair| (0..pair.len()).map(|q| free_gap(pair, q))).collect();
+        let gaps = self.pairs.iter().flat_map(|pair| (0..pair.len()).map(move |q| free_gap(pair, q, factor)));
+        self.gap = gaps.collect();
     }
 
-    /// Makes a trace known: states are from now on relative to a displacement with that trace, as if supports prescribed it.
+    /// Count a displacement with the trace `trace` (2n) as prescribed by supports. From now on states are relative to it.
     pub fn carry(&mut self, trace: &[f64]) {
         let points = self.points();
-        for pair in 0..self.pairs.len() {
-            for q in self.range(pair) {
-                let known = &mut self.pairs[pair].prescribed;
-                let local = q - self.offset[pair];
-                known[0][local] += trace[q];
-                known[1][local] += trace[points + q];
-                self.gap[q] = self.pairs[pair].gap[local]
-                    - self.pairs[pair].prescribed[0][local]
-                    - self.pairs[pair].prescribed[1][local];
+        for i in 0..self.pairs.len() {
+            for q in self.range(i) {
+                let (pair, local) = (&mut self.pairs[i], q - self.offset[i]);
+                pair.prescribed[0][local] += trace[q];
+                pair.prescribed[1][local] += trace[points + q];
+                self.gap[q] = free_gap(pair, local, 1.0);
             }
         }
     }
 
-    /// c = B u - d at the points (n), for a trace vector.
+    /// Return c = B u - d at the points (n), for a trace vector (2n).
     pub fn compression(&self, trace: &[f64]) -> Vec<f64> {
         let points = self.points();
-        // + 0.0 turns -0.0, which depends on the order of a sum, into 0.0
+        // adding 0.0 turns -0.0, which depends on the order of a sum, into 0.0
         (0..points).map(|q| trace[q] + trace[points + q] - self.gap[q] + 0.0).collect()
     }
 
-    /// omega p, for pressures p at the points (n).
+    /// Return the forces omega p, for pressures p at the points (n).
     pub fn forces(&self, pressure: &[f64]) -> Vec<f64> {
         self.weight.iter().zip(pressure).map(|(weight, pressure)| weight * pressure).collect()
     }
 
-    /// Stiffness of the nodes under every contact row (2n, layout of a trace vector).
+    /// Return the stiffness of the nodes under every contact row, as a trace vector (2n).
     pub fn row_stiffness(&self) -> Vec<f64> {
         let mut all = vec![0.0; 2 * self.points()];
         (0..self.bodies.len()).for_each(|body| self.put(body, &self.bodies[body].row_stiffness, &mut all));
         all
     }
 
-    /// Whether the dofs of the bodies are dealt out over the ranks.
+    /// Return whether the dofs of some bodies are distributed over the ranks.
     pub fn is_distributed(&self) -> bool {
         self.bodies.iter().any(|slot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some()))
     }
 
-    /// Number of contact points of all pairs.
+    /// Return the number of contact points of all pairs.
     pub fn points(&self) -> usize {
         self.weight.len()
     }
 
-    /// Points of pair `i` among all.
+    /// Return the numbers of the points of pair `i`.
     pub fn range(&self, i: usize) -> Range<usize> {
         self.offset[i]..self.offset[i + 1]
     }
 
-    /// Parts of a trace vector that belong to the rows of a body, in their order.
+    /// Return the ranges of a trace vector that belong to the rows of a body, in the order of the rows.
     pub fn trace_ranges(&self, body: usize) -> impl Iterator<Item = Range<usize>> + '_ {
         let points = self.points();
         self.bodies[body].segments.iter().map(move |segment| {
@@ -196,17 +193,18 @@ impl Model {
         })
     }
 
-    /// Values at points, as seen by the rows of a body.
-    pub fn at_rows(&self, body: usize, points: &[f64]) -> Vec<f64> {
-        self.bodies[body].segments.iter().flat_map(|s| points[self.range(s.pair)].iter().copied()).collect()
+    /// Return values at the rows of a body from those at the points (n).
+    pub fn at_rows(&self, body: usize, values: &[f64]) -> Vec<f64> {
+        let segments = self.bodies[body].segments.iter();
+        segments.flat_map(|segment| values[self.range(segment.pair)].iter().copied()).collect()
     }
 
-    /// The part of a trace vector that belongs to a body.
+    /// Return the part of a trace vector that belongs to the rows of a body.
     pub fn of_body(&self, body: usize, trace: &[f64]) -> Vec<f64> {
         self.trace_ranges(body).flat_map(|range| trace[range].iter().copied()).collect()
     }
 
-    /// Writes a body's rows into a trace vector.
+    /// Write values at the rows of a body into a trace vector.
     pub fn put(&self, body: usize, rows: &[f64], trace: &mut [f64]) {
         let mut next = 0;
         for range in self.trace_ranges(body) {
@@ -216,16 +214,16 @@ impl Model {
         }
     }
 
-    /// Tells every body how far its solves have to reduce r. Whether that matters to one of them.
+    /// Set the relative tolerance of solves in every body. Return whether the solves of some body depend on it.
     ///
     /// # Errors
     /// Failures of the solver library.
     pub fn precision(&mut self, rtol: f64) -> Result<bool> {
         let mut bodies = self.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
-        bodies.try_fold(false, |matters, body| Ok(body.precision(rtol)? || matters))
+        bodies.try_fold(false, |depends, body| Ok(body.precision(rtol)? || depends))
     }
 
-    /// Gives every body its Robin term `weight` = omega psi kappa of each contact row (37)-(38).
+    /// Set the Robin term of every body: `weight` = omega psi kappa at each contact row, as a trace vector (37)-(38).
     ///
     /// # Errors
     /// Failures of the solver library.
@@ -240,7 +238,12 @@ impl Model {
     }
 }
 
-/// A model for tests of what needs points and no body.
+/// Return the gap at local point `q` of a pair in units of `factor`, less the part that prescribed displacements close.
+fn free_gap(pair: &ContactPair, q: usize, factor: f64) -> f64 {
+    pair.gap[q] / factor - pair.prescribed[0][q] - pair.prescribed[1][q]
+}
+
+/// A model for tests that need points but no bodies.
 #[cfg(test)]
 pub(crate) mod sample {
     use super::*;
@@ -251,7 +254,7 @@ pub(crate) mod sample {
     /// omega of the points.
     pub const WEIGHT: [f64; 4] = [0.5, 2.0, 3.0, 0.25];
 
-    /// p = s c^2, with s of each point.
+    /// The law p = s c^2, with s of each point.
     #[derive(Debug)]
     struct Square([f64; 2]);
 
@@ -262,7 +265,7 @@ pub(crate) mod sample {
         }
     }
 
-    /// Two bodies with two pairs of two points each: p = 4 c in the first pair, p = c^2 in the second.
+    /// Return two bodies with two pairs of two points each. The law is p = 4 c in the first pair and p = c^2 in the second.
     pub fn two_pairs() -> Model {
         let laws: [Rc<dyn LayerLaw>; 2] = [Rc::new(Linear { stiffness: 4.0 }), Rc::new(Square([1.0; 2]))];
         let pair = |(i, law): (usize, Rc<dyn LayerLaw>)| ContactPair {

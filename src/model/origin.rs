@@ -1,32 +1,34 @@
 //! The rigid motions of the start as the origin of displacements.
 //!
-//! A body that falls far onto its neighbour comes with traces that are huge beside the compression of the layer: each sum of two of
-//! them, less the gap, is rounded anew, and the pressures of a stiff layer tremble with it. So the gap takes the motions of the
-//! start, once, and the iteration works on what is left. They come from the scene alone, not from a method or its start, and have few
-//! digits: every method sees the same gaps.
+//! A body that falls far onto its neighbour has traces that are huge compared with the compression of the layer. Each sum of two
+//! traces, less the gap, is rounded anew, and the pressures of a stiff layer vary with these rounding errors. So the motions of the start are
+//! subtracted from the gaps once, and the iteration works on displacements relative to them. The motions come from the scene alone, not from a method
+//! or its start, and have few digits. So every method sees the same gaps.
 
 use super::{Field, Model, Motions};
 use crate::linalg::dot;
 use nalgebra::DVector;
 
-/// Binary digits that an origin's amounts have: products with coordinates of 29 digits are then exact.
+/// Binary digits of the amounts of motions in an origin. Their products with coordinates of 29 digits are then exact.
 const DIGITS: u32 = 24;
 
-/// Share of an amount that its origin may lack.
+/// Largest relative difference between an amount of the start and that in its origin.
 pub const ROUNDING: f64 = 1.0 / (1 << DIGITS) as f64;
 
-/// Rigid motions that were taken out of the displacements, and the gap as it was with them.
+/// Rigid motions that were subtracted from displacements and gaps.
 pub struct Origin {
     motion: Field,
+    /// The gaps without the motions, n.
     gap: Vec<f64>,
-    /// What the loads have gained on these motions: to be added to F1.
+    /// Minus the work of the loads on the motions, which must be added to F1.
     pub energy: f64,
-    /// The start itself, seen from here: what it has beyond the digits of the motions.
+    /// The start relative to the origin: the part of its motions that the digits of the origin do not hold.
     pub rest: Field,
 }
 
 impl Origin {
-    /// Takes the motions of a start, in these `amounts`, into the gap of `model`; none if nothing moves. Collective.
+    /// Subtract the motions of a start from the gaps of `model`. `amounts` has one entry for each motion of [`Motions::with_springs`]. Return `None` if all
+    /// are zero. Collective.
     pub fn take(model: &mut Model, amounts: &DVector<f64>) -> Option<Self> {
         if amounts.iter().all(|&amount| amount == 0.0) {
             return None;
@@ -36,7 +38,7 @@ impl Origin {
         let mut energy = [0.0];
         for (index, slot) in model.bodies.iter_mut().enumerate() {
             let state = &mut motion.states[index];
-            // what springs hold is no free motion: it stays part of the displacements
+            // a motion that springs resist is not free, so it stays part of the displacements
             if slot.sprung.is_some() {
                 state.fill(0.0);
                 continue;
@@ -49,13 +51,12 @@ impl Origin {
                 *origin = short(amount);
                 *beyond += amount - *origin;
             }
-            // the residual at rest without contact is the load
+            // at rest and without contact the residual is the load; rigid motions cause no strain, so K u = 0
             let mut load = vec![0.0; state.len()];
-            // rigid motions strain nothing
             body.residual(&body.rest(), &vec![0.0; state.len()], &vec![0.0; slot.row_stiffness.len()], &mut load);
             energy[0] -= dot(&load[deformation..], &state[deformation..]);
         }
-        // one message: the energy, then the traces
+        // one message has the energy and both traces
         motion.trace_here(model);
         rest.trace_here(model);
         let mut message = [&energy[..], &motion.trace, &rest.trace].concat();
@@ -67,31 +68,31 @@ impl Origin {
         Some(Self { motion, gap, energy: message[0], rest })
     }
 
-    /// Traces of the motions.
+    /// Return the traces of the motions, 2n.
     pub fn trace(&self) -> &[f64] {
         &self.motion.trace
     }
 
-    /// Takes the motions out of displacements.
+    /// Subtract the motions from displacements.
     pub fn take_from(&self, model: &Model, iterate: &mut Field) {
         iterate.add(-1.0, &self.motion);
         iterate.retrace(model);
     }
 
-    /// Gives the motions back to the displacements.
+    /// Add the motions to displacements again, and restore the gaps.
     pub fn give(self, model: &mut Model, iterate: &mut Field) {
         iterate.add(1.0, &self.motion);
         model.gap = self.gap;
     }
 }
 
-/// `amount` with the leading digits only. Its products with the motion of a flat surface along an axis are then exact, and what
-/// rounding there is does not depend on the start.
+/// Return `amount` rounded to its leading [`DIGITS`]. Its products with the motion of a flat surface along an axis are then exact, and rounding does not
+/// depend on the start.
 fn short(amount: f64) -> f64 {
     let digits = f64::MANTISSA_DIGITS - DIGITS;
     let scale = (1u64 << digits) as f64 + 1.0;
     let product = amount * scale;
-    // Dekker's splitting
+    // Dekker's splitting of a number into two
     if product.is_finite() { product - (product - amount) } else { amount }
 }
 
@@ -99,7 +100,7 @@ fn short(amount: f64) -> f64 {
 mod tests {
     use super::short;
 
-    /// 24 binary digits, nearest, and products with small whole numbers without rounding.
+    /// An amount is rounded to the nearest number of 24 binary digits, and its products with small integers are exact.
     #[test]
     fn few_digits_are_left() {
         for amount in [10.0 + 3e-9, -0.1, 1e-300, 7.0f64.sqrt() * 1e40] {

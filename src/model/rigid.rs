@@ -1,7 +1,7 @@
-//! The free rigid motions of all bodies together, as the contact points feel them: closings B E of the motions E.
+//! The free rigid motions E of all bodies together, as they close the contact points: B E.
 //!
-//! Motions are numbered through body by body. As K E = 0, what is asked of them here are sums over contact points. Which of their
-//! combinations nothing holds is the kernel of [`Motions::springs`]; [`TOLERANCE`] says what is nothing.
+//! Motions are numbered consecutively, body by body. Since K E = 0, all that is computed here are sums over contact points. Combinations that no contact
+//! resists are the kernel of [`Motions::springs`], up to [`TOLERANCE`].
 
 use super::{BodySlot, Field, Model, Motion, Segment};
 use crate::linalg::{Blocks, axpy, dot, fit};
@@ -15,18 +15,24 @@ pub struct Motions<'a> {
     first: Vec<usize>,
     /// Motions of each body.
     bodies: Vec<&'a [Motion]>,
-    /// For each pair its points among all, and the bodies at its sides.
-    pairs: Vec<(Range<usize>, Vec<End<'a>>)>,
+    pairs: Vec<Pair<'a>>,
+}
+
+/// A pair and the bodies at its sides.
+struct Pair<'a> {
+    /// Numbers of its points.
+    points: Range<usize>,
+    sides: Vec<Side<'a>>,
 }
 
 /// A body at one side of a pair.
-struct End<'a> {
+struct Side<'a> {
     body: usize,
-    /// The trace of each of its motions there; `None` if the pair does not feel the motion.
+    /// The trace of each of its motions there; `None` if the motion only slides along the surface.
     traces: Vec<Option<&'a [f64]>>,
 }
 
-/// A motion of one body, in the words of its motions: "translation along x with rotation".
+/// A combined motion of one body, named after the motions that it combines: "translation along x with rotation".
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Moved {
     /// Number of the body.
@@ -36,25 +42,23 @@ pub struct Moved {
 }
 
 impl<'a> Motions<'a> {
-    /// Of bodies with these contact rows and free motions; `points` are the points of each pair.
+    /// Return the motions of bodies with these contact rows and free motions. `points` are the numbers of points of the pairs.
     pub fn new(bodies: impl IntoIterator<Item = (&'a [Segment], &'a [Motion])>, points: &[usize]) -> Self {
-        let (mut first, mut all) = (vec![0], Vec::new());
-        let mut next = 0;
-        let range = |&count: &usize| {
+        let (mut first, mut all, mut pairs, mut next) = (vec![0], Vec::new(), Vec::new(), 0);
+        for count in points {
+            pairs.push(Pair { points: next..next + count, sides: Vec::new() });
             next += count;
-            (next - count..next, Vec::new())
-        };
-        let mut pairs: Vec<(Range<usize>, Vec<End>)> = points.iter().map(range).collect();
+        }
         for (body, (segments, motions)) in bodies.into_iter().enumerate() {
             let mut row = 0;
             for segment in segments {
-                let (range, ends) = &mut pairs[segment.pair];
-                let rows = row..row + range.len();
+                let pair = &mut pairs[segment.pair];
+                let rows = row..row + pair.points.len();
                 row = rows.end;
-                // what slides along a surface closes it by rounding errors: their squares must not pass for stiffness
-                let felt = |trace: &&[f64]| trace.iter().any(|t| t * t > TOLERANCE);
-                let traces = motions.iter().map(|motion| Some(&motion.trace[rows.clone()]).filter(felt)).collect();
-                ends.push(End { body, traces });
+                // sliding along a surface closes points by rounding errors, whose squares must not count as stiffness
+                let closes = |trace: &&[f64]| trace.iter().any(|t| t * t > TOLERANCE);
+                let traces = motions.iter().map(|motion| Some(&motion.trace[rows.clone()]).filter(closes)).collect();
+                pair.sides.push(Side { body, traces });
             }
             first.push(first[body] + motions.len());
             all.push(motions);
@@ -62,12 +66,12 @@ impl<'a> Motions<'a> {
         Self { first, bodies: all, pairs }
     }
 
-    /// Of the bodies of a model: motions that neither supports nor springs hold.
+    /// Return the motions of a model's bodies that neither supports nor springs constrain.
     pub fn of(model: &'a Model) -> Self {
         Self::of_model(model, |slot| &slot.motions)
     }
 
-    /// Of the bodies of a model: motions that supports leave, with those that springs to the ground resist.
+    /// Return the motions of a model's bodies that supports leave free, with those that springs to the ground resist.
     pub fn with_springs(model: &'a Model) -> Self {
         Self::of_model(model, |slot| slot.sprung.as_ref().map_or(&slot.motions, |sprung| &sprung.motions))
     }
@@ -77,47 +81,47 @@ impl<'a> Motions<'a> {
         Self::new(model.bodies.iter().map(|slot| (&slot.segments[..], &motions(slot)[..])), &points)
     }
 
-    /// Motions of each body.
+    /// Return the motions of each body.
     pub fn bodies(&self) -> &[&'a [Motion]] {
         &self.bodies
     }
 
-    /// Number of all motions.
+    /// Return the number of all motions.
     pub fn count(&self) -> usize {
         self.first[self.first.len() - 1]
     }
 
-    /// Motions of a body.
+    /// Return the numbers of the motions of a body.
     pub fn of_body(&self, body: usize) -> Range<usize> {
         self.first[body]..self.first[body + 1]
     }
 
-    /// The body of a motion.
+    /// Return the body of a motion.
     pub fn body_of(&self, motion: usize) -> usize {
         self.first.partition_point(|&first| first <= motion) - 1
     }
 
-    /// Zero, with a row of blocks a body.
+    /// Return a zero matrix with a row and column of blocks for each body.
     pub fn blocks(&self) -> Blocks {
         Blocks::new(&self.first.windows(2).map(|ends| ends[1] - ends[0]).collect::<Vec<usize>>())
     }
 
-    /// (B E)' diag(`weight`) (B E), for springs at the points, one entry a point: a block a body.
+    /// Return (B E)' diag(`weight`) (B E) for springs at the points, one entry a point. The matrix has a row and column of blocks for each body.
     pub fn springs(&self, weight: &[f64]) -> Blocks {
         let mut springs = self.blocks();
-        for (range, ends) in &self.pairs {
-            let weight = &weight[range.clone()];
-            let pulled = |trace: &[f64]| trace.iter().zip(weight).map(|(t, w)| t * w).collect::<Vec<f64>>();
-            let pulled: Vec<Vec<Option<Vec<f64>>>> =
-                ends.iter().map(|end| end.traces.iter().map(|trace| trace.map(pulled)).collect()).collect();
+        for Pair { points, sides } in &self.pairs {
+            let weight = &weight[points.clone()];
+            let force = |trace: &[f64]| trace.iter().zip(weight).map(|(t, w)| t * w).collect::<Vec<f64>>();
+            let forces: Vec<Vec<Option<Vec<f64>>>> =
+                sides.iter().map(|side| side.traces.iter().map(|trace| trace.map(force)).collect()).collect();
             let block = |s: usize, t: usize| {
-                DMatrix::from_fn(ends[s].traces.len(), ends[t].traces.len(), |i, j| {
-                    pulled[s][i].as_ref().zip(ends[t].traces[j]).map_or(0.0, |(pulled, trace)| dot(pulled, trace))
+                DMatrix::from_fn(sides[s].traces.len(), sides[t].traces.len(), |i, j| {
+                    forces[s][i].as_ref().zip(sides[t].traces[j]).map_or(0.0, |(force, trace)| dot(force, trace))
                 })
             };
-            for s in 0..ends.len() {
-                for t in s..ends.len() {
-                    let (i, j) = (ends[s].body, ends[t].body);
+            for s in 0..sides.len() {
+                for t in s..sides.len() {
+                    let (i, j) = (sides[s].body, sides[t].body);
                     let block = block(s, t);
                     // a body may be at both sides
                     springs.add(i, j, &if i == j && s != t { &block + block.transpose() } else { block });
@@ -127,18 +131,18 @@ impl<'a> Motions<'a> {
         springs
     }
 
-    /// B E `amounts`: what each point closes by.
+    /// Return B E `amounts`, by which each point closes.
     pub fn closing(&self, amounts: &DVector<f64>) -> Vec<f64> {
-        let mut closing = vec![0.0; self.pairs.last().map_or(0, |(range, _)| range.end)];
-        for (range, motion, trace) in self.felt() {
+        let mut closing = vec![0.0; self.pairs.last().map_or(0, |pair| pair.points.end)];
+        for (points, motion, trace) in self.traces() {
             if amounts[motion] != 0.0 {
-                axpy(amounts[motion], trace, &mut closing[range.clone()]);
+                axpy(amounts[motion], trace, &mut closing[points.clone()]);
             }
         }
         closing
     }
 
-    /// The trace of E `amounts`, for the model whose motions these are.
+    /// Return the trace vector of E `amounts`, for the model whose motions these are.
     pub fn trace(&self, model: &Model, amounts: &DVector<f64>) -> Vec<f64> {
         let mut trace = vec![0.0; 2 * model.points()];
         for (body, motions) in self.bodies.iter().enumerate() {
@@ -151,13 +155,13 @@ impl<'a> Motions<'a> {
         trace
     }
 
-    /// E `amounts` of the bodies that live here, for the model whose motions these are; traces of all.
+    /// Return E `amounts` as a field of the model whose motions these are.
     pub fn field(&self, model: &Model, amounts: &DVector<f64>) -> Field {
         let mut field = Field::zero(model);
         field.trace = self.trace(model, amounts);
         for (body, slot) in model.bodies.iter().enumerate() {
             let Some(matrices) = slot.local.as_ref().and_then(|body| body.matrices()) else { continue };
-            // a state ends with its rigid motions
+            // a state ends with the amounts of its rigid motions
             let own = fit(matrices.traces, &model.of_body(body, &field.trace));
             let state = &mut field.states[body];
             let deformation = state.len() - own.len();
@@ -166,52 +170,49 @@ impl<'a> Motions<'a> {
         field
     }
 
-    /// Work of the loads on each motion.
+    /// Return the work of the loads on each motion.
     pub fn loads(&self) -> DVector<f64> {
         DVector::from_iterator(self.count(), self.bodies.iter().copied().flatten().map(|motion| motion.work))
     }
 
-    /// (B E)' `force`: work of forces at the points on each motion.
+    /// Return (B E)' `force`, the work of forces at the points on each motion.
     pub fn work(&self, force: &[f64]) -> DVector<f64> {
         let mut work = DVector::zeros(self.count());
-        self.felt().for_each(|(range, motion, trace)| work[motion] += dot(trace, &force[range.clone()]));
+        self.traces().for_each(|(points, motion, trace)| work[motion] += dot(trace, &force[points.clone()]));
         work
     }
 
-    /// |(B E)'| |`force`|: what forces at the points, of any signs, could do on each motion.
+    /// Return |(B E)'| |`force`|, the work on each motion that forces at the points of any signs could do.
     pub fn sizes(&self, force: &[f64]) -> DVector<f64> {
         let mut sizes = DVector::zeros(self.count());
-        let size = |trace: &[f64], range: &Range<usize>| -> f64 {
-            trace.iter().zip(&force[range.clone()]).map(|(t, f)| (t * f).abs()).sum()
-        };
-        self.felt().for_each(|(range, motion, trace)| sizes[motion] += size(trace, range));
+        for (points, motion, trace) in self.traces() {
+            sizes[motion] += trace.iter().zip(&force[points.clone()]).map(|(t, f)| (t * f).abs()).sum::<f64>();
+        }
         sizes
     }
 
-    /// What pairs feel: points, number of the motion, its trace there.
-    fn felt(&self) -> impl Iterator<Item = (&Range<usize>, usize, &'a [f64])> {
-        self.pairs.iter().flat_map(move |(range, ends)| {
-            ends.iter().flat_map(move |end| {
-                let numbers = self.of_body(end.body);
-                numbers.zip(&end.traces).filter_map(move |(motion, trace)| trace.map(|trace| (range, motion, trace)))
-            })
+    /// Return each trace by which a motion closes a pair: (points of the pair, number of the motion, its trace at these points).
+    fn traces(&self) -> impl Iterator<Item = (&Range<usize>, usize, &'a [f64])> {
+        let sides = self.pairs.iter().flat_map(|pair| pair.sides.iter().map(move |side| (&pair.points, side)));
+        sides.flat_map(move |(points, side)| {
+            let traces = self.of_body(side.body).zip(&side.traces);
+            traces.filter_map(move |(motion, trace)| trace.map(|trace| (points, motion, trace)))
         })
     }
 
-    /// The bodies that a combined motion moves, and how.
+    /// Return the bodies that a combined motion moves, with the name of the motion of each.
     pub fn names(&self, amounts: &DVector<f64>) -> Vec<Moved> {
         let least = PART * amounts.amax();
         let of_body = |(body, motions): (usize, &&[Motion])| {
             let own = amounts.rows(self.first[body], motions.len());
-            let moves = own.amax() > least;
-            let name = combined(motions.iter().map(|motion| &motion.name[..]), own.iter().copied());
-            moves.then_some(Moved { body, name })
+            let name = || combined(motions.iter().map(|motion| &motion.name[..]), own.iter().copied());
+            (own.amax() > least).then(|| Moved { body, name: name() })
         };
         self.bodies.iter().enumerate().filter(|(_, motions)| !motions.is_empty()).filter_map(of_body).collect()
     }
 }
 
-/// The name of a combination of motions: of those that matter in it.
+/// Return the name of a combination of motions, from the names of those with an amount that matters.
 pub fn combined<'n>(names: impl Iterator<Item = &'n str>, amounts: impl Iterator<Item = f64> + Clone) -> String {
     let least = PART * amounts.clone().fold(0.0, |most: f64, amount| most.max(amount.abs()));
     let parts = names.zip(amounts).filter(|(_, amount)| amount.abs() > least);
@@ -226,9 +227,9 @@ mod tests {
         Motion { name: name.into(), trace: trace.to_vec(), work: 0.0 }
     }
 
-    /// Two blocks side by side on the ground, pair 0 between them; the second has a rounding error in what it slides by.
+    /// Two blocks lie side by side on the ground, with pair 0 between them. The trace by which the second slides on the ground has a rounding error.
     #[test]
-    fn springs_are_those_that_points_feel() {
+    fn springs_are_those_of_motions_that_close_points() {
         let segment = |pair, side| Segment { pair, side };
         let segments = [vec![], vec![segment(0, 0), segment(1, 0)], vec![segment(0, 1), segment(2, 0)]];
         let motions = [

@@ -1,4 +1,4 @@
-//! The [coarse space](crate::model::coarse) of rigid motions around a preconditioner of the matrix of all bodies.
+//! The [coarse space](crate::model::coarse) of rigid motions, put around a preconditioner of the matrix of all bodies.
 
 use crate::error::Result;
 use crate::linalg::Csr;
@@ -7,53 +7,53 @@ use crate::model::coarse::{Coarse, Space};
 use crate::petsc::Subspace;
 use std::rc::Rc;
 
-/// The coarse space, of the rows of this rank.
+/// The rigid motions of all bodies, in the rows of the matrix that this rank owns.
 pub struct RigidSpace {
     space: Rc<Space>,
-    /// B of the rows of A here: a row a contact point.
+    /// The columns of B that this rank owns; one row a contact point.
     rows: Csr,
 }
 
 impl RigidSpace {
-    /// Of the bodies of a model, whose rows begin at `offset` in a vector here; `rows` are B of all bodies together and `first` is the number
-    /// of the first row here. `None` if no two bodies in contact move freely: what moves alone is no frame.
+    /// Return the space for the bodies of a model, or `None` if no two bodies in contact can both move freely. Then no bodies move together, and the space
+    /// would save nothing. `offset` is the first entry of each body in a vector of this rank, and its length. `rows` are B of all
+    /// bodies together, and `first` is the number of the first row that this rank owns.
     pub fn of(model: &Model, offset: &[usize], rows: &Csr, first: usize) -> Option<Self> {
-        let mut sides = vec![0; model.pairs.len()];
+        let mut free_sides = vec![0; model.pairs.len()];
         for slot in model.bodies.iter().filter(|slot| !slot.motions.is_empty()) {
-            slot.segments.iter().for_each(|segment| sides[segment.pair] += 1);
+            slot.segments.iter().for_each(|segment| free_sides[segment.pair] += 1);
         }
-        if !sides.contains(&2) {
+        if !free_sides.contains(&2) {
             return None;
         }
-        let mut here = Csr::new(offset[offset.len() - 1]);
-        let own = |(i, b): (usize, f64)| Some((i.checked_sub(first)?, b)).filter(|(i, _)| *i < here.columns);
-        let own: Vec<Vec<(usize, f64)>> = (0..rows.rows()).map(|q| rows.row(q).filter_map(own).collect()).collect();
-        own.into_iter().for_each(|row| here.push_row(row));
-        Some(Self { space: Rc::new(Space::of(model, Some(offset))), rows: here })
+        let columns = offset[offset.len() - 1];
+        let owned = rows.of_columns(columns, |i| i.checked_sub(first).filter(|i| *i < columns));
+        Some(Self { space: Rc::new(Space::of(model, Some(offset))), rows: owned })
     }
 
-    /// The space for these springs, one entry a contact point.
+    /// Return the space for these spring stiffnesses, one a contact point.
     pub fn with(self: &Rc<Self>, springs: &[f64]) -> Box<dyn Subspace> {
-        Box::new(Sprung { coarse: Coarse::new(self.space.clone(), springs), around: self.clone() })
+        Box::new(WithSprings { coarse: Coarse::new(self.space.clone(), springs), rigid: self.clone() })
     }
 }
 
-struct Sprung {
+/// The space of rigid motions for one set of springs.
+struct WithSprings {
     coarse: Coarse,
-    around: Rc<RigidSpace>,
+    rigid: Rc<RigidSpace>,
 }
 
-impl Subspace for Sprung {
+impl Subspace for WithSprings {
     fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
         let (y, _) = self.coarse.solve(&[&*r]);
         self.coarse.add(1.0, &y, &mut [x]);
-        self.around.rows.add_transpose(-1.0, &self.coarse.forces(&y), r);
+        self.rigid.rows.add_transpose(-1.0, &self.coarse.forces(&y), r);
         Ok(())
     }
 
     fn project(&self, z: &mut [f64]) -> Result<()> {
-        let mut closing = vec![0.0; self.around.rows.rows()];
-        self.around.rows.multiply(z, &mut closing);
+        let mut closing = vec![0.0; self.rigid.rows.rows()];
+        self.rigid.rows.multiply(z, &mut closing);
         self.coarse.add(-1.0, &self.coarse.part(&closing, true), &mut [z]);
         Ok(())
     }

@@ -1,9 +1,8 @@
-//! A body condensed to its contact: the interior is eliminated once, and the method works on what is left.
+//! A body condensed to its contact: the interior is eliminated once, and the method works on the remaining dofs.
 //!
-//! With retained dofs R and interior I (in axes turned to the contact normals), S = K_RR - K_RI K_II^-1 K_IR and
-//! g = f_R - K_RI K_II^-1 f_I give a body with the stiffness S, the load g and the same contact rows. Its G is
-//! S + B_R' diag(weight) B_R, dense and small. States are those of the whole body whose interior is in equilibrium: residual,
-//! energies and all that is printed are the same numbers.
+//! Let R be the retained dofs and I the interior ones, in axes turned to the contact normals. Then S = K_RR - K_RI K_II^-1 K_IR is the
+//! stiffness and g = f_R - K_RI K_II^-1 f_I the load of a body with the same contact rows. Its matrix G = S + B_R' diag(weight) B_R is dense and small.
+//! A state stands for that of the whole body with its interior in equilibrium. So residual, energies and all output have the values of the whole body.
 
 use super::options::Chosen;
 use super::{Dense, Retained, SparseBody, memory};
@@ -21,18 +20,20 @@ pub struct CondensedBody {
     chosen: Chosen,
     retained: Retained,
     dimension: usize,
-    /// K and f of all dofs; K till it is condensed.
+    /// The body with all dofs. Its K is dropped when the body is condensed.
     whole: ElasticBody,
+    /// f of all dofs, in the turned axes.
     load: Vec<f64>,
-    /// Rigid motions that supports leave, on the retained dofs.
+    /// Rigid motions that supports leave free, on the retained dofs.
     free: Vec<FreeMotion>,
-    /// Made by the first Robin term or set-up.
+    /// Made when something first needs G; results that need it are NaN before.
     condensed: Option<Condensed>,
 }
 
+/// The body on its retained dofs.
 struct Condensed {
-    /// Whether an earlier run made it.
-    kept: bool,
+    /// Whether it was made in an earlier run.
+    is_reused: bool,
     /// Wall seconds of the elimination.
     seconds: f64,
     schur: RefCell<Schur>,
@@ -40,7 +41,7 @@ struct Condensed {
 }
 
 impl CondensedBody {
-    /// A body that will be condensed when it is set up. Of its PETSc options those of MUMPS are read.
+    /// Prepare a body that will be condensed when it is set up. Its PETSc options for MUMPS apply, others are not read.
     pub fn new(
         session: &Session,
         chosen: Chosen,
@@ -54,7 +55,7 @@ impl CondensedBody {
         Self { session: session.clone(), chosen, retained, dimension, whole, load, free, condensed: None }
     }
 
-    /// Eliminates the interior, once.
+    /// Eliminate the interior, the first time that this is called.
     fn condense(&mut self) -> Result<&mut Condensed> {
         if self.condensed.is_none() {
             self.condensed = Some(self.eliminate()?);
@@ -66,26 +67,27 @@ impl CondensedBody {
         }
     }
 
-    /// The loads on the retained dofs, of which none is prescribed; without K.
-    fn loaded(&self, schur: &mut Schur) -> Result<ElasticBody> {
+    /// Return the body on the retained dofs, with its loads and without K. None of these dofs is prescribed.
+    fn with_loads(&self, schur: &mut Schur) -> Result<ElasticBody> {
         let (mut whole_lifting, mut lifting) = (Vec::new(), Vec::new());
         if !self.whole.lifting.is_empty() {
             whole_lifting = self.retained.turn(&self.whole.lifting);
             lifting = schur.condense(&whole_lifting)?;
         }
         let load = schur.condense(&self.load)?;
-        // the interior under the loads alone, with the retained dofs at rest
-        let rest = schur.expand_condensed(&self.load, &vec![0.0; self.retained.dofs.len()])?;
-        let work = dot(&self.load, &rest);
+        // displacement of the interior under the loads alone, with the retained dofs at rest
+        let interior = schur.expand_condensed(&self.load, &vec![0.0; self.retained.dofs.len()])?;
+        let work = dot(&self.load, &interior);
         Ok(ElasticBody {
             load,
             lifting,
             energy_constant: self.whole.energy_constant - 0.5 * work,
-            strain_constant: self.whole.strain_constant + work + 2.0 * dot(&whole_lifting, &rest),
+            strain_constant: self.whole.strain_constant + work + 2.0 * dot(&whole_lifting, &interior),
             ..ElasticBody::default()
         })
     }
 
+    /// Factor the interior and form S.
     fn eliminate(&self) -> Result<Condensed> {
         let began = Instant::now();
         let (dofs, retained) = (&self.retained.dofs, self.retained.dofs.len());
@@ -100,16 +102,15 @@ impl CondensedBody {
             return Err(Error::new(Kind::Solver, message).help("take multigrid: --set solver=hypre"));
         }
         schur.factor()?;
-        let loaded = self.loaded(&mut schur)?;
-        let stiffness = Csr::full(retained, schur.take_complement());
-        let body = ElasticBody { stiffness, ..loaded };
+        let with_loads = self.with_loads(&mut schur)?;
+        let body = ElasticBody { stiffness: Csr::full(retained, schur.take_complement()), ..with_loads };
         let dense = |stiffness: Rows| Ok(Dense::new(stiffness));
         let body = SparseBody::new(body, self.retained.rows.clone(), &self.free, None, dense, String::new());
-        Ok(Condensed { kept: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
+        Ok(Condensed { is_reused: false, seconds: began.elapsed().as_secs_f64(), schur: RefCell::new(schur), body })
     }
 }
 
-/// Turns the dofs of motions and leaves the retained ones.
+/// Return a motion on the retained dofs, in the turned axes.
 fn on_retained(retained: &Retained, motion: FreeMotion) -> FreeMotion {
     let turned = retained.turn(&motion.displacement);
     FreeMotion { displacement: retained.dofs.iter().map(|&dof| turned[dof]).collect(), work: motion.work }
@@ -185,25 +186,22 @@ impl Body for CondensedBody {
     }
 
     fn counts(&self) -> BodyCounts {
-        match &self.condensed {
-            None => BodyCounts::default(),
-            Some(condensed) => {
-                let counts = condensed.body.counts();
-                BodyCounts {
-                    factorizations: usize::from(!condensed.kept),
-                    factorizations_avoided: usize::from(condensed.kept),
-                    symbolic: usize::from(!condensed.kept),
-                    first_seconds: if condensed.kept { 0.0 } else { condensed.seconds },
-                    factor_seconds: counts.factor_seconds + if condensed.kept { 0.0 } else { condensed.seconds },
-                    ..counts
-                }
-            }
+        let Some(condensed) = &self.condensed else { return BodyCounts::default() };
+        let counts = condensed.body.counts();
+        let seconds = if condensed.is_reused { 0.0 } else { condensed.seconds };
+        BodyCounts {
+            factorizations: usize::from(!condensed.is_reused),
+            factorizations_avoided: usize::from(condensed.is_reused),
+            symbolic: usize::from(!condensed.is_reused),
+            first_seconds: seconds,
+            factor_seconds: counts.factor_seconds + seconds,
+            ..counts
         }
     }
 
     fn begin_anew(&mut self) {
         if let Some(condensed) = &mut self.condensed {
-            condensed.kept = true;
+            condensed.is_reused = true;
             condensed.body.begin_anew();
         }
     }
@@ -216,8 +214,8 @@ impl Body for CondensedBody {
             self.whole.reload(loads.force.clone(), loads.prescribed.clone(), loads.carried.clone());
             self.load = self.retained.turn(&self.whole.load);
             self.free.iter_mut().zip(&loads.work).for_each(|(motion, work)| motion.work = *work);
-            let loaded = self.loaded(condensed.schur.get_mut())?;
-            condensed.body.reload(loaded, &self.free);
+            let with_loads = self.with_loads(condensed.schur.get_mut())?;
+            condensed.body.reload(with_loads, &self.free);
         }
         self.condensed = Some(condensed);
         Ok(fits)
@@ -238,12 +236,11 @@ impl Body for CondensedBody {
     }
 
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
-        let mut all = match &self.condensed {
+        let turned = match &self.condensed {
             Some(Condensed { schur, body, .. }) => schur.borrow_mut().expand(&self.load, &body.join(u))?,
             None => vec![0.0; self.load.len()],
         };
-        all = self.retained.turn_back(&all);
-        Ok(all)
+        Ok(self.retained.turn_back(&turned))
     }
 
     fn carried(&self) -> &[f64] {

@@ -1,23 +1,23 @@
-//! Dense Cholesky factorisation by the LAPACK that PETSc runs on: for matrices without zeros.
+//! Dense Cholesky factorisation by the LAPACK that PETSc uses, for matrices without zeros.
 
 use super::{Change, InnerSolver, Seen};
 use crate::error::Result;
 use crate::model::Solved;
 use crate::petsc::{Rows, cholesky, cholesky_solve};
 
-/// G as a dense matrix, factored when it is first needed after a change.
+/// G as a dense matrix, which is factored when it is first needed after a change.
 pub struct Dense {
     rows: usize,
-    /// All of G, row by row.
+    /// All entries of G, row by row.
     values: Vec<f64>,
     factor: Vec<f64>,
-    /// What the factor is worth: none since the last change, or whether G was positive definite.
+    /// Whether G was positive definite when it was factored; `None` if it has not been factored since the last change.
     made: Option<bool>,
     factorizations: usize,
 }
 
 impl Dense {
-    /// Starts from a symmetric matrix without holes.
+    /// Start from a symmetric matrix with all entries stored.
     pub fn new(matrix: Rows) -> Self {
         let (rows, values) = (matrix.own().len(), matrix.into_values());
         Self { rows, factor: vec![0.0; values.len()], values, made: None, factorizations: 0 }

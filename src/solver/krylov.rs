@@ -1,4 +1,4 @@
-//! Any PETSc KSP and PC as inner solver.
+//! Any KSP and PC of PETSc as inner solver.
 
 use super::options::Chosen;
 use super::{Change, InnerSolver, Seen};
@@ -10,46 +10,50 @@ use crate::model::Solved;
 use crate::petsc::{Enough, Ksp, Matrix, Rows, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
+///
+/// A multigrid preconditioner is kept while G changes, if the user has not decided this by `-ksp_reuse_preconditioner`. Dofs at which it is poor then are
+/// solved exactly around it. This local correction is called a patch.
 pub struct Krylov {
     session: Session,
     chosen: Chosen,
     matrix: Matrix,
     ksp: Ksp,
+    /// Whether G has changed since the last set-up.
     changed: bool,
+    /// Number of factorisations or preconditioner set-ups.
     set_ups: usize,
-    /// Whether the preconditioner is one that makes a few iterations of whatever size: one application then preconditions
-    /// all bodies together, and making it costs more than using it.
+    /// Whether the preconditioner is a multigrid, which takes about as many iterations for any size. One application then preconditions
+    /// all bodies together, and its set-up costs more than its use.
     multigrid: bool,
-    /// Whether it is kept while G stays near; the user may decide by `-ksp_reuse_preconditioner`.
+    /// Whether the preconditioner is kept while G changes.
     keeps: bool,
-    /// Whether the user leaves the tolerance to the method.
+    /// Whether the method may set the tolerance of solves, because the user has not.
     free: bool,
-    /// Whether G is far from the matrix of the preconditioner.
+    /// Whether the next change of G gets a new preconditioner.
     stale: bool,
     /// Iterations per digit of the first solve with this preconditioner.
     fresh: Option<f64>,
-    /// Share of the residual that the last solve left.
+    /// Relative residual that the last solve reached.
     reached: f64,
-    /// Exact solves near the contact that were made.
+    /// Number of patches that were set up.
     patches: usize,
-    /// Whether rigid motions of bodies are around the preconditioner.
-    is_framed: bool,
+    /// Whether rigid motions of bodies have been put around the preconditioner.
+    has_rigid_space: bool,
 }
 
-/// Growth of the iterations, over those of a fresh preconditioner, at which a new one is made.
+/// Growth of the iterations, over those with a fresh preconditioner, at which a new one is set up.
 const WORN: f64 = 1.5;
 
 /// A patch has at most one in so many dofs. With 1, 2, 4, 8 and without patches `flange` (P1, n = 4, layer 1e8) takes 150, 150, 150, 401 and 434
 /// iterations, 1.6, 1.6, 1.6, 2.2 and 1.9 s, and `hertz-sphere` (P1, n = 12) 54, 54, 54, 65 and 75, 2.4, 2.4, 2.4, 2.2 and 2.1 s.
 const SMALL: usize = 4;
 
-/// Iterations that tell nothing of the pace.
+/// Number of iterations up to which a solve is too short to judge the preconditioner.
 const FEW: usize = 12;
 
 impl Krylov {
-    /// Starts from G = K, with the options that were chosen; collective if other ranks have rows of K. `near_null_space` are the
-    /// rigid motions that algebraic multigrid (GAMG) wants to know, one entry a dof each. With an `interpolation` from a coarse level, PETSc's
-    /// `mg` has two levels.
+    /// Start from G = K, with the options that were chosen. `near_null_space` has the rigid motions for the algebraic multigrid GAMG, one entry a dof
+    /// each. With an `interpolation` from a coarse level, PETSc's `mg` has two levels. Collective if other ranks have rows of K.
     ///
     /// # Errors
     /// PETSc's refusal of a matrix or an option value.
@@ -70,7 +74,7 @@ impl Krylov {
             ksp.set_interpolation(&matrix, [&super::integers(ptr), &super::integers(col)], &values, own)?;
         }
         chosen.lend(session, || ksp.set_from_options())?;
-        // errors in the energy norm follow from it and from residuals in the natural norm
+        // the spectrum turns a residual in the natural norm into an error in the energy norm
         if ksp.ksp_type() == "cg" && chosen.get("ksp_norm_type") == Some("natural") {
             ksp.estimate_spectrum()?;
         }
@@ -95,12 +99,12 @@ impl Krylov {
             fresh: None,
             reached: 1.0,
             patches: 0,
-            is_framed: false,
+            has_rigid_space: false,
         })
     }
 
-    /// A solve, timed and counted.
-    fn timed(&mut self, solve: impl FnOnce(&Ksp) -> Result<crate::petsc::Solved>) -> Result<Solved> {
+    /// Make a solve within the stage of PETSc's log for solves.
+    fn staged(&mut self, solve: impl FnOnce(&Ksp) -> Result<crate::petsc::Solved>) -> Result<Solved> {
         self.set_up()?;
         let stage = self.session.stage("linear solve");
         let solved = self.with_options(|| solve(&self.ksp))?;
@@ -112,14 +116,14 @@ impl Krylov {
         })
     }
 
-    /// Layers of the graph of G around dofs that are solved exactly: hypre smooths with the matrix of the set-up, and one layer does what it
-    /// cannot; smoothers of two levels have G itself.
+    /// Return how many layers of the graph of G are added around the dofs of a patch. hypre smooths with the matrix of its set-up, so it needs one layer.
+    /// The smoothers of two levels of multigrid use G itself, so they need none.
     fn layers(&self) -> usize {
         usize::from(self.ksp.pc_type() != "mg")
     }
 
-    /// Keeps the preconditioner and solves exactly on dofs that it is poor at. False if that costs more than a preconditioner or does not
-    /// serve.
+    /// Keep the preconditioner and put a patch around it at the dofs where it is poor. Return false if the patch would cost more than a new preconditioner or
+    /// cannot be made.
     fn patch(&mut self, dofs: &[usize]) -> Result<bool> {
         let layers = self.layers();
         if dofs.len() * (1 + layers) * SMALL > self.matrix.total() {
@@ -137,15 +141,15 @@ impl Krylov {
         Ok(true)
     }
 
-    /// Keeps the preconditioner or makes a new one, after a change of G.
+    /// Keep the preconditioner or set up a new one, after a change of G.
     fn renew(&mut self, change: &Change) -> Result<Seen> {
         if !self.keeps {
             return Ok(Seen::Whole);
         }
         self.stale |= self.set_ups == 0;
-        if !self.stale && self.patch(&(change.far)())? {
+        if !self.stale && self.patch(&(change.changed)())? {
             if self.ksp.pc_type() == "mg" {
-                // smoothers of PETSc see every change of G, but bounds of eigenvalues are those of their set-up
+                // PETSc's smoothers use the new G, but their bounds of eigenvalues are those of their set-up
                 self.chosen.lend(&self.session, || self.ksp.renew_smoother(&self.matrix))?;
             }
             return Ok(Seen::Older);
@@ -155,16 +159,16 @@ impl Krylov {
         Ok(if self.patch(&(change.stiff)())? { Seen::Patched } else { Seen::Whole })
     }
 
-    /// Remembers the pace of a solve: the next change of G brings a new preconditioner if this one is worn.
-    fn learn(&mut self, solved: &Solved) {
+    /// Compare the iterations per digit of a solve with those of the first solve. The next change of G gets a new preconditioner if they have grown too much.
+    fn judge(&mut self, solved: &Solved) {
         if self.keeps && solved.iterations > FEW {
             let pace = solved.iterations as f64 / -log10(self.reached);
             self.stale |= pace > WORN * *self.fresh.get_or_insert(pace);
         }
     }
 
-    /// Some work of the solver that may read options: what the program chose is read by the set-up, but of the options of PETSc some are
-    /// read in a solve (`-ksp_converged_reason`, all of a solver nested in another).
+    /// Do some work of the solver that may read options. The program's choices are read in the set-up, but a solve reads some of the user's options
+    /// (`-ksp_converged_reason`, and all of a solver nested in another).
     fn with_options<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
         if self.chosen.has_typed() { self.chosen.lend(&self.session, work) } else { work() }
     }
@@ -182,12 +186,12 @@ impl InnerSolver for Krylov {
         self.matrix.update(change.write)?;
         self.changed = true;
         let seen = self.renew(&change)?;
-        // of other preconditioners the user sees what he chose
+        // other preconditioners stay as the user chose them
         if self.multigrid
             && let Some(coarse) = (change.coarse)()
         {
             self.set_up()?;
-            self.is_framed = true;
+            self.has_rigid_space = true;
             self.ksp.wrap(&self.matrix, c"rigid motions of bodies around the preconditioner", coarse)?;
         }
         Ok(seen)
@@ -211,8 +215,8 @@ impl InnerSolver for Krylov {
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         self.reached = self.ksp.tolerance();
-        let solved = self.timed(|ksp| ksp.solve(r, z))?;
-        self.learn(&solved);
+        let solved = self.staged(|ksp| ksp.solve(r, z))?;
+        self.judge(&solved);
         Ok(solved)
     }
 
@@ -222,14 +226,14 @@ impl InnerSolver for Krylov {
         }
         self.ksp.set_tolerance(f64::EPSILON)?;
         let mut reached = 1.0;
-        let solved = self.timed(|ksp| {
+        let solved = self.staged(|ksp| {
             ksp.solve_until(r, z, &mut |iterate| {
                 reached = iterate.residual / iterate.first;
                 enough(iterate)
             })
         })?;
         self.reached = reached;
-        self.learn(&solved);
+        self.judge(&solved);
         Ok(solved)
     }
 
@@ -243,7 +247,7 @@ impl InnerSolver for Krylov {
     fn accuracy(&self) -> f64 {
         match (self.ksp.ksp_type().as_str(), self.ksp.pc_type().as_str()) {
             ("preonly", "cholesky" | "lu") => 0.0,
-            // one application of a preconditioner leaves any share
+            // one application of a preconditioner may leave an error of any size
             ("preonly", _) => 1.0,
             _ => self.reached,
         }
@@ -265,7 +269,7 @@ impl InnerSolver for Krylov {
     fn describe(&self) -> String {
         let coarse = || self.chosen.get("mg_coarse_pc_type").map(str::to_owned);
         let inside = self.ksp.factor_package().or_else(coarse).map_or(String::new(), |name| format!(" by {name}"));
-        let around = if self.is_framed { " with rigid motions of all bodies" } else { "" };
+        let around = if self.has_rigid_space { " with rigid motions of all bodies" } else { "" };
         format!("{} + {}{inside}{around}", self.ksp.ksp_type(), self.ksp.pc_type())
     }
 }

@@ -1,25 +1,25 @@
-//! Memory that factorisations take, and what the machine has.
+//! The memory and operations that factorisations take, and the memory that the machine has.
 
 use crate::linalg::portable::{log2, pow};
 
-/// Bytes that programs can still take without swapping, as Linux tells; no limit where it does not.
+/// Return the bytes that programs can still take without swapping, as Linux reports them. On other systems there is no limit.
 pub fn available() -> usize {
     crate::file::bytes_in_proc("/proc/meminfo", "MemAvailable").map_or(usize::MAX, |bytes| bytes as usize)
 }
 
-/// Estimated bytes of a sparse Cholesky factor of a body in the plane by nested dissection: the growth n log n with factors
+/// Return the estimated bytes of the sparse Cholesky factor of a plane body by nested dissection. They grow as n log n; the constant was
 /// measured on blocks of 32 000 to 500 000 dofs.
 pub fn in_plane(dofs: usize) -> usize {
     let n = dofs as f64;
     (60.0 * n * log2(n + 2.0)) as usize
 }
 
-/// Bytes of a condensed body besides its sparse factor: S with its pattern, G, and the factor of G.
+/// Return the bytes of a condensed body besides its sparse factor: S with its pattern, G, and the factor of G.
 pub fn of_condensed(retained: usize) -> usize {
     36 * retained * retained
 }
 
-/// Estimated operations of a sparse Cholesky factorisation in the plane by nested dissection; factors as for [`in_plane`].
+/// Return the estimated operations of a sparse Cholesky factorisation of a plane body by nested dissection, measured on the same blocks as [`in_plane`].
 pub fn work_in_plane(dofs: usize) -> f64 {
     56.0 * pow(dofs as f64, 1.5)
 }

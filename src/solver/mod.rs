@@ -1,9 +1,10 @@
-//! Inner solvers: how a body solves G z = r.
+//! Inner solvers: how a body solves G z = r, where G is its stiffness K plus springs at contact points.
 //!
-//! [`SparseBody`] owns K, f and B and answers the verbs of [`Body`](crate::model::Body); a [`RobinMatrix`] is G, by an
-//! [`InnerSolver`]. A new way to solve is a new file with that trait. [`CondensedBody`] is such a body whose dofs are those of its contact.
+//! [`SparseBody`] holds the stiffness K, the load f and the contact rows B of a body and implements [`Body`](crate::model::Body). A
+//! [`RobinMatrix`] holds G = K + B' diag(d) B and solves with it by an [`InnerSolver`]. [`CondensedBody`] is a `SparseBody` whose dofs are only those at its
+//! contact. A new way to solve is a new file with an implementation of `InnerSolver`.
 //!
-//! Errors are failures of the solver library, and PETSc being out of memory, but for what functions say of their own.
+//! Where a function says nothing else, its errors are failures of the solver library, and PETSc being out of memory.
 
 mod coarse;
 mod condensed;
@@ -19,23 +20,25 @@ mod robin;
 mod sparse;
 pub mod speed;
 mod split;
+mod union;
 
 pub use coarse::RigidSpace;
 pub use condensed::CondensedBody;
 pub use dense::Dense;
 pub use krylov::Krylov;
-pub use monolithic::{Monolithic, Union};
+pub use monolithic::Monolithic;
 pub use retained::Retained;
 pub use robin::RobinMatrix;
 pub use sparse::SparseBody;
 pub use split::Split;
+pub use union::Union;
 
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::Solved;
 use crate::petsc::{Enough, Int, Matrix, Rows, Subspace};
 
-/// A whole matrix as PETSc's, or the rows of this rank from number `start` on.
+/// Turn a whole matrix into PETSc's rows, or the rows of this rank, which begin with number `start`.
 fn rows(matrix: Csr, start: Option<usize>) -> Result<Rows> {
     let Csr { columns, ptr, col, values } = matrix;
     match start {
@@ -44,87 +47,87 @@ fn rows(matrix: Csr, start: Option<usize>) -> Result<Rows> {
     }
 }
 
-/// A pattern in PETSc's integers; where these have 32 bits, the array itself.
+/// Convert an array of a pattern to PETSc's integers. Where these have 32 bits, the array is not copied.
 #[allow(clippy::useless_conversion)]
 fn integers(part: Vec<i32>) -> Vec<Int> {
     part.into_iter().map(Int::from).collect()
 }
 
-/// A change of G = K + B' diag(d) B.
+/// A change of G = K + B' diag(d) B. An iterative solver may keep the preconditioner of an earlier G and correct it by exact solves on a few dofs.
 pub struct Change<'a> {
-    /// Writes the values of G in the order of the pattern it was made with.
+    /// Writes the values of G, in the order of the pattern that the solver was made with.
     pub write: &'a dyn Fn(&mut [f64]),
-    /// Dofs of the contact rows that a kept preconditioner is poor at.
-    pub far: &'a dyn Fn() -> Vec<usize>,
-    /// Those that a new one is poor at: stiff ones.
+    /// Returns the dofs of contact rows at which the preconditioner of an earlier G is poor: their springs have changed much.
+    pub changed: &'a dyn Fn() -> Vec<usize>,
+    /// Returns the dofs of contact rows at which even a new preconditioner is poor: their springs are stiff.
     pub stiff: &'a dyn Fn() -> Vec<usize>,
-    /// What rigid motions of bodies put around a preconditioner, if there are any.
+    /// Returns the rigid motions of bodies as a subspace to be put around a preconditioner, if there are any.
     pub coarse: &'a dyn Fn() -> Option<Box<dyn Subspace>>,
 }
 
 /// What a solver works with after a change of G.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seen {
-    /// The preconditioner of an older G.
+    /// The preconditioner of an earlier G, with exact solves at rows that have changed.
     Older,
-    /// One of G, around which stiff rows are solved exactly.
+    /// A preconditioner of G, with exact solves at stiff rows.
     Patched,
     /// G itself.
     Whole,
 }
 
-/// Owner of the matrix G with a way to solve G z = r.
+/// An owner of the matrix G with a way to solve G z = r.
 pub trait InnerSolver {
-    /// Whether it has G in rows, with which K can be applied: nobody else needs K then.
+    /// Whether the solver stores G in rows. Then K can be applied through it, and nobody else has to store K.
     const HAS_ROWS: bool = false;
 
-    /// G, for products that leave it as it is, of a solver that has it in rows.
+    /// Return G for products that leave it unchanged, if the solver stores it in rows.
     fn matrix_mut(&mut self) -> Option<&mut Matrix> {
         None
     }
 
-    /// Changes values of G; the next solve uses the new matrix.
+    /// Change values of G. The next solve uses the new matrix.
     fn update(&mut self, change: Change) -> Result<Seen>;
 
-    /// Factors G, or sets its preconditioner up, if it changed since.
+    /// Factor G, or set up its preconditioner, if G has changed since.
     fn set_up(&mut self) -> Result<()>;
 
-    /// Solves G z = r with zero guess.
+    /// Solve G z = r with zero initial guess.
     ///
     /// # Errors
-    /// Failures of the solver library; not converging is told in [`Solved`].
+    /// Failures of the solver library. A solve that does not converge is reported in [`Solved`].
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
 
-    /// The same, until `enough` is true of z and the share of r that it leaves, for solvers that come nearer step by step. If the user
-    /// set a tolerance, that ends the solve.
+    /// Solve G z = r until `enough` accepts an iterate, for iterative solvers. If the user set a tolerance, that ends the solve instead.
     fn solve_until(&mut self, r: &[f64], z: &mut [f64], _enough: &mut Enough) -> Result<Solved> {
         self.solve(r, z)
     }
 
-    /// How far solves have to reduce r, unless the user says; false if solves are what they are.
+    /// Set the relative tolerance of solves, unless the user has set one. Return false if solves do not depend on it.
     fn precision(&mut self, _rtol: f64) -> Result<bool> {
         Ok(false)
     }
 
-    /// Share of the energy norm of z that the last solve may be off: zero for a direct solver.
+    /// Return the relative error of the last solve in the energy norm, at most: zero for a direct solver.
     fn accuracy(&self) -> f64 {
         0.0
     }
 
-    /// z = M^-1 r with a fixed symmetric M near G: one application of the preconditioner of an iterative solver, a whole solve
-    /// of a direct one.
+    /// Compute z = M^-1 r with a fixed symmetric M that approximates G: one application of the preconditioner of an iterative solver, a
+    /// whole solve of a direct one.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         self.solve(r, z)
     }
 
-    /// Symbolic and numeric factorisations or preconditioner set-ups so far, and exact solves made around a preconditioner.
+    /// Return the numbers of symbolic factorisations, of numeric factorisations or preconditioner set-ups, and of exact solves that were set up around a
+    /// preconditioner, so far.
     fn factorizations(&self) -> [usize; 3];
 
-    /// Whether the factorisations are dense ones, which are counted apart.
+    /// Return whether the factorisations are dense ones, which are counted separately.
     fn is_dense(&self) -> bool {
         false
     }
 
-    /// One line for the report.
+    /// Return one line for the report.
     fn describe(&self) -> String;
 }

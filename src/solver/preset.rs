@@ -1,10 +1,10 @@
-//! Which inner solver a body gets when the user typed no PETSc option, and the defaults of each.
+//! The inner solver that a body gets when the user typed no PETSc option, and the default options of each.
 
 use super::memory;
 use super::options::Chosen;
 use crate::problem::solver::Preset;
 
-/// Options of algebraic multigrid by hypre for elasticity with many solves a set-up; docs/solvers.md has the
+/// Options of hypre's algebraic multigrid for elasticity with many solves for each set-up. docs/solvers.md has the
 /// measurements behind them.
 const HYPRE: [(&str, &str); 7] = [
     ("pc_hypre_type", "boomeramg"),
@@ -16,7 +16,8 @@ const HYPRE: [(&str, &str); 7] = [
     ("pc_hypre_boomeramg_relax_type_all", "Chebyshev"),
 ];
 
-/// What differs where the preconditioner is made anew for nearly every solve: four times cheaper to make, twice the iterations.
+/// Options that differ where a new preconditioner is set up for nearly every solve. The set-up is four times cheaper, and the iterations are twice as
+/// many.
 const MADE_OFTEN: [(&str, &str); 4] = [
     ("pc_hypre_boomeramg_coarsen_type", "HMIS"),
     ("pc_hypre_boomeramg_interp_type", "ext+i"),
@@ -24,22 +25,23 @@ const MADE_OFTEN: [(&str, &str); 4] = [
     ("pc_hypre_boomeramg_nodal_coarsen", "6"),
 ];
 
-/// Two levels of multigrid for quadratic elements: a smoother for all nodes, algebraic multigrid for the linear elements with the same
-/// vertices. Of the work and memory of algebraic multigrid for all nodes it needs half.
+/// The coarse one of two levels of multigrid for quadratic elements. The fine level has a smoother for all nodes, the coarse one algebraic multigrid for
+/// the linear elements with the same vertices. Together they take half the work and memory of algebraic multigrid for all nodes.
 const QUADRATIC: [(&str, &str); 2] = [("mg_coarse_ksp_type", "preonly"), ("mg_coarse_pc_type", "hypre")];
 
-/// The smoother of the level of quadratic elements.
+/// The smoother of the level with quadratic elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Smoother {
-    /// Gauss-Seidel there and back, which converges for every matrix that is symmetric and positive definite.
+    /// Symmetric Gauss-Seidel, which converges for every matrix that is symmetric and positive definite.
     GaussSeidel,
-    /// For rows of several ranks. Gauss-Seidel within each rank takes steps up to twice too long, or more, at their borders: the
-    /// preconditioner is not positive definite any more (two spheres of 74 799 dofs on three ranks). Steps of Chebyshev's method do not
-    /// depend on the ranks, and take 1.2 to 1.4 times as long on one.
+    /// Chebyshev's method, for rows on several ranks. Gauss-Seidel within each rank takes steps that are twice too long, or more, at the borders between
+    /// ranks. Its preconditioner was not positive definite for two spheres of 74 799 dofs on three ranks. Steps of Chebyshev's method do not
+    /// depend on the ranks, and take 1.2 to 1.4 times as long on one rank.
     Chebyshev,
 }
 
 impl Smoother {
+    /// Return the options (name, value) of the fine level.
     fn options(self) -> [(&'static str, &'static str); 3] {
         let (ksp, steps, pc) = match self {
             Smoother::GaussSeidel => ("richardson", "1", "sor"),
@@ -49,46 +51,41 @@ impl Smoother {
     }
 }
 
-/// Relative tolerance of an inner Krylov solve: relative to the outer residual, because corrections are solved.
+/// Relative tolerance of an inner Krylov solve. It is relative to the outer residual, because solves are for corrections.
 const TOLERANCE: &str = "1e-6";
 
-/// Retained dofs up to which a dense factorisation costs nothing worth comparing.
+/// Number of retained dofs up to which the cost of a dense factorisation need not be compared.
 const SMALL: usize = 300;
 
-/// What the choice of a solver in the plane depends on.
+/// The sizes on which the choice of a solver in the plane depends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Size {
-    /// Dofs of the body.
+    /// Number of dofs of the body.
     pub dofs: usize,
-    /// Dofs that a condensed body would retain.
+    /// Number of dofs that a condensed body would retain.
     pub retained: usize,
-    /// Bytes that the bodies before have left.
+    /// Bytes of memory that are left after the solvers of earlier bodies.
     pub memory: usize,
 }
 
 impl Size {
-    /// Whether an interior is there to be eliminated, and a rest that remains.
-    pub fn can_condense(&self) -> bool {
-        (1..self.dofs).contains(&self.retained)
-    }
-
-    /// Estimated bytes of a solver that factors, in the plane.
+    /// Return the estimated bytes of a solver that factors, for a plane body.
     pub fn bytes(&self, preset: Preset) -> usize {
         let dense = if preset == Preset::Condensed { memory::of_condensed(self.retained) } else { 0 };
         memory::in_plane(self.dofs) + dense
     }
 }
 
-/// The preset for a body in the plane whose scene names none, with the reason: there a factorisation costs little, and only
-/// memory speaks against it. In space [`cost`](super::cost) decides.
+/// Return the preset for a plane body whose scene names none, with the reason as text. A factorisation costs little in the plane, so only
+/// lack of memory speaks against it. In space [`cost`](super::cost) decides.
 ///
 /// ```
 /// use winkler::{problem::solver::Preset, solver::preset::{Size, in_plane}};
 /// let size = Size { dofs: 98_000, retained: 1024, memory: 8_000_000_000 };
 /// assert_eq!(in_plane(&size).0, Preset::Condensed);
-/// // a sheet that is nothing but contact has nothing to gain
+/// // a sheet whose dofs are mostly on the contact gains nothing by condensation
 /// assert_eq!(in_plane(&Size { dofs: 40_000, retained: 20_000, ..size }).0, Preset::Mumps);
-/// // too little memory for a factor: multigrid
+/// // multigrid is for a factor that does not fit into memory
 /// assert_eq!(in_plane(&Size { memory: 50_000_000, ..size }).0, Preset::Hypre);
 /// ```
 pub fn in_plane(size: &Size) -> (Preset, String) {
@@ -96,9 +93,11 @@ pub fn in_plane(size: &Size) -> (Preset, String) {
     let what = format!("{dofs} dofs in the plane, {retained} of them on the contact");
     let megabytes = |preset: Preset| size.bytes(preset) / 1_000_000;
     let fits = |preset: Preset| size.bytes(preset) < memory;
+    // some dofs can be eliminated, and some remain
+    let can_condense = (1..dofs).contains(&retained);
     let dense = (retained as f64).powi(3) / 3.0;
     let pays = retained <= SMALL || dense <= memory::work_in_plane(dofs);
-    if size.can_condense() && pays && fits(Preset::Condensed) {
+    if can_condense && pays && fits(Preset::Condensed) {
         (Preset::Condensed, format!("{what}, about {} MB", megabytes(Preset::Condensed)))
     } else if fits(Preset::Mumps) {
         (Preset::Mumps, format!("{what}, about {} MB", megabytes(Preset::Mumps)))
@@ -108,12 +107,12 @@ pub fn in_plane(size: &Size) -> (Preset, String) {
     }
 }
 
-/// Sets, before [`apply`], what is better for multigrid of a matrix that changes with nearly every solve.
+/// Set the options that suit multigrid of a matrix that changes with nearly every solve. To be called before [`apply`].
 pub fn made_often(chosen: &mut Chosen) {
     MADE_OFTEN.iter().for_each(|(name, value)| chosen.set_default(name, value));
 }
 
-/// The solver that the options in force make, in words.
+/// Return the name of the solver that the options in force choose.
 pub fn in_words(chosen: &Chosen) -> String {
     let word = |name: &str| chosen.get(name).unwrap_or_default();
     let inside = ["pc_factor_mat_solver_type", "mg_coarse_pc_type"].map(word).into_iter().find(|word| !word.is_empty());
@@ -121,14 +120,14 @@ pub fn in_words(chosen: &Chosen) -> String {
     format!("{} + {}{inside}", word("ksp_type"), word("pc_type"))
 }
 
-/// Sets the defaults of a solver: after the typed options, and only for the KSP and PC in force. A condensed body has no KSP and no
-/// defaults. With a `smoother` multigrid has a level for quadratic elements, unless the user speaks of hypre.
+/// Set the default options of a solver where the user typed nothing, and only for the KSP and PC in force. A condensed body has no KSP and no
+/// defaults. With a `smoother`, multigrid has a level for quadratic elements, unless the user typed an option of hypre.
 pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
-    let levels = smoother.is_some() && !chosen.has_typed_of("pc_hypre_");
+    let has_levels = smoother.is_some() && !chosen.has_typed_of("pc_hypre_");
     let pc = match preset {
         Preset::Condensed => return,
         Preset::Mumps => "cholesky",
-        Preset::Hypre if levels => "mg",
+        Preset::Hypre if has_levels => "mg",
         Preset::Hypre => "hypre",
         Preset::Gamg => "gamg",
         Preset::Icc => "icc",
@@ -144,10 +143,10 @@ pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
     chosen.prefer_mumps();
     if !is(chosen, "ksp_type", &["preonly"]) {
         chosen.set_default("ksp_rtol", TOLERANCE);
-        // PETSc's own is 1e-50, whatever the unit of forces is
+        // PETSc's own default is 1e-50, whatever the unit of forces is
         chosen.set_default("ksp_atol", "0");
         if is(chosen, "ksp_type", &["cg", "fcg", "pipecg"]) {
-            // r'M^-1 r: with a good preconditioner the energy of the error, which the outer residual measures
+            // the natural norm is that of r'M^-1 r; with a good preconditioner M this is the energy of the error, which the outer residual measures
             chosen.set_default("ksp_norm_type", "natural");
         }
     }

@@ -1,8 +1,8 @@
-//! Which dofs of a body a condensed solver retains, and the axes in which it sees them.
+//! The dofs of a body that a condensed solver retains, and the axes in which it sees them.
 //!
-//! The method feels a body through its contact rows alone, so their columns are retained. Where one normal serves all rows
-//! that touch a node, the node is turned to axes (n, t, ...), and of its dofs one is left. Dofs of a few more nodes are
-//! retained where supports and contact do not hold the interior safely.
+//! The method sees a body only through its contact rows, so the dofs in these rows are retained. Where all rows that touch a node have the same normal n,
+//! the node is turned to axes (n, t, ...), and only its dof along n is retained. Some more dofs are
+//! retained where supports and contact do not constrain the interior well.
 
 use serde::{Deserialize, Serialize};
 use crate::fem::rigid::AtDofs;
@@ -10,12 +10,12 @@ use crate::linalg::{Blocks, Csr, dot};
 use nalgebra::{DMatrix, DVector};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-/// Rows of a node count as parallel below this sine of their angle.
+/// Normals at a node count as parallel if the sine of their angle is at most this.
 const PARALLEL: f64 = 1e-12;
 
-/// A rigid motion held by less than this share of what all held dofs could do gets a dof of its own. Not the question whether it
-/// is held at all, but how well the interior is: its condition is about 1/SAFE times that of a clamped body, which leaves ten
-/// digits of sixteen.
+/// One more dof is retained for a rigid motion that is constrained by less than this share of what all constrained dofs could do. This is about accuracy, not
+/// only about whether the motion is constrained at all: the condition of the interior is about 1/SAFE times that of a clamped body, which leaves ten of
+/// sixteen digits.
 const SAFE: f64 = 1e-6;
 
 /// The retained dofs of a body.
@@ -23,68 +23,61 @@ const SAFE: f64 = 1e-6;
 pub struct Retained {
     /// Dofs, sorted, in the turned axes.
     pub dofs: Vec<usize>,
-    /// Contact rows over the retained dofs.
+    /// Contact rows; columns: the retained dofs.
     pub rows: Csr,
-    /// Axes of the turned nodes, one after the other; the first is the normal.
+    /// Axes of each turned node, by its number; the first axis is the normal.
     axes: BTreeMap<usize, Vec<Vec<f64>>>,
     dimension: usize,
 }
 
 impl Retained {
-    /// Chooses the dofs for contact `rows` (columns: all dofs, `dimension` of them a node), `prescribed` (dof, value) and the
-    /// `motions` of the free body.
+    /// Choose the dofs for contact `rows` (columns: all dofs, `dimension` of them a node), `prescribed` (dof, value) and the
+    /// rigid `motions` of the free body.
     pub fn new(dimension: usize, rows: &Csr, prescribed: &[(usize, f64)], motions: AtDofs) -> Self {
         let prescribed: HashSet<usize> = prescribed.iter().map(|entry| entry.0).collect();
-        let mut vectors: BTreeMap<usize, Vec<Vec<f64>>> = BTreeMap::new();
-        for q in 0..rows.rows() {
-            let mut of_row: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
-            for (dof, value) in rows.row(q) {
-                of_row.entry(dof / dimension).or_insert_with(|| vec![0.0; dimension])[dof % dimension] = value;
-            }
-            of_row.into_iter().for_each(|(node, vector)| vectors.entry(node).or_default().push(vector));
-        }
-        let axes = vectors.into_iter().filter_map(|(node, vectors)| {
-            let free = (node * dimension..(node + 1) * dimension).all(|dof| !prescribed.contains(&dof));
-            let normal = common_direction(&vectors).filter(|_| free)?;
-            // along an axis of the scene nothing is to be turned
+        let axes = normals(dimension, rows).into_iter().filter_map(|(node, normals)| {
+            let is_free = (node * dimension..(node + 1) * dimension).all(|dof| !prescribed.contains(&dof));
+            let normal = common_direction(&normals).filter(|_| is_free)?;
+            // a normal along an axis of the scene needs no turn
             (normal.iter().filter(|n| **n != 0.0).count() > 1).then(|| (node, frame(normal)))
         });
         let mut retained = Self { dofs: Vec::new(), rows: Csr::new(0), axes: axes.collect(), dimension };
         let turned = retained.turn_rows(rows);
-        let mut kept: BTreeSet<usize> = turned.col.iter().map(|&dof| dof as usize).collect();
-        retained.hold(&mut kept, &prescribed, rows.columns, motions);
-        retained.dofs = kept.into_iter().collect();
-        let place = |dof: usize| retained.dofs.binary_search(&dof).ok();
-        retained.rows = turned.of_columns(retained.dofs.len(), place);
+        let mut dofs: BTreeSet<usize> = turned.col.iter().map(|&dof| dof as usize).collect();
+        retained.constrain(&mut dofs, &prescribed, rows.columns, motions);
+        retained.dofs = dofs.into_iter().collect();
+        let number = |dof: usize| retained.dofs.binary_search(&dof).ok();
+        retained.rows = turned.of_columns(retained.dofs.len(), number);
         retained
     }
 
-    /// Adds dofs until supports and retained dofs together hold every rigid motion.
-    fn hold(&self, kept: &mut BTreeSet<usize>, prescribed: &HashSet<usize>, dofs: usize, motions: AtDofs) {
+    /// Add dofs to the `retained` ones until they constrain every rigid motion together with the `prescribed` ones.
+    fn constrain(&self, retained: &mut BTreeSet<usize>, prescribed: &HashSet<usize>, dofs: usize, motions: AtDofs) {
         let AtDofs { count: motions, at: motion } = motions;
         loop {
             let mut gram = DMatrix::zeros(motions, motions);
-            let held: BTreeSet<usize> = kept.iter().chain(prescribed).copied().collect();
-            for &dof in &held {
+            let constrained: BTreeSet<usize> = retained.iter().chain(prescribed).copied().collect();
+            for &dof in &constrained {
                 let at = DVector::from_fn(motions, |k, _| self.turned(dof, |dof| motion(k, dof)));
                 gram.syger(1.0, &at, &at, 1.0);
             }
             gram.fill_upper_triangle_with_lower_triangle();
-            let free = Blocks::free(&gram, held.len().max(1) as f64, SAFE);
-            let Some(weights) = free.first() else { return };
+            let free = Blocks::free(&gram, constrained.len().max(1) as f64, SAFE);
+            let Some(amounts) = free.first() else { return };
+            // displacement of a dof in the free motion, unless the dof is constrained
             let size = |dof: usize| {
-                let sum = |dof: usize| (0..motions).map(|k| weights[k] * motion(k, dof)).sum();
-                (!held.contains(&dof)).then(|| self.turned(dof, sum).abs() / weights.amax())
+                let sum = |dof: usize| (0..motions).map(|k| amounts[k] * motion(k, dof)).sum();
+                (!constrained.contains(&dof)).then(|| self.turned(dof, sum).abs() / amounts.amax())
             };
             let sizes = (0..dofs).filter_map(|dof| Some((dof, size(dof)?)));
             match sizes.max_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some((dof, size)) if size > 1e-3 => kept.insert(dof),
+                Some((dof, size)) if size > 1e-3 => retained.insert(dof),
                 _ => return,
             };
         }
     }
 
-    /// Entry of a vector in the turned axes.
+    /// Return the entry at `dof`, in the turned axes, of the vector with the entries `u` in the axes of the scene.
     fn turned(&self, dof: usize, u: impl Fn(usize) -> f64) -> f64 {
         let (node, c) = (dof / self.dimension, dof % self.dimension);
         match self.axes.get(&node) {
@@ -93,7 +86,7 @@ impl Retained {
         }
     }
 
-    /// A vector over all dofs in the turned axes.
+    /// Return a vector over all dofs in the turned axes.
     pub fn turn(&self, u: &[f64]) -> Vec<f64> {
         let mut turned = u.to_vec();
         for (&node, axes) in &self.axes {
@@ -103,7 +96,7 @@ impl Retained {
         turned
     }
 
-    /// The inverse of [`Retained::turn`].
+    /// Return a vector in the axes of the scene; the inverse of [`Retained::turn`].
     pub fn turn_back(&self, turned: &[f64]) -> Vec<f64> {
         let mut u = turned.to_vec();
         for (&node, axes) in &self.axes {
@@ -115,28 +108,30 @@ impl Retained {
         u
     }
 
+    /// Return contact rows in the turned axes.
     fn turn_rows(&self, rows: &Csr) -> Csr {
         let mut turned = Csr::new(rows.columns);
         for q in 0..rows.rows() {
             let entries = rows.row(q).collect::<Vec<_>>();
             let nodes = entries.chunk_by(|a, b| a.0 / self.dimension == b.0 / self.dimension);
-            turned.push_row(nodes.flat_map(|entries| {
-                let start = entries[0].0 / self.dimension * self.dimension;
-                match self.axes.get(&(entries[0].0 / self.dimension)) {
-                    // the other components are rounding
-                    Some(axes) => {
-                        let along = entries.iter().map(|(dof, value)| axes[0][dof - start] * value).sum();
-                        vec![(start, along)]
-                    }
-                    None => entries.to_vec(),
-                }
-            }));
+            turned.push_row(nodes.flat_map(|entries| self.turn_entries(entries)));
         }
         turned
     }
 
-    /// The lower triangle of a symmetric matrix with whole blocks of nodes, in the turned axes, without its zeros:
-    /// (row, column, value), row by row.
+    /// Return the entries (dof, value) of a contact row at one node in the turned axes. Only the component along the normal of a turned node is left; the
+    /// others are rounding.
+    fn turn_entries(&self, entries: &[(usize, f64)]) -> Vec<(usize, f64)> {
+        let node = entries[0].0 / self.dimension;
+        let start = node * self.dimension;
+        match self.axes.get(&node) {
+            Some(axes) => vec![(start, entries.iter().map(|(dof, value)| axes[0][dof - start] * value).sum())],
+            None => entries.to_vec(),
+        }
+    }
+
+    /// Return the lower triangle of a symmetric `matrix` that stores whole blocks of nodes, in the turned axes: (row, column, value), node by node.
+    /// Zeros are left out, except on the diagonal.
     pub fn lower_triangle(&self, matrix: &Csr) -> Vec<(usize, usize, f64)> {
         let d = self.dimension;
         let mut lower = Vec::with_capacity(matrix.values.len() / 2 + matrix.rows());
@@ -166,6 +161,7 @@ impl Retained {
         lower
     }
 
+    /// Turn a block of a matrix, with the rows of `node` and the columns of the `other` node.
     fn turn_block(&self, node: usize, other: usize, block: &mut [Vec<f64>]) {
         if let Some(axes) = self.axes.get(&other) {
             for row in block.iter_mut() {
@@ -181,7 +177,20 @@ impl Retained {
     }
 }
 
-/// The unit vector that all vectors are multiples of, if there is one.
+/// Return the entries of contact rows at each node as vectors, by the number of the node. They are multiples of normals.
+fn normals(dimension: usize, rows: &Csr) -> BTreeMap<usize, Vec<Vec<f64>>> {
+    let mut normals: BTreeMap<usize, Vec<Vec<f64>>> = BTreeMap::new();
+    for q in 0..rows.rows() {
+        let mut of_row: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+        for (dof, value) in rows.row(q) {
+            of_row.entry(dof / dimension).or_insert_with(|| vec![0.0; dimension])[dof % dimension] = value;
+        }
+        of_row.into_iter().for_each(|(node, vector)| normals.entry(node).or_default().push(vector));
+    }
+    normals
+}
+
+/// Return the unit vector of which all vectors are multiples, if there is one.
 fn common_direction(vectors: &[Vec<f64>]) -> Option<Vec<f64>> {
     let size = |vector: &[f64]| dot(vector, vector).sqrt();
     let longest = vectors.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
@@ -193,25 +202,14 @@ fn common_direction(vectors: &[Vec<f64>]) -> Option<Vec<f64>> {
     vectors.iter().all(|vector| aside(vector) <= PARALLEL * size(longest)).then_some(unit)
 }
 
-/// Orthonormal axes of which the first is a given unit vector.
+/// Return orthonormal axes, the first of which is the unit vector `normal`.
 fn frame(normal: Vec<f64>) -> Vec<Vec<f64>> {
     let dimension = normal.len();
     let mut axes = vec![normal];
     while axes.len() < dimension {
-        // what the axes so far leave of the coordinate axis that is farthest from them
-        let left = |c: usize| {
-            let mut rest = vec![0.0; dimension];
-            rest[c] = 1.0;
-            for _ in 0..2 {
-                for axis in &axes {
-                    let along = dot(&rest, axis);
-                    rest.iter_mut().zip(axis).for_each(|(x, n)| *x -= along * n);
-                }
-            }
-            rest
-        };
-        let rests = (0..dimension).map(left).max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)));
-        let Some(mut rest) = rests else { return axes };
+        // the coordinate axis that is farthest from the axes so far gives the next one
+        let rests = (0..dimension).map(|c| orthogonal_part(c, &axes));
+        let Some(mut rest) = rests.max_by(|a, b| dot(a, a).total_cmp(&dot(b, b))) else { return axes };
         let size = dot(&rest, &rest).sqrt();
         rest.iter_mut().for_each(|x| *x /= size);
         axes.push(rest);
@@ -219,12 +217,24 @@ fn frame(normal: Vec<f64>) -> Vec<Vec<f64>> {
     axes
 }
 
+/// Return the part of coordinate axis `c` that is orthogonal to `axes`, which are orthonormal.
+fn orthogonal_part(c: usize, axes: &[Vec<f64>]) -> Vec<f64> {
+    let mut rest = vec![0.0; axes[0].len()];
+    rest[c] = 1.0;
+    // Gram-Schmidt, done twice for orthogonality to rounding
+    for axis in axes.iter().chain(axes) {
+        let along = dot(&rest, axis);
+        rest.iter_mut().zip(axis).for_each(|(x, n)| *x -= along * n);
+    }
+    rest
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::fem::{Extent, rigid};
 
-    /// Nodes of a square with side 2; the dofs of node i are 2 i and 2 i + 1.
+    /// Nodes of a square with side 2. The dofs of node i are 2 i and 2 i + 1.
     const NODES: [[f64; 2]; 4] = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
 
     fn of(rows: &Csr, prescribed: &[(usize, f64)]) -> Retained {
@@ -260,9 +270,9 @@ mod tests {
         assert_eq!(retained.dofs, [4, 5, 6]);
     }
 
-    /// Contact holds one translation and the rotation; the other translation takes one more dof, and none if a support has it.
+    /// Contact constrains one translation and the rotation. The other translation takes one more dof, and none if a support constrains it.
     #[test]
-    fn what_contact_does_not_hold_gets_a_dof() {
+    fn what_contact_does_not_constrain_gets_a_dof() {
         let flat = rows(&[&[(5, 1.0)], &[(7, 1.0)]]);
         let retained = of(&flat, &[]);
         assert_eq!(retained.dofs.len(), 3);

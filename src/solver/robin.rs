@@ -1,4 +1,4 @@
-//! The matrix of a linear system with springs at contact points, G = K + B' diag(d) B, and what solves it.
+//! The matrix G = K + B' diag(d) B of a linear system with springs d at contact points, together with its solver.
 
 use super::{Change, InnerSolver, RigidSpace, Seen};
 use crate::error::Result;
@@ -11,31 +11,32 @@ use std::time::Instant;
 
 /// G of one body, or of all bodies together.
 ///
-/// Of K it keeps what G differs from; the rest is in the solver alone. The rows B stay with the owner, who passes the same ones
-/// to every call that wants them.
+/// Only the entries of K that differ from G are stored here; the others are in the solver alone. The rows B stay with the owner, who passes the same rows
+/// to every call that needs them.
 pub struct RobinMatrix<S> {
     solver: S,
-    /// Springs d of G, one a row of B.
+    /// Spring stiffnesses d of G, one a row of B.
     weight: Vec<f64>,
-    /// Those that the preconditioner bears: what it has seen, at most as stiff as the elements where stiff rows are solved exactly.
+    /// Spring stiffnesses in the matrix that the preconditioner was set up with. Where stiff rows are solved exactly, they are at most those of `soft`.
     prepared: Vec<f64>,
-    /// The springs that double the stiffness under a row.
+    /// Spring stiffnesses that double the stiffness under a row.
     soft: Vec<f64>,
     coupling: Coupling,
-    /// Rigid motions around the preconditioner, if G is of several bodies.
+    /// Rigid motions that are put around the preconditioner, if G is of several bodies.
     coarse: Option<Rc<RigidSpace>>,
     counts: BodyCounts,
-    /// The factorisations of the solver before the counts began.
+    /// Factorisations of the solver before the counters were last set to zero.
     before: [usize; 3],
 }
 
 impl<S: InnerSolver> RobinMatrix<S> {
-    /// Starts from G = K, on a pattern that holds B'B; `make` turns K into its solver. `row_stiffness` is b diag(K) b' of each row b,
-    /// also of those on other ranks.
+    /// Start from G = K, whose pattern holds that of B'B. `make` turns K into its solver. `row_stiffness` is b diag(K) b' of each row b of B, with the parts
+    /// of all ranks. With a `coarse` space, rigid motions are put around the preconditioner.
     pub fn new(
         stiffness: Rows,
         rows: &Csr,
         row_stiffness: Vec<f64>,
+        coarse: Option<RigidSpace>,
         make: impl FnOnce(Rows) -> Result<S>,
     ) -> Result<Self> {
         let weight = vec![0.0; rows.rows()];
@@ -46,19 +47,14 @@ impl<S: InnerSolver> RobinMatrix<S> {
             weight,
             soft,
             coupling: Coupling::new(&stiffness, rows),
-            coarse: None,
+            coarse: coarse.map(Rc::new),
             counts: BodyCounts::default(),
             before: [0; 3],
             solver: make(stiffness)?,
         })
     }
 
-    /// With rigid motions around the preconditioner.
-    pub fn with_coarse(self, coarse: Option<RigidSpace>) -> Self {
-        Self { coarse: coarse.map(Rc::new), ..self }
-    }
-
-    /// Sets the springs d.
+    /// Set the spring stiffnesses d, one a row of B.
     pub fn update(&mut self, rows: &Csr, weight: &[f64]) -> Result<()> {
         if weight == self.weight {
             self.counts.robin_skipped += 1;
@@ -70,8 +66,8 @@ impl<S: InnerSolver> RobinMatrix<S> {
         let (coupling, soft, prepared) = (&self.coupling, &self.soft, &self.prepared);
         let change = Change {
             write: &|g| coupling.write(rows, weight, g),
-            far: &|| far(rows, soft, prepared, weight),
-            stiff: &|| far(rows, soft, &softened, weight),
+            changed: &|| poor_dofs(rows, soft, prepared, weight),
+            stiff: &|| poor_dofs(rows, soft, &softened, weight),
             coarse: &|| self.coarse.as_ref().map(|coarse| coarse.with(weight)),
         };
         let began = Instant::now();
@@ -80,27 +76,27 @@ impl<S: InnerSolver> RobinMatrix<S> {
             Seen::Patched => self.prepared = softened,
             Seen::Whole => self.prepared.copy_from_slice(weight),
         }
-        self.note(began.elapsed().as_secs_f64());
+        self.count_seconds(began.elapsed().as_secs_f64());
         Ok(())
     }
 
-    /// Adds the seconds of a factorisation or set-up.
-    fn note(&mut self, seconds: f64) {
+    /// Count the seconds of a factorisation or set-up.
+    fn count_seconds(&mut self, seconds: f64) {
         self.counts.factor_seconds += seconds;
         if self.counts.first_seconds == 0.0 && self.solver.factorizations()[1] > self.before[1] {
             self.counts.first_seconds = seconds;
         }
     }
 
-    /// Factors G, or makes its preconditioner, if it changed since.
+    /// Factor G, or set up its preconditioner, if G has changed since.
     pub fn set_up(&mut self) -> Result<()> {
         let began = Instant::now();
         let done = self.solver.set_up();
-        self.note(began.elapsed().as_secs_f64());
+        self.count_seconds(began.elapsed().as_secs_f64());
         done
     }
 
-    /// One solve, or one application of the preconditioner, counted and timed apart from the set-up it may need.
+    /// Make one solve, or one application of the preconditioner. It is counted and timed apart from the set-up that it may need.
     pub fn apply(&mut self, solve: impl FnOnce(&mut S) -> Result<Solved>) -> Result<Solved> {
         self.set_up()?;
         self.counts.solves += 1;
@@ -115,15 +111,15 @@ impl<S: InnerSolver> RobinMatrix<S> {
         Ok(solved)
     }
 
-    /// How many times the stiffness under its row a spring has at most, if that takes more than half of the digits of K.
+    /// Return the largest ratio of a spring stiffness to the stiffness under its row, if it is so large that more than half of the digits of K are lost in G.
     fn steepest(&self) -> Option<f64> {
-        let ratio = self.weight.iter().zip(&self.soft).map(|(weight, soft)| weight / soft);
-        let most = ratio.filter(|ratio| ratio.is_finite()).fold(0.0, f64::max);
-        (most > f64::EPSILON.sqrt().recip()).then_some(most)
+        let ratios = self.weight.iter().zip(&self.soft).map(|(weight, soft)| weight / soft);
+        let largest = ratios.filter(|ratio| ratio.is_finite()).fold(0.0, f64::max);
+        (largest > f64::EPSILON.sqrt().recip()).then_some(largest)
     }
 
-    /// y = K x, by G with the springs taken out meanwhile; numbers that are none if PETSc fails, with which the run ends. The solver has G in
-    /// rows.
+    /// Compute y = K x with G, from which the springs are taken out meanwhile. The solver must store G in rows. If PETSc fails, y is NaN, and the run ends
+    /// with that.
     pub fn multiply_stiffness(&mut self, rows: &Csr, x: &[f64], y: &mut [f64]) {
         let (coupling, weight) = (&self.coupling, &self.weight);
         let product = self
@@ -135,7 +131,7 @@ impl<S: InnerSolver> RobinMatrix<S> {
         }
     }
 
-    /// What was done so far.
+    /// Return the counters since the start or the last [`Self::begin_anew`].
     pub fn counts(&self) -> BodyCounts {
         let made = self.solver.factorizations();
         let [symbolic, factorizations, patches] = std::array::from_fn(|kind| made[kind] - self.before[kind]);
@@ -145,43 +141,43 @@ impl<S: InnerSolver> RobinMatrix<S> {
         BodyCounts { symbolic, factorizations, patches, ..self.counts }
     }
 
-    /// Counts from zero.
+    /// Set the counters to zero.
     pub fn begin_anew(&mut self) {
         self.before = self.solver.factorizations();
         self.counts = BodyCounts::default();
     }
 
-    /// The solver.
+    /// Return the solver.
     pub fn solver(&self) -> &S {
         &self.solver
     }
 
-    /// The solver, for what does not change G.
+    /// Return the solver, for calls that do not change G.
     pub fn solver_mut(&mut self) -> &mut S {
         &mut self.solver
     }
 }
 
-/// Where B' diag(d) B goes in the values of G.
+/// The positions of B' diag(d) B in the values of G.
 struct Coupling {
-    /// Dofs of this rank.
+    /// Dofs that this rank owns.
     own: Range<usize>,
-    /// Position in the values of G of every product b_i b_j of every row with i here, in the order of rows, i and j.
+    /// Position in the values of G of every product b_i b_j of every row b, where this rank owns i. Ordered by row, then by i, then by j.
     positions: Vec<u32>,
-    /// Each position that some row has, once.
+    /// The distinct ones of these positions, sorted.
     touched: Vec<u32>,
-    /// The value of K there.
+    /// The value of K at each of the `touched` positions.
     stiffness: Vec<f64>,
 }
 
 impl Coupling {
     fn new(stiffness: &Rows, rows: &Csr) -> Self {
         let own = stiffness.own();
-        let here = |q: usize| rows.row(q).map(|entry| entry.0).filter(|i| own.contains(i));
-        let products = (0..rows.rows()).map(|q| here(q).count() * rows.range(q).len()).sum();
+        let owned = |q: usize| rows.row(q).map(|(i, _)| i).filter(|i| own.contains(i));
+        let products = (0..rows.rows()).map(|q| owned(q).count() * rows.range(q).len()).sum();
         let mut positions = Vec::with_capacity(products);
         for q in 0..rows.rows() {
-            for i in here(q) {
+            for i in owned(q) {
                 for (j, _) in rows.row(q) {
                     match stiffness.position(i - own.start, j) {
                         Some(position) => positions.push(position as u32),
@@ -198,42 +194,44 @@ impl Coupling {
         Self { own, positions, touched, stiffness }
     }
 
-    /// Makes K of G.
+    /// Write the values of K into those of G.
     fn reset(&self, g: &mut [f64]) {
         self.touched.iter().zip(&self.stiffness).for_each(|(&at, stiffness)| g[at as usize] = *stiffness);
     }
 
-    /// Writes K + B' diag(d) B where it differs from K; the rest of G is K already.
+    /// Write K + B' diag(d) B into the values of G, where it differs from K. Elsewhere the values are those of K already.
     fn write(&self, rows: &Csr, weight: &[f64], g: &mut [f64]) {
         self.reset(g);
-        let mut left = &self.positions[..];
+        let mut remaining = &self.positions[..];
         for (q, &weight) in weight.iter().enumerate() {
             let b = &rows.values[rows.range(q)];
-            let here = rows.row(q).filter(|entry| self.own.contains(&entry.0));
-            let (mine, others) = left.split_at(here.clone().count() * b.len());
-            left = others;
+            let owned = rows.row(q).filter(|(i, _)| self.own.contains(i));
+            let (positions, others) = remaining.split_at(owned.clone().count() * b.len());
+            remaining = others;
             if weight == 0.0 {
                 continue;
             }
-            let products = here.flat_map(|(_, x)| b.iter().map(move |y| x * y));
-            mine.iter().zip(products).for_each(|(&at, product)| g[at as usize] += weight * product);
+            let products = owned.flat_map(|(_, x)| b.iter().map(move |y| x * y));
+            positions.iter().zip(products).for_each(|(&at, product)| g[at as usize] += weight * product);
         }
     }
 }
 
-/// Growth of the stiffness under a contact row, either way, beyond which a preconditioner is poor there. With 1.2, 1.5, 2 and 3 `groove3d` (n = 16,
-/// layer 1e7) takes 50, 50, 56 and 56 iterations, `hertz-sphere` (P1, n = 12, layer 1e6) 56, 54, 56 and 117.
-const FAR: f64 = 1.5;
+/// Ratio of the stiffnesses under a contact row beyond which a preconditioner is poor there, in either direction. With 1.2, 1.5, 2 and 3
+/// `groove3d` (n = 16, layer 1e7) takes 50, 50, 56 and 56 iterations, `hertz-sphere` (P1, n = 12, layer 1e6) 56, 54, 56 and 117.
+const POOR: f64 = 1.5;
 
-/// Dofs of the contact rows where springs `new` make the stiffness [`FAR`] times that with springs `old`, or a share of it; `soft` are the springs
-/// that double it. The eigenvalues of G_old^-1 G_new lie between the least and the largest ratio of the springs; where the body is stiff
-/// beside them they do not come near that, and only the sum of both counts.
-fn far(rows: &Csr, soft: &[f64], old: &[f64], new: &[f64]) -> Vec<usize> {
-    let is_far = |q: &usize| {
+/// Return the dofs, sorted, of contact rows at which a preconditioner with springs `old` is poor for springs `new`: the stiffnesses under the row
+/// differ by more than the factor [`POOR`]. `soft` are the springs that double the stiffness under a row; all three have one entry a row.
+///
+/// The eigenvalues of G_old^-1 G_new lie between the smallest and the largest ratio of the springs. Where the body is stiff
+/// compared with its springs, they do not come near these bounds. So the stiffness of the body counts with that of the spring.
+fn poor_dofs(rows: &Csr, soft: &[f64], old: &[f64], new: &[f64]) -> Vec<usize> {
+    let is_poor = |q: &usize| {
         let (before, after) = (soft[*q] + old[*q], soft[*q] + new[*q]);
-        after > FAR * before || before > FAR * after
+        after > POOR * before || before > POOR * after
     };
-    let mut dofs: Vec<usize> = (0..rows.rows()).filter(is_far).flat_map(|q| rows.row(q).map(|entry| entry.0)).collect();
+    let mut dofs: Vec<usize> = (0..rows.rows()).filter(is_poor).flat_map(|q| rows.row(q).map(|(i, _)| i)).collect();
     dofs.sort_unstable();
     dofs.dedup();
     dofs

@@ -1,4 +1,4 @@
-//! A body whose state is all its dofs and its rigid motion, and whose G is a sparse matrix.
+//! A body whose state has all its dofs and its rigid motion.
 
 use super::{InnerSolver, RobinMatrix, Split};
 use crate::error::{Error, Kind, Result};
@@ -15,33 +15,41 @@ pub struct SparseBody<S> {
     body: ElasticBody,
     rows: Csr,
     split: Split,
-    /// Where its dofs are dealt out over the ranks: how. K and B have the dofs of this rank then, K with the columns of the matrix that its
-    /// rows are in.
+    /// How its dofs are distributed over the ranks, if they are. K and B then have the dofs that this rank owns. The columns of K are those of the
+    /// distributed matrix that has its rows.
     distribution: Option<Rc<Distribution>>,
     robin: Lazy<S>,
-    /// Diagonal and sum of magnitudes of each row of K, if the solver has it or it was given away.
-    sizes: Vec<[f64; 2]>,
+    /// The size of each row of K, if K itself is in the solver or was given away; else empty.
+    sizes: Vec<RowSize>,
 }
 
-/// G, made when something is first to be solved: a body that is only measured, or joined with others, needs none.
+/// The matrix G, which is made when something is first solved. A body that is only measured, or joined with others, needs none.
 enum Lazy<S> {
     Later {
-        /// Makes a solver of K; gone if it failed.
+        /// The function that makes a solver of K; `None` if it has failed.
         make: Option<Maker<S>>,
-        /// What it will be, for reports.
+        /// Description of the solver to be made, for reports.
         words: String,
     },
     Now(Box<RobinMatrix<S>>),
 }
 
-/// Makes a solver of K.
+/// A function that makes a solver of K.
 type Maker<S> = Box<dyn FnOnce(Rows) -> Result<S>>;
 
+/// What remains of a row of K.
+struct RowSize {
+    diagonal: f64,
+    /// Sum of the magnitudes of all entries.
+    sum: f64,
+}
+
 impl<S: InnerSolver> SparseBody<S> {
-    /// Joins a body, its contact rows (columns: its dofs, none of them prescribed) and a solver that `make` makes of K, on a
-    /// pattern that holds B'B, when something is first to be solved. `free` are the rigid motions that its supports leave. Where the body is
-    /// dealt out, it has its own dofs, and rows and motions those of the nodes that this rank knows; the matrix, if it gets one of its own,
-    /// is one of all ranks.
+    /// Join a body, whose K has a pattern that holds that of B'B, its contact rows B (columns: its dofs, none of them prescribed), and the rigid motions
+    /// `free` that its supports leave. `make` makes a solver of K when something is first solved, and `words` describe that solver.
+    ///
+    /// A distributed body has the dofs that this rank owns, while `rows` and `free` have those of its owned and ghost nodes. If the body gets a matrix of its
+    /// own, that is distributed over all ranks.
     pub fn new(
         mut body: ElasticBody,
         rows: Csr,
@@ -54,41 +62,42 @@ impl<S: InnerSolver> SparseBody<S> {
         let distribution = distribution.map(Rc::new);
         let split = Split::new(free, &rows, distribution.clone());
         body.held = Couplings::default();
-        let own = |places: &Vec<u32>| rows.of_columns(places.len(), |dof| places.binary_search(&(dof as u32)).ok());
-        let rows = distribution.as_ref().map(|distribution| own(&distribution.places)).unwrap_or(rows);
+        let owned = |places: &[u32]| rows.of_columns(places.len(), |dof| places.binary_search(&(dof as u32)).ok());
+        let rows = distribution.as_ref().map(|distribution| owned(&distribution.places)).unwrap_or(rows);
         Self { body, rows, split, distribution, robin, sizes: Vec::new() }
     }
 
-    /// Takes the loads of a body without K on the K that is here; their work on the motions that its supports leave is in `free`.
-    pub fn reload(&mut self, loaded: ElasticBody, free: &[FreeMotion]) {
-        self.body = ElasticBody { stiffness: std::mem::take(&mut self.body.stiffness), ..loaded };
+    /// Replace the loads by those of a body without K, and keep K. The work of the loads on the motions that supports leave is in `free`.
+    pub fn reload(&mut self, with_loads: ElasticBody, free: &[FreeMotion]) {
+        self.body = ElasticBody { stiffness: std::mem::take(&mut self.body.stiffness), ..with_loads };
         self.split = Split::new(free, &self.rows, None);
     }
 
-    /// Displacements of all dofs for a state.
+    /// Return the displacements of all dofs for a state.
     pub fn join(&self, u: &[f64]) -> Vec<f64> {
         self.split.join(u)
     }
 
+    /// Return the number of dofs of a state, which its rigid motions follow.
     fn dofs(&self) -> usize {
         self.body.load.len()
     }
 
-    /// G, made of K if it is not there.
+    /// Return G, which is made of K first if it does not exist.
     fn robin_matrix(&mut self) -> Result<&mut RobinMatrix<S>> {
         if let Lazy::Later { make, .. } = &mut self.robin
             && let Some(make) = make.take()
         {
             let stiffness = if S::HAS_ROWS { self.take_stiffness() } else { self.body.stiffness.clone() };
-            let diagonal = |i: usize| self.sizes.get(i).map_or_else(|| stiffness.diagonal(i), |sizes| sizes[0]);
+            let diagonal = |i: usize| self.sizes.get(i).map_or_else(|| stiffness.diagonal(i), |size| size.diagonal);
             let square = |q: usize| self.rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum();
             let mut row_stiffness: Vec<f64> = (0..self.rows.rows()).map(square).collect();
-            let (mut start, mut rows) = (None, &self.rows);
             if let Some(distribution) = &self.distribution {
                 distribution.exchange.sum(&mut row_stiffness);
-                (start, rows) = (Some(distribution.start), &distribution.rows);
             }
-            let matrix = RobinMatrix::new(super::rows(stiffness, start)?, rows, row_stiffness, make)?;
+            let start = self.distribution.as_ref().map(|distribution| distribution.start);
+            let rows = matrix_rows(&self.rows, &self.distribution);
+            let matrix = RobinMatrix::new(super::rows(stiffness, start)?, rows, row_stiffness, None, make)?;
             self.robin = Lazy::Now(Box::new(matrix));
         }
         match &mut self.robin {
@@ -97,17 +106,17 @@ impl<S: InnerSolver> SparseBody<S> {
         }
     }
 
-    /// K, of which diagonal and sizes stay.
+    /// Return K and keep the sizes of its rows.
     fn take_stiffness(&mut self) -> Csr {
         let k = std::mem::replace(&mut self.body.stiffness, Csr::new(0));
         let first = self.distribution.as_ref().map_or(0, |distribution| distribution.first);
         let diagonal = |i: usize| k.position(i, first + i).map_or(0.0, |at| k.values[at]);
-        let sizes = |i: usize| [diagonal(i), k.row(i).map(|(_, a)| a.abs()).sum()];
-        self.sizes = (0..k.rows()).map(sizes).collect();
+        let size = |i: usize| RowSize { diagonal: diagonal(i), sum: k.row(i).map(|(_, a)| a.abs()).sum() };
+        self.sizes = (0..k.rows()).map(size).collect();
         k
     }
 
-    /// G, if it was made.
+    /// Return G, if it was made.
     fn made(&self) -> Option<&RobinMatrix<S>> {
         match &self.robin {
             Lazy::Now(robin) => Some(robin),
@@ -115,7 +124,7 @@ impl<S: InnerSolver> SparseBody<S> {
         }
     }
 
-    /// One solve, or one application of the preconditioner.
+    /// Make one solve, or one application of the preconditioner.
     fn apply(&mut self, z: &mut [f64], solve: impl FnOnce(&mut S, &mut [f64]) -> Result<Solved>) -> Result<Solved> {
         let n = self.dofs();
         let solved = self.robin_matrix()?.apply(|solver| solve(solver, &mut z[..n]))?;
@@ -123,6 +132,11 @@ impl<S: InnerSolver> SparseBody<S> {
         self.split.separate(z);
         Ok(solved)
     }
+}
+
+/// Return the contact rows in the columns of the matrix that has the rows of K.
+fn matrix_rows<'a>(rows: &'a Csr, distribution: &'a Option<Rc<Distribution>>) -> &'a Csr {
+    distribution.as_ref().map_or(rows, |distribution| &distribution.rows)
 }
 
 impl<S: InnerSolver> Body for SparseBody<S> {
@@ -170,7 +184,7 @@ impl<S: InnerSolver> Body for SparseBody<S> {
 
     fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
         let n = self.dofs();
-        let rows = self.distribution.as_ref().map_or(&self.rows, |distribution| &distribution.rows);
+        let rows = matrix_rows(&self.rows, &self.distribution);
         match &mut self.robin {
             Lazy::Now(robin) if S::HAS_ROWS => robin.multiply_stiffness(rows, &u[..n], &mut y[..n]),
             _ => self.body.stiffness.multiply(&u[..n], &mut y[..n]),
@@ -179,15 +193,12 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn give_stiffness(&mut self) -> Option<Csr> {
-        if self.made().is_some() {
-            return None;
-        }
-        Some(self.take_stiffness())
+        self.made().is_none().then(|| self.take_stiffness())
     }
 
     fn robin(&mut self, weight: &[f64]) -> Result<()> {
         self.robin_matrix()?;
-        let rows = self.distribution.as_ref().map_or(&self.rows, |distribution| &distribution.rows);
+        let rows = matrix_rows(&self.rows, &self.distribution);
         match &mut self.robin {
             Lazy::Now(robin) => robin.update(rows, weight),
             Lazy::Later { .. } => Ok(()),
@@ -222,8 +233,8 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         for (i, size) in size.iter_mut().enumerate() {
             *size += match self.sizes.get(i) {
                 None => k.row(i).map(|(j, a)| (a * u[j]).abs()).sum::<f64>(),
-                // neighbours move by about as much
-                Some([_, row]) => row * u[i].abs(),
+                // without K, neighbours are taken to move by as much
+                Some(row) => row.sum * u[i].abs(),
             };
         }
         for q in 0..self.rows.rows() {
@@ -233,7 +244,7 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         }
         let diagonal = |i: usize| match self.sizes.get(i) {
             None => k.position(i, i).map_or(f64::INFINITY, |at| k.values[at]),
-            Some([diagonal, _]) => *diagonal,
+            Some(row) => row.diagonal,
         };
         let sum: f64 = size.iter().enumerate().map(|(i, size)| size * size / diagonal(i)).sum();
         sum * f64::EPSILON * f64::EPSILON
@@ -277,10 +288,10 @@ impl<S: InnerSolver> Body for SparseBody<S> {
     }
 
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
-        let own = self.join(u);
+        let owned = self.join(u);
         Ok(match &self.distribution {
-            None => own,
-            Some(distribution) => distribution.near(&own),
+            None => owned,
+            Some(distribution) => distribution.near(&owned),
         })
     }
 

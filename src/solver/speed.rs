@@ -1,30 +1,32 @@
-//! How fast this machine goes over sparse matrices in memory.
+//! How fast this machine multiplies with sparse matrices in memory.
 //!
-//! A factorisation is mostly dense algebra on numbers in the cache, multigrid goes over sparse matrices that are in memory. Processors differ by a factor of five
-//! in the latter and much less in the former, so a choice between the two that was measured on one machine is wrong on another.
+//! A factorisation is mostly dense algebra on numbers in the cache. Multigrid reads sparse matrices from memory. Processors differ by a factor of five
+//! in the speed of memory and much less in dense algebra, so a choice between the two that was measured on one machine is wrong on another.
 
 use std::hint::black_box;
 use std::sync::OnceLock;
 use std::time::Instant;
 
-/// Entries in a second on the machine of the table in docs/solvers.md.
+/// Entries a second on the machine of the table in docs/solvers.md.
 pub const REFERENCE: f64 = 5.3e8;
 
-/// Rows of the matrix and entries in each: 39 MB, more than the caches of a core hold.
+/// Rows of the matrix that is multiplied. With [`PER_ROW`] entries in each it takes 39 MB, more than the caches of a core hold.
 const ROWS: usize = 120_000;
+
+/// Entries in a row of the matrix.
 const PER_ROW: usize = 27;
 
-/// The product is measured so many times, and the fastest counts: what else the machine does only takes time.
+/// Number of measurements. The fastest counts, because other work of the machine only makes a product slower.
 const TIMES: usize = 3;
 
-/// Return how many entries of a sparse matrix one core multiplies in a second. The first call measures it, in 40 to 70 ms.
+/// Return how many entries of a sparse matrix one core multiplies in a second. The first call measures it, which takes 40 to 70 ms.
 pub fn products() -> f64 {
     static SPEED: OnceLock<f64> = OnceLock::new();
     *SPEED.get_or_init(measured)
 }
 
 fn measured() -> f64 {
-    // neighbours on a lattice, as in the matrix of a mesh
+    // columns are neighbours on a lattice, as in the matrix of a mesh
     let neighbour = |row: usize, k: usize| ((row + 3000 * (k / 9) + 55 * (k / 3 % 3) + k % 3) % ROWS) as u32;
     let columns: Vec<u32> = (0..ROWS).flat_map(|row| (0..PER_ROW).map(move |k| neighbour(row, k))).collect();
     let values = vec![1.0; ROWS * PER_ROW];
@@ -46,7 +48,7 @@ fn measured() -> f64 {
 mod tests {
     use super::*;
 
-    /// Between a machine of twenty years ago and one that does not exist yet.
+    /// The speed lies between that of a machine of twenty years ago and one that does not exist yet.
     #[test]
     fn a_speed_is_measured() {
         let speed = products();

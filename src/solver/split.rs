@@ -1,9 +1,9 @@
-//! Displacements as deformation and rigid motion, kept apart.
+//! The rigid-body split: displacements as deformation and rigid motion, stored apart.
 //!
-//! K R = 0 for the rigid motions R that supports leave free, but only for exact numbers: entries of K and u are rounded, and
-//! f - K u is wrong by eps |K| |u| however it is summed. A body that falls far onto a soft layer loses its strains in that. So
-//! its displacement is v + R a with v orthogonal to R, a state is (v, a), and K meets v alone. Forces are (r, R'r), so that
-//! sums over states are the work on displacements; their rigid part comes from loads and contact forces, without K.
+//! K R = 0 holds for the rigid motions R that supports leave free, but only in exact numbers. Entries of K and u are rounded, and
+//! f - K u has an error of eps |K| |u| however it is summed. A body that falls far onto a soft layer loses its strains in that error. So
+//! its displacement is v + R a with v orthogonal to R, a state is (v, a), and K multiplies v alone. A force is (r, R'r), so that the product of a force and a
+//! state is the work on the displacement. The rigid part R'r comes from loads and contact forces, without K.
 
 use crate::fem::rigid::FreeMotion;
 use crate::linalg::portable::log2;
@@ -12,56 +12,53 @@ use crate::model::Distribution;
 use nalgebra::DVector;
 use std::rc::Rc;
 
-/// Orthogonal rigid motions that a body's supports leave free, with what they do at its contact rows.
+/// Orthogonal rigid motions that a body's supports leave free, with their traces on its contact rows.
 #[derive(Default)]
 pub struct Split {
-    /// R, one vector over the dofs each. Their lengths lie between 1 and 2: they are scaled by powers of two, which leaves a
-    /// translation of a flat surface the same digits at all points, and few of them.
+    /// R, one vector over the dofs for each motion. Their lengths lie between 1 and 2. They are scaled by powers of two, so that a
+    /// translation of a flat surface has the same few digits at all points.
     motions: Vec<Rc<[f64]>>,
-    /// R'R, of which nothing but the diagonal is left.
+    /// The diagonal of R'R, which has no other entries.
     squares: Vec<f64>,
-    /// B R.
+    /// B R, one vector over the contact rows for each motion.
     traces: Vec<Vec<f64>>,
-    /// R'f.
+    /// R'f, one entry a motion; zero on ranks that do not own the body.
     work: Vec<f64>,
-    /// Where the dofs are dealt out over the ranks: how. R has the dofs of this rank then.
+    /// How the dofs are distributed over the ranks, if they are. R then has the dofs that this rank owns.
     distribution: Option<Rc<Distribution>>,
 }
 
 impl Split {
-    /// From motions that a body's supports leave free, independent ones; `rows` are its contact rows. Of a body that is dealt out both are
-    /// those of the dofs that this rank knows; forces on rigid motions belong to the rank that speaks for it.
+    /// Orthogonalise the independent rigid motions `free` that a body's supports leave; `rows` are its contact rows. For a distributed body both have
+    /// the dofs of the owned and ghost nodes of this rank, and forces on rigid motions belong to the rank that owns the body.
     pub fn new(free: &[FreeMotion], rows: &Csr, distribution: Option<Rc<Distribution>>) -> Self {
         let mut split = Self { distribution, ..Self::default() };
-        let mut weights: Vec<DVector<f64>> = Vec::new();
-        let products = split.distribution.clone();
-        // of two sums of motions: over the dofs, or by their weights where the dofs are those of many ranks
-        let product = |x: (&[f64], &DVector<f64>), y: (&[f64], &DVector<f64>)| match &products {
-            None => dot(x.0, y.0),
-            Some(distribution) => x.1.dot(&(&distribution.products * y.1)),
-        };
+        let mut combinations: Vec<DVector<f64>> = Vec::new();
         for (number, FreeMotion { displacement, work }) in free.iter().enumerate() {
             let (mut motion, mut work) = (displacement.clone(), *work);
-            let mut weight = DVector::from_fn(free.len(), |k, _| f64::from(u8::from(k == number)));
-            // twice is enough
+            // the motion as amounts of those in `free`
+            let mut combination = DVector::from_fn(free.len(), |k, _| f64::from(u8::from(k == number)));
+            // Gram-Schmidt, done twice for orthogonality to rounding
             for _ in 0..2 {
-                for (k, (other, square)) in split.motions.iter().zip(&split.squares).enumerate() {
-                    let part = product((other, &weights[k]), (&motion, &weight)) / square;
-                    axpy(-part, other, &mut motion);
-                    weight.axpy(-part, &weights[k], 1.0);
+                for (k, other) in combinations.iter().enumerate() {
+                    let earlier = (&split.motions[k][..], other);
+                    let part = split.product(earlier, (&motion, &combination)) / split.squares[k];
+                    axpy(-part, &split.motions[k], &mut motion);
+                    combination.axpy(-part, other, 1.0);
                     work -= part * split.work[k];
                 }
             }
-            let scale = log2(product((&motion, &weight), (&motion, &weight)).sqrt()).floor().exp2();
+            let square = split.product((&motion, &combination), (&motion, &combination));
+            let scale = log2(square.sqrt()).floor().exp2();
             motion.iter_mut().for_each(|u| *u /= scale);
-            weight /= scale;
-            split.squares.push(product((&motion, &weight), (&motion, &weight)));
+            combination /= scale;
+            split.squares.push(split.product((&motion, &combination), (&motion, &combination)));
             let mut trace = vec![0.0; rows.rows()];
             rows.multiply(&motion, &mut trace);
             split.traces.push(trace);
             split.work.push(work / scale);
             split.motions.push(motion.into());
-            weights.push(weight);
+            combinations.push(combination);
         }
         if let Some(distribution) = &split.distribution {
             split.motions.iter_mut().for_each(|motion| *motion = distribution.of_known(motion).into());
@@ -72,46 +69,56 @@ impl Split {
         split
     }
 
-    /// Sums over dofs, one a motion, from those over the dofs here; one message.
-    fn sums(&self, here: impl Iterator<Item = f64>) -> Vec<f64> {
-        let mut sums: Vec<f64> = here.collect();
+    /// Return the product of two motions over all dofs of the body. Each motion is given by its displacements of the dofs of this rank, and by its amounts of
+    /// the motions that supports leave. The amounts serve a distributed body, whose dofs belong to many ranks.
+    fn product(&self, x: (&[f64], &DVector<f64>), y: (&[f64], &DVector<f64>)) -> f64 {
+        match &self.distribution {
+            None => dot(x.0, y.0),
+            Some(distribution) => x.1.dot(&(&distribution.products * y.1)),
+        }
+    }
+
+    /// Return sums over all dofs of the body, one a motion, from those over the dofs of this rank. One message.
+    fn sums(&self, local: impl Iterator<Item = f64>) -> Vec<f64> {
+        let mut sums: Vec<f64> = local.collect();
         if let Some(distribution) = &self.distribution {
             distribution.exchange.sum(&mut sums);
         }
         sums
     }
 
-    /// Whether forces on rigid motions are this rank's.
+    /// Return whether forces on rigid motions belong to this rank, which then owns the body.
     fn leads(&self) -> bool {
         self.distribution.as_ref().is_none_or(|distribution| distribution.leads)
     }
 
-    /// Number of motions: a state is this much longer than the dofs.
+    /// Return the number of motions. A state has so many entries after its dofs.
     pub fn count(&self) -> usize {
         self.motions.len()
     }
 
-    /// R, one vector over the dofs each.
+    /// Return R, one vector over the dofs for each motion.
     pub fn motions(&self) -> &[Rc<[f64]>] {
         &self.motions
     }
 
-    /// B R, one vector over the contact rows each.
+    /// Return B R, one vector over the contact rows for each motion.
     pub fn traces(&self) -> &[Vec<f64>] {
         &self.traces
     }
 
-    /// Moves the rigid part of the dofs of a state to its end.
+    /// Move the rigid part of the dofs of a state to the entries for rigid motions at its end.
     pub fn separate(&self, state: &mut [f64]) {
         let (dofs, rigid) = state.split_at_mut(state.len() - self.count());
         let parts = self.sums(self.motions.iter().map(|motion| dot(motion, dofs)));
-        for (((motion, square), part), a) in self.motions.iter().zip(&self.squares).zip(parts).zip(rigid) {
-            axpy(-part / square, motion, dofs);
-            *a += part / square;
+        for (k, part) in parts.into_iter().enumerate() {
+            let amount = part / self.squares[k];
+            axpy(-amount, &self.motions[k], dofs);
+            rigid[k] += amount;
         }
     }
 
-    /// Displacements of all dofs.
+    /// Return the displacements v + R a of all dofs for a state.
     pub fn join(&self, state: &[f64]) -> Vec<f64> {
         let (dofs, rigid) = state.split_at(state.len() - self.count());
         let mut u = dofs.to_vec();
@@ -119,38 +126,36 @@ impl Split {
         u
     }
 
-    /// t += B R a, on the rank that speaks for the body.
+    /// Add B R a to the trace t, on the rank that owns the body.
     pub fn add_trace(&self, rigid: &[f64], t: &mut [f64]) {
-        if !self.leads() {
-            return;
+        if self.leads() {
+            self.traces.iter().zip(rigid).for_each(|(trace, &a)| axpy(a, trace, t));
         }
-        self.traces.iter().zip(rigid).for_each(|(trace, &a)| axpy(a, trace, t));
     }
 
-    /// y += (B R)' force, one entry a motion, on the rank that speaks for the body.
+    /// Add s (B R)' force to y, which has one entry a motion, on the rank that owns the body.
     pub fn add_rows(&self, s: f64, force: &[f64], y: &mut [f64]) {
-        if !self.leads() {
-            return;
+        if self.leads() {
+            self.traces.iter().zip(y).for_each(|(trace, y)| *y += s * dot(trace, force));
         }
-        self.traces.iter().zip(y).for_each(|(trace, y)| *y += s * dot(trace, force));
     }
 
-    /// R'r of a force at the dofs.
+    /// Return R'r for a force r at the dofs.
     pub fn rigid_part(&self, force: &[f64]) -> Vec<f64> {
         self.motions.iter().map(|motion| dot(motion, force)).collect()
     }
 
-    /// R'f.
+    /// Return R'f, one entry a motion; zero on ranks that do not own the body.
     pub fn work(&self) -> &[f64] {
         &self.work
     }
 
-    /// Gives the dofs of a force the rigid part that its end says.
+    /// Correct the dofs of a force so that their rigid part R'r is the one at its end.
     pub fn balance(&self, force: &mut [f64]) {
         let (dofs, rigid) = force.split_at_mut(force.len() - self.count());
-        let lacking = self.sums(self.motions.iter().zip(&*rigid).map(|(motion, a)| a - dot(motion, dofs)));
-        for ((motion, square), lacking) in self.motions.iter().zip(&self.squares).zip(lacking) {
-            axpy(lacking / square, motion, dofs);
+        let lacking = self.sums(self.motions.iter().zip(&*rigid).map(|(motion, part)| part - dot(motion, dofs)));
+        for (k, lacking) in lacking.into_iter().enumerate() {
+            axpy(lacking / self.squares[k], &self.motions[k], dofs);
         }
     }
 }
@@ -159,8 +164,8 @@ impl Split {
 mod tests {
     use super::*;
 
-    /// Three nodes on a line that slides and turns: deformation and rigid motion come apart and together again, and sliding moves
-    /// all contact rows by the same number.
+    /// Three nodes on a line slide and turn. Deformation and rigid motion are separated and joined again, and sliding moves
+    /// all contact rows by the same amount.
     #[test]
     fn states_come_apart_and_together() {
         let free = |displacement: [f64; 6]| FreeMotion { displacement: displacement.to_vec(), work: 3.0 };
@@ -170,7 +175,7 @@ mod tests {
         let split = Split::new(&free, &rows, None);
         assert_eq!(split.traces()[0], [1.0; 3]);
         assert!(dot(&split.motions()[0], &split.motions()[1]).abs() < 1e-15);
-        // of the second motion half the first is taken away, with its work
+        // half of the first motion is taken away from the second, with its work
         assert_eq!(split.work()[0], 3.0);
         let shape = split.motions()[1][1] / 0.5;
         assert!((split.work()[1] - 1.5 * shape).abs() < 1e-14);

@@ -1,15 +1,23 @@
-//! What the options of a scene may be: a choice of solvers and of their parameters, and nothing else.
+//! The options that stand in a scene. They choose solvers and set parameters of solvers, and do nothing else.
 //!
-//! PETSc's options also write files, remove folders, call a shell, load libraries and read more options. A scene may come from anybody, so its
-//! options are those of the lists below: names that PETSc 3.18 tells in its help for the solvers of [`probe`](super::probe), each looked up in
-//! PETSc's sources, whose values are numbers, switches, or words of a closed list. An option that PETSc adds later is not among them.
+//! PETSc's options also write files, remove folders, call a shell, load libraries and read more options. A scene may come from anybody, so it
+//! may only have the options listed below. Their names are those in the help of PETSc 3.18 for the solvers of [`probe`](super::probe). Each was
+//! looked up in PETSc's sources, and takes numbers, a switch, or words of a closed list. An option that PETSc adds later is not among them.
 
 use super::looks;
 use super::probe::{METHODS, PRECONDITIONERS};
+use super::typed::Prefixes;
 use crate::error::{Error, Kind, Result, nearest};
-use crate::petsc::is_global;
+use crate::petsc::{Session, is_global};
+use std::cell::RefCell;
+use std::collections::BTreeSet;
 
-/// Options that are on or off, or that print to the terminal alone.
+thread_local! {
+    /// Names of the scene's options in PETSc's table, which is one for the process. They are weaker than typed ones, and are removed with the scene.
+    static OF_SCENE: RefCell<BTreeSet<String>> = const { RefCell::new(BTreeSet::new()) };
+}
+
+/// Options that are on or off, or that only print to the terminal.
 const SWITCHES: &str = "ksp_bcgsl_cxpoly ksp_bcgsl_mrpoly ksp_bcgsl_pinv ksp_cg_single_reduction \
     ksp_chebyshev_esteig_noisy ksp_constant_null_space ksp_converged_maxits ksp_converged_use_initial_residual_norm \
     ksp_converged_use_min_initial_residual_norm ksp_dgmres_force ksp_dgmres_improve ksp_diagonal_scale \
@@ -91,20 +99,20 @@ const WORDS: &str = "ksp_cg_dtype ksp_convergence_test ksp_fcg_truncation_type k
 /// Options that take a word of the lists below.
 const LISTED: &str = "ksp_type pc_type mat_type pc_hypre_type pc_hypre_boomeramg_smooth_type";
 
-/// Names of matrix types that the program's matrices can have.
+/// Matrix types that the program's matrices can have.
 const MATRICES: [&str; 9] = ["aij", "seqaij", "mpiaij", "baij", "seqbaij", "mpibaij", "sbaij", "seqsbaij", "mpisbaij"];
 
 /// Preconditioners of hypre. `euclid` is left out: it reads a file `database` of the current folder.
 const OF_HYPRE: [&str; 3] = ["boomeramg", "parasails", "pilut"];
 
-/// Smoothers of its multigrid, likewise.
+/// Smoothers of hypre's multigrid, likewise without Euclid.
 const SMOOTHERS: [&str; 3] = ["Schwarz-smoothers", "Pilut", "ParaSails"];
 
-/// Controls of MUMPS that a scene may not set: 1 to 3 are numbers of Fortran files that MUMPS writes to, 22 lets it write its factors to a
-/// disk.
+/// Controls of MUMPS that a scene may not set. Controls 1 to 3 are numbers of Fortran files that MUMPS writes to, and 22 lets MUMPS write its
+/// factors to a disk.
 const WRITING: [&str; 4] = ["1", "2", "3", "22"];
 
-/// What an option takes.
+/// The kind of value that an option takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Takes {
     /// Nothing, a truth value or a number.
@@ -121,32 +129,29 @@ enum Takes {
     OneOf(&'static [&'static str]),
 }
 
-/// Return what an option takes, by its bare name or the end of it after the prefixes of a body and of nested solvers; none of one that is not
-/// for scenes.
+/// Return the kind of value that an option takes, given its name without dash; `None` if a scene may not have it. The name may begin with the
+/// prefixes of a body and of nested solvers.
 fn takes(name: &str) -> Option<Takes> {
-    ends(name).find_map(of_leaf)
+    ends(name).find_map(takes_of_leaf)
 }
 
-/// A name, and what is left of it behind each `_`.
+/// Return a name, and the rest of the name behind each `_`.
 fn ends(name: &str) -> impl Iterator<Item = &str> {
     std::iter::once(name).chain(name.match_indices('_').map(|(at, _)| &name[at + 1..]))
 }
 
-/// The same for a name without prefixes.
-fn of_leaf(name: &str) -> Option<Takes> {
+/// Return the kind of value that an option without prefixes takes.
+fn takes_of_leaf(name: &str) -> Option<Takes> {
     let is_in = |list: &str| list.split_whitespace().any(|known| known.eq_ignore_ascii_case(name));
-    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let control = |family: &str| name.strip_prefix(family).filter(|number| is_number(number));
-    let name_is = |known: &str| known.eq_ignore_ascii_case(name);
-    Some(match () {
-        _ if name_is("ksp_type") => Takes::Method,
-        _ if name_is("pc_type") => Takes::Preconditioner,
-        _ if name_is("mat_type") => Takes::OneOf(&MATRICES),
-        _ if name_is("pc_hypre_type") => Takes::OneOf(&OF_HYPRE),
-        _ if name_is("pc_hypre_boomeramg_smooth_type") => Takes::OneOf(&SMOOTHERS),
-        _ if control("mat_mumps_icntl_").is_some_and(|number| !WRITING.contains(&number.trim_start_matches('0'))) => {
-            Takes::Numbers
-        }
+    let may_set = |number: &str| !WRITING.contains(&number.trim_start_matches('0'));
+    Some(match name.to_ascii_lowercase().as_str() {
+        "ksp_type" => Takes::Method,
+        "pc_type" => Takes::Preconditioner,
+        "mat_type" => Takes::OneOf(&MATRICES),
+        "pc_hypre_type" => Takes::OneOf(&OF_HYPRE),
+        "pc_hypre_boomeramg_smooth_type" => Takes::OneOf(&SMOOTHERS),
+        _ if control("mat_mumps_icntl_").is_some_and(may_set) => Takes::Numbers,
         _ if control("mat_mumps_cntl_").is_some() => Takes::Numbers,
         _ if is_in(SWITCHES) => Takes::Switch,
         _ if is_in(NUMBERS) => Takes::Numbers,
@@ -155,8 +160,13 @@ fn of_leaf(name: &str) -> Option<Takes> {
     })
 }
 
+/// Return whether a text is a natural number.
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
 impl Takes {
-    /// Whether a value, empty if there is none, is of this kind. None can be the name of a file or of a viewer.
+    /// Return whether a value is of this kind; an option without a value has an empty one. No such value can name a file or a viewer.
     fn allows(self, value: &str) -> bool {
         let has = |list: &[&str]| list.iter().any(|known| known.eq_ignore_ascii_case(value));
         let is_default = |word: &str| ["default", "decide"].iter().any(|known| known.eq_ignore_ascii_case(word));
@@ -174,7 +184,7 @@ impl Takes {
         }
     }
 
-    /// What it is, in words.
+    /// Return what the user may write, for a message.
     fn words(self) -> String {
         match self {
             Self::Switch => "nothing, true or false, or a number".to_owned(),
@@ -187,7 +197,7 @@ impl Takes {
     }
 }
 
-/// The names of preconditioners, each once or several times.
+/// Return the names of PETSc's preconditioners. A name may come several times.
 fn preconditioners() -> impl Iterator<Item = &'static str> {
     PRECONDITIONERS.split_whitespace().map(|word| word.split(':').next().unwrap_or(word))
 }
@@ -237,7 +247,7 @@ pub fn check_of_scene(name: &str, value: Option<&str>) -> Result<()> {
     Err(error.help("what PETSc takes besides is for the command line"))
 }
 
-/// The refusal of an option that is not for scenes.
+/// Return the error for an option that a scene may not have.
 fn refused(name: &str, value: Option<&str>) -> Error {
     let typed = value.map_or(name.to_owned(), |value| format!("{name} {value}"));
     let help = || {
@@ -246,11 +256,11 @@ fn refused(name: &str, value: Option<&str>) -> Error {
             + &typed
     };
     let error = Error::new(Kind::Solver, format!("a scene may not have the option {name}"));
-    error.help(slip(name).unwrap_or_else(help))
+    error.help(corrected(name).unwrap_or_else(help))
 }
 
-/// The option that a name may be a slip of the keyboard for, as advice. One that asks PETSc to show something is none.
-fn slip(name: &str) -> Option<String> {
+/// Return advice with the option that a mistyped name may stand for. There is none for an option that asks PETSc to show something.
+fn corrected(name: &str) -> Option<String> {
     let lists = [SWITCHES, NUMBERS, WORDS, LISTED];
     let known: Vec<&str> = lists.iter().flat_map(|list| list.split_whitespace()).collect();
     let bare = name.trim_start_matches('-');
@@ -259,6 +269,29 @@ fn slip(name: &str) -> Option<String> {
     }
     let mut ends = ends(bare).map(|end| (&bare[..bare.len() - end.len()], nearest(end, known.iter().copied())));
     ends.find_map(|(prefix, near)| near.map(|near| format!("did you mean -{prefix}{near}?")))
+}
+
+/// Set an option that stands in the scene, unless the command line has the same option, or the plain one for an option of one
+/// body.
+///
+/// # Errors
+/// The option is not one that a scene may have, or PETSc refuses the name.
+pub fn set_of_scene(session: &Session, bodies: &[&str], name: &str, value: Option<&str>) -> Result<()> {
+    check_of_scene(name, value)?;
+    let options = session.options();
+    let is_typed = |name: &str| options.has(name) && !OF_SCENE.with_borrow(|names| names.contains(name));
+    let plain = Prefixes::new(bodies).split(name).map(|(_, bare)| format!("-{bare}"));
+    if is_typed(name) || plain.is_some_and(|plain| is_typed(&plain)) {
+        return Ok(());
+    }
+    options.set(name, value)?;
+    OF_SCENE.with_borrow_mut(|names| names.insert(name.to_owned()));
+    Ok(())
+}
+
+/// Take the scene's options out of PETSc's table, so that another scene of the process starts from the typed options.
+pub fn withdraw(session: &Session) -> Result<()> {
+    OF_SCENE.take().iter().try_for_each(|name| session.options().clear(name))
 }
 
 #[cfg(test)]

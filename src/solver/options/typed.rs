@@ -1,17 +1,12 @@
 //! What the user wrote: options for all solvers, and for one.
 
-use super::{Chosen, check_of_scene, looks};
+use super::chosen::Origin;
+use super::{Chosen, looks};
 use crate::error::Result;
 use crate::petsc::{Entry, Session, is_of_family};
-use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, HashSet};
 
-thread_local! {
-    /// Names that stand in the scene: as good as typed, but weaker, and gone with the scene. PETSc's table is one for the process too.
-    static OF_SCENE: RefCell<BTreeSet<String>> = const { RefCell::new(BTreeSet::new()) };
-}
-
-/// Prefixes of solvers, to be looked up.
+/// The prefixes of all solvers of a run: names of bodies, and that of the matrix of all bodies.
 pub(super) struct Prefixes<'a>(HashSet<&'a str>);
 
 impl<'a> Prefixes<'a> {
@@ -19,86 +14,68 @@ impl<'a> Prefixes<'a> {
         Self(names.iter().copied().collect())
     }
 
-    /// The solver whose prefix an option has, and the option without it; of `brick` and `brick_1` the longer one.
+    /// Split a name into the prefix of a solver and the rest, which has no dash. Where both `brick` and `brick_1` fit, the longer prefix counts.
     pub(super) fn split<'b>(&self, name: &'b str) -> Option<(&'b str, &'b str)> {
-        let bare = name.trim_start_matches('-');
-        let mut parts = bare.rmatch_indices('_').map(|(at, _)| (&bare[..at], &bare[at + 1..]));
-        parts.find(|(first, _)| self.0.contains(first))
+        let name = without_dash(name);
+        let mut parts = name.rmatch_indices('_').map(|(at, _)| (&name[..at], &name[at + 1..]));
+        parts.find(|(prefix, _)| self.0.contains(prefix))
     }
 
-    /// The option without dash and prefix.
+    /// Return the name without dash and prefix.
     pub(super) fn bare<'b>(&self, name: &'b str) -> &'b str {
-        self.split(name).map_or(name.trim_start_matches('-'), |(_, bare)| bare)
+        self.split(name).map_or(without_dash(name), |(_, bare)| bare)
     }
 
-    /// Whether an option is a plain one of an object family, and of no solver.
+    /// Return whether an option of a PETSc object is written without the prefix of a solver.
     pub(super) fn is_plain(&self, name: &str) -> bool {
-        self.split(name).is_none() && is_of_family(name.trim_start_matches('-'))
+        self.split(name).is_none() && is_of_family(without_dash(name))
     }
 }
 
-/// Sets an option that stands in the scene, unless the command line says something else: that option, or the plain one for
-/// one of a body.
-///
-/// # Errors
-/// When it is not one that a scene may have, or PETSc refuses the name.
-pub fn set_of_scene(session: &Session, bodies: &[&str], name: &str, value: Option<&str>) -> Result<()> {
-    check_of_scene(name, value)?;
-    let options = session.options();
-    let typed = |name: &str| options.has(name) && !OF_SCENE.with_borrow(|names| names.contains(name));
-    let plain = Prefixes::new(bodies).split(name).map(|(_, bare)| format!("-{bare}"));
-    if typed(name) || plain.is_some_and(|plain| typed(&plain)) {
-        return Ok(());
-    }
-    options.set(name, value)?;
-    OF_SCENE.with_borrow_mut(|names| names.insert(name.to_owned()));
-    Ok(())
+/// Return the name of an option without its dash.
+pub(super) fn without_dash(name: &str) -> &str {
+    name.trim_start_matches('-')
 }
 
-/// Takes what stood in the scene out of the table, so that another scene of the process starts from the typed options.
-pub fn withdraw(session: &Session) -> Result<()> {
-    OF_SCENE.take().iter().try_for_each(|name| session.options().clear(name))
-}
-
-/// The options that the user wrote for solvers, on the command line, in files, and in the scene.
+/// The options that the user wrote for solvers: on the command line, in files, and in the scene.
 #[derive(Default)]
 pub struct Typed {
-    /// Those for all solvers, without dash.
+    /// Options for all solvers, without dash.
     plain: Vec<Entry>,
-    /// Those for one, by its prefix, without that.
+    /// Options for one solver under its prefix, without dash and prefix.
     own: BTreeMap<String, Vec<Entry>>,
 }
 
 impl Typed {
-    /// Reads PETSc's table. `prefixes` are those of all solvers of the run, on every rank.
+    /// Read PETSc's table. `prefixes` are those of all solvers of the run, on every rank.
     pub fn read(session: &Session, prefixes: &[&str]) -> Result<Self> {
-        let known = Prefixes::new(prefixes);
+        let prefixes = Prefixes::new(prefixes);
         let (mut plain, mut own) = (Vec::new(), BTreeMap::<String, Vec<Entry>>::new());
         for (name, value) in session.options().all()? {
-            if let Some((prefix, bare)) = known.split(&name) {
+            if let Some((prefix, bare)) = prefixes.split(&name) {
                 own.entry(prefix.to_owned()).or_default().push((bare.to_owned(), value));
-            } else if known.is_plain(&name) {
-                plain.push((name.trim_start_matches('-').to_owned(), value));
+            } else if prefixes.is_plain(&name) {
+                plain.push((without_dash(&name).to_owned(), value));
             }
         }
         Ok(Self { plain, own })
     }
 
-    /// What they say of one solver.
+    /// Return the options of one solver: its own ones, and plain ones that it has not as its own.
     pub fn of(&self, prefix: &str) -> Chosen {
         let mut chosen = Chosen::new(prefix);
-        let own = self.own.get(prefix).map_or(&[][..], Vec::as_slice);
-        own.iter().for_each(|(name, value)| chosen.write(name, value.as_deref(), true));
-        self.plain.iter().for_each(|(name, value)| chosen.write(name, value.as_deref(), false));
+        let own = self.own.get(prefix).into_iter().flatten();
+        own.for_each(|(name, value)| chosen.add(name, value.as_deref(), Origin::Own));
+        self.plain.iter().for_each(|(name, value)| chosen.add(name, value.as_deref(), Origin::Plain));
         chosen
     }
 
-    /// Number of solvers that have an option of this bare name of their own.
+    /// Return the number of solvers that have an own option of this bare name.
     pub(super) fn owners(&self, bare: &str) -> usize {
         self.own.values().filter(|own| own.iter().any(|(name, _)| name.eq_ignore_ascii_case(bare))).count()
     }
 
-    /// The combinations of options that solvers have: that for all, and that of each one with options of its own.
+    /// Return the combinations of options that solvers have: first the plain options, then one combination for each solver with own options.
     pub(super) fn combinations(&self) -> Vec<Vec<Entry>> {
         let of = |own: &[Entry]| -> Vec<Entry> {
             let is_own = |name: &str| own.iter().any(|(known, _)| known.eq_ignore_ascii_case(name));
@@ -108,11 +85,11 @@ impl Typed {
     }
 }
 
-/// The options that the user typed and that look at a solver, with their dash.
+/// Return the options that the user typed and that only look at a solver, with their dash.
 pub fn watching(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
     let prefixes = Prefixes::new(bodies);
-    let watches = |name: &String| looks(prefixes.bare(name)) && is_of_family(prefixes.bare(name));
-    Ok(session.options().all()?.into_iter().map(|(name, _)| name).filter(watches).collect())
+    let is_watching = |name: &String| looks(prefixes.bare(name)) && is_of_family(prefixes.bare(name));
+    Ok(session.options().all()?.into_iter().map(|(name, _)| name).filter(is_watching).collect())
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
-//! Options that nobody read: slips of the keyboard, and good options that have no effect.
+//! Options that nobody read: mistyped ones, and valid ones that have no effect.
 
+use super::chosen::nest_of;
 use super::probe::Names;
-use super::typed::{Prefixes, Typed};
+use super::typed::{Prefixes, Typed, without_dash};
 use crate::error::{Result, nearest};
 use crate::petsc::{Entry, Session, is_global};
 use std::collections::BTreeSet;
@@ -26,12 +27,12 @@ pub enum UnreadKind {
     NotInUse,
 }
 
-/// Options of solvers that are read only in a solve.
+/// An option that a solver reads only when it solves.
 const LATE: &str = "ksp_converged_reason";
 
-/// The options that the user typed and that nobody has read on any rank. Call it on every rank with the same bodies,
-/// after all solvers are set up; `all_reduce` combines the flags of all ranks by "or". What is returned counts as read
-/// from then on, so that PETSc does not repeat it at its end.
+/// Return the options that the user typed and that nobody has read on any rank. Call it on every rank with the same bodies,
+/// after all solvers are set up. `all_reduce` combines the flags of all ranks by "or". The returned options count as read
+/// from then on, so that PETSc does not report them again when it finalizes.
 ///
 /// ```
 /// use winkler::{petsc::{Ksp, Matrix, Session}, solver::options::*};
@@ -47,8 +48,8 @@ const LATE: &str = "ksp_converged_reason";
 ///     ksp.set_up()
 /// })?;
 /// let unread = unread(&session, &["upper"], &|_| ())?;
-/// let told: Vec<_> = unread.iter().map(|u| (u.name.as_str(), u.kind, u.nearest.as_deref())).collect();
-/// assert_eq!(told, [
+/// let found: Vec<_> = unread.iter().map(|u| (u.name.as_str(), u.kind, u.nearest.as_deref())).collect();
+/// assert_eq!(found, [
 ///     ("-ksp_tpye", UnreadKind::Unknown, Some("-ksp_type")),
 ///     ("-pc_gamg_threshold", UnreadKind::NotInUse, None),
 ///     ("-uper_pc_type", UnreadKind::Unknown, Some("-upper_pc_type")),
@@ -60,18 +61,18 @@ pub fn unread(session: &Session, bodies: &[&str], all_reduce: &dyn Fn(&mut [u8])
     let (prefixes, typed) = (Prefixes::new(bodies), Typed::read(session, bodies)?);
     let all = options.all()?;
     let candidates: Vec<&Entry> = all.iter().filter(|(name, _)| !is_late(name, &prefixes)).collect();
-    // one that every solver has of its own serves none, and is no mistake
-    let is_served =
-        |name: &str| prefixes.is_plain(name) && !bodies.is_empty() && typed.owners(bare(name)) == bodies.len();
-    let mut read: Vec<u8> =
-        candidates.iter().map(|(name, _)| u8::from(options.used(name) || is_served(name))).collect();
+    // a plain option serves no solver if every solver has an own option of that name; this is no mistake
+    let is_replaced =
+        |name: &str| prefixes.is_plain(name) && !bodies.is_empty() && typed.owners(without_dash(name)) == bodies.len();
+    let flag = |(name, _): &&Entry| u8::from(options.used(name) || is_replaced(name));
+    let mut read: Vec<u8> = candidates.iter().map(flag).collect();
     all_reduce(&mut read);
-    let mut left: Vec<&Entry> = Vec::new();
-    for (entry, read) in candidates.into_iter().zip(read) {
-        // Here for all ranks: PETSc's -options_left knows only its own.
-        options.mark_used(&entry.0)?;
+    let mut left: Vec<&str> = Vec::new();
+    for ((name, _), read) in candidates.into_iter().zip(read) {
+        // an option that another rank read is marked here, too: PETSc's -options_left knows only its own process
+        options.mark_used(name)?;
         if read == 0 {
-            left.push(entry);
+            left.push(name);
         }
     }
     if left.is_empty() {
@@ -79,24 +80,20 @@ pub fn unread(session: &Session, bodies: &[&str], all_reduce: &dyn Fn(&mut [u8])
     }
 
     let names = Names::collect(session, &typed.combinations())?;
-    let found = left.into_iter().map(|(name, _)| {
-        let valid = names.contains(prefixes.bare(name));
-        Unread {
-            name: name.clone(),
-            kind: if valid { UnreadKind::NotInUse } else { UnreadKind::Unknown },
-            nearest: if valid { None } else { near(name, bodies, &names) },
-        }
+    let found = left.into_iter().map(|name| {
+        let (kind, nearest) = match names.contains(prefixes.bare(name)) {
+            true => (UnreadKind::NotInUse, None),
+            false => (UnreadKind::Unknown, most_similar(name, bodies, &names)),
+        };
+        Unread { name: name.to_owned(), kind, nearest }
     });
     Ok(found.collect())
 }
 
-fn bare(name: &str) -> &str {
-    name.trim_start_matches('-')
-}
-
-/// The most similar name that PETSc knows, plain or of a body whose name resembles the beginning of `name`.
-fn near(name: &str, bodies: &[&str], names: &Names) -> Option<String> {
-    let heads = bare(name).match_indices('_').map(|(at, _)| &bare(name)[..at]);
+/// Return the most similar name that PETSc knows, as a plain option or with the prefix of a body whose name resembles the beginning of `name`.
+fn most_similar(name: &str, bodies: &[&str], names: &Names) -> Option<String> {
+    let bare = without_dash(name);
+    let heads = bare.match_indices('_').map(|(at, _)| &bare[..at]);
     let bodies: BTreeSet<&str> = heads.filter_map(|head| nearest(head, bodies.iter().copied())).collect();
     let prefixes = std::iter::once(String::new()).chain(bodies.iter().map(|body| format!("{body}_")));
     let known: Vec<String> =
@@ -104,18 +101,9 @@ fn near(name: &str, bodies: &[&str], names: &Names) -> Option<String> {
     nearest(name, known.iter().map(String::as_str)).map(str::to_owned)
 }
 
-/// Whether an option is not read by the objects at set-up: one of PETSc as a whole, or one read later.
+/// Return whether an option is not read by objects when they are set up. It belongs to PETSc as a whole, or a solver, which may be nested
+/// (`sub_ksp_converged_reason`), reads it later.
 fn is_late(name: &str, prefixes: &Prefixes) -> bool {
-    let bare = match prefixes.split(name) {
-        Some((_, own)) => own,
-        None => {
-            let bare = bare(name);
-            if is_global(bare) {
-                return true;
-            }
-            bare
-        }
-    };
-    // Also in a nested solver, as sub_ksp_converged_reason.
-    bare.strip_suffix(LATE).is_some_and(|nest| nest.is_empty() || nest.ends_with('_'))
+    let is_of_petsc = prefixes.split(name).is_none() && is_global(without_dash(name));
+    is_of_petsc || nest_of(prefixes.bare(name), LATE).is_some()
 }
