@@ -1,60 +1,60 @@
-//! What the ranks of a run tell each other: bytes, and plain data as bytes.
+//! Messages between the ranks of a run: bytes, and plain data packed into bytes.
 
 use crate::error::{Error, Kind, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
 
-/// What the ranks of a parallel run tell each other; calls are collective unless they say otherwise.
+/// The messages between the ranks of a run. Calls are collective unless they say otherwise.
 pub trait Exchange {
-    /// Replaces `values` on every rank by the sum over the ranks: the same numbers everywhere, as MPI promises. Where every body lives
-    /// on one rank, every entry is non-zero on one only, so that sums are exact.
+    /// Replace `values` by their sum over the ranks (MPI_Allreduce). All ranks get the same numbers, as MPI guarantees. If every body lives on one
+    /// rank, every entry is non-zero on one rank only, so that sums are exact.
     fn sum(&self, values: &mut [f64]);
-    /// Number of ranks.
+    /// Return the number of ranks.
     fn ranks(&self) -> usize;
-    /// Number of this one.
+    /// Return the number of this rank, from 0.
     fn rank(&self) -> usize;
-    /// The bytes of each rank, in their order.
+    /// Return the bytes of every rank, in the order of the ranks (MPI_Allgather).
     fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>>;
-    /// The bytes of the first rank.
+    /// Return the bytes of the first rank (MPI_Bcast).
     fn tell(&self, mine: Vec<u8>) -> Vec<u8>;
-    /// The bytes that each rank has for this one, in their order, where `mine` are those for each rank.
+    /// Send `mine[k]` to rank k, and return the bytes from every rank, in the order of the ranks (MPI_Alltoall).
     fn trade(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
-    /// Bytes for one other rank, which takes them from this one; neither is collective.
+    /// Send bytes to one other rank, which has to receive them from this one. Not collective.
     fn send(&self, to: usize, bytes: &[u8]);
-    /// Bytes that another rank sends to this one.
+    /// Receive the bytes that another rank sends to this one. Not collective.
     fn receive(&self, from: usize) -> Vec<u8>;
-    /// Sums and shares so far between several ranks.
+    /// Return the number of sums, shares and trades between several ranks so far.
     fn messages(&self) -> usize;
 }
 
-/// What each rank knows, in their order; collective.
+/// Return the value of every rank, in the order of the ranks (all_gather). Collective.
 pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
     if exchange.ranks() == 1 {
         return vec![mine];
     }
-    exchange.share(pack(&mine)).into_iter().map(own).collect()
+    exchange.share(pack(&mine)).into_iter().map(received).collect()
 }
 
-/// One list of what all ranks have, sorted; collective.
+/// Return the elements of all ranks in one sorted list. Collective.
 pub fn gather<T: Serialize + DeserializeOwned + Ord>(exchange: &dyn Exchange, mine: &[T]) -> Vec<T> {
     let mut all: Vec<T> = Vec::new();
-    exchange.share(pack(&mine)).into_iter().for_each(|bytes| all.append(&mut own(bytes)));
+    exchange.share(pack(&mine)).into_iter().for_each(|bytes| all.append(&mut received(bytes)));
     all.sort_unstable();
     all
 }
 
-/// The place of each of `mine`, which are sorted, among those of all ranks, of which no two are the same: each rank sorts those between two values, which
-/// are found by samples. Collective.
+/// Return the global index of each element of the sorted slice `mine`, in the order of the elements of all ranks. Elements are distinct across
+/// ranks. Each rank sorts one interval of values; the ends of the intervals are found from samples. Collective.
 pub fn places<T: Serialize + DeserializeOwned + Ord + Clone>(exchange: &dyn Exchange, mine: &[T]) -> Vec<u32> {
     let ranks = exchange.ranks();
-    let every = |all: &[T]| (1..ranks).filter_map(|k| all.get(k * all.len() / ranks).cloned()).collect::<Vec<T>>();
-    let between = every(&gather(exchange, &every(mine)));
+    let sample = |all: &[T]| (1..ranks).filter_map(|k| all.get(k * all.len() / ranks).cloned()).collect::<Vec<T>>();
+    let ends = sample(&gather(exchange, &sample(mine)));
     let mut rest = mine;
     let mut parts = Vec::with_capacity(ranks);
-    for value in &between {
+    for end in &ends {
         let part;
-        (part, rest) = rest.split_at(rest.partition_point(|other| other < value));
+        (part, rest) = rest.split_at(rest.partition_point(|value| value < end));
         parts.push(part.to_vec());
     }
     parts.push(rest.to_vec());
@@ -62,60 +62,62 @@ pub fn places<T: Serialize + DeserializeOwned + Ord + Clone>(exchange: &dyn Exch
     let theirs: Vec<Vec<T>> = trade(exchange, parts);
     let lengths = share(exchange, theirs.iter().map(Vec::len).sum::<usize>());
     let first = lengths[..exchange.rank()].iter().sum::<usize>() as u32;
-    let mut places: Vec<Vec<u32>> = theirs.iter().map(|theirs| vec![0; theirs.len()]).collect();
+    let mut indices: Vec<Vec<u32>> = theirs.iter().map(|theirs| vec![0; theirs.len()]).collect();
+    // each value with its rank and its position there
     let of_rank = |(rank, theirs): (usize, Vec<T>)| theirs.into_iter().zip(0..).map(move |(value, k)| (value, rank, k));
     let mut all: Vec<(T, usize, usize)> = theirs.into_iter().enumerate().flat_map(of_rank).collect();
     all.sort_unstable();
-    all.iter().zip(first..).for_each(|(&(_, rank, k), place)| places[rank][k] = place);
-    trade(exchange, places).concat()
+    all.iter().zip(first..).for_each(|(&(_, rank, k), index)| indices[rank][k] = index);
+    trade(exchange, indices).concat()
 }
 
-/// What this rank has of lists of these lengths, if all of them one after the other are cut into equal parts for the ranks.
+/// Return the range of each list that this rank gets, if the lists, of these lengths and one after the other, are cut into equal parts for the
+/// ranks.
 pub fn shares(lengths: impl Iterator<Item = usize> + Clone, exchange: &dyn Exchange) -> Vec<Range<usize>> {
     let (all, ranks): (usize, _) = (lengths.clone().sum(), exchange.ranks());
     let [begin, end] = [0, 1].map(|next| all * (exchange.rank() + next) / ranks);
     let mut first = 0;
     let of_list = |length| {
-        let mine = [begin, end].map(|at| at.clamp(first, first + length) - first);
+        let [from, to] = [begin, end].map(|at| at.clamp(first, first + length) - first);
         first += length;
-        mine[0]..mine[1]
+        from..to
     };
     lengths.map(of_list).collect()
 }
 
-/// What each rank has for this one, in their order, where `mine` is that for each rank; collective.
+/// Send `mine[k]` to rank k, and return the values from every rank, in the order of the ranks (all_to_all). Collective.
 pub fn trade<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: Vec<T>) -> Vec<T> {
     if exchange.ranks() == 1 {
         return mine;
     }
-    // one after the other: what is packed is dropped
+    // values are packed and dropped one after the other, which limits the memory
     let packed = mine.into_iter().map(|mine| pack(&mine)).collect();
-    exchange.trade(packed).into_iter().map(own).collect()
+    exchange.trade(packed).into_iter().map(received).collect()
 }
 
-/// The data of a message, which is dropped.
-fn own<T: DeserializeOwned>(bytes: Vec<u8>) -> T {
+/// Return the data of a message; the bytes are freed.
+fn received<T: DeserializeOwned>(bytes: Vec<u8>) -> T {
     unpack(&bytes).unwrap_or_else(|_| unreachable!("ranks run one program"))
 }
 
-/// Kinds of asking of a run from outside, three signals, a snapshot and a checkpoint: bits of one number, which go as sums with messages that ranks
-/// send anyway.
+/// Kinds of requests to a run from outside: three signals, a snapshot and a checkpoint. They are bits of one number. They are summed over the ranks in
+/// messages that ranks send anyway.
 pub const ASKS: usize = 5;
 
-/// One number a kind, to be added up over the ranks.
+/// Return one number per kind of request, to be summed over the ranks.
 pub fn asks(asked: u8) -> [f64; ASKS] {
     std::array::from_fn(|bit| f64::from(asked >> bit & 1))
 }
 
-/// What at least one rank asks, from the sums of [`asks`].
+/// Return the requests of at least one rank, from the sums of [`asks`].
 pub fn asked(sums: &[f64]) -> u8 {
     sums.iter().enumerate().fold(0, |all, (bit, &count)| all | u8::from(count > 0.0) << bit)
 }
 
-/// What the first rank has found; `mine` is there alone, and is asked for nowhere else. Collective.
+/// Return the result of the first rank on all ranks (broadcast). `mine` is called on the first rank only. Collective.
 ///
 /// # Errors
-/// That of the first rank, there; elsewhere one of the same kind without words.
+/// The error of the first rank, there; on the other ranks an error of the same kind without a message.
 pub fn tell<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: impl FnOnce() -> Result<T>) -> Result<T> {
     if exchange.rank() == 0 {
         let found = mine();
@@ -127,11 +129,11 @@ pub fn tell<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: impl
     unpack::<Result<T, i32>>(&exchange.tell(Vec::new()))?.map_err(Error::silent)
 }
 
-/// What ranks have found that looked at different parts of one thing: the error, if there is any, with the least key, which is the one that a rank
-/// would meet first that had all parts. Collective.
+/// Return the result of this rank if no rank has an error. The ranks check different parts of the same data. If several fail, the error with the least
+/// key counts, which is the one that a single rank with all the data would find first. Collective.
 ///
 /// # Errors
-/// That error on the rank that has found it; elsewhere one of the same kind without words.
+/// That error, on the rank that has found it; on the other ranks an error of the same kind without a message.
 pub fn first<K: Serialize + DeserializeOwned + Ord, T>(
     exchange: &dyn Exchange,
     found: Result<T, (K, Error)>,
@@ -149,22 +151,22 @@ pub fn first<K: Serialize + DeserializeOwned + Ord, T>(
     }
 }
 
-/// Plain data as bytes, numbers with all their digits.
+/// Pack plain data into bytes; numbers keep all their digits.
 pub fn pack<T: Serialize>(value: &T) -> Vec<u8> {
     postcard::to_allocvec(value).unwrap_or_default()
 }
 
-/// The data of these bytes.
+/// Unpack the data of these bytes.
 ///
 /// # Errors
-/// Bytes of something else.
+/// The bytes do not contain such data.
 pub fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T> {
     postcard::from_bytes(bytes).map_err(|cause| {
         Error::new(Kind::Solver, "a message of another rank cannot be read").because(cause.to_string())
     })
 }
 
-/// One process: nothing to exchange.
+/// The exchange of a single process, which has no messages.
 #[derive(Debug, Default)]
 pub struct Serial;
 
@@ -214,7 +216,7 @@ pub mod crowd {
         common: &'a Common,
     }
 
-    /// What each of so many ranks comes to.
+    /// Return the result of `work` on each of so many ranks.
     pub fn on<T: Send>(ranks: usize, work: impl Fn(&dyn Exchange) -> T + Sync) -> Vec<T> {
         let (slots, sent) = (Mutex::new(vec![Vec::new(); ranks]), Mutex::default());
         let common = &Common { barrier: Barrier::new(ranks), slots, sent, news: Condvar::new() };
@@ -278,7 +280,7 @@ pub mod crowd {
 mod tests {
     use super::{crowd, places, shares};
 
-    /// Values have the places that one rank would give them, wherever they are.
+    /// Values have the indices that one rank would give them, wherever they are.
     #[test]
     fn ranks_sort_together() {
         for ranks in [1, 2, 5] {
