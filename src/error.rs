@@ -1,7 +1,7 @@
 //! The one error type of the program: what went wrong, where, and what to do about it.
 //!
-//! Modules make errors as data; `cli` prints them, once (see [`Error::render`]). Not converging is not an
-//! error but a [`Status`](crate::ddm::Status) of a run.
+//! Modules return errors as data; `cli` prints them, once (see [`Error::render`]). Not converging is not an error but a
+//! [`Status`](crate::ddm::Status) of a run.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use std::fmt;
@@ -14,11 +14,11 @@ use std::sync::Arc;
 pub struct Source {
     /// Name of the file, or the option of the command line (`--set`).
     pub name: String,
-    /// The whole text; of an option, the option and its value.
+    /// The whole text; for an option, the option and its value.
     pub text: String,
 }
 
-/// A place in a [`Source`]: what a caret points to.
+/// A place in a [`Source`], to which a caret points.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
     /// The text.
@@ -28,11 +28,11 @@ pub struct Place {
 }
 
 impl Place {
-    /// The line of the Rust program that calls the function with this attribute (`#[track_caller]`); `word` is what the caret marks.
+    /// Return the line of the Rust program that calls the function with the attribute `#[track_caller]`; `word` is what the caret marks.
     #[track_caller]
     pub fn here(word: &str) -> Self {
         let caller = std::panic::Location::caller();
-        // the word stands on the line of the call, so that a refusal shows the number of that line
+        // the word is put on the line of the call, so that an error shows the number of that line
         let above = "\n".repeat(caller.line() as usize - 1);
         let span = above.len()..above.len() + word.len();
         Self { source: Arc::new(Source { name: caller.file().to_owned(), text: above + word }), span }
@@ -44,26 +44,26 @@ impl Place {
 pub struct Located<T> {
     /// The value.
     pub value: T,
-    /// Where it stands.
+    /// Its place.
     pub place: Place,
 }
 
 impl<T> Located<T> {
-    /// Joins a value with its place.
+    /// Join a value with its place.
     pub fn new(value: T, place: Place) -> Self {
         Self { value, place }
     }
 }
 
 impl Located<String> {
-    /// A name and the line of the Rust program where it stands: see [`Place::here`].
+    /// Return a name with its line in the Rust program: see [`Place::here`].
     #[track_caller]
     pub fn here(name: &str) -> Self {
         Self::new(name.to_owned(), Place::here(name))
     }
 }
 
-/// What kind of thing failed; it fixes the exit code of the process (docs/command-line.md).
+/// The kind of an error, which determines the exit code of the process (docs/command-line.md).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The command line: exit code 2.
@@ -76,15 +76,15 @@ pub enum Kind {
     Solver,
     /// The file system: exit code 6.
     File,
-    /// A signal with this number ended the program before it had results: exit code 128 and the number, as a shell has it.
+    /// A signal with this number ended the program before it had results: exit code 128 plus the number, as in a shell.
     Stopped(i32),
 }
 
-/// What a shell adds to the number of the signal that ended a program.
+/// The number that a shell adds to the signal that ended a program.
 const SIGNALLED: i32 = 128;
 
 impl Kind {
-    /// Exit code of the process for this kind of error.
+    /// Return the exit code of the process for this kind of error.
     pub fn exit_code(self) -> i32 {
         match self {
             Kind::Usage => 2,
@@ -97,18 +97,22 @@ impl Kind {
     }
 }
 
-/// An error that a user can act on; `{:?}` is the whole message, too, which `main` of a program prints.
+/// An error that a user can act on. `{:?}` also formats the whole message, because `main` of a program prints that.
 pub struct Error(Box<Inner>);
 
 struct Inner {
     kind: Kind,
     message: String,
     place: Option<Place>,
+    /// Text next to the caret.
     label: String,
+    /// File and line of a mesh.
     file: Option<(PathBuf, Option<usize>)>,
     help: Option<String>,
     causes: Vec<String>,
+    /// Whether every rank ends with this error.
     agreed: bool,
+    /// Whether every rank has found this error by itself.
     common: bool,
 }
 
@@ -116,7 +120,7 @@ struct Inner {
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl Error {
-    /// An error of a kind; `message` is a fragment without a full stop.
+    /// Return an error of a kind; `message` is a fragment without a full stop.
     pub fn new(kind: Kind, message: impl Into<String>) -> Self {
         Error(Box::new(Inner {
             kind,
@@ -131,28 +135,28 @@ impl Error {
         }))
     }
 
-    /// A refusal of something that stands at `place` in the scene.
+    /// Return an error about something at `place` in the scene.
     pub fn scene(place: &Place, message: impl Into<String>) -> Self {
         let mut error = Self::new(Kind::Scene, message);
         error.0.place = Some(place.clone());
         error
     }
 
-    /// A refusal of a mesh file, with the line where that is known.
+    /// Return an error about a mesh file, with the line if it is known.
     pub fn mesh(path: &Path, line: Option<usize>, message: impl Into<String>) -> Self {
         let mut error = Self::new(Kind::Mesh, message);
         error.0.file = Some((path.to_owned(), line));
         error
     }
 
-    /// A failure of the file system; `verb` says what was tried ("read", "create").
+    /// Return an error of the file system; `verb` says what was tried ("read", "create").
     pub fn file(path: &Path, verb: &str, cause: &std::io::Error) -> Self {
         let mut error = Self::new(Kind::File, format!("cannot {verb} {}", path.display()));
         error.0.causes.push(cause.to_string());
         error
     }
 
-    /// The end of a rank whose fellow has the words: not printed, same exit code.
+    /// Return an error without a message, which is not printed, with the same exit code as the error of another rank that has the message.
     pub fn silent(exit_code: i32) -> Self {
         let kinds = [Kind::Usage, Kind::Scene, Kind::Mesh, Kind::Solver, Kind::File];
         let stopped = (exit_code > SIGNALLED).then(|| Kind::Stopped(exit_code - SIGNALLED));
@@ -160,23 +164,23 @@ impl Error {
         Self::new(kind, String::new())
     }
 
-    /// Whether another rank prints the words.
+    /// Whether another rank prints the message.
     pub fn is_silent(&self) -> bool {
         self.0.message.is_empty()
     }
 
-    /// Marks that every rank ends with this error.
+    /// Mark that every rank ends with this error.
     pub fn agreed(mut self) -> Self {
         self.0.agreed = true;
         self
     }
 
-    /// Whether every rank ends with this error, so that nobody waits for this one.
+    /// Whether every rank ends with this error, so that no rank waits for this one.
     pub fn is_agreed(&self) -> bool {
         self.0.agreed
     }
 
-    /// Marks that every rank has found this error by itself, with the same words.
+    /// Mark that every rank has found this error by itself, with the same message.
     pub fn common(mut self) -> Self {
         (self.0.agreed, self.0.common) = (true, true);
         self
@@ -187,25 +191,25 @@ impl Error {
         self.0.common
     }
 
-    /// Points at a place in the scene.
+    /// Point at a place in the scene.
     pub fn at(mut self, place: &Place) -> Self {
         self.0.place = Some(place.clone());
         self
     }
 
-    /// Says next to the caret what is wrong there.
+    /// Say next to the caret what is wrong there.
     pub fn label(mut self, label: impl Into<String>) -> Self {
         self.0.label = label.into();
         self
     }
 
-    /// Says what to do about it.
+    /// Say what to do about the error.
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.0.help = Some(help.into());
         self
     }
 
-    /// Advises the known name that `name` may be a slip of, or else what `otherwise` says.
+    /// Suggest the known name that `name` may be a misspelling of; if there is none, give the advice `otherwise`.
     pub fn suggest<'a>(
         self,
         name: &str,
@@ -215,28 +219,28 @@ impl Error {
         self.help(suggestion(name, known).unwrap_or_else(otherwise))
     }
 
-    /// Adds a cause, printed on a line of its own.
+    /// Add a cause, which is printed on a line of its own.
     pub fn because(mut self, cause: impl Into<String>) -> Self {
         self.0.causes.push(cause.into());
         self
     }
 
-    /// The kind.
+    /// Return the kind.
     pub fn kind(&self) -> Kind {
         self.0.kind
     }
 
-    /// The message alone.
+    /// Return the message alone.
     pub fn message(&self) -> &str {
         &self.0.message
     }
 
-    /// The advice, if there is one.
+    /// Return the advice, if there is one.
     pub fn advice(&self) -> Option<&str> {
         self.0.help.as_deref()
     }
 
-    /// The whole message as a terminal shows it: message, file, line, caret, causes, help.
+    /// Return the whole message as a terminal shows it: message, file, line, caret, causes, help.
     pub fn render(&self, color: bool) -> String {
         let inner = &*self.0;
         let renderer = if color { Renderer::styled() } else { Renderer::plain() };
@@ -256,7 +260,7 @@ impl Error {
             }
             let Source { name, text } = &*place.source;
             let mut snippet = Snippet::source(text.as_str()).annotation(annotation);
-            // the words of an option say where they stand
+            // the text of an option shows by itself where it is
             if !name.starts_with("--") {
                 snippet = snippet.path(name.as_str());
             }
@@ -283,7 +287,7 @@ impl fmt::Debug for Error {
         if self.is_silent() {
             return f.write_str("another rank has the message");
         }
-        // `main` prints a word of its own before it
+        // `main` prints `Error: ` before it
         let text = self.render(false);
         f.write_str(text.strip_prefix("error: ").unwrap_or(&text))
     }
@@ -291,7 +295,7 @@ impl fmt::Debug for Error {
 
 impl std::error::Error for Error {}
 
-/// A number as people write it: far from one with an exponent, not with three hundred digits.
+/// Format a number as people write it: numbers far from one have an exponent, not three hundred digits.
 pub fn shown(value: f64) -> String {
     match value.abs() {
         size if size != 0.0 && size.is_finite() && !(1e-5..1e16).contains(&size) => format!("{value:e}"),
@@ -299,7 +303,7 @@ pub fn shown(value: f64) -> String {
     }
 }
 
-/// Names in a row joined by "with", words that they begin with said once: `rotation about x and y`.
+/// Join names by "with"; the first words of consecutive names are written once: `rotation about x and y`.
 pub fn joined<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
     for name in names {
@@ -317,14 +321,14 @@ pub fn joined<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     groups.into_iter().map(group).collect::<Vec<_>>().join(" with ")
 }
 
-/// Most names in a sentence: with ten letters each and their quotes, two lines of a terminal of 80 columns.
+/// Most names in a sentence: with ten letters each and their quotes, they fill two lines of a terminal of 80 columns.
 const NAMES: usize = 12;
 
-/// The first of many names, and the number of others: of a few names all.
+/// Return all of a few names, or the first of many and the number of the others.
 pub fn few(names: impl IntoIterator<Item = impl ToString>) -> Vec<String> {
     let mut names: Vec<String> = names.into_iter().map(|name| name.to_string()).collect();
     let others = names.len().saturating_sub(NAMES);
-    // a single other one is said as fast as counted
+    // a single other name is as short as its count
     if others > 1 {
         names.truncate(NAMES);
         names.push(format!("{others} others"));
@@ -332,7 +336,7 @@ pub fn few(names: impl IntoIterator<Item = impl ToString>) -> Vec<String> {
     names
 }
 
-/// The known name nearest to `name`, if one is near enough to be a slip of the keyboard.
+/// Return the known name nearest to `name`, if one is near enough for a typing mistake.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
@@ -342,12 +346,12 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
-/// The same as advice.
+/// Return the nearest known name as advice.
 pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
     nearest(name, known).map(|near| format!("did you mean `{near}`?"))
 }
 
-/// The text that the caret of a rendered error marks.
+/// Return the text that the caret of a rendered error marks.
 #[cfg(test)]
 pub(crate) fn caret(error: &Error) -> String {
     let shown = error.render(false);

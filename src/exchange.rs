@@ -1,30 +1,29 @@
-//! What the ranks of a run tell each other: bytes, and plain data as bytes.
+//! Messages between the ranks of a run: bytes, and plain data packed into bytes.
 
 use crate::error::{Error, Kind, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::ops::Range;
 
-/// What the ranks of a parallel run tell each other; calls are collective unless they say otherwise.
+/// The messages between the ranks of a run. Calls are collective unless they say otherwise.
 pub trait Exchange {
-    /// Replaces `values` on every rank by the sum over the ranks: the same numbers everywhere, as MPI promises. Where every body lives
-    /// on one rank, every entry is non-zero on one only, so that sums are exact.
+    /// Replace `values` by their sum over the ranks (MPI_Allreduce). All ranks get the same numbers, as MPI guarantees. If every body lives on one
+    /// rank, every entry is non-zero on one rank only, so that sums are exact.
     fn sum(&self, values: &mut [f64]);
-    /// Number of ranks.
+    /// Return the number of ranks.
     fn ranks(&self) -> usize;
-    /// Number of this one.
+    /// Return the number of this rank, from 0.
     fn rank(&self) -> usize;
-    /// The bytes of each rank, in their order.
+    /// Return the bytes of every rank, in the order of the ranks (MPI_Allgather).
     fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>>;
-    /// The bytes of the first rank.
+    /// Return the bytes of the first rank (MPI_Bcast).
     fn tell(&self, mine: Vec<u8>) -> Vec<u8>;
-    /// The bytes that each rank has for this one, in their order, where `mine` are those for each rank.
+    /// Send `mine[k]` to rank k, and return the bytes from every rank, in the order of the ranks (MPI_Alltoall).
     fn trade(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
-    /// Bytes for one other rank, which takes them from this one; neither is collective.
+    /// Send bytes to one other rank, which has to receive them from this one. Not collective.
     fn send(&self, to: usize, bytes: &[u8]);
-    /// Bytes that another rank sends to this one.
+    /// Receive the bytes that another rank sends to this one. Not collective.
     fn receive(&self, from: usize) -> Vec<u8>;
-    /// Sums and shares so far between several ranks.
+    /// Return the number of sums, shares and trades between several ranks so far.
     fn messages(&self) -> usize;
 }
 
@@ -33,7 +32,7 @@ pub trait Plain: Serialize + DeserializeOwned {}
 
 impl<T: Serialize + DeserializeOwned> Plain for T {}
 
-/// Give each rank what the first rank has for it: `part` is called there alone, for each other rank and then for itself. Collective.
+/// Give each rank what the first rank has for it (scatter). `part` is called on the first rank only, for each other rank and then for itself. Collective.
 ///
 /// # Errors
 /// A message that cannot be read.
@@ -45,94 +44,47 @@ pub fn scatter<T: Plain>(exchange: &dyn Exchange, mut part: impl FnMut(usize) ->
     Ok(part(0))
 }
 
-/// What each rank knows, in their order; collective.
+/// Return the value of every rank, in the order of the ranks (all_gather). Collective.
 pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
     if exchange.ranks() == 1 {
         return vec![mine];
     }
-    exchange.share(pack(&mine)).into_iter().map(own).collect()
+    exchange.share(pack(&mine)).into_iter().map(received).collect()
 }
 
-/// One list of what all ranks have, sorted; collective.
-pub fn gather<T: Serialize + DeserializeOwned + Ord>(exchange: &dyn Exchange, mine: &[T]) -> Vec<T> {
-    let mut all: Vec<T> = Vec::new();
-    exchange.share(pack(&mine)).into_iter().for_each(|bytes| all.append(&mut own(bytes)));
-    all.sort_unstable();
-    all
-}
-
-/// The place of each of `mine`, which are sorted, among those of all ranks, of which no two are the same: each rank sorts those between two values, which
-/// are found by samples. Collective.
-pub fn places<T: Serialize + DeserializeOwned + Ord + Clone>(exchange: &dyn Exchange, mine: &[T]) -> Vec<u32> {
-    let ranks = exchange.ranks();
-    let every = |all: &[T]| (1..ranks).filter_map(|k| all.get(k * all.len() / ranks).cloned()).collect::<Vec<T>>();
-    let between = every(&gather(exchange, &every(mine)));
-    let mut rest = mine;
-    let mut parts = Vec::with_capacity(ranks);
-    for value in &between {
-        let part;
-        (part, rest) = rest.split_at(rest.partition_point(|other| other < value));
-        parts.push(part.to_vec());
-    }
-    parts.push(rest.to_vec());
-    parts.resize(ranks, Vec::new());
-    let theirs: Vec<Vec<T>> = trade(exchange, parts);
-    let lengths = share(exchange, theirs.iter().map(Vec::len).sum::<usize>());
-    let first = lengths[..exchange.rank()].iter().sum::<usize>() as u32;
-    let mut places: Vec<Vec<u32>> = theirs.iter().map(|theirs| vec![0; theirs.len()]).collect();
-    let of_rank = |(rank, theirs): (usize, Vec<T>)| theirs.into_iter().zip(0..).map(move |(value, k)| (value, rank, k));
-    let mut all: Vec<(T, usize, usize)> = theirs.into_iter().enumerate().flat_map(of_rank).collect();
-    all.sort_unstable();
-    all.iter().zip(first..).for_each(|(&(_, rank, k), place)| places[rank][k] = place);
-    trade(exchange, places).concat()
-}
-
-/// What this rank has of lists of these lengths, if all of them one after the other are cut into equal parts for the ranks.
-pub fn shares(lengths: impl Iterator<Item = usize> + Clone, exchange: &dyn Exchange) -> Vec<Range<usize>> {
-    let (all, ranks): (usize, _) = (lengths.clone().sum(), exchange.ranks());
-    let [begin, end] = [0, 1].map(|next| all * (exchange.rank() + next) / ranks);
-    let mut first = 0;
-    let of_list = |length| {
-        let mine = [begin, end].map(|at| at.clamp(first, first + length) - first);
-        first += length;
-        mine[0]..mine[1]
-    };
-    lengths.map(of_list).collect()
-}
-
-/// What each rank has for this one, in their order, where `mine` is that for each rank; collective.
+/// Send `mine[k]` to rank k, and return the values from every rank, in the order of the ranks (all_to_all). Collective.
 pub fn trade<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: Vec<T>) -> Vec<T> {
     if exchange.ranks() == 1 {
         return mine;
     }
-    // one after the other: what is packed is dropped
+    // values are packed and dropped one after the other, which limits the memory
     let packed = mine.into_iter().map(|mine| pack(&mine)).collect();
-    exchange.trade(packed).into_iter().map(own).collect()
+    exchange.trade(packed).into_iter().map(received).collect()
 }
 
-/// The data of a message, which is dropped.
-fn own<T: DeserializeOwned>(bytes: Vec<u8>) -> T {
+/// Return the data of a message; the bytes are freed.
+fn received<T: DeserializeOwned>(bytes: Vec<u8>) -> T {
     unpack(&bytes).unwrap_or_else(|_| unreachable!("ranks run one program"))
 }
 
-/// Kinds of asking of a run from outside, three signals, a snapshot and a checkpoint: bits of one number, which go as sums with messages that ranks
-/// send anyway.
+/// Kinds of requests to a run from outside: three signals, a snapshot and a checkpoint. They are bits of one number. They are summed over the ranks in
+/// messages that ranks send anyway.
 pub const ASKS: usize = 5;
 
-/// One number a kind, to be added up over the ranks.
+/// Return one number per kind of request, to be summed over the ranks.
 pub fn asks(asked: u8) -> [f64; ASKS] {
     std::array::from_fn(|bit| f64::from(asked >> bit & 1))
 }
 
-/// What at least one rank asks, from the sums of [`asks`].
+/// Return the requests of at least one rank, from the sums of [`asks`].
 pub fn asked(sums: &[f64]) -> u8 {
     sums.iter().enumerate().fold(0, |all, (bit, &count)| all | u8::from(count > 0.0) << bit)
 }
 
-/// What the first rank has found; `mine` is there alone, and is asked for nowhere else. Collective.
+/// Return the result of the first rank on all ranks (broadcast). `mine` is called on the first rank only. Collective.
 ///
 /// # Errors
-/// That of the first rank, there; elsewhere one of the same kind without words.
+/// The error of the first rank, there; on the other ranks an error of the same kind without a message.
 pub fn tell<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: impl FnOnce() -> Result<T>) -> Result<T> {
     if exchange.rank() == 0 {
         let found = mine();
@@ -144,44 +96,22 @@ pub fn tell<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: impl
     unpack::<Result<T, i32>>(&exchange.tell(Vec::new()))?.map_err(Error::silent)
 }
 
-/// What ranks have found that looked at different parts of one thing: the error, if there is any, with the least key, which is the one that a rank
-/// would meet first that had all parts. Collective.
-///
-/// # Errors
-/// That error on the rank that has found it; elsewhere one of the same kind without words.
-pub fn first<K: Serialize + DeserializeOwned + Ord, T>(
-    exchange: &dyn Exchange,
-    found: Result<T, (K, Error)>,
-) -> Result<T> {
-    if exchange.ranks() == 1 {
-        return found.map_err(|(_, error)| error);
-    }
-    let (mine, found) = match found {
-        Ok(found) => (Vec::new(), Ok(found)),
-        Err((key, error)) => (vec![(key, exchange.rank(), error.kind().exit_code())], Err(error)),
-    };
-    match gather(exchange, &mine).first() {
-        Some((_, rank, code)) if *rank != exchange.rank() => Err(Error::silent(*code)),
-        _ => found,
-    }
-}
-
-/// Plain data as bytes, numbers with all their digits.
+/// Pack plain data into bytes; numbers keep all their digits.
 pub fn pack<T: Serialize>(value: &T) -> Vec<u8> {
     postcard::to_allocvec(value).unwrap_or_default()
 }
 
-/// The data of these bytes.
+/// Unpack the data of these bytes.
 ///
 /// # Errors
-/// Bytes of something else.
+/// The bytes do not contain such data.
 pub fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T> {
     postcard::from_bytes(bytes).map_err(|cause| {
         Error::new(Kind::Solver, "a message of another rank cannot be read").because(cause.to_string())
     })
 }
 
-/// One process: nothing to exchange.
+/// The exchange of a single process, which has no messages.
 #[derive(Debug, Default)]
 pub struct Serial;
 
@@ -231,7 +161,7 @@ pub mod crowd {
         common: &'a Common,
     }
 
-    /// What each of so many ranks comes to.
+    /// Return the result of `work` on each of so many ranks.
     pub fn on<T: Send>(ranks: usize, work: impl Fn(&dyn Exchange) -> T + Sync) -> Vec<T> {
         let (slots, sent) = (Mutex::new(vec![Vec::new(); ranks]), Mutex::default());
         let common = &Common { barrier: Barrier::new(ranks), slots, sent, news: Condvar::new() };
@@ -293,32 +223,32 @@ pub mod crowd {
 
 #[cfg(test)]
 mod tests {
-    use super::{crowd, places, shares};
+    use super::{Kind, crowd, scatter, tell};
+    use crate::error::Error;
 
-    /// Values have the places that one rank would give them, wherever they are.
+    /// The first rank alone makes the parts, one for each rank.
     #[test]
-    fn ranks_sort_together() {
+    fn parts_go_to_their_ranks() {
         for ranks in [1, 2, 5] {
-            let lists = crowd::on(ranks, |exchange| {
-                let rank = exchange.rank() as u64;
-                // some rank has nothing, and values of ranks lie among each other
-                let mut mine: Vec<u64> = (0..40 * (rank % 3)).map(|k| 7919 * (k + 1000 * rank) % 10_007).collect();
-                mine.sort_unstable();
-                (places(exchange, &mine), mine)
+            let parts = crowd::on(ranks, |exchange| {
+                let part = |rank: usize| {
+                    assert_eq!(exchange.rank(), 0);
+                    vec![rank as u64; rank]
+                };
+                scatter(exchange, part).expect("a part")
             });
-            let mut all: Vec<u64> = lists.iter().flat_map(|(_, mine)| mine).copied().collect();
-            all.sort_unstable();
-            for (places, mine) in lists {
-                assert_eq!(places.len(), mine.len());
-                assert!(mine.iter().zip(places).all(|(value, place)| all[place as usize] == *value));
-            }
+            assert!(parts.iter().enumerate().all(|(rank, part)| *part == vec![rank as u64; rank]), "{parts:?}");
         }
     }
 
-    /// Lists are cut into parts of equal length, one after the other.
+    /// An error of the first rank ends all with its kind; the words are printed once.
     #[test]
-    fn lists_are_cut_into_equal_parts() {
-        let parts = crowd::on(3, |exchange| shares([4, 0, 2, 3].into_iter(), exchange));
-        assert_eq!(parts, [[0..3, 0..0, 0..0, 0..0], [3..4, 0..0, 0..2, 0..0], [4..4, 0..0, 2..2, 0..3]]);
+    fn errors_of_the_first_rank_are_those_of_all() {
+        let found = crowd::on(3, |exchange| {
+            let error = tell::<u8>(exchange, || Err(Error::new(Kind::Mesh, "flat"))).expect_err("an error");
+            (error.kind().exit_code(), error.is_silent())
+        });
+        let code = Kind::Mesh.exit_code();
+        assert_eq!(found, [(code, false), (code, true), (code, true)]);
     }
 }

@@ -1,4 +1,4 @@
-//! Reading of files that users name, and digests of data.
+//! Reading of files that the user names, and digests of data.
 
 use crate::error::{Error, Kind, Result};
 use serde::Serialize;
@@ -8,35 +8,35 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
-/// All bytes of a regular file.
+/// Return all bytes of a regular file.
 ///
 /// # Errors
-/// Those of [`open`].
+/// Those of [`open`], and [`Kind::File`] if reading fails.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     let (mut file, mut bytes) = (open(path)?, Vec::new());
     file.read_to_end(&mut bytes).map_err(|cause| Error::file(path, "read", &cause)).map(|_| bytes)
 }
 
-/// Opens a regular file. Devices and pipes may have no end, or keep a reader waiting for ever.
+/// Open a regular file. Others are refused: devices and pipes may have no end, or keep a reader waiting for ever.
 ///
 /// # Errors
-/// [`Kind::File`]: it is none, or cannot be read.
+/// [`Kind::File`]: the path is no regular file, or cannot be read.
 pub fn open(path: &Path) -> Result<File> {
     let failed = |cause| Error::file(path, "read", &cause);
     let kind = std::fs::metadata(path).map_err(failed)?.file_type();
-    let odd = match () {
+    let other = match () {
         _ if kind.is_file() => return File::open(path).map_err(failed),
         _ if kind.is_dir() => "a folder",
         _ if kind.is_fifo() => "a pipe",
         _ if kind.is_socket() => "a socket",
         _ => "a device",
     };
-    Err(Error::new(Kind::File, format!("{} is {odd}, not a file", path.display()))
+    Err(Error::new(Kind::File, format!("{} is {other}, not a file", path.display()))
         .help("name a regular file; what a pipe gives can be saved as one"))
 }
 
-/// The bytes of a text whose lines end as on Unix: those of old Macs end with carriage returns alone. Texts with other ends stay as they are,
-/// so that every line keeps its number.
+/// Return the bytes of a text with the line ends of Unix, if it has those of old Macs, carriage returns alone. Other texts are unchanged, so that
+/// every line keeps its number.
 pub fn with_unix_lines(mut bytes: Vec<u8>) -> Vec<u8> {
     if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
         bytes.iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
@@ -44,7 +44,7 @@ pub fn with_unix_lines(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// What is wrong with bytes that should be text in UTF-8, as the rest of a sentence about their file; none where that is not seen at once.
+/// Return why bytes are no UTF-8 text, as the rest of a sentence about their file; none if nothing is obviously wrong.
 pub fn other_encoding(bytes: &[u8]) -> Option<&'static str> {
     match bytes {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("is UTF-16 text, not UTF-8"),
@@ -53,7 +53,7 @@ pub fn other_encoding(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Bytes on a line of a file in which Linux tells of itself, such as `MemAvailable` of /proc/meminfo; none where it does not.
+/// Return the number of bytes on a line of a file of /proc, such as `MemAvailable` of /proc/meminfo; none where there is no such file or line.
 pub fn bytes_in_proc(file: &str, line: &str) -> Option<u64> {
     bytes_on_line(&std::fs::read_to_string(file).ok()?, line)
 }
@@ -63,12 +63,12 @@ fn bytes_on_line(text: &str, line: &str) -> Option<u64> {
     rest.split_whitespace().next()?.parse::<u64>().ok().map(|kibibytes| kibibytes * 1024)
 }
 
-/// A source of bytes whose contents are digested as they are read, each byte once, however often a reader goes back.
+/// A source of bytes that are digested while they are read, each byte once, however often a reader goes back.
 pub struct Digested<R> {
     source: R,
-    /// Where the next byte is read.
+    /// Position of the next byte that is read.
     at: u64,
-    /// How many bytes from the start are in the sum.
+    /// Number of bytes from the start that are in the digest.
     summed: u64,
     sum: Sha256,
 }
@@ -79,7 +79,7 @@ impl<R: Read + Seek> Digested<R> {
         Self { source, at: 0, summed: 0, sum: Sha256::new() }
     }
 
-    /// Return the SHA-256 of the bytes from the start that were read without a hole, in hexadecimal digits.
+    /// Return the SHA-256 of the bytes from the start to the first one that was not read, in hexadecimal digits.
     pub fn digest(self) -> String {
         hexadecimal(&self.sum.finalize())
     }
@@ -105,13 +105,14 @@ impl<R: Read + Seek> Seek for Digested<R> {
     }
 }
 
-/// SHA-256 of numbers, texts, lists and tuples of such, in hexadecimal digits. Lengths are part of it, so that pieces do not run together.
+/// Return the SHA-256 of numbers, texts, and lists and tuples of such, in hexadecimal digits. Lengths are part of the digested bytes, so that
+/// different divisions of the same text differ.
 pub fn digest(data: &impl Serialize) -> String {
-    // nothing of these kinds fails
+    // data of these kinds can always be packed
     digest_of_bytes(&postcard::to_allocvec(data).unwrap_or_default())
 }
 
-/// The same of the contents of a file.
+/// Return the SHA-256 of bytes, in hexadecimal digits.
 pub fn digest_of_bytes(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }

@@ -1,8 +1,8 @@
-//! Signals that ask the program to end, or to write what it has.
+//! Signals that request the program to end, or to write its present results.
 //!
-//! A signal ends the program at once where nothing would be lost, with the exit code that a shell gives it. While something is
-//! [held](Interrupt::hold), the first signal is only noted, and whoever holds asks for it where he can end well; a second one ends the
-//! program all the same. Handlers set flags and do nothing else.
+//! A signal ends the program at once where nothing would be lost, with the exit code that a shell uses for it. After [`Interrupt::hold`], the first
+//! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at once. Handlers set
+//! flags and do nothing else.
 
 use crate::error::{Error, Kind, Result};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
@@ -10,61 +10,60 @@ use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// The signals that end a run, in the order in which they are told where several came.
+/// The signals that end a run, in the order in which several are reported.
 pub const ENDING: [i32; 3] = [SIGTERM, SIGINT, SIGHUP];
 
-/// What the signals of this process asked for. Clones share it.
+/// The requests by signals to this process. Clones share them.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt {
-    /// Whether the next signal ends the program.
+    /// Whether the next signal ends the program at once.
     at_once: Arc<AtomicBool>,
-    /// Number of the signal that asked for the end; 0 for none.
+    /// Number of the signal that requested the end; 0 for none.
     asked: Arc<AtomicUsize>,
+    /// Whether a snapshot was requested.
     snapshot: Arc<AtomicBool>,
 }
 
 impl Interrupt {
-    /// Notes signals from now on; until something is held they end the program. SIGHUP stays ignored under `nohup`. A limit on the
-    /// size of files becomes an error of writing, which has words.
+    /// Install the handlers. Signals end the program until [`hold`](Interrupt::hold) is called. SIGHUP stays ignored under `nohup`. With a
+    /// limit on the size of files, writing fails with an error that has a message.
     ///
     /// # Errors
     /// The system refuses a handler.
     pub fn watch() -> Result<Self> {
         let interrupt = Self::default();
         interrupt.at_once.store(true, Ordering::SeqCst);
-        let all = || -> std::io::Result<()> {
-            for signal in ENDING.into_iter().filter(|&signal| signal != SIGHUP || !is_ignored(signal)) {
-                // in this order: the first signal that is noted lets the second one end the program
-                flag::register_conditional_shutdown(
-                    signal,
-                    Kind::Stopped(signal).exit_code(),
-                    interrupt.at_once.clone(),
-                )?;
-                flag::register(signal, interrupt.at_once.clone())?;
-                flag::register_usize(signal, interrupt.asked.clone(), signal as usize)?;
-            }
-            flag::register(SIGUSR1, interrupt.snapshot.clone())?;
-            flag::register(SIGXFSZ, Arc::default()).map(|_| ())
-        };
-        all().map_err(|cause| Error::new(Kind::File, "signals cannot be watched").because(cause.to_string()))?;
+        let installed = interrupt.install();
+        installed.map_err(|cause| Error::new(Kind::File, "signals cannot be watched").because(cause.to_string()))?;
         Ok(interrupt)
     }
 
-    /// From now on the first signal is only noted.
+    fn install(&self) -> std::io::Result<()> {
+        for signal in ENDING.into_iter().filter(|&signal| signal != SIGHUP || !is_ignored(signal)) {
+            // handlers run in this order: the shutdown is tested before the flag is set, so that only the second signal ends the program
+            flag::register_conditional_shutdown(signal, Kind::Stopped(signal).exit_code(), self.at_once.clone())?;
+            flag::register(signal, self.at_once.clone())?;
+            flag::register_usize(signal, self.asked.clone(), signal as usize)?;
+        }
+        flag::register(SIGUSR1, self.snapshot.clone())?;
+        flag::register(SIGXFSZ, Arc::default()).map(|_| ())
+    }
+
+    /// From now on, let the first signal set the flag only.
     pub fn hold(&self) {
         self.at_once.store(self.asked().is_some(), Ordering::SeqCst);
     }
 
-    /// From now on a signal ends the program again.
+    /// From now on, let a signal end the program at once again.
     ///
     /// # Errors
-    /// A signal was noted meanwhile: the end of the program, in words.
+    /// A signal came since [`hold`](Interrupt::hold): the error ends the program with a message.
     pub fn release(&self) -> Result<()> {
         self.at_once.store(true, Ordering::SeqCst);
         self.asked().map_or(Ok(()), |signal| Err(ended(signal)))
     }
 
-    /// The signal that asked for the end.
+    /// Return the signal that requested the end, if one did.
     pub fn asked(&self) -> Option<i32> {
         match self.asked.load(Ordering::SeqCst) {
             0 => None,
@@ -72,19 +71,19 @@ impl Interrupt {
         }
     }
 
-    /// Whether somebody asked for a snapshot since the last call.
+    /// Whether a snapshot was requested since the last call.
     pub fn wants_snapshot(&self) -> bool {
         self.snapshot.swap(false, Ordering::SeqCst)
     }
 }
 
-/// The end by a signal before there was anything to write.
+/// Return the error of a program that a signal ended before there was anything to write.
 pub fn ended(signal: i32) -> Error {
     Error::new(Kind::Stopped(signal), format!("ended by {} before the iteration began", name(signal)))
         .help("all that was computed before is written")
 }
 
-/// Name of a signal that ends a run.
+/// Return the name of a signal that ends a run.
 pub fn name(signal: i32) -> &'static str {
     signal_hook::low_level::signal_name(signal).unwrap_or("a signal")
 }

@@ -1,4 +1,4 @@
-//! Which rank owns which body, and what ranks tell each other, over the `mpi` crate.
+//! Owner ranks of bodies, and messages between ranks by the `mpi` crate.
 
 use crate::error::{Error, Result};
 use crate::exchange::{Exchange, pack, share};
@@ -17,15 +17,17 @@ pub struct Ranks {
 }
 
 impl Ranks {
-    /// The ranks of a session.
+    /// Return the ranks of a session.
     pub fn new(session: &Session) -> Self {
         Self { session: session.clone(), messages: Cell::new(0) }
     }
-}
 
-impl Ranks {
-    /// The bytes of one rank, on all.
-    fn from(&self, rank: usize, mut bytes: Vec<u8>) -> Vec<u8> {
+    fn count_message(&self) {
+        self.messages.set(self.messages.get() + 1);
+    }
+
+    /// Return the bytes of one rank on all ranks. Collective.
+    fn broadcast(&self, rank: usize, mut bytes: Vec<u8>) -> Vec<u8> {
         let world = self.session.world();
         let root = world.process_at_rank(rank as i32);
         let mut length = bytes.len() as u64;
@@ -41,7 +43,7 @@ impl Exchange for Ranks {
         if self.session.size() > 1 && !values.is_empty() {
             let mine = values.to_vec();
             self.session.world().all_reduce_into(&mine[..], values, SystemOperation::sum());
-            self.messages.set(self.messages.get() + 1);
+            self.count_message();
         }
     }
 
@@ -57,37 +59,37 @@ impl Exchange for Ranks {
         if self.session.size() == 1 {
             return vec![mine];
         }
-        self.messages.set(self.messages.get() + 1);
-        let of_rank = |rank| self.from(rank, if rank == self.session.rank() { mine.clone() } else { Vec::new() });
+        self.count_message();
+        let of_rank = |rank| self.broadcast(rank, if rank == self.session.rank() { mine.clone() } else { Vec::new() });
         (0..self.session.size()).map(of_rank).collect()
     }
 
     fn tell(&self, mine: Vec<u8>) -> Vec<u8> {
-        self.from(0, mine)
+        self.broadcast(0, mine)
     }
 
     fn trade(&self, mut mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
         let (world, rank, ranks) = (self.session.world(), self.session.rank(), self.session.size());
-        self.messages.set(self.messages.get() + 1);
+        self.count_message();
         let lengths: Vec<u64> = mine.iter().map(|bytes| bytes.len() as u64).collect();
         let mut theirs = vec![0_u64; ranks];
         world.all_to_all_into(&lengths[..], &mut theirs[..]);
-        // rounds are the same for all, however long the messages of each
-        let (mine_most, mut most) = (lengths.iter().copied().max().unwrap_or(0), 0u64);
-        world.all_reduce_into(&mine_most, &mut most, SystemOperation::max());
+        // all ranks take as many rounds as the longest message of any rank needs
+        let (my_longest, mut longest) = (lengths.iter().copied().max().unwrap_or(0), 0u64);
+        world.all_reduce_into(&my_longest, &mut longest, SystemOperation::max());
         let mut all = vec![Vec::new(); ranks];
         all[rank] = std::mem::take(&mut mine[rank]);
         for step in 1..ranks {
             let [to, from] = [(rank + step) % ranks, (rank + ranks - step) % ranks];
-            let (sent, mut got) = (std::mem::take(&mut mine[to]), vec![0; theirs[from] as usize]);
-            let ends = [to, from].map(|rank| world.process_at_rank(rank as i32));
-            // a message of several chunks meets one of others, or empty ones
-            for chunk in 0..(most as usize).div_ceil(CHUNK) {
+            let (sent, mut received) = (std::mem::take(&mut mine[to]), vec![0; theirs[from] as usize]);
+            let [target, source] = [to, from].map(|rank| world.process_at_rank(rank as i32));
+            // a chunk may be exchanged for a shorter or an empty one
+            for chunk in 0..(longest as usize).div_ceil(CHUNK) {
                 let part = |length: usize| (chunk * CHUNK).min(length)..((chunk + 1) * CHUNK).min(length);
-                let part_of_got = part(got.len());
-                send_receive_into(&sent[part(sent.len())], &ends[0], &mut got[part_of_got], &ends[1]);
+                let taken = part(received.len());
+                send_receive_into(&sent[part(sent.len())], &target, &mut received[taken], &source);
             }
-            all[from] = got;
+            all[from] = received;
         }
         all
     }
@@ -113,10 +115,11 @@ impl Exchange for Ranks {
     }
 }
 
-/// Bytes of one message: MPI counts them by 31 bits.
+/// Most bytes of one message: MPI counts them by 31 bits.
 const CHUNK: usize = 1 << 30;
 
-/// Owner of each body: whole bodies, largest first, each to the rank with the least load so far.
+/// Return the owner rank of each body, where `loads` has the load of each body. Whole bodies are assigned, the largest first, each to the rank
+/// with the least load so far.
 pub fn owners(loads: &[usize], ranks: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..loads.len()).collect();
     order.sort_by_key(|&body| (std::cmp::Reverse(loads[body]), body));
@@ -130,23 +133,23 @@ pub fn owners(loads: &[usize], ranks: usize) -> Vec<usize> {
     owner
 }
 
-/// What a rank has otherwise than the first one.
+/// A fact that a rank has other than the first rank.
 pub struct Difference {
     /// The rank.
     pub rank: usize,
-    /// What it is that differs.
+    /// Name of the fact.
     pub what: String,
 }
 
-/// Compare facts, each with a name of what it tells, which all ranks should have alike; return what differs, the same on all ranks. One short
-/// message if nothing does. Collective.
+/// Compare facts (name and value) that should be the same on all ranks. Return the differences, the same list on all ranks. If there are none, this
+/// takes one short message. Collective.
 pub fn differences(session: &Session, facts: &BTreeMap<String, String>) -> Vec<Difference> {
     let sum = Sha256::digest(pack(facts));
     let sum = u64::from_le_bytes(std::array::from_fn(|byte| sum[byte]));
-    // the largest of all sums, and by its complement the least
-    let (mine, mut most) = ([sum, !sum], [0; 2]);
-    session.world().all_reduce_into(&mine[..], &mut most[..], SystemOperation::max());
-    if most[0] == !most[1] {
+    // the largest of all sums, and the smallest as the complement of the largest complement
+    let (mine, mut largest) = ([sum, !sum], [0; 2]);
+    session.world().all_reduce_into(&mine[..], &mut largest[..], SystemOperation::max());
+    if largest[0] == !largest[1] {
         return Vec::new();
     }
     let all = share(&Ranks::new(session), facts.clone());
@@ -159,22 +162,22 @@ pub fn differences(session: &Session, facts: &BTreeMap<String, String>) -> Vec<D
     found
 }
 
-/// Makes a result that ranks reached separately a common one: if it failed anywhere it fails everywhere, with the error
-/// of the lowest rank that has one. Other ranks get an error of the same kind without words, which is not printed.
+/// Make the results of all ranks agree: if one rank failed, all fail, with the error of the lowest rank that has a message. The other ranks get an
+/// error of the same kind without a message, which is not printed. Collective.
 ///
 /// # Errors
-/// As described; collective, so every rank must call it.
+/// As described.
 pub fn agree<T>(session: &Session, result: Result<T>) -> Result<T> {
     if session.size() == 1 {
         return result;
     }
-    let silent = i32::MAX;
-    // who has no words has them from another one
-    let has_words = result.as_ref().is_err_and(|error| !error.is_silent());
-    let mine = if has_words { session.rank() as i32 } else { silent };
-    let mut first = silent;
+    let none = i32::MAX;
+    // an error without a message comes from another rank, which has the message
+    let has_message = result.as_ref().is_err_and(|error| !error.is_silent());
+    let mine = if has_message { session.rank() as i32 } else { none };
+    let mut first = none;
     session.world().all_reduce_into(&mine, &mut first, SystemOperation::min());
-    if first == silent {
+    if first == none {
         return result;
     }
     let mine = match &result {

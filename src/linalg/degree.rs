@@ -1,10 +1,10 @@
-//! An order in which to eliminate the vertices of a graph so that few edges are added: minimum degree.
+//! Minimum degree ordering: an order in which the elimination of the vertices of a graph adds few edges.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
-/// The vertices in the order of their elimination, each with those that it is connected to then.
+/// The vertices in the order of their elimination, each with its neighbours at that time.
 pub type Order = Rc<Vec<(usize, Vec<usize>)>>;
 
 thread_local! {
@@ -12,10 +12,10 @@ thread_local! {
     static LAST: RefCell<(Vec<Vec<usize>>, Order)> = RefCell::default();
 }
 
-/// [`order`], kept for the next call: a run factors the springs between its bodies some ten times, and the order takes a third as long as
-/// the factor.
+/// Return [`order`] of a graph; it is kept for the next call with the same graph. A run factors the springs between its bodies some ten times,
+/// and the order takes a third as long as the factor.
 pub fn order_again(graph: Vec<Vec<usize>>) -> Order {
-    // a single vertex is no reason to forget
+    // a single vertex does not replace the graph that is kept
     if graph.len() < 2 {
         return order(graph).into();
     }
@@ -28,11 +28,11 @@ pub fn order_again(graph: Vec<Vec<usize>>) -> Order {
     })
 }
 
-/// The vertices in the order of their elimination, each with those that it is connected to then.
+/// Return the vertices in the order of their elimination, each with its neighbours at that time.
 ///
-/// `graph` has the neighbours of each vertex, sorted, without itself. At every step a vertex of least degree is taken, the first
-/// of them, and its neighbours are connected to each other (George, Liu: The evolution of the minimum degree ordering
-/// algorithm, 1989; here on the explicit graph, which is small: one vertex a body).
+/// `graph` has the neighbours of each vertex, sorted, without the vertex itself. Every step eliminates the first vertex of least degree, and connects
+/// its neighbours to each other (George, Liu: The evolution of the minimum degree ordering algorithm, 1989). The graph is explicit, because it is
+/// small: one vertex per body.
 pub fn order(mut graph: Vec<Vec<usize>>) -> Vec<(usize, Vec<usize>)> {
     let mut queue: BTreeSet<(usize, usize)> = graph.iter().enumerate().map(|(v, near)| (near.len(), v)).collect();
     let mut order = Vec::with_capacity(graph.len());
@@ -52,7 +52,7 @@ pub fn order(mut graph: Vec<Vec<usize>>) -> Vec<(usize, Vec<usize>)> {
     order
 }
 
-/// Members of either of two sorted lists, but for two of them.
+/// Return the sorted union of two sorted lists without the members `without`.
 fn union(a: &[usize], b: &[usize], without: [usize; 2]) -> Vec<usize> {
     let mut all = Vec::with_capacity(a.len() + b.len());
     let (mut i, mut k) = (0, 0);

@@ -1,4 +1,4 @@
-//! Factor of a semidefinite matrix of blocks: some solution of A x = b, and a basis of the kernel.
+//! The factor of a semidefinite matrix of blocks: it gives a solution of A x = b and a basis of the kernel.
 
 use super::blocks::Blocks;
 use super::degree;
@@ -6,33 +6,32 @@ use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-/// Share of stiffness below which a motion counts as free: the one tolerance of the question which motions nothing holds.
+/// Relative stiffness below which a motion counts as free: the one tolerance that decides which motions are unconstrained.
 ///
-/// Let A be springs in terms of motions whose largest displacement is about one, scaled to ones on its diagonal. A motion e is
-/// free if e'Ae <= TOLERANCE e'e: against e'e, what the springs would store if every unknown of e moved alone, they store
-/// nothing. Both sides are quadratic: what a free motion closes is below 3e-7 of what its parts close.
+/// Let A be the springs in terms of motions whose largest displacement is about one, scaled to ones on its diagonal. A motion e is free if
+/// e'Ae <= TOLERANCE e'e. Here e'e is what the springs would store if every unknown of e moved alone; compared with it, they store nothing. Both sides
+/// are quadratic: a free motion closes less than 3e-7 of what its parts close.
 ///
-/// - Why no less: an entry of A is a sum of products, each rounded by eps = 1.1e-16 of itself, and the elimination of k unknowns
-///   changes it by no more than (k + 1) eps again (Higham, Accuracy and Stability of Numerical Algorithms, theorem 10.3), k being
-///   the unknowns of bodies around: some hundreds at most. So e'Ae/e'e of a true kernel is rounded to 1e-14 at worst; measured
-///   are 1e-16 on a wall of 64 x 64 blocks and 8e-17 on 1000 blocks in space. Coordinates in files of meshes have 16 digits or,
-///   on curved surfaces, some ten; closings have that error, and A its square.
-/// - Why no more: everything above is real. A chain of n bodies that is held at one end has e'Ae/e'e = 1/n^2, springs of 1
-///   beside those of 1e8 have 1e-8, and both may come together.
-/// - Why e'e and not the pivot alone: a pivot is e'Ae for the e that is one at its own unknown. If that is the turn of a single
-///   block, all others move by their distance, and so do their rounding errors: the pivot is 2.5e-9 on that wall, e'e 2.4e7.
+/// - Why the tolerance is not less. An entry of A is a sum of products, each rounded by eps = 1.1e-16 of itself. The elimination of k unknowns changes
+///   it by at most (k + 1) eps again (Higham, Accuracy and Stability of Numerical Algorithms, theorem 10.3), where k counts the unknowns of the bodies
+///   around, some hundreds at most. So e'Ae/e'e of a true kernel is rounded to 1e-14 at worst. Measured are 1e-16 on a wall of 64 x 64 blocks and 8e-17
+///   on 1000 blocks in space. Coordinates in mesh files have 16 digits or, on curved surfaces, some ten. Closings have that error, and A its square.
+/// - Why it is not more. Everything above is real. A chain of n bodies that is held at one end has e'Ae/e'e = 1/n^2, springs of 1 beside those of 1e8
+///   have 1e-8, and both may occur together.
+/// - Why it refers to e'e, not to the pivot alone. A pivot is e'Ae for the e that is one at its own unknown. If that is the rotation of a single block,
+///   all others move by their distance, and their rounding errors grow with it: the pivot is 2.5e-9 on that wall, and e'e is 2.4e7.
 pub const TOLERANCE: f64 = 1e-13;
 
-/// Parts of a free motion below this share of its largest are rounding: it is known to the root of [`TOLERANCE`], 3e-7, and to
-/// less than that where springs differ much. The share below which anything else counts as zero that is not merely rounded once.
+/// Share of the largest part of a free motion below which a part is rounding. A motion is known to the root of [`TOLERANCE`], 3e-7, and less accurately
+/// where springs differ much. Other quantities that are rounded more than once count as zero below this share, too.
 pub const PART: f64 = 1e-6;
 
-/// LDL' of a symmetric positive semidefinite matrix, unknowns scaled to ones on the diagonal, bodies in an order of minimum
-/// degree, unknowns of a body by their pivots, largest first.
+/// The factorisation LDL' of a symmetric positive semidefinite matrix. Unknowns are scaled to ones on the diagonal. Bodies are in an order of minimum
+/// degree, and the unknowns of a body are eliminated by their pivots, largest first.
 ///
-/// A pivot d belongs to the vector e that is one at its unknown, zero at those not yet eliminated, and e'Ae = d is least. If
-/// e'Ae <= tolerance e'e, then e is in the kernel and the unknown is left out: the matrix of the others is regular. So is an
-/// unknown with a diagonal entry below tolerance^2 of the largest in its block, the square of a rounded number.
+/// A pivot d belongs to a vector e that is one at its unknown and zero at the unknowns that are not eliminated yet; its other entries make e'Ae = d
+/// least. If e'Ae <= tolerance e'e, then e is in the kernel, and the unknown is left out: the matrix of the others is regular. An unknown is also left
+/// out if its diagonal entry is below tolerance^2 of the largest in its block, the square of a rounded number.
 #[derive(Debug, Clone)]
 pub struct Factor {
     /// Number of unknowns.
@@ -50,26 +49,27 @@ pub struct Factor {
 /// The columns of L of one body.
 #[derive(Debug, Clone)]
 struct Column {
-    /// Its unknowns.
+    /// Unknowns of the body.
     own: Range<usize>,
-    /// Bodies eliminated later that it touches: number of their column, their unknowns.
+    /// Bodies connected to it that are eliminated later: number of their column, their unknowns.
     below: Vec<(usize, Range<usize>)>,
-    /// All rows: own ones and those below.
+    /// Number of rows: those of the body and those below.
     height: usize,
-    /// L column by column of the own unknowns, `height` entries each; one on its diagonal is implied.
+    /// L column by column, `height` entries for each unknown of the body; the ones on the diagonal are implied.
     panel: Vec<f64>,
     /// D; zero for unknowns left out.
     pivot: Vec<f64>,
-    /// Own unknowns, counted from `own.start`, in the order of their pivots; without those left out.
+    /// Unknowns of the body, counted from `own.start`, in the order of their pivots; without those left out.
     order: Vec<usize>,
 }
 
 impl Column {
+    /// Return the column of L of unknown p of the body.
     fn column(&self, p: usize) -> &[f64] {
         &self.panel[p * self.height..(p + 1) * self.height]
     }
 
-    /// Sum of L's entries below the own rows, times x, in the column of an own unknown.
+    /// Return the sum of the entries below the body's rows, times x, in the column of unknown p.
     fn along_below(&self, p: usize, x: &[f64]) -> f64 {
         let (mut sum, mut row) = (0.0, self.own.len());
         let column = self.column(p);
@@ -80,7 +80,7 @@ impl Column {
         sum
     }
 
-    /// x at the own unknowns that L'x = 0 asks for; x below is given, and added to on the own ones.
+    /// Backward substitution with L' at the unknowns of the body; x at the rows below is final.
     fn back(&self, x: &mut [f64]) {
         for &p in self.order.iter().rev() {
             let own = super::dot(&self.column(p)[..self.own.len()], &x[self.own.clone()]);
@@ -90,7 +90,7 @@ impl Column {
 }
 
 impl Factor {
-    /// Factors a matrix whose unknowns are scaled with `scale`, one entry each.
+    /// Factor a matrix whose unknowns are scaled with `scale`, one entry each.
     fn new(matrix: &Blocks, scale: Vec<f64>, tolerance: f64) -> Self {
         let mut factor = Self {
             count: matrix.unknowns(),
@@ -99,6 +99,7 @@ impl Factor {
             kernel: Vec::new(),
             left_out: Vec::new(),
         };
+        // for each column, the earlier ones that it is below: their number, and its position there
         let mut earlier: Vec<Vec<(usize, usize)>> = vec![Vec::new(); factor.columns.len()];
         for (j, column) in factor.columns.iter().enumerate() {
             column.below.iter().enumerate().for_each(|(position, (k, _))| earlier[*k].push((j, position)));
@@ -120,7 +121,7 @@ impl Factor {
         factor
     }
 
-    /// Writes the scaled matrix into column k, from its blocks (column, transpose of the block above).
+    /// Write the scaled matrix into column k, from its blocks (column, transpose of the block above).
     fn assemble(&mut self, k: usize, entries: &[(usize, DMatrix<f64>)], work: &mut Work) {
         let mut height = self.columns[k].own.len();
         for (column, range) in &self.columns[k].below {
@@ -141,32 +142,30 @@ impl Factor {
         self.columns[k].panel = panel;
     }
 
-    /// Subtracts from column k what the elimination of column j < k changes, which touches k at `position`.
+    /// Subtract from column k the change by the elimination of column j < k, in which k is at `position` of the columns below.
     fn update(&mut self, k: usize, j: usize, position: usize, work: &mut Work) {
         let (before, rest) = self.columns.split_at_mut(k);
         let (source, target) = (&before[j], &mut rest[0]);
         let touched = &source.below[position..];
         let count: usize = touched.iter().map(|(_, range)| range.len()).sum();
         let top = source.height - count;
-        // rows that follow each other in both columns, as most do in the last ones, which are full
+        // join rows that are consecutive in both columns; in the last columns, which are full, most are
         work.runs.clear();
         let mut from = top;
         for (column, range) in touched {
             let to = work.row[*column];
             match work.runs.last_mut() {
-                Some((start, first, length)) if *start + *length == from && *first + *length == to => {
-                    *length += range.len()
-                }
-                _ => work.runs.push((from, to, range.len())),
+                Some(run) if run.from + run.length == from && run.to + run.length == to => run.length += range.len(),
+                _ => work.runs.push(Run { from, to, length: range.len() }),
             }
             from += range.len();
         }
         for p in 0..target.own.len() {
             let amount = |q: usize| source.pivot[q] * source.column(q)[top + p];
             let panel = &mut target.panel[p * target.height..(p + 1) * target.height];
-            // three unknowns at once: bodies have three or six, and a row is then read and written less often
+            // three unknowns at once, as bodies have three or six: each row is then read and written less often
             for some in source.order.chunks(3) {
-                for &(from, to, length) in &work.runs {
+                for &Run { from, to, length } in &work.runs {
                     let rows = &mut panel[to..to + length];
                     let of = |q: usize| &source.column(q)[from..from + length];
                     match *some {
@@ -182,19 +181,20 @@ impl Factor {
         }
     }
 
-    /// Eliminates the unknowns of column k.
+    /// Eliminate the unknowns of column k.
     fn eliminate(&mut self, k: usize, earlier: &[Vec<(usize, usize)>], tolerance: f64, work: &mut Work) {
         let size = self.columns[k].own.len();
         let height = self.columns[k].height;
         let mut open: Vec<usize> = (0..size).collect();
-        // of equal pivots the first: rotations come last, and are left out first
+        // take the first of equal pivots: rotations come last, so that they are left out first
         while let Some(at) = (0..open.len()).rev().max_by(|&a, &b| {
             let pivot = |i: usize| self.columns[k].panel[open[i] * (height + 1)];
             pivot(a).total_cmp(&pivot(b))
         }) {
             let p = open.remove(at);
             let pivot = self.columns[k].panel[p * (height + 1)];
-            // rounding is eps e'e, and e'e of a turn about the square of the number of bodies: up to 5e4 of them it is below
+            // a pivot of the kernel is about eps e'e, and e'e of a rotation is about the square of the number of bodies: below this bound for up to
+            // 5e4 bodies
             if pivot <= tolerance.sqrt() {
                 let vector = self.candidate(k, p, earlier, work);
                 let size: f64 = vector.iter().map(|(_, value)| value * value).sum();
@@ -217,7 +217,7 @@ impl Factor {
         }
     }
 
-    /// Notes a kernel vector of the scaled matrix, and makes the row and column of its unknown zero.
+    /// Keep a kernel vector of the scaled matrix, and set the row and the column of its unknown to zero.
     fn leave_out(&mut self, k: usize, p: usize, vector: Vec<(usize, f64)>, open: &[usize]) {
         let column = &mut self.columns[k];
         column.panel[p * column.height..(p + 1) * column.height].fill(0.0);
@@ -232,8 +232,8 @@ impl Factor {
         self.left_out.push(unknown);
     }
 
-    /// The vector of the scaled matrix that is one at own unknown p of column k, zero at what is not eliminated yet, and that
-    /// earlier unknowns follow: its entries (unknown, value).
+    /// Return the vector e of a pivot of the scaled matrix: one at unknown p of column k, zero at the unknowns that are not eliminated yet, and with
+    /// the least e'Ae. Its entries are (unknown, value).
     fn candidate(&self, k: usize, p: usize, earlier: &[Vec<(usize, usize)>], work: &mut Work) -> Vec<(usize, f64)> {
         let x = &mut work.x;
         x[self.columns[k].own.start + p] = 1.0;
@@ -251,30 +251,30 @@ impl Factor {
         entries.filter(|entry| entry.1 != 0.0).collect()
     }
 
-    /// Number of entries of the factor that are stored: what it costs.
+    /// Return the number of stored entries of the factor.
     #[cfg(test)]
     pub fn entries(&self) -> usize {
         self.columns.iter().map(|column| column.panel.len()).sum()
     }
 
-    /// Number of unknowns that are not left out.
+    /// Return the number of unknowns that are not left out.
     pub fn rank(&self) -> usize {
         self.count - self.left_out.len()
     }
 
-    /// The unknowns left out, one for each kernel vector.
+    /// Return the unknowns left out, one for each kernel vector.
     #[cfg(test)]
     pub fn left_out(&self) -> &[usize] {
         &self.left_out
     }
 
-    /// A basis of the kernel: entries (unknown, value) of each vector, the largest one. It is reduced: of the unknowns left
-    /// out, each vector has its own alone. So motions that are pure come out pure.
+    /// Return a basis of the kernel: entries (unknown, value) of each vector, the largest value one. The basis is reduced: each vector is zero at all
+    /// unknowns left out but its own. So pure motions are found as such.
     pub fn kernel_entries(&self) -> &[Vec<(usize, f64)>] {
         &self.kernel
     }
 
-    /// The same basis as whole vectors.
+    /// Return the same basis as full vectors.
     pub fn kernel(&self) -> Vec<DVector<f64>> {
         let whole = |entries: &Vec<(usize, f64)>| {
             let mut vector = DVector::zeros(self.count);
@@ -284,8 +284,8 @@ impl Factor {
         self.kernel.iter().map(whole).collect()
     }
 
-    /// A solution of A x = b that is zero at the unknowns left out, for b in the range of A; else the equations of these
-    /// unknowns are not satisfied.
+    /// Return the solution of A x = b that is zero at the unknowns left out. If b is not in the range of A, the equations of these unknowns are not
+    /// satisfied.
     pub fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
         let mut x: Vec<f64> = b.iter().zip(&self.scale).map(|(b, scale)| b * scale).collect();
         for column in &self.columns {
@@ -310,31 +310,36 @@ impl Factor {
 }
 
 impl Blocks {
-    /// Factors the matrix and finds its kernel: see [`Factor`]. `tolerance` is [`TOLERANCE`] unless there is
-    /// a reason.
+    /// Factor the matrix and find its kernel: see [`Factor`]. `tolerance` is [`TOLERANCE`] unless there is a reason for another.
     pub fn factor(&self, tolerance: f64) -> Factor {
         Factor::new(self, unit_diagonal(self, tolerance), tolerance)
     }
 
-    /// Basis of the combinations e of a few motions with e'Ae <= `tolerance * full * e'e`, where `full` is the entry of a motion
-    /// that is held in full: a scale that small entries do not have by themselves. Pure motions come out pure, largest part one.
+    /// Return a basis of the combinations e of a few motions with e'Ae <= `tolerance * full * e'e`. `full` is the entry of a motion that is fully
+    /// constrained; small entries have no such scale of their own. Pure motions are found as such, with the largest part one.
     pub fn free(gram: &DMatrix<f64>, full: f64, tolerance: f64) -> Vec<DVector<f64>> {
         let scale = vec![full.sqrt().recip(); gram.nrows()];
         Factor::new(&Self::single(gram), scale, tolerance).kernel()
     }
 }
 
-/// What the columns share while they are made.
+/// Work arrays of the factorisation.
 struct Work {
     /// A vector over all unknowns, zero between uses.
     x: Vec<f64>,
-    /// First row of each column's unknowns in the panel at hand.
+    /// First row of each column's unknowns in the panel of the present column.
     row: Vec<usize>,
-    /// Rows of one panel that are rows of another: first row there, first row here, and how many.
-    runs: Vec<(usize, usize, usize)>,
+    runs: Vec<Run>,
 }
 
-/// 1/root of each diagonal entry, zero where it is rounding.
+/// Consecutive rows of one panel that are consecutive in another: the first row in each, and how many they are.
+struct Run {
+    from: usize,
+    to: usize,
+    length: usize,
+}
+
+/// Return 1/root of each diagonal entry, zero where the entry is rounding.
 fn unit_diagonal(matrix: &Blocks, tolerance: f64) -> Vec<f64> {
     let of = |i: usize| {
         let diagonal = matrix.diagonal(i).diagonal();
@@ -345,7 +350,7 @@ fn unit_diagonal(matrix: &Blocks, tolerance: f64) -> Vec<f64> {
     (0..matrix.rows()).flat_map(of).collect()
 }
 
-/// The columns of the factor in the order of their elimination, without numbers.
+/// Return the columns of the factor in the order of their elimination, without values.
 fn structure(matrix: &Blocks) -> Vec<Column> {
     let bodies: Vec<usize> = (0..matrix.rows()).filter(|&i| !matrix.range(i).is_empty()).collect();
     let mut vertex = vec![0; matrix.rows()];
@@ -370,7 +375,7 @@ fn structure(matrix: &Blocks) -> Vec<Column> {
     order.iter().map(column).collect()
 }
 
-/// The column of each row of blocks; any for those without unknowns.
+/// Return the column of each row of blocks; for rows without unknowns the value has no meaning.
 fn steps(matrix: &Blocks, columns: &[Column]) -> Vec<usize> {
     let mut of_first = vec![0; matrix.unknowns()];
     columns.iter().enumerate().for_each(|(k, column)| of_first[column.own.start] = k);

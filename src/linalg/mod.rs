@@ -1,7 +1,7 @@
-//! Compressed sparse rows with the few operations that the method needs.
+//! Linear algebra: sparse matrices in compressed rows, matrices of blocks with their factor, and functions that are the same on all processors.
 //!
-//! Dense algebra comes from `nalgebra`. The sparse type is our own because its index type must be PETSc's
-//! 32-bit integer, so that a pattern goes to PETSc as it is.
+//! Dense algebra comes from `nalgebra`. The sparse type is our own because its index type must be PETSc's 32-bit integer, so that a pattern can be
+//! passed to PETSc without a copy.
 
 mod blocks;
 #[cfg(test)]
@@ -21,22 +21,22 @@ use crate::error::{Error, Kind, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Least and largest coordinates of points, the corners of the box around them; without points the least ones are infinite.
+/// Return the least and the largest coordinates of points: the corners of their bounding box. Without points the least ones are infinite.
 pub fn bounds<const K: usize>(points: impl IntoIterator<Item = [f64; K]>) -> [[f64; K]; 2] {
     points.into_iter().fold([[f64::INFINITY; K], [f64::NEG_INFINITY; K]], |all, x| around(all, [x; 2]))
 }
 
-/// The box around two boxes, of which one may have no points.
+/// Return the bounding box of two boxes; either may be that of no points.
 pub fn around<const K: usize>(a: [[f64; K]; 2], b: [[f64; K]; 2]) -> [[f64; K]; 2] {
     [std::array::from_fn(|c| a[0][c].min(b[0][c])), std::array::from_fn(|c| a[1][c].max(b[1][c]))]
 }
 
-/// A vector of 2 or 3 components as 3.
+/// Return a vector of 2 or 3 components as one of 3.
 pub fn pad<const K: usize>(v: [f64; K]) -> [f64; 3] {
     std::array::from_fn(|c| if c < K { v[c] } else { 0.0 })
 }
 
-/// A sparse matrix in compressed rows: row `i` holds columns `col[ptr[i]..ptr[i+1]]`, sorted.
+/// A sparse matrix in compressed rows: row `i` has the columns `col[ptr[i]..ptr[i+1]]`, sorted.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Csr {
     /// Number of columns.
@@ -50,23 +50,23 @@ pub struct Csr {
 }
 
 impl Csr {
-    /// A matrix without rows, to be filled with [`Csr::push_row`].
+    /// Return a matrix without rows, to be filled with [`Csr::push_row`].
     pub fn new(columns: usize) -> Self {
         Self { columns, ptr: vec![0], col: Vec::new(), values: Vec::new() }
     }
 
-    /// A square matrix with all entries stored, from its values row by row.
+    /// Return a square matrix with all entries stored, from its values row by row.
     pub fn full(rows: usize, values: Vec<f64>) -> Self {
         let ptr = (0..=rows).map(|i| (i * rows) as i32).collect();
         Self { columns: rows, ptr, col: (0..rows).flat_map(|_| 0..rows as i32).collect(), values }
     }
 
-    /// Number of rows.
+    /// Return the number of rows.
     pub fn rows(&self) -> usize {
         self.ptr.len() - 1
     }
 
-    /// Appends a row; `entries` are (column, value), in any order, columns distinct. Zeros are kept out.
+    /// Append a row; `entries` are (column, value), in any order, with distinct columns. Zeros are not stored.
     pub fn push_row(&mut self, entries: impl IntoIterator<Item = (usize, f64)>) {
         let mut row: Vec<_> = entries.into_iter().filter(|entry| entry.1 != 0.0).collect();
         row.sort_unstable_by_key(|entry| entry.0);
@@ -78,17 +78,17 @@ impl Csr {
         self.ptr.push(self.col.len() as i32);
     }
 
-    /// Entry range of row `i`.
+    /// Return the range of the entries of row `i`.
     pub fn range(&self, i: usize) -> std::ops::Range<usize> {
         self.ptr[i] as usize..self.ptr[i + 1] as usize
     }
 
-    /// Entries (column, value) of row `i`.
+    /// Iterate over the entries (column, value) of row `i`.
     pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
         self.range(i).map(|k| (self.col[k] as usize, self.values[k]))
     }
 
-    /// y = A x.
+    /// Compute y = A x.
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
         debug_assert_eq!(x.len(), self.columns);
         for (i, y) in y.iter_mut().enumerate() {
@@ -101,7 +101,7 @@ impl Csr {
         }
     }
 
-    /// y += s A' x.
+    /// Add s A' x to y.
     pub fn add_transpose(&self, s: f64, x: &[f64], y: &mut [f64]) {
         debug_assert_eq!(y.len(), self.columns);
         for (i, &x) in x.iter().enumerate() {
@@ -113,14 +113,14 @@ impl Csr {
         }
     }
 
-    /// Position of entry (i, j) in `values`, if the pattern has it.
+    /// Return the position of entry (i, j) in `values`, if the pattern has it.
     pub fn position(&self, i: usize, j: usize) -> Option<usize> {
         let range = self.range(i);
         let offset = self.col[range.clone()].binary_search(&(j as i32)).ok()?;
         Some(range.start + offset)
     }
 
-    /// The same rows over other columns, of so many; those without a number there are left out.
+    /// Return the same rows over other `columns`; `number` maps a column to its new number, none if it is left out.
     pub fn of_columns(&self, columns: usize, number: impl Fn(usize) -> Option<usize>) -> Self {
         let mut rows = Self::new(columns);
         for i in 0..self.rows() {
@@ -129,21 +129,21 @@ impl Csr {
         rows
     }
 
-    /// b diag(K) b' of each row b, for a square K.
+    /// Return b diag(K) b' of each row b, for a square K.
     pub fn quadratic_diagonal(&self, k: &Csr) -> Vec<f64> {
         (0..self.rows()).map(|q| self.row(q).map(|(i, b)| b * b * k.diagonal(i)).sum()).collect()
     }
 
-    /// Diagonal entry of row i; zero if the pattern does not have it.
+    /// Return the diagonal entry of row i, zero if the pattern does not have it.
     pub fn diagonal(&self, i: usize) -> f64 {
         self.position(i, i).map_or(0.0, |k| self.values[k])
     }
 }
 
-/// Refuses a number of entries that the 32-bit starts of rows cannot count; `what` names the matrix.
+/// Check that 32-bit row starts can count this number of entries; `what` names the matrix.
 ///
 /// # Errors
-/// [`Kind::Solver`] with the number.
+/// [`Kind::Solver`] with the number, if they cannot.
 pub fn countable(what: &str, entries: usize) -> Result<()> {
     if entries <= i32::MAX as usize {
         return Ok(());
@@ -152,7 +152,7 @@ pub fn countable(what: &str, entries: usize) -> Result<()> {
     Err(Error::new(Kind::Solver, message).help("take a coarser mesh, or order = 1"))
 }
 
-/// Sum of products of a row without holes, in partial sums that the processor adds side by side.
+/// Return the scalar product for a row with all columns. Its partial sums allow vector instructions.
 fn dot_of_full(a: &[f64], b: &[f64]) -> f64 {
     const WIDE: usize = 8;
     let (a, b) = (a.chunks_exact(WIDE), b.chunks_exact(WIDE));
@@ -164,19 +164,19 @@ fn dot_of_full(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// Scalar product.
+/// Return x'y.
 pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// y += a x.
+/// Add a x to y.
 pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
     for (y, x) in y.iter_mut().zip(x) {
         *y += a * x;
     }
 }
 
-/// Least squares: amounts of some vectors that together come nearest to another.
+/// Return the amounts of some vectors whose combination is nearest to the vector `to` (least squares).
 pub fn fit<V: AsRef<[f64]>>(vectors: &[V], to: &[f64]) -> Vec<f64> {
     let count = vectors.len();
     let normal = DMatrix::from_fn(count, count, |i, j| dot(vectors[i].as_ref(), vectors[j].as_ref()));
@@ -185,7 +185,7 @@ pub fn fit<V: AsRef<[f64]>>(vectors: &[V], to: &[f64]) -> Vec<f64> {
     if largest == 0.0 {
         return vec![0.0; count];
     }
-    // combinations of the vectors that vanish stay out
+    // leave out combinations of the vectors that vanish
     match normal.svd(true, true).solve(&right, 1e-10 * largest) {
         Ok(amounts) => amounts.as_slice().to_vec(),
         Err(_) => vec![0.0; count],

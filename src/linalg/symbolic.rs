@@ -1,20 +1,19 @@
-//! What a sparse Cholesky factorisation takes, counted before it is made.
+//! The cost of a sparse Cholesky factorisation, counted in advance.
 
-/// Size of a factorisation.
+/// The size of a factorisation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Work {
     /// Entries of the factor, without those among rows that stay.
     pub entries: f64,
-    /// Multiplications and additions: the squares of the lengths of its columns, summed.
+    /// Multiplications and additions: the sum of the squared lengths of the columns.
     pub operations: f64,
 }
 
-/// The work of eliminating the nodes of a graph in a given order, while some unknowns stay (a Schur complement).
+/// Return the work of the elimination of the nodes of a graph in a given order, where some unknowns stay (a Schur complement).
 ///
-/// The neighbours of node i are `col[ptr[i]..ptr[i + 1]]`, with or without i itself. Node i is the `position[i]`-th to go and has
-/// `weight[i]` unknowns that go; `stays` are (node, number of its unknowns that stay). The paths of each row through the
-/// elimination tree are its entries (Liu, SIAM J. Matrix Anal. Appl. 11, 1990, 134), so it takes as many steps as the factor of
-/// the graph has entries.
+/// The neighbours of node i are `col[ptr[i]..ptr[i + 1]]`, with or without i itself. Node i is the `position[i]`-th to be eliminated, with
+/// `weight[i]` unknowns; `stays` are (node, number of its unknowns that stay). The entries of a row of the factor are on its paths through the
+/// elimination tree (Liu, SIAM J. Matrix Anal. Appl. 11, 1990, 134). So the count takes as many steps as the factor of the graph has entries.
 pub fn factorisation(ptr: &[u32], col: &[u32], position: &[i32], weight: &[usize], stays: &[(usize, usize)]) -> Work {
     const NONE: u32 = u32::MAX;
     let nodes = ptr.len() - 1;
@@ -31,7 +30,7 @@ pub fn factorisation(ptr: &[u32], col: &[u32], position: &[i32], weight: &[usize
         }
         for &other in &col[ptr[node] as usize..ptr[node + 1] as usize] {
             let mut at = position[other as usize] as u32;
-            // a node that stays is below all that go
+            // a node that stays is below all nodes that are eliminated
             while at < row && seen[at as usize] != row {
                 seen[at as usize] = row;
                 below[at as usize] += unknowns as f64;
@@ -57,7 +56,7 @@ pub fn factorisation(ptr: &[u32], col: &[u32], position: &[i32], weight: &[usize
 mod tests {
     use super::*;
 
-    /// The work by elimination of a dense pattern, unknown by unknown.
+    /// Count the work by elimination in a dense pattern, unknown by unknown.
     fn dense(pattern: &mut [Vec<bool>], order: &[usize]) -> Work {
         let mut work = Work::default();
         let mut gone = vec![false; pattern.len()];

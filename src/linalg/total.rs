@@ -1,8 +1,8 @@
-//! Sums that do not depend on how their terms are shared by ranks.
+//! Sums that do not depend on the distribution of their terms over ranks.
 
 use serde::{Deserialize, Serialize};
 
-/// A sum, and what its additions have lost: rounded together, it is the same in any order of the terms but for rare last digits.
+/// A sum with the rounding errors of its additions. The rounded total of both is the same in any order of the terms, but for rare last digits.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct Total {
     sum: f64,
@@ -10,7 +10,7 @@ pub struct Total {
 }
 
 impl Total {
-    /// Adds a term.
+    /// Add a term.
     pub fn add(&mut self, term: f64) {
         let next = self.sum + term;
         let added = next - self.sum;
@@ -18,13 +18,13 @@ impl Total {
         self.sum = next;
     }
 
-    /// Adds all terms of another sum.
+    /// Add all terms of another sum.
     pub fn join(&mut self, other: &Self) {
         self.add(other.sum);
         self.add(other.lost);
     }
 
-    /// The sum.
+    /// Return the sum.
     pub fn value(&self) -> f64 {
         self.sum + self.lost
     }

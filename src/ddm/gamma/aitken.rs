@@ -5,7 +5,7 @@ use crate::linalg::dot;
 
 /// gamma^k = -gamma^{k-1} z^{k-1}.(z^k - z^{k-1}) / |z^k - z^{k-1}|^2 on the traces: the secant of the fixed point map.
 ///
-/// A value outside of (0, 10) is replaced by the exact line search.
+/// A value outside of (0, 10), as where contact changes the most, is replaced by the exact line search.
 #[derive(Debug, Default)]
 pub struct Aitken {
     last: Option<(f64, Vec<f64>)>,
