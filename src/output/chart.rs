@@ -153,19 +153,20 @@ struct Pen {
 
 /// Return the pens of all series.
 fn pens(series: &[Series]) -> Vec<Pen> {
-    let mut next = 0;
-    let pen = |(index, series): (usize, &Series)| {
-        let (color, number) = match series.color {
-            Color::Grey => (GREY, index),
-            Color::Palette(number) => (PALETTE[number % PALETTE.len()], number),
+    let (mut next, mut pens) = (0, Vec::new());
+    for (index, series) in series.iter().enumerate() {
+        let number = match series.color {
+            Color::Grey => index,
+            Color::Palette(number) => number,
             Color::Next => {
                 next += 1;
-                (PALETTE[(next - 1) % PALETTE.len()], next - 1)
+                next - 1
             }
         };
-        Pen { style: series.style, color, mark: MARKS[number % MARKS.len()] }
-    };
-    series.iter().enumerate().map(pen).collect()
+        let color = if series.color == Color::Grey { GREY } else { PALETTE[number % PALETTE.len()] };
+        pens.push(Pen { style: series.style, color, mark: MARKS[number % MARKS.len()] });
+    }
+    pens
 }
 
 impl Pen {

@@ -190,20 +190,22 @@ fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> 
     temporary.push(path.file_name().unwrap_or_default());
     temporary.push(format!(".{}.part", std::process::id()));
     let part = path.with_file_name(temporary);
-    let written = (|| {
-        let mut out = BufWriter::new(create_new(&part)?);
-        fill(&mut out)?;
-        let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
-        // Network file systems and quotas may refuse the data only at this point.
-        file.sync_all()?;
-        fs::rename(&part, path)?;
-        Ok(file)
-    })();
-    written.map_err(|cause| {
+    fill_and_rename(&part, path, fill).map_err(|cause| {
         // The first failure is reported; the temporary file may not even exist.
         let _ = fs::remove_file(&part);
         failed(path, &cause)
     })
+}
+
+/// Create the file `part`, fill it, rename it to `path`, and return it.
+fn fill_and_rename(part: &Path, path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<File> {
+    let mut out = BufWriter::new(create_new(part)?);
+    fill(&mut out)?;
+    let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    // Network file systems and quotas may refuse the data only at this point.
+    file.sync_all()?;
+    fs::rename(part, path)?;
+    Ok(file)
 }
 
 /// Remove the temporary files of processes that were killed while they wrote. A file that cannot be removed is no error.

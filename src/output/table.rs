@@ -138,23 +138,28 @@ struct Column {
     value: fn(&Row) -> String,
 }
 
+impl Column {
+    fn new(heading: &'static str, width: usize, value: fn(&Row) -> String) -> Self {
+        Self { heading, width, value }
+    }
+}
+
 /// Return the columns of a table that begins with the row `first`. Inner iterations have a column if there are any.
 fn columns(first: &Row) -> Vec<Column> {
     // the column has closed points / all points
     let closed = (2 * first.points.to_string().len() + 1).max("closed".len());
-    let all: [(_, _, fn(&Row) -> String); 9] = [
-        ("k", 5, |row| row.iteration.to_string()),
-        ("residual", 9, |row| sci(row.residual, 3)),
-        ("increment", 9, |row| sci(row.increment, 3)),
-        ("gamma", 6, |row| if row.gamma.is_nan() { "-".into() } else { format!("{:.4}", row.gamma) }),
-        ("F1", 13, |row| sci(row.energy, 6)),
-        ("closed", closed, |row| format!("{}/{}", row.closed, row.points)),
-        ("factored", 8, |row| row.factorizations.to_string()),
-        ("inner", 7, |row| row.inner_iterations.to_string()),
-        ("seconds", 7, |row| seconds(row.seconds)),
+    let columns = [
+        Column::new("k", 5, |row| row.iteration.to_string()),
+        Column::new("residual", 9, |row| sci(row.residual, 3)),
+        Column::new("increment", 9, |row| sci(row.increment, 3)),
+        Column::new("gamma", 6, |row| if row.gamma.is_nan() { "-".into() } else { format!("{:.4}", row.gamma) }),
+        Column::new("F1", 13, |row| sci(row.energy, 6)),
+        Column::new("closed", closed, |row| format!("{}/{}", row.closed, row.points)),
+        Column::new("factored", 8, |row| row.factorizations.to_string()),
+        Column::new("inner", 7, |row| row.inner_iterations.to_string()),
+        Column::new("seconds", 7, |row| seconds(row.seconds)),
     ];
-    let columns = all.into_iter().map(|(heading, width, value)| Column { heading, width, value });
-    columns.filter(|column| column.heading != "inner" || first.inner_iterations > 0).collect()
+    columns.into_iter().filter(|column| column.heading != "inner" || first.inner_iterations > 0).collect()
 }
 
 /// Return a line of the table, with the texts of the columns aligned to the right.

@@ -35,9 +35,14 @@ fn relative(low: [f64; 3], x: &[f64; 3]) -> [f64; 3] {
 
 /// Return the data of parts, with points relative to `low`.
 fn parts(parts: &[Part], low: [f64; 3]) -> Vec<Value> {
+    let range = super::bands::range(parts.iter().flat_map(|part| &part.value));
+    parts.iter().map(|part| part_data(part, low, range)).collect()
+}
+
+/// Return the data of a part; values are scaled to the range.
+fn part_data(part: &Part, low: [f64; 3], [least, most]: [f64; 2]) -> Value {
     // float32 has too few digits for a small body far from the origin
-    let points = |part: &Part| part.points.iter().map(|x| relative(low, x)).collect::<Vec<_>>();
-    let [least, most] = super::bands::range(parts.iter().flat_map(|part| &part.value));
+    let points: Vec<[f64; 3]> = part.points.iter().map(|x| relative(low, x)).collect();
     let short = |value: &f64| match value.is_finite() {
         true => ((value - least) / (most - least) * f64::from(NONE - 1)).round() as u16,
         false => NONE,
@@ -45,14 +50,11 @@ fn parts(parts: &[Part], low: [f64; 3]) -> Vec<Value> {
     let floats = |points: &[[f64; 3]]| -> Vec<u8> {
         points.as_flattened().iter().flat_map(|&x| (x as f32).to_le_bytes()).collect()
     };
-    let part = |part: &Part| {
-        json!({
-            "name": part.name,
-            "points": STANDARD.encode(floats(&points(part))),
-            "displacement": STANDARD.encode(floats(&part.displacement)),
-            "value": STANDARD.encode(part.value.iter().map(short).flat_map(u16::to_le_bytes).collect::<Vec<_>>()),
-            "triangles": STANDARD.encode(part.triangles.as_flattened().iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>()),
-        })
-    };
-    parts.iter().map(part).collect()
+    json!({
+        "name": part.name,
+        "points": STANDARD.encode(floats(&points)),
+        "displacement": STANDARD.encode(floats(&part.displacement)),
+        "value": STANDARD.encode(part.value.iter().map(short).flat_map(u16::to_le_bytes).collect::<Vec<_>>()),
+        "triangles": STANDARD.encode(part.triangles.as_flattened().iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>()),
+    })
 }

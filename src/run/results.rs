@@ -8,7 +8,7 @@ use crate::error::{Result, few};
 use crate::exchange::share;
 use crate::fem::strain::{self, Strained};
 use crate::linalg::{around, bounds};
-use crate::model::BodySlot;
+use crate::model::{Body, BodySlot};
 use crate::output::report::readable;
 use crate::output::{BodyReport, sci};
 use serde::{Deserialize, Serialize};
@@ -19,27 +19,26 @@ use std::rc::Rc;
 pub fn recover(done: &Done) -> Rc<All> {
     done.recovered.clone().unwrap_or_else(|| {
         let bodies = done.model().bodies.iter().zip(&done.outcome.iterate.states);
-        Rc::new(bodies.map(|(slot, state)| recover_body(slot, state, done.share)).collect())
+        let local = |(slot, state): (&BodySlot, &Vec<f64>)| {
+            slot.local.as_ref().map(|body| recover_body(slot, &**body, state, done.share))
+        };
+        Rc::new(bodies.map(local).collect())
     })
 }
 
-/// Return the displacements of a body from its state at a share of the loads, if this rank has nodes of it. Collective.
-fn recover_body(slot: &BodySlot, state: &[f64], share: f64) -> Option<Result<Recovered>> {
-    let body = slot.local.as_ref()?;
+/// Return the displacements of a body from its state at a share of the loads. Collective.
+fn recover_body(slot: &BodySlot, body: &dyn Body, state: &[f64], share: f64) -> Result<Recovered> {
     // A motion that springs resist counts as deformation, too.
     let rigid = if slot.sprung.is_some() { 0 } else { body.rigid() };
     // bodies expect states at the full load
     let state: Vec<f64> = state.iter().map(|u| u / share).collect();
     let (deformation, motion) = state.split_at(state.len() - rigid);
-    let recover = || -> Result<Recovered> {
-        let mut bent = body.recover(&[deformation, &vec![0.0; rigid]].concat())?;
-        // The rigid motion is the same on all ranks, so all of them take the same branch.
-        let mut state = if motion.iter().all(|a| *a == 0.0) { bent.clone() } else { body.recover(&state)? };
-        state.iter_mut().zip(body.carried()).for_each(|(u, imposed)| *u += imposed);
-        bent.iter_mut().chain(&mut state).for_each(|u| *u *= share);
-        Ok(Recovered::new(state, bent))
-    };
-    Some(recover())
+    let mut bent = body.recover(&[deformation, &vec![0.0; rigid]].concat())?;
+    // The rigid motion is the same on all ranks, so all of them take the same branch.
+    let mut state = if motion.iter().all(|a| *a == 0.0) { bent.clone() } else { body.recover(&state)? };
+    state.iter_mut().zip(body.carried()).for_each(|(u, imposed)| *u += imposed);
+    bent.iter_mut().chain(&mut state).for_each(|u| *u *= share);
+    Ok(Recovered::new(state, bent))
 }
 
 /// The results on a rank's part of a body.
