@@ -1,6 +1,6 @@
-//! `SHA256SUMS`: what the files of a run were when it wrote them, so that a damaged one is not taken for its results.
+//! `SHA256SUMS`: the checksums of the files of a run as it wrote them, so that a damaged file is not taken for a result.
 //!
-//! `sha256sum -c SHA256SUMS` reads it, too. Its last line is a comment with the sum of the lines above.
+//! `sha256sum -c SHA256SUMS` can read the list. Its last line is a comment with the checksum of the lines above.
 
 use super::folder::Folder;
 use super::leftovers::{SUMS as FILE, SUMS_TITLE as TITLE};
@@ -11,20 +11,20 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Sums of files, in hexadecimal digits, by their names.
+/// The checksums of files in hexadecimal digits, by file name.
 #[derive(Debug, Default)]
 pub struct Checksums(BTreeMap<String, String>);
 
 impl Checksums {
-    /// Writes the sums of these files of a folder, of those that are there.
+    /// Write the checksums of the named files of a folder. Names without a file are skipped.
     ///
     /// # Errors
-    /// [`Kind::File`] when one cannot be read, or the sums cannot be written.
+    /// [`Kind::File`] when a file cannot be read, or the list cannot be written.
     pub fn save<'a>(folder: &Folder, names: impl Iterator<Item = &'a String>) -> Result<()> {
         let mut text = format!("{TITLE}\n");
         for name in names {
             let path = folder.path().join(name);
-            // what is no file could not be written, which is said elsewhere; a pipe would keep its reader waiting
+            // A missing file could not be written, which is reported elsewhere. A pipe would block its reader.
             if fs::symlink_metadata(&path).is_ok_and(|data| data.is_file()) {
                 let sum = sum_of_file(&path).map_err(|cause| Error::file(&path, "read", &cause))?;
                 text += &format!("{sum}  {name}\n");
@@ -34,53 +34,56 @@ impl Checksums {
         folder.write(FILE, |out| out.write_all(text.as_bytes()))
     }
 
-    /// Removes the file, before those that it tells of change.
+    /// Remove the list, before the files that it names change.
     pub fn withdraw(folder: &Path) {
-        // without one there is nothing to withdraw; one that stays makes its files look damaged, never good
+        // A missing list needs no removal. A list that cannot be removed makes its files look damaged, never good.
         let _ = fs::remove_file(folder.join(FILE));
     }
 
-    /// The sums of a file with these bytes.
+    /// Parse a list of checksums; `path` names the list in the error.
     ///
     /// # Errors
-    /// [`Kind::File`] when it is damaged itself.
+    /// [`Kind::File`] when the list itself is damaged.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
         let text = std::str::from_utf8(bytes).ok().and_then(|text| text.strip_suffix('\n'));
-        let whole = text.and_then(|text| text.rsplit_once('\n')).filter(|(above, last)| {
+        let intact = text.and_then(|text| text.rsplit_once('\n')).filter(|(above, last)| {
             last.strip_prefix("# ").is_some_and(|digits| digits == sum(format!("{above}\n").as_bytes()))
         });
-        let Some((lines, _)) = whole else { return Err(damaged(path)) };
+        let Some((lines, _)) = intact else { return Err(damaged(path)) };
         let lines = lines.lines().filter(|line| !line.starts_with('#'));
         Ok(Self(lines.filter_map(|line| line.split_once("  ")).map(|(sum, name)| (name.into(), sum.into())).collect()))
     }
 
-    /// Checks the bytes of a file, if its sum is known.
+    /// Check the bytes of a file against its checksum. A file without a checksum passes.
     ///
     /// # Errors
-    /// [`Kind::File`] when they are not those that were written.
+    /// [`Kind::File`] when the bytes are not those that the run wrote.
     pub fn check(&self, folder: &Path, name: &str, bytes: &[u8]) -> Result<()> {
         match self.0.get(name) {
-            Some(known) if *known != sum(bytes) => Err(damaged(&folder.join(name))),
+            Some(expected) if *expected != sum(bytes) => Err(damaged(&folder.join(name))),
             _ => Ok(()),
         }
     }
 }
 
+/// Return the error for a file that is not what the run wrote.
 fn damaged(path: &Path) -> Error {
     Error::new(Kind::File, format!("{} is damaged", path.display()))
         .because(format!("it is not what the run wrote, by the sums in {FILE}"))
         .help("solve the scene again, with --vtu for pictures of bodies; `sha256sum -c` lists all files that have changed")
 }
 
+/// Return a finished checksum in hexadecimal digits.
 fn digits(sum: Sha256) -> String {
     sum.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Return the checksum of bytes in memory.
 fn sum(bytes: &[u8]) -> String {
     digits(Sha256::new().chain_update(bytes))
 }
 
-/// The sum of a file of any size.
+/// Return the checksum of a file, which is read in blocks.
 fn sum_of_file(path: &Path) -> io::Result<String> {
     let (mut file, mut sum, mut block) = (File::open(path)?, Sha256::new(), vec![0; 1 << 16]);
     loop {

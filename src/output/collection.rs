@@ -1,20 +1,20 @@
-//! The `.pvd` that gathers files of bodies and contact surfaces over time, for ParaView.
+//! The `.pvd` collection, with which ParaView opens the files of bodies and contact surfaces over time.
 
 use std::io::{self, Write};
 
-/// A file of a collection: a body or a contact surface at a time.
+/// An entry of a collection: the file of a body or a contact surface at a time.
 pub struct Entry<'a> {
     /// Time.
     pub time: f64,
     /// Number of the body or surface.
     pub part: usize,
-    /// Its name.
+    /// Name of the body or surface.
     pub name: &'a str,
     /// File, relative to the collection.
     pub file: String,
 }
 
-/// Writes the collection that opens the `.vtu` files of all bodies and contact surfaces at once, over time.
+/// Write the collection that opens the `.vtu` files of all bodies and contact surfaces at once, over time.
 ///
 /// # Errors
 /// Those of `out`.
@@ -30,7 +30,7 @@ pub fn write_pvd(entries: &[Entry], out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "</VTKFile>")
 }
 
-/// A text as the value of an attribute.
+/// Escape a text for the value of an XML attribute.
 pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }

@@ -1,4 +1,4 @@
-//! `contacts.csv`: one row a pair of contact surfaces.
+//! `contacts.csv`: one row per pair of contact surfaces.
 
 use super::folder::Folder;
 use super::format::field;
@@ -6,14 +6,14 @@ use super::report::PairReport;
 use crate::error::Result;
 use std::io::{self, Write};
 
-/// What `contacts.csv` says of a pair besides what its report says.
+/// The columns of `contacts.csv` that the report of a pair does not have.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PairRow {
-    /// Points with c > 0.
+    /// Number of points with c > 0.
     pub closed: usize,
-    /// Initial gap d at the points: least, mean by weight, largest.
+    /// Initial gap d at the points: least, mean over the area, largest.
     pub gap: [f64; 3],
-    /// How far the surfaces are apart after deformation, -c where that is positive: mean by weight over all points, and largest.
+    /// Distance of the surfaces after deformation, -c where that is positive: mean over the area of all points, and largest.
     pub opening: [f64; 2],
     /// File of its contact table; empty if it has none.
     pub table: String,
@@ -22,24 +22,23 @@ pub struct PairRow {
 }
 
 impl PairRow {
-    /// The numbers of a pair from `weight`, gap d and compression c of its points; without files.
+    /// Return the row of a pair from the area `weight`, the gap d and the compression c of its points, without files.
     pub fn new(weight: &[f64], gap: &[f64], compression: &[f64]) -> Self {
-        let open = || compression.iter().map(|c| (-c).max(0.0));
+        let opening: Vec<f64> = compression.iter().map(|c| (-c).max(0.0)).collect();
         let total: f64 = weight.iter().sum();
-        let mean =
-            |values: &mut dyn Iterator<Item = f64>| weight.iter().zip(values).map(|(w, v)| w * v).sum::<f64>() / total;
+        let mean = |values: &[f64]| weight.iter().zip(values).map(|(w, v)| w * v).sum::<f64>() / total;
         let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
         let most = gap.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Self {
             closed: compression.iter().filter(|&&c| c > 0.0).count(),
-            gap: [least, mean(&mut gap.iter().copied()), most],
-            opening: [mean(&mut open()), open().fold(0.0, f64::max)],
+            gap: [least, mean(gap), most],
+            opening: [mean(&opening), opening.iter().copied().fold(0.0, f64::max)],
             ..Self::default()
         }
     }
 }
 
-/// Writes the pairs in the order of the scene.
+/// Write the pairs to `contacts.csv`, in the order of the scene.
 ///
 /// # Errors
 /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
@@ -56,7 +55,7 @@ fn write(out: &mut dyn Write, pairs: &[PairReport], rows: &[PairRow]) -> io::Res
     csv.flush()
 }
 
-/// The columns in their order, and what a pair has in them.
+/// Return the names of the columns in their order, each with the value of a pair.
 fn fields(pair: &PairReport, row: &PairRow) -> [(&'static str, String); 23] {
     let [force, _] = pair.force;
     [

@@ -1,4 +1,4 @@
-//! The folder of results: made before the work starts, written by one run at a time, and never left with half a file.
+//! The folder of results. It is made before the work starts, one run at a time writes to it, and no file is left half written.
 
 use super::leftovers;
 use super::lock::Lock;
@@ -15,15 +15,15 @@ use std::path::{Path, PathBuf};
 pub struct Folder {
     path: PathBuf,
     files: RefCell<BTreeSet<PathBuf>>,
-    /// Held by the process that writes the tables of a run.
+    /// The lock of the process that writes the tables of a run.
     _lock: Option<Lock>,
 }
 
 impl Folder {
-    /// Makes the folder with its parents, or takes the one that is there, and tries whether it can be written.
+    /// Open the folder, which is created with its parents if needed, and check that it can be written.
     ///
     /// # Errors
-    /// [`Kind::File`] when it cannot be made, is no folder, belongs to somebody else, or cannot be written.
+    /// [`Kind::File`] when it cannot be created, is no folder, belongs to another user, or cannot be written.
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref().to_owned();
         make_folder(&path)?;
@@ -38,8 +38,8 @@ impl Folder {
         Ok(Self { path, files: RefCell::default(), _lock: None })
     }
 
-    /// The same for the results of a run, which no other run may write to until this value is dropped. Temporary files of processes that
-    /// were killed are removed.
+    /// Open the folder as [`Self::create`] does, and lock it for one run until this value is dropped. Temporary files of
+    /// killed processes are removed.
     ///
     /// # Errors
     /// Those of [`Self::create`], and [`Kind::File`] while another process has the folder.
@@ -51,37 +51,37 @@ impl Folder {
         Ok(Self { _lock: Some(lock), ..folder })
     }
 
-    /// Removes what an earlier run left, and nothing else.
+    /// Remove the files that an earlier run left, and nothing else.
     ///
     /// # Errors
     /// [`Kind::File`] when a file cannot be removed.
     pub fn clear(&self) -> Result<()> {
-        for name in leftovers::of_runs(&self.path) {
+        for name in leftovers::files_of_runs(&self.path) {
             let path = self.path.join(&name);
-            // never below a link that leads elsewhere; what is no file is no result
+            // Files below a link to another folder stay. A folder is never a result.
             let is_inside = path.parent().is_some_and(|parent| parent == self.path || !parent.is_symlink());
             if is_inside && fs::symlink_metadata(&path).is_ok_and(|data| !data.is_dir()) {
                 fs::remove_file(&path).map_err(|cause| Error::file(&path, "remove the old", &cause))?;
             }
         }
-        // one that still has something in it stays
+        // A folder that is not empty stays.
         let _ = fs::remove_dir(self.path.join(leftovers::STEPS));
         Ok(())
     }
 
-    /// The folder as it was named.
+    /// Return the path of the folder, as it was given.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The files written so far, by name, each once; paths begin with [`Folder::path`].
+    /// Return the files written so far, sorted by name, each once. Paths begin with [`Folder::path`].
     pub fn files(&self) -> Vec<PathBuf> {
         self.files.borrow().iter().cloned().collect()
     }
 
-    /// Writes a whole file `name`, replacing one of this name.
+    /// Write a whole file `name` and replace one of this name.
     ///
-    /// The text goes to a temporary file in the same folder, which takes the name only when it is complete.
+    /// The text goes to a temporary file in the same folder, which is renamed when it is complete.
     ///
     /// # Errors
     /// [`Kind::File`] with the path and the cause; then nothing was changed.
@@ -92,7 +92,7 @@ impl Folder {
         Ok(())
     }
 
-    /// Opens a file `name` that begins with `start` and grows while the program works, replacing one of this name.
+    /// Open a file `name` that begins with `start` and grows while the program works. It replaces one of this name.
     ///
     /// # Errors
     /// [`Kind::File`] with the path and the cause; then nothing was changed.
@@ -103,7 +103,7 @@ impl Folder {
         Ok((path, file))
     }
 
-    /// Makes a folder in it, or takes the one that is there.
+    /// Create a folder inside this one, unless it is there already.
     ///
     /// # Errors
     /// [`Kind::File`] with the path and the cause.
@@ -117,13 +117,13 @@ impl Folder {
     }
 }
 
-/// Makes a folder with its parents, or takes the one that is there.
+/// Create a folder with its parents, unless it is there already.
 ///
 /// # Errors
-/// [`Kind::File`] when it cannot be made, or something else has its name.
+/// [`Kind::File`] when it cannot be created, or something else has its name.
 pub fn make_folder(path: &Path) -> Result<()> {
     let help = "remove it, or name another folder (`-o FOLDER`)";
-    // the first that is there and no folder is in the way
+    // the nearest existing ancestor must be a folder
     let in_the_way = path.ancestors().find(|part| part.symlink_metadata().is_ok()).filter(|part| !part.is_dir());
     if let Some(part) = in_the_way {
         let part_is = match (fs::read_link(part), fs::metadata(part)) {
@@ -138,8 +138,8 @@ pub fn make_folder(path: &Path) -> Result<()> {
     fs::create_dir_all(path).map_err(|cause| Error::file(path, "create the folder", &cause).help(help))
 }
 
-/// Refuses to write into a folder of somebody else, who might not expect it, as root could; one that its owner lets a group or all write to
-/// is meant for that. `user` is the owner of a file that this process has made there.
+/// Refuse to write into a folder of another user, as root could do by mistake. A folder that its owner lets a group or
+/// everybody write to is accepted. `user` owns the files that this process creates there.
 fn refuse_foreign(path: &Path, user: u32) -> Result<()> {
     const SHARED: u32 = 0o022;
     match fs::metadata(path) {
@@ -152,7 +152,7 @@ fn refuse_foreign(path: &Path, user: u32) -> Result<()> {
     }
 }
 
-/// What a thing in a folder is, in words.
+/// Return the kind of a directory entry in words.
 fn kind_of(kind: FileType) -> &'static str {
     match () {
         _ if kind.is_file() => "a file, not a folder",
@@ -163,14 +163,15 @@ fn kind_of(kind: FileType) -> &'static str {
     }
 }
 
-/// Makes a file that is not there, never through a link.
+/// Create a new file, never through a link.
 fn create_new(path: &Path) -> io::Result<File> {
-    // of a process of this number that was killed
+    // a killed process with the same id may have left one
     let _ = fs::remove_file(path);
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-/// Writes a whole file or nothing: fills a temporary file beside `path` and renames it. A link of this name is replaced, not followed.
+/// Write a whole file or nothing: fill a temporary file beside `path` and rename it. A link of this name is replaced, not
+/// followed.
 ///
 /// # Errors
 /// [`Kind::File`] with the path and the cause; then nothing was changed.
@@ -178,34 +179,36 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<
     replace(path, fill).map(|_| ())
 }
 
-/// The same; gives the file, at its end.
+/// Write a whole file as [`write_whole`] does, and return it, positioned at its end.
 fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<File> {
-    // a folder cannot be replaced; a pipe or a device has its name for a purpose, which a file would not serve
+    // A folder cannot be replaced, and a file would not serve the purpose of a pipe or a device.
     if let Some(kind) = fs::metadata(path).ok().map(|data| data.file_type()).filter(|kind| !kind.is_file()) {
         return Err(Error::new(Kind::File, format!("{} is {}, not a file", path.display(), kind_of(kind)))
             .help("rename or remove it, or name another file or folder with `-o`"));
     }
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(path.file_name().unwrap_or_default());
-    hidden.push(format!(".{}.part", std::process::id()));
-    let part = path.with_file_name(hidden);
-    let written = (|| {
-        let mut out = BufWriter::new(create_new(&part)?);
-        fill(&mut out)?;
-        let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
-        // Network file systems and quotas may refuse the data only here.
-        file.sync_all()?;
-        fs::rename(&part, path)?;
-        Ok(file)
-    })();
-    written.map_err(|cause| {
-        // The first failure is the one to tell; the part may not even exist.
+    let mut temporary = std::ffi::OsString::from(".");
+    temporary.push(path.file_name().unwrap_or_default());
+    temporary.push(format!(".{}.part", std::process::id()));
+    let part = path.with_file_name(temporary);
+    fill_and_rename(&part, path, fill).map_err(|cause| {
+        // The first failure is reported; the temporary file may not even exist.
         let _ = fs::remove_file(&part);
         failed(path, &cause)
     })
 }
 
-/// Removes the temporary files of processes that were killed while they wrote; what cannot be removed is litter, not an error.
+/// Create the file `part`, fill it, rename it to `path`, and return it.
+fn fill_and_rename(part: &Path, path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<File> {
+    let mut out = BufWriter::new(create_new(part)?);
+    fill(&mut out)?;
+    let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    // Network file systems and quotas may refuse the data only at this point.
+    file.sync_all()?;
+    fs::rename(part, path)?;
+    Ok(file)
+}
+
+/// Remove the temporary files of processes that were killed while they wrote. A file that cannot be removed is no error.
 fn remove_parts(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
@@ -219,7 +222,7 @@ fn remove_parts(folder: &Path) {
     }
 }
 
-/// The error for a file that could not be written.
+/// Return the error for a file that could not be written.
 pub(super) fn failed(path: &Path, cause: &io::Error) -> Error {
     let help = match cause.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
@@ -233,8 +236,8 @@ pub(super) fn failed(path: &Path, cause: &io::Error) -> Error {
     Error::file(path, "write", cause).help(help)
 }
 
-/// A name that is safe in a file name: characters other than letters, digits, `-`, `_` and `.` become `_`.
-/// An empty name, or one that begins with a dot, gets a `_` in front.
+/// Return `name` as a safe file name: characters other than letters, digits, `-`, `_` and `.` become `_`. An empty name, or
+/// one that begins with a dot, gets a `_` in front.
 pub fn safe_name(name: &str) -> String {
     let safe: String = name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
     if safe.is_empty() || safe.starts_with('.') { format!("_{safe}") } else { safe }

@@ -1,6 +1,6 @@
-//! How numbers are written.
+//! The formats of numbers for people and for programs.
 
-/// A number for people: `digits` after the point and a two-digit exponent (`1.23e-08`); NaN is `-`.
+/// Format a number for people: `digits` after the point and a two-digit exponent (`1.23e-08`); NaN is `-`.
 pub fn sci(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "-".into();
@@ -18,7 +18,7 @@ pub fn sci(value: f64, digits: usize) -> String {
     }
 }
 
-/// A duration in seconds for people: two decimals below 100 s, none from 10 000 s on; NaN is `-`.
+/// Format a duration in seconds for people: two decimals below 100 s, none from 10 000 s on; NaN is `-`.
 pub fn seconds(value: f64) -> String {
     match value {
         v if v.is_nan() => "-".into(),
@@ -28,17 +28,17 @@ pub fn seconds(value: f64) -> String {
     }
 }
 
-/// A number for programs: the shortest text that reads back as the same number; NaN is an empty field.
+/// Format a number for programs: the shortest text that reads back as the same number; NaN is an empty field.
 pub(super) fn field(value: f64) -> String {
     if value.is_nan() { String::new() } else { format!("{value:?}") }
 }
 
-/// A number without zeros at the end of its fraction.
+/// Return the text of a number without zeros at the end of its fraction.
 pub fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
-/// An integer in superscript digits, for powers of ten.
+/// Format an integer in superscript digits, for powers of ten.
 #[cfg(feature = "cli")]
 pub(super) fn superscript(value: i32) -> String {
     value

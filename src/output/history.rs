@@ -1,4 +1,4 @@
-//! `history.csv`: the iteration history, written as it comes.
+//! `history.csv`: the iteration history, written row by row during the run.
 
 use super::folder::Folder;
 use super::format::field;
@@ -6,7 +6,7 @@ use super::rows::RowFile;
 use crate::ddm::{Observer, Row};
 use crate::error::Result;
 
-/// Writes one line of `history.csv` for each row.
+/// An observer that writes one line of `history.csv` for each row.
 pub struct HistoryWriter {
     rows: RowFile,
     bodies: usize,
@@ -15,8 +15,8 @@ pub struct HistoryWriter {
 }
 
 impl HistoryWriter {
-    /// Opens `history.csv` and writes its header; `bodies` are the names in the order of [`Row::increments`]. With `steps` each row
-    /// begins with its load step.
+    /// Open `history.csv` and write its header; `bodies` are the names in the order of [`Row::increments`]. With `steps`, each
+    /// row begins with its load step.
     ///
     /// # Errors
     /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
@@ -41,15 +41,15 @@ impl HistoryWriter {
         Ok(Self { rows: RowFile::create(folder, "history.csv", &header, &[])?, bodies: bodies.len(), steps })
     }
 
-    /// Why rows are missing, in words, once.
+    /// Return in words why rows are missing, only the first time.
     pub fn complaint(&mut self) -> Option<String> {
         self.rows.complaint()
     }
 
-    /// Ends the file.
+    /// Complete the file.
     ///
     /// # Errors
-    /// Rows that could not be written to the end.
+    /// [`Kind::File`](crate::error::Kind::File) when rows could still not be written.
     pub fn finish(self) -> Result<()> {
         self.rows.finish()
     }
@@ -60,7 +60,7 @@ impl Observer for HistoryWriter {
         let mut fields = if self.steps { vec![row.step.to_string()] } else { Vec::new() };
         fields.push(row.iteration.to_string());
         fields.extend([row.residual, row.error, row.increment].map(field));
-        // Row 0 may come without increments.
+        // row 0 may have no increments
         fields.extend((0..self.bodies).map(|body| row.increments.get(body).map_or(String::new(), |&v| field(v))));
         fields.extend([field(row.gamma), field(row.energy)]);
         fields.extend(

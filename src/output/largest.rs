@@ -1,6 +1,7 @@
-//! Which of many things are worth showing.
+//! The selection of the few things that are worth showing.
 
-/// Places of the `most` largest numbers, in their order; of equal ones the first. What is not a number counts as zero.
+/// Return the indices of the `most` largest numbers in ascending order. Among equal numbers the first is preferred; a number
+/// that is not finite counts as zero.
 pub fn largest(numbers: impl Iterator<Item = f64>, most: usize) -> Vec<usize> {
     let numbers: Vec<f64> = numbers.map(|number| if number.is_finite() { number } else { 0.0 }).collect();
     let mut order: Vec<usize> = (0..numbers.len()).collect();

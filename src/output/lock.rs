@@ -1,8 +1,8 @@
-//! The lock of a folder of results: one command at a time writes its tables there.
+//! The lock of a folder of results, so that one command at a time writes its tables there.
 //!
-//! The lock is one of the kernel's (`flock`), on a file that names its holder. It ends with the process, however that ends, so that a
-//! killed run leaves nothing that stops the next one. Network file systems share it between hosts; where a file system knows no locks,
-//! the name of the holder decides alone.
+//! The lock is one of the kernel (`flock`) on a file that names its holder. The kernel releases it when the process ends, so that a
+//! killed run does not block the next one. Network file systems share the lock between hosts. Where a file system has no locks,
+//! the name of the holder alone decides.
 
 use crate::error::{Error, Kind, Result};
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -10,17 +10,17 @@ use std::io::{self, Read, Seek, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-/// Name of the file in the folder.
+/// Name of the lock file in the folder.
 const FILE: &str = ".winkler.lock";
 
-/// Bytes that a holder may take: a number and the longest name of a host.
+/// Most bytes of a holder's text: a process id and the longest name of a host.
 const LONGEST: u64 = 300;
 
 /// A folder that is locked until this value is dropped.
 #[derive(Debug)]
 pub struct Lock {
     path: PathBuf,
-    /// The kernel's lock goes with this file.
+    /// The open file, whose closing releases the lock.
     _file: File,
 }
 
@@ -32,10 +32,10 @@ struct Holder {
 }
 
 impl Lock {
-    /// Locks a folder.
+    /// Lock a folder.
     ///
     /// # Errors
-    /// [`Kind::File`]: another process writes there, or may do so; the file cannot be written.
+    /// [`Kind::File`] when another process writes there or may do so, or the lock file cannot be written.
     pub fn take(folder: &Path) -> Result<Self> {
         let path = folder.join(FILE);
         let failed = |cause: io::Error| {
@@ -43,19 +43,19 @@ impl Lock {
         };
         loop {
             let mut file = open(&path).map_err(failed)?;
-            let before = Holder::read(&mut file);
+            let previous = Holder::read(&mut file);
             match file.try_lock() {
                 Ok(()) => {}
-                Err(TryLockError::WouldBlock) => return Err(in_use(folder, before.as_ref())),
-                // without locks a name counts unless its process has certainly ended
-                Err(TryLockError::Error(_)) => match before.filter(Holder::may_live) {
+                Err(TryLockError::WouldBlock) => return Err(in_use(folder, previous.as_ref())),
+                // without locks, a name counts unless its process has certainly ended
+                Err(TryLockError::Error(_)) => match previous.filter(Holder::may_live) {
                     Some(holder) if holder != Holder::this() => return Err(may_be_in_use(folder, &path, &holder)),
                     _ => {}
                 },
             }
-            // the holder before may have removed the file since it was opened: a lock on it would shut nobody out
-            let is_there = |there: fs::Metadata| file.metadata().is_ok_and(|own| own.ino() == there.ino());
-            if fs::symlink_metadata(&path).is_ok_and(is_there) {
+            // The previous holder may have removed the file since it was opened. A lock on a removed file excludes nobody.
+            let is_same = |found: fs::Metadata| file.metadata().is_ok_and(|own| own.ino() == found.ino());
+            if fs::symlink_metadata(&path).is_ok_and(is_same) {
                 Holder::this().write(&mut file).map_err(failed)?;
                 return Ok(Self { path, _file: file });
             }
@@ -65,12 +65,12 @@ impl Lock {
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // while the lock is held, so that nobody else's file is removed; one that stays shuts nobody out
+        // The lock is still held, so this cannot remove the file of another holder. A file that stays excludes nobody.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-/// Opens the file for reading and writing, which does not wait for a partner if it is a pipe; never through a link.
+/// Open the lock file, never through a link. Opening for reading and writing does not block on a pipe.
 fn open(path: &Path) -> io::Result<File> {
     let file = OpenOptions::new().read(true).write(true).create(true).custom_flags(libc::O_NOFOLLOW).open(path)?;
     match file.metadata()?.is_file() {
@@ -79,12 +79,14 @@ fn open(path: &Path) -> io::Result<File> {
     }
 }
 
+/// Return the error for a folder that another process has locked.
 fn in_use(folder: &Path, holder: Option<&Holder>) -> Error {
     let who = holder.map_or("another process".to_owned(), Holder::in_words);
     Error::new(Kind::File, format!("{who} is writing its results to {}", folder.display()))
         .help("name another folder with `-o FOLDER`, or wait until it has ended")
 }
 
+/// Return the error for a folder whose holder may still run.
 fn may_be_in_use(folder: &Path, path: &Path, holder: &Holder) -> Error {
     Error::new(Kind::File, format!("{} may be writing its results to {}", holder.in_words(), folder.display()))
         .because("the file system has no locks that would tell whether it still runs")
@@ -92,12 +94,13 @@ fn may_be_in_use(folder: &Path, path: &Path, holder: &Holder) -> Error {
 }
 
 impl Holder {
-    /// This process.
+    /// Return the holder that stands for this process.
     fn this() -> Self {
         let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         Self { process: std::process::id(), host: host.trim().to_owned() }
     }
 
+    /// Read the holder that a lock file names, if any.
     fn read(file: &mut File) -> Option<Self> {
         let mut text = String::new();
         Read::take(file, LONGEST).read_to_string(&mut text).ok()?;
@@ -105,17 +108,19 @@ impl Holder {
         Some(Self { process: process.parse().ok()?, host: host.to_owned() })
     }
 
+    /// Replace the text of a lock file by this holder.
     fn write(&self, file: &mut File) -> io::Result<()> {
         file.set_len(0)?;
         file.rewind()?;
         file.write_all(format!("{} {}\n", self.process, self.host).as_bytes())
     }
 
-    /// Whether the process may still be there: on another host nobody knows.
+    /// Whether the process may still run; on another host this is unknown.
     fn may_live(&self) -> bool {
         self.host != Self::this().host || Path::new("/proc").join(self.process.to_string()).exists()
     }
 
+    /// Return the holder in words, with its host if that is another one.
     fn in_words(&self) -> String {
         match self.host == Self::this().host {
             true => format!("process {}", self.process),

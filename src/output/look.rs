@@ -1,19 +1,19 @@
-//! What the last look at a result found, for `report.json`.
+//! The result of the last look, for `report.json`. The last look sums the forces anew from the displacements of a result.
 
 use serde::Serialize;
 
-/// Relative errors of a result by forces that are summed anew from its displacements, at least so large.
+/// The relative errors that the last look found; they are lower bounds.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct LookReport {
     /// Error in the energy norm; null if it is not finite, like the others.
     pub error: Option<f64>,
     /// Error of the pressures, relative to the largest.
     pub pressure: Option<f64>,
-    /// Share of its contact forces that a body lacks in balance.
+    /// Out-of-balance force of a body, relative to its contact forces.
     pub imbalance: Option<f64>,
-    /// The body or the bodies with the largest of them.
+    /// The body or the bodies with the largest of these errors.
     pub at: Vec<String>,
-    /// Cells gone over.
+    /// Number of cells in the sums.
     pub cells: usize,
     /// Wall seconds.
     pub seconds: f64,

@@ -1,7 +1,7 @@
 //! Everything the program writes: the table on the terminal, and the files of a run.
 //!
-//! Nothing here knows the space dimension: points and vectors have three components, z = 0 in the plane. What is
-//! written to an `out` has the errors of that.
+//! Nothing here knows the space dimension: points and vectors have three components, with z = 0 in the plane. A function
+//! that writes to an `out` returns the errors of that writer.
 
 #[cfg(feature = "cli")]
 mod chart;
@@ -23,6 +23,8 @@ pub mod plot;
 pub mod progress;
 pub mod report;
 pub mod rows;
+#[cfg(feature = "cli")]
+mod scale;
 pub mod steps;
 mod summary;
 #[cfg(feature = "cli")]
@@ -30,12 +32,12 @@ pub mod table;
 mod tags;
 pub mod vtu;
 
-/// Prints a line to standard output. A reader that has gone is no reason to stop.
+/// Print a line to standard output. A reader that has closed the pipe is no error.
 ///
 /// # Errors
-/// What is printed is lost otherwise, as on a full disk.
+/// [`Kind::File`](crate::error::Kind::File) when the line is lost for another reason, as on a full disk.
 pub fn say(text: impl std::fmt::Display) -> Result<()> {
-    // in one piece: standard output would pass each of its lines on by itself
+    // one write for the whole text: standard output would flush after each of its lines
     let mut out = std::io::stdout();
     match out.write_all(format!("{text}\n").as_bytes()).and_then(|()| out.flush()) {
         Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {

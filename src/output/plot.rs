@@ -16,7 +16,7 @@ pub struct Plot {
 /// An axis; its range and ticks follow the data.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Axis {
-    /// What it shows, with the unit.
+    /// Title of the axis, with the unit.
     pub label: String,
     /// Logarithmic, with ticks at powers of ten.
     pub log: bool,
@@ -30,13 +30,13 @@ pub struct Series {
     /// Points (x, y). Values that the axes cannot show (NaN, infinite, not positive on a logarithmic axis) leave
     /// a gap in the curve.
     pub points: Vec<(f64, f64)>,
-    /// How it is drawn.
+    /// Line and marks.
     pub style: Style,
-    /// Its colour.
+    /// Colour.
     pub color: Color,
 }
 
-/// How a series is drawn.
+/// The lines and marks of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
     /// A solid line.
@@ -52,7 +52,7 @@ pub enum Style {
 /// Colour of a series.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Color {
-    /// That of its place among the series without colour of their own.
+    /// The next entry of the palette among the series without a colour of their own.
     #[default]
     Next,
     /// An entry of the palette, which starts again after its end; entries can be told apart by colour-blind readers.
@@ -62,24 +62,24 @@ pub enum Color {
 }
 
 impl Series {
-    /// A series in the next colour.
+    /// Return a series in the next colour.
     pub fn new(label: impl Into<String>, points: Vec<(f64, f64)>, style: Style) -> Self {
         Self { label: label.into(), points, style, color: Color::Next }
     }
 
-    /// The same in another colour.
+    /// Return the series in another colour.
     pub fn color(self, color: Color) -> Self {
         Self { color, ..self }
     }
 }
 
 impl Axis {
-    /// An axis with even steps.
+    /// Return an axis with even steps.
     pub fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), log: false }
     }
 
-    /// A logarithmic axis.
+    /// Return a logarithmic axis.
     pub fn log(label: impl Into<String>) -> Self {
         Self { label: label.into(), log: true }
     }
@@ -95,7 +95,7 @@ pub struct ConvergenceSeries {
 }
 
 impl Plot {
-    /// Residual (solid) and increment (dashed) of one or more runs against the iteration, on a logarithmic axis.
+    /// Return the plot of residual (solid) and increment (dashed) of one or more runs over the iteration, on a logarithmic axis.
     pub fn convergence(title: &str, runs: &[ConvergenceSeries]) -> Self {
         let (solid, dashed) = ("residual", "increment");
         let mut series = Vec::new();
@@ -120,7 +120,8 @@ impl Plot {
         Self { title: title.into(), x: Axis::linear("iteration"), y: Axis::log(y), series }
     }
 
-    /// Contact force of pairs over their approach, step by step, with the labels of both; a curve without a name if there is one.
+    /// Return the plot of the contact force of pairs over their approach, step by step, with the labels `[x, y]`. A single curve
+    /// has no name.
     pub fn approach<'a>(
         title: &str,
         [x, y]: [String; 2],
@@ -131,7 +132,8 @@ impl Plot {
         Self { title: title.into(), x: Axis::linear(x), y: Axis::linear(y), series: pairs.map(curve).collect() }
     }
 
-    /// Contact pressure along a surface from curves of (place, pressure) in any order; dashed references on top.
+    /// Return the plot of the contact pressure along a surface from points (coordinate, pressure) in any order. Dashed reference
+    /// curves are drawn on top.
     pub fn pressure(title: &str, x: &str, y: &str, mut series: Vec<Series>) -> Self {
         series.iter_mut().for_each(|series| series.points.sort_by(|a, b| a.0.total_cmp(&b.0)));
         series.sort_by_key(|series| series.style == Style::Dashed);

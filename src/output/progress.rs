@@ -1,25 +1,25 @@
-//! Lines on standard error that say what goes on; nothing where that is no terminal.
+//! Progress lines on standard error, if that is a terminal.
 
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::time::Duration;
 
-/// How often a line is drawn.
+/// Time between two drawings of a line.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Phases that end sooner have no line.
+/// Phases that end sooner show no line.
 const SHORT: Duration = Duration::from_secs(1);
 
-/// A line for one phase of a run, which goes when it is dropped.
+/// The progress line of one phase of a run, which disappears when it is dropped.
 pub struct Line(ProgressBar);
 
 impl Line {
-    /// A line that says `what` is done and how long it has taken, from the second second on; with the seconds that it takes by an
-    /// estimate those that are left.
+    /// Return a line with the name `what` of the phase and the elapsed time, shown after [`SHORT`]. If the duration in seconds
+    /// has an `estimate`, the line shows the remaining time, too.
     pub fn new(what: &str, estimate: Option<f64>) -> Self {
         let what = what.to_owned();
         let text = move |state: &ProgressState, out: &mut dyn Write| {
-            // a line that cannot be written is not worth an end
+            // a line that cannot be written is no reason to stop
             let _ = out.write_str(&text(&what, state.elapsed(), estimate));
         };
         let bar = ProgressBar::new_spinner();
@@ -37,20 +37,21 @@ impl Drop for Line {
     }
 }
 
+/// Return the text of a progress line.
 fn text(what: &str, elapsed: Duration, estimate: Option<f64>) -> String {
     if elapsed < SHORT {
         return String::new();
     }
-    format!("{what}, {} s{}", elapsed.as_secs(), left(estimate.map(|all| all - elapsed.as_secs_f64())))
+    format!("{what}, {} s{}", elapsed.as_secs(), left(estimate.map(|total| total - elapsed.as_secs_f64())))
 }
 
-/// Seconds that are left, in words; nothing where they are not known or were too few.
+/// Return the remaining seconds in words; nothing if they are unknown or an estimate was too low.
 pub fn left(seconds: Option<f64>) -> String {
     let known = seconds.and_then(|left| Duration::try_from_secs_f64(left.round()).ok()).filter(|left| !left.is_zero());
     known.map_or(String::new(), |left| format!(", about {:#} left", HumanDuration(left)))
 }
 
-/// A bar over many runs, with the time that is left; hidden if nothing is to be shown.
+/// Return a bar over many runs with the remaining time, hidden unless `is_shown`.
 pub fn runs(count: usize, is_shown: bool) -> ProgressBar {
     if !is_shown {
         return ProgressBar::hidden();
@@ -61,7 +62,7 @@ pub fn runs(count: usize, is_shown: bool) -> ProgressBar {
     {
         bar.set_style(style);
     }
-    // time goes on while a run is on its way
+    // the elapsed time must go on during a run
     bar.enable_steady_tick(TICK);
     bar
 }

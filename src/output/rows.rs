@@ -1,4 +1,4 @@
-//! A CSV file that grows by a row at a time.
+//! A CSV file that grows row by row.
 
 use super::folder::{Folder, failed};
 use crate::error::Result;
@@ -7,24 +7,24 @@ use std::io;
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 
-/// Writes rows as they come. Every row reaches the file at once, so that a run that is killed keeps all that it had computed.
+/// A CSV file to which every row is written at once, so that a killed run keeps all that it had computed.
 ///
-/// A row that cannot be written, as on a full disk, is kept and tried again with each later one and at the end.
+/// A row that cannot be written, as on a full disk, is kept and tried again with each later row and at the end.
 pub struct RowFile {
     path: PathBuf,
     file: File,
-    /// Bytes of the file: whole rows.
+    /// Length of the file in bytes, always whole rows.
     length: u64,
-    /// Rows that it does not have yet.
+    /// Rows that are not in the file yet, as CSV.
     waiting: Vec<u8>,
-    /// Why not, if not.
+    /// Cause of the last failed attempt, until one succeeds.
     failure: Option<io::Error>,
-    /// Whether somebody was told.
-    is_told: bool,
+    /// Whether [`Self::complaint`] has reported a failure.
+    is_reported: bool,
 }
 
 impl RowFile {
-    /// Opens a file of this name, which replaces one that is there, with its header and the rows that are known already.
+    /// Open a file with its header and the rows that are `known` already. It replaces a file of this name.
     ///
     /// # Errors
     /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
@@ -33,23 +33,23 @@ impl RowFile {
         known.iter().for_each(|row| start.extend(line(row)));
         let (path, file) = folder.open(name, &start)?;
         let (length, waiting) = (start.len() as u64, Vec::new());
-        Ok(Self { path, file, length, waiting, failure: None, is_told: false })
+        Ok(Self { path, file, length, waiting, failure: None, is_reported: false })
     }
 
-    /// The words of the first failure, once: for a warning while the program goes on.
+    /// Return the first failure in words, only once, for a warning while the program goes on.
     pub fn complaint(&mut self) -> Option<String> {
-        let failure = self.failure.as_ref().filter(|_| !self.is_told)?;
-        self.is_told = true;
+        let failure = self.failure.as_ref().filter(|_| !self.is_reported)?;
+        self.is_reported = true;
         Some(format!("{} lacks rows: {failure}; they are kept in memory and tried again", self.path.display()))
     }
 
-    /// Appends a row.
+    /// Append a row.
     pub fn push(&mut self, fields: &[String]) {
         self.waiting.extend(line(fields));
         self.write();
     }
 
-    /// Writes the rows that wait, or nothing: after half a row the next one would not begin a line.
+    /// Write all waiting rows or nothing: after half a row the next one would not begin a line.
     fn write(&mut self) {
         match self.file.write_all_at(&self.waiting, self.length) {
             Ok(()) => {
@@ -58,17 +58,17 @@ impl RowFile {
                 self.failure = None;
             }
             Err(cause) => {
-                // where even this fails half a row stays at the end
+                // if even this fails, half a row stays at the end
                 let _ = self.file.set_len(self.length);
                 self.failure = Some(cause);
             }
         }
     }
 
-    /// Ends the file.
+    /// Complete the file.
     ///
     /// # Errors
-    /// Rows that could not be written to the end.
+    /// [`Kind::File`](crate::error::Kind::File) when rows could still not be written.
     pub fn finish(mut self) -> Result<()> {
         if self.failure.is_some() {
             self.write();
@@ -77,10 +77,10 @@ impl RowFile {
     }
 }
 
-/// A row as a line of CSV.
+/// Format a row as a line of CSV.
 fn line(fields: &[String]) -> Vec<u8> {
     let mut csv = csv::Writer::from_writer(Vec::new());
-    // memory takes what is written
+    // writing to memory does not fail
     let _ = csv.write_record(fields);
     csv.into_inner().unwrap_or_default()
 }
@@ -100,7 +100,7 @@ mod tests {
             length: 0,
             waiting: Vec::new(),
             failure,
-            is_told: false,
+            is_reported: false,
         };
         rows.push(&["1".to_owned()]);
         assert!(rows.complaint().unwrap().contains("history.csv lacks rows"));

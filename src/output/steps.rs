@@ -1,4 +1,4 @@
-//! `steps.csv`: one row a load step, written as it ends; and the columns of forces that other tables share.
+//! `steps.csv`: one row per load step, written when the step ends. Other tables share its columns of forces.
 
 use super::folder::Folder;
 use super::format::field;
@@ -7,47 +7,47 @@ use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A load step.
+/// The report of a load step.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Time in the history.
     pub time: f64,
-    /// Factors of loads and prescribed displacements by name.
+    /// Factors of loads and prescribed displacements, by name.
     pub factors: BTreeMap<String, f64>,
-    /// How it ended, as [`Report::status`](super::Report::status).
+    /// Status at the end of the step, as [`Report::status`](super::Report::status).
     pub status: String,
     /// The status in words.
     pub message: String,
-    /// Updates of the iterate in it.
+    /// Updates of the iterate in this step.
     pub iterations: usize,
-    /// Relative residual at its end.
+    /// Relative residual at the end of the step.
     pub residual: Option<f64>,
-    /// Its pairs in the order of the scene.
+    /// Pairs in the order of the scene.
     pub pairs: Vec<StepPairReport>,
     /// Forces of supports, springs and rigid surfaces, body by body.
     pub reactions: Vec<ReactionReport>,
 }
 
-/// A pair of surfaces at the end of a load step.
+/// The result of a pair of surfaces at the end of a load step.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepPairReport {
     /// Contact force on the side that stands first in the scene (x, y, z).
     pub force: [f64; 3],
-    /// How far the bodies come nearer to each other; none where normals cancel.
+    /// Approach of the two bodies; none where normals cancel.
     pub approach: Option<f64>,
-    /// How much of it is in contact.
+    /// Size of the contact.
     #[serde(flatten)]
     pub extent: Extent,
     /// Largest pressure.
     pub peak_pressure: f64,
     /// Largest compression of the layer; negative where all of it is open.
     pub peak_compression: f64,
-    /// Points with c > 0.
+    /// Number of points with c > 0.
     pub closed: usize,
 }
 
-/// How much of what two surfaces cover is in contact, c > 0, and how much is open, c < 0: lengths in the plane; areas in space, and of bodies
-/// of revolution, all around.
+/// The part of the common surface of a pair that is in contact, c > 0, and the part that is open, c < 0. They are lengths in
+/// the plane and areas in space; for bodies of revolution, they are areas of the whole circumference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 #[allow(missing_docs)] // the names are those of the report
@@ -63,10 +63,11 @@ impl Default for Extent {
 }
 
 impl Extent {
-    /// Of a pair whose points have these weights, a [`measure`](crate::contact::ContactPair::measure) of them, and compressions.
+    /// Sum the areas `weight` of the points by the sign of their compression. `measure` says whether these are lengths, see
+    /// [`measure`](crate::contact::ContactPair::measure).
     pub fn new(measure: &str, weight: &[f64], compression: &[f64]) -> Self {
-        let sum = |is: fn(f64) -> bool| {
-            weight.iter().zip(compression).filter(|(_, c)| is(**c)).fold(0.0, |sum, (weight, _)| sum + weight)
+        let sum = |counts: fn(f64) -> bool| {
+            weight.iter().zip(compression).filter(|(_, c)| counts(**c)).fold(0.0, |sum, (weight, _)| sum + weight)
         };
         let (contact, open) = (sum(|c| c > 0.0), sum(|c| c < 0.0));
         match measure {
@@ -75,20 +76,20 @@ impl Extent {
         }
     }
 
-    /// What is in contact.
+    /// Return the length or area in contact.
     pub fn contact(&self) -> f64 {
         let (Self::Length { contact_length: contact, .. } | Self::Area { contact_area: contact, .. }) = self;
         *contact
     }
 
-    /// What is open.
+    /// Return the length or area that is open.
     pub fn open(&self) -> f64 {
         let (Self::Length { open_length: open, .. } | Self::Area { open_area: open, .. }) = self;
         *open
     }
 }
 
-/// Name of the column of what is in contact, by the measure of the pairs.
+/// Return the name of the column of the contact size, from the measure of the pairs.
 pub fn contact_column(measure: &str) -> String {
     format!("contact_{measure}")
 }
@@ -104,17 +105,17 @@ pub struct ReactionReport {
     pub force: [f64; 3],
 }
 
-/// Names of the components of a vector: `what_x name` and so on, as many as the scene has dimensions.
+/// Return the column names `what_x name` and so on of a vector, one per dimension of the scene.
 pub fn vector_columns(what: &str, name: &str, dimension: usize) -> Vec<String> {
     ["x", "y", "z"][..dimension].iter().map(|axis| format!("{what}_{axis} {name}")).collect()
 }
 
-/// Its fields.
+/// Return the fields of a vector in the columns of [`vector_columns`].
 pub fn vector_fields(vector: &[f64; 3], dimension: usize) -> impl Iterator<Item = String> {
     vector[..dimension].iter().map(|&value| field(value))
 }
 
-/// Writes one line of `steps.csv` for each load step.
+/// The table `steps.csv`, one line per load step.
 pub struct StepTable {
     rows: RowFile,
     dimension: usize,
@@ -122,8 +123,8 @@ pub struct StepTable {
 }
 
 impl StepTable {
-    /// Opens `steps.csv` and writes its header: names of `factors`, of `pairs`, whose contact has this `measure`, and of `reactions`, each
-    /// once.
+    /// Open `steps.csv` and write its header from the names of `factors`, `pairs` and `reactions`, each of which occurs once. The
+    /// `measure` is that of the pairs.
     ///
     /// # Errors
     /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
@@ -147,7 +148,7 @@ impl StepTable {
         Ok(Self { rows: RowFile::create(folder, "steps.csv", &header, &[])?, dimension, count: 0 })
     }
 
-    /// Writes a step; `names` are those of its factors in the order of the header.
+    /// Write a step; `names` are those of its factors in the order of the header.
     pub fn row(&mut self, names: &[String], step: &StepReport) {
         self.count += 1;
         let number = |value: Option<f64>| value.map_or(String::new(), field);
@@ -163,15 +164,15 @@ impl StepTable {
         self.rows.push(&line);
     }
 
-    /// Why rows are missing, in words, once.
+    /// Return in words why rows are missing, only the first time.
     pub fn complaint(&mut self) -> Option<String> {
         self.rows.complaint()
     }
 
-    /// Ends the file.
+    /// Complete the file.
     ///
     /// # Errors
-    /// Rows that could not be written to the end.
+    /// [`Kind::File`](crate::error::Kind::File) when rows could still not be written.
     pub fn finish(self) -> Result<()> {
         self.rows.finish()
     }

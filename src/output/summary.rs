@@ -5,11 +5,11 @@ use super::report::{BalanceReport, BodyReport, ForceReport, LISTED, PairReport, 
 use super::steps::StepReport;
 
 impl Report {
-    /// The closing lines for a terminal.
+    /// Return the closing lines of a run for the terminal.
     pub fn summary(&self) -> String {
         let mut lines = vec![format!("{}: {}", self.title, self.message), self.counts()];
         lines.extend(self.settings["units"].as_str().map(|units| format!("  units: {units}")));
-        lines.extend(self.mesh_lines());
+        lines.extend(self.mesh_table());
         lines.extend(self.discretization_line());
         if self.steps.len() <= LISTED {
             lines.extend(self.steps.iter().enumerate().map(|(index, step)| step_line(index + 1, step)));
@@ -21,6 +21,7 @@ impl Report {
         lines.join("\n")
     }
 
+    /// Return the line with the counters, errors and times.
     fn counts(&self) -> String {
         let number = |value: Option<f64>| sci(value.unwrap_or(f64::NAN), 2);
         format!(
@@ -37,14 +38,13 @@ impl Report {
         )
     }
 
-    /// A table of the adapted meshes.
-    fn mesh_lines(&self) -> Vec<String> {
-        let mut lines = Vec::new();
-        if !self.rounds.is_empty() {
-            lines.push(
-                "  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds".to_owned(),
-            );
+    /// Return the table of the adapted meshes, empty without any.
+    fn mesh_table(&self) -> Vec<String> {
+        if self.rounds.is_empty() {
+            return Vec::new();
         }
+        let mut lines =
+            vec!["  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds".to_owned()];
         for (index, round) in self.rounds.iter().enumerate() {
             let [pressure, displacement, energy] =
                 [round.pressure, round.displacement, round.energy].map(|e| sci(e, 2));
@@ -59,6 +59,7 @@ impl Report {
         lines
     }
 
+    /// Return the line on the estimated error of the discretisation.
     fn discretization_line(&self) -> Option<String> {
         let error = self.discretization_error.as_ref()?;
         let pressures: Vec<String> = error.pressure.iter().map(|&error| sci(error, 1)).collect();
@@ -70,7 +71,7 @@ impl Report {
         ))
     }
 
-    /// A line a body on its balance, or one for all of many; none before the first iterate.
+    /// Return a line per body on its balance, or one line for many bodies; none before the first iterate.
     fn balance_lines(&self) -> Vec<String> {
         if self.residual.is_none() {
             return Vec::new();
@@ -78,8 +79,8 @@ impl Report {
         if self.bodies.len() <= LISTED {
             return self.bodies.iter().map(balance_line).collect();
         }
-        let worst = |of: fn(&BalanceReport) -> f64| {
-            let all = self.bodies.iter().map(|body| (of(&body.balance), &body.name));
+        let worst = |imbalance: fn(&BalanceReport) -> f64| {
+            let all = self.bodies.iter().map(|body| (imbalance(&body.balance), &body.name));
             all.max_by(|a, b| a.0.total_cmp(&b.0))
                 .map_or(String::new(), |(most, name)| format!("{} (`{name}`)", sci(most, 1)))
         };
@@ -92,7 +93,7 @@ impl Report {
     }
 }
 
-/// A load step, which has this number.
+/// Return the line of a load step; `number` counts from 1.
 fn step_line(number: usize, step: &StepReport) -> String {
     let pairs = match step.pairs.len() {
         ..=LISTED => {
@@ -113,6 +114,7 @@ fn step_line(number: usize, step: &StepReport) -> String {
     format!("  step {number}, {factors}: {} iterations, {}: {pairs}", step.iterations, step.status)
 }
 
+/// Return the line of a pair.
 fn pair_line(pair: &PairReport) -> String {
     let names = format!("  {} - {}", pair.bodies[0], pair.bodies[1]);
     if pair.peak_pressure <= 0.0 || pair.peak_pressure.is_nan() {
@@ -128,22 +130,23 @@ fn pair_line(pair: &PairReport) -> String {
     )
 }
 
+/// Return the line of a body with its reactions and imbalances.
 fn balance_line(body: &BodyReport) -> String {
     let BalanceReport { supports, springs, rigid, force_imbalance, moment_imbalance, .. } = &body.balance;
     let named = |verb: &str, parts: &mut dyn Iterator<Item = &ForceReport>| {
         let all: Vec<_> = parts.map(|part| format!("{} {}", part.on, vector(part.force))).collect();
         if all.is_empty() { String::new() } else { format!("{verb} {}; ", all.join(", ")) }
     };
-    let held = named("held by", &mut supports.iter().chain(springs)) + &named("rigid", &mut rigid.iter());
+    let reactions = named("held by", &mut supports.iter().chain(springs)) + &named("rigid", &mut rigid.iter());
     format!(
-        "  {}: {held}imbalance {} of forces, {} of moments",
+        "  {}: {reactions}imbalance {} of forces, {} of moments",
         body.name,
         sci(*force_imbalance, 1),
         sci(*moment_imbalance, 1)
     )
 }
 
-/// A line each for the first warnings, and one that says where the others stand.
+/// Return a line for each of the first [`LISTED`] warnings, and one that names the file `others` with the rest.
 pub fn warning_lines(warnings: &[String], others: &str) -> Vec<String> {
     let mut lines: Vec<String> = warnings.iter().take(LISTED).map(|warning| format!("  warning: {warning}")).collect();
     if warnings.len() > LISTED {
@@ -152,7 +155,7 @@ pub fn warning_lines(warnings: &[String], others: &str) -> Vec<String> {
     lines
 }
 
-/// A vector as text.
+/// Format a vector.
 fn vector(v: [f64; 3]) -> String {
     format!("({})", v.map(|v| readable(v, 6)).join(", "))
 }

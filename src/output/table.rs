@@ -1,7 +1,7 @@
 //! The table of iterations on the terminal, and the progress line.
 //!
-//! The table goes to standard output when that is a terminal; the progress line to standard error when that is one.
-//! Piped output stays free of both.
+//! The table goes to standard output and the progress line to standard error, each only if that is a terminal. Piped output stays
+//! free of both.
 
 use super::format::{sci, seconds};
 use super::progress::left;
@@ -10,34 +10,35 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
-/// How much a command says.
+/// The amount of output of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verbosity {
     /// Errors, warnings, and where the results are.
     Quiet,
-    /// Tables and progress lines where there is a terminal, and what came out.
+    /// Tables and progress lines if there is a terminal, and a summary of the results.
     Usual,
-    /// Besides, what is decided and why.
+    /// Also the decisions of the program with their reasons.
     Verbose,
 }
 
-/// Prints one line per iteration: all up to 20, every 10th up to 200, every 100th after that, and always the last.
+/// An observer that prints one line per iteration: all up to 20, every 10th up to 200, every 100th after that, and the last.
 pub struct IterationTable {
-    /// Where the table goes; `None` prints no table.
+    /// Output of the table; `None` prints no table.
     table: Option<Box<dyn Write>>,
     bar: ProgressBar,
     target: String,
-    /// Residual that ends the iteration, for the time that is left.
+    /// Residual that ends the iteration, for the remaining time.
     tolerance: Option<f64>,
-    first: Option<(f64, f64)>,
+    /// First row, from which the mean rate is measured.
+    first: Option<Row>,
     columns: Option<Vec<Column>>,
-    /// Last row, as long as it is not printed.
+    /// Last row, until it is printed.
     waiting: Option<Row>,
 }
 
 impl IterationTable {
-    /// A table on this process's terminal, if it is `loud`; `target` says in words when the iteration stops ("residual < 1e-8"),
-    /// `tolerance` by which residual.
+    /// Return a table on the terminal of this process, or one without output unless `loud`. `target` says in words when the
+    /// iteration stops ("residual < 1e-8"), and `tolerance` is that residual.
     pub fn new(loud: bool, target: &str, tolerance: Option<f64>) -> Self {
         let bar = if loud && io::stderr().is_terminal() {
             let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
@@ -57,11 +58,12 @@ impl IterationTable {
         table
     }
 
+    /// Return a table with this output and progress bar.
     fn on(table: Option<Box<dyn Write>>, bar: ProgressBar, target: &str) -> Self {
         Self { table, bar, target: target.into(), tolerance: None, first: None, columns: None, waiting: None }
     }
 
-    /// Prints the last row, if it is not there yet, and takes the progress line away. Dropping does the same.
+    /// Print the last row, if it is not printed yet, and remove the progress line. Dropping does the same.
     pub fn finish(&mut self) {
         if let Some(row) = self.waiting.take() {
             self.print(&row);
@@ -69,21 +71,22 @@ impl IterationTable {
         self.bar.finish_and_clear();
     }
 
-    /// Prints a warning to standard error, above the progress line.
+    /// Print a warning to standard error, above the progress line.
     pub fn warn(&self, text: &str) {
         self.bar.suspend(|| eprintln!("warning: {text}"));
     }
 
+    /// Print a row, the first time after the heading.
     fn print(&mut self, row: &Row) {
         let Some(table) = &mut self.table else { return };
         let mut text = String::new();
         let columns = self.columns.get_or_insert_with(|| {
             let columns = columns(row);
-            text = line(&columns, |(heading, ..)| (*heading).to_owned()) + "\n";
+            text = line(&columns, |column| column.heading.to_owned()) + "\n";
             columns
         });
-        text += &line(columns, |(.., of)| of(row));
-        // above the progress line; a terminal that is gone is no reason to stop computing
+        text += &line(columns, |column| (column.value)(row));
+        // printed above the progress line; a closed terminal is no reason to stop the run
         self.bar.suspend(|| {
             let _ = writeln!(table, "{text}").and_then(|()| table.flush());
         });
@@ -92,16 +95,16 @@ impl IterationTable {
 
 impl Observer for IterationTable {
     fn row(&mut self, row: &Row) {
-        let (residual, began) = *self.first.get_or_insert((row.residual, row.seconds));
-        let to_go = self.tolerance.map(|tolerance| time_left(row, residual, began, tolerance));
+        let first = self.first.get_or_insert_with(|| row.clone());
+        let remaining = self.tolerance.map(|tolerance| time_left(row, first, tolerance));
         self.bar.set_message(format!(
             "iteration {}, residual {}, until {}{}",
             row.iteration,
             sci(row.residual, 2),
             self.target,
-            left(to_go)
+            left(remaining)
         ));
-        if shown(row.iteration) {
+        if is_shown(row.iteration) {
             self.print(row);
             self.waiting = None;
         } else {
@@ -116,41 +119,52 @@ impl Drop for IterationTable {
     }
 }
 
-/// Seconds to a residual if it goes on to fall as it did on average since it was `first` at the time `began`; not finite if it does not
-/// fall.
-fn time_left(row: &Row, first: f64, began: f64, tolerance: f64) -> f64 {
-    (row.residual / tolerance).ln() / (first / row.residual).ln().max(0.0) * (row.seconds - began)
+/// Return the seconds until the residual reaches `tolerance`, if it falls at the mean rate since the `first` row. The result is
+/// not finite if the residual does not fall.
+fn time_left(row: &Row, first: &Row, tolerance: f64) -> f64 {
+    (row.residual / tolerance).ln() / (first.residual / row.residual).ln().max(0.0) * (row.seconds - first.seconds)
 }
 
 /// Whether iteration `k` has a line of its own in a long run.
-fn shown(k: usize) -> bool {
+fn is_shown(k: usize) -> bool {
     k <= 20 || k <= 200 && k.is_multiple_of(10) || k.is_multiple_of(100)
 }
 
-/// A column: its heading, its width, and what it has of a row.
-type Column = (&'static str, usize, fn(&Row) -> String);
-
-/// The columns of a table that begins with this row: one of inner iterations where there are any.
-fn columns(first: &Row) -> Vec<Column> {
-    // contact points with pressure out of all
-    let closed = (2 * first.points.to_string().len() + 1).max("closed".len());
-    let all: [Column; 9] = [
-        ("k", 5, |row| row.iteration.to_string()),
-        ("residual", 9, |row| sci(row.residual, 3)),
-        ("increment", 9, |row| sci(row.increment, 3)),
-        ("gamma", 6, |row| if row.gamma.is_nan() { "-".into() } else { format!("{:.4}", row.gamma) }),
-        ("F1", 13, |row| sci(row.energy, 6)),
-        ("closed", closed, |row| format!("{}/{}", row.closed, row.points)),
-        ("factored", 8, |row| row.factorizations.to_string()),
-        ("inner", 7, |row| row.inner_iterations.to_string()),
-        ("seconds", 7, |row| seconds(row.seconds)),
-    ];
-    all.into_iter().filter(|(heading, ..)| *heading != "inner" || first.inner_iterations > 0).collect()
+/// A column of the table.
+struct Column {
+    heading: &'static str,
+    width: usize,
+    /// Text for a row.
+    value: fn(&Row) -> String,
 }
 
-/// A line of the table.
+impl Column {
+    fn new(heading: &'static str, width: usize, value: fn(&Row) -> String) -> Self {
+        Self { heading, width, value }
+    }
+}
+
+/// Return the columns of a table that begins with the row `first`. Inner iterations have a column if there are any.
+fn columns(first: &Row) -> Vec<Column> {
+    // the column has closed points / all points
+    let closed = (2 * first.points.to_string().len() + 1).max("closed".len());
+    let columns = [
+        Column::new("k", 5, |row| row.iteration.to_string()),
+        Column::new("residual", 9, |row| sci(row.residual, 3)),
+        Column::new("increment", 9, |row| sci(row.increment, 3)),
+        Column::new("gamma", 6, |row| if row.gamma.is_nan() { "-".into() } else { format!("{:.4}", row.gamma) }),
+        Column::new("F1", 13, |row| sci(row.energy, 6)),
+        Column::new("closed", closed, |row| format!("{}/{}", row.closed, row.points)),
+        Column::new("factored", 8, |row| row.factorizations.to_string()),
+        Column::new("inner", 7, |row| row.inner_iterations.to_string()),
+        Column::new("seconds", 7, |row| seconds(row.seconds)),
+    ];
+    columns.into_iter().filter(|column| column.heading != "inner" || first.inner_iterations > 0).collect()
+}
+
+/// Return a line of the table, with the texts of the columns aligned to the right.
 fn line(columns: &[Column], text: impl Fn(&Column) -> String) -> String {
-    columns.iter().map(|column| format!("{:>1$}", text(column), column.1)).collect::<Vec<_>>().join("  ")
+    columns.iter().map(|column| format!("{:>1$}", text(column), column.width)).collect::<Vec<_>>().join("  ")
 }
 
 #[cfg(test)]
@@ -209,7 +223,8 @@ mod tests {
 
     #[test]
     fn the_time_left_is_that_of_the_mean_rate() {
-        let at = |residual: f64, seconds: f64| time_left(&Row { residual, seconds, ..Row::default() }, 1.0, 1.0, 1e-8);
+        let row = |residual: f64, seconds: f64| Row { residual, seconds, ..Row::default() };
+        let at = |residual: f64, seconds: f64| time_left(&row(residual, seconds), &row(1.0, 1.0), 1e-8);
         assert!((at(1e-2, 5.0) - 12.0).abs() < 1e-9, "two digits of eight in four seconds");
         assert!(!at(1.0, 5.0).is_finite() && !at(2.0, 5.0).is_finite());
     }

@@ -1,4 +1,4 @@
-//! What the files of vtkio lack: names of components, and an end that is told of on a full disk.
+//! A writer that adds what vtkio lacks: names of components, and an error when the disk is full.
 
 use std::io::{self, Write};
 
@@ -10,40 +10,42 @@ const COMPONENTS: [(&str, &[&str]); 4] = [
     ("normal", &["x", "y", "z"]),
 ];
 
-/// Passes all bytes on, gives arrays the names of their components, and keeps the first failure: vtkio 0.7.0-rc2 has no such names,
-/// ignores short writes, and failures of its last flush, which on a full disk would leave half a file without a word.
-pub struct Whole<'a> {
+/// A writer that passes all bytes on, adds the names of components to the tags of arrays, and keeps the first failure.
+///
+/// vtkio 0.7.0-rc2 writes no such names. It also ignores short writes and failures of its last flush, which on a full disk would
+/// leave half a file without an error.
+pub struct TagWriter<'a> {
     out: &'a mut dyn Write,
-    /// The tag that has begun, from its `<` on.
+    /// Bytes of the current tag from its `<` on, none outside of tags.
     tag: Option<Vec<u8>>,
     failure: Option<io::Error>,
 }
 
-impl<'a> Whole<'a> {
-    /// Passes on to `out`.
+impl<'a> TagWriter<'a> {
+    /// Return a writer that passes its bytes on to `out`.
     pub fn new(out: &'a mut dyn Write) -> Self {
         Self { out, tag: None, failure: None }
     }
 
-    /// The first failure.
+    /// Return the first failure.
     pub fn failure(self) -> Option<io::Error> {
         self.failure
     }
 
-    /// Base64 has no `<`, so that tags are all between that and `>`.
+    /// Pass bytes on, with names in the tags. Base64 has no `<`, so every `<` begins a tag that ends at the next `>`.
     fn pass(&mut self, mut bytes: &[u8]) -> io::Result<()> {
         while !bytes.is_empty() {
             let end = if self.tag.is_some() { b'>' } else { b'<' };
             let at = bytes.iter().position(|&byte| byte == end);
-            let (here, rest) = bytes.split_at(at.unwrap_or(bytes.len()));
+            let (head, rest) = bytes.split_at(at.unwrap_or(bytes.len()));
             bytes = rest;
             match &mut self.tag {
-                Some(tag) => tag.extend_from_slice(here),
-                None => self.out.write_all(here)?,
+                Some(tag) => tag.extend_from_slice(head),
+                None => self.out.write_all(head)?,
             }
             match (at, self.tag.take()) {
                 (Some(_), None) => self.tag = Some(Vec::new()),
-                (Some(_), Some(tag)) => self.out.write_all(&named(&tag))?,
+                (Some(_), Some(tag)) => self.out.write_all(&with_component_names(&tag))?,
                 (None, tag) => self.tag = tag,
             }
         }
@@ -51,8 +53,8 @@ impl<'a> Whole<'a> {
     }
 }
 
-/// The tag of an array with the names of its components behind its own.
-fn named(tag: &[u8]) -> Vec<u8> {
+/// Return a tag; that of an array gets the names of its components after the name of the array.
+fn with_component_names(tag: &[u8]) -> Vec<u8> {
     let mut text = String::from_utf8_lossy(tag).into_owned();
     for (array, components) in COMPONENTS {
         let name = format!(" Name=\"{array}\"");
@@ -66,7 +68,7 @@ fn named(tag: &[u8]) -> Vec<u8> {
     text.into_bytes()
 }
 
-impl Write for Whole<'_> {
+impl Write for TagWriter<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.failure.is_none() {
             self.failure = self.pass(bytes).err();

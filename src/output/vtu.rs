@@ -1,8 +1,8 @@
-//! `<body>.vtu`, for ParaView.
+//! `<body>.vtu`: meshes and fields for ParaView.
 
 use serde::{Deserialize, Serialize};
 use super::collection::escape;
-use super::tags::Whole;
+use super::tags::TagWriter;
 use std::io::{self, Write};
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, ElementType, IOBuffer,
@@ -10,7 +10,7 @@ use vtkio::model::{
 };
 use vtkio::xml::Compressor;
 
-/// Kind of the cells of a body; local numbering of the points is VTK's.
+/// The kind of the cells of a body. The local numbering of the points is that of VTK.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CellKind {
     /// Two ends.
@@ -28,7 +28,7 @@ pub enum CellKind {
 }
 
 impl CellKind {
-    /// Kind of the simplices of a dimension (2 or 3) and order (1 or 2).
+    /// Return the kind of the simplices of a dimension (2 or 3) and order (1 or 2).
     pub fn simplex(dimension: usize, order: usize) -> Self {
         match (dimension, order) {
             (2, 1) => CellKind::Triangle,
@@ -38,7 +38,7 @@ impl CellKind {
         }
     }
 
-    /// Points per cell.
+    /// Return the number of points per cell.
     pub fn stride(self) -> usize {
         match self {
             CellKind::Line => 2,
@@ -50,6 +50,7 @@ impl CellKind {
         }
     }
 
+    /// Return the type of a cell in VTK.
     fn vtk(self) -> CellType {
         match self {
             CellKind::Line => CellType::Line,
@@ -62,7 +63,7 @@ impl CellKind {
     }
 }
 
-/// How numbers are written.
+/// The format of the numbers in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Encoding {
     /// Whether numbers have four bytes instead of eight.
@@ -77,7 +78,8 @@ impl Default for Encoding {
     }
 }
 
-/// Level of zlib from 1, fast, to 9: more than 1 takes four times as long for some per cent, as the last digits of numbers are random.
+/// Level of zlib from 1, fast, to 9. Levels above 1 take four times as long for some per cent, as the last digits of numbers are
+/// random.
 const LEVEL: u32 = 1;
 
 /// The mesh of one body and the fields at its points.
@@ -102,10 +104,10 @@ pub struct BodyField {
 }
 
 impl BodyField {
-    /// Arrays at the points and their components, in the order of the files.
+    /// Names of the arrays at the points and numbers of their components, in the order of the files.
     const ARRAYS: [(&'static str, u32); 4] = [("displacement", 3), ("stress", 6), ("von_mises", 1), ("principal", 3)];
 
-    /// Writes VTK's XML format with binary (base64) data: point arrays `displacement` (3 components), `stress` (6),
+    /// Write VTK's XML format with binary (base64) data and the point arrays `displacement` (3 components), `stress` (6),
     /// `von_mises` (1) and `principal` (3).
     ///
     /// # Errors
@@ -114,7 +116,7 @@ impl BodyField {
         self.into_grid().write(encoding, out)
     }
 
-    /// The field as a grid with the arrays that [`Self::write`] names.
+    /// Return the field as a grid with the arrays that [`Self::write`] names.
     pub fn into_grid(self) -> Grid {
         let (displacement, stress) = (self.displacement.into_flattened(), self.stress.into_flattened());
         let values = [displacement, stress, self.von_mises, self.principal.into_flattened()];
@@ -129,13 +131,13 @@ impl BodyField {
         }
     }
 
-    /// Writes the file that joins the fields of the parts of a body in these files of the same folder.
+    /// Write the `.pvtu` file that joins the parts of a body in `files` of the same folder.
     ///
     /// # Errors
     /// Those of `out`.
     pub fn join(files: &[String], encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         let kind = if encoding.single { "Float32" } else { "Float64" };
-        let mut out = Whole::new(out);
+        let mut out = TagWriter::new(out);
         let order = if cfg!(target_endian = "big") { "BigEndian" } else { "LittleEndian" };
         writeln!(out, "<?xml version=\"1.0\"?>")?;
         writeln!(out, "<VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"{order}\">")?;
@@ -169,7 +171,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Writes VTK's XML format with binary (base64) data. Arrays must fit the points and cells.
+    /// Write VTK's XML format with binary (base64) data. Arrays must fit the points and cells.
     ///
     /// # Errors
     /// Those of `out`.
@@ -204,10 +206,10 @@ impl Grid {
             file_path: None,
         };
         writeln!(out, r#"<?xml version="1.0"?>"#)?;
-        let mut whole = Whole::new(out);
+        let mut out = TagWriter::new(out);
         let compressor = if encoding.compress { Compressor::ZLib } else { Compressor::None };
-        let written = vtk.try_into_xml_format(compressor, LEVEL).and_then(|file| file.write(&mut whole));
-        match whole.failure() {
+        let written = vtk.try_into_xml_format(compressor, LEVEL).and_then(|file| file.write(&mut out));
+        match out.failure() {
             Some(failure) => Err(failure),
             None => written.map_err(io::Error::other),
         }
@@ -325,7 +327,7 @@ mod tests {
         }
     }
 
-    /// Takes a few bytes at a time, and no more than it has room for.
+    /// A writer that takes a few bytes at a time, and no more than it has room for.
     struct Disk(usize);
 
     impl Write for Disk {

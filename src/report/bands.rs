@@ -1,4 +1,4 @@
-//! Bands of equal value on deformed bodies of the plane, as SVG.
+//! Pictures of deformed bodies in the plane with bands of equal value, as SVG.
 
 use super::body::Part;
 use crate::linalg::bounds;
@@ -8,14 +8,14 @@ use serde::Serialize;
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
-/// Colours of a picture.
+/// Number of colours in a picture.
 pub const BANDS: usize = 12;
-/// Width of a picture, and its largest height.
+/// Width of a picture, and its largest height, in pixels.
 const SIZE: [f64; 2] = [760.0, 620.0];
-/// Steps of the coordinates in a pixel: pictures can be enlarged.
+/// Steps of the integer coordinates per pixel, so that pictures can be enlarged.
 const FINE: f64 = 50.0;
 
-/// The colours from the least value to the largest one: viridis, which colour-blind readers can follow.
+/// Return the colours from the smallest to the largest value: viridis, which colour-blind readers can follow.
 pub fn colors() -> [String; BANDS] {
     std::array::from_fn(|band| {
         let color = ViridisRGB.get_color_normalized(band as f32, 0.0, (BANDS - 1) as f32);
@@ -23,7 +23,7 @@ pub fn colors() -> [String; BANDS] {
     })
 }
 
-/// Least and largest of all values that are numbers; never equal.
+/// Return the smallest and the largest finite value. They are never equal.
 pub fn range<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
     let finite = values.filter(|value| value.is_finite());
     let [low, high] = finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)]);
@@ -36,58 +36,65 @@ pub fn range<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
     }
 }
 
-/// The band of a value in a range; what is no number is in the first.
+/// Return the band of a value in a range; NaN belongs to the first band. For `squares` see [`svg`].
 pub fn band(value: f64, [least, most]: [f64; 2], squares: bool) -> usize {
-    let share = ((value - least) / (most - least)).max(0.0);
-    ((if squares { share.sqrt() } else { share } * BANDS as f64) as usize).min(BANDS - 1)
+    let fraction = ((value - least) / (most - least)).max(0.0);
+    ((if squares { fraction.sqrt() } else { fraction } * BANDS as f64) as usize).min(BANDS - 1)
 }
 
-/// A part of a picture in one colour.
+/// A region of a picture in one colour.
 #[derive(Serialize)]
 pub struct Piece {
-    /// Its colour.
+    /// Colour.
     pub fill: String,
-    /// Its outline as SVG has it.
+    /// Outline as an SVG path.
     pub path: String,
 }
 
-/// What pictures of bodies share: their size, colours and legend.
+/// A body in a picture.
+#[derive(Serialize)]
+pub struct Shape {
+    /// Name, shown under the pointer; empty for none.
+    pub name: String,
+    /// Regions from back to front.
+    pub pieces: Vec<Piece>,
+    /// Outline as an SVG path; empty for none.
+    pub outline: String,
+}
+
+/// The size, colours and legend of a picture of bodies.
 pub struct Canvas {
     low: [f64; 3],
     high: [f64; 3],
+    /// Length of a pixel in the units of the scene.
     pixel: f64,
-    /// Least and largest value.
+    /// Smallest and largest value.
     pub range: [f64; 2],
     squares: bool,
 }
 
 impl Canvas {
-    /// For points within a box, of which two coordinates are seen, and values in a range; see [`svg`].
+    /// Return the canvas for points in a box `[low, high]`, seen along the third coordinate, and values in a range. For
+    /// `squares` see [`svg`].
     pub fn new([low, high]: [[f64; 3]; 2], range: [f64; 2], squares: bool) -> Self {
         let pixel = ((high[0] - low[0]) / SIZE[0]).max((high[1] - low[1]) / SIZE[1]);
         Self { low, high, pixel, range, squares }
     }
 
-    /// Where a point is seen, in steps of the picture.
+    /// Return the position of a point in steps of the picture.
     pub fn place(&self, x: &[f64; 3]) -> [f64; 2] {
         [(x[0] - self.low[0]) / self.pixel * FINE, (self.high[1] - x[1]) / self.pixel * FINE]
     }
 
-    /// The value where a band begins.
+    /// Return the smallest value of a band.
     fn level(&self, band: usize) -> f64 {
         let [least, most] = self.range;
-        let share = band as f64 / BANDS as f64;
-        least + (most - least) * if self.squares { share * share } else { share }
+        let fraction = band as f64 / BANDS as f64;
+        least + (most - least) * if self.squares { fraction * fraction } else { fraction }
     }
 
-    /// The picture of bodies: of each its name, its pieces from back to front and its outline.
-    pub fn draw(
-        &self,
-        bodies: Vec<(String, Vec<Piece>, String)>,
-        title: &str,
-        scale: f64,
-        alone: bool,
-    ) -> Result<String, minijinja::Error> {
+    /// Return the SVG picture of bodies with title and legend. For `scale` and `alone` see [`svg`].
+    pub fn draw(&self, bodies: Vec<Shape>, title: &str, scale: f64, alone: bool) -> Result<String, minijinja::Error> {
         let [width, height] = [0, 1].map(|k| (self.high[k] - self.low[k]) / self.pixel);
         super::words::environment().render_named_str(
             "bands.svg.html",
@@ -100,9 +107,11 @@ impl Canvas {
     }
 }
 
-/// The picture of one value, given at the points of all parts; `title` says what it is, with its unit. With `squares` the
-/// levels grow as squares: a stress peaks at contacts, and with equal steps most of a body would have the first colour.
-/// A picture that stands alone has a white ground.
+/// Return the picture of one scalar field, given at the points of all parts.
+///
+/// The `title` names the field with its unit. Displacements are magnified by `scale`. With `squares` the levels grow as squares:
+/// a stress peaks at contacts, and with equal steps most of a body would have the first colour. A picture that stands
+/// `alone` has a white background.
 pub fn svg(
     parts: &[Part],
     values: &[Vec<f64>],
@@ -111,24 +120,23 @@ pub fn svg(
     scale: f64,
     alone: bool,
 ) -> Result<String, minijinja::Error> {
-    let places: Vec<Vec<[f64; 3]>> = parts.iter().map(|part| part.moved(scale)).collect();
-    let canvas = Canvas::new(bounds(places.iter().flatten().copied()), range(values.iter().flatten()), squares);
-    let colors = colors();
-    let body = |((part, places), values): ((&Part, &Vec<[f64; 3]>), &Vec<f64>)| {
-        let places: Vec<[f64; 2]> = places.iter().map(|x| canvas.place(x)).collect();
-        let pieces = (0..BANDS).map(|band| {
-            // all of the body is in the first band, whatever its values are
-            let level = if band == 0 { f64::NEG_INFINITY } else { canvas.level(band) };
-            Piece { fill: colors[band].clone(), path: path(&part.triangles, &places, values, level) }
-        });
-        let pieces: Vec<Piece> = pieces.collect();
-        let outline = pieces[0].path.clone();
-        (part.name.clone(), pieces, outline)
-    };
-    canvas.draw(parts.iter().zip(&places).zip(values).map(body).collect(), title, scale, alone)
+    let moved: Vec<Vec<[f64; 3]>> = parts.iter().map(|part| part.moved(scale)).collect();
+    let canvas = Canvas::new(bounds(moved.iter().flatten().copied()), range(values.iter().flatten()), squares);
+    let mut shapes = Vec::new();
+    for (k, part) in parts.iter().enumerate() {
+        let places: Vec<[f64; 2]> = moved[k].iter().map(|x| canvas.place(x)).collect();
+        let region = |level: f64| path(&part.triangles, &places, &values[k], level);
+        // the first band covers the whole body, whatever its values are
+        let outline = region(f64::NEG_INFINITY);
+        let path = |band: usize| if band == 0 { outline.clone() } else { region(canvas.level(band)) };
+        let pieces = colors().into_iter().enumerate().map(|(band, fill)| Piece { fill, path: path(band) }).collect();
+        shapes.push(Shape { name: part.name.clone(), pieces, outline });
+    }
+    canvas.draw(shapes, title, scale, alone)
 }
 
-/// The picture of the pressure on a contact surface in space, seen along its shortest direction; grey where there is none.
+/// Return the picture of the pressure on a contact surface in space. It shows the two coordinates `axes`; points without pressure
+/// are grey.
 pub fn pressure(surface: &Part, axes: [usize; 2], title: &str, alone: bool) -> Result<String, minijinja::Error> {
     let flat: Vec<[f64; 3]> = surface.points.iter().map(|x| [x[axes[0]], x[axes[1]], 0.0]).collect();
     let pressures: Vec<f64> = surface.value.iter().map(|p| p.max(0.0)).collect();
@@ -141,21 +149,34 @@ pub fn pressure(surface: &Part, axes: [usize; 2], title: &str, alone: bool) -> R
     for (band, fill) in colors().into_iter().enumerate() {
         pieces.push(Piece { fill, path: region(canvas.level(band).max(1e-9 * most)) });
     }
-    canvas.draw(vec![(surface.name.clone(), pieces, outline)], title, 0.0, alone)
+    canvas.draw(vec![Shape { name: surface.name.clone(), pieces, outline }], title, 0.0, alone)
 }
 
-/// A corner of a region: a point of the mesh, twice, or the place between two of them where the level is.
+/// A corner of a region: a node, written twice, or the point between two nodes at which the value is the level.
 type Corner = (u32, u32);
 
-/// Outline of the region in which a value is at least `level`, linear in each triangle. Edges that two triangles share
-/// are left out, so that a region is as long as its border.
+/// A directed edge of a region.
+type Edge = (Corner, Corner);
+
+/// Return the outline of the region in which a value is at least `level`, as an SVG path. The value is linear in each triangle.
 fn path(triangles: &[[u32; 3]], places: &[[f64; 2]], values: &[f64], level: f64) -> String {
     let is_in = |node: u32| values[node as usize] >= level || level == f64::NEG_INFINITY;
-    let mut edges: HashSet<(Corner, Corner)> = HashSet::new();
+    let position = |(i, j): Corner| {
+        let (x, y, v, w) = (places[i as usize], places[j as usize], values[i as usize], values[j as usize]);
+        let fraction = if i == j { 0.0 } else { (level - v) / (w - v) };
+        [0, 1].map(|k| (x[k] + fraction * (y[k] - x[k])).round() as i64)
+    };
+    path_of(&border(triangles, places, is_in), position)
+}
+
+/// Return the sorted border edges of the region with the nodes that are in it. Edges that two triangles share are left out, so
+/// that the size of the path grows with the border of the region alone.
+fn border(triangles: &[[u32; 3]], places: &[[f64; 2]], is_in: impl Fn(u32) -> bool) -> Vec<Edge> {
+    let mut edges: HashSet<Edge> = HashSet::new();
     let mut corners: Vec<Corner> = Vec::with_capacity(4);
     for &[a, b, c] in triangles {
         let [p, q, r] = [a, b, c].map(|node| places[node as usize]);
-        // all outlines turn the same way
+        // all triangles get the same orientation
         let turned = (q[0] - p[0]) * (r[1] - p[1]) < (r[0] - p[0]) * (q[1] - p[1]);
         let nodes = if turned { [a, c, b] } else { [a, b, c] };
         corners.clear();
@@ -170,43 +191,37 @@ fn path(triangles: &[[u32; 3]], places: &[[f64; 2]], values: &[f64], level: f64)
         }
         for k in 0..corners.len() {
             let (from, to) = (corners[k], corners[(k + 1) % corners.len()]);
+            // a neighbour has the shared edge in the other direction
             if !edges.remove(&(to, from)) {
                 edges.insert((from, to));
             }
         }
     }
-    let at = |(i, j): Corner| {
-        let (x, y, v, w) = (places[i as usize], places[j as usize], values[i as usize], values[j as usize]);
-        let share = if i == j { 0.0 } else { (level - v) / (w - v) };
-        [0, 1].map(|k| (x[k] + share * (y[k] - x[k])).round() as i64)
-    };
-    let mut next: HashMap<Corner, Vec<Corner>> = HashMap::new();
-    let mut sorted: Vec<_> = edges.into_iter().collect();
+    let mut sorted: Vec<Edge> = edges.into_iter().collect();
     sorted.sort_unstable();
-    sorted.iter().for_each(|&(from, to)| next.entry(from).or_default().push(to));
+    sorted
+}
+
+/// Join edges to closed outlines and return them as an SVG path.
+fn path_of(edges: &[Edge], position: impl Fn(Corner) -> [i64; 2]) -> String {
+    let mut next: HashMap<Corner, Vec<Corner>> = HashMap::new();
+    edges.iter().for_each(|&(from, to)| next.entry(from).or_default().push(to));
     let mut text = String::new();
-    for (start, _) in sorted {
-        let mut last = at(start);
-        let mut corner = start;
-        let mut is_first = true;
+    for &(start, _) in edges {
+        let begin = position(start);
+        let (mut corner, mut last, mut steps) = (start, begin, Vec::new());
         while let Some(to) = next.get_mut(&corner).and_then(Vec::pop) {
-            if is_first {
-                let _ = write!(text, "M{},{}l", last[0], last[1]);
+            let here = position(to);
+            let step = [here[0] - last[0], here[1] - last[1]];
+            // an outline has one step at least, even if it is too small to be seen
+            if step != [0, 0] || steps.is_empty() {
+                steps.push(format!("{},{}", step[0], step[1]));
             }
-            let place = at(to);
-            let step = [place[0] - last[0], place[1] - last[1]];
-            if step != [0, 0] {
-                let gap = if is_first { "" } else { " " };
-                let _ = write!(text, "{gap}{},{}", step[0], step[1]);
-                is_first = false;
-            } else if is_first {
-                let _ = write!(text, "0,0");
-                is_first = false;
-            }
-            (corner, last) = (to, place);
+            (corner, last) = (to, here);
         }
-        if !is_first {
-            text.push('z');
+        if !steps.is_empty() {
+            // writing to a String does not fail
+            let _ = write!(text, "M{},{}l{}z", begin[0], begin[1], steps.join(" "));
         }
     }
     text

@@ -7,11 +7,14 @@ use crate::error::{Error, Kind, Result};
 use crate::output::{Folder, write_whole};
 use std::path::{Path, PathBuf};
 
-/// What can be drawn.
+/// Names of the pictures.
 const WHAT: [&str; 5] = ["stress", "displacement", "pressure", "convergence", "area"];
 
-/// Draws one of `WHAT` from a folder of results to `out`, or to a file of its name in the folder; returns the paths. Several pairs
-/// have a picture each, numbered from the second one on.
+/// Draw one of the pictures `stress`, `displacement`, `pressure`, `convergence` and `area` from a folder of results, and return the
+/// paths of the files.
+///
+/// The file is `out`, or an SVG file of the picture's name in the folder. Each pair has a picture of its own, numbered from the
+/// second one on.
 ///
 /// # Errors
 /// [`Kind::Usage`] for another word or ending; [`Kind::File`] when the folder lacks what is to be drawn.
@@ -23,17 +26,38 @@ pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf
             || format!("there are {}", WHAT.join(", ")),
         ));
     }
-    let path = out.map_or_else(|| folder.join(format!("{what}.svg")), Path::to_owned);
-    let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
+    let out_path = out.map_or_else(|| folder.join(format!("{what}.svg")), Path::to_owned);
+    let ending = out_path.extension().unwrap_or_default().to_string_lossy().into_owned();
     if !matches!(ending.as_str(), "svg" | "png") {
-        return Err(Error::new(Kind::Usage, format!("{} ends neither in .svg nor in .png", path.display()))
+        return Err(Error::new(Kind::Usage, format!("{} ends neither in .svg nor in .png", out_path.display()))
             .help("pictures are SVG or PNG; rsvg-convert or Inkscape make PDF of SVG"));
     }
     let results = Results::read(folder)?;
     if out.is_none() {
-        // results of others are read, never written to
+        // a folder of another user is read, never written to
         Folder::create(folder)?;
     }
+    let mut paths = Vec::new();
+    for (k, svg) in pictures(&results, folder, what)?.into_iter().enumerate() {
+        let path = if k == 0 { out_path.clone() } else { numbered(&out_path, k + 1) };
+        let bytes = if ending == "png" { raster::png(&svg)? } else { svg.into_bytes() };
+        write_whole(&path, |out| out.write_all(&bytes))?;
+        paths.push(path);
+    }
+    Ok(paths)
+}
+
+/// Return a path with a number behind the stem of its file.
+fn numbered(path: &Path, number: usize) -> PathBuf {
+    let [stem, ending] = [path.file_stem(), path.extension()].map(|part| part.unwrap_or_default().to_string_lossy());
+    path.with_file_name(format!("{stem}-{number}.{ending}"))
+}
+
+/// Return the pictures called `what` as SVG, at least one.
+///
+/// # Errors
+/// [`Kind::File`] when the folder lacks the data.
+fn pictures(results: &Results, folder: &Path, what: &str) -> Result<Vec<String>> {
     let lacks = |lacking: &str, advice: &str| {
         Error::new(Kind::File, format!("{} has {lacking}", folder.display())).help(advice)
     };
@@ -62,17 +86,5 @@ pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf
             "no pair touches or has a table, or nothing was iterated",
         ));
     }
-    let file = |(k, svg): (usize, String)| {
-        let path = match k {
-            0 => path.clone(),
-            _ => {
-                let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-                path.with_file_name(format!("{stem}-{}.{ending}", k + 1))
-            }
-        };
-        let bytes = if ending == "png" { raster::png(&svg)? } else { svg.into_bytes() };
-        write_whole(&path, |out| out.write_all(&bytes))?;
-        Ok(path)
-    };
-    pictures.into_iter().enumerate().map(file).collect()
+    Ok(pictures)
 }

@@ -1,11 +1,11 @@
-//! The files of a run, read with a look at whether they are what it wrote.
+//! The files of a run, which are checked against its checksums when they are read.
 
 use crate::error::{Error, Kind, Result};
 use crate::output::{Checksums, leftovers};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// A row of a table by the names of its columns.
+/// A row of a table: values by the names of their columns.
 pub type Row = HashMap<String, String>;
 
 /// A folder of results.
@@ -15,13 +15,13 @@ pub struct Files {
 }
 
 impl Files {
-    /// Opens a folder.
+    /// Open a folder.
     ///
     /// # Errors
-    /// [`Kind::File`] when its list of sums is damaged.
+    /// [`Kind::File`] when its list of checksums is damaged.
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(leftovers::SUMS);
-        // runs that were killed, or of earlier versions, have none
+        // a killed run or one of an earlier version has no list
         let sums = match path.symlink_metadata() {
             Ok(_) => Some(Checksums::parse(&path, &crate::file::read(&path)?)?),
             Err(_) => None,
@@ -29,17 +29,17 @@ impl Files {
         Ok(Self { folder: folder.to_owned(), sums })
     }
 
-    /// The folder.
+    /// Return the folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// The path of a file.
+    /// Return the path of a file.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// All bytes of a file.
+    /// Read a file.
     ///
     /// # Errors
     /// [`Kind::File`] when it cannot be read, or is damaged.
@@ -49,7 +49,7 @@ impl Files {
         Ok(bytes)
     }
 
-    /// Rows of a table; none if the file is not there.
+    /// Return the rows of a table, none if there is no such file.
     ///
     /// # Errors
     /// Those of [`Self::read`]; [`Kind::File`] when it is no CSV file.
@@ -65,7 +65,7 @@ impl Files {
     }
 }
 
-/// A number of a row; NaN if it has none.
+/// Return a number of a row, NaN if the column has none.
 pub fn value(row: &Row, column: &str) -> f64 {
     row.get(column).and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)
 }

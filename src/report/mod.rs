@@ -1,6 +1,6 @@
-//! Results of a run for the eye, made from its files alone: one page, and single pictures.
+//! The page and the pictures of a run, made from its files alone.
 //!
-//! Errors are those of the files that are read and of the templates, but for what functions say of their own.
+//! Unless a function says otherwise, its errors are those of the files that it reads and of the templates.
 
 pub mod bands;
 pub mod body;

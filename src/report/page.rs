@@ -1,4 +1,4 @@
-//! The page of a run: one HTML file with all that is in its folder, without anything from elsewhere.
+//! The page of a run: one HTML file with the contents of its folder. The file needs nothing from other places.
 
 use super::body::{Part, magnification};
 use super::contact::{Picture, failed, pictures};
@@ -14,27 +14,27 @@ use std::path::{Path, PathBuf};
 /// Name of the page in the folder of results.
 pub const FILE: &str = "report.html";
 
-/// A name and its points.
+/// The name of a curve and its points.
 type Curve = (String, Vec<(f64, f64)>);
 
-/// A number of a report.
+/// Return a number of a report, NaN if the value is none.
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
 }
 
-/// Size of the contact force of a pair in a load step.
+/// Return the size of the contact force of a pair in a load step.
 fn force(pair: &Value) -> f64 {
     pair["force"].as_array().into_iter().flatten().map(|f| number(f).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Writes the page of the results in `folder` to `out`, or to [`FILE`] in the folder; returns its path.
+/// Write the page of the results in `folder` to `out`, or to [`FILE`] in the folder, and return its path.
 ///
 /// # Errors
 /// [`Kind::File`] when the folder has no readable `report.json`, or a file that it names is broken.
 pub fn save(folder: &Path, out: Option<&Path>) -> Result<PathBuf> {
     let text = Results::read(folder)?.page()?;
     if out.is_none() {
-        // results of others are read, never written to
+        // a folder of another user is read, never written to
         Folder::create(folder)?;
     }
     let path = out.map_or_else(|| folder.join(FILE), Path::to_owned);
@@ -42,7 +42,7 @@ pub fn save(folder: &Path, out: Option<&Path>) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// What a folder of results has.
+/// The results in a folder.
 pub struct Results {
     files: Files,
     report: Value,
@@ -51,10 +51,10 @@ pub struct Results {
 }
 
 impl Results {
-    /// Reads `report.json` of a folder.
+    /// Read `report.json` of a folder.
     ///
     /// # Errors
-    /// [`Kind::File`] when it is not there or no report.
+    /// [`Kind::File`] when it is missing or no report.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join("report.json");
         if !path.exists() {
@@ -86,14 +86,14 @@ impl Results {
         self.report["settings"]["dimension"] == 3
     }
 
-    /// The bodies, if the run wrote their fields.
+    /// Return the bodies, if the run wrote their fields.
     pub fn bodies(&self) -> Result<Vec<Part>> {
         let names = self.names("bodies", |body| body["name"].as_str().map(str::to_owned));
         let parts = names.iter().filter_map(|name| Some((name, self.file(&[&safe_name(name), name])?)));
         parts.map(|(name, file)| Part::read(&self.files, &file, name, "von_mises")).collect()
     }
 
-    /// The contact surfaces, if the run wrote them.
+    /// Return the contact surfaces, if the run wrote them.
     pub fn surfaces(&self) -> Result<Vec<Part>> {
         let files = self.names("files", |file| Some(file.as_str()?.strip_suffix(".vtu")?.to_owned()));
         let surfaces = files.iter().filter(|name| name.starts_with("contact-"));
@@ -101,32 +101,34 @@ impl Results {
         parts.map(|(name, file)| Part::read(&self.files, &file, name, "pressure")).collect()
     }
 
+    /// Return the names in a list of the report.
     fn names(&self, key: &str, name: impl Fn(&Value) -> Option<String>) -> Vec<String> {
         self.report[key].as_array().into_iter().flatten().filter_map(name).collect()
     }
 
-    /// The first VTU file of these names that the run wrote.
+    /// Return the first VTU file with one of these stems that the run wrote.
     fn file(&self, stems: &[&str]) -> Option<String> {
         let files = self.report["files"].as_array()?;
         let written = |name: &String| files.iter().any(|file| file == name);
-        // the name of a file is no path that leads elsewhere
+        // a name with a separator could lead out of the folder
         let stems = stems.iter().flat_map(|stem| ["pvtu", "vtu"].map(|ending| format!("{stem}.{ending}")));
         let name = stems.filter(|name| !name.contains('/')).find(written);
         name.filter(|name| self.files.path(name).exists())
     }
 
-    /// A label with the unit of a length or a stress.
+    /// Return a label with one of the units of the scene.
     pub fn label(&self, what: &str, unit: fn(&Units) -> &str) -> String {
         label(what, self.units.as_ref().map(unit))
     }
 
-    /// Residual, error and increment of each iteration; none without iterations.
+    /// Return the plot of residual, error and increment over the iteration, none without iterations.
     pub fn convergence(&self) -> Result<Option<Plot>> {
         let rows = self.files.rows("history.csv")?;
-        // load steps begin to count anew
-        let place = |k: usize| if rows[k].contains_key("step") { k as f64 + 1.0 } else { value(&rows[k], "iteration") };
+        // iterations count from zero in each load step, so rows are numbered through
+        let abscissa =
+            |k: usize| if rows[k].contains_key("step") { k as f64 + 1.0 } else { value(&rows[k], "iteration") };
         let curve = |name: &str, column: &str, style| {
-            let points: Vec<_> = (0..rows.len()).map(|k| (place(k), value(&rows[k], column))).collect();
+            let points: Vec<_> = (0..rows.len()).map(|k| (abscissa(k), value(&rows[k], column))).collect();
             points.iter().any(|point| point.1 > 0.0).then(|| Series::new(name, points, style))
         };
         let error = if self.report["error_bound"].is_null() { "estimated error" } else { "bound of the error" };
@@ -140,7 +142,7 @@ impl Results {
         Ok((!series.is_empty()).then_some(Plot { title, x, y, series }))
     }
 
-    /// A curve of the load steps for each pair, with its name; none without steps.
+    /// Return a curve over the load steps for each pair, none without steps.
     fn curves(&self, point: impl Fn(&Value) -> (f64, f64)) -> Option<Vec<Curve>> {
         let steps = self.report["steps"].as_array().filter(|steps| !steps.is_empty())?;
         let curve = |(i, pair): (usize, &Value)| {
@@ -150,7 +152,8 @@ impl Results {
         Some(self.report["pairs"].as_array()?.iter().enumerate().map(curve).collect())
     }
 
-    /// What is in contact over the contact force, a curve of the load steps for each pair; none without steps.
+    /// Return the plot of the area or length in contact over the contact force, with a curve over the load steps for each pair;
+    /// none without steps.
     pub fn area(&self) -> Option<Plot> {
         let curves =
             self.curves(|pair| (force(pair), number(pair.get("contact_area").unwrap_or(&pair["contact_length"]))))?;
@@ -161,7 +164,7 @@ impl Results {
         Some(Plot { title: String::new(), x: Axis::linear(force), y: Axis::linear(size), series })
     }
 
-    /// Contact force over approach, likewise; none of more pairs than one looks through.
+    /// Return the plot of the contact force over the approach in the same way; none for more than [`LISTED`] pairs.
     fn approach(&self) -> Option<Plot> {
         let curves =
             self.curves(|pair| (number(&pair["approach"]), force(pair))).filter(|curves| curves.len() <= LISTED)?;
@@ -169,22 +172,22 @@ impl Results {
         Some(Plot::approach("", force_labels(self.units.as_ref()), curves))
     }
 
-    /// Whether contact has an area, as in space, and no length.
+    /// Whether the size of a contact is an area, as in space, and no length.
     fn is_area(&self) -> bool {
         self.report["pairs"][0].get("contact_area").is_some()
     }
 
-    /// The unit of this area or length.
+    /// Return the unit of this area or length.
     fn size_unit(&self) -> Option<String> {
         self.units.as_ref().map(|units| format!("{}{}", units.length, if self.is_area() { "²" } else { "" }))
     }
 
-    /// A picture of the pressure of each pair that touches and has a table.
+    /// Return a picture of the pressure of each pair that touches and has a table.
     pub fn pressures(&self, alone: bool) -> Result<Vec<Picture>> {
         pictures(&self.files, self.is_space(), self.units.as_ref(), alone)
     }
 
-    /// A picture of the stress, or else the displacement, on deformed bodies: of those in space their surfaces.
+    /// Return the picture of the stress, or else the displacement, on deformed bodies. Bodies in space show their surfaces.
     pub fn bands(&self, bodies: &[Part], stress: bool, alone: bool) -> Result<String> {
         let values: Vec<Vec<f64>> =
             bodies.iter().map(|part| if stress { part.value.clone() } else { part.travel() }).collect();
@@ -196,7 +199,18 @@ impl Results {
         draw(bodies, &values, stress, &title, magnification(bodies), alone).map_err(failed)
     }
 
-    /// The text of the page.
+    /// Return the command of the run for a shell, after a change to its directory; empty if the report does not have it.
+    fn command(&self) -> String {
+        let quoted = |word| shlex::try_quote(word).unwrap_or(word.into());
+        let words = self.report["command"].as_array().into_iter().flatten().filter_map(Value::as_str);
+        let command = words.map(quoted).collect::<Vec<_>>().join(" ");
+        match self.report["directory"].as_str().filter(|_| !command.is_empty()) {
+            Some(folder) => format!("cd {}\n{command}", quoted(folder)),
+            None => command,
+        }
+    }
+
+    /// Return the text of the page.
     fn page(&self) -> Result<String> {
         let report = &self.report;
         let bodies = self.bodies()?;
@@ -210,20 +224,10 @@ impl Results {
         let unit = |unit: fn(&Units) -> &str| self.label("", unit);
         let phases = ["mesh", "discretize", "set-up", "iterate", "estimate", "output"];
         let timed = |phase: &&str| report["times"].get(*phase).is_some();
-        let words_of = |key: &str| -> Vec<&str> {
-            report[key].as_array().into_iter().flatten().filter_map(Value::as_str).collect()
-        };
-        let command = words_of("command").into_iter().map(|word| shlex::try_quote(word).unwrap_or(word.into()));
-        let command = command.collect::<Vec<_>>().join(" ");
-        let folder = report["directory"].as_str().filter(|_| !command.is_empty());
-        let command = match folder.map(|folder| shlex::try_quote(folder).unwrap_or(folder.into())) {
-            Some(folder) => format!("cd {folder}\n{command}"),
-            None => command,
-        };
         let mut environment = words::environment();
-        // reports of other versions may lack keys
+        // a report of another version may lack keys
         environment.set_undefined_behavior(UndefinedBehavior::Chainable);
-        let known = context! {
+        let values = context! {
             report,
             units => self.units.as_ref().map(|u| context! { length => u.length, stress => u.stress, force => u.force }),
             stress_unit => unit(|units| units.stress),
@@ -237,12 +241,12 @@ impl Results {
             convergence,
             approach => self.approach().map(|plot| plot.svg().map_err(failed)).transpose()?,
             phases => phases.into_iter().filter(timed).chain(["total"]).collect::<Vec<_>>(),
-            command,
+            command => self.command(),
             settings => serde_json::to_string_pretty(&report["settings"]).unwrap_or_default(),
             style => include_str!("style.css"),
             library => include_str!("vendor/twgl.min.js"),
             viewer => include_str!("viewer.js"),
         };
-        environment.render_named_str("page.html", include_str!("page.html"), known).map_err(failed)
+        environment.render_named_str("page.html", include_str!("page.html"), values).map_err(failed)
     }
 }

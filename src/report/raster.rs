@@ -1,17 +1,17 @@
-//! SVG pictures as PNG, with a font of their own: a machine without a display has none.
+//! SVG pictures as PNG. The program brings its own font, as a machine without a display has none.
 
 use super::contact::failed;
 use crate::error::Result;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 
-/// Pixels of the PNG for one of the SVG: sharp in print at the usual size of a figure, a column of 85 mm.
+/// Pixels of the PNG per pixel of the SVG, which makes figures sharp in print at the usual column width of 85 mm.
 const SHARP: f32 = 2.0;
 
-/// The PNG of an SVG picture.
+/// Return an SVG picture as PNG.
 ///
 /// # Errors
-/// A text that is no SVG, and a picture of no or too many pixels.
+/// [`Kind::File`](crate::error::Kind::File) for a text that is no SVG, and for a picture without or with too many pixels.
 pub fn png(svg: &str) -> Result<Vec<u8>> {
     let mut options = Options::default();
     let fonts = options.fontdb_mut();

@@ -1,4 +1,4 @@
-//! Surfaces in space for the view that turns.
+//! The data of surfaces in space for the interactive view of the page.
 
 use super::body::Part;
 use crate::linalg::bounds;
@@ -9,8 +9,10 @@ use serde_json::{Value, json};
 /// Marks points without a value.
 const NONE: u16 = u16::MAX;
 
-/// Numbers of a view: of each part points, seen from the least coordinates, and displacements (float32), triangles (uint32), and its value (uint16 between
-/// `low` and `high`, 65535 for none), little endian in base64.
+/// Return the numbers of the view, little endian in base64.
+///
+/// Each part has points relative to the least coordinates and displacements (float32), triangles (uint32), and a value at each
+/// point (uint16). Values are scaled to the range of the parts; 65535 stands for none.
 pub fn view(bodies: &[Part], surfaces: &[Part], scale: f64) -> Value {
     let [low, high] = bounds(bodies.iter().chain(surfaces).flat_map(|part| &part.points).copied());
     json!({
@@ -20,21 +22,27 @@ pub fn view(bodies: &[Part], surfaces: &[Part], scale: f64) -> Value {
         "stress": super::bands::range(bodies.iter().flat_map(|part| &part.value)),
         "pressure": super::bands::range(surfaces.iter().flat_map(|part| &part.value)),
         "low": [0.0, 0.0, 0.0],
-        "high": from(low, &high),
+        "high": relative(low, &high),
         "scale": scale,
         "colors": super::bands::colors().to_vec(),
     })
 }
 
-/// Return a point as it is seen from another one.
-fn from(low: [f64; 3], x: &[f64; 3]) -> [f64; 3] {
+/// Return the coordinates of a point relative to another one.
+fn relative(low: [f64; 3], x: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| x[c] - low[c])
 }
 
+/// Return the data of parts, with points relative to `low`.
 fn parts(parts: &[Part], low: [f64; 3]) -> Vec<Value> {
-    // float32 has no digits for a small body far from the origin
-    let places = |part: &Part| part.points.iter().map(|x| from(low, x)).collect::<Vec<_>>();
-    let [least, most] = super::bands::range(parts.iter().flat_map(|part| &part.value));
+    let range = super::bands::range(parts.iter().flat_map(|part| &part.value));
+    parts.iter().map(|part| part_data(part, low, range)).collect()
+}
+
+/// Return the data of a part; values are scaled to the range.
+fn part_data(part: &Part, low: [f64; 3], [least, most]: [f64; 2]) -> Value {
+    // float32 has too few digits for a small body far from the origin
+    let points: Vec<[f64; 3]> = part.points.iter().map(|x| relative(low, x)).collect();
     let short = |value: &f64| match value.is_finite() {
         true => ((value - least) / (most - least) * f64::from(NONE - 1)).round() as u16,
         false => NONE,
@@ -42,14 +50,11 @@ fn parts(parts: &[Part], low: [f64; 3]) -> Vec<Value> {
     let floats = |points: &[[f64; 3]]| -> Vec<u8> {
         points.as_flattened().iter().flat_map(|&x| (x as f32).to_le_bytes()).collect()
     };
-    let part = |part: &Part| {
-        json!({
-            "name": part.name,
-            "points": STANDARD.encode(floats(&places(part))),
-            "displacement": STANDARD.encode(floats(&part.displacement)),
-            "value": STANDARD.encode(part.value.iter().map(short).flat_map(u16::to_le_bytes).collect::<Vec<_>>()),
-            "triangles": STANDARD.encode(part.triangles.as_flattened().iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>()),
-        })
-    };
-    parts.iter().map(part).collect()
+    json!({
+        "name": part.name,
+        "points": STANDARD.encode(floats(&points)),
+        "displacement": STANDARD.encode(floats(&part.displacement)),
+        "value": STANDARD.encode(part.value.iter().map(short).flat_map(u16::to_le_bytes).collect::<Vec<_>>()),
+        "triangles": STANDARD.encode(part.triangles.as_flattened().iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>()),
+    })
 }

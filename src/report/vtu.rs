@@ -1,5 +1,7 @@
-//! Reader of the `.vtu` files of a run: XML with arrays in base64, compressed by zlib or not. It trusts nothing in them: sizes and counts
-//! must agree with each other before anything is allocated for them, and blocks with their check sums.
+//! The reader of the `.vtu` files of a run: XML with arrays in base64, compressed by zlib or not.
+//!
+//! The reader trusts no file. Sizes and counts must agree with each other before memory is allocated for them, and blocks must agree with
+//! their checksums.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -8,14 +10,17 @@ use quick_xml::events::{BytesStart, Event};
 use std::collections::HashMap;
 use std::io::Read;
 
-/// What is wrong with a file, in words.
-type Said<T> = Result<T, String>;
+/// A value, or a description of what is wrong with the file.
+type Parsed<T> = Result<T, String>;
 
-/// A grid, or the files that have its parts.
+/// The attributes of an element by name.
+type Attributes = HashMap<String, String>;
+
+/// The content of a file: a grid, or the names of the files with its parts.
 pub enum Content {
-    /// Parts in the file itself.
+    /// Pieces in the file itself.
     Pieces(Vec<Piece>),
-    /// Names of files beside a `.pvtu`.
+    /// Names of the files that a `.pvtu` joins, in the same folder.
     Sources(Vec<String>),
 }
 
@@ -24,107 +29,140 @@ pub enum Content {
 pub struct Piece {
     /// Points.
     pub points: Vec<[f64; 3]>,
-    /// Kind of each cell by VTK's number, and its points.
+    /// Type number in VTK and point numbers of each cell.
     pub cells: Vec<(u8, Vec<usize>)>,
-    /// Arrays at the points by name, point by point.
+    /// Arrays at the points by name; all components of a point stand together.
     pub at_points: HashMap<String, Vec<f64>>,
 }
 
-/// Numbers of an array.
+/// The numbers of an array.
 enum Numbers {
     Real(Vec<f64>),
     Whole(Vec<u64>),
 }
 
-/// How the arrays of a file are encoded.
+/// The encoding of the arrays of a file.
 #[derive(Clone, Copy)]
 struct Encoding {
+    /// Whether numbers are big-endian.
     is_big: bool,
-    /// Bytes of a size.
+    /// Bytes of a size in the header of an array.
     size: usize,
     is_compressed: bool,
 }
 
-/// An array and where it stands.
+/// An array of a piece.
 struct Array {
+    /// Name of the element around it, such as `PointData`.
     section: String,
     name: String,
     numbers: Numbers,
 }
 
-/// A piece that is being read.
-struct Open {
+/// A piece that is being read: its numbers of points and cells, and the arrays so far.
+struct OpenPiece {
     points: usize,
     cells: usize,
     arrays: Vec<Array>,
 }
 
-/// Reads a `.vtu` or `.pvtu` file.
+/// Read a `.vtu` or `.pvtu` file.
 ///
 /// # Errors
-/// What is wrong with it.
-pub fn read(bytes: &[u8]) -> Said<Content> {
+/// A description of what is wrong with the file.
+pub fn read(bytes: &[u8]) -> Parsed<Content> {
     let text = std::str::from_utf8(bytes).map_err(|_| "it is no text")?;
     let mut reader = quick_xml::Reader::from_str(text);
-    let (mut encoding, mut open, mut array) = (None::<Encoding>, None::<Open>, None::<HashMap<String, String>>);
-    let (mut pieces, mut sources, mut sections, mut has_ended) = (Vec::new(), Vec::new(), Vec::<String>::new(), false);
+    let mut document = Document::default();
     loop {
         match reader.read_event().map_err(|cause| cause.to_string())? {
-            Event::Eof if has_ended => break,
+            Event::Eof if document.has_ended => return document.content(),
             Event::Eof => return Err("it ends too early".to_owned()),
-            Event::Start(tag) => {
-                let (name, attributes) = (name_of(&tag), attributes(&tag)?);
-                match name.as_str() {
-                    "VTKFile" => encoding = Some(encoding_of(&attributes)?),
-                    "Piece" => {
-                        let count = |key: &str| number(&attributes, key);
-                        open = Some(Open {
-                            points: count("NumberOfPoints")?,
-                            cells: count("NumberOfCells")?,
-                            arrays: Vec::new(),
-                        });
-                    }
-                    "DataArray" => array = Some(attributes),
-                    _ => {}
-                }
-                sections.push(name);
-            }
+            Event::Start(tag) => document.start(&tag)?,
             Event::Empty(tag) if name_of(&tag) == "Piece" => {
-                sources.extend(attributes(&tag)?.remove("Source"));
+                document.sources.extend(attributes(&tag)?.remove("Source"));
             }
-            Event::Text(data) => {
-                if let (Some(open), Some(attributes), Some(encoding)) = (&mut open, array.take(), encoding) {
-                    let section = sections.iter().rev().nth(1).cloned().unwrap_or_default();
-                    let name = attributes.get("Name").cloned().unwrap_or_default();
-                    let numbers =
-                        numbers(&attributes, &data, encoding).map_err(|what| format!("array `{name}`: {what}"))?;
-                    open.arrays.push(Array { section, name, numbers });
-                }
-            }
-            Event::End(tag) => {
-                sections.pop();
-                match tag.name().as_ref() {
-                    b"Piece" => pieces.push(open.take().ok_or("a piece ends that has not begun")?.close()?),
-                    b"DataArray" => array = None,
-                    b"VTKFile" => has_ended = true,
-                    _ => {}
-                }
-            }
+            Event::Text(data) => document.text(&data)?,
+            Event::End(tag) => document.end(tag.name().as_ref())?,
             _ => {}
         }
     }
-    match (pieces.is_empty(), sources.is_empty()) {
-        (false, true) => Ok(Content::Pieces(pieces)),
-        (true, false) => Ok(Content::Sources(sources)),
-        _ => Err("it has no piece of an unstructured grid".to_owned()),
+}
+
+/// The part of a file that has been read so far.
+#[derive(Default)]
+struct Document {
+    encoding: Option<Encoding>,
+    /// Names of the elements around the current position.
+    elements: Vec<String>,
+    piece: Option<OpenPiece>,
+    /// Attributes of the current array, until its data is read.
+    array: Option<Attributes>,
+    pieces: Vec<Piece>,
+    sources: Vec<String>,
+    has_ended: bool,
+}
+
+impl Document {
+    /// Process the start tag of an element.
+    fn start(&mut self, tag: &BytesStart) -> Parsed<()> {
+        let (name, attributes) = (name_of(tag), attributes(tag)?);
+        match name.as_str() {
+            "VTKFile" => self.encoding = Some(encoding_of(&attributes)?),
+            "Piece" => {
+                let count = |key: &str| number(&attributes, key);
+                let (points, cells) = (count("NumberOfPoints")?, count("NumberOfCells")?);
+                self.piece = Some(OpenPiece { points, cells, arrays: Vec::new() });
+            }
+            "DataArray" => self.array = Some(attributes),
+            _ => {}
+        }
+        self.elements.push(name);
+        Ok(())
+    }
+
+    /// Process text, which may be the data of an array.
+    fn text(&mut self, data: &[u8]) -> Parsed<()> {
+        let (Some(piece), Some(attributes), Some(encoding)) = (&mut self.piece, self.array.take(), self.encoding)
+        else {
+            return Ok(());
+        };
+        let section = self.elements.iter().rev().nth(1).cloned().unwrap_or_default();
+        let name = attributes.get("Name").cloned().unwrap_or_default();
+        let numbers = numbers(&attributes, data, encoding).map_err(|what| format!("array `{name}`: {what}"))?;
+        piece.arrays.push(Array { section, name, numbers });
+        Ok(())
+    }
+
+    /// Process the end tag of an element.
+    fn end(&mut self, name: &[u8]) -> Parsed<()> {
+        self.elements.pop();
+        match name {
+            b"Piece" => self.pieces.push(self.piece.take().ok_or("a piece ends that has not begun")?.close()?),
+            b"DataArray" => self.array = None,
+            b"VTKFile" => self.has_ended = true,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Return the content of the whole file.
+    fn content(self) -> Parsed<Content> {
+        match (self.pieces.is_empty(), self.sources.is_empty()) {
+            (false, true) => Ok(Content::Pieces(self.pieces)),
+            (true, false) => Ok(Content::Sources(self.sources)),
+            _ => Err("it has no piece of an unstructured grid".to_owned()),
+        }
     }
 }
 
+/// Return the name of an element.
 fn name_of(tag: &BytesStart) -> String {
     String::from_utf8_lossy(tag.name().as_ref()).into_owned()
 }
 
-fn attributes(tag: &BytesStart) -> Said<HashMap<String, String>> {
+/// Return the attributes of an element.
+fn attributes(tag: &BytesStart) -> Parsed<Attributes> {
     let attribute = |one: Result<quick_xml::events::attributes::Attribute, _>| {
         let one = one.map_err(|cause: quick_xml::events::attributes::AttrError| cause.to_string())?;
         let value = one.unescape_value().map_err(|cause| cause.to_string())?.into_owned();
@@ -133,11 +171,13 @@ fn attributes(tag: &BytesStart) -> Said<HashMap<String, String>> {
     tag.attributes().map(attribute).collect()
 }
 
-fn number(attributes: &HashMap<String, String>, key: &str) -> Said<usize> {
+/// Return the number in an attribute of a piece.
+fn number(attributes: &Attributes, key: &str) -> Parsed<usize> {
     attributes.get(key).and_then(|text| text.parse().ok()).ok_or_else(|| format!("a piece has no `{key}`"))
 }
 
-fn encoding_of(attributes: &HashMap<String, String>) -> Said<Encoding> {
+/// Return the encoding from the attributes of the root element.
+fn encoding_of(attributes: &Attributes) -> Parsed<Encoding> {
     let text = |key: &str| attributes.get(key).map_or("", String::as_str);
     let size = match text("header_type") {
         "UInt64" => 8,
@@ -157,8 +197,8 @@ fn encoding_of(attributes: &HashMap<String, String>) -> Said<Encoding> {
     Ok(Encoding { is_big, size, is_compressed })
 }
 
-/// The numbers of an array.
-fn numbers(attributes: &HashMap<String, String>, data: &[u8], encoding: Encoding) -> Said<Numbers> {
+/// Decode the numbers of an array.
+fn numbers(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Numbers> {
     let text = |key: &str| attributes.get(key).map_or("", String::as_str);
     if text("format") != "binary" {
         return Err(format!("its format is `{}`, not `binary`", text("format")));
@@ -178,8 +218,8 @@ fn numbers(attributes: &HashMap<String, String>, data: &[u8], encoding: Encoding
     }
 }
 
-/// Numbers of so many bytes each.
-fn split(bytes: &[u8], size: usize, is_big: bool) -> Said<Vec<u64>> {
+/// Split bytes into numbers of `size` bytes each.
+fn split(bytes: &[u8], size: usize, is_big: bool) -> Parsed<Vec<u64>> {
     if !bytes.len().is_multiple_of(size) {
         return Err("it ends within a number".to_owned());
     }
@@ -190,8 +230,8 @@ fn split(bytes: &[u8], size: usize, is_big: bool) -> Said<Vec<u64>> {
     Ok(bytes.chunks_exact(size).map(value).collect())
 }
 
-/// The bytes of an array: its sizes in base64, then what it has.
-fn bytes(data: &[u8], encoding: Encoding) -> Said<Vec<u8>> {
+/// Decode the bytes of an array, which follow their sizes.
+fn bytes(data: &[u8], encoding: Encoding) -> Parsed<Vec<u8>> {
     let decode = |text: &[u8]| STANDARD.decode(text).map_err(|cause| format!("no base64: {cause}"));
     let Encoding { is_big, size, is_compressed } = encoding;
     let short = || "it is shorter than it says".to_owned();
@@ -203,7 +243,8 @@ fn bytes(data: &[u8], encoding: Encoding) -> Said<Vec<u8>> {
             false => Err("it has not as many bytes as it says".to_owned()),
         };
     }
-    // three sizes at least stand in front, in an encoding of their own: the first one, which counts the blocks, then all
+    // The data begins with at least three sizes, which are encoded separately. The first size is the number of blocks, and
+    // it tells how long the encoded sizes are.
     let encoded = |bytes: usize| bytes.div_ceil(3).checked_mul(4);
     let first = encoded(size).and_then(|length| data.get(..length)).ok_or_else(short)?;
     let count = split(decode(first)?.get(..size).ok_or_else(short)?, size, is_big)?[0];
@@ -211,18 +252,24 @@ fn bytes(data: &[u8], encoding: Encoding) -> Said<Vec<u8>> {
     let head_length = head.and_then(encoded).filter(|&length| length <= data.len()).ok_or_else(short)?;
     let sizes = split(&decode(&data[..head_length])?, size, is_big)?;
     let [_, block, last, compressed @ ..] = &sizes[..] else { return Err(short()) };
-    let mut rest = &decode(&data[head_length..])?[..];
-    let mut all = Vec::new();
-    for (k, &length) in compressed.iter().enumerate() {
-        let (packed, after) =
-            usize::try_from(length).ok().and_then(|length| rest.split_at_checked(length)).ok_or_else(short)?;
+    inflate(&decode(&data[head_length..])?, compressed, *block, *last)
+}
+
+/// Decompress blocks with these compressed lengths. Each has `block` bytes, and the last one has `last`, or `block` if that is 0.
+fn inflate(packed: &[u8], lengths: &[u64], block: u64, last: u64) -> Parsed<Vec<u8>> {
+    let (mut rest, mut all) = (packed, Vec::new());
+    for (k, &length) in lengths.iter().enumerate() {
+        let (packed, after) = usize::try_from(length)
+            .ok()
+            .and_then(|length| rest.split_at_checked(length))
+            .ok_or("it is shorter than it says")?;
         let before = all.len() as u64;
-        // no more than a block, whatever it claims
+        // at most one byte more than a block is read, whatever the block claims
         let mut blocks = ZlibDecoder::new(packed).take(block.saturating_add(1));
         blocks.read_to_end(&mut all).map_err(|cause| format!("a block is damaged: {cause}"))?;
         let found = all.len() as u64 - before;
-        let is_last = k + 1 == compressed.len();
-        let fits = if is_last { found == *last || (*last == 0 && found == *block) } else { found == *block };
+        let is_last = k + 1 == lengths.len();
+        let fits = if is_last { found == last || (last == 0 && found == block) } else { found == block };
         if !fits || blocks.into_inner().total_in() != length {
             return Err("a block has not as many bytes as it says".to_owned());
         }
@@ -231,9 +278,9 @@ fn bytes(data: &[u8], encoding: Encoding) -> Said<Vec<u8>> {
     if rest.is_empty() { Ok(all) } else { Err("it is longer than it says".to_owned()) }
 }
 
-impl Open {
-    /// The piece, if all its counts agree.
-    fn close(self) -> Said<Piece> {
+impl OpenPiece {
+    /// Return the piece, if all its counts agree.
+    fn close(self) -> Parsed<Piece> {
         let Self { points: count, cells, arrays } = self;
         let (mut piece, mut lists, mut coordinates) = (Piece::default(), HashMap::new(), None);
         for Array { section, name, numbers } in arrays {

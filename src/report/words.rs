@@ -1,10 +1,10 @@
-//! Values of a report as words and numbers for people, and the templates that have them as filters.
+//! Filters of the templates, which format values of a report for people.
 
 use crate::output::trimmed;
 use minijinja::value::{Rest, ValueKind};
 use minijinja::{Environment, Value};
 
-/// An environment of templates with the filters `num`, `words` and `without`.
+/// Return an environment of templates with the filters `num`, `words` and `without`.
 pub fn environment() -> Environment<'static> {
     let mut environment = Environment::new();
     environment.add_filter("num", number);
@@ -13,7 +13,7 @@ pub fn environment() -> Environment<'static> {
     environment
 }
 
-/// A number with five digits; a dash for what is none.
+/// Format a number with five digits; other values become a dash.
 fn number(value: &Value) -> String {
     let Ok(value) = f64::try_from(value.clone()) else { return "–".to_owned() };
     match value.abs() {
@@ -30,16 +30,16 @@ fn number(value: &Value) -> String {
     }
 }
 
-/// A table as `key = value, ...`, a list as `(a, b)`; numbers as [`number`] has them.
+/// Format a table as `key = value, ...` and a list as `(a, b)`, with the numbers of [`number`].
 fn words(value: &Value) -> String {
     let list = || value.try_iter().into_iter().flatten();
     match value.kind() {
         ValueKind::Map => {
             let item = |key: Value| {
-                let of = value.get_item(&key).unwrap_or_default();
-                match of.kind() {
-                    ValueKind::Map => format!("{key}: {}", words(&of)),
-                    _ => format!("{key} = {}", words(&of)),
+                let item = value.get_item(&key).unwrap_or_default();
+                match item.kind() {
+                    ValueKind::Map => format!("{key}: {}", words(&item)),
+                    _ => format!("{key} = {}", words(&item)),
                 }
             };
             list().map(item).collect::<Vec<_>>().join(", ")
@@ -51,7 +51,7 @@ fn words(value: &Value) -> String {
     }
 }
 
-/// A table without some of its keys.
+/// Return a table without some of its keys.
 fn without(value: &Value, keys: Rest<String>) -> Value {
     let kept =
         value.try_iter().into_iter().flatten().filter(|key| !keys.iter().any(|other| key.as_str() == Some(other)));

@@ -1,17 +1,18 @@
-//! Layers that a run has compressed beyond the end of their law.
+//! Warnings of layers that a run has compressed beyond the end of their law.
 
 use super::measure::peak;
 use super::stages::Done;
 use super::verdict::is_solved;
 use crate::output::sci;
 
-/// Warn of each pair whose layer is compressed further than its law is given for, at the solution or in a load step: there the law is a
-/// straight line through the end of a table, or of an expression with `up_to`, which nobody has measured.
+/// Return a warning for each pair whose layer is compressed beyond the end of its law, at the solution or in a load step. There the
+/// law is extrapolated by a straight line from the end of a table, or of an expression with `up_to`, without measured data.
 pub fn warnings(done: &Done) -> Vec<String> {
-    (0..done.model().pairs.len()).filter_map(|i| of_pair(done, i)).collect()
+    (0..done.model().pairs.len()).filter_map(|i| warning(done, i)).collect()
 }
 
-fn of_pair(done: &Done, i: usize) -> Option<String> {
+/// Return the warning for pair `i`, if its layer is beyond the end of its law.
+fn warning(done: &Done, i: usize) -> Option<String> {
     let pair = &done.model().pairs[i];
     let end = (0..pair.len()).map(|q| pair.law.end(q)).fold(f64::INFINITY, f64::min);
     let Compressed { most, pressure, step } = most_compressed(done, i)?;
@@ -28,15 +29,15 @@ fn of_pair(done: &Done, i: usize) -> Option<String> {
     })
 }
 
-/// The place of a pair where its layer is compressed most.
+/// The largest compression of the layer of a pair.
 struct Compressed {
     most: f64,
     pressure: f64,
-    /// The load step, counted from 1, if there are any.
+    /// Load step, counted from 1, if there are any.
     step: Option<usize>,
 }
 
-/// Return the largest compression of a pair over the solutions of a run; none if it has found none.
+/// Return the largest compression of a pair over all solutions of a run, none if the run has found no solution.
 fn most_compressed(done: &Done, i: usize) -> Option<Compressed> {
     if done.steps.is_empty() {
         let (layer, range) = (&done.outcome.layer, done.model().range(i));
@@ -45,9 +46,9 @@ fn most_compressed(done: &Done, i: usize) -> Option<Compressed> {
         return done.outcome.status.is_solved().then_some(found);
     }
     let solved = done.steps.iter().enumerate().filter(|(_, step)| is_solved(step));
-    let of_step = solved.map(|(number, step)| {
+    let compressed = solved.map(|(number, step)| {
         let pair = &step.pairs[i];
         Compressed { most: pair.peak_compression, pressure: pair.peak_pressure, step: Some(number + 1) }
     });
-    of_step.max_by(|a, b| a.most.total_cmp(&b.most))
+    compressed.max_by(|a, b| a.most.total_cmp(&b.most))
 }

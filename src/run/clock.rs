@@ -1,26 +1,26 @@
-//! Where the time of a run goes.
+//! The time and memory of the phases of a run.
 
 use crate::file::bytes_in_proc;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Instant;
 
-/// Wall seconds of the phases of a run.
+/// The clock of a run, which measures its phases.
 #[derive(Clone)]
 pub struct Clock {
     began: Instant,
     last: Instant,
-    /// Seconds by phase.
+    /// Wall seconds by phase.
     pub times: BTreeMap<String, f64>,
-    /// Largest resident memory of this process so far, 10^6 bytes, at the end of each phase; empty where the system does not say.
+    /// Peak resident memory of this process at the end of each phase, 10^6 bytes; empty where the system does not report it.
     pub memory: BTreeMap<String, f64>,
-    /// Seconds of set-up and iteration by the estimate that chose the solvers, where one was made.
+    /// Estimated seconds of set-up and iteration, if the choice of the solvers made an estimate.
     pub estimate: Option<f64>,
-    /// Called at the end of each phase with its name, at the beginning of the first with none.
+    /// Function that is called at the end of each phase with its name, and at the beginning of the first with an empty name.
     pub watch: Option<Rc<Watch>>,
 }
 
-/// Called with the name of a phase that has ended, and the estimate.
+/// A function of the name of a phase that has ended, and of the estimate.
 pub type Watch = dyn Fn(&str, Option<f64>);
 
 impl Default for Clock {
@@ -32,12 +32,12 @@ impl Default for Clock {
 }
 
 impl Clock {
-    /// Begins the first phase of a mesh.
+    /// Report the beginning of the first phase of a mesh.
     pub fn begin(&self) {
         self.watch.iter().for_each(|watch| watch("", None));
     }
 
-    /// Ends a phase.
+    /// End a phase, which began when the one before ended.
     pub fn phase(&mut self, name: &str) {
         let now = Instant::now();
         *self.times.entry(name.to_owned()).or_default() += (now - self.last).as_secs_f64();
@@ -47,7 +47,7 @@ impl Clock {
         self.watch.iter().for_each(|watch| watch(name, self.estimate));
     }
 
-    /// Seconds since the run began, noted as `total`.
+    /// Return the seconds since the run began, and store them as `total`.
     pub fn total(&mut self) -> f64 {
         let total = self.began.elapsed().as_secs_f64();
         self.times.insert("total".to_owned(), total);

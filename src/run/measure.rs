@@ -1,4 +1,4 @@
-//! What is measured of a result: forces, approach and contact of each pair, reactions of each body.
+//! Quantities of a result: forces, approach and contact size of each pair, and reactions of each body.
 
 use super::balance;
 use super::ended::{All, Recovered};
@@ -9,11 +9,13 @@ use crate::model::Model;
 use crate::output::{BalanceReport, BodyReport, Extent, ReactionReport, StepPairReport, StepReport};
 use crate::problem::history::History;
 
-/// Sum of the normals of a pair over that of its weights below which it has no mean normal. Around a closed surface the sum is zero but for
-/// facets without a partner: that of one facet in a thousand is no direction of the contact. Half a circle has 0.64.
+/// Least length of the integrated normal of a pair relative to its area: below this ratio the pair has no mean normal.
+///
+/// Around a closed surface the integral is zero except for facets without a partner, and one such facet in a thousand does not
+/// define a direction of the contact. Half a circle has the ratio 0.64.
 const CANCELS: f64 = 1e-3;
 
-/// Names of the pairs in the order of the scene, each once.
+/// Return the names of the pairs in the order of the scene, made unique.
 pub fn pair_names(built: &Built) -> Vec<String> {
     let model = &built.discrete.model;
     let names = (0..model.pairs.len()).map(|i| {
@@ -23,12 +25,12 @@ pub fn pair_names(built: &Built) -> Vec<String> {
     numbered(names)
 }
 
-/// What the points of all pairs have: `"length"`, or `"area"` in space and on bodies of revolution.
+/// Return the measure of the contact points: `"length"`, or `"area"` in space and for bodies of revolution.
 pub fn of_points(built: &Built) -> &'static str {
     built.discrete.model.pairs.first().map_or("length", |pair| pair.measure)
 }
 
-/// Names of what holds the bodies, each once: supports, springs, rigid surfaces, body by body.
+/// Return the names of the supports, springs and rigid surfaces, body by body, made unique.
 pub fn reaction_names(built: &Built) -> Vec<String> {
     numbered(built.discrete.bodies.iter().flat_map(|body| {
         let all = body.supports.iter().chain(&body.springs).chain(&body.rigid);
@@ -36,7 +38,7 @@ pub fn reaction_names(built: &Built) -> Vec<String> {
     }))
 }
 
-/// What holds the bodies, in the order of [`reaction_names`].
+/// Return the reactions of bodies with these names and balances, in the order of [`reaction_names`].
 fn reactions<'a>(bodies: impl Iterator<Item = (&'a String, BalanceReport)>) -> Vec<ReactionReport> {
     let of_body = |(name, balance): (&String, BalanceReport)| {
         let BalanceReport { supports, springs, rigid, .. } = balance;
@@ -46,12 +48,12 @@ fn reactions<'a>(bodies: impl Iterator<Item = (&'a String, BalanceReport)>) -> V
     bodies.flat_map(of_body).collect()
 }
 
-/// The reactions in the reports of bodies, in the order of [`reaction_names`].
+/// Return the reactions from the reports of bodies, in the order of [`reaction_names`].
 pub fn reported(bodies: &[BodyReport]) -> Vec<ReactionReport> {
     reactions(bodies.iter().map(|body| (&body.name, body.balance.clone())))
 }
 
-/// What the report says of the step that has ended, `number` of a history, in these bodies. Collective.
+/// Return the report of the load step `number` of a history, counted from 0, which has ended with these displacements. Collective.
 pub fn step(
     done: &Done,
     recovered: &All,
@@ -78,33 +80,33 @@ pub fn step(
     }
 }
 
-/// Sum of contact forces (n) at points whose unit pressures act by these rows, n each.
+/// Return the resultant force or moment of contact forces (n) on a side: minus the sum of the forces times the `rows` (n x 3) of their
+/// points.
 pub fn resultant(force: &[f64], rows: &[[f64; 3]]) -> [f64; 3] {
     std::array::from_fn(|k| force.iter().zip(rows).fold(0.0, |sum, (force, row)| sum - force * row[k]))
 }
 
-/// Largest compression of a layer, which has a point at least; negative where all of it is open.
+/// Return the largest compression of a layer, negative if all of it is open.
 pub fn peak(compression: &[f64]) -> f64 {
     compression.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Forces and contact of pair `i`.
-pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
+/// Return the report of pair `i` in a load step.
+fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
     let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, force) = (&layer.compression[range.clone()], &layer.force[range.clone()]);
-    let closed = || (0..pair.len()).filter(|&q| c[q] > 0.0);
     StepPairReport {
         force: resultant(force, &pair.resultant[discrete.sides(i)[0]]),
         approach,
         extent: Extent::new(pair.measure, &pair.weight, c),
         peak_pressure: layer.pressure[range].iter().copied().fold(0.0, f64::max),
         peak_compression: peak(c),
-        closed: closed().count(),
+        closed: c.iter().filter(|c| **c > 0.0).count(),
     }
 }
 
-/// How far the bodies of each pair come nearer to each other along its mean normal; collective, one message.
+/// Return the approach of the bodies of each pair along its mean normal, none without a mean normal. Collective, one message.
 pub fn approaches(done: &Done, recovered: &All) -> Vec<Option<f64>> {
     let (discrete, model) = (&done.built.discrete, done.model());
     let directions: Vec<Option<[f64; 3]>> = (0..model.pairs.len()).map(|i| direction(model, i)).collect();
@@ -128,7 +130,7 @@ pub fn approaches(done: &Done, recovered: &All) -> Vec<Option<f64>> {
     directions.into_iter().zip(message).map(finite).collect()
 }
 
-/// The mean normal of pair `i` from side a to side b.
+/// Return the mean normal of pair `i` from side a to side b, if there is one.
 fn direction(model: &Model, i: usize) -> Option<[f64; 3]> {
     let pair = &model.pairs[i];
     let points = || pair.weight.iter().zip(&pair.resultant[0]);
@@ -137,7 +139,7 @@ fn direction(model: &Model, i: usize) -> Option<[f64; 3]> {
     (size > CANCELS * total).then(|| sum.map(|n| n / size))
 }
 
-/// Whether a run that ended like this is a start for the next step.
+/// Whether a run with this status is a start for the next load step.
 pub fn is_usable(status: &Status) -> bool {
     status.is_solved() || *status == Status::IterationLimit
 }

@@ -1,4 +1,4 @@
-//! Outcome -> report and contact tables.
+//! The report and the contact tables of a run, from its outcome.
 
 use super::clock::Clock;
 use super::ended::{All, Look};
@@ -6,8 +6,8 @@ use super::stages::{Built, Done};
 use super::verdict::{self, forecast, message, status_name};
 use super::{asking, balance, beyond, measure, preflight, results};
 use crate::contact::{ContactPair, Left};
-use crate::ddm::{Reached, Status, Whose};
-use crate::discretize::Discrete;
+use crate::ddm::{Outcome, Reached, Status, Whose};
+use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Kind, few};
 use crate::estimate::Estimate;
 use crate::exchange::share;
@@ -20,87 +20,98 @@ use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Exit code of a run that ended like this.
+/// Return the exit code of a run.
 pub fn exit_code(done: &Done) -> i32 {
     match done.outcome.status {
-        Status::Converged | Status::RoundoffLimited if verdict::of_steps(&done.steps).is_empty() => 0,
+        Status::Converged | Status::RoundoffLimited if verdict::step_warnings(&done.steps).is_empty() => 0,
         Status::Paused { asked } => asking::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
 }
 
-/// Fills the report of a run.
+/// Return the report of a run. Collective.
 pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) -> Report {
     let (discrete, model, outcome) = (&done.built.discrete, done.model(), &done.outcome);
     let shared = Shared::gather(discrete);
-    let counts = &shared.counts;
-    let joint = &outcome.joint;
-    let last = outcome.rows.last();
-    let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
-    let mut report = Report {
-        status: status_name(&outcome.status).to_owned(),
-        message: message(outcome, model),
-        iterations: outcome.iterations,
-        sweeps: outcome.sweeps,
-        method: outcome.method.to_owned(),
-        spectrum: outcome.spectrum.map(|(low, high)| [low, high]),
-        forecast: forecast(outcome),
-        gamma_interval: outcome.interval.map(|interval| IntervalReport {
-            theorem: Some(interval.theorem()).filter(|&end| end > 0.0),
-            descent: interval.descent(),
-            lower: interval.lower,
-            upper: interval.upper,
-        }),
-        error_bound: finite(last.filter(|row| row.is_bound).map(|row| row.error)),
-        rounding: finite(Some(outcome.rounding)),
-        error_estimate: finite(last.filter(|row| !row.is_bound).map(|row| row.error)),
-        factorizations: counts.factorizations + joint.factorizations,
-        inner_times: InnerTimes {
-            factor: counts.factor_seconds + joint.factor_seconds,
-            first: counts.first_seconds + joint.first_seconds,
-            solve: counts.solve_seconds + joint.solve_seconds,
-        },
-        linear_step: outcome.linear_step.clone(),
-        patches: counts.patches + joint.patches,
-        symbolic_factorizations: counts.symbolic + joint.symbolic,
-        body_solves: counts.solves,
-        inner_iterations: counts.inner_iterations + joint.inner_iterations,
-        smoothed_steps: last.map_or(0, |row| row.smoothed),
-        robin_updates: counts.robin_updates,
-        robin_updates_skipped: counts.robin_skipped,
-        dense_factorizations: counts.dense_factorizations + joint.dense_factorizations,
-        assemblies: shared.assemblies,
-        assemblies_avoided: shared.assemblies_avoided,
-        
-        factorizations_avoided: counts.factorizations_avoided,
-        body_solves_skipped: outcome.solves_skipped,
-        messages: model.exchange.messages(),
-        memory_of_ranks: share(&*model.exchange, clock.memory.clone()),
-        steps: done.steps.clone(),
-        residual: finite(last.map(|row| row.residual)),
-        increment: finite(last.map(|row| row.increment)),
-        f1: finite(last.map(|row| row.energy)),
-        ..headline(session, &done.built, &shared.solvers, clock)
-    };
+    let mut report = headline(session, &done.built, &shared.solvers, clock);
+    add_outcome(&mut report, outcome, model);
+    add_counters(&mut report, &shared, outcome);
+    report.messages = model.exchange.messages();
+    report.memory_of_ranks = share(&*model.exchange, clock.memory.clone());
+    report.steps = done.steps.clone();
     if let Some(look) = &done.look {
         add_look(&mut report, look_report(look, discrete, model), &outcome.status);
     }
-    report.warnings.extend(done.warnings.iter().cloned().chain(verdict::of_steps(&done.steps)));
+    report.warnings.extend(done.warnings.iter().cloned().chain(verdict::step_warnings(&done.steps)));
     let too_large = results::fill(discrete, recovered, &mut report.bodies);
     report.warnings.extend(too_large.into_iter().chain(beyond::warnings(done)));
     let approaches = measure::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = balance::gather(done, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
-    if let Some(message) = lost(done) {
-        tell_lost(&mut report, message, &outcome.status);
+    if let Some(message) = lost_digits(done) {
+        add_lost_digits(&mut report, message, &outcome.status);
     }
     report
 }
 
-/// Adds the last look at a result. What the iteration did not see is no bound, and no less than what was found.
+/// Add the status and the results of the iteration.
+fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
+    let last = outcome.rows.last();
+    report.status = status_name(&outcome.status).to_owned();
+    report.message = message(outcome, model);
+    report.method = outcome.method.to_owned();
+    report.linear_step = outcome.linear_step.clone();
+    report.spectrum = outcome.spectrum.map(|(low, high)| [low, high]);
+    report.forecast = forecast(outcome);
+    report.gamma_interval = outcome.interval.map(|interval| IntervalReport {
+        theorem: Some(interval.theorem()).filter(|&end| end > 0.0),
+        descent: interval.descent(),
+        lower: interval.lower,
+        upper: interval.upper,
+    });
+    report.error_bound = last.filter(|row| row.is_bound).and_then(|row| finite(row.error));
+    report.error_estimate = last.filter(|row| !row.is_bound).and_then(|row| finite(row.error));
+    report.rounding = finite(outcome.rounding);
+    report.residual = last.and_then(|row| finite(row.residual));
+    report.increment = last.and_then(|row| finite(row.increment));
+    report.f1 = last.and_then(|row| finite(row.energy));
+}
+
+/// Return a number if it is finite.
+fn finite(value: f64) -> Option<f64> {
+    Some(value).filter(|value| value.is_finite())
+}
+
+/// Add the counters of the iteration, of the bodies, and of the joint solver of all bodies.
+fn add_counters(report: &mut Report, shared: &Shared, outcome: &Outcome) {
+    let (counts, joint) = (&shared.counts, &outcome.joint);
+    report.iterations = outcome.iterations;
+    report.sweeps = outcome.sweeps;
+    report.smoothed_steps = outcome.rows.last().map_or(0, |row| row.smoothed);
+    report.body_solves = counts.solves;
+    report.body_solves_skipped = outcome.solves_skipped;
+    report.inner_iterations = counts.inner_iterations + joint.inner_iterations;
+    report.factorizations = counts.factorizations + joint.factorizations;
+    report.factorizations_avoided = counts.factorizations_avoided;
+    report.dense_factorizations = counts.dense_factorizations + joint.dense_factorizations;
+    report.symbolic_factorizations = counts.symbolic + joint.symbolic;
+    report.patches = counts.patches + joint.patches;
+    report.robin_updates = counts.robin_updates;
+    report.robin_updates_skipped = counts.robin_skipped;
+    report.assemblies = shared.assemblies;
+    report.assemblies_avoided = shared.assemblies_avoided;
+    report.inner_times = InnerTimes {
+        factor: counts.factor_seconds + joint.factor_seconds,
+        first: counts.first_seconds + joint.first_seconds,
+        solve: counts.solve_seconds + joint.solve_seconds,
+    };
+}
+
+/// Add the last look at a result. If it found a larger error than the iteration, that error replaces the bound or estimate, as an
+/// estimate.
 fn add_look(report: &mut Report, found: LookReport, status: &Status) {
-    let error = [report.error_bound, report.error_estimate].into_iter().flatten().next();
+    let error = report.error_bound.or(report.error_estimate);
     let is_more = |found: f64| error.map_or(matches!(status, Status::Inaccurate(_)), |error| found > error);
     if found.error.is_some_and(is_more) {
         (report.error_bound, report.error_estimate) = (None, found.error);
@@ -108,8 +119,8 @@ fn add_look(report: &mut Report, found: LookReport, status: &Status) {
     report.last_look = Some(found);
 }
 
-/// Tells that displacements leave few digits for the pressures.
-fn tell_lost(report: &mut Report, message: String, status: &Status) {
+/// Put the message that few digits are left for the pressures into the report.
+fn add_lost_digits(report: &mut Report, message: String, status: &Status) {
     match status {
         Status::Converged | Status::RoundoffLimited => {
             (report.status, report.message) = (status_name(&Status::RoundoffLimited).to_owned(), message);
@@ -121,9 +132,8 @@ fn tell_lost(report: &mut Report, message: String, status: &Status) {
     }
 }
 
-/// The last look for the report.
+/// Return the last look for the report.
 fn look_report(look: &Look, discrete: &Discrete, model: &Model) -> LookReport {
-    let finite = |value: f64| value.is_finite().then_some(value);
     let at = match look.whose {
         Whose::Body(body) => vec![body],
         Whose::Pair(pair) => model.pairs[pair].bodies.to_vec(),
@@ -140,14 +150,14 @@ fn look_report(look: &Look, discrete: &Discrete, model: &Model) -> LookReport {
     }
 }
 
-/// What displacements that are far larger than the deformations have cost the pressures, in words: more than ten times what the run or its
-/// inner solvers were asked for.
-fn lost(done: &Done) -> Option<String> {
+/// Return a message if displacements that are far larger than the deformations leave few digits for the pressures. It appears when
+/// rounding exceeds ten times the tolerances of the run and of its inner solvers.
+fn lost_digits(done: &Done) -> Option<String> {
     let stop = &done.built.scene.method.stop;
     let reached = done.outcome.rows.last().map(|row| row.error).filter(|error| stop.balanced && error.is_finite());
-    let asked = [stop.residual, stop.increment, reached].into_iter().flatten().fold(INNER, f64::max);
+    let tolerance = [stop.residual, stop.increment, reached].into_iter().flatten().fold(INNER, f64::max);
     let pressure = done.outcome.rounding;
-    (pressure > 10.0 * asked).then(|| {
+    (pressure > 10.0 * tolerance).then(|| {
         format!(
             "the displacements are so large beside what compresses the layers that few digits are left for the pressures, which may be off \
              by {} of their peak: begin with a smaller gap, let supports move bodies less, or take softer layers",
@@ -156,10 +166,10 @@ fn lost(done: &Done) -> Option<String> {
     })
 }
 
-/// Relative tolerance of an inner solver by default.
+/// Default relative tolerance of an inner solver.
 const INNER: f64 = 1e-6;
 
-/// The part of the report that is known before the first sweep; `solvers` are the inner solvers in words.
+/// Return the part of the report that is known before the first sweep. `solvers` are the inner solvers of the bodies in words.
 pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Clock) -> Report {
     let Built { scene, discrete: Discrete { bodies, .. }, .. } = built;
     Report {
@@ -169,22 +179,7 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
         ranks: session.size(),
         title: scene.title.clone(),
         dofs: bodies.iter().map(|body| body.dofs).sum(),
-        bodies: bodies
-            .iter()
-            .zip(solvers)
-            .map(|(info, solver)| BodyReport {
-                name: info.name.clone(),
-                nodes: info.nodes,
-                cells: info.cells,
-                inner_facets: info.facets.inner,
-                boundary_facets: info.facets.outer,
-                parts: info.facets.parts.count,
-                dofs: info.dofs,
-                solver: solver.clone(),
-                rank: info.rank,
-                ..BodyReport::default()
-            })
-            .collect(),
+        bodies: bodies.iter().zip(solvers).map(|(info, solver)| body_report(info, solver)).collect(),
         times: clock.times.clone(),
         memory: clock.memory.clone(),
         command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect(),
@@ -196,7 +191,23 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
     }
 }
 
-/// PETSc options as they are typed, from wherever they come; those that PETSc cannot list are no reason to stop.
+/// Return the report of a body without results.
+fn body_report(info: &BodyInfo, solver: &str) -> BodyReport {
+    BodyReport {
+        name: info.name.clone(),
+        nodes: info.nodes,
+        cells: info.cells,
+        inner_facets: info.facets.inner,
+        boundary_facets: info.facets.outer,
+        parts: info.facets.parts.count,
+        dofs: info.dofs,
+        solver: solver.to_owned(),
+        rank: info.rank,
+        ..BodyReport::default()
+    }
+}
+
+/// Return all PETSc options as they are typed, whatever their source. A failure of PETSc to list them is no reason to stop.
 fn petsc_options(session: &Session) -> Vec<String> {
     let option = |(name, value): (String, Option<String>)| match value {
         Some(value) => format!("{name} {value}"),
@@ -205,18 +216,19 @@ fn petsc_options(session: &Session) -> Vec<String> {
     session.options().all().unwrap_or_default().into_iter().map(option).collect()
 }
 
-/// What only the owner of a body knows: counts over all bodies and the inner solver of each in words.
+/// Data that only the owners of the bodies have, gathered on every rank: counters over all bodies, and their inner solvers.
 #[derive(Default, Serialize, Deserialize)]
 pub struct Shared {
-    /// What the bodies did, all together.
+    /// Counters, summed over all bodies.
     pub counts: BodyCounts,
     assemblies: usize,
     assemblies_avoided: usize,
-    /// Inner solver of each body.
+    /// Inner solver of each body in words.
     pub solvers: Vec<String>,
 }
 
-/// Inner solvers in words: once if all bodies have the same, of many bodies each kind with the number of those that have it.
+/// Return the inner solvers of the bodies in words: one name if all are the same, and numbers of bodies per solver if there are many
+/// bodies.
 pub fn solvers_in_words(solvers: &[String]) -> String {
     match solvers {
         [first, rest @ ..] if rest.iter().all(|other| other == first) => first.clone(),
@@ -232,20 +244,20 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
 }
 
 impl Shared {
-    /// Collects it on every rank; collective.
+    /// Gather the data on every rank. Collective.
     pub fn gather(discrete: &Discrete) -> Self {
         let &Discrete { assemblies, assemblies_avoided, .. } = discrete;
         let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
         for slot in &discrete.model.bodies {
-            let leader = slot.local.as_ref().filter(|body| body.leads());
-            mine.solvers.push(leader.map_or(String::new(), |body| body.describe()));
-            mine.counts += leader.map_or(BodyCounts::default(), |body| body.counts());
+            let owned = slot.local.as_ref().filter(|body| body.leads());
+            mine.solvers.push(owned.map_or(String::new(), |body| body.describe()));
+            mine.counts += owned.map_or(BodyCounts::default(), |body| body.counts());
         }
-        share(&*discrete.model.exchange, mine).into_iter().reduce(Self::with).unwrap_or_default()
+        share(&*discrete.model.exchange, mine).into_iter().reduce(Self::merged).unwrap_or_default()
     }
 
-    /// With what another rank knows.
-    fn with(mut self, other: Self) -> Self {
+    /// Merge the data of another rank.
+    fn merged(mut self, other: Self) -> Self {
         self.counts += other.counts;
         self.assemblies += other.assemblies;
         self.assemblies_avoided += other.assemblies_avoided;
@@ -254,19 +266,20 @@ impl Shared {
     }
 }
 
-/// The estimate of the error for the report.
+/// Return the estimate of the discretisation error for the report.
 pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
-    let all: f64 = estimate.bodies.iter().chain(&estimate.layers).sum();
-    let share = |error: &f64| if all > 0.0 { error / all } else { 0.0 };
+    let total: f64 = estimate.bodies.iter().chain(&estimate.layers).sum();
+    let fraction = |error: &f64| if total > 0.0 { error / total } else { 0.0 };
     EstimateReport {
         energy: estimate.energy,
         nodal: estimate.nodal,
         displacement: estimate.displacement,
         pressure: estimate.pressure.clone(),
-        bodies: estimate.bodies.iter().map(share).collect(),
+        bodies: estimate.bodies.iter().map(fraction).collect(),
     }
 }
 
+/// Return the report of pair `i`.
 fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
@@ -298,13 +311,13 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     }
 }
 
-/// What `contacts.csv` says of pair `i` besides.
+/// Return the further columns of `contacts.csv` for pair `i`.
 pub fn pair_row(done: &Done, i: usize) -> PairRow {
     let pair = &done.model().pairs[i];
     PairRow::new(&pair.weight, &pair.gap, &done.outcome.layer.compression[done.model().range(i)])
 }
 
-/// Where the compression changes sign between neighbouring points of a curve.
+/// Return the zeros of the compression c between neighbouring points of a curve, interpolated linearly.
 fn ends(pair: &ContactPair, c: &[f64]) -> Vec<[f64; 3]> {
     let mut ends = Vec::new();
     for q in 1..pair.len() {
@@ -316,14 +329,14 @@ fn ends(pair: &ContactPair, c: &[f64]) -> Vec<[f64; 3]> {
     ends
 }
 
-/// The contact table of pair `i`, sides in the order of the scene.
+/// Return the contact table of pair `i`, with sides in the order of the scene.
 pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> ContactTable {
     let (model, outcome) = (done.model(), &done.outcome);
     let (pair, range, points) = (&model.pairs[i], model.range(i), model.points());
     let sides = done.built.discrete.sides(i);
     let displacement = |side: usize| -> Vec<f64> {
         let trace = &outcome.iterate.trace[side * points + range.start..side * points + range.end];
-        trace.iter().zip(&pair.prescribed[side]).map(|(free, known)| free + done.share * known).collect()
+        trace.iter().zip(&pair.prescribed[side]).map(|(free, prescribed)| free + done.share * prescribed).collect()
     };
     ContactTable {
         side_names: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
@@ -337,7 +350,7 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
     }
 }
 
-/// Pair `i` on its surface: gap, compression, pressure, normal (from side a to side b) and area (length) of the points.
+/// Return the surface of pair `i` with gap, compression, pressure, normal (from side a to side b) and area (length) of the points.
 pub fn contact_surface(name: &str, done: &Done, i: usize) -> Grid {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));

@@ -1,4 +1,4 @@
-//! The stages of a run, each made from the one before: [`Scene`], [`Built`], [`Ready`], [`Done`].
+//! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Ready`], [`Done`].
 
 use super::clock::Clock;
 use super::ended::{All, Look};
@@ -14,98 +14,99 @@ use crate::scene::Scene;
 use crate::solver::options::Chosen;
 use std::rc::Rc;
 
-/// A scene with its discrete problem. Bodies have their inner solvers, nothing is factored.
+/// A scene with its discrete problem. Bodies have their inner solvers, but nothing is factorised yet.
 pub struct Built {
-    /// What was asked for.
+    /// The scene.
     pub scene: Rc<Scene>,
     /// The discrete problem.
     pub discrete: Discrete,
-    /// SHA-256 of the file of its mesh, on the rank that has read it; none elsewhere.
+    /// SHA-256 of the file of its mesh, on the rank that has read the file; none on other ranks.
     pub mesh: Option<String>,
-    /// How linear steps are solved.
+    /// The solver of linear steps.
     pub linear: Linear,
-    /// PETSc options of the matrix of all bodies.
+    /// PETSc options for the joint matrix of all bodies.
     pub whole: Chosen,
-    /// Interpolation of all bodies from linear displacements, until multigrid has it.
+    /// Interpolation of all bodies from linear displacements, until multigrid takes it.
     pub interpolation: Option<Interpolation>,
-    /// Why the inner solver is what it is where no PETSc option was typed.
+    /// Reason for the choice of the inner solver, if no PETSc option was typed.
     pub choice: String,
-    /// Names of the condensed bodies, with which another run can go on.
+    /// Names of the condensed bodies, which another run can reuse.
     pub condensed: Vec<String>,
-    /// The options of all its solvers of PETSc.
+    /// Options of all PETSc solvers of the problem.
     pub options: Vec<Chosen>,
-    /// What the user should know of it.
+    /// Warnings on the problem.
     pub warnings: Vec<String>,
-    /// The way to the other legs of a history; none if this problem serves all its steps.
+    /// Function that prepares the problem of another leg of the load history; none if this problem serves all load steps. On a leg,
+    /// all loads are proportional.
     pub again: Option<Again>,
 }
 
-/// Makes a problem with the loads of another leg of a history: first step of the leg, where it begins, the condensed bodies of the leg
-/// before. Collective.
+/// A function that prepares the problem with the loads of another leg of a history. Its arguments are the first step of the leg, the
+/// start, the condensed bodies of the leg before, and the clock. Collective.
 pub type Again = Rc<dyn Fn(usize, Begin, Vec<BodySlot>, &mut Clock) -> Result<Ready>>;
 
-/// What another mesh or another process gives a run.
+/// The start of a run that continues one on another mesh or in another process.
 #[derive(Default)]
 pub struct Begin {
-    /// The start; none for that of the scene.
+    /// The start; none for the start of the scene.
     pub start: Option<Start>,
-    /// Load steps before.
+    /// Earlier load steps.
     pub steps: Vec<StepReport>,
-    /// Their rows.
+    /// Iteration rows of the earlier load steps.
     pub earlier: Vec<Row>,
 }
 
-/// A problem with its method set up and a start: the next is the first step.
+/// A problem that is prepared for its first iteration, with the method set up and a start.
 pub struct Ready {
     /// The problem.
     pub built: Built,
-    /// The method, whose solvers are set up.
+    /// The method with its solvers, all set up.
     pub method: Method,
-    /// Where it begins; with load steps each finds its own, but for one that another process has begun.
+    /// The start. Each load step determines its own, except for one that another process has begun.
     pub start: Start,
-    /// Load steps before.
+    /// Earlier load steps.
     pub steps: Vec<StepReport>,
-    /// Their rows.
+    /// Iteration rows of the earlier load steps.
     pub earlier: Vec<Row>,
-    /// What the user should know of the set-up.
+    /// Warnings on the set-up.
     pub warnings: Vec<String>,
 }
 
-/// A run that has ended, well or not, or has paused.
+/// A run that has ended, with or without a solution, or has paused.
 pub struct Done {
     /// The problem.
     pub built: Built,
-    /// The method as the run has left it.
+    /// The method in its last state.
     pub method: Method,
-    /// How it ended; of a load step that has paused, in the units of the step.
+    /// The outcome. That of a paused load step is in the units of the step.
     pub outcome: Outcome,
-    /// Share of the loads and prescribed displacements that the outcome is the answer to.
+    /// Factor of the loads and prescribed displacements to which the outcome belongs.
     pub share: f64,
-    /// Its load steps so far.
+    /// Load steps so far.
     pub steps: Vec<StepReport>,
-    /// Rows of the load steps before one that has paused.
+    /// Iteration rows of the load steps before a paused one.
     pub earlier: Vec<Row>,
-    /// What the user should know of the set-up.
+    /// Warnings on the set-up.
     pub warnings: Vec<String>,
-    /// Displacements of its bodies, once it has ended.
+    /// Displacements of its bodies, once the run has ended.
     pub recovered: Option<Rc<All>>,
-    /// What the last look found, at a result that may be a solution.
+    /// Errors that the last look found, for a result that may be a solution.
     pub look: Option<Look>,
 }
 
 impl Built {
-    /// Who knows the error of the discretisation, if the scene lets the run end by it.
+    /// Return the estimator of the discretisation error, if the scene lets the run end by it.
     pub fn balance(&self) -> Option<Box<dyn Discretisation>> {
         let meshes = self.discrete.meshes.clone().filter(|_| self.scene.method.stop.balanced);
         meshes.map(|meshes| Box::new(Nodal(meshes)) as _)
     }
 
-    /// Whether PETSc has no solver in it: all bodies are condensed, and what joins them is dense.
+    /// Whether no solver of PETSc is part of the problem: linear steps are dense, or all bodies are condensed.
     pub fn is_without_petsc(&self) -> bool {
         self.linear == Linear::Dense || self.condensed.len() == self.discrete.bodies.len()
     }
 
-    /// The condensed bodies, their counts begun anew, for other loads, layers or gaps.
+    /// Return the condensed bodies with their counters reset, for other loads, layers or gaps.
     pub fn into_condensed(self) -> Vec<BodySlot> {
         let mut slots = self.discrete.model.bodies;
         slots.retain(|slot| self.condensed.contains(&slot.name));
@@ -115,13 +116,13 @@ impl Built {
 }
 
 impl Done {
-    /// The next run of the same problem and method, from what this one has found.
+    /// Return the same problem and method, prepared for another run that starts from this outcome.
     pub fn go_on(self, start: impl FnOnce(Outcome) -> Start) -> Ready {
         let Self { built, method, outcome, steps, earlier, warnings, .. } = self;
         Ready { built, method, start: start(outcome), steps, earlier, warnings }
     }
 
-    /// The discrete problem.
+    /// Return the model of the discrete problem.
     pub fn model(&self) -> &Model {
         &self.built.discrete.model
     }

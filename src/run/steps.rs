@@ -1,8 +1,9 @@
-//! Load steps: one solution after another, each started from the one before.
+//! Load steps: a sequence of solutions, each of which starts from the previous one.
 //!
-//! At a share s of all loads and prescribed displacements, u/s solves the problem of these loads with the gap d/s and the layer
-//! p(s c)/s. So on a leg of a history, where all loads are in proportion, a step changes gaps and laws alone: no body is
-//! assembled, reduced or factored anew. Another leg is another problem on the same mesh, to which condensed bodies are kept.
+//! A leg of a load history is a sequence of steps in which all loads and prescribed displacements have a common factor s. For the
+//! displacements u at the factor s, u/s solves the problem of the full loads with the gap d/s and the layer law p(s c)/s of the
+//! compression c. A step within a leg therefore changes gaps and laws alone, and no body is assembled, reduced or factorised again.
+//! Another leg is another problem on the same mesh, which reuses condensed bodies.
 
 use super::clock::Clock;
 use super::ended::{self, All};
@@ -13,7 +14,7 @@ use super::results;
 use super::stages::{Begin, Done, Ready};
 use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
-use crate::ddm::{Method, Observer, Row, Start, Status};
+use crate::ddm::{Method, Observer, Outcome, Row, Start, Status};
 use crate::discretize::{self, Discrete};
 use crate::error::Result;
 use crate::model::{BodyCounts, Field, Layer, Model};
@@ -21,8 +22,10 @@ use crate::problem::history::History;
 use crate::scene::Scene;
 use std::rc::Rc;
 
-/// Runs the steps of a scene and reports each. The outcome is that of the last one with the counts and the history of all. A step that
-/// ends badly leaves its start to the next one; one that a signal ends is the last.
+/// Solve the load steps of a scene and report each. The outcome is that of the last step with the counters and rows of all steps.
+///
+/// After a step without a usable result, the next step begins with the start of the scene. A step that a signal interrupts is the
+/// last.
 ///
 /// # Errors
 /// Failures of the solver library, and loads that a body cannot have.
@@ -34,9 +37,9 @@ pub fn iterate(mut ready: Ready, keep: &mut dyn Keep, clock: &mut Clock) -> Resu
         let before = all.factor;
         all.factor = history.share(all.step);
         all.step += 1;
-        let (last, share) = (all.step == history.steps.len(), all.factor);
-        load(&mut ready.built.discrete.model, &all.laws, share);
-        ready.start = start(ready.start, &mut ready.method, &ready.built.discrete, &scene, [before, share])?;
+        let (last, factor) = (all.step == history.steps.len(), all.factor);
+        scale_loads(&mut ready.built.discrete.model, &all.laws, factor);
+        ready.start = start(ready.start, &mut ready.method, &ready.built.discrete, &scene, [before, factor])?;
         let mut done = keep::solve(ready, last, &mut all)?;
         let interrupted = matches!(done.outcome.status, Status::Paused { .. });
         if interrupted && !last {
@@ -57,7 +60,7 @@ pub fn iterate(mut ready: Ready, keep: &mut dyn Keep, clock: &mut Clock) -> Resu
             all.end_step(&mut done, &of_step);
             done.recovered = None;
             (done.outcome, done.share) = (of_step, 1.0);
-            load(&mut done.built.discrete.model, &all.laws, share);
+            scale_loads(&mut done.built.discrete.model, &all.laws, factor);
             ready = done.go_on(|outcome| if usable { Start::Resume(outcome.iterate) } else { Start::Automatic });
         } else {
             ready = all.end_leg(done, &of_step, usable, clock)?;
@@ -65,37 +68,37 @@ pub fn iterate(mut ready: Ready, keep: &mut dyn Keep, clock: &mut Clock) -> Resu
     }
 }
 
-/// Gaps and laws at a share of the loads.
-fn load(model: &mut Model, laws: &[Rc<dyn LayerLaw>], factor: f64) {
+/// Set the gaps d/s and the laws p(s c)/s for a load factor s.
+fn scale_loads(model: &mut Model, laws: &[Rc<dyn LayerLaw>], factor: f64) {
     model.scale_gaps(factor);
     for (pair, law) in model.pairs.iter_mut().zip(laws) {
-        // the full load is the scene itself, to the last digit
+        // at the full load, the law is the one of the scene without rounding
         pair.law = if factor == 1.0 { law.clone() } else { Rc::new(Scaled { law: law.clone(), factor }) };
     }
 }
 
-/// Where a step begins, whose share of the loads follows another one.
+/// Return the start of a step, from the load factors of the previous step and of this one.
 fn start(
     start: Start,
     method: &mut Method,
     discrete: &Discrete,
     scene: &Scene,
-    [before, share]: [f64; 2],
+    [before, factor]: [f64; 2],
 ) -> Result<Start> {
     Ok(match start {
         Start::Resume(field) => {
             if let Method::Sweeps { acceleration, .. } = method {
                 acceleration.restart();
             }
-            Start::Resume(rescaled(&discrete.model, field, before / share))
+            Start::Resume(rescaled(&discrete.model, field, before / factor))
         }
         paused @ Start::Continue(_) => paused,
-        Start::Pressure(pressure) => Start::Pressure(pressure.into_iter().map(|p| p / share).collect()),
-        _ => discretize::start(scene, discrete, share)?.into(),
+        Start::Pressure(pressure) => Start::Pressure(pressure.into_iter().map(|p| p / factor).collect()),
+        _ => discretize::start(scene, discrete, factor)?.into(),
     })
 }
 
-/// The same displacements in other shares: what supports prescribe is a part of a state that stays.
+/// Return the displacements multiplied by a ratio, except for the part that supports prescribe, which stays.
 fn rescaled(model: &Model, mut field: Field, ratio: f64) -> Field {
     let rest = Field::rest(model);
     field.add_to(ratio, &rest);
@@ -103,28 +106,32 @@ fn rescaled(model: &Model, mut field: Field, ratio: f64) -> Field {
     field
 }
 
-/// Passes rows and results on in the units of the scene, numbered through.
+/// An observer that passes rows and results on in the units of the scene, with iterations numbered through all steps.
 struct Steps<'a> {
     keep: &'a mut dyn Keep,
     history: History,
     /// Laws at the full load.
     laws: Vec<Rc<dyn LayerLaw>>,
-    /// Loads of the step over those of its leg.
+    /// Load factor of the current step relative to its leg.
     factor: f64,
-    /// Steps begun.
+    /// Number of steps begun.
     step: usize,
-    /// Counts of the steps before.
+    /// Iterations of the steps before.
     iterations: usize,
+    /// Sweeps of the steps before.
     sweeps: usize,
+    /// Newton steps with smoothed laws in the steps before.
     smoothed: usize,
+    /// Body solves skipped in the steps before.
     skipped: usize,
+    /// Wall seconds of the steps before.
     seconds: f64,
-    /// What bodies of the legs before did.
+    /// Counters of the bodies in the legs before.
     counts: BodyCounts,
 }
 
 impl<'a> Steps<'a> {
-    /// After the steps that another process made.
+    /// Continue after the steps that another process has solved.
     fn new(keep: &'a mut dyn Keep, ready: &Ready) -> Self {
         ready.earlier.iter().for_each(|row| keep.row(row));
         let last = ready.earlier.last().cloned().unwrap_or_default();
@@ -144,8 +151,8 @@ impl<'a> Steps<'a> {
         }
     }
 
-    /// A row of this step in the units of the scene.
-    fn whole(&self, row: &Row) -> Row {
+    /// Return a row of this step in the units of the scene, with the counters of all steps.
+    fn in_scene(&self, row: &Row) -> Row {
         let mut row = row.clone();
         row.step = self.step;
         row.iteration += self.iterations;
@@ -158,9 +165,9 @@ impl<'a> Steps<'a> {
         row
     }
 
-    /// Leaves a step, which ended like this, for the next one.
-    fn end_step(&mut self, done: &mut Done, of_step: &crate::ddm::Outcome) {
-        done.earlier.extend(of_step.rows.iter().map(|row| self.whole(row)));
+    /// End a step with this outcome.
+    fn end_step(&mut self, done: &mut Done, of_step: &Outcome) {
+        done.earlier.extend(of_step.rows.iter().map(|row| self.in_scene(row)));
         self.iterations += of_step.iterations;
         self.sweeps += of_step.sweeps;
         self.smoothed += of_step.rows.last().map_or(0, |row| row.smoothed);
@@ -168,28 +175,22 @@ impl<'a> Steps<'a> {
         self.seconds += of_step.rows.last().map_or(0.0, |row| row.seconds);
     }
 
-    /// Leaves a leg for the next one: another problem, which begins with the pressures of this one. Collective.
-    fn end_leg(
-        &mut self,
-        mut done: Done,
-        of_step: &crate::ddm::Outcome,
-        usable: bool,
-        clock: &mut Clock,
-    ) -> Result<Ready> {
+    /// End a leg and return the problem of the next one, which begins with the pressures of this one. Collective.
+    fn end_leg(&mut self, mut done: Done, of_step: &Outcome, usable: bool, clock: &mut Clock) -> Result<Ready> {
         clock.phase("iterate");
         self.end_step(&mut done, of_step);
         self.counts += Shared::gather(&done.built.discrete).counts;
         self.counts += of_step.joint;
         let Discrete { assemblies, assemblies_avoided, .. } = done.built.discrete;
         let Done { built, method, outcome, steps, earlier, mut warnings, .. } = done;
-        // without loads any pressure is infinitely far
+        // at zero load the ratio p/s is undefined, so there is no warm start
         let start = (usable && !self.history.is_at_rest(self.step)).then_some(Start::Pressure(outcome.layer.pressure));
         let (again, mut known) = (built.again.clone(), built.warnings.clone());
         drop(method);
-        let kept = built.into_condensed();
-        let Some(again) = again else { unreachable!("a history of several legs comes with the way to them") };
-        let mut ready = again(self.step, Begin { start, steps, earlier }, kept, clock)?;
-        ready.built.again = Some(again);
+        let condensed = built.into_condensed();
+        let Some(prepare) = again else { unreachable!("a history of several legs comes with the way to them") };
+        let mut ready = prepare(self.step, Begin { start, steps, earlier }, condensed, clock)?;
+        ready.built.again = Some(prepare);
         ready.built.discrete.assemblies += assemblies;
         ready.built.discrete.assemblies_avoided += assemblies_avoided;
         self.laws = laws(&ready.built.discrete.model);
@@ -201,8 +202,8 @@ impl<'a> Steps<'a> {
         Ok(ready)
     }
 
-    /// Brings what this step has found, and the model, to the units of the scene, with the counts and the history of all steps.
-    /// Gives its bodies. Collective.
+    /// Bring the result of this step and the model to the units of the scene, with the counters and rows of all steps. Return the
+    /// displacements of the bodies. Collective.
     fn complete(&self, done: &mut Done) -> Rc<All> {
         let Done { built, outcome, share, earlier, .. } = &mut *done;
         *share = self.factor;
@@ -212,15 +213,14 @@ impl<'a> Steps<'a> {
         outcome.sweeps += self.sweeps;
         outcome.solves_skipped += self.skipped;
         outcome.joint += self.counts;
-        outcome.rows = earlier.iter().cloned().chain(outcome.rows.iter().map(|row| self.whole(row))).collect();
+        outcome.rows = earlier.iter().cloned().chain(outcome.rows.iter().map(|row| self.in_scene(row))).collect();
         if self.factor != 1.0 {
-            load(&mut built.discrete.model, &self.laws, 1.0);
+            scale_loads(&mut built.discrete.model, &self.laws, 1.0);
             outcome.iterate.add_to(self.factor, &Field::zero(&built.discrete.model));
             let compression = outcome.layer.compression.iter().map(|c| self.factor * c).collect();
             outcome.layer = Layer::new(&built.discrete.model, compression);
         }
-        let scaled = done.recovered.take().map(|all| Rc::new(ended::scaled(&all, self.factor)));
-        done.recovered = scaled;
+        done.recovered = done.recovered.take().map(|all| Rc::new(ended::scaled(&all, self.factor)));
         let recovered = results::recover(done);
         let step = measure::step(done, &recovered, &self.history, self.step - 1, iterations, status, message);
         done.steps.push(step);
@@ -228,14 +228,14 @@ impl<'a> Steps<'a> {
     }
 }
 
+/// Return the laws of the pairs.
 fn laws(model: &Model) -> Vec<Rc<dyn LayerLaw>> {
     model.pairs.iter().map(|pair| pair.law.clone()).collect()
 }
 
 impl Observer for Steps<'_> {
     fn row(&mut self, row: &Row) {
-        let row = self.whole(row);
-        self.keep.row(&row);
+        self.keep.row(&self.in_scene(row));
     }
 
     fn asked(&self) -> u8 {
@@ -254,6 +254,6 @@ impl Keep for Steps<'_> {
         self.keep.results(done);
         done.steps.pop();
         (done.outcome, done.share) = (paused, 1.0);
-        load(&mut done.built.discrete.model, &self.laws, self.factor);
+        scale_loads(&mut done.built.discrete.model, &self.laws, self.factor);
     }
 }

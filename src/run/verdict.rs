@@ -1,4 +1,4 @@
-//! How a run ended: the name of its status, and in words what happened and what to try.
+//! The end of a run in words: the name of its status, and a message with the cause and with advice.
 
 use super::asking;
 use super::words::in_words;
@@ -7,7 +7,7 @@ use crate::ddm::{Inaccuracy, Outcome, Status, Whose};
 use crate::model::{Mechanism, Model, Moved};
 use crate::output::{ForecastReport, StepReport, sci};
 
-/// Name of a status in `report.json`.
+/// Return the name of a status in `report.json`.
 pub fn status_name(status: &Status) -> &'static str {
     match status {
         Status::Converged => "converged",
@@ -20,44 +20,28 @@ pub fn status_name(status: &Status) -> &'static str {
         Status::Unbounded { .. } => "unbounded",
         Status::InnerSolver { .. } => "inner-solver",
         Status::Inaccurate(_) => "inaccurate",
-        Status::Paused { asked } => {
-            if asking::signal(*asked).is_some() {
-                "interrupted"
-            } else {
-                "running"
-            }
-        }
+        Status::Paused { asked } if asking::signal(*asked).is_some() => "interrupted",
+        Status::Paused { .. } => "running",
     }
 }
 
-/// The status in words: what happened, to which body, in which iteration, and what to try.
+/// Return the status in words: what happened in which body and iteration, and what to try.
 pub fn message(outcome: &Outcome, model: &Model) -> String {
     let k = outcome.iterations;
     let name = |body: &usize| &model.bodies[*body].name;
-    let residual = outcome.rows.last().map_or(f64::NAN, |row| row.residual);
-    // what turns the step shorter in the paper's iteration; other methods choose it themselves
-    let other = if outcome.method == "robin" { "a smaller method.gamma, or --method auto" } else { "another --method" };
+    let other = alternative(outcome);
     match &outcome.status {
         Status::Converged => format!("converged in {k} iteration{}", if k == 1 { "" } else { "s" }),
         Status::RoundoffLimited => {
-            format!("{} {} after {k} iterations: rounding allows no less", measure(outcome), sci(residual, 1))
+            format!("{} after {k} iterations: rounding allows no less", measure(outcome))
         }
         Status::IterationLimit => format!(
-            "not converged in {k} iterations, {} {}: allow more (method.stop.iterations{}) or try {}",
+            "not converged in {k} iterations, {}: allow more (method.stop.iterations{}) or try {}",
             measure(outcome),
-            sci(residual, 1),
             outlook(outcome),
             advice(outcome).unwrap_or_else(|| other.to_owned())
         ),
-        Status::NotFinite { body } if k == 0 => format!(
-            "body `{}`: a number is not finite before the first iteration: look for a far too large one among its constants, \
-             its loads, the layers, and in method.start",
-            name(body)
-        ),
-        Status::NotFinite { body } => format!(
-            "body `{}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}",
-            name(body)
-        ),
+        Status::NotFinite { body } => not_finite(name(body), k, other),
         Status::OutOfRange { energy } => format!(
             "the energy of bodies and layers, {}, is beyond what double precision can carry: choose units in which loads, moduli \
              and lengths are nearer to 1",
@@ -76,39 +60,64 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
              or a start that closes the contact (method.start), or try {other}",
             name(body)
         ),
-        Status::Mechanism(Mechanism { bodies, motion, work, .. }) => format!(
-            "bodies {}: nothing holds them together in their {motion}, which changes no gap, and loads work on it ({} of what \
-             forces of their sizes could): add a support, or balance the loads",
-            in_words(bodies.iter().map(name)),
-            sci(*work, 1)
-        ),
-        Status::Unbounded { moving } => {
-            let part = |free: &Moved| format!("{} of `{}`", free.name, name(&free.body));
-            let what = match &moving[..] {
-                [] => "a motion of a body".to_owned(),
-                all => all.iter().map(part).collect::<Vec<_>>().join(" and "),
-            };
-            format!(
-                "unbounded: no support or contact resists {what}, and the loads push that way; add a support, or turn the load"
-            )
-        }
+        Status::Mechanism(mechanism) => unbalanced_mechanism(mechanism, model),
+        Status::Unbounded { moving } => unbounded(moving, model),
         Status::InnerSolver(failure) => {
             let reason = if failure.reason.is_empty() { "its rank knows more" } else { &failure.reason };
             let whose = failure.body.map_or("all bodies".to_owned(), |body| format!("body `{}`", name(&body)));
             format!("{whose}: the inner solver failed in iteration {k}: {reason}")
         }
-        Status::Inaccurate(found) => inaccurate(found, model),
+        Status::Inaccurate(inaccuracy) => inaccurate(inaccuracy, model),
         Status::Paused { asked } => {
             let what = match asking::signal_name(*asked) {
                 "" => "snapshot".to_owned(),
                 name => format!("interrupted by {name}"),
             };
-            format!("{what} after {k} iterations, {} {}", measure(outcome), sci(residual, 1))
+            format!("{what} after {k} iterations, {}", measure(outcome))
         }
     }
 }
 
-/// What the last look found, in words.
+/// Return what to try instead. Only the method `robin` has a step length that a user can make shorter; other methods choose it
+/// themselves.
+fn alternative(outcome: &Outcome) -> &'static str {
+    if outcome.method == "robin" { "a smaller method.gamma, or --method auto" } else { "another --method" }
+}
+
+/// Return the message on a number that is not finite in iteration `k`.
+fn not_finite(body: &str, k: usize, other: &str) -> String {
+    if k == 0 {
+        return format!(
+            "body `{body}`: a number is not finite before the first iteration: look for a far too large one among its constants, \
+             its loads, the layers, and in method.start"
+        );
+    }
+    format!("body `{body}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}")
+}
+
+/// Return the message on bodies whose common motion no gap resists, and on which loads work.
+fn unbalanced_mechanism(Mechanism { bodies, motion, work, .. }: &Mechanism, model: &Model) -> String {
+    format!(
+        "bodies {}: nothing holds them together in their {motion}, which changes no gap, and loads work on it ({} of what \
+         forces of their sizes could): add a support, or balance the loads",
+        in_words(bodies.iter().map(|body| &model.bodies[*body].name)),
+        sci(*work, 1)
+    )
+}
+
+/// Return the message on unresisted motions of bodies.
+fn unbounded(moving: &[Moved], model: &Model) -> String {
+    let motion = |moved: &Moved| format!("{} of `{}`", moved.name, model.bodies[moved.body].name);
+    let what = match moving {
+        [] => "a motion of a body".to_owned(),
+        all => all.iter().map(motion).collect::<Vec<_>>().join(" and "),
+    };
+    format!(
+        "unbounded: no support or contact resists {what}, and the loads push that way; add a support, or turn the load"
+    )
+}
+
+/// Return the message on a result that the last look found to be inaccurate.
 fn inaccurate(Inaccuracy { told, found, whose }: &Inaccuracy, model: &Model) -> String {
     let what = match whose {
         Whose::Body(body) => format!("body `{}`: its forces, summed anew, lack balance", model.bodies[*body].name),
@@ -132,12 +141,14 @@ fn inaccurate(Inaccuracy { told, found, whose }: &Inaccuracy, model: &Model) -> 
     )
 }
 
-/// What the number is by which a run ends.
-fn measure(outcome: &Outcome) -> &'static str {
-    if outcome.method.starts_with("newton") { "largest relative error" } else { "residual" }
+/// Return the last value of the stopping test with its name.
+fn measure(outcome: &Outcome) -> String {
+    let residual = outcome.rows.last().map_or(f64::NAN, |row| row.residual);
+    let name = if outcome.method.starts_with("newton") { "largest relative error" } else { "residual" };
+    format!("{name} {}", sci(residual, 1))
 }
 
-/// What more iterations would bring, for the report.
+/// Return the forecast of further iterations for the report.
 pub fn forecast(outcome: &Outcome) -> Option<ForecastReport> {
     let goes_on = matches!(
         outcome.status,
@@ -152,7 +163,7 @@ pub fn forecast(outcome: &Outcome) -> Option<ForecastReport> {
     })
 }
 
-/// The iterations left in words, to follow the advice to allow more.
+/// Return the remaining iterations in words, as a continuation of the advice to allow more.
 fn outlook(outcome: &Outcome) -> String {
     match forecast(outcome).map(|forecast| forecast.iterations) {
         None => String::new(),
@@ -162,11 +173,11 @@ fn outlook(outcome: &Outcome) -> String {
     }
 }
 
-/// What helps the paper's iteration where the spectrum is known.
+/// Return advice for the method `robin` if the spectrum is known.
 fn advice(outcome: &Outcome) -> Option<String> {
     let spectrum = outcome.spectrum.filter(|_| outcome.method == "robin")?;
     let (gamma, factor) = (best_gamma(spectrum), best_factor(spectrum));
-    // near one the digits that matter are those of the difference
+    // for a factor near 1, the digits that matter are those of the difference
     let factor = if factor > 0.99 { format!("1 - {}", sci(1.0 - factor, 1)) } else { format!("{factor:.3}") };
     Some(format!("--method auto; the best number for method.gamma is {gamma:.2}, a factor of {factor} an iteration"))
 }
@@ -176,13 +187,13 @@ pub fn is_solved(step: &StepReport) -> bool {
     [Status::Converged, Status::RoundoffLimited].iter().any(|status| step.status == status_name(status))
 }
 
-/// Warnings of the steps before the last one that were not solved.
-pub fn of_steps(steps: &[StepReport]) -> Vec<String> {
+/// Return warnings of the load steps before the last one that found no solution.
+pub fn step_warnings(steps: &[StepReport]) -> Vec<String> {
     let before = steps.iter().take(steps.len().saturating_sub(1)).enumerate();
-    let bad = before.filter(|(_, step)| !is_solved(step));
-    let told = |(i, step): (usize, &StepReport)| {
+    let unsolved = before.filter(|(_, step)| !is_solved(step));
+    let warning = |(i, step): (usize, &StepReport)| {
         let factors: Vec<String> = step.factors.iter().map(|(name, factor)| format!("{name} {factor}")).collect();
         format!("load step {} ({}): {}", i + 1, factors.join(", "), step.message)
     };
-    bad.map(told).collect()
+    unsolved.map(warning).collect()
 }

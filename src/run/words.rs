@@ -1,9 +1,9 @@
-//! Lists of names: in sentences, and each once.
+//! Lists of names: in sentences, and without repetition.
 
 use crate::error::few;
 use std::collections::HashMap;
 
-/// Names of bodies as in a sentence.
+/// Return the names of bodies as part of a sentence.
 pub fn in_words<'a>(names: impl Iterator<Item = &'a String>) -> String {
     let mut names = few(names.map(|name| format!("`{name}`")));
     match names.pop() {
@@ -12,14 +12,14 @@ pub fn in_words<'a>(names: impl Iterator<Item = &'a String>) -> String {
     }
 }
 
-/// Each name once: with a number from its second time on.
+/// Return the names made unique: a name gets a number from its second occurrence on.
 pub fn numbered(names: impl Iterator<Item = String>) -> Vec<String> {
     let mut counts: HashMap<String, usize> = HashMap::new();
-    let once = |name: String| match counts.entry(name.clone()).and_modify(|count| *count += 1).or_insert(1) {
+    let unique = |name: String| match counts.entry(name.clone()).and_modify(|count| *count += 1).or_insert(1) {
         1 => name,
         count => format!("{name}-{count}"),
     };
-    names.map(once).collect()
+    names.map(unique).collect()
 }
 
 #[cfg(test)]
@@ -29,10 +29,10 @@ mod tests {
     #[test]
     fn long_lists_are_cut() {
         let names = |count: usize| (0..count).map(|i| format!("b{i}")).collect::<Vec<_>>();
-        let said = |count: usize| in_words(names(count).iter());
-        assert_eq!([said(0), said(1), said(3)], ["", "`b0`", "`b0`, `b1` and `b2`"]);
-        assert!(said(13).ends_with("`b11` and `b12`"));
-        assert!(said(4096).ends_with("`b11` and 4084 others"));
+        let text = |count: usize| in_words(names(count).iter());
+        assert_eq!([text(0), text(1), text(3)], ["", "`b0`", "`b0`, `b1` and `b2`"]);
+        assert!(text(13).ends_with("`b11` and `b12`"));
+        assert!(text(4096).ends_with("`b11` and 4084 others"));
     }
 
     #[test]
