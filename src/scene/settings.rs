@@ -1,37 +1,23 @@
-//! The scene echoed with all defaults filled in, for the report.
+//! The echo of a scene with all defaults filled in, for the report. A new key of a scene is written here, too.
 
 use crate::data::{DataSpec, Interpolation, Outside};
 use crate::expression::Field;
 use crate::problem::{
-    AsperitySpec, AxesSpec, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, History, LayerSpec,
-    LoadKind, MeshSource, MethodName, MethodSpec, Overlap, Plane, RobinRule, SpringKind, Start, StopRule, Zone,
-    name_of,
+    AsperitySpec, AutoContact, AxesSpec, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, History,
+    LayerSpec, LoadKind, MeshSource, MethodName, MethodSpec, Overlap, Plane, RobinRule, SpringKind, Start, StopRule,
+    Zone, name_of,
 };
-use crate::scene::Scene;
+use crate::scene::{OutputSpec, Scene};
 use serde_json::{Map, Value, json};
 
 impl Scene {
-    /// The scene as JSON, keyed like the scene file, every default written out. What has no default and was not
-    /// given is left out; expressions are texts.
+    /// Return the scene as JSON, keyed like the scene file, with every default written out. Keys that have no default and were not given
+    /// are left out. Expressions are texts.
     pub fn settings(&self) -> Value {
         let dimension = self.dimension.value;
         let data: Map<_, _> = self.data.values().map(|data| (data.spec.name.clone(), function(&data.spec))).collect();
-        let auto = self.auto.iter().map(|auto| {
-            let mut map = contact(&auto.contact);
-            map["between"] = json!("auto");
-            map["distance"] = json!(auto.distance);
-            if let Some(of) = &auto.of {
-                map["of"] = of.iter().map(|name| json!(name.value)).collect();
-            }
-            (auto.contact.table, map)
-        });
-        let named = self.contacts.iter().map(|spec| (spec.table, contact(spec)));
-        let mut contacts: Vec<_> = named.chain(auto).collect();
-        contacts.sort_by_key(|(table, _)| *table);
-        let output = &self.output;
-        let pairs = |&most: &usize| if most == usize::MAX { json!("all") } else { json!(most) };
         let preset = self.solver.preset.map(|preset| preset.name());
-        given(json!({
+        without_null(json!({
             "scene": self.path.display().to_string(),
             "title": self.title,
             "dimension": dimension,
@@ -40,30 +26,29 @@ impl Scene {
             "mesh": mesh(&self.mesh),
             "data": (!data.is_empty()).then_some(data),
             "body": self.bodies.iter().map(|item| body(item, dimension)).collect::<Value>(),
-            "contact": contacts.into_iter().map(|(_, map)| map).collect::<Value>(),
+            "contact": self.contact_tables(),
             "method": method(&self.method),
-            "solver": given(json!({ "preset": preset, "options": self.solver.options.join(" ") })),
+            "solver": without_null(json!({ "preset": preset, "options": self.solver.options.join(" ") })),
             "estimate": self.estimate,
             "adapt": self.adapt.as_ref().map(|adapt| {
                 json!({ "error": adapt.error, "cells": adapt.cells, "rounds": adapt.rounds })
             }),
-            "output": given(json!({
-                "dir": output.dir.as_ref().map(|dir| dir.display().to_string()),
-                "vtu": output.vtu,
-                "msh": output.msh,
-                "report": output.report,
-                "precision": if output.encoding.single { "single" } else { "double" },
-                "compress": output.encoding.compress,
-                "plots": output.plots,
-                "pairs": output.pairs.as_ref().map(pairs),
-                "checkpoint": output.checkpoint,
-            })),
+            "output": output(&self.output),
         }))
+    }
+
+    /// Return the tables of named pairs and of rules, in the order of the file.
+    fn contact_tables(&self) -> Value {
+        let named = self.contacts.iter().map(|spec| (spec.table, contact(spec)));
+        let rules = self.auto.iter().map(|auto| (auto.contact.table, rule(auto)));
+        let mut tables: Vec<(usize, Value)> = named.chain(rules).collect();
+        tables.sort_by_key(|(table, _)| *table);
+        tables.into_iter().map(|(_, settings)| settings).collect()
     }
 }
 
-/// A table without the keys that have no value.
-fn given(mut table: Value) -> Value {
+/// Return a table without the keys that have no value.
+fn without_null(mut table: Value) -> Value {
     if let Value::Object(map) = &mut table {
         map.retain(|_, value| !value.is_null());
     }
@@ -85,7 +70,7 @@ fn mesh(mesh: &MeshSource) -> Value {
     match mesh {
         MeshSource::Arrays(arrays) => json!({ "points": arrays.points.len(), "groups": arrays.groups.len() }),
         MeshSource::Msh { file } => json!({ "msh": file.value.display().to_string() }),
-        MeshSource::Geo { file, set, guard, .. } => given(json!({
+        MeshSource::Geo { file, set, guard, .. } => without_null(json!({
             "geo": file.value.display().to_string(),
             "set": set.iter().map(|(name, value)| (name.clone(), json!(value))).collect::<Map<_, _>>(),
             "timeout": guard.seconds,
@@ -112,7 +97,7 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
     let fix = body.fix.iter().map(|support| {
         let [x, y, z] = support.value.each_ref().map(|value| value.as_ref().map(field));
         let (normal, path) = (support.normal.as_ref().map(field), support.path.as_ref().map(|path| &path.value));
-        given(json!({ "on": support.on.value, "x": x, "y": y, "z": z, "normal": normal, "path": path }))
+        without_null(json!({ "on": support.on.value, "x": x, "y": y, "z": z, "normal": normal, "path": path }))
     });
     let load = body.load.iter().map(|load| {
         let mut map = match &load.kind {
@@ -121,7 +106,7 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
             LoadKind::Force { total, rigid } => json!({ "force": total[..dimension], "rigid": rigid }),
         };
         (map["on"], map["path"]) = (json!(load.on.value), json!(load.path.as_ref().map(|path| &path.value)));
-        given(map)
+        without_null(map)
     });
     let spring = body.spring.iter().map(|spring| match &spring.kind {
         SpringKind::Vector(fields) => json!({ "on": spring.on.value, "stiffness": vector(fields, dimension) }),
@@ -140,7 +125,7 @@ fn body(body: &BodySpec, dimension: usize) -> Value {
     map["force"] = json!(body.force.as_ref().map(|force| vector(force, dimension)));
     let exact = body.exact.as_ref().map(|exact| exact.iter().map(|u| u.text()).collect::<Vec<_>>());
     map["exact"] = json!(exact);
-    given(map)
+    without_null(map)
 }
 
 fn elasticity(elasticity: &ElasticitySpec) -> Value {
@@ -155,11 +140,11 @@ fn elasticity(elasticity: &ElasticitySpec) -> Value {
     map["axes"] = json!(elasticity.axes.as_ref().map(|axes| match axes {
         AxesSpec::Directions { first, second } => {
             let second = second.as_ref().map(|second| vector(second, 3));
-            given(json!({ "first": vector(first, 3), "second": second }))
+            without_null(json!({ "first": vector(first, 3), "second": second }))
         }
         AxesSpec::Angle { angle, axis } => json!({ "angle": field(angle), "axis": vector(axis, 3) }),
     }));
-    given(map)
+    without_null(map)
 }
 
 fn contact(contact: &ContactSpec) -> Value {
@@ -171,9 +156,9 @@ fn contact(contact: &ContactSpec) -> Value {
         LayerSpec::Table(points) => json!({ "table": points }),
         LayerSpec::Own(name) => json!({ "own": name }),
         LayerSpec::Asperities(spec) => json!({ "asperities": asperities(spec) }),
-        LayerSpec::Pressure { law, up_to } => given(json!({ "pressure": law.text(), "up_to": up_to })),
+        LayerSpec::Pressure { law, up_to } => without_null(json!({ "pressure": law.text(), "up_to": up_to })),
     };
-    given(json!({
+    without_null(json!({
         "between": contact.between.each_ref().map(|name| &name.value),
         "gap": field(&contact.gap),
         "touching": contact.touching,
@@ -182,6 +167,16 @@ fn contact(contact: &ContactSpec) -> Value {
         "layer": layer,
         "reference": contact.reference.as_ref().map(field),
     }))
+}
+
+fn rule(auto: &AutoContact) -> Value {
+    let mut map = contact(&auto.contact);
+    map["between"] = json!("auto");
+    map["distance"] = json!(auto.distance);
+    if let Some(of) = &auto.of {
+        map["of"] = of.iter().map(|name| json!(name.value)).collect();
+    }
+    map
 }
 
 fn asperities(spec: &AsperitySpec) -> Value {
@@ -193,7 +188,7 @@ fn asperities(spec: &AsperitySpec) -> Value {
         }
         Depths::Measured(depths) => map["summits"] = json!(depths.len()),
     }
-    given(map)
+    without_null(map)
 }
 
 fn method(method: &MethodSpec) -> Value {
@@ -201,7 +196,7 @@ fn method(method: &MethodSpec) -> Value {
         Zone::None => json!("none"),
         Zone::Full => json!("full"),
         Zone::Active => json!("active"),
-        // Text also for a constant condition, as the key takes no number.
+        // a constant condition is a text, too, as the key takes no number
         Zone::Subset(condition) => json!(condition.text()),
     };
     let start = match &method.start {
@@ -224,12 +219,12 @@ fn method(method: &MethodSpec) -> Value {
         RobinRule::Auto => json!("auto"),
     };
     let is_robin = method.name == MethodName::Robin;
-    given(json!({
+    without_null(json!({
         "name": name_of(&MethodName::ALL, &method.name),
         "psi": psi,
         "robin": robin,
         "start": start,
-        "stop": given(json!({
+        "stop": without_null(json!({
             "residual": residual, "increment": increment, "balanced": balanced.then_some(true), "iterations": iterations,
         })),
         "gamma": is_robin.then_some(gamma),
@@ -241,10 +236,24 @@ fn method(method: &MethodSpec) -> Value {
 }
 
 fn history(history: &History) -> Value {
-    let column = |place: usize| history.steps.iter().map(|step| step.factors[place]).collect::<Vec<_>>();
-    let Some(table) = &history.table else { return json!(column(0)) };
+    let factors = |column: usize| history.steps.iter().map(|step| step.factors[column]).collect::<Vec<_>>();
+    let Some(table) = &history.table else { return json!(factors(0)) };
     let mut columns = Map::new();
     columns.insert("time".into(), history.steps.iter().map(|step| json!(step.time)).collect());
-    columns.extend(history.names.iter().enumerate().map(|(place, name)| (name.clone(), json!(column(place)))));
+    columns.extend(history.names.iter().enumerate().map(|(column, name)| (name.clone(), json!(factors(column)))));
     json!({ "table": table.value.display().to_string(), "columns": columns })
+}
+
+fn output(output: &OutputSpec) -> Value {
+    without_null(json!({
+        "dir": output.dir.as_ref().map(|dir| dir.display().to_string()),
+        "vtu": output.vtu,
+        "msh": output.msh,
+        "report": output.report,
+        "precision": if output.encoding.single { "single" } else { "double" },
+        "compress": output.encoding.compress,
+        "plots": output.plots,
+        "pairs": output.pairs.map(|most| if most == usize::MAX { json!("all") } else { json!(most) }),
+        "checkpoint": output.checkpoint,
+    }))
 }
