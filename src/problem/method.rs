@@ -145,7 +145,7 @@ impl Gamma {
 /// The start of the iteration, given on the contact surfaces.
 #[derive(Debug, Clone)]
 pub enum Start {
-    /// Rigid bodies on their own surfaces.
+    /// The solution with rigid bodies, each layer in series with a spring that stands for the surfaces of the two bodies.
     Auto,
     /// Zero normal displacement.
     Zero,

@@ -41,7 +41,7 @@ pub struct Scene {
     pub solver: SolverSpec,
     /// Whether to estimate the error of the discretisation.
     pub estimate: bool,
-    /// Meshes adapted to an error, if asked for.
+    /// How meshes are adapted, if the scene requests it.
     pub adapt: Option<AdaptSpec>,
     /// What to write.
     pub output: OutputSpec,

@@ -8,35 +8,32 @@ use crate::problem::layer::{AsperitySpec, Depths, FORMS, LawForm, LayerSpec, Par
 
 /// Advice for a layer without a law.
 pub(super) const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
-/// Advice for a table that is none.
+/// What a table of points is, and the advice for wrong points.
 const POINTS: &str = "write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0";
 
 /// Return the shape of `layer`.
 pub(super) fn shape() -> TableShape {
+    use ValueKind::{Number, Text};
     let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure", "asperities"]).collect();
-    let add = |table: TableShape, form: &'static LawForm| {
-        let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
-        table.optional(
-            form.name,
-            form_shape(form).into_kind(),
-            format!("write {} = {{ {} }}", form.name, values.join(", ")),
-        )
-    };
-    let forms = FORMS.into_iter().fold(TableShape::new("the layer"), add);
-    forms
-        .optional("table", ValueKind::Number.list().list(), POINTS)
-        .optional(
-            "pressure",
-            ValueKind::Text,
-            "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"",
-        )
+    FORMS
+        .into_iter()
+        .fold(TableShape::new("the layer"), with_form)
+        .optional("table", Number.list().list(), POINTS)
+        .optional("pressure", Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
         .optional(
             "asperities",
             asperities_shape().into_kind(),
             "a law of summits: asperities = { modulus = E*, data = \"NAME\" }",
         )
-        .optional("up_to", ValueKind::Number, "compression beyond which the expression goes on linearly")
+        .optional("up_to", Number, "compression beyond which the expression goes on linearly")
         .at_most_one(&laws)
+}
+
+/// Add the key of a law with parameters.
+fn with_form(table: TableShape, form: &'static LawForm) -> TableShape {
+    let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
+    let advice = format!("write {} = {{ {} }}", form.name, values.join(", "));
+    table.optional(form.name, form_shape(form).into_kind(), advice)
 }
 
 /// Return the shape of a law with parameters.
