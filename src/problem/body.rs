@@ -6,15 +6,15 @@ use crate::error::{Located, Place};
 use crate::expression::{Expression, Field};
 use crate::petsc::{begins_options, is_family};
 
-/// A body: a named group of cells, its elasticity, supports and loads; or, in a scene, as many bodies as its name, a
-/// [pattern](super::pattern), stands for.
+/// A body: a named group of cells with its elasticity, supports and loads. In a scene file the name may be a
+/// [pattern](super::pattern); the table then stands for all bodies whose names match.
 #[derive(Debug, Clone)]
 pub struct BodySpec {
-    /// Name of the physical group of cells; `[a-z][a-z0-9_]*` without words of PETSc's own (it is an option prefix).
+    /// Name of the physical group of cells. It is a prefix of PETSc options: `[a-z][a-z0-9_]*` without words of PETSc's own.
     pub name: Located<String>,
-    /// What it is made of.
+    /// Elastic constants.
     pub elasticity: ElasticitySpec,
-    /// Parts of it that are made of something else.
+    /// Parts of the body with other elastic constants.
     pub regions: Vec<RegionSpec>,
     /// Polynomial order.
     pub order: Order,
@@ -26,15 +26,15 @@ pub struct BodySpec {
     pub spring: Vec<SpringSpec>,
     /// Body force density (x, y, z), if any.
     pub force: Option<[Field; 3]>,
-    /// Factor of the body force at a step of a history; 1 without one.
+    /// Factor of the body force at the present load step; 1 without load steps.
     pub force_factor: f64,
-    /// A known displacement to compare with, if any: as many components as the scene has dimensions, of x, y (z).
+    /// A known displacement to compare with, if any: functions of x, y (z), one for each dimension of the scene.
     pub exact: Option<Vec<Expression>>,
 }
 
 impl BodySpec {
-    /// An isotropic body of linear elements on the group of cells of this name: Young's modulus (a stress, > 0) and Poisson's ratio in
-    /// (-1, 0.5), numbers or functions of the place.
+    /// Return an isotropic body of linear elements on the group of cells `name`. Young's modulus (a stress, > 0) and Poisson's ratio (in
+    /// (-1, 0.5)) are numbers or functions of the coordinates.
     #[track_caller]
     pub fn new(name: &str, young: impl Into<Field>, poisson: impl Into<Field>) -> Self {
         let constants = Constants::Isotropic { young: young.into(), poisson: poisson.into() };
@@ -52,13 +52,12 @@ impl BodySpec {
         }
     }
 
-    /// With elements of this order, not above that of the mesh.
+    /// Set the order of the elements, which must not exceed that of the mesh.
     pub fn order(self, order: Order) -> Self {
         Self { order, ..self }
     }
 
-    /// Prescribes displacements (x, y in the plane, x, y, z in space; a length each) on a boundary or at points; `None` leaves a
-    /// component free.
+    /// Prescribe displacements (x, y in the plane, x, y, z in space; lengths) on a boundary or at points. `None` leaves a component free.
     #[track_caller]
     pub fn fix<const N: usize>(mut self, on: &str, value: [Option<f64>; N]) -> Self {
         const { assert!(N <= 3, "displacements have three components at most") };
@@ -67,7 +66,7 @@ impl BodySpec {
         self
     }
 
-    /// Lets a plane surface slide in its plane: no displacement along its normal.
+    /// Let a plane surface slide in its plane, without displacement along its normal.
     #[track_caller]
     pub fn symmetry(mut self, on: &str) -> Self {
         let (on, value, normal) = (Located::here(on), [const { None }; 3], Some(Field::Constant(0.0)));
@@ -75,14 +74,14 @@ impl BodySpec {
         self
     }
 
-    /// Adds a load on a boundary: pressure or traction (stresses), or a total force.
+    /// Add a load on a boundary: pressure or traction (stresses), or a total force.
     #[track_caller]
     pub fn load(mut self, on: &str, kind: LoadKind) -> Self {
         self.load.push(Load { on: Located::here(on), kind, path: None, factor: 1.0 });
         self
     }
 
-    /// Adds a traction (x, y in the plane, x, y, z in space; stresses), numbers or functions of the place.
+    /// Add a traction (x, y in the plane, x, y, z in space; stresses); its components are numbers or functions of the coordinates.
     #[track_caller]
     pub fn traction<const N: usize>(self, on: &str, traction: [impl Into<Field>; N]) -> Self {
         const { assert!(N <= 3, "tractions have three components at most") };
@@ -90,7 +89,7 @@ impl BodySpec {
         self.load(on, LoadKind::Traction(std::array::from_fn(|_| given.next().unwrap_or(Field::Constant(0.0)))))
     }
 
-    /// Adds a pressure against the outer normal (a stress, > 0 pushes), a number or a function of the place.
+    /// Add a pressure against the outer normal (a stress, > 0 pushes), a number or a function of the coordinates.
     #[track_caller]
     pub fn pressure(self, on: &str, pressure: impl Into<Field>) -> Self {
         self.load(on, LoadKind::Pressure(pressure.into()))
@@ -102,13 +101,13 @@ impl BodySpec {
 pub struct Support {
     /// The physical group.
     pub on: Located<String>,
-    /// Prescribed value of each component; `None` leaves it free.
+    /// Prescribed displacement of each component (lengths); `None` leaves the component free.
     pub value: [Option<Field>; 3],
-    /// Prescribed displacement along the outer normal of a plane surface.
+    /// Prescribed displacement along the outer normal of a plane surface (a length).
     pub normal: Option<Field>,
-    /// Name of its factor in a history.
+    /// Name of the factor of these displacements in a history.
     pub path: Option<Located<String>>,
-    /// Factor of its values at a step of a history; 1 without one.
+    /// Factor of the displacements at the present load step; 1 without load steps.
     pub factor: f64,
 }
 
@@ -117,11 +116,11 @@ pub struct Support {
 pub struct SpringSpec {
     /// The physical group.
     pub on: Located<String>,
-    /// How stiff they are.
+    /// The stiffness: stress per length on a boundary, force per length at a point.
     pub kind: SpringKind,
 }
 
-/// Kinds of springs; stiffnesses are >= 0.
+/// The stiffness of springs, >= 0.
 #[derive(Debug, Clone)]
 pub enum SpringKind {
     /// Stiffness along x, y, z.
@@ -135,54 +134,58 @@ pub enum SpringKind {
 pub struct Load {
     /// The physical group.
     pub on: Located<String>,
-    /// What acts there.
+    /// The pressure, traction or force.
     pub kind: LoadKind,
-    /// Name of its factor in a history.
+    /// Name of the factor of this load in a history.
     pub path: Option<Located<String>>,
-    /// Its factor at a step of a history; 1 without one.
+    /// Factor of the load at the present load step; 1 without load steps.
     pub factor: f64,
 }
 
-/// Kinds of boundary load.
+/// The kinds of load on a boundary.
 #[derive(Debug, Clone)]
 pub enum LoadKind {
-    /// Pressure against the outer normal, > 0 pushes.
+    /// Pressure against the outer normal (a stress); > 0 pushes.
     Pressure(Field),
-    /// Traction vector (x, y, z).
+    /// Traction vector (x, y, z; stresses).
     Traction([Field; 3]),
     /// Force on the whole boundary.
     Force {
         /// The force (x, y, z).
         total: [f64; 3],
-        /// Whether the boundary moves as one, by a translation; else the force is spread evenly.
+        /// Whether all nodes of the boundary have one displacement. Otherwise the force is spread evenly.
         rigid: bool,
     },
 }
 
-/// What is wrong with a name that is not spelt like that of a body, and what to do about it.
+/// Label and help for a name that is not spelt like the name of a body.
 pub const SPELLING: [&str; 2] =
     ["", "it is a prefix of PETSc options: a small letter, then small letters, digits and _"];
 
-/// Most numbers in the name of a body: with four a solver's options take 24 times as long to look up, with eight 40 320 times, which is 14 s.
+/// The most numbers in the name of a body. With four, PETSc takes 24 times as long to look up the options of a solver; with eight it takes
+/// 40 320 times as long, which is 14 s.
 const MOST_NUMBERS: usize = 4;
 
-/// Whether names of bodies may have this character.
+/// Return whether names of bodies may have this character.
 pub fn is_in_name(c: char) -> bool {
     c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_'
 }
 
-/// Why a body cannot have this name, and what to do about it. A word of PETSc's own options is none, as the body could not have options
-/// of its own; one that follows another would give it those of a solver inside that body's (`-brick_sub_ksp_type`).
+/// Return why a body cannot have this name and what to do about it, as label and help; `None` for a good name.
+///
+/// A body called like one of PETSc's own options could not have options of its own. A name in which such a word follows another, as in
+/// `brick_sub`, would give the body the options of a solver inside the solver of `brick` (`-brick_sub_ksp_type`).
 pub fn fault(name: &str) -> Option<[&'static str; 2]> {
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.chars().all(is_in_name) {
         return Some(SPELLING);
     }
-    // PETSc looks an option up anew without each number between two `_`, and so on with those that are left: k! times for k of them
+    // PETSc repeats the look-up of an option without each number between two `_`, and each of these again with the numbers that are
+    // left: k! look-ups for k numbers
     let is_number = |word: &&str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
     if name.split('_').filter(is_number).count() > MOST_NUMBERS {
         return Some(["a name of more than four numbers", "join numbers by a letter: brick_1x2x3"]);
     }
-    // `newton` begins those of all bodies together
+    // `newton` is the prefix of the solver of all bodies together
     (begins_options(name) || name.split('_').any(is_family) || name == "newton")
         .then_some(["a word of PETSc's own options", "choose another name, also for the physical group in the mesh"])
 }

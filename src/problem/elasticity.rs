@@ -1,20 +1,20 @@
-//! What bodies are made of: elastic constants and their axes.
+//! Elastic constants of bodies, and the axes that they refer to.
 
 use crate::error::{Located, Place};
 use crate::expression::Field;
 
-/// Elastic constants of a body or of one of its regions, in axes of their own.
+/// The elastic constants of a body, or of one of its regions, and their axes.
 #[derive(Debug, Clone)]
 pub struct ElasticitySpec {
     /// The constants.
     pub constants: Constants,
-    /// Axes 1, 2, 3 that they belong to; x, y, z if there are none.
+    /// Axes 1, 2, 3 of the material; x, y, z if `None`.
     pub axes: Option<AxesSpec>,
-    /// Where the constants stand.
+    /// Place of the constants.
     pub place: Place,
 }
 
-/// Elastic constants, each a number or an expression.
+/// The elastic constants, each a number or an expression. Moduli are stresses; Poisson's ratios have no unit.
 #[derive(Debug, Clone)]
 pub enum Constants {
     /// Young's modulus and Poisson's ratio.
@@ -24,25 +24,26 @@ pub enum Constants {
         /// Poisson's ratio, in (-1, 0.5).
         poisson: Field,
     },
-    /// E1 E2 E3 nu12 nu13 nu23 G12 G13 G23.
+    /// E1 E2 E3 nu12 nu13 nu23 G12 G13 G23: nu12 is the contraction along axis 2 under tension along axis 1.
     Orthotropic(Box<[Field; 9]>),
-    /// C11 C12 ... C16 C22 ... C66: upper triangle in Voigt's order 11 22 33 23 13 12.
+    /// C11 C12 ... C16 C22 ... C66: the upper triangle of C by rows, in Voigt's order 11 22 33 23 13 12.
     Anisotropic(Box<[Field; 21]>),
 }
 
-/// Directions of the material's axes.
+/// The directions of the material's axes.
 #[derive(Debug, Clone)]
 pub enum AxesSpec {
-    /// Along axis 1, and towards axis 2 (in the plane by default a right angle to the left of axis 1).
+    /// A direction along axis 1, and one towards axis 2.
     Directions {
         /// Direction of axis 1.
         first: [Field; 3],
-        /// A vector in the plane of axes 1 and 2, on the side of axis 2.
+        /// A vector in the plane of axes 1 and 2, on the side of axis 2. Without it, in plane problems, axis 2 is at a right angle to the
+        /// left of axis 1.
         second: Option<[Field; 3]>,
     },
-    /// x, y, z turned by an angle (radian) about an axis.
+    /// The axes x, y, z, turned about an axis.
     Angle {
-        /// The angle.
+        /// The angle, in radians.
         angle: Field,
         /// The axis; z in plane problems.
         axis: [Field; 3],
@@ -52,19 +53,19 @@ pub enum AxesSpec {
 /// A part of a body with constants of its own.
 #[derive(Debug, Clone)]
 pub struct RegionSpec {
-    /// Physical group of its cells.
+    /// Physical group of the cells.
     pub on: Located<String>,
-    /// Its constants.
+    /// The constants of this part.
     pub elasticity: ElasticitySpec,
 }
 
 impl Constants {
-    /// Names of the orthotropic constants.
+    /// The names of the orthotropic constants.
     pub const ORTHOTROPIC: [&'static str; 9] = ["E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23"];
 }
 
 impl ElasticitySpec {
-    /// All constants and directions by name.
+    /// Return all constants and directions, with their names in messages.
     pub fn fields(&self) -> Vec<(&'static str, &Field)> {
         let mut fields: Vec<(&str, &Field)> = match &self.constants {
             Constants::Isotropic { young, poisson } => vec![("young", young), ("poisson", poisson)],
@@ -85,13 +86,13 @@ impl ElasticitySpec {
         fields
     }
 
-    /// Whether nothing depends on the place.
+    /// Return whether no constant and no direction depends on the coordinates.
     pub fn is_constant(&self) -> bool {
         self.fields().iter().all(|(_, field)| field.is_constant())
     }
 }
 
-/// What the plane of a plane problem stands for.
+/// What a plane problem stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Plane {
     /// No out-of-plane strain.

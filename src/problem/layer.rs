@@ -1,50 +1,50 @@
-//! Laws of layers: their forms and parameters.
+//! Laws of layers p(c), pressure p over compression c: their forms and parameters.
 
 use crate::expression::{Expression, Field};
 use std::sync::Arc;
 
-/// Law of a Winkler layer.
+/// The law of a Winkler layer.
 #[derive(Debug, Clone)]
 pub enum LayerSpec {
-    /// A law of a known form; its parameters are numbers or expressions in the coordinates.
+    /// A law of a known form, whose parameters are numbers or expressions in the coordinates.
     Form {
-        /// Which one.
+        /// The form.
         form: &'static LawForm,
-        /// One value for each of its parameters.
+        /// One value for each parameter of the form.
         values: Vec<Field>,
     },
-    /// Monotone cubic curve through points (c, p), both increasing from (0, 0), which is not among them.
+    /// A monotone cubic curve through points (c, p). Both columns increase from (0, 0), which is not among the points.
     Table(Vec<[f64; 2]>),
-    /// Summits of a rough surface.
+    /// A law from the summits of a rough surface.
     Asperities(AsperitySpec),
-    /// The law of this name that a Rust program gives the scene ([`Scene::law`](crate::scene::Scene::law)).
+    /// The law of this name from a Rust program ([`Scene::law`](crate::scene::Scene::law)).
     Own(String),
-    /// An expression p(c), which may also use the coordinates.
+    /// An expression p(c), which may use the coordinates, too.
     Pressure {
         /// The expression; its first variable is c.
         law: Expression,
-        /// Compression beyond which p goes on linearly, if given.
+        /// The compression (a length) beyond which p goes on linearly, if given.
         up_to: Option<f64>,
     },
 }
 
 impl LayerSpec {
-    /// p = (c/B)^(1/a) with B > 0 and a in (0, 1], the layer of the paper.
+    /// Return p = (c/B)^(1/a) with B > 0 and a in (0, 1], the layer of the paper.
     pub fn power(b: impl Into<Field>, a: impl Into<Field>) -> Self {
         Self::Form { form: &POWER, values: vec![b.into(), a.into()] }
     }
 
-    /// p = `stiffness` c with a stiffness (stress per length) > 0.
+    /// Return p = `stiffness` c with a stiffness (stress per length) > 0.
     pub fn linear(stiffness: impl Into<Field>) -> Self {
         Self::Form { form: &LINEAR, values: vec![stiffness.into()] }
     }
 
-    /// p = p0 (e^(c/c0) - 1) with a stress p0 > 0 and a length c0 > 0.
+    /// Return p = p0 (e^(c/c0) - 1) with a stress p0 > 0 and a length c0 > 0.
     pub fn exponential(p0: impl Into<Field>, c0: impl Into<Field>) -> Self {
         Self::Form { form: &EXPONENTIAL, values: vec![p0.into(), c0.into()] }
     }
 
-    /// p = k1 c + k3 c^3 with k1 > 0 and k3 >= 0.
+    /// Return p = k1 c + k3 c^3 with k1 > 0 and k3 >= 0.
     pub fn cubic(k1: impl Into<Field>, k3: impl Into<Field>) -> Self {
         Self::Form { form: &CUBIC, values: vec![k1.into(), k3.into()] }
     }
@@ -53,33 +53,33 @@ impl LayerSpec {
 /// Summits of one radius at different heights, after Greenwood and Williamson.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AsperitySpec {
-    /// Number per area.
+    /// Number of summits per area.
     pub density: f64,
-    /// Their radius.
+    /// Radius of the summits (a length).
     pub radius: f64,
-    /// E* of both bodies: 1/E* is the sum of (1 - nu^2)/E.
+    /// E* of both bodies (a stress): 1/E* is the sum of (1 - nu^2)/E.
     pub modulus: f64,
-    /// How far they lie below the highest.
+    /// Depths of the summits below the highest one.
     pub depths: Depths,
-    /// Name of the data that they are from, if they are measured.
+    /// Name of the data with the surface, if the summits are measured.
     pub data: Option<String>,
 }
 
-/// How summits are distributed below the highest one.
+/// How the summits are distributed below the highest one (lengths).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Depths {
     /// A normal distribution of heights.
     Normal {
-        /// Its standard deviation.
+        /// Standard deviation of the heights.
         deviation: f64,
-        /// Height of the highest summit above the mean; none lies above.
+        /// Height of the highest summit above the mean. No summit lies above it.
         highest: f64,
     },
-    /// Each summit of a measured surface, from 0 on and increasing.
+    /// The depth of each summit of a measured surface, increasing from 0.
     Measured(Arc<[f64]>),
 }
 
-/// Forms of laws with a few parameters.
+/// The laws that have a form with a few parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LawKind {
     /// p = stiffness c.
@@ -92,29 +92,29 @@ pub enum LawKind {
     Cubic,
 }
 
-/// A form of law: how it is called and what it needs.
+/// A form of law: its name and its parameters. The decoder, the JSON schema and the checks of a scene are made of this table.
 #[derive(Debug, PartialEq, Eq)]
 pub struct LawForm {
-    /// Which one.
+    /// The law.
     pub kind: LawKind,
-    /// Key of the scene.
+    /// Key in the scene.
     pub name: &'static str,
-    /// Its parameters, in the order in which values are kept.
+    /// The parameters, in the order of the values of [`LayerSpec::Form`].
     pub parameters: &'static [Parameter],
 }
 
 /// A parameter of a law.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Parameter {
-    /// Key of the scene.
+    /// Key in the scene.
     pub key: &'static str,
     /// Name in messages.
     pub what: &'static str,
-    /// Values that make a law.
+    /// The range of values that make a law.
     pub bounds: Bounds,
 }
 
-/// Ranges of parameters.
+/// The range of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bounds {
     /// Greater than 0.
@@ -126,7 +126,7 @@ pub enum Bounds {
 }
 
 impl Bounds {
-    /// What is wrong with a value; `None` if it lies in the range.
+    /// Return what a value must be instead; `None` if it lies in the range.
     pub fn breach(self, value: f64) -> Option<&'static str> {
         match self {
             Bounds::Positive | Bounds::UpToOne if value <= 0.0 => Some("must be greater than 0"),
@@ -162,5 +162,5 @@ static CUBIC: LawForm = LawForm {
     parameters: &[parameter("k1", "k1", Bounds::Positive), parameter("k3", "k3", Bounds::NotNegative)],
 };
 
-/// Every form.
+/// All forms.
 pub static FORMS: [&LawForm; 4] = [&POWER, &LINEAR, &EXPONENTIAL, &CUBIC];

@@ -1,4 +1,4 @@
-//! The outer iteration: methods and their settings by name.
+//! The outer iteration: methods by name, and their settings.
 
 use serde::{Deserialize, Serialize};
 use super::history::History;
@@ -9,31 +9,31 @@ use crate::expression::Field;
 /// The outer iteration.
 #[derive(Debug, Clone)]
 pub struct MethodSpec {
-    /// How steps are made. Without a name it is [`MethodName::Robin`] where psi, gamma, robin or the increment rule are given,
-    /// else [`MethodName::Auto`].
+    /// The method. A scene file without a name means [`MethodName::Robin`] if psi, gamma, robin or the increment rule is given, and
+    /// [`MethodName::Auto`] otherwise.
     pub name: MethodName,
     /// Robin zone psi.
     pub psi: Zone,
     /// Robin coefficient on the zone.
     pub robin: RobinRule,
-    /// Relaxation of the method `robin`.
+    /// Relaxation gamma of the method `robin`.
     pub gamma: Gamma,
-    /// Whether `robin` finds the interval (33) of gamma at the end.
+    /// Whether `robin` determines the interval (33) of gamma at the end.
     pub interval: bool,
-    /// Earlier steps that the method `anderson` mixes.
+    /// Number of earlier steps that the method `anderson` mixes.
     pub depth: usize,
-    /// How linear steps of Newton's method are solved, or the program's choice.
+    /// How linear steps of Newton's method are solved; the program chooses if `None`.
     pub linear: Option<Linear>,
     /// Start of the iteration.
     pub start: Start,
     /// Load steps.
     pub steps: History,
-    /// When to stop.
+    /// The rules that stop the run.
     pub stop: StopRule,
 }
 
 impl MethodSpec {
-    /// The method of this name with its defaults: for [`MethodName::Robin`] those of the paper.
+    /// Return the method of this name with its defaults. Those of [`MethodName::Robin`] are the paper's.
     pub fn new(name: MethodName) -> Self {
         let robin = if name == MethodName::Robin { RobinRule::Tangent } else { RobinRule::Auto };
         Self { name, robin, ..Self::default() }
@@ -57,10 +57,10 @@ impl Default for MethodSpec {
     }
 }
 
-/// Methods by name.
+/// The methods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MethodName {
-    /// Newton's method with the linear step that suits bodies, memory and ranks.
+    /// Newton's method, with the kind of linear step that suits the bodies, the memory and the number of ranks.
     Auto,
     /// The paper's iteration (41)-(42).
     Robin,
@@ -68,14 +68,14 @@ pub enum MethodName {
     Ncg,
     /// Anderson acceleration of the sweep.
     Anderson,
-    /// Newton's method, linear steps by conjugate gradients over the sweep.
+    /// Newton's method with linear steps by conjugate gradients over the sweep.
     NewtonRobin,
-    /// Newton's method, all bodies in one matrix: dense, factored, or solved by multigrid.
+    /// Newton's method with one matrix of all bodies: dense, factorised, or solved by multigrid.
     Newton,
 }
 
 impl MethodName {
-    /// Every method with its name in the scene.
+    /// All methods with their names in the scene.
     pub const ALL: [(&'static str, MethodName); 6] = [
         ("auto", MethodName::Auto),
         ("robin", MethodName::Robin),
@@ -86,7 +86,7 @@ impl MethodName {
     ];
 }
 
-/// How the linear steps of Newton's method are solved.
+/// The ways to solve the linear steps of Newton's method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Linear {
     /// One dense matrix of condensed bodies.
@@ -95,12 +95,12 @@ pub enum Linear {
     Direct,
     /// Conjugate gradients with multigrid of all bodies.
     Multigrid,
-    /// Conjugate gradients over the Robin sweep: every body by itself.
+    /// Conjugate gradients over the Robin sweep (one solve in every body).
     Sweeps,
 }
 
 impl Linear {
-    /// Every way with its name in the scene.
+    /// All ways with their names in the scene.
     pub const ALL: [(&'static str, Linear); 4] = [
         ("dense", Linear::Dense),
         ("direct", Linear::Direct),
@@ -108,33 +108,33 @@ impl Linear {
         ("sweeps", Linear::Sweeps),
     ];
 
-    /// Its name in the scene.
+    /// Return the name in the scene.
     pub fn name(self) -> &'static str {
         super::name_of(&Self::ALL, &self)
     }
 }
 
-/// Relaxation gamma^k.
+/// The relaxation gamma^k of iteration k.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Gamma {
-    /// The same number > 0 all the way.
+    /// The same number > 0 in every iteration.
     Stationary(f64),
-    /// Numbers > 0 for k = 0, 1, ...; the last one stays.
+    /// Numbers > 0 for k = 0, 1, ...; the last one is kept.
     Schedule(Vec<f64>),
-    /// Exact line search on F1.
+    /// Exact line search on the functional F1.
     LineSearch,
     /// Aitken's rule.
     Aitken,
     /// The rule of Barzilai and Borwein.
     BarzilaiBorwein,
-    /// Best stationary value for the estimated spectrum.
+    /// The best stationary value for the estimated spectrum.
     Spectral,
-    /// The rule of this name that a Rust program gives the scene ([`Scene::rule`](crate::scene::Scene::rule)).
+    /// The rule of this name from a Rust program ([`Scene::rule`](crate::scene::Scene::rule)).
     Own(String),
 }
 
 impl Gamma {
-    /// Rules with a name in the scene.
+    /// All rules of the program with their names in the scene.
     pub const NAMED: [(&'static str, Gamma); 4] = [
         ("line-search", Gamma::LineSearch),
         ("aitken", Gamma::Aitken),
@@ -143,10 +143,10 @@ impl Gamma {
     ];
 }
 
-/// Start of the iteration, given on the contact surfaces.
+/// The start of the iteration, given on the contact surfaces.
 #[derive(Debug, Clone)]
 pub enum Start {
-    /// Rigid bodies on their own surfaces.
+    /// The solution with rigid bodies, each layer in series with a spring that stands for the surfaces of the two bodies.
     Auto,
     /// Zero normal displacement.
     Zero,

@@ -1,7 +1,7 @@
 //! What is to be solved, and how, as plain data: bodies, contacts, layers, and methods and solvers by name.
 //!
-//! What names a group of the mesh, which is read later, keeps
-//! the place where it was written, for a refusal.
+//! Names of groups keep the place where they were written ([`Located`](crate::error::Located)): the mesh is read later, and a refusal of
+//! a group that it does not have points there.
 
 pub mod body;
 pub mod contact;
@@ -32,7 +32,7 @@ pub use solver::{Preset, SolverSpec};
 pub use stop::StopRule;
 pub use units::{Units, force_labels, label};
 
-/// The name of a choice in a list of all; empty if it has none.
+/// Return the name of a choice in a list of choices; empty if the list does not have it.
 pub fn name_of<T: PartialEq>(choices: &[(&'static str, T)], choice: &T) -> &'static str {
     choices.iter().find(|(_, known)| known == choice).map_or("", |(name, _)| name)
 }

@@ -1,8 +1,8 @@
-//! Order of finite elements.
+//! The order of finite elements.
 
 use serde::{Deserialize, Serialize};
 
-/// Polynomial order of the displacements.
+/// The polynomial order of the displacements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Order {
     /// Linear simplices.
@@ -12,7 +12,7 @@ pub enum Order {
 }
 
 impl Order {
-    /// Polynomial degree: 1 or 2.
+    /// Return the polynomial degree: 1 or 2.
     pub fn degree(self) -> usize {
         match self {
             Order::P1 => 1,

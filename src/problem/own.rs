@@ -1,23 +1,23 @@
-//! What a Rust program adds to a scene by name: laws of layers, rules for gamma.
+//! Laws of layers and rules for gamma that a Rust program adds to a scene by name.
 
 use crate::error::{Error, Kind, Result};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::rc::Rc;
 
-/// Things of a Rust program by name.
+/// The laws or rules of a Rust program, by name.
 pub struct Own<T: ?Sized>(BTreeMap<String, Rc<T>>);
 
 impl<T: ?Sized> Own<T> {
-    /// Adds one, or replaces the one of this name.
+    /// Add a law or rule; it replaces an earlier one of the same name.
     pub fn insert(&mut self, name: &str, own: Rc<T>) {
         self.0.insert(name.to_owned(), own);
     }
 
-    /// The one of a name; `what` says what it is in the message.
+    /// Return the law or rule of a name; `what` says in the message which of the two it is.
     ///
     /// # Errors
-    /// A name that is not there.
+    /// An unknown name.
     pub fn get(&self, what: &str, name: &str) -> Result<&T> {
         self.0.get(name).map(|own| &**own).ok_or_else(|| {
             let error = Error::new(Kind::Scene, format!("no {what} is called `{name}`"));

@@ -1,11 +1,11 @@
-//! Names of bodies and groups, and patterns that stand for many of them, as shells have them.
+//! Names of bodies and groups, and patterns that stand for many names, as in shells.
 
 use glob::Pattern as Glob;
 
-/// What stands for the name of the body in the names of its groups.
+/// The text that stands for the name of the body in the names of its groups.
 pub const BODY: &str = "{body}";
 
-/// Whether a name is a pattern: `*` is any text, `?` one character, `[0-9]` one of some.
+/// Return whether a name is a pattern: `*` is any text, `?` one character, `[0-9]` one of some.
 pub fn is_pattern(name: &str) -> bool {
     name.contains(['*', '?']) || name.find('[').is_some_and(|open| name[open..].contains(']'))
 }
@@ -14,50 +14,51 @@ pub fn is_pattern(name: &str) -> bool {
 #[derive(Debug, Clone)]
 pub struct Pattern<'a> {
     text: &'a str,
-    /// None of a plain name.
+    /// The pattern; `None` for a plain name.
     glob: Option<Glob>,
 }
 
-/// How narrow a pattern is, the narrowest last: plain names, then characters that stand for themselves, `[ ]`, `?`.
+/// How narrow a pattern is; narrower ones compare greater. The entries are: 1 for a plain name and 0 for a pattern, then the numbers of
+/// characters that stand for themselves, of `[ ]`, and of `?`.
 pub type Rank = [usize; 4];
 
 impl<'a> Pattern<'a> {
-    /// Reads a name or a pattern.
+    /// Read a name or a pattern.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
+    /// What is wrong with the pattern, in words.
     pub fn new(text: &'a str) -> Result<Self, &'static str> {
         let glob = if is_pattern(text) { Some(Glob::new(text).map_err(|error| error.msg)?) } else { None };
         Ok(Self { text, glob })
     }
 
-    /// Whether a name is this one to the letter, or one of the pattern.
+    /// Return whether `name` is the same text, or matches the pattern.
     pub fn matches(&self, name: &str) -> bool {
         self.text == name || self.glob.as_ref().is_some_and(|glob| glob.matches(name))
     }
 
-    /// Whether it stands for many names.
+    /// Return whether this is a pattern, which may stand for many names.
     pub fn is_plural(&self) -> bool {
         self.glob.is_some()
     }
 
-    /// How narrow it is.
+    /// Return how narrow the pattern is.
     pub fn rank(&self) -> Rank {
         if self.glob.is_none() {
             return [1, self.text.len(), 0, 0];
         }
-        let (mut rank, mut rest) = ([0; 4], self.text);
+        let ([mut literals, mut classes, mut singles], mut rest) = ([0; 3], self.text);
         while let Some(first) = rest.chars().next() {
-            let class = if first == '[' { rest.find(']') } else { None };
-            match (first, class) {
-                (_, Some(_)) => rank[2] += 1,
+            let class_end = if first == '[' { rest.find(']') } else { None };
+            match (first, class_end) {
+                (_, Some(_)) => classes += 1,
                 ('*', _) => {}
-                ('?', _) => rank[3] += 1,
-                _ => rank[1] += 1,
+                ('?', _) => singles += 1,
+                _ => literals += 1,
             }
-            rest = &rest[class.map_or(first.len_utf8(), |end| end + 1)..];
+            rest = &rest[class_end.map_or(first.len_utf8(), |end| end + 1)..];
         }
-        rank
+        [0, literals, classes, singles]
     }
 }
 

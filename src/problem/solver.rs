@@ -1,22 +1,20 @@
-//! Inner solvers by name.
+//! Inner solvers by name: what solves the linear systems of bodies.
 
-use serde::{Deserialize, Serialize};
-
-/// Inner solver asked for in the scene; PETSc options override it.
+/// The inner solver that the scene requests. PETSc options override it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SolverSpec {
-    /// A preset, or the program's choice.
+    /// The preset; the program chooses if `None`.
     pub preset: Option<Preset>,
-    /// PETSc options of the scene, as words, weaker than those of the command line.
+    /// PETSc options of the scene, as words. Those of the command line win.
     pub options: Vec<String>,
 }
 
-/// Presets of inner solvers.
+/// The presets of inner solvers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Preset {
     /// Sparse Cholesky factorisation by MUMPS.
     Mumps,
-    /// The interior eliminated once by MUMPS, a dense problem on the contact in each sweep.
+    /// Interior dofs eliminated once by MUMPS, and a dense system on the contact in each sweep.
     Condensed,
     /// Conjugate gradients preconditioned by hypre's BoomerAMG.
     Hypre,
@@ -27,7 +25,7 @@ pub enum Preset {
 }
 
 impl Preset {
-    /// Every preset with its name in the scene.
+    /// All presets with their names in the scene.
     pub const ALL: [(&'static str, Preset); 5] = [
         ("mumps", Preset::Mumps),
         ("condensed", Preset::Condensed),
@@ -36,7 +34,7 @@ impl Preset {
         ("icc", Preset::Icc),
     ];
 
-    /// Its name in the scene.
+    /// Return the name in the scene.
     pub fn name(self) -> &'static str {
         super::name_of(&Self::ALL, &self)
     }

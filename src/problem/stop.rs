@@ -1,16 +1,16 @@
-//! When a run stops.
+//! The rules that stop a run.
 
-/// Rules of a run. At least one of `residual` and `increment` is given; the first rule met stops.
+/// The rules that stop a run. At least one of `residual` and `increment` is given. The first rule that is met ends the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StopRule {
-    /// Relative residual of sweeps, largest relative error of Newton's method (docs/theory.md); default 1e-8 when `increment` is not
-    /// given.
+    /// Tolerance of the relative residual of sweeps, or of the largest relative error of Newton's method (docs/theory.md). The default
+    /// is 1e-8 if `increment` is not given.
     pub residual: Option<f64>,
-    /// The paper's rule on the increment of normal displacements, for every body.
+    /// Tolerance of the paper's rule: the relative increment of normal displacements, in every body.
     pub increment: Option<f64>,
-    /// Whether to stop where the error of the iteration is a tenth of that of the discretisation.
+    /// Whether to stop where the error of the iteration is a tenth of the error of the discretisation.
     pub balanced: bool,
-    /// Most iterations; default 2000.
+    /// The most iterations; 2000 by default.
     pub iterations: usize,
 }
 
@@ -21,12 +21,13 @@ impl Default for StopRule {
 }
 
 impl StopRule {
-    /// What relative errors inside a run refer to: the tolerance of its residual; half of all digits where the increment alone ends it.
+    /// Return the tolerance that relative errors inside a run refer to. It is that of the residual, or the square root of machine epsilon
+    /// where the increment alone ends the run.
     pub fn tolerance(&self) -> f64 {
         self.residual.unwrap_or(f64::EPSILON.sqrt())
     }
 
-    /// Whether an iterate with this number, reached by this increment (NaN before the first update), is good enough.
+    /// Return whether an iterate meets a rule. `residual` and `increment` are relative; the increment is NaN before the first update.
     pub fn is_met(&self, residual: f64, increment: f64) -> bool {
         self.residual.is_some_and(|tolerance| residual <= tolerance)
             || self.increment.is_some_and(|tolerance| increment <= tolerance)

@@ -1,106 +1,132 @@
-//! Names of the units of a scene: words for labels. Nothing is converted.
+//! Names of the units of a scene, which are words for labels. Nothing is converted.
 
 use crate::error::suggestion;
 
-/// What a unit is of.
+/// The quantity that a unit measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum Quantity {
     Length,
     Stress,
 }
 
-/// Known units: of the SI with their power of ten of m or Pa, and those of the inch.
-const KNOWN: [(&str, Kind, Option<i32>); 15] = [
-    ("m", Kind::Length, Some(0)),
-    ("cm", Kind::Length, Some(-2)),
-    ("mm", Kind::Length, Some(-3)),
-    ("um", Kind::Length, Some(-6)),
-    ("µm", Kind::Length, Some(-6)),
-    ("nm", Kind::Length, Some(-9)),
-    ("in", Kind::Length, None),
-    ("Pa", Kind::Stress, Some(0)),
-    ("kPa", Kind::Stress, Some(3)),
-    ("MPa", Kind::Stress, Some(6)),
-    ("N/mm2", Kind::Stress, Some(6)),
-    ("N/mm²", Kind::Stress, Some(6)),
-    ("GPa", Kind::Stress, Some(9)),
-    ("psi", Kind::Stress, None),
-    ("ksi", Kind::Stress, None),
+/// A known unit.
+struct Unit {
+    name: &'static str,
+    quantity: Quantity,
+    /// Power of ten by which it is larger than m or Pa; `None` for units of the inch's system.
+    power: Option<i32>,
+}
+
+const fn unit(name: &'static str, quantity: Quantity, power: Option<i32>) -> Unit {
+    Unit { name, quantity, power }
+}
+
+/// The known units: of the SI, and of the inch's system.
+static KNOWN: [Unit; 15] = [
+    unit("m", Quantity::Length, Some(0)),
+    unit("cm", Quantity::Length, Some(-2)),
+    unit("mm", Quantity::Length, Some(-3)),
+    unit("um", Quantity::Length, Some(-6)),
+    unit("µm", Quantity::Length, Some(-6)),
+    unit("nm", Quantity::Length, Some(-9)),
+    unit("in", Quantity::Length, None),
+    unit("Pa", Quantity::Stress, Some(0)),
+    unit("kPa", Quantity::Stress, Some(3)),
+    unit("MPa", Quantity::Stress, Some(6)),
+    unit("N/mm2", Quantity::Stress, Some(6)),
+    unit("N/mm²", Quantity::Stress, Some(6)),
+    unit("GPa", Quantity::Stress, Some(9)),
+    unit("psi", Quantity::Stress, None),
+    unit("ksi", Quantity::Stress, None),
 ];
 
-/// Units of a scene.
+impl Unit {
+    /// Return the unit of a name, or a message and advice.
+    fn named(name: &str) -> Result<&'static Self, (String, String)> {
+        KNOWN.iter().find(|unit| unit.name == name).ok_or_else(|| {
+            let all: Vec<&str> = KNOWN.iter().map(|unit| unit.name).collect();
+            let advice =
+                suggestion(name, all.iter().copied()).unwrap_or_else(|| format!("known are {}", all.join(", ")));
+            (format!("no unit is called `{name}`"), advice)
+        })
+    }
+}
+
+/// The units of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Units {
-    /// Of coordinates and displacements.
+    /// Unit of coordinates and displacements.
     pub length: &'static str,
-    /// Of stresses, pressures and moduli.
+    /// Unit of stresses, pressures and moduli.
     pub stress: &'static str,
-    /// Of forces: stress times length squared, in the plane per length of thickness.
+    /// Unit of forces: stress times length squared, in the plane per length of thickness.
     pub force: String,
 }
 
 impl Units {
-    /// Reads a length and a stress in any order: `mm, MPa`.
+    /// Read a length and a stress in any order: `mm, MPa`.
     ///
     /// # Errors
-    /// In words, with advice: a name that is not known, two of one kind, or a pair that does not fit.
+    /// A message and advice, for an unknown name, two units of one quantity, or units of different systems.
     pub fn parse(text: &str) -> Result<Self, (String, String)> {
-        let known = |name: &str| {
-            KNOWN.iter().find(|unit| unit.0 == name).ok_or_else(|| {
-                let all = KNOWN.map(|unit| unit.0);
-                let advice = suggestion(name, all).unwrap_or_else(|| format!("known are {}", all.join(", ")));
-                (format!("no unit is called `{name}`"), advice)
-            })
-        };
         let example = || "for example \"mm, MPa\"".to_owned();
         let names: Vec<&str> = text.split(',').map(str::trim).collect();
         let [first, second] = names[..] else {
             return Err(("expected a length and a stress, with a comma between".to_owned(), example()));
         };
-        let (first, second) = (known(first)?, known(second)?);
-        let (length, stress) = match (first.1, second.1) {
-            (Kind::Length, Kind::Stress) => (first, second),
-            (Kind::Stress, Kind::Length) => (second, first),
-            (Kind::Length, _) => return Err((format!("`{}` and `{}` are both lengths", first.0, second.0), example())),
-            _ => return Err((format!("`{}` and `{}` are both stresses", first.0, second.0), example())),
-        };
-        let force = match (length.2, stress.2) {
-            (Some(length_power), Some(stress_power)) => match stress_power + 2 * length_power {
-                -6 => "µN".to_owned(),
-                -3 => "mN".to_owned(),
-                0 => "N".to_owned(),
-                3 => "kN".to_owned(),
-                6 => "MN".to_owned(),
-                9 => "GN".to_owned(),
-                _ => format!("{}·{}²", stress.0, length.0),
-            },
-            (None, None) => if stress.0 == "psi" { "lbf" } else { "kip" }.to_owned(),
-            _ => {
-                let message = format!("`{}` and `{}` are of different systems of units", length.0, stress.0);
-                return Err((message, "for example \"mm, MPa\" or \"in, psi\"".to_owned()));
+        let (first, second) = (Unit::named(first)?, Unit::named(second)?);
+        let (length, stress) = match (first.quantity, second.quantity) {
+            (Quantity::Length, Quantity::Stress) => (first, second),
+            (Quantity::Stress, Quantity::Length) => (second, first),
+            (both, _) => {
+                let what = if both == Quantity::Length { "lengths" } else { "stresses" };
+                return Err((format!("`{}` and `{}` are both {what}", first.name, second.name), example()));
             }
         };
-        Ok(Self { length: length.0, stress: stress.0, force })
+        let force = force(length, stress).ok_or_else(|| {
+            let message = format!("`{}` and `{}` are of different systems of units", length.name, stress.name);
+            (message, "for example \"mm, MPa\" or \"in, psi\"".to_owned())
+        })?;
+        Ok(Self { length: length.name, stress: stress.name, force })
     }
 
-    /// For bodies of the plane, whose forces are per length of thickness.
+    /// Return the units for plane bodies, whose forces are per length of thickness.
     pub fn per_thickness(self) -> Self {
         Self { force: format!("{}/{}", self.force, self.length), ..self }
     }
 
-    /// As a scene has it.
+    /// Return the text that a scene has for these units.
     pub fn text(&self) -> String {
         format!("{}, {}", self.length, self.stress)
     }
 }
 
-/// Labels of an approach and a contact force.
+/// Return the unit of force that belongs to a length and a stress; `None` for units of different systems.
+fn force(length: &Unit, stress: &Unit) -> Option<String> {
+    let name = match (length.power, stress.power) {
+        (Some(length_power), Some(stress_power)) => match stress_power + 2 * length_power {
+            -6 => "µN",
+            -3 => "mN",
+            0 => "N",
+            3 => "kN",
+            6 => "MN",
+            9 => "GN",
+            _ => return Some(format!("{}·{}²", stress.name, length.name)),
+        },
+        (None, None) if stress.name == "psi" => "lbf",
+        (None, None) => "kip",
+        _ => return None,
+    };
+    Some(name.to_owned())
+}
+
+/// Return the labels of an approach and a contact force.
 pub fn force_labels(units: Option<&Units>) -> [String; 2] {
     let (length, force) = units.map(|units| (units.length, units.force.as_str())).unzip();
     [label("approach", length), label("contact force", force)]
 }
 
-/// A label with its unit, if there is one.
+/// Return a label with its unit, if there is one.
 pub fn label(what: &str, unit: Option<&str>) -> String {
     unit.map_or_else(|| what.to_owned(), |unit| format!("{what}, {unit}"))
 }

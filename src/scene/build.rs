@@ -9,8 +9,8 @@ use crate::problem::{BodySpec, ContactSpec, MeshSource, MethodSpec, Own, Plane, 
 use std::rc::Rc;
 
 impl Scene {
-    /// A scene without bodies, in the plane (`dimension` 2, plane strain) or in space (3), solved by Newton's method. What has no verb
-    /// here is set in the fields.
+    /// Return a scene without bodies, in the plane (`dimension` 2, plane strain) or in space (3), solved by Newton's method. Settings
+    /// without a method of their own are fields of the scene.
     #[track_caller]
     pub fn new(dimension: usize, mesh: impl Into<MeshSource>) -> Self {
         let place = Place::here(&dimension.to_string());
@@ -35,31 +35,33 @@ impl Scene {
         }
     }
 
-    /// With one more body.
+    /// Add a body.
     pub fn body(mut self, body: BodySpec) -> Self {
         self.bodies.push(body);
         self
     }
 
-    /// With one more pair of contact surfaces.
+    /// Add a pair of contact surfaces.
     pub fn contact(mut self, contact: ContactSpec) -> Self {
         self.contacts.push(ContactSpec { table: self.contacts.len(), ..contact });
         self
     }
 
-    /// With this outer iteration.
+    /// Set the outer iteration.
     pub fn method(self, method: MethodSpec) -> Self {
         Self { method, ..self }
     }
 
-    /// With a law for [`LayerSpec::Own`](crate::problem::layer::LayerSpec::Own) of this name. `maker` gets the contact points of a
-    /// pair (x, y, z) and gives the law of all of them, which is checked at the first: increasing, with its derivative and its integral.
+    /// Add a law of a layer, which [`LayerSpec::Own`](crate::problem::layer::LayerSpec::Own) uses by its name. `maker` gets the contact
+    /// points (x, y, z) of a pair and returns the law for all of them. The law is checked at the first point: it must increase, and have
+    /// its derivative and its integral.
     pub fn law<L: LayerLaw + 'static>(mut self, name: &str, maker: impl Fn(&[[f64; 3]]) -> L + 'static) -> Self {
         self.laws.insert(name, Rc::new(move |points: &[[f64; 3]]| Box::new(maker(points)) as _));
         self
     }
 
-    /// With a rule for [`Gamma::Own`](crate::problem::method::Gamma::Own) of this name; `maker` gives a new one for each run.
+    /// Add a rule for gamma, which [`Gamma::Own`](crate::problem::method::Gamma::Own) uses by its name. `maker` returns a new rule for
+    /// each run.
     pub fn rule<R: GammaRule + 'static>(mut self, name: &str, maker: impl Fn() -> R + 'static) -> Self {
         self.rules.insert(name, Rc::new(move || Box::new(maker()) as _));
         self

@@ -1,5 +1,7 @@
-//! What every scene must satisfy, read from a file or built in Rust: each check once. A refusal names the key that it is about, as
-//! `--set` has it, so that who has read a file can point at it; a Rust program gets the line where the body or the surface was named.
+//! What every scene must satisfy, whether it was read from a file or built in Rust. Each check is made once, here.
+//!
+//! A refusal names the key that it is about, as `--set` has it. For a scene file, [`load`](super::load) then points at the value of that
+//! key; for a scene built in Rust, the refusal points at the line that named the body, surface or group.
 
 use super::Scene;
 use crate::error::{Error, Place, Result, shown};
@@ -7,24 +9,27 @@ use crate::expression::Field;
 use crate::problem::body::{SPELLING, fault, is_in_name};
 use crate::problem::pattern::is_pattern;
 use crate::problem::{
-    AutoContact, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, LayerSpec, LoadKind, MeshSource,
-    MethodName, MethodSpec, Plane, RobinRule, SpringKind, Start, Support,
+    AsperitySpec, AutoContact, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, LayerSpec, Load,
+    LoadKind, MeshSource, MethodName, MethodSpec, Plane, RobinRule, SpringKind, SpringSpec, Start, StopRule, Support,
 };
 use std::collections::HashSet;
+use std::fmt::Display;
 
 /// A refusal and the key that it is about.
-pub(super) struct Fault {
+pub(super) struct Refusal {
     /// Dotted path of the key.
     pub key: String,
-    /// The refusal, which points at what a program has near it.
+    /// The refusal, which points at the nearest line of a Rust program.
     pub error: Error,
 }
 
-type Checked = Result<(), Fault>;
+type Checked = Result<(), Refusal>;
 
-/// A key of the scene, and what a Rust program has near it.
+/// The key whose value is being checked.
 struct At<'a> {
+    /// Dotted path of the key.
     key: String,
+    /// Place of the nearest name that a Rust program gives.
     near: &'a Place,
 }
 
@@ -33,17 +38,23 @@ impl<'a> At<'a> {
         Self { key: key.into(), near }
     }
 
-    fn below(&self, key: impl std::fmt::Display) -> Self {
+    /// Return a key, or the number of an item, below this key.
+    fn below(&self, key: impl Display) -> Self {
         Self { key: format!("{}.{key}", self.key), near: self.near }
     }
 
-    /// A refusal; texts may be empty.
-    fn refuse(&self, message: impl Into<String>, label: &str, help: &str) -> Checked {
-        let error = Error::scene(self.near, message).label(label);
-        Err(Fault { key: self.key.clone(), error: if help.is_empty() { error } else { error.help(help) } })
+    /// Return item `number` of the list `list` below this key; `near` is the place of the item's name.
+    fn item(&self, list: &str, number: usize, near: &'a Place) -> Self {
+        Self { near, ..self.below(format_args!("{list}.{number}")) }
     }
 
-    /// Refuses a number that is not finite and > 0.
+    /// Return a refusal; `label` and `help` may be empty.
+    fn refuse(&self, message: impl Into<String>, label: &str, help: &str) -> Checked {
+        let error = Error::scene(self.near, message).label(label);
+        Err(Refusal { key: self.key.clone(), error: if help.is_empty() { error } else { error.help(help) } })
+    }
+
+    /// Refuse a number that is not finite and > 0.
     fn positive(&self, what: &str, value: f64) -> Checked {
         match value > 0.0 && value.is_finite() {
             true => Ok(()),
@@ -51,12 +62,12 @@ impl<'a> At<'a> {
         }
     }
 
-    /// The same for the number below a key.
+    /// Refuse the number of a key below if it is not finite and > 0.
     fn positive_in(&self, key: &str, what: &str, value: f64) -> Checked {
         self.below(key).positive(what, value)
     }
 
-    /// Refuses what cannot be the name of a body, or a pattern of such.
+    /// Refuse what cannot be the name of a body, or a pattern of such names.
     fn name(&self, name: &str) -> Checked {
         let fault = match is_pattern(name) {
             true => name.chars().any(|c| !is_in_name(c) && !"*?[]!-".contains(c)).then_some(SPELLING),
@@ -67,7 +78,7 @@ impl<'a> At<'a> {
 }
 
 impl Scene {
-    /// Checks what no later stage checks: numbers that are not fields, names, and what contradicts itself.
+    /// Check what no later stage checks: numbers that are not fields, names, and keys that contradict each other.
     ///
     /// # Errors
     /// The first refusal, with the line of the program where the body, surface or group was named.
@@ -76,27 +87,44 @@ impl Scene {
             let message = "several meshes for one scene: only the command line makes them";
             return Err(Error::scene(&self.dimension.place, message));
         }
-        self.verify().map_err(|fault| fault.error)
+        self.verify().map_err(|refusal| refusal.error)
     }
 
+    /// Check the whole scene. A new check stands in the function of its table.
     pub(super) fn verify(&self) -> Checked {
         let at = |key: &str| At::new(key, &self.dimension.place);
-        let dimension = self.dimension.value;
-        if !matches!(dimension, 2 | 3) || (dimension == 3 && self.plane != Plane::Strain) {
-            let message = "the dimension is 2 or 3, and only plane problems have a `plane`";
-            return at("dimension").refuse(message, "", "");
+        self.check_dimension(&at("dimension"))?;
+        check_mesh(&at("mesh"), &self.mesh)?;
+        self.check_bodies(&at("body"))?;
+        check_pairs(&self.contacts)?;
+        check_rules(&self.auto)?;
+        for contact in self.contacts.iter().chain(self.auto.iter().map(|auto| &auto.contact)) {
+            check_contact(&at_contact(contact), contact)?;
         }
-        if let MeshSource::Geo { guard, .. } = &self.mesh {
-            at("mesh.timeout").positive("the timeout", guard.seconds)?;
-            guard.gigabytes.map_or(Ok(()), |memory| at("mesh.memory").positive("the memory", memory))?;
-            guard.size.map_or(Ok(()), |size| at("mesh.size").positive("the size", size))?;
+        check_method(&at("method"), &self.method)?;
+        self.check_adapt(&at("adapt"))?;
+        self.output.checkpoint.map_or(Ok(()), |time| at("output.checkpoint").positive("the time in minutes", time))
+    }
+
+    fn is_plane(&self) -> bool {
+        self.dimension.value == 2
+    }
+
+    fn check_dimension(&self, at: &At) -> Checked {
+        let is_known = self.is_plane() || (self.dimension.value == 3 && self.plane == Plane::Strain);
+        match is_known {
+            true => Ok(()),
+            false => at.refuse("the dimension is 2 or 3, and only plane problems have a `plane`", "", ""),
         }
+    }
+
+    fn check_bodies(&self, at: &At) -> Checked {
         if self.bodies.is_empty() {
-            return at("body").refuse("the scene has no body", "", "a body starts with the line [[body]]");
+            return at.refuse("the scene has no body", "", "a body starts with the line [[body]]");
         }
         let mut names = HashSet::new();
         for (number, body) in self.bodies.iter().enumerate() {
-            let at = At::new(format!("body.{number}"), &body.name.place);
+            let at = At { near: &body.name.place, ..at.below(number) };
             let name = &body.name.value;
             if !names.insert(name) {
                 let help = "names of bodies are those of physical groups of cells, one for each";
@@ -104,116 +132,91 @@ impl Scene {
                 return at.below("name").refuse(message, "taken by an earlier body", help);
             }
             at.below("name").name(name)?;
-            self.body_is_good(&at, body)?;
-        }
-        let mut pairs = HashSet::new();
-        for contact in &self.contacts {
-            let at = At::new(format!("contact.{}.between", contact.table), &contact.between[0].place);
-            let [a, b] = contact.between.each_ref().map(|name| &name.value);
-            let second = At { near: &contact.between[1].place, ..at.below(1) };
-            if a == b {
-                let help = "name one surface of each of two bodies";
-                return second.refuse(format!("a contact between `{b}` and itself"), "", help);
-            }
-            if !pairs.insert([a.min(b), a.max(b)]) {
-                return at.below(0).refuse(format!("a second contact of `{a}` and `{b}`"), "", "remove one of the two");
-            }
-            let is_plural = |name: &String| name.contains(['*', '?']);
-            if let Some((side, name)) = [a, b].into_iter().enumerate().find(|(_, name)| is_plural(name)) {
-                let help = "many pairs are found between bodies: between = \"auto\", of = [\"one_*\", \"other_*\"], distance = D";
-                let message = format!("the pattern `{name}` for one surface");
-                return at.below(side).refuse(message, "one name belongs here", help);
-            }
-        }
-        rules(&self.auto)?;
-        for contact in self.contacts.iter().chain(self.auto.iter().map(|auto| &auto.contact)) {
-            contact_is_good(&At::new(format!("contact.{}", contact.table), &contact.between[0].place), contact)?;
-        }
-        method_is_good(&at("method"), &self.method)?;
-        if let Some(adapt) = &self.adapt {
-            at("adapt.error").positive("the error", adapt.error)?;
-            if adapt.error >= 1.0 {
-                let message = format!("the error is {}", shown(adapt.error));
-                return at("adapt.error").refuse(message, "must be less than 1", "it is a share: 0.01 is one per cent");
-            }
-        }
-        self.output.checkpoint.map_or(Ok(()), |time| at("output.checkpoint").positive("the time in minutes", time))
-    }
-
-    fn body_is_good(&self, at: &At, body: &BodySpec) -> Checked {
-        let is_plane = self.dimension.value == 2;
-        elasticity_is_good(at, &body.elasticity)?;
-        for (number, region) in body.regions.iter().enumerate() {
-            let near = &region.on.place;
-            elasticity_is_good(&At { near, ..at.below(format_args!("region.{number}")) }, &region.elasticity)?;
-        }
-        if is_plane && body.force.as_ref().is_some_and(|force| !force[2].is_zero()) {
-            return at.below("force").refuse("a body force in z in a plane problem", "", "");
-        }
-        for (number, support) in body.fix.iter().enumerate() {
-            let at = At { near: &support.on.place, ..at.below(format_args!("fix.{number}")) };
-            self.support_is_good(&at, support)?;
-        }
-        for (number, spring) in body.spring.iter().enumerate() {
-            let at = At { near: &spring.on.place, ..at.below(format_args!("spring.{number}")) };
-            let constant = |field: &Field| if let Field::Constant(value) = field { *value } else { f64::MIN_POSITIVE };
-            match &spring.kind {
-                SpringKind::Normal(k) => at.positive_in("normal", "the stiffness", constant(k))?,
-                SpringKind::Vector(all) if all.iter().all(Field::is_zero) => {
-                    let label = "some component must be greater than 0";
-                    return at.below("stiffness").refuse("the spring has no stiffness", label, "");
-                }
-                SpringKind::Vector(all) => {
-                    let mut negative = all.iter().map(constant).filter(|value| *value < 0.0 || value.is_nan());
-                    negative.try_for_each(|value| at.positive_in("stiffness", "the stiffness", value))?;
-                }
-            }
-        }
-        for (number, load) in body.load.iter().enumerate() {
-            let at = At { near: &load.on.place, ..at.below(format_args!("load.{number}")) };
-            let across = match &load.kind {
-                LoadKind::Pressure(_) => false,
-                LoadKind::Traction(traction) => !traction[2].is_zero(),
-                LoadKind::Force { total, .. } => total[2] != 0.0,
-            };
-            if is_plane && across {
-                return at.refuse("a load in z in a plane problem", "", "");
-            }
-            let LoadKind::Force { total, .. } = load.kind else { continue };
-            if total.iter().any(|force| !force.is_finite()) {
-                return at.below("force").refuse(format!("the force is {total:?}"), "", "");
-            }
-            if self.plane == Plane::Axisymmetric && total[0] != 0.0 {
-                return at.below("force").refuse(
-                    "a total force across the axis in an axisymmetric scene",
-                    "radial forces cancel all around: the first component must be 0",
-                    "for a radial load give pressure = p or traction = [tr, ta]",
-                );
-            }
+            self.check_body(&at, body)?;
         }
         Ok(())
     }
 
-    fn support_is_good(&self, at: &At, support: &Support) -> Checked {
-        let is_plane = self.dimension.value == 2;
-        let held = support.value.iter().flatten().count();
-        if held > 0 && support.normal.is_some() {
+    fn check_body(&self, at: &At, body: &BodySpec) -> Checked {
+        check_elasticity(at, &body.elasticity)?;
+        for (number, region) in body.regions.iter().enumerate() {
+            check_elasticity(&at.item("region", number, &region.on.place), &region.elasticity)?;
+        }
+        if self.is_plane() && body.force.as_ref().is_some_and(|force| !force[2].is_zero()) {
+            return at.below("force").refuse("a body force in z in a plane problem", "", "");
+        }
+        for (number, support) in body.fix.iter().enumerate() {
+            self.check_support(&at.item("fix", number, &support.on.place), support)?;
+        }
+        for (number, spring) in body.spring.iter().enumerate() {
+            check_spring(&at.item("spring", number, &spring.on.place), spring)?;
+        }
+        for (number, load) in body.load.iter().enumerate() {
+            self.check_load(&at.item("load", number, &load.on.place), load)?;
+        }
+        Ok(())
+    }
+
+    fn check_support(&self, at: &At, support: &Support) -> Checked {
+        let components = support.value.iter().flatten().count();
+        if components > 0 && support.normal.is_some() {
             return at.refuse("a support holds some components, or the normal alone", "", "");
         }
-        if is_plane && support.value[2].is_some() {
+        if self.is_plane() && support.value[2].is_some() {
             let help = "remove it, or set dimension = 3";
             return at.below("z").refuse("a support in `z` in a plane problem", "there is no z", help);
         }
-        if held == 0 && support.normal.is_none() {
-            let axes = if is_plane { "x, y" } else { "x, y, z" };
+        if components == 0 && support.normal.is_none() {
+            let axes = if self.is_plane() { "x, y" } else { "x, y, z" };
             let help = format!("give the displacement in some of {axes}: x = 0; or symmetry = true");
             return at.refuse(format!("the support on `{}` holds no component", support.on.value), "", &help);
         }
         Ok(())
     }
+
+    fn check_load(&self, at: &At, load: &Load) -> Checked {
+        let acts_along_z = match &load.kind {
+            LoadKind::Pressure(_) => false,
+            LoadKind::Traction(traction) => !traction[2].is_zero(),
+            LoadKind::Force { total, .. } => total[2] != 0.0,
+        };
+        if self.is_plane() && acts_along_z {
+            return at.refuse("a load in z in a plane problem", "", "");
+        }
+        let LoadKind::Force { total, .. } = load.kind else { return Ok(()) };
+        if total.iter().any(|force| !force.is_finite()) {
+            return at.below("force").refuse(format!("the force is {total:?}"), "", "");
+        }
+        if self.plane == Plane::Axisymmetric && total[0] != 0.0 {
+            return at.below("force").refuse(
+                "a total force across the axis in an axisymmetric scene",
+                "radial forces cancel all around: the first component must be 0",
+                "for a radial load give pressure = p or traction = [tr, ta]",
+            );
+        }
+        Ok(())
+    }
+
+    fn check_adapt(&self, at: &At) -> Checked {
+        let Some(adapt) = &self.adapt else { return Ok(()) };
+        let at = at.below("error");
+        at.positive("the error", adapt.error)?;
+        if adapt.error >= 1.0 {
+            let message = format!("the error is {}", shown(adapt.error));
+            return at.refuse(message, "must be less than 1", "it is a share: 0.01 is one per cent");
+        }
+        Ok(())
+    }
 }
 
-fn elasticity_is_good(at: &At, elasticity: &ElasticitySpec) -> Checked {
+fn check_mesh(at: &At, mesh: &MeshSource) -> Checked {
+    let MeshSource::Geo { guard, .. } = mesh else { return Ok(()) };
+    at.positive_in("timeout", "the timeout", guard.seconds)?;
+    guard.gigabytes.map_or(Ok(()), |memory| at.positive_in("memory", "the memory", memory))?;
+    guard.size.map_or(Ok(()), |size| at.positive_in("size", "the size", size))
+}
+
+fn check_elasticity(at: &At, elasticity: &ElasticitySpec) -> Checked {
     let Constants::Isotropic { young, poisson } = &elasticity.constants else { return Ok(()) };
     if let Field::Constant(young) = young {
         at.positive_in("young", "Young's modulus", *young)?;
@@ -236,41 +239,91 @@ fn elasticity_is_good(at: &At, elasticity: &ElasticitySpec) -> Checked {
     }
 }
 
-/// Rules that find pairs: each of other bodies.
-fn rules(all: &[AutoContact]) -> Checked {
-    let mut known = HashSet::new();
-    for AutoContact { distance, of, contact } in all {
-        let at = At::new(format!("contact.{}", contact.table), &contact.between[0].place);
-        at.positive_in("distance", "the distance", *distance)?;
-        let names = of.as_ref().map(|of| of.each_ref().map(|name| &name.value));
-        for (side, name) in names.iter().flatten().enumerate() {
-            at.below(format_args!("of.{side}")).name(name)?;
+fn check_spring(at: &At, spring: &SpringSpec) -> Checked {
+    // expressions are checked where they are evaluated; here they count as > 0
+    let constant = |field: &Field| if let Field::Constant(value) = field { *value } else { f64::MIN_POSITIVE };
+    match &spring.kind {
+        SpringKind::Normal(k) => at.positive_in("normal", "the stiffness", constant(k)),
+        SpringKind::Vector(all) if all.iter().all(Field::is_zero) => {
+            let label = "some component must be greater than 0";
+            at.below("stiffness").refuse("the spring has no stiffness", label, "")
         }
-        if !known.insert(names.map(|[a, b]| [a.min(b), a.max(b)])) {
-            return match names {
-                None => at.refuse(
-                    "a second contact between \"auto\" of all bodies",
-                    "",
-                    "name the bodies of each: of = [\"one_*\", \"other_*\"]",
-                ),
-                Some([a, b]) => {
-                    let message = format!("a second contact between \"auto\" of `{a}` and `{b}`");
-                    at.below("of.0").refuse(message, "", "remove one of the two")
-                }
-            };
+        SpringKind::Vector(all) => {
+            let mut negative = all.iter().map(constant).filter(|value| *value < 0.0 || value.is_nan());
+            negative.try_for_each(|value| at.positive_in("stiffness", "the stiffness", value))
+        }
+    }
+}
+
+/// Return the key of the table of a contact.
+fn at_contact(contact: &ContactSpec) -> At<'_> {
+    At::new(format!("contact.{}", contact.table), &contact.between[0].place)
+}
+
+/// Check pairs of surfaces that the scene names: two plain names each, and no pair twice.
+fn check_pairs(contacts: &[ContactSpec]) -> Checked {
+    let mut pairs = HashSet::new();
+    for contact in contacts {
+        let at = at_contact(contact).below("between");
+        let [a, b] = contact.between.each_ref().map(|name| &name.value);
+        if a == b {
+            let help = "name one surface of each of two bodies";
+            let second = At { near: &contact.between[1].place, ..at.below(1) };
+            return second.refuse(format!("a contact between `{b}` and itself"), "", help);
+        }
+        if !pairs.insert([a.min(b), a.max(b)]) {
+            return at.below(0).refuse(format!("a second contact of `{a}` and `{b}`"), "", "remove one of the two");
+        }
+        let is_plural = |name: &String| name.contains(['*', '?']);
+        if let Some((side, name)) = [a, b].into_iter().enumerate().find(|(_, name)| is_plural(name)) {
+            let help =
+                "many pairs are found between bodies: between = \"auto\", of = [\"one_*\", \"other_*\"], distance = D";
+            let message = format!("the pattern `{name}` for one surface");
+            return at.below(side).refuse(message, "one name belongs here", help);
         }
     }
     Ok(())
 }
 
-fn contact_is_good(at: &At, contact: &ContactSpec) -> Checked {
+/// Check rules that find pairs: no two are for the same names of bodies.
+fn check_rules(rules: &[AutoContact]) -> Checked {
+    let mut known = HashSet::new();
+    for AutoContact { distance, of, contact } in rules {
+        let at = at_contact(contact);
+        at.positive_in("distance", "the distance", *distance)?;
+        let names = of.as_ref().map(|of| of.each_ref().map(|name| &name.value));
+        for (side, name) in names.iter().flatten().enumerate() {
+            at.below(format_args!("of.{side}")).name(name)?;
+        }
+        if known.insert(names.map(|[a, b]| [a.min(b), a.max(b)])) {
+            continue;
+        }
+        return match names {
+            None => at.refuse(
+                "a second contact between \"auto\" of all bodies",
+                "",
+                "name the bodies of each: of = [\"one_*\", \"other_*\"]",
+            ),
+            Some([a, b]) => {
+                let message = format!("a second contact between \"auto\" of `{a}` and `{b}`");
+                at.below("of.0").refuse(message, "", "remove one of the two")
+            }
+        };
+    }
+    Ok(())
+}
+
+fn check_contact(at: &At, contact: &ContactSpec) -> Checked {
     at.positive_in("angle", "the angle", contact.angle)?;
     if contact.angle > 90.0 {
         let message = format!("the angle is {} degrees", shown(contact.angle));
         return at.below("angle").refuse(message, "must be at most 90", "");
     }
-    let at = at.below("layer");
-    match &contact.layer {
+    check_layer(&at.below("layer"), &contact.layer)
+}
+
+fn check_layer(at: &At, layer: &LayerSpec) -> Checked {
+    match layer {
         LayerSpec::Form { form, values } => {
             for (parameter, value) in form.parameters.iter().zip(values) {
                 let Field::Constant(value) = *value else { continue };
@@ -282,50 +335,42 @@ fn contact_is_good(at: &At, contact: &ContactSpec) -> Checked {
             }
             Ok(())
         }
-        LayerSpec::Table(points) => {
-            let at = at.below("table");
-            if points.is_empty() {
-                return at.refuse("the table has no point", "", "write table = [[1e-5, 2], [2e-5, 10]]");
-            }
-            for (before, point) in std::iter::once(&[0.0; 2]).chain(points).zip(points) {
-                for (k, what) in ["compression", "pressure"].into_iter().enumerate() {
-                    if point[k] <= before[k] || !point[k].is_finite() {
-                        let values = [point[k], before[k]].map(shown).join(" of the table does not exceed ");
-                        let help = "a layer's law increases from p(0) = 0";
-                        return at.refuse(format!("the {what} {values}"), "", help);
-                    }
-                }
-            }
-            Ok(())
-        }
-        LayerSpec::Asperities(spec) => {
-            let at = at.below("asperities");
-            at.positive_in("modulus", "the modulus", spec.modulus)?;
-            if let Depths::Normal { deviation, highest } = spec.depths {
-                at.positive_in("deviation", "the deviation", deviation)?;
-                at.positive_in("highest", "the highest summit", highest)?;
-            }
-            at.positive_in("density", "the density", spec.density)?;
-            at.positive_in("radius", "the radius", spec.radius)
-        }
+        LayerSpec::Table(points) => check_table(&at.below("table"), points),
+        LayerSpec::Asperities(spec) => check_asperities(&at.below("asperities"), spec),
         LayerSpec::Pressure { up_to: Some(end), .. } => at.positive_in("up_to", "the end of the law", *end),
         LayerSpec::Pressure { .. } | LayerSpec::Own(_) => Ok(()),
     }
 }
 
-fn method_is_good(at: &At, method: &MethodSpec) -> Checked {
-    match &method.gamma {
-        Gamma::Stationary(gamma) => at.positive_in("gamma", "gamma", *gamma)?,
-        Gamma::Schedule(list) if list.is_empty() => {
-            let help = "write a number, a list of numbers, or the name of a rule";
-            return at.below("gamma").refuse("gamma has no value", "", help);
-        }
-        Gamma::Schedule(list) => {
-            let one = |(k, gamma): (usize, &f64)| at.below(format_args!("gamma.{k}")).positive("gamma", *gamma);
-            list.iter().enumerate().try_for_each(one)?;
-        }
-        _ => {}
+/// Check that compressions and pressures (c, p) increase from (0, 0).
+fn check_table(at: &At, points: &[[f64; 2]]) -> Checked {
+    if points.is_empty() {
+        return at.refuse("the table has no point", "", "write table = [[1e-5, 2], [2e-5, 10]]");
     }
+    for (before, point) in std::iter::once(&[0.0; 2]).chain(points).zip(points) {
+        for (k, what) in ["compression", "pressure"].into_iter().enumerate() {
+            if point[k] <= before[k] || !point[k].is_finite() {
+                let values = [point[k], before[k]].map(shown).join(" of the table does not exceed ");
+                let help = "a layer's law increases from p(0) = 0";
+                return at.refuse(format!("the {what} {values}"), "", help);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_asperities(at: &At, spec: &AsperitySpec) -> Checked {
+    at.positive_in("modulus", "the modulus", spec.modulus)?;
+    if let Depths::Normal { deviation, highest } = spec.depths {
+        at.positive_in("deviation", "the deviation", deviation)?;
+        at.positive_in("highest", "the highest summit", highest)?;
+    }
+    at.positive_in("density", "the density", spec.density)?;
+    at.positive_in("radius", "the radius", spec.radius)
+}
+
+fn check_method(at: &At, method: &MethodSpec) -> Checked {
+    check_gamma(at, &method.gamma)?;
     if let RobinRule::Floor(floor) = method.robin {
         at.positive_in("robin.floor", "the floor", floor)?;
     }
@@ -340,21 +385,47 @@ fn method_is_good(at: &At, method: &MethodSpec) -> Checked {
         let help = "name = \"robin\", or leave `interval` away";
         return at.below("interval").refuse("only the method `robin` has an interval of gamma", "", help);
     }
+    check_steps(&at.below("steps"), method)?;
+    check_stop(&at.below("stop"), &method.stop)
+}
+
+/// Check gamma; `at` is the method.
+fn check_gamma(at: &At, gamma: &Gamma) -> Checked {
+    match gamma {
+        Gamma::Stationary(gamma) => at.positive_in("gamma", "gamma", *gamma),
+        Gamma::Schedule(list) if list.is_empty() => {
+            let help = "write a number, a list of numbers, or the name of a rule";
+            at.below("gamma").refuse("gamma has no value", "", help)
+        }
+        Gamma::Schedule(list) => {
+            let one = |(k, gamma): (usize, &f64)| at.below(format_args!("gamma.{k}")).positive("gamma", *gamma);
+            list.iter().enumerate().try_for_each(one)
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_steps(at: &At, method: &MethodSpec) -> Checked {
     if !method.steps.is_empty() && matches!(method.start, Start::Nested) {
         let help = "each step starts from the one before: leave `start = \"nested\"` away";
-        return at.below("steps").refuse("load steps after a start from a coarser mesh", "", help);
+        return at.refuse("load steps after a start from a coarser mesh", "", help);
     }
-    // tables come from files, which were checked
-    let steps = if method.steps.is_table() { &[] } else { &method.steps.steps[..] };
-    for (k, step) in steps.iter().enumerate() {
-        let at = at.below(format_args!("steps.{k}"));
-        step.factors.iter().try_for_each(|share| at.positive("the factor", *share))?;
+    // the numbers of a table were checked when its file was read
+    if method.steps.is_table() {
+        return Ok(());
     }
-    if steps.last().is_some_and(|last| last.factors != [1.0]) {
+    for (k, step) in method.steps.steps.iter().enumerate() {
+        let at = at.below(k);
+        step.factors.iter().try_for_each(|factor| at.positive("the factor", *factor))?;
+    }
+    if method.steps.steps.last().is_some_and(|last| last.factors != [1.0]) {
         let help = "end the list with 1; a table may end anywhere: steps = { table = \"path.csv\" }";
-        return at.below("steps").refuse("the last load step is not the full load", "", help);
+        return at.refuse("the last load step is not the full load", "", help);
     }
-    let (at, stop) = (at.below("stop"), &method.stop);
+    Ok(())
+}
+
+fn check_stop(at: &At, stop: &StopRule) -> Checked {
     if stop.iterations == 0 || stop.residual.or(stop.increment).is_none() {
         return at.refuse("a stop rule has a tolerance, and at least one iteration", "", "");
     }

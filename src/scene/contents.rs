@@ -1,12 +1,12 @@
-//! What a scene asks for, wherever its files are: equal for scenes that have the same answer.
+//! What a scene asks for, wherever its files are. Scenes with equal contents have the same answer.
 
 use super::Scene;
 use crate::file::digest;
 use serde_json::{Value, json};
 
 impl Scene {
-    /// Return the settings without the names of files and folders, and with digests of the numbers of data files in their place. Tables
-    /// are in the settings with their numbers. The contents of the mesh's files are not in it.
+    /// Return the settings without the names of files and folders. The name of each data file is replaced by a digest of its numbers;
+    /// the settings have the numbers of tables themselves. The contents of the mesh's files are not included.
     pub fn contents(&self) -> Value {
         let mut settings = self.settings();
         let mut remove = |place: &str, keys: &[&str]| {
@@ -24,7 +24,7 @@ impl Scene {
         settings
     }
 
-    /// Return the contents without what changes neither problem nor method: what is written and how it is called.
+    /// Return the contents without the keys that change neither problem nor method: title, units and output.
     pub fn problem(&self) -> Value {
         let mut contents = self.contents();
         if let Some(table) = contents.as_object_mut() {

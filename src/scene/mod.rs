@@ -1,4 +1,7 @@
-//! What the user wrote: TOML -> checked [`Scene`]. Every refusal names file, line, and the way out.
+//! Scene files: from TOML to a checked [`Scene`]. Every refusal names file and line, and says what to do.
+//!
+//! [`load`] reads the file into a tree of values (`read`), applies the overrides of the command line (`overrides`), and decodes the tree
+//! (`decode`), whose tables must fit their shapes (`shape`). The scene that results (`spec`) is then checked (`check`).
 
 mod build;
 mod check;
@@ -20,15 +23,16 @@ use crate::error::{Error, Kind, Result, Source};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Reads and checks a scene file, after replacing what `overrides` say (`KEY=VALUE`, as given to `--set`; the last
-/// one wins). The mesh file is looked for, not read.
+/// Read and check a scene file, after applying `overrides` in their order: `KEY=VALUE` as given to `--set`, or options that are short for
+/// it. The mesh file must exist; it is not read.
 ///
-/// Errors point at the words in the scene or the override; a file that cannot be read is [`Kind::File`].
+/// # Errors
+/// Refusals point at the text of the scene or of the override. A file that cannot be read is [`Kind::File`].
 pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
     parse(path, read_text(path)?, overrides)
 }
 
-/// Checks the text of a scene file like [`load`], which reads it from `path`.
+/// Check the text of a scene file like [`load`], which reads it from `path`.
 ///
 /// # Errors
 /// Those of [`load`], but for reading the file.
@@ -39,7 +43,7 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
         overrides::apply(&mut tree, text)?;
     }
     let scene = decode::scene(&tree, path)?;
-    scene.verify().map_err(|fault| fault.error.at(tree.place_of(&fault.key)))?;
+    scene.verify().map_err(|refusal| refusal.error.at(tree.place_of(&refusal.key)))?;
     Ok(scene)
 }
 

@@ -1,19 +1,19 @@
-//! TOML as a tree of values that know where they stand, with getters that refuse in words.
+//! TOML as a tree of values with their places, and getters that refuse a wrong value with its place and advice.
 
-use super::shape::{Form, Table};
+use super::shape::{TableShape, ValueKind};
 use crate::error::{Error, Located, Place, Result, Source, nearest, shown};
 use std::ops::Range;
 use std::sync::Arc;
 use toml::de::{DeTable, DeValue};
 
-/// A value and its place.
+/// A TOML value and its place.
 #[derive(Debug, Clone)]
 pub(super) struct Node {
     pub place: Place,
     pub value: Value,
 }
 
-/// Kinds of TOML value.
+/// A TOML value.
 #[derive(Debug, Clone)]
 pub(super) enum Value {
     String(String),
@@ -22,7 +22,7 @@ pub(super) enum Value {
     Boolean(bool),
     Date,
     List(Vec<Node>),
-    /// In the order of the text.
+    /// The entries in the order of the text.
     Table(Vec<Entry>),
 }
 
@@ -34,7 +34,10 @@ pub(super) struct Entry {
     pub node: Node,
 }
 
-/// Parses a whole scene; the result is a table.
+/// Parse the text of a scene file into a table.
+///
+/// # Errors
+/// A text that is not TOML, and numbers that are too large to hold.
 pub(super) fn document(source: &Arc<Source>) -> Result<Node> {
     let table = DeTable::parse(&source.text).map_err(|error| syntax(source, 0, &error))?;
     let convert = Convert { source, offset: 0 };
@@ -42,44 +45,50 @@ pub(super) fn document(source: &Arc<Source>) -> Result<Node> {
     Ok(Node { place: convert.place(table.span()), value })
 }
 
-/// Parses the value that stands at `offset` of the source up to its end.
+/// Parse the value that reaches from byte `offset` of the source to its end.
+///
+/// # Errors
+/// Those of [`document`].
 pub(super) fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
     let value = DeValue::parse(&source.text[offset..]).map_err(|error| syntax(source, offset, &error))?;
     Convert { source, offset }.node(&value)
 }
 
-/// Turns an error of the `toml` crate into ours.
+/// Turn an error of the `toml` crate into a refusal, with advice for common slips.
 fn syntax(source: &Arc<Source>, offset: usize, error: &toml::de::Error) -> Error {
-    let span = error.span().unwrap_or(0..0);
-    let place = Convert { source, offset }.place(span);
+    let place = Convert { source, offset }.place(error.span().unwrap_or(0..0));
     let marked = &source.text[place.span.clone()];
-    let refusal = Error::scene(&place, format!("this is not TOML: {}", error.message()));
-    let quotable = !marked.is_empty() && !marked.contains(['"', '\'', '\n', '=', '[', '{']);
     let before = source.text[..place.span.start].trim_end();
-    let repeats = matches!(marked, "body" | "contact") && before.lines().next_back().is_some_and(|line| line == "[");
-    if repeats {
+    let refusal = Error::scene(&place, format!("this is not TOML: {}", error.message()));
+    let is_single_bracket =
+        matches!(marked, "body" | "contact") && before.lines().next_back().is_some_and(|line| line == "[");
+    let is_bare_text =
+        !marked.is_empty() && !marked.contains(['"', '\'', '\n', '=', '[', '{']) && before.ends_with(['=', '[', ',']);
+    if is_single_bracket {
         refusal.help(format!("each {marked} begins with two brackets: [[{marked}]]"))
     } else if source.name.ends_with(".geo") {
         refusal.help("a scene is a TOML file that names its script: mesh = \"part.geo\"; `winkler new` writes both")
-    } else if quotable && before.ends_with(['=', '[', ',']) {
+    } else if is_bare_text {
         refusal.help(format!("texts and expressions need quotes: \"{marked}\""))
     } else {
         refusal
     }
 }
 
+/// The conversion of the `toml` crate's values, whose spans count from `offset` of the source.
 struct Convert<'a> {
     source: &'a Arc<Source>,
     offset: usize,
 }
 
 impl Convert<'_> {
-    /// A place, kept inside the text and on character borders.
+    /// Return the place of a span, moved into the text and onto character boundaries.
     fn place(&self, span: Range<usize>) -> Place {
         let text = &self.source.text;
-        let border = |from: usize| (0..=from.min(text.len())).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
-        let start = border(span.start + self.offset);
-        let end = border(span.end + self.offset).max(start);
+        let boundary =
+            |from: usize| (0..=from.min(text.len())).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
+        let start = boundary(span.start + self.offset);
+        let end = boundary(span.end + self.offset).max(start);
         Place { source: self.source.clone(), span: start..end }
     }
 
@@ -116,8 +125,8 @@ impl Convert<'_> {
 }
 
 impl Node {
-    /// Refusal of a value of the wrong kind; `about` says what belongs there.
-    pub fn expected(&self, what: &str, about: &str) -> Error {
+    /// Return the refusal of a value that is not of the kind `what`. `advice` says what belongs there; it may be empty.
+    pub fn expected(&self, what: &str, advice: &str) -> Error {
         let found = match &self.value {
             Value::String(_) => "a string",
             Value::Integer(_) => "a whole number",
@@ -133,30 +142,30 @@ impl Node {
             Value::Integer(_) | Value::Float(_) | Value::Boolean(_) if what == "a string" => {
                 error.help("write it in quotes")
             }
-            _ if about.is_empty() => error,
-            _ => error.help(about),
+            _ if advice.is_empty() => error,
+            _ => error.help(advice),
         }
     }
 
-    /// Refusal of a value of the right kind.
+    /// Return a refusal that points at this value.
     pub fn refuse(&self, message: impl Into<String>) -> Error {
         Error::scene(&self.place, message)
     }
 
-    /// The place of the first such word in a text, or of the whole where it is not written as it reads.
+    /// Return the place of the first occurrence of `word` in this text. If escapes hide the word, return the place of the whole text.
     pub fn place_of_word(&self, word: &str) -> Place {
         let Place { source, span } = &self.place;
         let found = source.text[span.clone()].find(word).map(|at| span.start + at);
         Place { source: source.clone(), span: found.map_or(span.clone(), |at| at..at + word.len()) }
     }
 
-    /// The place of the value at a dotted path, or of the nearest one around it.
+    /// Return the place of the value at a dotted path, or of the innermost value around it that is there.
     pub fn place_of(&self, path: &str) -> &Place {
         let mut node = self;
         for key in path.split('.') {
             let below = match &node.value {
                 Value::Table(entries) => entries.iter().find(|entry| entry.key == key).map(|entry| &entry.node),
-                Value::List(items) => key.parse().ok().and_then(|place: usize| items.get(place)),
+                Value::List(items) => key.parse().ok().and_then(|index: usize| items.get(index)),
                 _ => None,
             };
             let Some(below) = below else { break };
@@ -165,12 +174,12 @@ impl Node {
         &node.place
     }
 
-    /// Whether it is a table with this key.
-    pub fn holds(&self, key: &str) -> bool {
+    /// Return whether this is a table with this key.
+    pub fn has_key(&self, key: &str) -> bool {
         matches!(&self.value, Value::Table(entries) if entries.iter().any(|entry| entry.key == key))
     }
 
-    /// The name of a table that has one.
+    /// Return the text of the key `name` of this table, if there is one.
     pub fn name_in(&self) -> Option<&str> {
         let Value::Table(entries) = &self.value else { return None };
         entries.iter().find(|entry| entry.key == "name").and_then(|entry| entry.node.string().ok())
@@ -183,7 +192,7 @@ impl Node {
         }
     }
 
-    /// A string that is a name: not empty.
+    /// Return a text that is not empty, with its place.
     pub fn name(&self) -> Result<Located<String>> {
         match self.string()? {
             "" => Err(self.refuse("the name is empty")),
@@ -191,7 +200,7 @@ impl Node {
         }
     }
 
-    /// A finite number.
+    /// Return a finite number.
     pub fn number(&self) -> Result<f64> {
         match self.value {
             Value::Integer(value) => Ok(value as f64),
@@ -201,7 +210,7 @@ impl Node {
         }
     }
 
-    /// A finite number > 0; `what` names it in the message.
+    /// Return a finite number > 0; `what` names it in the message.
     pub fn positive(&self, what: &str) -> Result<f64> {
         match self.number()? {
             value if value > 0.0 => Ok(value),
@@ -209,7 +218,7 @@ impl Node {
         }
     }
 
-    /// A whole number, not negative; a fraction is refused.
+    /// Return a whole number >= 0.
     pub fn count(&self) -> Result<usize> {
         match self.value {
             Value::Integer(value) => usize::try_from(value).map_err(|_| self.refuse("the number is below 0")),
@@ -232,118 +241,138 @@ impl Node {
     }
 }
 
-impl Form {
-    /// Whether a value is of this kind, whatever is in it.
+impl ValueKind {
+    /// Return whether a value is of this kind. The items of lists and the entries of tables are not looked at.
     fn admits(&self, value: &Value) -> bool {
         match self {
             Self::Text | Self::Word(_) => matches!(value, Value::String(_)),
             Self::Flag => matches!(value, Value::Boolean(_)),
             Self::Number => matches!(value, Value::Integer(_) | Value::Float(_)),
-            Self::Whole | Self::Count | Self::Among(_) => matches!(value, Value::Integer(_)),
+            Self::NonNegativeInteger | Self::PositiveInteger | Self::OneOf(_) => matches!(value, Value::Integer(_)),
             Self::Field => matches!(value, Value::Integer(_) | Value::Float(_) | Value::String(_)),
             Self::List(_) => matches!(value, Value::List(_)),
-            Self::Table(_) | Self::Named(_) => matches!(value, Value::Table(_)),
-            Self::Either(forms) => forms.iter().any(|form| form.admits(value)),
+            Self::Table(_) | Self::Map(_) => matches!(value, Value::Table(_)),
+            Self::Either(kinds) => kinds.iter().any(|kind| kind.admits(value)),
         }
     }
 
-    /// Why a whole number is refused; none if it is not.
-    fn breach(&self, value: &Value) -> Option<String> {
-        match (self, value) {
-            (Self::Whole, Value::Integer(..0)) => Some("must be 0 or more".to_owned()),
-            (Self::Count, Value::Integer(..1)) => Some("must be 1 or more".to_owned()),
-            (Self::Among(known), Value::Integer(number)) if !known.contains(number) => {
+    /// Return what a whole number must be instead; `None` if it is in range.
+    fn breach(&self, number: i64) -> Option<String> {
+        match self {
+            Self::NonNegativeInteger if number < 0 => Some("must be 0 or more".to_owned()),
+            Self::PositiveInteger if number < 1 => Some("must be 1 or more".to_owned()),
+            Self::OneOf(known) if !known.contains(&number) => {
                 let known: Vec<String> = known.iter().map(i64::to_string).collect();
                 Some(format!("must be {}", known.join(" or ")))
             }
-            (Self::Either(forms), _) => {
-                forms.iter().filter(|form| form.admits(value)).find_map(|form| form.breach(value))
-            }
+            Self::Either(kinds) => kinds.iter().find_map(|kind| kind.breach(number)),
             _ => None,
         }
     }
 }
 
-/// Names that others give to keys.
-const USUAL: [(&str, &str); 6] =
+/// Names that other programs give to keys, and the names of the keys here.
+const SYNONYMS: [(&str, &str); 6] =
     [("nu", "poisson"), ("E", "young"), ("e", "young"), ("modulus", "young"), ("dim", "dimension"), ("bc", "fix")];
 
-/// Keys of the whole scene that are values, which TOML gives to the table before them.
-const TOP: [&str; 8] = ["title", "dimension", "plane", "units", "mesh", "solver", "estimate", "adapt"];
+/// Keys of the whole scene that are values. Below a line in brackets TOML gives them to that table instead.
+const TOP_LEVEL: [&str; 8] = ["title", "dimension", "plane", "units", "mesh", "solver", "estimate", "adapt"];
 
-/// A table whose keys are all known, with values of the right kind.
+/// A table that fits its shape: all its keys are known, and their values are of the right kind.
 pub(super) struct Keys<'a> {
     /// The table itself.
     pub node: &'a Node,
     entries: &'a [Entry],
-    what: String,
+    /// Name of the table in messages.
+    name: String,
 }
 
 impl<'a> Keys<'a> {
-    /// Opens a table; what does not fit its shape is refused.
-    pub fn open(node: &'a Node, shape: &Table) -> Result<Self> {
-        let names = || shape.keys.iter().filter(|key| !key.about.is_empty()).map(|key| key.name);
-        let all = || format!("its keys are {}", names().collect::<Vec<_>>().join(", "));
-        let Value::Table(entries) = &node.value else { return Err(node.expected("a table", &all())) };
-        let keys = Self { node, entries, what: shape.what.to_string() };
+    /// Open a table of this shape.
+    ///
+    /// # Errors
+    /// A value that is no table, unknown keys, values of the wrong kind, keys that exclude each other, and missing keys.
+    pub fn open(node: &'a Node, shape: &TableShape) -> Result<Self> {
+        let Value::Table(entries) = &node.value else { return Err(node.expected("a table", &key_list(shape))) };
+        let keys = Self { node, entries, name: shape.name.to_string() };
         for Entry { key: name, key_place, node } in entries {
             let Some(key) = shape.keys.iter().find(|key| key.name == name) else {
-                let error = Error::scene(key_place, format!("unknown key `{name}` in {}", keys.what));
-                let other = USUAL.iter().find(|(usual, own)| usual == name && names().any(|key| key == *own));
-                return Err(error.label("unknown key").help(
-                    match other.map(|(_, own)| *own).or_else(|| nearest(name, names())) {
-                        Some(near) => format!("did you mean `{near}`?"),
-                        None if TOP.contains(&name.as_str()) => {
-                            format!("`{name}` belongs to the whole scene: write it above the first line in [brackets]")
-                        }
-                        None => all(),
-                    },
-                ));
+                return Err(unknown_key(name, key_place, shape));
             };
-            if !key.form.admits(&node.value) {
-                return Err(node.expected(&key.form.words(), &key.about));
+            if !key.kind.admits(&node.value) {
+                return Err(node.expected(&key.kind.words(), &key.description));
             }
-            if let (Some(breach), Value::Integer(number)) = (key.form.breach(&node.value), &node.value) {
+            if let Value::Integer(number) = node.value
+                && let Some(breach) = key.kind.breach(number)
+            {
                 return Err(node.refuse(format!("`{name}` is {number}")).label(breach));
             }
         }
-        shape.apart.iter().try_for_each(|[first, second]| keys.exclude(first, second))?;
-        for key in shape.keys.iter().filter(|key| key.must) {
-            keys.require(key.name).map_err(|error| error.help(format!("{}: {}", key.name, key.about)))?;
+        shape.exclusive.iter().try_for_each(|[first, second]| keys.exclude(first, second))?;
+        for key in shape.keys.iter().filter(|key| key.required) {
+            keys.require(key.name).map_err(|error| error.help(format!("{}: {}", key.name, key.description)))?;
         }
         Ok(keys)
     }
 
+    /// Return the key and its value, if the key is given.
     pub fn entry(&self, key: &str) -> Option<&'a Entry> {
         self.entries.iter().find(|entry| entry.key == key)
     }
 
+    /// Return the value of a key, if the key is given.
     pub fn get(&self, key: &str) -> Option<&'a Node> {
         self.entry(key).map(|entry| &entry.node)
     }
 
-    /// True or false, or what holds without the key.
-    pub fn flag(&self, key: &str, usual: bool) -> Result<bool> {
-        self.get(key).map_or(Ok(usual), Node::boolean)
+    /// Read the value of a key by `read`, if the key is given.
+    pub fn read<T>(&self, key: &str, read: impl FnOnce(&'a Node) -> Result<T>) -> Result<Option<T>> {
+        self.get(key).map(read).transpose()
     }
 
-    /// The value of a key that must be there.
+    /// Return the items of a list; there are none without the key.
+    pub fn items(&self, key: &str) -> Result<&'a [Node]> {
+        Ok(self.read(key, Node::list)?.unwrap_or_default())
+    }
+
+    /// Return true or false, or `default` without the key.
+    pub fn flag(&self, key: &str, default: bool) -> Result<bool> {
+        Ok(self.read(key, Node::boolean)?.unwrap_or(default))
+    }
+
+    /// Return the value of a key that must be there.
     pub fn require(&self, key: &str) -> Result<&'a Node> {
         self.get(key).ok_or_else(|| {
-            Error::scene(&self.node.place, format!("{} has no `{key}`", self.what)).label(format!("`{key}` is missing"))
+            Error::scene(&self.node.place, format!("{} has no `{key}`", self.name)).label(format!("`{key}` is missing"))
         })
     }
 
-    /// Refuses a table with two keys of which only one can hold; points at the later one, or the overriding one.
+    /// Refuse a table that has both keys. The caret marks the later one; an override comes later than what the scene file has.
     fn exclude(&self, first: &str, second: &str) -> Result<()> {
-        let mut both = self.entries.iter().filter(|entry| entry.key == first || entry.key == second).skip(1);
-        match both.next() {
-            None => Ok(()),
-            Some(Entry { key_place, .. }) => {
-                Err(Error::scene(key_place, format!("{} has both `{first}` and `{second}`", self.what))
-                    .label("only one of them can hold")
-                    .help(format!("remove `{first}` or `{second}`")))
-            }
-        }
+        let mut both = self.entries.iter().filter(|entry| entry.key == first || entry.key == second);
+        let Some(Entry { key_place, .. }) = both.nth(1) else { return Ok(()) };
+        Err(Error::scene(key_place, format!("{} has both `{first}` and `{second}`", self.name))
+            .label("only one of them can hold")
+            .help(format!("remove `{first}` or `{second}`")))
     }
+}
+
+/// Return the refusal of a key that the table does not have, with the key that was probably meant.
+fn unknown_key(name: &str, place: &Place, shape: &TableShape) -> Error {
+    let known = || shape.documented().map(|key| key.name);
+    let synonym = SYNONYMS.iter().find(|(other, own)| *other == name && known().any(|key| key == *own));
+    let help = match synonym.map(|(_, own)| *own).or_else(|| nearest(name, known())) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None if TOP_LEVEL.contains(&name) => {
+            format!("`{name}` belongs to the whole scene: write it above the first line in [brackets]")
+        }
+        None => key_list(shape),
+    };
+    Error::scene(place, format!("unknown key `{name}` in {}", shape.name)).label("unknown key").help(help)
+}
+
+/// Return the advice that lists the keys of a table.
+fn key_list(shape: &TableShape) -> String {
+    let names: Vec<&str> = shape.documented().map(|key| key.name).collect();
+    format!("its keys are {}", names.join(", "))
 }

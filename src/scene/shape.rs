@@ -1,118 +1,126 @@
-//! What a table of a scene may have: its keys, the values that each takes, what they mean. [`Keys::open`](super::read::Keys::open)
-//! refuses what does not fit, and the [JSON schema](super::schema) of scenes is made of the same tables.
+//! The shape of each table of a scene: which keys it may have, which kinds of value they take, and what they mean.
+//!
+//! [`Keys::open`](super::read::Keys::open) refuses a table that does not fit its shape, and the [JSON schema](super::schema) is made
+//! of the same shapes.
 
 use std::borrow::Cow;
 
-/// A table: its name in messages, its keys, and pairs of keys of which only one can hold.
-pub struct Table {
-    /// Name in messages.
-    pub what: Cow<'static, str>,
-    /// The keys in the order in which messages list them.
-    pub keys: Vec<Key>,
-    /// Keys that exclude each other.
-    pub apart: Vec<[&'static str; 2]>,
+/// The shape of a table.
+pub struct TableShape {
+    /// Name of the table in messages.
+    pub name: Cow<'static, str>,
+    /// The keys, in the order in which messages list them.
+    pub keys: Vec<KeyShape>,
+    /// Pairs of keys that exclude each other.
+    pub exclusive: Vec<[&'static str; 2]>,
 }
 
-/// A key of a table.
-pub struct Key {
-    /// Its name.
+/// The shape of a key.
+pub struct KeyShape {
+    /// Name of the key.
     pub name: &'static str,
-    /// The values that it takes.
-    pub form: Form,
-    /// What it is, with its default; the advice where its value is of the wrong kind. Without one the key is no part of a scene file.
-    pub about: Cow<'static, str>,
-    /// Whether a table must have it.
-    pub must: bool,
+    /// The kind of value that it takes.
+    pub kind: ValueKind,
+    /// What the key means, and its default. It is the description in the JSON schema, and the advice where a value is of the wrong
+    /// kind. A key without a description is set by the command line only, so that neither messages nor the schema mention it.
+    pub description: Cow<'static, str>,
+    /// Whether the table must have the key.
+    pub required: bool,
 }
 
-/// Values of a key.
-pub enum Form {
+/// A kind of value.
+pub enum ValueKind {
     /// A text.
     Text,
     /// True or false.
     Flag,
     /// A number.
     Number,
-    /// A whole number from 0 on.
-    Whole,
-    /// A whole number from 1 on.
-    Count,
-    /// One of some whole numbers.
-    Among(&'static [i64]),
+    /// A whole number >= 0.
+    NonNegativeInteger,
+    /// A whole number >= 1.
+    PositiveInteger,
+    /// One of these whole numbers.
+    OneOf(&'static [i64]),
     /// A number, or an expression in the coordinates.
     Field,
-    /// One of some words, which the decoder looks up.
+    /// One of these words. The check of the kind accepts any text; the decoder looks the word up and suggests the nearest one.
     Word(Vec<&'static str>),
-    /// A list of such values.
-    List(Box<Form>),
-    /// A table with these keys.
-    Table(Table),
-    /// A table whose keys are names.
-    Named(Box<Form>),
-    /// One of several forms.
-    Either(Vec<Form>),
+    /// A list of values of one kind.
+    List(Box<ValueKind>),
+    /// A table of a known shape.
+    Table(TableShape),
+    /// A table whose keys are names that the user chooses.
+    Map(Box<ValueKind>),
+    /// A value of any of these kinds.
+    Either(Vec<ValueKind>),
 }
 
-impl Table {
-    /// A table without keys.
-    pub fn new(what: impl Into<Cow<'static, str>>) -> Self {
-        Self { what: what.into(), keys: Vec::new(), apart: Vec::new() }
+impl TableShape {
+    /// Return the shape of a table without keys.
+    pub fn new(name: impl Into<Cow<'static, str>>) -> Self {
+        Self { name: name.into(), keys: Vec::new(), exclusive: Vec::new() }
     }
 
-    /// With a key that may be left out.
-    pub fn key(self, name: &'static str, form: Form, about: impl Into<Cow<'static, str>>) -> Self {
-        self.with(Key { name, form, about: about.into(), must: false })
+    /// Add a key that may be left out.
+    pub fn optional(self, name: &'static str, kind: ValueKind, description: impl Into<Cow<'static, str>>) -> Self {
+        self.with(KeyShape { name, kind, description: description.into(), required: false })
     }
 
-    /// With a key that must be there.
-    pub fn must(self, name: &'static str, form: Form, about: impl Into<Cow<'static, str>>) -> Self {
-        self.with(Key { name, form, about: about.into(), must: true })
+    /// Add a key that must be there.
+    pub fn required(self, name: &'static str, kind: ValueKind, description: impl Into<Cow<'static, str>>) -> Self {
+        self.with(KeyShape { name, kind, description: description.into(), required: true })
     }
 
-    fn with(mut self, key: Key) -> Self {
+    fn with(mut self, key: KeyShape) -> Self {
         self.keys.push(key);
         self
     }
 
-    /// Of these keys only one can hold.
-    pub fn apart(self, names: &[&'static str]) -> Self {
-        (1..names.len()).fold(self, |table, end| table.against(&names[end - 1..end], &names[end..]))
+    /// Let at most one of these keys be given.
+    pub fn at_most_one(self, names: &[&'static str]) -> Self {
+        (1..names.len()).fold(self, |table, end| table.not_both(&names[end - 1..end], &names[end..]))
     }
 
-    /// Each of some keys excludes each of others.
-    pub fn against(mut self, some: &[&'static str], others: &[&'static str]) -> Self {
-        self.apart.extend(some.iter().flat_map(|one| others.iter().map(|other| [*one, *other])));
+    /// Let each key of `some` exclude each key of `others`.
+    pub fn not_both(mut self, some: &[&'static str], others: &[&'static str]) -> Self {
+        self.exclusive.extend(some.iter().flat_map(|one| others.iter().map(|other| [*one, *other])));
         self
     }
 
-    /// This table as a value.
-    pub fn form(self) -> Form {
-        Form::Table(self)
+    /// Iterate over the keys that a scene file may have.
+    pub fn documented(&self) -> impl Iterator<Item = &KeyShape> {
+        self.keys.iter().filter(|key| !key.description.is_empty())
+    }
+
+    /// Return the kind of value that is a table of this shape.
+    pub fn into_kind(self) -> ValueKind {
+        ValueKind::Table(self)
     }
 }
 
-/// One of the words of a list of choices.
-pub fn word<T>(choices: &[(&'static str, T)]) -> Form {
-    Form::Word(choices.iter().map(|(name, _)| *name).collect())
+/// Return the kind of value that is one word of a list of choices.
+pub fn word<T>(choices: &[(&'static str, T)]) -> ValueKind {
+    ValueKind::Word(choices.iter().map(|(name, _)| *name).collect())
 }
 
-impl Form {
-    /// A list of such values.
+impl ValueKind {
+    /// Return the kind of value that is a list of values of this kind.
     pub fn list(self) -> Self {
         Self::List(Box::new(self))
     }
 
-    /// What it is in words.
+    /// Return what this kind is called in messages.
     pub fn words(&self) -> String {
         match self {
             Self::Text | Self::Word(_) => "a string".to_owned(),
             Self::Flag => "true or false".to_owned(),
             Self::Number => "a number".to_owned(),
-            Self::Whole | Self::Count | Self::Among(_) => "a whole number".to_owned(),
+            Self::NonNegativeInteger | Self::PositiveInteger | Self::OneOf(_) => "a whole number".to_owned(),
             Self::Field => "a number or an expression".to_owned(),
             Self::List(_) => "a list".to_owned(),
-            Self::Table(_) | Self::Named(_) => "a table".to_owned(),
-            Self::Either(forms) => forms.iter().map(Self::words).collect::<Vec<_>>().join(" or "),
+            Self::Table(_) | Self::Map(_) => "a table".to_owned(),
+            Self::Either(kinds) => kinds.iter().map(Self::words).collect::<Vec<_>>().join(" or "),
         }
     }
 }

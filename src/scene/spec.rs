@@ -1,4 +1,4 @@
-//! What the user asked for, checked: a problem, and what to do with it.
+//! The checked scene: a problem, how to solve it, and what to write.
 
 use crate::contact::law::OwnLaws;
 use crate::data::Library;
@@ -11,29 +11,29 @@ use std::path::PathBuf;
 /// A checked scene.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    /// Path of the scene file as given.
+    /// Path of the scene file, as given.
     pub path: PathBuf,
-    /// Title, or the file's stem.
+    /// Title; by default the name of the file without its extension.
     pub title: String,
     /// Space dimension: 2 or 3.
     pub dimension: Located<usize>,
-    /// Plane strain (default), plane stress or bodies of revolution; plane problems only.
+    /// What a plane problem stands for: plane strain (default), plane stress, or bodies of revolution.
     pub plane: Plane,
-    /// Units of its numbers, if it names them: words for labels.
+    /// Names of the units for labels, if they are given.
     pub units: Option<Units>,
     /// Where the mesh comes from.
     pub mesh: MeshSource,
-    /// Laws of layers that a Rust program brings, by name.
+    /// Laws of layers from a Rust program, by name.
     pub laws: OwnLaws,
-    /// Rules for gamma that a Rust program brings, by name.
+    /// Rules for gamma from a Rust program, by name.
     pub rules: OwnRules,
-    /// Functions from files, by name; those that no expression uses are not read.
+    /// Functions from files, by name. A file that no expression and no layer uses is not read.
     pub data: Library,
-    /// The tables of bodies, in the order of the file; the name of one may be a pattern, and so may those of groups.
+    /// The tables of bodies, in the order of the file. The name of a body may be a pattern, and so may the names of groups.
     pub bodies: Vec<BodySpec>,
     /// The pairs of contact surfaces, in the order of the file.
     pub contacts: Vec<ContactSpec>,
-    /// Rules for pairs to be found on the mesh, in the order of the file.
+    /// Rules that find pairs on the mesh, in the order of the file.
     pub auto: Vec<AutoContact>,
     /// The outer iteration.
     pub method: MethodSpec,
@@ -41,26 +41,26 @@ pub struct Scene {
     pub solver: SolverSpec,
     /// Whether to estimate the error of the discretisation.
     pub estimate: bool,
-    /// Meshes adapted to an error, if asked for.
+    /// How meshes are adapted, if the scene requests it.
     pub adapt: Option<AdaptSpec>,
     /// What to write.
     pub output: OutputSpec,
 }
 
-/// Meshes adapted until an estimated error is small enough.
+/// The accuracy to which meshes are adapted, and the limits of adaptation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdaptSpec {
-    /// Relative error of pressures and displacements asked for.
+    /// The requested relative error of pressures and displacements.
     pub error: f64,
-    /// Most cells of a mesh.
+    /// The most cells of a mesh.
     pub cells: usize,
-    /// Most meshes.
+    /// The most meshes.
     pub rounds: usize,
-    /// Where the error was asked for.
+    /// Place of the requested error.
     pub place: Place,
 }
 
-/// What to write.
+/// The files to write.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutputSpec {
     /// Folder for the results, if the scene names one (`-o` wins).
@@ -69,13 +69,13 @@ pub struct OutputSpec {
     pub vtu: bool,
     /// Whether to write `<body>.msh` with views for Gmsh; default false.
     pub msh: bool,
-    /// How the `.vtu` are written.
+    /// How the numbers of `.vtu` files are written.
     pub encoding: Encoding,
     /// Whether to write the page of the run, `report.html`; default false.
     pub report: bool,
     /// Whether to draw the SVG plots; default true.
     pub plots: bool,
-    /// Most pairs with tables and plots of their own; by default as many as a person looks through.
+    /// The most pairs with tables and plots of their own; by default as many as a person looks through.
     pub pairs: Option<usize>,
     /// Minutes between checkpoints; none by default.
     pub checkpoint: Option<f64>,

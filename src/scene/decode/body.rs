@@ -1,6 +1,6 @@
-//! `[[body]]`: supports, loads.
+//! `[[body]]`, with its supports, springs and loads.
 
-use super::{Decoder, Form, Keys, Node, Table, Value, elasticity, pattern};
+use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, elasticity, pattern};
 use crate::error::{Error, Result};
 use crate::expression::Field;
 use crate::problem::{BodySpec, Load, LoadKind, Order, SpringKind, SpringSpec, Support};
@@ -8,100 +8,110 @@ use crate::problem::{BodySpec, Load, LoadKind, Order, SpringKind, SpringSpec, Su
 /// Names of components, for supports.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// A number or an expression, or one for each component.
-fn components() -> Form {
-    Form::Either(vec![Form::Field, Form::Field.list()])
+/// Return the kind of value that is a number or an expression, or a list with one for each component.
+fn one_or_components() -> ValueKind {
+    ValueKind::Either(vec![ValueKind::Field, ValueKind::Field.list()])
 }
 
-/// The shape of `[[body]]`.
-pub(super) fn table() -> Table {
-    elasticity::keys(Table::new("[[body]]").must(
+/// Return the shape of `[[body]]`.
+pub(super) fn shape() -> TableShape {
+    elasticity::with_constants(TableShape::new("[[body]]").required(
         "name",
-        Form::Text,
+        ValueKind::Text,
         "group of cells, or a pattern such as \"brick_*\" for many bodies",
     ))
-    .key("order", Form::Among(&[1, 2]), "linear or quadratic elements; 1")
-    .key("fix", support().form().list(), "supports: fix = [{ on = \"base\", x = 0, y = 0 }]")
-    .key("load", load().form().list(), "loads: load = [{ on = \"top\", pressure = 10 }]")
-    .key("spring", spring().form().list(), "springs to the ground: spring = [{ on = \"base\", stiffness = 100 }]")
-    .key("force", Form::Field.list(), "force density, one number or expression for each component")
-    .key("exact", Form::Field.list(), "known displacement to compare with")
-    .key("region", elasticity::region().form().list(), "a region starts with the line [[body.region]]")
+    .optional("order", ValueKind::OneOf(&[1, 2]), "linear or quadratic elements; 1")
+    .optional("fix", support_shape().into_kind().list(), "supports: fix = [{ on = \"base\", x = 0, y = 0 }]")
+    .optional("load", load_shape().into_kind().list(), "loads: load = [{ on = \"top\", pressure = 10 }]")
+    .optional(
+        "spring",
+        spring_shape().into_kind().list(),
+        "springs to the ground: spring = [{ on = \"base\", stiffness = 100 }]",
+    )
+    .optional("force", ValueKind::Field.list(), "force density, one number or expression for each component")
+    .optional("exact", ValueKind::Field.list(), "known displacement to compare with")
+    .optional(
+        "region",
+        elasticity::region_shape().into_kind().list(),
+        "a region starts with the line [[body.region]]",
+    )
 }
 
-fn support() -> Table {
-    Table::new("a support")
-        .must("on", Form::Text, "boundary or points, or a pattern of such")
-        .key("x", Form::Field, "displacement along x")
-        .key("y", Form::Field, "displacement along y")
-        .key("z", Form::Field, "displacement along z, in space")
-        .key("normal", Form::Field, "displacement along the outer normal of a plane surface")
-        .key("symmetry", Form::Flag, "whether a plane surface slides in its plane: normal = 0")
-        .key("path", Form::Text, "column of the table of load steps with its factor")
-        .against(&["x", "y", "z"], &["normal", "symmetry"])
-        .apart(&["normal", "symmetry"])
+fn support_shape() -> TableShape {
+    TableShape::new("a support")
+        .required("on", ValueKind::Text, "boundary or points, or a pattern of such")
+        .optional("x", ValueKind::Field, "displacement along x")
+        .optional("y", ValueKind::Field, "displacement along y")
+        .optional("z", ValueKind::Field, "displacement along z, in space")
+        .optional("normal", ValueKind::Field, "displacement along the outer normal of a plane surface")
+        .optional("symmetry", ValueKind::Flag, "whether a plane surface slides in its plane: normal = 0")
+        .optional("path", ValueKind::Text, "column of the table of load steps with its factor")
+        .not_both(&["x", "y", "z"], &["normal", "symmetry"])
+        .at_most_one(&["normal", "symmetry"])
 }
 
-fn spring() -> Table {
-    Table::new("a spring")
-        .must("on", Form::Text, "boundary (stiffness per area) or points")
-        .key("stiffness", components(), "stiffness, one for all or one for each component")
-        .key("normal", Form::Field, "stiffness along the normal alone")
-        .apart(&["stiffness", "normal"])
+fn spring_shape() -> TableShape {
+    TableShape::new("a spring")
+        .required("on", ValueKind::Text, "boundary (stiffness per area) or points")
+        .optional("stiffness", one_or_components(), "stiffness, one for all or one for each component")
+        .optional("normal", ValueKind::Field, "stiffness along the normal alone")
+        .at_most_one(&["stiffness", "normal"])
 }
 
-fn load() -> Table {
-    Table::new("a load")
-        .must("on", Form::Text, "boundary, or a pattern of such")
-        .key("pressure", Form::Field, "pressure against the outer normal")
-        .key("traction", Form::Field.list(), "force per area, one for each component")
-        .key("force", Form::Field.list(), "total force on the whole boundary, numbers: [FX, FY], in space [FX, FY, FZ]")
-        .key("rigid", Form::Flag, "whether the boundary moves as one under the force; false")
-        .key("path", Form::Text, "column of the table of load steps with its factor")
-        .apart(&["pressure", "traction", "force"])
+fn load_shape() -> TableShape {
+    TableShape::new("a load")
+        .required("on", ValueKind::Text, "boundary, or a pattern of such")
+        .optional("pressure", ValueKind::Field, "pressure against the outer normal")
+        .optional("traction", ValueKind::Field.list(), "force per area, one for each component")
+        .optional(
+            "force",
+            ValueKind::Field.list(),
+            "total force on the whole boundary, numbers: [FX, FY], in space [FX, FY, FZ]",
+        )
+        .optional("rigid", ValueKind::Flag, "whether the boundary moves as one under the force; false")
+        .optional("path", ValueKind::Text, "column of the table of load steps with its factor")
+        .at_most_one(&["pressure", "traction", "force"])
 }
 
 impl Decoder<'_> {
-    /// The bodies in the order of the file.
+    /// Return the bodies in the order of the file.
     pub(super) fn bodies(&self, keys: &Keys) -> Result<Vec<BodySpec>> {
-        keys.require("body")?.list()?.iter().map(|item| self.body(item)).collect()
+        keys.items("body")?.iter().map(|item| self.body(item)).collect()
     }
 
     fn body(&self, node: &Node) -> Result<BodySpec> {
-        let keys = Keys::open(node, &table())?;
-        let items = |key: &str| keys.get(key).map_or(Ok(&[][..]), Node::list);
+        let keys = Keys::open(node, &shape())?;
         Ok(BodySpec {
             name: pattern(keys.require("name")?)?,
             elasticity: self.elasticity(&keys)?,
-            regions: self.regions(&keys)?,
-            order: if keys.get("order").map_or(Ok(1), Node::count)? == 2 { Order::P2 } else { Order::P1 },
-            fix: items("fix")?.iter().map(|item| self.support(item)).collect::<Result<_>>()?,
-            load: items("load")?.iter().map(|item| self.load(item)).collect::<Result<_>>()?,
-            spring: items("spring")?.iter().map(|item| self.spring(item)).collect::<Result<_>>()?,
-            force: keys.get("force").map(|force| self.vector(force)).transpose()?,
+            regions: keys.items("region")?.iter().map(|item| self.region(item)).collect::<Result<_>>()?,
+            order: if keys.read("order", Node::count)? == Some(2) { Order::P2 } else { Order::P1 },
+            fix: keys.items("fix")?.iter().map(|item| self.support(item)).collect::<Result<_>>()?,
+            load: keys.items("load")?.iter().map(|item| self.load(item)).collect::<Result<_>>()?,
+            spring: keys.items("spring")?.iter().map(|item| self.spring(item)).collect::<Result<_>>()?,
+            force: keys.read("force", |node| self.vector(node))?,
             force_factor: 1.0,
-            exact: keys.get("exact").map(|exact| self.expressions(exact)).transpose()?,
+            exact: keys.read("exact", |node| self.expressions(node))?,
         })
     }
 
     fn support(&self, node: &Node) -> Result<Support> {
-        let keys = Keys::open(node, &support())?;
+        let keys = Keys::open(node, &support_shape())?;
         let on = pattern(keys.require("on")?)?;
         let mut value = [const { None }; 3];
         for (value, axis) in value.iter_mut().zip(AXES) {
-            *value = keys.get(axis).map(|node| self.field(node)).transpose()?;
+            *value = keys.read(axis, |node| self.field(node))?;
         }
         let normal = match keys.get("symmetry") {
             Some(node) if node.boolean()? => Some(Field::Constant(0.0)),
             Some(node) => return Err(node.refuse("`symmetry = false` holds nothing").help("remove this support")),
-            None => keys.get("normal").map(|node| self.field(node)).transpose()?,
+            None => keys.read("normal", |node| self.field(node))?,
         };
-        let path = keys.get("path").map(Node::name).transpose()?;
-        Ok(Support { on, value, normal, path, factor: 1.0 })
+        Ok(Support { on, value, normal, path: keys.read("path", Node::name)?, factor: 1.0 })
     }
 
     fn spring(&self, node: &Node) -> Result<SpringSpec> {
-        let keys = Keys::open(node, &spring())?;
+        let keys = Keys::open(node, &spring_shape())?;
         let on = pattern(keys.require("on")?)?;
         let kind = match (keys.get("stiffness"), keys.get("normal")) {
             (Some(node), _) if matches!(node.value, Value::List(_)) => SpringKind::Vector(self.vector(node)?),
@@ -120,7 +130,7 @@ impl Decoder<'_> {
     }
 
     fn load(&self, node: &Node) -> Result<Load> {
-        let keys = Keys::open(node, &load())?;
+        let keys = Keys::open(node, &load_shape())?;
         let on = pattern(keys.require("on")?)?;
         let rigid = keys.flag("rigid", false)?;
         if let (Some(entry), None) = (keys.entry("rigid"), keys.get("force")) {
@@ -138,13 +148,10 @@ impl Decoder<'_> {
                 return Err(node.refuse(format!("the load on `{}` has no component", on.value)).help(advice));
             }
         };
-        let path = keys.get("path").map(Node::name).transpose()?;
-        Ok(Load { on, kind, path, factor: 1.0 })
+        Ok(Load { on, kind, path: keys.read("path", Node::name)?, factor: 1.0 })
     }
-}
 
-impl Decoder<'_> {
-    /// A vector of numbers.
+    /// Return a vector of numbers; expressions in the coordinates are refused.
     fn numbers(&self, node: &Node) -> Result<[f64; 3]> {
         let mut numbers = [0.0; 3];
         for (number, field) in numbers.iter_mut().zip(self.vector(node)?) {

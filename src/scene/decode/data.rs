@@ -1,64 +1,71 @@
 //! `[data.NAME]`: files whose numbers are functions for expressions.
 
-use super::{Decoder, Form, Keys, Node, Table, Value, choose, file, word};
+use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, choose, file, word};
 use crate::data::{Data, DataSpec, Interpolation, Library, Outside};
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use crate::expression::names;
 use crate::scene::read::Entry;
 use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The shape of `[data.NAME]`.
-pub(super) fn table(what: impl Into<Cow<'static, str>>) -> Table {
-    use Form::{Either, Flag, Number, Text};
-    let pair = || Either(vec![Number, Number.list()]);
-    Table::new(what)
-        .must("file", Text, "a table of numbers, or .npy")
-        .key("points", Flag, "whether each row is a place and its height; false")
-        .key("origin", pair(), "place of the first height; 0")
-        .key("spacing", pair(), "distance of the heights along a row and from row to row")
-        .key("unit", Number, "what a height of 1 in the file is; 1")
-        .key("interpolate", word(&Interpolation::ALL), "what is between the heights; \"linear\"")
-        .key("outside", word(&Outside::ALL), "what is beyond them; \"error\"")
+/// Return the shape of `[data.NAME]`; `name` is its name in messages.
+pub(super) fn shape(name: impl Into<Cow<'static, str>>) -> TableShape {
+    use ValueKind::{Either, Flag, Number, Text};
+    let one_or_two = || Either(vec![Number, Number.list()]);
+    TableShape::new(name)
+        .required("file", Text, "a table of numbers, or .npy")
+        .optional("points", Flag, "whether each row is a place and its height; false")
+        .optional("origin", one_or_two(), "place of the first height; 0")
+        .optional("spacing", one_or_two(), "distance of the heights along a row and from row to row")
+        .optional("unit", Number, "what a height of 1 in the file is; 1")
+        .optional("interpolate", word(&Interpolation::ALL), "what is between the heights; \"linear\"")
+        .optional("outside", word(&Outside::ALL), "what is beyond them; \"error\"")
 }
 
+/// Advice for heights on a grid without a spacing.
+const SPACING: &str = "spacing = d or [d1, d2] is the distance of the heights along a row and from row to row; or points = true, if each row \
+                       is a place and its height";
+
 impl Decoder<'_> {
-    /// The data of a scene. Files are looked for, not read.
+    /// Return the data of a scene by name. Their files must exist; they are not read.
     pub(super) fn library(&self, node: Option<&Node>) -> Result<Library> {
         const EXAMPLE: &str = "write [data.rough] and below it file = \"surface.csv\"";
         let Some(node) = node else { return Ok(Library::new()) };
         let Value::Table(entries) = &node.value else { return Err(node.expected("a table", EXAMPLE)) };
-        if let Some(Entry { key, key_place, .. }) =
-            entries.iter().find(|entry| !matches!(entry.node.value, Value::Table(_)))
-        {
+        let is_table = |entry: &&Entry| matches!(entry.node.value, Value::Table(_));
+        if let Some(Entry { key, key_place, .. }) = entries.iter().find(|entry| !is_table(entry)) {
             return Err(Error::scene(key_place, format!("`{key}` in data without a name")).help(EXAMPLE));
         }
         entries.iter().map(|entry| Ok((entry.key.clone(), Arc::new(Data::new(spec(entry, self.folder)?))))).collect()
     }
 }
 
-fn spec(entry: &Entry, folder: &Path) -> Result<DataSpec> {
-    let Entry { key: name, key_place, node } = entry;
+/// Refuse names that expressions cannot use, or use for something else.
+fn check_name(name: &str, place: &Place) -> Result<()> {
     if !name.starts_with(|c: char| c.is_alphabetic()) || name.contains(|c: char| !c.is_alphanumeric() && c != '_') {
-        return Err(Error::scene(key_place, format!("data cannot be called `{name}`"))
+        return Err(Error::scene(place, format!("data cannot be called `{name}`"))
             .help("a name that expressions can use has letters, digits and _, a letter first"));
     }
     if names().any(|known| known == name) {
-        return Err(Error::scene(key_place, format!("data cannot be called `{name}`"))
-            .label("expressions have this name already"));
+        return Err(
+            Error::scene(place, format!("data cannot be called `{name}`")).label("expressions have this name already")
+        );
     }
-    let keys = Keys::open(node, &table(format!("[data.{name}]")))?;
+    Ok(())
+}
+
+fn spec(entry: &Entry, folder: &Path) -> Result<DataSpec> {
+    let Entry { key: name, key_place, node } = entry;
+    check_name(name, key_place)?;
+    let keys = Keys::open(node, &shape(format!("[data.{name}]")))?;
     let path = file(folder, keys.require("file")?)?;
     let points = keys.flag("points", false)?;
     let spacing = match keys.get("spacing") {
-        Some(node) => pair(node, |node| node.positive("the spacing"))?,
         None if points => [1.0; 2],
-        None => {
-            return Err(keys.require("spacing").err().unwrap_or_else(|| node.refuse("no spacing")).help(
-                "spacing = d or [d1, d2] is the distance of the heights along a row and from row to row; or points = true, if each row is a \
-                 place and its height",
-            ));
+        _ => {
+            let node = keys.require("spacing").map_err(|error| error.help(SPACING))?;
+            pair(node, |node| node.positive("the spacing"))?
         }
     };
     Ok(DataSpec {
@@ -66,20 +73,25 @@ fn spec(entry: &Entry, folder: &Path) -> Result<DataSpec> {
         file: path.value,
         place: path.place,
         points,
-        origin: keys.get("origin").map_or(Ok([0.0; 2]), |node| pair(node, Node::number))?,
+        origin: keys.read("origin", |node| pair(node, Node::number))?.unwrap_or_default(),
         spacing,
-        unit: keys.get("unit").map_or(Ok(1.0), |node| match node.number()? {
-            0.0 => Err(node.refuse("the unit is 0").label("all heights would be 0")),
-            unit => Ok(unit),
-        })?,
+        unit: keys.read("unit", unit)?.unwrap_or(1.0),
         interpolation: keys
-            .get("interpolate")
-            .map_or(Ok(Interpolation::Linear), |node| choose(node, "interpolation", &Interpolation::ALL))?,
-        outside: keys.get("outside").map_or(Ok(Outside::Error), |node| choose(node, "`outside`", &Outside::ALL))?,
+            .read("interpolate", |node| choose(node, "interpolation", &Interpolation::ALL))?
+            .unwrap_or(Interpolation::Linear),
+        outside: keys.read("outside", |node| choose(node, "`outside`", &Outside::ALL))?.unwrap_or(Outside::Error),
     })
 }
 
-/// Two numbers, or one for both.
+/// Return a number that is not 0.
+fn unit(node: &Node) -> Result<f64> {
+    match node.number()? {
+        0.0 => Err(node.refuse("the unit is 0").label("all heights would be 0")),
+        unit => Ok(unit),
+    }
+}
+
+/// Return two numbers, each read by `number`; a single number stands for both.
 fn pair(node: &Node, number: impl Fn(&Node) -> Result<f64>) -> Result<[f64; 2]> {
     match &node.value {
         Value::List(items) => match &items[..] {

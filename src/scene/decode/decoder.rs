@@ -1,4 +1,4 @@
-//! What all tables need: numbers, expressions, vectors, words, files.
+//! What the decoders of all tables need: numbers, expressions, vectors, words, files.
 
 use crate::data::Library;
 use crate::error::{Error, Located, Result};
@@ -7,22 +7,25 @@ use crate::problem::pattern::Pattern;
 use crate::scene::read::{Node, Value};
 use std::path::{Path, PathBuf};
 
-/// What the meaning of values depends on.
+/// The context in which values are decoded.
 pub struct Decoder<'a> {
     /// Space dimension: 2 or 3.
     pub dimension: usize,
     /// Folder of the scene file.
     pub folder: &'a Path,
-    /// Functions from files.
+    /// Functions from files, by name.
     pub data: Library,
 }
 
-/// The smallest size of a quantity that is not zero; its reciprocal is the largest. Energies hold squares of loads and displacements, and rounding is
-/// a share of 1e-32 of them.
+/// The smallest absolute value of a number that is not zero; its reciprocal is the largest. Energies contain squares of loads and
+/// displacements, and their rounding errors are 1e-32 times as large.
 const LEAST: f64 = 1e-110;
 
 impl Decoder<'_> {
-    /// A number, or an expression in the coordinates. Numbers of sizes that no run computes with are refused.
+    /// Return a number, or an expression in the coordinates.
+    ///
+    /// # Errors
+    /// Values of another kind, texts that are no expression, and numbers that are too large or too small.
     pub fn field(&self, node: &Node) -> Result<Field> {
         let field = match &node.value {
             Value::Integer(_) | Value::Float(_) => Field::Constant(node.number()?),
@@ -38,7 +41,7 @@ impl Decoder<'_> {
         }
     }
 
-    /// A vector with as many components as space has; the missing third one is zero.
+    /// Return a vector with as many components as the scene has dimensions; in the plane the third one is zero.
     pub fn vector(&self, node: &Node) -> Result<[Field; 3]> {
         let mut vector = [const { Field::Constant(0.0) }; 3];
         for (component, item) in vector.iter_mut().zip(self.components(node)?) {
@@ -47,7 +50,7 @@ impl Decoder<'_> {
         Ok(vector)
     }
 
-    /// A vector of expressions alone.
+    /// Return a vector of expressions, with as many components as the scene has dimensions. Numbers become constant expressions.
     pub fn expressions(&self, node: &Node) -> Result<Vec<Expression>> {
         let scope = Scope { variables: &["x", "y", "z"][..self.dimension], data: &self.data };
         let component = |item: &Node| match &item.value {
@@ -58,7 +61,7 @@ impl Decoder<'_> {
         self.components(node)?.iter().map(component).collect()
     }
 
-    /// The components of a vector: as many as space has.
+    /// Return the components of a vector; there must be as many as the scene has dimensions.
     pub fn components<'n>(&self, node: &'n Node) -> Result<&'n [Node]> {
         let items = node.list()?;
         if items.len() != self.dimension {
@@ -70,7 +73,10 @@ impl Decoder<'_> {
     }
 }
 
-/// The path of a file that must exist, joined with the folder of the scene.
+/// Return the path of a file, joined with the folder of the scene.
+///
+/// # Errors
+/// A file that does not exist.
 pub fn file(folder: &Path, node: &Node) -> Result<Located<PathBuf>> {
     let name = node.name()?.value;
     let path = folder.join(&name);
@@ -91,7 +97,10 @@ pub fn file(folder: &Path, node: &Node) -> Result<Located<PathBuf>> {
     }
 }
 
-/// One of a few words; `what` names the key in the message.
+/// Return the choice of this name; `what` names the key in the message.
+///
+/// # Errors
+/// A word that is no choice, with the nearest one as advice.
 pub fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Result<T> {
     let word = node.string()?;
     if let Some((_, choice)) = choices.iter().find(|(name, _)| *name == word) {
@@ -102,7 +111,7 @@ pub fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Resul
     Err(node.refuse(format!("unknown {what} `{word}`")).suggest(word, names.iter().copied(), otherwise))
 }
 
-/// The name of a group, or a pattern of such names.
+/// Return the name of a group, or a pattern of names.
 pub fn pattern(node: &Node) -> Result<Located<String>> {
     let name = node.name()?;
     match Pattern::new(&name.value) {

@@ -1,47 +1,53 @@
 //! Elastic constants of bodies and regions.
 
-use super::{Decoder, Form, Keys, Node, Table, Value};
+use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, pattern};
 use crate::error::Result;
 use crate::expression::Field;
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, RegionSpec};
 
-/// Adds the keys that say what a body or a region is made of.
-pub(super) fn keys(table: Table) -> Table {
+/// Add the keys of the elastic constants, which bodies and regions have.
+pub(super) fn with_constants(table: TableShape) -> TableShape {
     table
-        .key("young", Form::Field, "Young's modulus, > 0")
-        .key("poisson", Form::Field, "Poisson's ratio, between -1 and 0.5")
-        .key("orthotropic", orthotropic().form(), "orthotropic = { E1 = ..., E2 = ..., E3 = ..., nu12 = ..., ... }")
-        .key("anisotropic", Form::Field.list(), UPPER)
-        .key("axes", axes().form(), AXES)
-        .apart(&["young", "orthotropic", "anisotropic"])
-        .against(&["poisson"], &["orthotropic", "anisotropic"])
+        .optional("young", ValueKind::Field, "Young's modulus, > 0")
+        .optional("poisson", ValueKind::Field, "Poisson's ratio, between -1 and 0.5")
+        .optional(
+            "orthotropic",
+            orthotropic_shape().into_kind(),
+            "orthotropic = { E1 = ..., E2 = ..., E3 = ..., nu12 = ..., ... }",
+        )
+        .optional("anisotropic", ValueKind::Field.list(), UPPER)
+        .optional("axes", axes_shape().into_kind(), AXES)
+        .at_most_one(&["young", "orthotropic", "anisotropic"])
+        .not_both(&["poisson"], &["orthotropic", "anisotropic"])
 }
 
-/// The shape of `[[body.region]]`.
-pub(super) fn region() -> Table {
-    keys(Table::new("[[body.region]]").must("on", Form::Text, "group of its cells"))
+/// Return the shape of `[[body.region]]`.
+pub(super) fn region_shape() -> TableShape {
+    with_constants(TableShape::new("[[body.region]]").required("on", ValueKind::Text, "group of its cells"))
 }
 
 const UPPER: &str = "C11, C12, ..., C16, C22, ..., C66: the upper triangle by rows, in the order 11 22 33 23 13 12";
 const AXES: &str = "write first = [1, 1, 0] and second = [-1, 1, 0], or angle = \"pi/6\" and axis = [0, 0, 1]";
 
-fn orthotropic() -> Table {
-    let table = Table::new("the orthotropic material");
-    Constants::ORTHOTROPIC.iter().fold(table, |table, name| table.must(name, Form::Field, "a constant of the material"))
+fn orthotropic_shape() -> TableShape {
+    let table = TableShape::new("the orthotropic material");
+    Constants::ORTHOTROPIC
+        .iter()
+        .fold(table, |table, name| table.required(name, ValueKind::Field, "a constant of the material"))
 }
 
-fn axes() -> Table {
-    Table::new("the axes")
-        .key("first", Form::Field.list(), "direction of axis 1")
-        .key("second", Form::Field.list(), "direction on the side of axis 2")
-        .key("angle", Form::Field, "angle (radian) by which x, y, z are turned")
-        .key("axis", Form::Field.list(), "axis of the turn; z in the plane")
-        .against(&["first", "second"], &["angle"])
-        .apart(&["first", "axis"])
+fn axes_shape() -> TableShape {
+    TableShape::new("the axes")
+        .optional("first", ValueKind::Field.list(), "direction of axis 1")
+        .optional("second", ValueKind::Field.list(), "direction on the side of axis 2")
+        .optional("angle", ValueKind::Field, "angle (radian) by which x, y, z are turned")
+        .optional("axis", ValueKind::Field.list(), "axis of the turn; z in the plane")
+        .not_both(&["first", "second"], &["angle"])
+        .at_most_one(&["first", "axis"])
 }
 
 impl Decoder<'_> {
-    /// The constants among the keys of a body or a region.
+    /// Return the elastic constants among the keys of a body or a region.
     pub(super) fn elasticity(&self, keys: &Keys) -> Result<ElasticitySpec> {
         let (constants, place) = if let Some(node) = keys.get("orthotropic") {
             (self.orthotropic(node)?, &node.place)
@@ -55,22 +61,18 @@ impl Decoder<'_> {
             let constants = Constants::Isotropic { young: self.field(young)?, poisson: self.field(poisson)? };
             (constants, &young.place)
         };
-        let axes = keys.get("axes").map(|axes| self.axes(axes)).transpose()?;
+        let axes = keys.read("axes", |node| self.axes(node))?;
         Ok(ElasticitySpec { constants, axes, place: place.clone() })
     }
 
-    /// Parts of a body with other constants.
-    pub(super) fn regions(&self, keys: &Keys) -> Result<Vec<RegionSpec>> {
-        let Some(list) = keys.get("region") else { return Ok(Vec::new()) };
-        let region = |node: &Node| {
-            let keys = Keys::open(node, &region())?;
-            Ok(RegionSpec { on: super::pattern(keys.require("on")?)?, elasticity: self.elasticity(&keys)? })
-        };
-        list.list()?.iter().map(region).collect()
+    /// Return a part of a body with constants of its own.
+    pub(super) fn region(&self, node: &Node) -> Result<RegionSpec> {
+        let keys = Keys::open(node, &region_shape())?;
+        Ok(RegionSpec { on: pattern(keys.require("on")?)?, elasticity: self.elasticity(&keys)? })
     }
 
     fn orthotropic(&self, node: &Node) -> Result<Constants> {
-        let keys = Keys::open(node, &orthotropic())?;
+        let keys = Keys::open(node, &orthotropic_shape())?;
         let mut fields = [const { Field::Constant(0.0) }; 9];
         for (field, name) in fields.iter_mut().zip(Constants::ORTHOTROPIC) {
             *field = self.field(keys.require(name)?)?;
@@ -93,7 +95,7 @@ impl Decoder<'_> {
     }
 
     fn axes(&self, node: &Node) -> Result<AxesSpec> {
-        let keys = Keys::open(node, &axes())?;
+        let keys = Keys::open(node, &axes_shape())?;
         if let Some(angle) = keys.get("angle") {
             let axis = match (keys.get("axis"), self.dimension) {
                 (None, 2) => [0.0, 0.0, 1.0].map(Field::Constant),
@@ -111,7 +113,7 @@ impl Decoder<'_> {
         Ok(AxesSpec::Directions { first, second })
     }
 
-    /// A direction in space; in plane problems the third component may be left out.
+    /// Return a direction in space. In plane problems the third component may be left out.
     fn direction(&self, node: &Node) -> Result<[Field; 3]> {
         match &node.value {
             Value::List(items) if self.dimension == 2 && items.len() == 3 => {

@@ -1,6 +1,6 @@
-//! `steps` of the method: shares of all loads, or a table of factors.
+//! `steps` of `[method]`: factors of all loads, or a table with a factor for each load.
 
-use super::{Decoder, Form, Keys, Node, Table, Value, file};
+use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, file};
 use crate::error::{Error, Kind, Located, Place, Result, Source, joined};
 use crate::file::{other_encoding, with_unix_lines};
 use crate::problem::body::BodySpec;
@@ -8,24 +8,24 @@ use crate::problem::history::{COMMON, History, Step, has_common, paths};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Most steps that a number may stand for.
+/// The most steps that a number may stand for.
 const MOST_STEPS: usize = 1000;
 
-/// Name of the column of times.
+/// The name of the column of times.
 const TIME: &str = "time";
 
-/// The shape of `steps` from a file.
-pub(super) fn table() -> Table {
-    Table::new("the load steps").must("table", Form::Text, "CSV file with a column of each factor")
+/// Return the shape of `steps` from a file.
+pub(super) fn shape() -> TableShape {
+    TableShape::new("the load steps").required("table", ValueKind::Text, "CSV file with a column of each factor")
 }
 
 impl Decoder<'_> {
-    /// Load steps.
+    /// Return the load steps: so many equal ones, a list of factors, or the table of a file.
     pub(super) fn history(&self, node: &Node) -> Result<History> {
         match &node.value {
             Value::List(items) => items.iter().map(Node::number).collect::<Result<_>>().map(History::of_shares),
             Value::Table(_) => {
-                let keys = Keys::open(node, &table())?;
+                let keys = Keys::open(node, &shape())?;
                 read(file(self.folder, keys.require("table")?)?)
             }
             _ => match node.count()? {
@@ -37,7 +37,11 @@ impl Decoder<'_> {
         }
     }
 
-    /// Joins a history with the lines that name its factors.
+    /// Match the columns of a table of load steps with the lines of the bodies that name them by `path`. Set whether some loads have no
+    /// factor.
+    ///
+    /// # Errors
+    /// A path that is no column, and a column that no line names.
     pub(super) fn join(&self, history: &mut History, bodies: &[BodySpec]) -> Result<()> {
         let Some(table) = &history.table else { return Ok(()) };
         let columns = || history.names.iter().map(String::as_str).filter(|name| *name != COMMON);
@@ -48,13 +52,13 @@ impl Decoder<'_> {
                 return Err(Error::scene(&path.place, message).suggest(&path.value, columns(), otherwise));
             }
         }
-        if let Some(idle) = columns().find(|name| bodies.iter().flat_map(paths).all(|path| path.value != **name)) {
+        if let Some(unused) = columns().find(|name| bodies.iter().flat_map(paths).all(|path| path.value != **name)) {
             return Err(Error::scene(
                 &table.place,
-                format!("no load and no support has the path `{idle}` of this table"),
+                format!("no load and no support has the path `{unused}` of this table"),
             )
             .help(format!(
-                "path = \"{idle}\" in a line of `load` or `fix`; `{COMMON}` is the column of all lines without"
+                "path = \"{unused}\" in a line of `load` or `fix`; `{COMMON}` is the column of all lines without"
             )));
         }
         let common = history.names.iter().any(|name| name == COMMON);
@@ -63,46 +67,18 @@ impl Decoder<'_> {
     }
 }
 
-/// A table of factors: a line of names, then one line a step.
+/// Read a table of factors: a line of names, then one line a step.
 fn read(file: Located<PathBuf>) -> Result<History> {
-    let bytes = crate::file::read(&file.value).map_err(|error| error.at(&file.place))?;
-    let name = file.value.display().to_string();
-    let refuse =
-        |what: &str| Error::new(Kind::Scene, format!("{name} {what}")).help("save it as CSV in UTF-8").at(&file.place);
-    if let Some(other) = other_encoding(&bytes) {
-        return Err(refuse(other));
-    }
-    let text = String::from_utf8(with_unix_lines(bytes)).map_err(|_| refuse("is not UTF-8 text"))?;
-    let source = Arc::new(Source { name, text });
-    let text = source.text.as_str();
-    let place = |from: usize, to: usize| {
-        let span = text.get(from..to).unwrap_or_default();
-        let start = from + span.len() - span.trim_start().len();
-        Place { source: source.clone(), span: start..start + span.trim().len() }
-    };
-    let mut lines = csv::ReaderBuilder::new();
-    lines.has_headers(false).flexible(true).comment(Some(b'#')).trim(csv::Trim::All);
-    let mut reader = lines.from_reader(text.as_bytes());
-    let (mut record, mut names, mut history) = (csv::StringRecord::new(), None::<Vec<String>>, History::default());
-    loop {
-        let begin = reader.position().byte() as usize;
-        match reader.read_record(&mut record) {
-            Ok(false) => break,
-            Ok(true) => {}
-            Err(cause) => {
-                return Err(Error::scene(&place(begin, text.len()), "this is not a table").because(cause.to_string()));
-            }
+    let source = text_of(&file)?;
+    let mut lines = Lines::new(&source);
+    let mut history = History::default();
+    if let Some(place) = lines.next()? {
+        let names: Vec<String> = lines.record.iter().map(str::to_owned).collect();
+        check_names(&names, &place)?;
+        while let Some(place) = lines.next()? {
+            history.steps.push(step(&names, &lines.record, &place, history.steps.last())?);
         }
-        let begin = record.position().map_or(begin, |position| position.byte() as usize);
-        let line = place(begin, reader.position().byte() as usize);
-        let Some(names) = &names else {
-            let found: Vec<String> = record.iter().map(str::to_owned).collect();
-            refuse_names(&found, &line)?;
-            history.names = found.iter().filter(|name| *name != TIME).cloned().collect();
-            names = Some(found);
-            continue;
-        };
-        history.steps.push(step(names, &record, &line, history.steps.last())?);
+        history.names = names.into_iter().filter(|name| name != TIME).collect();
     }
     if history.is_empty() {
         return Err(Error::scene(&file.place, "the table of load steps has no steps")
@@ -112,7 +88,60 @@ fn read(file: Located<PathBuf>) -> Result<History> {
     Ok(history)
 }
 
-fn refuse_names(names: &[String], line: &Place) -> Result<()> {
+/// Return the text of a table, which must be UTF-8.
+fn text_of(file: &Located<PathBuf>) -> Result<Arc<Source>> {
+    let bytes = crate::file::read(&file.value).map_err(|error| error.at(&file.place))?;
+    let name = file.value.display().to_string();
+    let refuse =
+        |what: &str| Error::new(Kind::Scene, format!("{name} {what}")).help("save it as CSV in UTF-8").at(&file.place);
+    if let Some(other) = other_encoding(&bytes) {
+        return Err(refuse(other));
+    }
+    let text = String::from_utf8(with_unix_lines(bytes)).map_err(|_| refuse("is not UTF-8 text"))?;
+    Ok(Arc::new(Source { name, text }))
+}
+
+/// The lines of a CSV file, one after the other.
+struct Lines<'a> {
+    source: &'a Arc<Source>,
+    reader: csv::Reader<&'a [u8]>,
+    /// The words of the line that was read last.
+    record: csv::StringRecord,
+}
+
+impl<'a> Lines<'a> {
+    fn new(source: &'a Arc<Source>) -> Self {
+        let mut format = csv::ReaderBuilder::new();
+        format.has_headers(false).flexible(true).comment(Some(b'#')).trim(csv::Trim::All);
+        let reader = format.from_reader(source.text.as_bytes());
+        Self { source, reader, record: csv::StringRecord::new() }
+    }
+
+    /// Read the next line and return its place; `None` at the end of the file.
+    fn next(&mut self) -> Result<Option<Place>> {
+        let before = self.reader.position().byte() as usize;
+        let is_line = self.reader.read_record(&mut self.record).map_err(|cause| {
+            let rest = self.place(before, self.source.text.len());
+            Error::scene(&rest, "this is not a table").because(cause.to_string())
+        })?;
+        if !is_line {
+            return Ok(None);
+        }
+        // comments and empty lines may stand before the line
+        let begin = self.record.position().map_or(before, |position| position.byte() as usize);
+        Ok(Some(self.place(begin, self.reader.position().byte() as usize)))
+    }
+
+    /// Return the place of a byte range, without the blanks around it.
+    fn place(&self, from: usize, to: usize) -> Place {
+        let span = self.source.text.get(from..to).unwrap_or_default();
+        let start = from + span.len() - span.trim_start().len();
+        Place { source: self.source.clone(), span: start..start + span.trim().len() }
+    }
+}
+
+/// Refuse names that are no names of factors, and names that two columns have.
+fn check_names(names: &[String], line: &Place) -> Result<()> {
     if let [name] = names
         && name.contains([';', '\t'])
     {
@@ -129,7 +158,7 @@ fn refuse_names(names: &[String], line: &Place) -> Result<()> {
     }
 }
 
-/// One line of a table, after another one.
+/// Return the step of one line of the table. `before` is the step of the line before it.
 fn step(names: &[String], record: &csv::StringRecord, line: &Place, before: Option<&Step>) -> Result<Step> {
     if record.len() != names.len() {
         let message = format!("a step has {} numbers here, not {}", names.len(), record.len());

@@ -1,68 +1,80 @@
 //! `layer` of a contact: a form with parameters, a table, or an expression.
 
-use super::{Decoder, Form, Keys, Node, Table};
+use super::{Decoder, Keys, Node, TableShape, ValueKind};
 use crate::data::{Grid, Summits};
 use crate::error::{Error, Result};
 use crate::expression::{Expression, Scope};
 use crate::problem::layer::{AsperitySpec, Depths, FORMS, LawForm, LayerSpec, Parameter};
 
-/// What a layer may be.
+/// Advice for a layer without a law.
 pub(super) const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
+/// What a table of points is, and the advice for wrong points.
 const POINTS: &str = "write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0";
 
-/// The shape of `layer`.
-pub(super) fn table() -> Table {
+/// Return the shape of `layer`.
+pub(super) fn shape() -> TableShape {
+    use ValueKind::{Number, Text};
     let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure", "asperities"]).collect();
-    let add = |table: Table, form: &'static LawForm| {
-        let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
-        table.key(form.name, self::form(form).form(), format!("write {} = {{ {} }}", form.name, values.join(", ")))
-    };
-    let forms = FORMS.into_iter().fold(Table::new("the layer"), add);
-    forms
-        .key("table", Form::Number.list().list(), POINTS)
-        .key("pressure", Form::Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
-        .key("asperities", asperities().form(), "a law of summits: asperities = { modulus = E*, data = \"NAME\" }")
-        .key("up_to", Form::Number, "compression beyond which the expression goes on linearly")
-        .apart(&laws)
+    FORMS
+        .into_iter()
+        .fold(TableShape::new("the layer"), with_form)
+        .optional("table", Number.list().list(), POINTS)
+        .optional("pressure", Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
+        .optional(
+            "asperities",
+            asperities_shape().into_kind(),
+            "a law of summits: asperities = { modulus = E*, data = \"NAME\" }",
+        )
+        .optional("up_to", Number, "compression beyond which the expression goes on linearly")
+        .at_most_one(&laws)
 }
 
-/// The shape of a law with parameters.
-fn form(form: &'static LawForm) -> Table {
-    let table = Table::new(format!("the {} layer", form.name));
-    form.parameters.iter().fold(table, |table, known| table.must(known.key, Form::Field, known.what))
+/// Add the key of a law with parameters.
+fn with_form(table: TableShape, form: &'static LawForm) -> TableShape {
+    let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
+    let advice = format!("write {} = {{ {} }}", form.name, values.join(", "));
+    table.optional(form.name, form_shape(form).into_kind(), advice)
 }
 
-fn asperities() -> Table {
-    use Form::{Number, Text};
-    Table::new("the layer of asperities")
-        .must("modulus", Number, "E* of both bodies: 1/E* is the sum of (1 - nu^2)/E")
-        .key("data", Text, "data whose summits these are")
-        .key("density", Number, "summits per area")
-        .key("radius", Number, "their radius")
-        .key("deviation", Number, "standard deviation of their heights")
-        .key("highest", Number, "height of the highest above the mean; 4 deviations")
-        .against(&["data"], &["density", "radius", "deviation", "highest"])
+/// Return the shape of a law with parameters.
+fn form_shape(form: &'static LawForm) -> TableShape {
+    let table = TableShape::new(format!("the {} layer", form.name));
+    form.parameters.iter().fold(table, |table, known| table.required(known.key, ValueKind::Field, known.what))
 }
+
+fn asperities_shape() -> TableShape {
+    use ValueKind::{Number, Text};
+    TableShape::new("the layer of asperities")
+        .required("modulus", Number, "E* of both bodies: 1/E* is the sum of (1 - nu^2)/E")
+        .optional("data", Text, "data whose summits these are")
+        .optional("density", Number, "summits per area")
+        .optional("radius", Number, "their radius")
+        .optional("deviation", Number, "standard deviation of their heights")
+        .optional("highest", Number, "height of the highest above the mean; 4 deviations")
+        .not_both(&["data"], &["density", "radius", "deviation", "highest"])
+}
+
+/// Standard deviations from the mean to the highest summit by default; a share of 3e-5 of a normal distribution lies above.
+const HIGHEST: f64 = 4.0;
 
 impl Decoder<'_> {
+    /// Return the law of a layer.
     pub(super) fn layer(&self, node: &Node) -> Result<LayerSpec> {
-        let keys = Keys::open(node, &table())?;
+        let keys = Keys::open(node, &shape())?;
         if let (Some(entry), None) = (keys.entry("up_to"), keys.get("pressure")) {
             return Err(Error::scene(&entry.key_place, "`up_to` without an expression")
                 .help("it says how far `pressure = \"...\"` goes; other laws need no end"));
         }
         if let Some(points) = keys.get("table") {
-            return points_of(points);
+            return table(points);
         }
         if let Some(summits) = keys.get("asperities") {
             return self.asperities(summits);
         }
         if let Some(law) = keys.get("pressure") {
-            let names: &[&'static str] = if self.dimension == 3 { &["c", "x", "y", "z"] } else { &["c", "x", "y"] };
-            let scope = Scope { variables: names, data: &self.data };
+            let scope = Scope { variables: &["c", "x", "y", "z"][..=self.dimension], data: &self.data };
             let law = Expression::parse(law.string()?, &law.place, scope)?;
-            let up_to = keys.get("up_to").map(Node::number).transpose()?;
-            return Ok(LayerSpec::Pressure { law, up_to });
+            return Ok(LayerSpec::Pressure { law, up_to: keys.read("up_to", Node::number)? });
         }
         match FORMS.into_iter().find_map(|form| Some((form, keys.get(form.name)?))) {
             Some((form, node)) => self.form(form, node),
@@ -70,28 +82,23 @@ impl Decoder<'_> {
         }
     }
 
-    /// The parameters of a form.
+    /// Return a law with the values of its parameters.
     fn form(&self, form: &'static LawForm, node: &Node) -> Result<LayerSpec> {
-        let keys = Keys::open(node, &self::form(form))?;
+        let keys = Keys::open(node, &form_shape(form))?;
         let value = |parameter: &Parameter| self.field(keys.require(parameter.key)?);
         let values = form.parameters.iter().map(value).collect::<Result<_>>()?;
         Ok(LayerSpec::Form { form, values })
     }
-}
 
-/// Standard deviations from the mean to the highest summit, if nobody says it: a share of 3e-5 of a normal distribution lies above.
-const HIGHEST: f64 = 4.0;
-
-impl Decoder<'_> {
-    /// Summits, by numbers or of data.
+    /// Return the summits that numbers describe, or those of data.
     fn asperities(&self, node: &Node) -> Result<LayerSpec> {
-        let keys = Keys::open(node, &asperities())?;
+        let keys = Keys::open(node, &asperities_shape())?;
         let missing = "give modulus = E* and data = \"NAME\", or modulus, density, radius and deviation of the summits";
         let number = |key: &str| keys.require(key).map_err(|error| error.help(missing))?.number();
         let modulus = number("modulus")?;
         let Some(named) = keys.get("data") else {
             let deviation = number("deviation")?;
-            let highest = keys.get("highest").map_or(Ok(HIGHEST * deviation), Node::number)?;
+            let highest = keys.read("highest", Node::number)?.unwrap_or(HIGHEST * deviation);
             let depths = Depths::Normal { deviation, highest };
             let (density, radius) = (number("density")?, number("radius")?);
             return Ok(LayerSpec::Asperities(AsperitySpec { density, radius, modulus, depths, data: None }));
@@ -114,8 +121,8 @@ impl Decoder<'_> {
     }
 }
 
-/// Points (c, p) of a law.
-fn points_of(node: &Node) -> Result<LayerSpec> {
+/// Return the law through points (c, p).
+fn table(node: &Node) -> Result<LayerSpec> {
     let mut points: Vec<[f64; 2]> = Vec::new();
     for item in node.list()? {
         let [c, p] = item.list().map_err(|error| error.help(POINTS))? else {
@@ -124,7 +131,7 @@ fn points_of(node: &Node) -> Result<LayerSpec> {
         points.push([c.number()?, p.number()?]);
     }
     if points.first() == Some(&[0.0, 0.0]) {
-        points.remove(0); // every law begins there
+        points.remove(0); // every law begins at the origin
     }
     Ok(LayerSpec::Table(points))
 }
