@@ -158,7 +158,7 @@ impl Plan {
         // the cache of another rank may have other sizes
         let mut view = tell(&Ranks::new(session), || Ok(adapted::recall(&self.purpose, true)))?;
         if view.is_none() {
-            let coarse: Sizing = |meshes, bodies| sizes::coarse(meshes, bodies, FIRST_CELLS * bodies);
+            let coarse = |meshes: &dyn Meshes, bodies| sizes::coarse(meshes, bodies, FIRST_CELLS * bodies);
             view = sized(session, &self.scene, coarse, interrupt, clock)?;
         }
         follow(Rc::make_mut(&mut self.scene), view);
@@ -319,6 +319,7 @@ impl Plan {
         if self.best.as_ref().is_some_and(|best| best.error <= error && best.energy <= estimate.energy) {
             return self.follow_best(session);
         }
+        // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
         let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
         let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
@@ -419,14 +420,11 @@ fn contact_tables(done: &Done) -> Vec<ContactTable> {
     (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect()
 }
 
-/// A function that returns the sizes of the next mesh. Its arguments are the present meshes and the number of bodies.
-type Sizing = fn(&dyn Meshes, usize) -> Sizes;
-
-/// Build the scene on its own mesh, and return the view of the sizes that follow from it.
+/// Build the scene on its own mesh, and return the view of the sizes that `sizing` makes of the meshes and the number of bodies.
 fn sized(
     session: &Session,
     scene: &Scene,
-    sizing: Sizing,
+    sizing: fn(&dyn Meshes, usize) -> Sizes,
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Option<String>> {
